@@ -1,0 +1,101 @@
+"""Design explorer of the flagged 4-4 parallel manipulator.
+
+The names below are the whole public interface; each is loaded when it is first used, so
+that `import explorer` costs next to nothing.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from explorer.design import JOINTS, VARIABLES, Design, Limits
+    from explorer.design_file import PRESETS, decode_design, encode_design, load_design
+    from explorer.errors import (
+        DesignError,
+        ExplorerError,
+        InputError,
+        MissingExtraError,
+        NoAnswerError,
+    )
+    from explorer.home import home_pose
+    from explorer.kinematics import attachment_points, discriminants, forward, inverse
+    from explorer.pose import (
+        Pose,
+        quaternion_from_rotation,
+        rotation_from_quaternion,
+        rotation_from_yaw_pitch_roll,
+        yaw_pitch_roll_from_rotation,
+    )
+    from explorer.singularity import jacobian, margins
+    from explorer.snapshot import Snapshot, evaluate
+    from explorer.strata import stratum
+
+_HOMES = {
+    "design": ("JOINTS", "VARIABLES", "Design", "Limits"),
+    "design_file": ("PRESETS", "decode_design", "encode_design", "load_design"),
+    "errors": (
+        "DesignError",
+        "ExplorerError",
+        "InputError",
+        "MissingExtraError",
+        "NoAnswerError",
+    ),
+    "home": ("home_pose",),
+    "kinematics": ("attachment_points", "discriminants", "forward", "inverse"),
+    "pose": (
+        "Pose",
+        "quaternion_from_rotation",
+        "rotation_from_quaternion",
+        "rotation_from_yaw_pitch_roll",
+        "yaw_pitch_roll_from_rotation",
+    ),
+    "singularity": ("jacobian", "margins"),
+    "snapshot": ("Snapshot", "evaluate"),
+    "strata": ("stratum",),
+}
+_MODULE_OF = {name: module for module, names in _HOMES.items() for name in names}
+
+__all__ = [
+    "JOINTS",
+    "PRESETS",
+    "VARIABLES",
+    "Design",
+    "DesignError",
+    "ExplorerError",
+    "InputError",
+    "Limits",
+    "MissingExtraError",
+    "NoAnswerError",
+    "Pose",
+    "Snapshot",
+    "attachment_points",
+    "decode_design",
+    "discriminants",
+    "encode_design",
+    "evaluate",
+    "forward",
+    "home_pose",
+    "inverse",
+    "jacobian",
+    "load_design",
+    "margins",
+    "quaternion_from_rotation",
+    "rotation_from_quaternion",
+    "rotation_from_yaw_pitch_roll",
+    "stratum",
+    "yaw_pitch_roll_from_rotation",
+]
+
+__version__ = "0.1.0"
+
+
+def __getattr__(name: str) -> object:
+    if name not in _MODULE_OF:
+        raise AttributeError(f"module 'explorer' has no attribute {name!r}")
+    return getattr(importlib.import_module(f"explorer.{_MODULE_OF[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,74 @@
+"""Which of a design's limits a pose breaks (design.md, section 6, but for interference)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from explorer.arrays import FloatArray
+from explorer.design import JOINTS, LENGTHS, Design
+
+# A pose on a limit is within it, whatever its last bits say.
+SLACK = 1e-12
+
+
+@dataclass(frozen=True)
+class Violation:
+    """A broken limit.
+
+    Attributes:
+        limit: What is limited: a joint, "gap", "box x", "margin κ1", ….
+        value: What it is, in design units.
+        bound: What it may be at the most, or at the least.
+        above: Whether the value exceeds the bound, rather than falling short of it.
+    """
+
+    limit: str
+    value: float
+    bound: float
+    above: bool
+
+    def __str__(self) -> str:
+        relation = "above its maximum" if self.above else "below its minimum"
+        return f"{self.limit} = {self.value:.4g} is {relation} {self.bound:.4g}"
+
+
+def violations(
+    design: Design,
+    position: FloatArray,
+    joints: FloatArray,
+    margin: FloatArray,
+    home_signs: tuple[int, int, int],
+) -> tuple[Violation, ...]:
+    """Return the limits that a pose breaks, in the order of the design file; none if ().
+
+    Args:
+        design: The manipulator.
+        position: b4 in the base frame, shape (3,).
+        joints: Those of the pose, shape (6,).
+        margin: Those of the pose, shape (3,).
+        home_signs: The sign triple of the home pose.
+    """
+    limits = design.limits
+    slack = SLACK * design.reach
+    found: list[Violation] = []
+
+    def check(name: str, value: float, low: float | None, high: float | None) -> None:
+        if low is not None and value < low - slack:
+            found.append(Violation(name, value, low, above=False))
+        if high is not None and value > high + slack:
+            found.append(Violation(name, value, high, above=True))
+
+    q = dict(zip(JOINTS, joints.tolist(), strict=True))
+    for name in LENGTHS:
+        check(name, q[name], *design.length_range(name))
+    if limits.guide is not None:
+        check("d1", q["d1"], *limits.guide)
+        check("d3", q["d3"], *limits.guide)
+    check("gap |d1 − d3|", abs(q["d1"] - q["d3"]), limits.gap, None)
+    if limits.box is not None:
+        for axis, value, low, high in zip("xyz", position.tolist(), *limits.box, strict=True):
+            check(f"box {axis}", value, low, high)
+    if limits.margin is not None:
+        for index, (value, sign) in enumerate(zip(margin.tolist(), home_signs, strict=True), 1):
+            check(f"margin {'−' if sign < 0 else ''}κ{index}", sign * value, limits.margin, None)
+    return tuple(found)

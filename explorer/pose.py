@@ -1,0 +1,113 @@
+"""The pose of the platform: the position of b4 and the rotation from platform to base.
+
+Quaternions are (w, x, y, z). Yaw, pitch and roll are degrees about the intrinsic z, y
+and x axes, in this order, so R = Rz(yaw) Ry(pitch) Rx(roll).
+"""
+
+from __future__ import annotations
+
+import msgspec
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
+
+from explorer.arrays import FloatArray, finite_array
+from explorer.errors import InputError
+
+Triple = tuple[float, float, float]
+Quadruple = tuple[float, float, float, float]
+
+# A rotation is accepted when it is orthonormal to this, then used as it was given.
+ORTHONORMAL_TOLERANCE = 1e-6
+
+
+class Pose(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A pose of the platform.
+
+    Attributes:
+        position: b4 in the base frame, in design units.
+        quaternion: (w, x, y, z), platform to base; kept at unit length.
+
+    Raises:
+        InputError: not finite, or a quaternion of length zero.
+    """
+
+    position: Triple
+    quaternion: Quadruple
+
+    def __post_init__(self) -> None:
+        finite_array("position", self.position, (3,))
+        quaternion = finite_array("quaternion", self.quaternion, (4,))
+        size = float(np.abs(quaternion).max())
+        if size == 0.0:
+            raise InputError("quaternion must not be all zeros; no rotation is (1, 0, 0, 0)")
+        unit = quaternion / size
+        norm = float(np.linalg.norm(unit))
+        # One already of unit length is kept to the last bit, so that files round-trip.
+        if abs(norm * size - 1.0) > 4e-16:
+            w, x, y, z = (unit / norm).tolist()
+            msgspec.structs.force_setattr(self, "quaternion", (w, x, y, z))
+
+    @property
+    def rotation(self) -> FloatArray:
+        """The rotation matrix, platform to base, shape (3, 3)."""
+        return rotation_from_quaternion(self.quaternion)
+
+    @staticmethod
+    def of(position: ArrayLike, rotation: ArrayLike) -> Pose:
+        """Return the pose with this position (3,) and rotation matrix (3, 3)."""
+        x, y, z = finite_array("position", position, (3,)).tolist()
+        w, i, j, k = quaternion_from_rotation(rotation).tolist()
+        return Pose((x, y, z), (w, i, j, k))
+
+    @staticmethod
+    def of_yaw_pitch_roll(position: ArrayLike, yaw_pitch_roll: ArrayLike) -> Pose:
+        """Return the pose with this position (3,) and these angles (3,), in degrees."""
+        return Pose.of(position, rotation_from_yaw_pitch_roll(yaw_pitch_roll))
+
+
+def rotation_from_quaternion(quaternion: ArrayLike) -> FloatArray:
+    """Return rotation matrices (..., 3, 3) of quaternions (..., 4), of any length but zero."""
+    array = finite_array("quaternion", quaternion, (4,))
+    if not np.abs(array).max(axis=-1).all():
+        raise InputError("quaternion must not be all zeros; no rotation is (1, 0, 0, 0)")
+    return Rotation.from_quat(array, scalar_first=True).as_matrix()
+
+
+def quaternion_from_rotation(rotation: ArrayLike) -> FloatArray:
+    """Return unit quaternions (..., 4), w not negative, of rotation matrices (..., 3, 3)."""
+    matrix = checked_rotation(rotation)
+    return Rotation.from_matrix(matrix).as_quat(canonical=True, scalar_first=True)
+
+
+def rotation_from_yaw_pitch_roll(yaw_pitch_roll: ArrayLike) -> FloatArray:
+    """Return rotation matrices (..., 3, 3) of angles (..., 3), in degrees."""
+    angles = finite_array("yaw, pitch and roll", yaw_pitch_roll, (3,))
+    return Rotation.from_euler("ZYX", angles, degrees=True).as_matrix()
+
+
+def yaw_pitch_roll_from_rotation(rotation: ArrayLike) -> FloatArray:
+    """Return yaw, pitch and roll (..., 3) in degrees, pitch within ±90°.
+
+    At a pitch of ±90° only yaw ∓ roll is determined; roll is then zero.
+    """
+    matrix = checked_rotation(rotation)
+    return Rotation.from_matrix(matrix).as_euler("ZYX", degrees=True, suppress_warnings=True)
+
+
+def checked_rotation(rotation: ArrayLike) -> FloatArray:
+    """Return rotation matrices (..., 3, 3) once they are known to be proper rotations.
+
+    Raises:
+        InputError: not orthonormal to 1e-6, or a reflection.
+    """
+    matrix = finite_array("rotation", rotation, (3, 3))
+    residual = np.abs(matrix @ np.swapaxes(matrix, -1, -2) - np.eye(3))
+    if residual.size and float(residual.max()) > ORTHONORMAL_TOLERANCE:
+        raise InputError(
+            f"rotation must be orthonormal to {ORTHONORMAL_TOLERANCE:g}; "
+            f"R Rᵀ is off the identity by {float(residual.max()):.3g}"
+        )
+    if (np.linalg.det(matrix) < 0.0).any():
+        raise InputError("rotation must have determinant +1; this one is a reflection")
+    return matrix
