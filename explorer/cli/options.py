@@ -1,0 +1,74 @@
+"""Options that commands share, to inherit from: the design, the pose, the form of output."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import tyro
+
+from explorer.cli.values import numbers
+from explorer.design import Design
+from explorer.design_file import load_design
+from explorer.errors import InputError
+from explorer.home import home_pose
+from explorer.pose import Pose, Quadruple, Triple
+
+
+@dataclass(frozen=True, kw_only=True)
+class DesignOptions:
+    """Which design a command is about."""
+
+    design: Annotated[str, tyro.conf.arg(metavar="PRESET_OR_FILE")] = "paper-optimal"
+    """A preset (paper-initial, paper-optimal) or a design file (JSON)."""
+
+    def load(self) -> Design:
+        """Return the design.
+
+        Raises:
+            DesignError: no such preset or file, or a file that holds no design.
+        """
+        return load_design(self.design)
+
+
+@dataclass(frozen=True, kw_only=True)
+class JsonOptions:
+    """In which form a command answers."""
+
+    json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    """Answer with one JSON object on standard output, and nothing else there."""
+
+
+_THE_HOME = tyro.conf.arg(help_behavior_hint="(default: that of the home pose)")
+
+
+@dataclass(frozen=True, kw_only=True)
+class PoseOptions:
+    """Which pose a command is about; what is not given is that of the design's home."""
+
+    position: Annotated[Triple | None, numbers("--position", "x y z"), _THE_HOME] = None
+    """Position of b4 in the base frame, in design units."""
+
+    quaternion: Annotated[Quadruple | None, numbers("--quaternion", "w x y z"), _THE_HOME] = None
+    """Orientation of the platform; need not be of unit length."""
+
+    yaw_pitch_roll: Annotated[
+        Triple | None,
+        numbers("--yaw-pitch-roll", "yaw pitch roll"),
+        tyro.conf.arg(help_behavior_hint="(instead of --quaternion)"),
+    ] = None
+    """Orientation of the platform: degrees about its own z, then y, then x axis."""
+
+    def pose(self, design: Design) -> Pose:
+        """Return the pose, from the design's home where no option says otherwise.
+
+        Raises:
+            InputError: two orientations, or a quaternion of length zero.
+        """
+        if self.quaternion is not None and self.yaw_pitch_roll is not None:
+            raise InputError("give one of --quaternion and --yaw-pitch-roll, not both")
+        home = home_pose(design)
+        position = home.position if self.position is None else self.position
+        if self.yaw_pitch_roll is not None:
+            return Pose.of_yaw_pitch_roll(position, self.yaw_pitch_roll)
+        return Pose(position, self.quaternion or home.quaternion)

@@ -1,0 +1,84 @@
+"""What the commands write: one JSON object, or aligned columns for people.
+
+Plain text without colours; numbers carry a minus sign that can be pasted back.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+
+from explorer.cli.streams import write
+from explorer.design import Design
+from explorer.pose import Pose, yaw_pitch_roll_from_rotation
+
+
+def write_json(answer: Mapping[str, object]) -> None:
+    """Write the one JSON object of a command to standard output.
+
+    Args:
+        answer: Plain values, lists and mappings; arrays as lists, no NaN or infinity.
+    """
+    write(json.dumps(answer, allow_nan=False) + "\n")
+
+
+def write_lines(*lines: str) -> None:
+    """Write lines of text to standard output."""
+    write("\n".join(lines) + "\n")
+
+
+def table(rows: Sequence[Sequence[str]], align: str) -> str:
+    """Return rows as lines of aligned columns.
+
+    Args:
+        rows: Cells, as many in each row.
+        align: One letter for each column, "<" or ">".
+    """
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return "\n".join(
+        "  ".join(
+            f"{cell:{side}{width}}" for cell, side, width in zip(row, align, widths, strict=True)
+        ).rstrip()
+        for row in rows
+    )
+
+
+def figure(value: float) -> str:
+    """Return a number with six significant digits."""
+    return f"{value:#.6g}"
+
+
+def figures(values: Iterable[float]) -> list[str]:
+    """Return numbers with six significant digits each."""
+    return [figure(value) for value in values]
+
+
+def degrees(values: Iterable[float]) -> list[str]:
+    """Return angles in degrees with three decimals each, never a negative zero."""
+    return [f"{value:z.3f}°" for value in values]
+
+
+def millimetres(design: Design, values: Iterable[float]) -> str:
+    """Return lengths in design units as millimetres in brackets."""
+    return f"[{', '.join(f'{value * design.unit_mm:.6g}' for value in values)} mm]"
+
+
+def heading(design: Design) -> str:
+    """Return the line that names the design and its unit."""
+    # A name from a file may hold anything; what is not printable stays out of terminals.
+    name = "".join(letter if letter.isprintable() else "?" for letter in design.name)
+    return f"{name} (1 unit = {design.unit_mm:g} mm, reach {design.reach:.6g})"
+
+
+def pose_table(design: Design, pose: Pose) -> str:
+    """Return position, quaternion and angles of a pose, a line each."""
+    angles = yaw_pitch_roll_from_rotation(pose.rotation).tolist()
+    position = f"{'  '.join(figures(pose.position))}  {millimetres(design, pose.position)}"
+    return table(
+        [
+            ("position", position),
+            ("quaternion", "  ".join(figures(pose.quaternion))),
+            ("yaw pitch roll", "  ".join(degrees(angles))),
+        ],
+        "<<",
+    )

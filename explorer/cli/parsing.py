@@ -1,0 +1,125 @@
+"""From arguments to a command: tyro reads the options, this module words what is wrong.
+
+Tyro frames its complaints in boxes of several lines; here each becomes one line that ends
+with where to find help. What people get wrong most, a misspelt option or command, is
+looked at before tyro, with a suggestion.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import difflib
+import importlib
+import io
+import re
+from collections.abc import Iterable, Sequence
+from typing import Any, ClassVar, Protocol
+
+import tyro
+
+from explorer.cli.streams import write
+from explorer.cli.usage import UsageError
+
+_COLOUR = re.compile(r"\x1b\[[0-9;]*m")
+_FRAME = "│╭╮╰╯─ "
+_HELP = ("-h", "--help")
+
+
+class Command(Protocol):
+    """What a command's dataclass has."""
+
+    __dataclass_fields__: ClassVar[dict[str, dataclasses.Field[Any]]]
+
+    def run(self) -> None:
+        """Do what the options say, writing to standard output.
+
+        Raises:
+            ExplorerError: bad input, or no answer.
+        """
+        ...
+
+
+def load_command(name: str, known: Iterable[str]) -> type[Command]:
+    """Return the dataclass of a command, importing only its module.
+
+    Raises:
+        UsageError: there is no such command.
+    """
+    if name not in known:
+        hint = suggestion(name, known) or f"there are {', '.join(known)}"
+        raise UsageError(f"no command {name!r} ({hint}); see explorer --help")
+    module = importlib.import_module(f"explorer.cli.{name}")
+    return getattr(module, name.capitalize())
+
+
+def parse(name: str, command: type[Command], argv: Sequence[str]) -> Command | None:
+    """Return the command with the options in the arguments; None once help was shown.
+
+    Raises:
+        UsageError: the arguments do not make a command.
+    """
+    program = f"explorer {name}"
+    page, complaint = io.StringIO(), io.StringIO()
+    try:
+        if not any(argument in _HELP for argument in argv):
+            _check_options(command, argv)
+        with contextlib.redirect_stdout(page), contextlib.redirect_stderr(complaint):
+            parsed, unread = tyro.cli(command, prog=program, args=argv, return_unknown_args=True)
+        if not unread:
+            return parsed
+        reason = f"cannot make sense of {unread[0]!r}"
+    except SystemExit as leave:
+        if not leave.code:
+            write("".join(f"{line.rstrip()}\n" for line in page.getvalue().splitlines()))
+            return None
+        reason = condensed(complaint.getvalue())
+    except UsageError as error:
+        reason = str(error)
+    raise UsageError(f"{reason}; see {program} --help", program)
+
+
+def condensed(complaint: str) -> str:
+    """Return tyro's framed complaint as one line: what it says first, without the frame."""
+    lines = [_COLOUR.sub("", line).strip() for line in complaint.strip().splitlines()]
+    titled = bool(lines) and lines[0].startswith("╭")
+    sections: list[list[str]] = [[]]
+    for line in lines:
+        is_rule = line.startswith("╭") or not line.strip(_FRAME + "-")
+        if not is_rule:
+            sections[-1].append(line.strip(_FRAME))
+        elif sections[-1]:
+            sections.append([])
+    sections = [section for section in sections if section]
+    # Without line-drawing characters the title is a section of its own, over a rule.
+    body = sections[min(len(sections) - 1, 0 if titled else 1)] if sections else []
+    text = " ".join(body)
+    if text.startswith("Missing from"):
+        options = [words.split()[0] for words in body if words.startswith("--")]
+        return f"missing {', '.join(options)}" if options else "an option is missing"
+    without_value = re.match(r"Missing value for argument '(--[a-z0-9-]+)'", text)
+    if without_value:
+        return f"{without_value[1]} needs a value"
+    if not text:
+        return "the arguments cannot be read"
+    return text[0].lower() + text[1:].rstrip(".")
+
+
+def suggestion(word: str, known: Iterable[str]) -> str | None:
+    """Return "did you mean …?" with the known word that is most like the given one."""
+    close = difflib.get_close_matches(word, list(known), n=1)
+    return f"did you mean {close[0]}?" if close else None
+
+
+def _check_options(command: type[Command], argv: Sequence[str]) -> None:
+    known = ["--help"]
+    for field in dataclasses.fields(command):
+        option = field.name.replace("_", "-")
+        known.append(f"--{option}")
+        if isinstance(field.default, bool):
+            known.append(f"--no-{option}")
+    for argument in argv:
+        option = argument.partition("=")[0].replace("_", "-")
+        if option.startswith("--") and option not in known:
+            hint = suggestion(option, known)
+            raise UsageError(f"no option {option}" + (f" ({hint})" if hint else ""))

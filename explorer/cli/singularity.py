@@ -1,0 +1,82 @@
+"""`explorer singularity`: the margins of a pose, and all that tells how singular it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from explorer.cli.options import DesignOptions, JsonOptions, PoseOptions
+from explorer.cli.output import figure, heading, pose_table, table, write_json, write_lines
+from explorer.singularity import INCIDENCES, TETRAHEDRA, mode_name
+from explorer.snapshot import Snapshot, evaluate
+
+
+@dataclass(frozen=True, kw_only=True)
+class Singularity(JsonOptions, PoseOptions, DesignOptions):
+    """Tell how near a pose is to a singularity, and to which.
+
+    Each of the three margins is zero where one of three tetrahedra is flat; together their
+    signs name the assembly mode.
+    """
+
+    def run(self) -> None:
+        """Write the margins of the pose and what follows from them.
+
+        Raises:
+            InputError: a design or pose that cannot be used.
+        """
+        design = self.load()
+        snapshot = evaluate(design, self.pose(design))
+        if self.json:
+            write_json(
+                {
+                    "margins": snapshot.margins.tolist(),
+                    "volumes": snapshot.volumes.tolist(),
+                    "determinant": snapshot.determinant,
+                    "inverse_condition": snapshot.inverse_condition,
+                    "stratum": list(snapshot.stratum),
+                    "stratum_dimension": snapshot.stratum_dimension,
+                    "mode": snapshot.mode,
+                    "signs": list(snapshot.signs),
+                    "proximity": snapshot.proximity,
+                }
+            )
+        else:
+            write_lines(
+                heading(design),
+                pose_table(design, snapshot.pose),
+                "",
+                _margin_table(snapshot),
+                "",
+                _measures(snapshot),
+            )
+
+
+def _margin_table(snapshot: Snapshot) -> str:
+    rows = [("margin", "units", "mm", "zero when", "tetrahedron", "volume")]
+    for index in range(3):
+        margin = float(snapshot.margins[index])
+        rows.append(
+            (
+                f"κ{index + 1}",
+                figure(margin),
+                figure(margin * snapshot.design.unit_mm),
+                INCIDENCES[index],
+                " ".join(TETRAHEDRA[index]),
+                figure(float(snapshot.volumes[index])),
+            )
+        )
+    return table(rows, "<>><<>")
+
+
+def _measures(snapshot: Snapshot) -> str:
+    stratum = " ".join(map(str, snapshot.stratum))
+    return table(
+        [
+            ("assembly mode", f"{snapshot.mode} ({mode_name(snapshot.mode)})"),
+            ("stratum", f"{stratum}, dimension {snapshot.stratum_dimension}"),
+            ("det J", figure(snapshot.determinant)),
+            ("inverse condition", f"{figure(snapshot.inverse_condition)} (0 singular, 1 best)"),
+            ("proximity", f"{figure(snapshot.proximity)} (least |κ| over the reach)"),
+        ],
+        "<<",
+    )

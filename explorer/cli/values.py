@@ -1,0 +1,103 @@
+"""How the words after an option become numbers, with messages that name what is wanted."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Any
+
+from tyro.constructors import PrimitiveConstructorSpec
+
+from explorer.cli.usage import UsageError
+from explorer.design import LARGEST_SIZE
+
+_COUNTS = {3: "three", 4: "four", 6: "six"}
+
+
+def numbers(option: str, order: str) -> PrimitiveConstructorSpec[Any]:
+    """Return how to read an option that takes one finite number for each name.
+
+    Args:
+        option: The option, such as ``--joints``.
+        order: The names of the numbers in their order, separated by blanks.
+    """
+    names = order.split()
+
+    def read(words: list[str]) -> tuple[float, ...]:
+        values = [_number(option, word) for word in words]
+        if len(values) != len(names):
+            raise UsageError(
+                f"{option} needs {_COUNTS[len(names)]} numbers in the order {order}; "
+                f"got {len(values)}"
+            )
+        for name, value in zip(names, values, strict=True):
+            if not math.isfinite(value):
+                raise UsageError(f"{option}: {name} must be a finite number; got {value}")
+            if abs(value) > LARGEST_SIZE:
+                raise UsageError(
+                    f"{option}: {name} must lie within ±{LARGEST_SIZE:g}; got {value:g}"
+                )
+        return tuple(values)
+
+    return PrimitiveConstructorSpec(
+        nargs="*",
+        metavar=order.upper(),
+        instance_from_str=read,
+        is_instance=lambda value: value is None or isinstance(value, tuple),
+        str_from_instance=lambda value: [str(entry) for entry in value or ()],
+    )
+
+
+def whole_number(option: str, low: int, high: int) -> PrimitiveConstructorSpec[Any]:
+    """Return how to read an option that takes a whole number in a range, ends included."""
+
+    def read(words: list[str]) -> int:
+        try:
+            value = int(words[0])
+        except ValueError:
+            raise UsageError(f"{option} must be a whole number; got {words[0]!r}") from None
+        if not low <= value <= high:
+            raise UsageError(f"{option} must lie within {low} to {high}; got {value}")
+        return value
+
+    return PrimitiveConstructorSpec(
+        nargs=1,
+        metavar="N",
+        instance_from_str=read,
+        is_instance=lambda value: isinstance(value, int),
+        str_from_instance=lambda value: [str(value)],
+    )
+
+
+def pixels(option: str, low: int, high: int) -> PrimitiveConstructorSpec[Any]:
+    """Return how to read an option that takes a size in pixels, such as 1280x800."""
+
+    def read(words: list[str]) -> tuple[int, int]:
+        match = re.fullmatch(r"([0-9]{1,9})[xX×]([0-9]{1,9})", words[0])
+        if match is None:
+            raise UsageError(
+                f"{option} must be WIDTHxHEIGHT in pixels, such as 1280x800; got {words[0]!r}"
+            )
+        width, height = int(match[1]), int(match[2])
+        for name, value in (("width", width), ("height", height)):
+            if not low <= value <= high:
+                raise UsageError(
+                    f"{option}: the {name} must lie within {low} to {high} pixels; got {value}"
+                )
+        return width, height
+
+    return PrimitiveConstructorSpec(
+        nargs=1,
+        metavar="WIDTHxHEIGHT",
+        instance_from_str=read,
+        is_instance=lambda value: isinstance(value, tuple),
+        str_from_instance=lambda value: ["x".join(map(str, value))],
+    )
+
+
+def _number(option: str, word: str) -> float:
+    try:
+        return float(word)
+    except ValueError:
+        hint = "; separate numbers by blanks" if "," in word else ""
+        raise UsageError(f"{option}: {word!r} is not a number{hint}") from None
