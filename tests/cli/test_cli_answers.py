@@ -1,0 +1,223 @@
+"""What the commands answer is what the package computes, as JSON and as text."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import explorer
+from explorer.cli import run
+from explorer.feasibility import feasible_intervals
+
+POSITION = (8.0, -2.5, 1.1e1)
+ANGLES = (-60.0, 12.5, -7.0)
+POSE = [
+    *("--position", "8", "-2.5", "1.1e1"),
+    *("--yaw-pitch-roll", "-60", "12.5", "-7"),
+]
+PRESET = explorer.PRESETS["paper-optimal"]
+
+
+def snapshot() -> explorer.Snapshot:
+    return explorer.evaluate(PRESET, explorer.Pose.of_yaw_pitch_roll(POSITION, ANGLES))
+
+
+def answer(capsys: pytest.CaptureFixture[str], *argv: str, status: int = 0) -> dict[str, Any]:
+    """Return the one JSON object that a command writes, and nothing else."""
+    assert run([*argv, "--json"]) == status
+    captured = capsys.readouterr()
+    assert captured.out.endswith("}\n")
+    assert captured.out.count("\n") == 1
+    assert bool(captured.err) == bool(status)
+    found = json.loads(captured.out)
+    assert isinstance(found, dict)
+    return found  # pyright: ignore[reportUnknownVariableType]
+
+
+def test_inverse_gives_the_joints_in_their_one_order(capsys: pytest.CaptureFixture[str]) -> None:
+    found = answer(capsys, "inverse", *POSE)
+    expected = snapshot()
+    assert set(found) == {"joints", "within_limits", "violations"}
+    assert found["joints"] == expected.joints.tolist()
+    assert found["violations"] == [str(each) for each in expected.violations]
+    assert found["within_limits"] is (not expected.violations)
+
+
+def test_inverse_names_every_limit_that_the_pose_breaks(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    found = answer(capsys, "inverse", "--position", "30", "5", "9")
+    assert found["within_limits"] is False
+    assert any("box x" in each for each in found["violations"])
+
+
+def test_singularity_gives_what_the_snapshot_holds(capsys: pytest.CaptureFixture[str]) -> None:
+    found = answer(capsys, "singularity", *POSE)
+    expected = snapshot()
+    assert found == {
+        "margins": expected.margins.tolist(),
+        "volumes": expected.volumes.tolist(),
+        "determinant": expected.determinant,
+        "inverse_condition": expected.inverse_condition,
+        "stratum": list(expected.stratum),
+        "stratum_dimension": expected.stratum_dimension,
+        "mode": expected.mode,
+        "signs": list(expected.signs),
+        "proximity": expected.proximity,
+    }
+
+
+def test_singularity_of_a_singular_pose_is_an_answer(capsys: pytest.CaptureFixture[str]) -> None:
+    found = answer(capsys, "singularity", "--position", "0", "0", "0")
+    assert found["determinant"] == 0.0
+    assert found["stratum_dimension"] < 5
+
+
+def test_forward_of_inverse_holds_the_pose_in_its_mode(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    expected = snapshot()
+    found = answer(capsys, "forward", "--joints", *map(repr, expected.joints.tolist()))
+    assert set(found) == {"feasible", "discriminants", "modes"}
+    assert found["feasible"] is True
+    np.testing.assert_allclose(found["discriminants"], expected.margins**2, rtol=1e-9)
+    assert [mode["mode"] for mode in found["modes"]] == list(range(8))
+    mode = found["modes"][expected.mode]
+    assert set(mode) == {"mode", "signs", "position", "quaternion", "margins"}
+    np.testing.assert_allclose(mode["position"], POSITION, rtol=1e-9)
+    np.testing.assert_allclose(
+        explorer.rotation_from_quaternion(mode["quaternion"]), expected.rotation, atol=1e-9
+    )
+
+
+def test_forward_lists_modes_whose_margins_have_their_signs(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    found = answer(capsys, "forward", "--joints", *map(repr, snapshot().joints.tolist()))
+    for mode in found["modes"]:
+        rotation = explorer.rotation_from_quaternion(mode["quaternion"])
+        np.testing.assert_allclose(
+            mode["margins"], explorer.margins(mode["position"], rotation), atol=1e-12
+        )
+        assert np.sign(mode["margins"]).tolist() == mode["signs"]
+        bits = [mode["mode"] >> bit & 1 for bit in (2, 1, 0)]
+        assert bits == [sign > 0 for sign in mode["signs"]]
+
+
+def test_lengths_that_cannot_close_are_an_answer_with_status_1(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    joints = snapshot().joints.copy()
+    joints[0] = 0.5
+    found = answer(capsys, "forward", "--joints", *map(repr, joints.tolist()), status=1)
+    assert found["feasible"] is False
+    assert found["modes"] == []
+    assert found["discriminants"] == explorer.discriminants(PRESET, joints).tolist()
+    assert found["discriminants"][0] < 0.0
+
+
+@pytest.mark.parametrize("joint", range(6))
+def test_the_value_that_is_said_to_close_does_close_as_written(
+    capsys: pytest.CaptureFixture[str], joint: int
+) -> None:
+    joints = snapshot().joints.copy()
+    intervals = feasible_intervals(PRESET, joints)[joint]
+    joints[joint] = intervals[-1][1] + 0.25
+    assert run(["forward", "--joints", *map(repr, joints.tolist())]) == 1
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert "tetrahedron" in captured.err
+    advice = captured.err.strip().rpartition(" is ")[2].split()
+    name, _, _, _, closing = advice
+    joints[explorer.JOINTS.index(name)] = float(closing)
+    assert explorer.forward(PRESET, joints).feasible
+
+
+def test_the_failing_trilateration_is_named_with_its_points(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    joints = snapshot().joints.copy()
+    joints[5] = 60.0
+    squares = explorer.discriminants(PRESET, joints)
+    assert [square < 0 for square in squares.tolist()] == [False, False, True]
+    assert run(["forward", "--joints", *map(repr, joints.tolist())]) == 1
+    message = capsys.readouterr().err
+    assert message.startswith("explorer: ")
+    assert "trilateration 3 (tetrahedron b4 a1 a2 a3)" in message
+    assert f"{squares[2]:.4g}" in message
+    assert "l4 from 60 to " in message
+
+
+def test_without_pose_options_it_is_the_home_pose(capsys: pytest.CaptureFixture[str]) -> None:
+    home = explorer.evaluate(PRESET, explorer.home_pose(PRESET))
+    assert answer(capsys, "inverse")["joints"] == home.joints.tolist()
+
+
+def test_a_position_alone_keeps_the_orientation_of_home(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    home = explorer.home_pose(PRESET)
+    found = answer(capsys, "inverse", *POSE[:4])
+    assert found["joints"] == explorer.inverse(PRESET, POSITION, home.rotation).tolist()
+
+
+def test_an_orientation_alone_keeps_the_position_of_home(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    home = explorer.home_pose(PRESET)
+    rotation = explorer.rotation_from_yaw_pitch_roll(ANGLES)
+    found = answer(capsys, "inverse", *POSE[4:])
+    np.testing.assert_allclose(
+        found["joints"], explorer.inverse(PRESET, home.position, rotation), rtol=1e-12
+    )
+
+
+def test_both_forms_of_an_orientation_mean_the_same(capsys: pytest.CaptureFixture[str]) -> None:
+    quaternion = explorer.quaternion_from_rotation(explorer.rotation_from_yaw_pitch_roll(ANGLES))
+    # Of any length, and -q is the same rotation as q.
+    words = map(repr, (-3.0 * quaternion).tolist())
+    by_quaternion = answer(capsys, "inverse", *POSE[:4], "--quaternion", *words)
+    by_angles = answer(capsys, "inverse", *POSE)
+    np.testing.assert_allclose(by_quaternion["joints"], by_angles["joints"], rtol=1e-12)
+
+
+def test_a_design_file_counts_like_its_preset(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    file = tmp_path / "my design.json"
+    file.write_bytes(explorer.encode_design(explorer.PRESETS["paper-initial"]))
+    by_file = answer(capsys, "inverse", "--design", str(file), *POSE)
+    assert by_file == answer(capsys, "inverse", "--design", "paper-initial", *POSE)
+    assert by_file != answer(capsys, "inverse", *POSE)
+
+
+def test_text_for_people_shows_units_and_millimetres(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["inverse", *POSE]) == 0
+    text = capsys.readouterr().out
+    joints = snapshot().joints
+    for name, value in zip(explorer.JOINTS, joints.tolist(), strict=True):
+        (row,) = [line.split() for line in text.splitlines() if line.startswith(f"{name} ")]
+        assert float(row[1]) == pytest.approx(value, rel=1e-5)
+        assert float(row[2]) == pytest.approx(value * PRESET.unit_mm, rel=1e-5)
+
+
+@pytest.mark.parametrize("command", ["inverse", "singularity"])
+def test_text_for_people_has_no_colour_and_no_loose_ends(
+    capsys: pytest.CaptureFixture[str], command: str
+) -> None:
+    assert run([command, *POSE]) == 0
+    captured = capsys.readouterr()
+    assert "\x1b" not in captured.out
+    assert all(line == line.rstrip() for line in captured.out.splitlines())
+    assert captured.err == ""
+
+
+def test_forward_for_people_has_a_row_for_each_mode(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["forward", "--joints", *map(repr, snapshot().joints.tolist())]) == 0
+    rows = [line.split() for line in capsys.readouterr().out.splitlines()]
+    assert [row[0] for row in rows[-8:]] == list("01234567")
+    assert [float(value) for value in rows[-8 + snapshot().mode][4:7]] == pytest.approx(POSITION)
