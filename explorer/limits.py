@@ -16,7 +16,7 @@ class Violation:
     """A broken limit.
 
     Attributes:
-        limit: What is limited: a joint, "gap", "box x", "margin κ1", ….
+        limit: What is limited: a joint, "gap |d1 − d3|", "box x", "margin κ1", ….
         value: What it is, in design units.
         bound: What it may be at the most, or at the least.
         above: Whether the value exceeds the bound, rather than falling short of it.
@@ -28,8 +28,13 @@ class Violation:
     above: bool
 
     def __str__(self) -> str:
+        if self.limit.startswith("margin") and self.bound == 0.0:
+            sign = "negative" if self.above else "positive"
+            text = f"{self.limit} = {self.value:.4g}, but it is {sign} in the home mode"
+            return text.replace("-", "−")
         relation = "above its maximum" if self.above else "below its minimum"
-        return f"{self.limit} = {self.value:.4g} is {relation} {self.bound:.4g}"
+        text = f"{self.limit} = {self.value:.4g} is {relation} {self.bound:.4g}"
+        return text.replace("-", "−")
 
 
 def violations(
@@ -70,5 +75,7 @@ def violations(
             check(f"box {axis}", value, low, high)
     if limits.margin is not None:
         for index, (value, sign) in enumerate(zip(margin.tolist(), home_signs, strict=True), 1):
-            check(f"margin {'−' if sign < 0 else ''}κ{index}", sign * value, limits.margin, None)
+            # In the home mode a margin lies on the home's side of zero.
+            low, high = (limits.margin, None) if sign > 0 else (None, -limits.margin)
+            check(f"margin κ{index}", value, low, high)
     return tuple(found)

@@ -1,0 +1,80 @@
+"""Work that must not pile up: one thread, and of each kind of event only the newest.
+
+viser runs callbacks at the same time and in no order, so none of them computes. They
+leave word here; what is waiting when the thread comes round is handled in one go.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Sequence
+from typing import Generic, TypeVar
+
+Item = TypeVar("Item")
+
+
+class LatestWins(Generic[Item]):
+    """A thread that handles what is posted, the newest of each key only.
+
+    Args:
+        handle: Called with everything that waits, in the order of the stamps. What it
+            raises ends the thread, so it must not.
+        name: Of the thread.
+    """
+
+    def __init__(self, handle: Callable[[Sequence[Item]], None], name: str) -> None:
+        self._handle = handle
+        self._waiting: dict[object, tuple[float, Item]] = {}
+        self._condition = threading.Condition()
+        self._busy = False
+        self._stopped = False
+        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+        self._thread.start()
+
+    def post(self, key: object, stamp: float, item: Item) -> None:
+        """Leave an item; it replaces one of the same key that still waits.
+
+        Args:
+            key: What it is about; events of one slider share it.
+            stamp: When it happened. An item older than the waiting one is dropped.
+            item: What to handle.
+        """
+        with self._condition:
+            waiting = self._waiting.get(key)
+            if waiting is None or waiting[0] <= stamp:
+                self._waiting[key] = (stamp, item)
+                self._condition.notify_all()
+
+    def is_waiting(self, key: object) -> bool:
+        """Whether an item of this key waits to be handled."""
+        with self._condition:
+            return key in self._waiting
+
+    def wait_until_idle(self, timeout: float) -> bool:
+        """Wait until nothing waits and nothing runs; say whether that came about."""
+        with self._condition:
+            return self._condition.wait_for(
+                lambda: not self._waiting and not self._busy, timeout=timeout
+            )
+
+    def stop(self) -> None:
+        """Drop what waits and end the thread."""
+        with self._condition:
+            self._stopped = True
+            self._waiting.clear()
+            self._condition.notify_all()
+        if threading.current_thread() is not self._thread:
+            self._thread.join(timeout=5.0)
+
+    def _run(self) -> None:
+        while True:
+            with self._condition:
+                self._busy = False
+                self._condition.notify_all()
+                self._condition.wait_for(lambda: self._waiting or self._stopped)
+                if self._stopped:
+                    return
+                items = [item for _, item in sorted(self._waiting.values(), key=lambda w: w[0])]
+                self._waiting.clear()
+                self._busy = True
+            self._handle(items)

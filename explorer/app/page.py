@@ -1,0 +1,152 @@
+"""The page of one server: scene and panels, drawn from the session's frames."""
+
+from __future__ import annotations
+
+import sys
+import time
+import traceback
+from typing import cast, get_args
+
+import numpy as np
+import viser
+
+from explorer.app.actions import SetPose
+from explorer.app.panels.design import DesignPanel
+from explorer.app.panels.move import MovePanel
+from explorer.app.panels.singularity import SingularityPanel
+from explorer.app.panels.view import ViewPanel
+from explorer.app.scene import Scene
+from explorer.app.scene.camera import Cameras, ViewName, framing
+from explorer.app.scene.placing import Placed, scene_scale
+from explorer.app.scene.shapes import Update
+from explorer.app.session import Session, Who
+from explorer.app.state import Frame, State
+from explorer.app.viser_gaps import set_marks
+from explorer.pose import Pose
+
+TITLE = "Flagged 4-4 explorer"
+BRAND = (24, 74, 150)
+# One complaint is shown this long, and not again within it.
+COMPLAINT_SECONDS = 6.0
+VIEW_LABELS: dict[str, ViewName] = {name.capitalize(): name for name in get_args(ViewName)}
+
+
+class Page:
+    """Draws frames on a viser server and posts what people do to the session.
+
+    Args:
+        server: On which everything is drawn.
+        state: The first state.
+        docked: Whether the panels lie beside the scene, rather than over it.
+    """
+
+    def __init__(self, server: viser.ViserServer, state: State, *, docked: bool = True) -> None:
+        self._server = server
+        self._complained: dict[str, float] = {}
+        self._frame = Frame(state)
+        self.session = Session(state, self._draw, self._complain, self._report)
+        gui = server.gui
+        gui.configure_theme(
+            show_logo=False, show_share_button=False, control_width="large", brand_color=BRAND
+        )
+        gui.set_panel_label(TITLE)
+        self._scene = Scene(server)
+        self._cameras = Cameras(lambda: Placed(self._frame))
+        self._add_view_buttons(gui)
+        tabs = gui.add_tab_group()
+        with tabs.add_tab("Move", viser.Icon.ARROWS_MOVE):
+            move = MovePanel(gui, self.session)
+        with tabs.add_tab("Design", viser.Icon.RULER_2):
+            design = DesignPanel(gui, self.session)
+        with tabs.add_tab("View", viser.Icon.EYE):
+            view = ViewPanel(gui, self.session)
+        side = gui.add_panel()
+        with side.add_tab("Singularity", viser.Icon.FLAG):
+            singularity = SingularityPanel(gui, self.session)
+        self._panels = (move, design, view, singularity)
+        if docked:
+            gui.main_panel.dock_right()
+            gui.main_panel.set_width(350)
+            side.dock_left()
+            side.set_width(250)
+
+        self._scene.drag_handle.handle.on_update(self._dragged)
+        self._aim_initial_camera()
+        server.on_client_connect(self._cameras.connected)
+        server.on_client_disconnect(self._cameras.disconnected)
+        self._draw(self._frame)
+
+    def point_cameras(self, view: ViewName) -> None:
+        """Point the camera of every open browser."""
+        for client in self._server.get_clients().values():
+            self._cameras.point(client, view)
+
+    def _add_view_buttons(self, gui: viser.GuiApi) -> None:
+        buttons = gui.add_button_group(
+            "View", tuple(VIEW_LABELS), hint="Frame the mechanism from one of four sides."
+        )
+
+        @buttons.on_click
+        def _(event: viser.GuiEvent[viser.GuiButtonGroupHandle]) -> None:
+            if event.client is not None:
+                self._cameras.point(event.client, VIEW_LABELS[buttons.value])
+
+    def _draw(self, frame: Frame) -> None:
+        placed = Placed(frame)
+        updates = self._scene.updates(placed)
+        for panel in self._panels:
+            updates.extend(panel.updates(frame))
+        self._frame = frame
+        # Nothing is computed in here: the block holds up every browser.
+        with self._server.atomic():
+            for update in updates:
+                _assign(update)
+
+    def _dragged(self, event: viser.TransformControlsEvent) -> None:
+        if event.client_id is None:
+            return
+        handle = self._scene.drag_handle.handle
+
+        def change(state: State) -> SetPose:
+            x, y, z = (np.asarray(handle.position) / scene_scale(state)).tolist()
+            w, i, j, k = np.asarray(handle.wxyz, dtype=np.float64).tolist()
+            return SetPose(Pose((x, y, z), (w, i, j, k)))
+
+        self.session.post(handle, change, stamp=handle.update_timestamp, who=event.client_id)
+
+    def _aim_initial_camera(self) -> None:
+        eye, target = framing(Placed(self._frame), "isometric", aspect=1.2)
+        camera = self._server.initial_camera
+        camera.position, camera.look_at = eye, target
+
+    def _complain(self, message: str, who: Who) -> None:
+        now = time.monotonic()
+        if now - self._complained.get(message, -COMPLAINT_SECONDS) < COMPLAINT_SECONDS:
+            return
+        self._complained = {
+            m: t for m, t in self._complained.items() if now - t < COMPLAINT_SECONDS
+        }
+        self._complained[message] = now
+        clients = self._server.get_clients()
+        for client_id, client in clients.items():
+            if who is None or client_id == who:
+                client.add_notification(
+                    "That is not possible",
+                    message,
+                    auto_close_seconds=COMPLAINT_SECONDS,
+                    color="orange",
+                )
+
+    def _report(self, error: Exception) -> None:
+        traceback.print_exception(error, file=sys.stderr)
+        self._complain(f"Something went wrong in the explorer itself: {error}", None)
+
+
+def _assign(update: Update) -> None:
+    handle, name, value = update
+    if handle is set_marks:
+        set_marks(
+            *cast("tuple[viser.GuiSliderHandle[float], tuple[tuple[float, str], ...]]", value)
+        )
+    else:
+        setattr(handle, name, value)

@@ -1,0 +1,42 @@
+"""The ranges of the sliders, from the design as it was opened, so that they hold still."""
+
+from __future__ import annotations
+
+import math
+
+from explorer.app.controls import Span
+from explorer.app.state import State
+
+# Sliders reach somewhat beyond what the limits usually allow, to let people feel them.
+REACHES = 1.5
+
+
+def fine_step(size: float, parts: float) -> float:
+    """Return the power of ten at or below a share of a size."""
+    return 10.0 ** math.floor(math.log10(size / parts))
+
+
+def length_span(state: State) -> Span:
+    """Return the range of a length."""
+    reach = state.base.reach
+    return Span(0.0, round_up(REACHES * reach), fine_step(reach, 2e3))
+
+
+def coordinate_span(state: State) -> Span:
+    """Return the range of a coordinate."""
+    reach = state.base.reach
+    edge = round_up(REACHES * reach)
+    return Span(-edge, edge, fine_step(reach, 2e3))
+
+
+def variable_span(state: State) -> Span:
+    """Return the range of a design variable, in steps as fine as the paper's figures."""
+    size = max(map(abs, state.base.variables))
+    edge = round_up(REACHES * size)
+    return Span(-edge, edge, fine_step(size, 1e5))
+
+
+def round_up(value: float) -> float:
+    """Return the next number of two significant digits."""
+    power = 10.0 ** (math.floor(math.log10(value)) - 1)
+    return math.ceil(value / power - 1e-9) * power

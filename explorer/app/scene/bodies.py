@@ -1,0 +1,79 @@
+"""Base and platform as bodies, and the grid they stand on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import viser
+
+from explorer.app.colours import BASE_BODY, PLATFORM_BODY
+from explorer.app.scene.legs import PLATE_TOP
+from explorer.app.scene.placing import Placed
+from explorer.app.scene.shapes import Mesh, Update, plate
+
+PLATE_THICKNESS = 0.22
+PLATFORM_THICKNESS = 0.2
+
+
+class Bodies:
+    """The base plate, the platform plate and the grid."""
+
+    def __init__(self, scene: viser.SceneApi) -> None:
+        self._scene = scene
+        # The frame that carries all that is rigid with the platform.
+        self._frame = scene.add_frame("/platform", show_axes=False)
+        empty = np.zeros((3, 3)), np.array([[0, 1, 2]])
+        self._base = scene.add_mesh_simple("/base/body", *empty, color=BASE_BODY)
+        self._platform = scene.add_mesh_simple(
+            "/platform/body", *empty, color=PLATFORM_BODY, opacity=0.82, side="double"
+        )
+        self._grid = scene.add_grid(
+            "/grid",
+            width=60.0,
+            height=60.0,
+            cell_size=1.0,
+            section_size=5.0,
+            cell_color=(226, 230, 236),
+            section_color=(203, 209, 218),
+            fade_distance=46.0,
+            fade_from="origin",
+            shadow_opacity=0.1,
+            position=(0.0, 0.0, PLATE_TOP - PLATE_THICKNESS - 0.01),
+        )
+        self._shapes: dict[object, tuple[Mesh, Mesh]] = {}
+
+    def updates(self, placed: Placed) -> Iterator[Update]:
+        """Yield what draws the bodies of this frame."""
+        state = placed.frame.state
+        yield self._frame, "position", tuple(placed.points["b4"].tolist())
+        yield self._frame, "wxyz", state.pose.quaternion
+        for body in (self._base, self._platform):
+            yield body, "visible", state.view.bodies
+        yield self._grid, "visible", state.view.grid
+        for handle, (vertices, faces) in zip(
+            (self._base, self._platform), self._meshes(placed), strict=True
+        ):
+            yield handle, "vertices", vertices.astype(np.float32)
+            yield handle, "faces", faces.astype(np.uint32)
+
+    def _meshes(self, placed: Placed) -> tuple[Mesh, Mesh]:
+        design = placed.frame.state.design
+        key = (design.variables, design.a2x, placed.scale, placed.facing)
+        if key not in self._shapes:
+            self._shapes = {key: (_base_plate(placed), platform_plate(placed))}
+        return self._shapes[key]
+
+
+def _base_plate(placed: Placed) -> Mesh:
+    points = np.array([placed.points[name][:2] for name in ("a1", "a2", "a3")])
+    return plate(points, 0.75, PLATE_TOP - PLATE_THICKNESS, PLATE_TOP)
+
+
+def platform_plate(placed: Placed) -> Mesh:
+    """Return the platform's plate in the platform frame, on the side away from the legs."""
+    size = placed.thickness
+    points = np.array([p[:2] for p in placed.platform_points.values()])
+    near = 0.26 * size * placed.facing
+    far = near + PLATFORM_THICKNESS * size * placed.facing
+    return plate(points, 0.42 * size, min(near, far), max(near, far))

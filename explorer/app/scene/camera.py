@@ -1,0 +1,115 @@
+"""Cameras that frame the mechanism, in the four views that CAD programs offer."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+import viser
+
+from explorer.app.scene.legs import guide_span
+from explorer.app.scene.placing import Placed
+from explorer.arrays import FloatArray
+
+ViewName = Literal["isometric", "front", "side", "top"]
+VIEWS: tuple[ViewName, ...] = get_args(ViewName)
+
+FIELD_OF_VIEW = math.radians(32.0)
+# From the target towards the eye; front looks along +y, side along -x, top down.
+DIRECTIONS: dict[ViewName, tuple[float, float, float]] = {
+    "isometric": (0.72, -1.0, 0.62),
+    "front": (0.0, -1.0, 0.0),
+    "side": (1.0, 0.0, 0.0),
+    # A hair off the vertical, so that y points up on the screen.
+    "top": (0.0, -1e-4, 1.0),
+}
+
+
+def framing(placed: Placed, view: ViewName, aspect: float) -> tuple[FloatArray, FloatArray]:
+    """Return the eye and the target, in scene units, that show the whole mechanism.
+
+    Args:
+        placed: What to show.
+        view: From where.
+        aspect: Width over height of the picture.
+    """
+    points = outermost_points(placed)
+    target = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    corners = points - target
+    forward = -np.array(DIRECTIONS[view]) / np.linalg.norm(DIRECTIONS[view])
+    right = np.cross(forward, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    up = np.cross(right, forward)
+    half = math.tan(0.5 * FIELD_OF_VIEW)
+    depth = corners @ forward
+    needed = np.maximum(
+        np.abs(corners @ up) / half - depth,
+        np.abs(corners @ right) / (half * max(aspect, 0.2)) - depth,
+    )
+    return target - 1.02 * float(needed.max()) * forward, target
+
+
+def outermost_points(placed: Placed) -> FloatArray:
+    """Return what must be in the picture, shape (n, 3): joints, bodies and flag lines."""
+    joints = np.array(list(placed.points.values()))
+    if placed.frame.state.view.ghosts:
+        joints = np.concatenate([joints, placed.scale * placed.frame.snapshot.modes.position])
+    around = np.array(np.meshgrid(*[(-0.8, 0.8)] * 3)).reshape(3, -1).T
+    low, high = guide_span(placed)
+    line = np.array([[low - 1.0, 0.0, 0.0], [high + 1.0, 0.0, 0.0]])
+    return np.concatenate([(joints[:, None] + around).reshape(-1, 3), line])
+
+
+@dataclass(frozen=True)
+class _Aimed:
+    view: ViewName
+    eye: FloatArray
+    aspect: float
+
+
+class Cameras:
+    """The cameras of all open browsers.
+
+    A browser tells its size before its panels are laid out, and people resize windows. A
+    camera that still stands where it was put is therefore put again when the size changes.
+
+    Args:
+        placed: Gives what to frame at the time.
+    """
+
+    def __init__(self, placed: Callable[[], Placed]) -> None:
+        self._placed = placed
+        self._aimed: dict[int, _Aimed] = {}
+
+    def point(self, client: viser.ClientHandle, view: ViewName) -> None:
+        """Point one browser's camera."""
+        given = client.camera.aspect
+        aspect = given if math.isfinite(given) and given > 0.0 else 1.0
+        eye, target = framing(self._placed(), view, aspect)
+        self._aimed[client.client_id] = _Aimed(view, eye, given)
+        with client.atomic():
+            client.camera.fov = FIELD_OF_VIEW
+            client.camera.up_direction = (0.0, 0.0, 1.0)
+            client.camera.position = eye
+            client.camera.look_at = target
+
+    def connected(self, client: viser.ClientHandle) -> None:
+        """Point a new browser's camera and keep it framed while nobody moves it."""
+        client.camera.on_update(lambda _: self._resized(client))
+        self.point(client, "isometric")
+
+    def disconnected(self, client: viser.ClientHandle) -> None:
+        """Forget a browser."""
+        self._aimed.pop(client.client_id, None)
+
+    def _resized(self, client: viser.ClientHandle) -> None:
+        aimed = self._aimed.get(client.client_id)
+        if aimed is None or client.camera.aspect == aimed.aspect:
+            return
+        distance = float(np.linalg.norm(aimed.eye - client.camera.look_at))
+        moved = float(np.abs(client.camera.position - aimed.eye).max())
+        if moved <= 1e-3 * distance:
+            self.point(client, aimed.view)

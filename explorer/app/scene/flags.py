@@ -1,0 +1,106 @@
+"""Both flags, coloured by the incidences: a point, a line and a plane that hangs from it.
+
+Each element takes the colour of the incidence that it is part of: a1 and the platform
+plane that of κ1, the two lines that of κ2, b4 and the base plane that of κ3.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import viser
+
+from explorer.app.colours import proximity_colour
+from explorer.app.scene.legs import guide_span
+from explorer.app.scene.placing import Placed
+from explorer.app.scene.shapes import Update, cylinder, sphere, turned_to
+from explorer.arrays import FloatArray
+
+POINT_RADIUS = 0.36
+LINE_RADIUS = 0.075
+PLANE_OPACITY = 0.2
+ALONG_X = turned_to(np.array([[1.0, 0.0, 0.0]]))[0]
+
+
+class Flag:
+    """One flag in its own frame: the point at the origin, the line along x."""
+
+    def __init__(self, scene: viser.SceneApi, root: str, kappas: tuple[int, int, int]) -> None:
+        # Which margin colours the point, the line and the plane.
+        self._kappas = kappas
+        self._point = scene.add_mesh_simple(
+            f"{root}/flag/point", *sphere(), scale=POINT_RADIUS, cast_shadow=False
+        )
+        self._line = scene.add_mesh_simple(
+            f"{root}/flag/line", *cylinder(), wxyz=ALONG_X, cast_shadow=False
+        )
+        self._plane = scene.add_mesh_simple(
+            f"{root}/flag/plane",
+            np.zeros((4, 3)),
+            np.array([[0, 1, 2], [0, 2, 3]]),
+            opacity=PLANE_OPACITY,
+            side="double",
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+        self._hem = scene.add_line_segments(
+            f"{root}/flag/hem",
+            np.zeros((4, 2, 3)),
+            (0, 0, 0),
+            thickness=1.5,
+            thickness_units="screen",
+        )
+
+    def updates(
+        self, placed: Placed, line: tuple[float, float], hang: float, size: float
+    ) -> Iterator[Update]:
+        """Yield what draws it with the line over an x range and the plane hanging to y."""
+        state = placed.frame.state
+        margins = placed.frame.snapshot.margins
+        point, along, plane = (
+            proximity_colour(float(margins[k]), state.warn_below) for k in self._kappas
+        )
+        low, high = line
+        corners = np.array([[low, 0, 0], [high, 0, 0], [high, hang, 0], [low, hang, 0]], float)
+        for handle in (self._point, self._line, self._plane, self._hem):
+            yield handle, "visible", state.view.flags
+        yield self._point, "color", point
+        yield self._point, "scale", POINT_RADIUS * size
+        yield self._line, "color", along
+        yield self._line, "position", (low, 0.0, 0.0)
+        yield self._line, "scale", (LINE_RADIUS * size, LINE_RADIUS * size, high - low)
+        yield self._plane, "color", plane
+        yield self._plane, "vertices", corners.astype(np.float32)
+        yield self._hem, "points", _outline(corners).astype(np.float32)
+        yield self._hem, "colors", np.tile(np.array(plane, dtype=np.uint8), (4, 2, 1))
+
+
+class Flags:
+    """The base's flag and the platform's."""
+
+    def __init__(self, scene: viser.SceneApi) -> None:
+        self._base = Flag(scene, "/base", kappas=(0, 1, 2))
+        self._platform = Flag(scene, "/platform", kappas=(2, 1, 0))
+
+    def updates(self, placed: Placed) -> Iterator[Update]:
+        """Yield what draws the flags of this frame."""
+        low, high = guide_span(placed)
+        hang = 1.2 * float(placed.points["a3"][1])
+        yield from self._base.updates(placed, (low - 1.0, high + 1.0), hang, 1.0)
+
+        local = placed.platform_points
+        stations = [float(local[name][0]) for name in ("b1", "b2", "b3", "b4")]
+        beyond = 0.16 * placed.reach
+        side = float(local["b1"][1])
+        hang = side + np.copysign(0.5 * beyond, side)
+        yield from self._platform.updates(
+            placed,
+            (min(stations) - beyond, max(stations) + beyond),
+            hang,
+            max(0.6, placed.thickness),
+        )
+
+
+def _outline(corners: FloatArray) -> FloatArray:
+    return np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)

@@ -1,0 +1,81 @@
+"""From design units to the scene, where every mechanism is about ten units large.
+
+The scale follows the design as it was opened and not its sliders, so that a growing
+design is seen to grow. It is 1, 2 or 5 times a power of ten: grid cells are round numbers.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from explorer.app.state import Frame, State
+from explorer.arrays import FloatArray
+
+# What the reach of a design measures in the scene, roughly.
+SCENE_REACH = 10.0
+
+
+def round_step(length: float) -> float:
+    """Return the 1, 2 or 5 times a power of ten that is nearest in ratio to a length."""
+    power = 10.0 ** math.floor(math.log10(length))
+    return min(
+        (factor * power for factor in (1.0, 2.0, 5.0, 10.0)),
+        key=lambda step: abs(math.log(step / length)),
+    )
+
+
+def scene_scale(state: State) -> float:
+    """Return scene units per design unit."""
+    return 1.0 / round_step(state.base.reach / SCENE_REACH)
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A frame with its points in scene units."""
+
+    frame: Frame
+
+    @cached_property
+    def scale(self) -> float:
+        """Scene units per design unit."""
+        return scene_scale(self.frame.state)
+
+    @cached_property
+    def points(self) -> dict[str, FloatArray]:
+        """a1 … b4 in the scene, each (3,)."""
+        return {n: self.scale * p for n, p in self.frame.snapshot.points._asdict().items()}
+
+    @cached_property
+    def platform_points(self) -> dict[str, FloatArray]:
+        """b1 … b4 in the platform frame, in scene units, each (3,)."""
+        design = self.frame.state.design
+        local = {
+            "b1": (*design.b1, 0.0),
+            "b2": (design.b2, 0.0, 0.0),
+            "b3": (design.b3, 0.0, 0.0),
+            "b4": (0.0, 0.0, 0.0),
+        }
+        return {name: self.scale * np.array(point) for name, point in local.items()}
+
+    @cached_property
+    def reach(self) -> float:
+        """|a3| in the scene."""
+        return self.scale * self.frame.state.design.reach
+
+    @cached_property
+    def thickness(self) -> float:
+        """How thick parts are drawn: 1, and less where the platform's points are close."""
+        points = np.array(list(self.platform_points.values()))
+        gaps = np.linalg.norm(points[:, None] - points, axis=2)[np.triu_indices(4, 1)]
+        # b4 and b2 or b3 may coincide; the legs then simply share a joint.
+        apart = gaps[gaps > 0.05]
+        return float(np.clip(apart.min(initial=1.2) / 1.2, 0.3, 1.0))
+
+    @cached_property
+    def facing(self) -> float:
+        """On which side of the platform plane its body lies: away from a1 at home."""
+        return 1.0 if self.frame.state.mode & 4 == 0 else -1.0

@@ -1,0 +1,170 @@
+"""Primitive meshes, and nodes that hold many of one kind and move in one message.
+
+viser is slow with many nodes and fast with one that is instanced, so rods, balls and
+boxes are each one node however many there are.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterator
+from typing import Any, TypeAlias
+
+import numpy as np
+import viser
+
+from explorer.app.colours import Rgb
+from explorer.arrays import FloatArray, IntArray
+
+Update: TypeAlias = tuple[Any, str, object]
+"""A handle, the property to assign, and its value: computed first, assigned together."""
+
+Mesh: TypeAlias = tuple[FloatArray, IntArray]
+
+SECTIONS = 28
+
+
+class Instances:
+    """Many copies of one mesh in one node, each with its own place, size and colour."""
+
+    def __init__(
+        self,
+        scene: viser.SceneApi,
+        name: str,
+        mesh: Mesh,
+        colours: list[Rgb],
+        *,
+        opacity: float | None = None,
+        cast_shadow: bool = True,
+    ) -> None:
+        count = len(colours)
+        vertices, faces = mesh
+        self.handle = scene.add_batched_meshes_simple(
+            name,
+            vertices,
+            faces,
+            batched_wxyzs=np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)),
+            batched_positions=np.zeros((count, 3)),
+            batched_scales=np.ones((count, 3)),
+            batched_colors=np.array(colours, dtype=np.uint8),
+            opacity=opacity,
+            cast_shadow=cast_shadow,
+            lod="off",
+        )
+
+    def placed(
+        self, positions: FloatArray, wxyzs: FloatArray, scales: FloatArray
+    ) -> Iterator[Update]:
+        """Yield what puts the copies there; shapes (n, 3), (n, 4), (n, 3)."""
+        yield self.handle, "batched_positions", positions.astype(np.float32)
+        yield self.handle, "batched_wxyzs", wxyzs.astype(np.float32)
+        yield self.handle, "batched_scales", scales.astype(np.float32)
+
+    def shown(self, visible: bool) -> Iterator[Update]:
+        """Yield what shows or hides all of them."""
+        yield self.handle, "visible", visible
+
+
+class Rods(Instances):
+    """Cylinders between pairs of points."""
+
+    def __init__(self, scene: viser.SceneApi, name: str, colours: list[Rgb]) -> None:
+        super().__init__(scene, name, cylinder(), colours)
+
+    def between(self, starts: FloatArray, ends: FloatArray, radii: FloatArray) -> Iterator[Update]:
+        """Yield what lays the cylinders from starts (n, 3) to ends (n, 3)."""
+        spans = ends - starts
+        lengths = np.linalg.norm(spans, axis=1)
+        scales = np.stack([radii, radii, np.maximum(lengths, 1e-9)], axis=1)
+        yield from self.placed(starts, turned_to(spans), scales)
+
+
+class Balls(Instances):
+    """Spheres."""
+
+    def __init__(self, scene: viser.SceneApi, name: str, colours: list[Rgb]) -> None:
+        super().__init__(scene, name, sphere(), colours)
+
+    def at(self, centres: FloatArray, radii: FloatArray) -> Iterator[Update]:
+        """Yield what puts the spheres at centres (n, 3)."""
+        upright = np.tile([1.0, 0.0, 0.0, 0.0], (len(centres), 1))
+        yield from self.placed(centres, upright, np.repeat(radii[:, None], 3, axis=1))
+
+
+class Boxes(Instances):
+    """Boxes along the axes."""
+
+    def __init__(self, scene: viser.SceneApi, name: str, colours: list[Rgb]) -> None:
+        super().__init__(scene, name, box(), colours)
+
+    def spanning(self, lows: FloatArray, highs: FloatArray) -> Iterator[Update]:
+        """Yield what spans the boxes from lows (n, 3) to highs (n, 3)."""
+        upright = np.tile([1.0, 0.0, 0.0, 0.0], (len(lows), 1))
+        yield from self.placed(0.5 * (lows + highs), upright, highs - lows)
+
+
+def turned_to(directions: FloatArray) -> FloatArray:
+    """Return quaternions (n, 4) that turn the z-axis to directions (n, 3)."""
+    lengths = np.linalg.norm(directions, axis=1, keepdims=True)
+    unit = np.divide(
+        directions, lengths, out=np.tile([0.0, 0.0, 1.0], (len(lengths), 1)), where=lengths > 0.0
+    )
+    wxyz = np.stack([1.0 + unit[:, 2], -unit[:, 1], unit[:, 0], np.zeros(len(unit))], axis=1)
+    wxyz[unit[:, 2] < -1.0 + 1e-12] = (0.0, 1.0, 0.0, 0.0)
+    return wxyz / np.linalg.norm(wxyz, axis=1, keepdims=True)
+
+
+@functools.cache
+def cylinder() -> Mesh:
+    """Return the cylinder of radius one from z = 0 to z = 1, its rim with sharp edges."""
+    angles = np.linspace(0.0, 2.0 * np.pi, SECTIONS, endpoint=False)
+    ring = np.stack([np.cos(angles), np.sin(angles), np.zeros(SECTIONS)], axis=1)
+    top = ring + [0.0, 0.0, 1.0]
+    # Each rim stands twice, so that caps and mantle keep their own normals.
+    vertices = np.concatenate([ring, top, ring, top])
+    i = np.arange(SECTIONS)
+    j = (i + 1) % SECTIONS
+    mantle = np.concatenate(
+        [np.stack([i, j, SECTIONS + j], 1), np.stack([i, SECTIONS + j, SECTIONS + i], 1)]
+    )
+    fan = np.stack([np.zeros(SECTIONS - 2, int), i[1:-1], i[2:]], axis=1)
+    bottom_cap = 2 * SECTIONS + fan[:, ::-1]
+    top_cap = 3 * SECTIONS + fan
+    return vertices, np.concatenate([mantle, bottom_cap, top_cap])
+
+
+@functools.cache
+def sphere() -> Mesh:
+    """Return the sphere of radius one."""
+    from trimesh import creation
+
+    untyped: Any = creation
+    mesh = untyped.icosphere(subdivisions=3)
+    return np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int64)
+
+
+@functools.cache
+def box() -> Mesh:
+    """Return the unit cube about the origin."""
+    from trimesh import creation
+
+    untyped: Any = creation
+    return _sharp(untyped.box())
+
+
+def plate(points: FloatArray, radius: float, bottom: float, top: float) -> Mesh:
+    """Return the hull of discs of a radius around points (n, 2), from z = bottom to top."""
+    from trimesh import convex
+
+    angles = np.linspace(0.0, 2.0 * np.pi, 4 * SECTIONS, endpoint=False)
+    disc = radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    outline = (points[:, None, :] + disc).reshape(-1, 2)
+    layers = [np.pad(outline, ((0, 0), (0, 1)), constant_values=z) for z in (bottom, top)]
+    untyped: Any = convex
+    return _sharp(untyped.convex_hull(np.concatenate(layers)))
+
+
+def _sharp(mesh: Any) -> Mesh:
+    """Return the mesh with corners of its own for each triangle, so that edges are sharp."""
+    triangles = np.asarray(mesh.triangles, dtype=np.float64)
+    return triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3)

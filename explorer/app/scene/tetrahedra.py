@@ -1,0 +1,66 @@
+"""The three trilateration tetrahedra: singular is where one of them is flat."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+
+import numpy as np
+import viser
+
+from explorer.app.colours import OUTLINE, proximity_colour
+from explorer.app.scene.placing import Placed
+from explorer.app.scene.shapes import Update
+from explorer.singularity import TETRAHEDRA
+
+FACES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
+EDGES = tuple(itertools.combinations(range(4), 2))
+OPACITY = 0.1
+
+
+class Tetrahedra:
+    """Each translucent in the colour of its margin; one that cannot close is outlined."""
+
+    def __init__(self, scene: viser.SceneApi) -> None:
+        self._meshes = [
+            scene.add_mesh_simple(
+                f"/tetrahedra/{index}/faces",
+                np.zeros((4, 3)),
+                FACES,
+                opacity=OPACITY,
+                side="double",
+                flat_shading=True,
+                cast_shadow=False,
+                receive_shadow=False,
+            )
+            for index in (1, 2, 3)
+        ]
+        self._edges = [
+            scene.add_line_segments(
+                f"/tetrahedra/{index}/edges",
+                np.zeros((6, 2, 3)),
+                (0, 0, 0),
+                thickness=1.5,
+                thickness_units="screen",
+            )
+            for index in (1, 2, 3)
+        ]
+
+    def updates(self, placed: Placed) -> Iterator[Update]:
+        """Yield what draws the tetrahedra of this frame."""
+        state = placed.frame.state
+        failing = state.unclosed.failing if state.unclosed else ()
+        for index, names in enumerate(TETRAHEDRA):
+            margin = float(placed.frame.snapshot.margins[index])
+            fails = index in failing
+            colour = OUTLINE if fails else proximity_colour(margin, state.warn_below)
+            corners = np.array([placed.points[name] for name in names])
+            mesh, edges = self._meshes[index], self._edges[index]
+            shown = state.view.tetrahedra[index]
+            yield mesh, "visible", shown
+            yield edges, "visible", shown or fails
+            yield mesh, "vertices", corners.astype(np.float32)
+            yield mesh, "color", colour
+            yield edges, "points", corners[np.array(EDGES)].astype(np.float32)
+            yield edges, "colors", np.tile(np.array(colour, dtype=np.uint8), (6, 2, 1))
+            yield edges, "thickness", 5.0 if fails else 1.5

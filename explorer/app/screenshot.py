@@ -1,0 +1,163 @@
+"""Pictures of the page or of the scene alone, taken by a headless browser.
+
+The browser is a real one with a software renderer, so the pictures need no display and
+no graphics card, and the README's can be made again by anyone.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from explorer.app.chromium import find_chromium
+from explorer.app.scene.camera import ViewName
+from explorer.app.server import Running, start
+from explorer.design import Design
+from explorer.errors import ExplorerError, MissingExtraError
+from explorer.pose import Pose
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
+
+CHROMIUM_FLAGS = (
+    "--no-sandbox",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--disable-quic",
+    "--no-first-run",
+    "--hide-scrollbars",
+    "--force-color-profile=srgb",
+)
+# A software renderer on a busy machine takes seconds for a large picture.
+PATIENCE_SECONDS = 60.0
+# Whatever neither holds the canvas nor is it.
+SCENE_ALONE = "body *:not(:has(canvas)):not(canvas) { visibility: hidden !important; }"
+
+
+class PictureError(ExplorerError):
+    """The browser did not start or did not draw in time."""
+
+
+def take(
+    design: Design,
+    pose: Pose | None,
+    *,
+    view: ViewName,
+    out: Path,
+    size: tuple[int, int],
+    panels: bool = False,
+    prepare: Callable[[Running], None] | None = None,
+) -> None:
+    """Write a picture of a design in a pose as a PNG file, whole or not at all.
+
+    Args:
+        design: The manipulator.
+        pose: Of its platform; its home pose if None.
+        view: From where to look.
+        out: The file to write.
+        size: Width and height in pixels.
+        panels: Whether to show the page with its panels, rather than the scene alone.
+        prepare: Called with the running explorer before the picture is taken.
+
+    Raises:
+        MissingExtraError: Playwright or a Chromium is missing.
+        PictureError: the browser did not start or did not draw in time.
+    """
+    with headless_browser() as browser:
+        running = start(design, pose, port=0, docked=panels)
+        try:
+            if prepare is not None:
+                prepare(running)
+                running.page.session.wait_until_idle()
+            page = open_page(browser, running, size)
+            if not panels:
+                page.add_style_tag(content=SCENE_ALONE)
+            running.page.point_cameras(view)
+            data = stable_picture(page)
+        finally:
+            running.stop()
+    _write(out, data)
+
+
+@contextmanager
+def headless_browser() -> Generator[Browser]:
+    """Start a headless Chromium and close it in the end.
+
+    Raises:
+        MissingExtraError: Playwright or a Chromium is missing.
+        PictureError: the browser did not start.
+    """
+    try:
+        from playwright.sync_api import Error, sync_playwright
+    except ImportError:
+        raise MissingExtraError(
+            'pictures need the extra "screenshot": pip install "flagged-explorer[screenshot]"'
+        ) from None
+    chromium = find_chromium()
+    if chromium is None:
+        raise MissingExtraError(
+            "pictures need a Chromium: install chromium or google-chrome with the system's "
+            "package manager, or run: playwright install chromium"
+        )
+    with sync_playwright() as playwright:
+        try:
+            browser = playwright.chromium.launch(
+                executable_path=chromium, args=list(CHROMIUM_FLAGS)
+            )
+        except Error as error:
+            reason = str(error).splitlines()[0]
+            raise PictureError(f"the browser {chromium} did not start: {reason}") from None
+        try:
+            yield browser
+        finally:
+            browser.close()
+
+
+def open_page(browser: Browser, running: Running, size: tuple[int, int]) -> Page:
+    """Open the explorer in a new tab and wait until it is connected."""
+    known = set(running.viser.get_clients())
+    page = browser.new_page(viewport={"width": size[0], "height": size[1]})
+    page.goto(running.url)
+    # viser tells of software rendering; a picture is not the place for it.
+    page.add_style_tag(content=".mantine-Notifications-root { display: none !important; }")
+    deadline = time.monotonic() + PATIENCE_SECONDS
+    while not set(running.viser.get_clients()) - known:
+        if time.monotonic() > deadline:
+            raise PictureError("the page did not connect to the explorer in time")
+        page.wait_for_timeout(50)
+    return page
+
+
+def stable_picture(page: Page) -> bytes:
+    """Return a PNG of the page once two in a row are the same.
+
+    Raises:
+        PictureError: it keeps changing.
+    """
+    deadline = time.monotonic() + PATIENCE_SECONDS
+    # The page fades in; what is the same before that is not done.
+    page.wait_for_timeout(1500)
+    last = page.screenshot()
+    while time.monotonic() < deadline:
+        page.wait_for_timeout(400)
+        data = page.screenshot()
+        if data == last:
+            return data
+        last = data
+    raise PictureError("the page did not come to rest in time")
+
+
+def _write(out: Path, data: bytes) -> None:
+    partial = out.with_name(f".{out.name}.part")
+    try:
+        partial.write_bytes(data)
+        partial.replace(out)
+    except OSError as error:
+        partial.unlink(missing_ok=True)
+        raise PictureError(f"cannot write {str(out)!r}: {error.strerror}") from None

@@ -1,0 +1,157 @@
+"""The state of the application, a frozen value, and the frame that is drawn from it.
+
+There is one state for the whole server, shared by every tab. It changes through one
+door, `explorer.app.session`, by the actions of `explorer.app.actions`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from explorer.design import JOINTS, Design
+from explorer.home import home_pose
+from explorer.kinematics import inverse
+from explorer.pose import Pose, Triple, yaw_pitch_roll_from_rotation
+from explorer.singularity import TETRAHEDRA, margins, mode_of
+from explorer.snapshot import Snapshot, evaluate
+
+Joints = tuple[float, float, float, float, float, float]
+Hold = Literal["pose", "legs"]
+
+# Unless told otherwise, margins below this share of the reach are warned of.
+WARN_SHARE = 0.05
+
+
+@dataclass(frozen=True)
+class View:
+    """What is shown, and how.
+
+    Attributes:
+        flags, bodies, legs, labels, grid, handle: Whether each is drawn.
+        tetrahedra: Whether each of the three is drawn.
+        ghosts: Whether the seven other assembly modes are drawn.
+        twin: Whether the 6-4 twin's six legs replace the four.
+        warn_below: Margins below this length are warned of, in design units; None for a
+            share of the reach.
+    """
+
+    flags: bool = True
+    bodies: bool = True
+    legs: bool = True
+    labels: bool = True
+    grid: bool = True
+    handle: bool = True
+    tetrahedra: tuple[bool, bool, bool] = (True, True, True)
+    ghosts: bool = False
+    twin: bool = False
+    warn_below: float | None = None
+
+
+@dataclass(frozen=True)
+class Unclosed:
+    """Joints that were asked for and cannot close; the mechanism keeps its last pose.
+
+    Attributes:
+        joint: Index of the joint that was moved.
+        asked: The value it was moved to.
+        nearest: The nearest value that closes, the others as they are; None if none is.
+        failing: Which of the three trilaterations have no solution, 0 to 2.
+    """
+
+    joint: int
+    asked: float
+    nearest: float | None
+    failing: tuple[int, ...]
+
+    def __str__(self) -> str:
+        which = " and ".join(" ".join(TETRAHEDRA[i]) for i in self.failing)
+        kind = "tetrahedron" if len(self.failing) == 1 else "tetrahedra"
+        advice = (
+            f"the nearest value that works is {self.nearest:.6g}"
+            if self.nearest is not None
+            else "with the other legs as they are, no value works"
+        )
+        name = JOINTS[self.joint]
+        return f"{name} = {self.asked:.6g} cannot close the {kind} {which}; {advice}."
+
+
+@dataclass(frozen=True)
+class State:
+    """Everything that the page shows follows from this.
+
+    Attributes:
+        design: The manipulator.
+        base: The design as it was opened, to which reset returns.
+        pose: The last pose that closes.
+        yaw_pitch_roll: Its angles in degrees, kept as they were given.
+        joints: As asked for; those of the pose unless `unclosed` says otherwise.
+        mode: The assembly mode; at a singular pose the one it came from.
+        hold: What stays when the design changes.
+        unclosed: Why the joints asked for do not close, if they do not.
+        view: What is shown.
+    """
+
+    design: Design
+    base: Design
+    pose: Pose
+    yaw_pitch_roll: Triple
+    joints: Joints
+    mode: int
+    hold: Hold = "pose"
+    unclosed: Unclosed | None = None
+    view: View = field(default_factory=View)
+
+    @property
+    def warn_below(self) -> float:
+        """The length below which margins are warned of, in design units."""
+        given = self.view.warn_below
+        return WARN_SHARE * self.design.reach if given is None else given
+
+
+def opened(design: Design, pose: Pose | None = None, view: View | None = None) -> State:
+    """Return the state in which a design opens: in its home pose unless told otherwise."""
+    at = home_pose(design) if pose is None else pose
+    return State(
+        design=design,
+        base=design,
+        pose=at,
+        yaw_pitch_roll=angles_of(at),
+        joints=joints_of(design, at),
+        mode=mode_at(at, previous=0),
+        view=view or View(),
+    )
+
+
+def joints_of(design: Design, pose: Pose) -> Joints:
+    """Return the joints of a pose as plain numbers."""
+    l1, d1, d2, d3, d4, l4 = inverse(design, pose.position, pose.rotation).tolist()
+    return (l1, d1, d2, d3, d4, l4)
+
+
+def angles_of(pose: Pose) -> Triple:
+    """Return yaw, pitch and roll of a pose in degrees as plain numbers."""
+    yaw, pitch, roll = yaw_pitch_roll_from_rotation(pose.rotation).tolist()
+    return (yaw, pitch, roll)
+
+
+def mode_at(pose: Pose, previous: int) -> int:
+    """Return the mode of a pose; a margin that is exactly zero keeps its previous sign."""
+    margin = margins(pose.position, pose.rotation)
+    bits = np.where(margin == 0.0, previous & np.array([4, 2, 1]), 0).sum()
+    return int(mode_of(margin)) | int(bits)
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A state and what follows from it: all that scene and panels need to draw."""
+
+    state: State
+
+    @cached_property
+    def snapshot(self) -> Snapshot:
+        """The design in its pose."""
+        return evaluate(self.state.design, self.state.pose)

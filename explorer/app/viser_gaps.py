@@ -1,0 +1,33 @@
+"""What viser does but offers no public name for; every private name of it is in here."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+from typing import Any
+
+import viser
+
+Mark = tuple[float, str]
+
+
+def start_viser(host: str, port: int) -> viser.ViserServer:
+    """Return a running server, without the banner that viser prints to standard output."""
+    with contextlib.redirect_stdout(io.StringIO()):
+        return viser.ViserServer(host=host, port=port, verbose=False)
+
+
+def set_marks(slider: viser.GuiSliderHandle[float], marks: tuple[Mark, ...]) -> None:
+    """Put other marks below a slider; its constructor takes them, its handle does not."""
+    from viser import _messages
+
+    handle: Any = slider
+    handle._marks = tuple(_messages.GuiSliderMark(value, label) for value, label in marks)
+
+
+def refuse_tunnels(server: viser.ViserServer) -> None:
+    """Ignore every request for a public tunnel; viser opens one for any client that asks."""
+    from viser import _messages
+
+    internals: Any = server
+    internals._websock_server.unregister_handler(_messages.ShareUrlRequest)
