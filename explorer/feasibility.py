@@ -28,7 +28,7 @@ def feasible_intervals(design: Design, joints: FloatArray) -> tuple[tuple[Interv
         design: The manipulator.
         joints: (l1, d1, d2, d3, d4, l4), shape (6,); for each joint the other five count.
     """
-    held = checked_joints(joints)
+    held = checked_joints(design, joints)
     # Dividing by the largest length keeps the roots near one, whatever the units.
     scale = max(map(abs, (*design.variables, *held.tolist())))
     polynomials = _discriminants(design, held / scale, scale)

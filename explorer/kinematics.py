@@ -17,6 +17,9 @@ from explorer.errors import InputError
 from explorer.pose import checked_rotation
 from explorer.trilateration import solve_rows
 
+# Beyond this multiple of the design's size its points are one point in double precision.
+LARGEST_RATIO = 1e15
+
 
 class AttachmentPoints(NamedTuple):
     """The attachment points in the base frame, each of shape (..., 3), in design units."""
@@ -107,7 +110,7 @@ def forward(design: Design, joints: ArrayLike) -> ForwardKinematics:
         joints: (l1, d1, d2, d3, d4, l4), shape (..., 6), in design units.
 
     Raises:
-        InputError: not six finite numbers, or a negative length.
+        InputError: not six finite numbers, a negative length, or one beyond precision.
     """
     position, rotation, feasible, _ = _solve(design, joints)
     return ForwardKinematics(position, rotation, feasible)
@@ -120,16 +123,17 @@ def discriminants(design: Design, joints: ArrayLike) -> FloatArray:
     trilateration that fails, and by how much.
 
     Raises:
-        InputError: not six finite numbers, or a negative length.
+        InputError: not six finite numbers, a negative length, or one beyond precision.
     """
     return _solve(design, joints)[3]
 
 
-def checked_joints(joints: ArrayLike) -> FloatArray:
-    """Return joints (..., 6) once they are known to be finite, and the lengths not negative.
+def checked_joints(design: Design, joints: ArrayLike) -> FloatArray:
+    """Return joints (..., 6) once they are known to be usable.
 
     Raises:
-        InputError: they are not.
+        InputError: not six finite numbers, a negative length, or so large that double
+            precision cannot tell the design's points apart.
     """
     array = finite_array(f"joints ({', '.join(JOINTS)})", joints, (6,))
     for index, name in enumerate(JOINTS):
@@ -138,13 +142,19 @@ def checked_joints(joints: ArrayLike) -> FloatArray:
                 f"{name} is a length and must not be negative; "
                 f"got {float(array[..., index].min()):g}"
             )
+    largest = LARGEST_RATIO * max(map(abs, design.variables))
+    if (np.abs(array) > largest).any():
+        raise InputError(
+            f"joints must not exceed {LARGEST_RATIO:g} times the largest design variable, "
+            f"{largest:g}; got {float(np.abs(array).max()):g}"
+        )
     return array
 
 
 def _solve(
     design: Design, joints: ArrayLike
 ) -> tuple[FloatArray, FloatArray, BoolArray, FloatArray]:
-    q = checked_joints(joints)
+    q = checked_joints(design, joints)
     batch = q.shape[:-1]
     rows = np.ascontiguousarray(q.reshape(-1, 6))
     count = len(rows)

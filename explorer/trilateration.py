@@ -146,10 +146,15 @@ def solve_rows(  # noqa: PLR0915 - one loop body, so that nothing is stored betw
 
             # e: from the line b2b3 to a1, backwards; f: the same turned about u.
             ex, ey, ez = px - along * c, py - along * uy, pz - along * uz
-            h = math.sqrt(ex * ex + ey * ey + ez * ez)
+            rough = ex * ex + ey * ey + ez * ez
+            # Near the line cancellation leaves e leaning along u, so project once more.
+            lean = ex * c + ey * uy + ez * uz
+            ex, ey, ez = ex - lean * c, ey - lean * uy, ez - lean * uz
+            square_h = ex * ex + ey * ey + ez * ez
             cosine, sine = 1.0, 0.0
-            if h > 0.0:
-                inverse = 1.0 / h
+            # If little is left e was all rounding: a1 is on the line, any normal of u does.
+            if square_h > 0.25 * rough:
+                inverse = 1.0 / math.sqrt(square_h)
                 ex, ey, ez = ex * inverse, ey * inverse, ez * inverse
                 cosine = min(1.0, max(-1.0, across * inverse))
                 sine = math.sqrt((1.0 - cosine) * (1.0 + cosine))
