@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -45,7 +47,9 @@ class Screenshot(JsonOptions, PoseOptions, DesignOptions):
         pose = self.pose(design)
         from explorer.app.screenshot import take
 
-        take(design, pose, view=self.view, out=self.out, size=self.size, panels=self.panels)
+        # Standard output belongs to the answer; viser reports there when a server stops.
+        with contextlib.redirect_stdout(io.StringIO()):
+            take(design, pose, view=self.view, out=self.out, size=self.size, panels=self.panels)
         if self.json:
             write_json({"file": str(self.out), "size": list(self.size)})
         else:

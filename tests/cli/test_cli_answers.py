@@ -221,3 +221,27 @@ def test_forward_for_people_has_a_row_for_each_mode(capsys: pytest.CaptureFixtur
     rows = [line.split() for line in capsys.readouterr().out.splitlines()]
     assert [row[0] for row in rows[-8:]] == list("01234567")
     assert [float(value) for value in rows[-8 + snapshot().mode][4:7]] == pytest.approx(POSITION)
+
+
+@pytest.mark.parametrize("form", [[], ["--json"]])
+def test_what_libraries_report_stays_out_of_the_answer(
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    form: list[str],
+) -> None:
+    def chatty(design: object, pose: explorer.Pose, **options: object) -> None:
+        print("(a library) did this")
+        assert pose.position == POSITION
+        assert options == {"view": "top", "out": out, "size": (640, 480), "panels": True}
+
+    out = tmp_path / "shot.png"
+    monkeypatch.setattr("explorer.app.screenshot.take", chatty)
+    words = ["--view", "top", "--out", str(out), "--size", "640x480", "--panels"]
+    assert run(["screenshot", *POSE, *words, *form]) == 0
+    captured = capsys.readouterr()
+    assert captured.err == ""
+    if form:
+        assert json.loads(captured.out) == {"file": str(out), "size": [640, 480]}
+    else:
+        assert captured.out == f"{out}\n"
