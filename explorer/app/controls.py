@@ -14,10 +14,10 @@ from typing import Any, Generic, TypeVar
 import viser
 
 from explorer.app.actions import Action
-from explorer.app.scene.shapes import Update
+from explorer.app.assigning import Update
 from explorer.app.session import Session
 from explorer.app.state import Frame, State
-from explorer.app.viser_gaps import Mark, set_marks
+from explorer.app.viser_gaps import Mark, MarksOf
 
 Value = TypeVar("Value", float, bool, str)
 
@@ -101,7 +101,7 @@ class Slider(Control[float]):
         self._slider = handle
         self._span = span
         self._marks = marks
-        self._marked: tuple[Mark, ...] | None = None
+        self._marks_of = MarksOf(handle)
 
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield what makes the slider show the frame, its range and marks first."""
@@ -113,10 +113,7 @@ class Slider(Control[float]):
         yield self._slider, "step", span.step
         yield self._slider, "precision", decimals(span.step)
         if self._marks is not None:
-            marks = self._marks(frame)
-            if marks != self._marked:
-                self._marked = marks
-                yield set_marks, "call", (self._slider, marks)
+            yield self._marks_of, "marks", self._marks(frame)
         yield from super().updates(frame)
 
 

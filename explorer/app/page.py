@@ -5,12 +5,13 @@ from __future__ import annotations
 import sys
 import time
 import traceback
-from typing import cast, get_args
+from typing import get_args
 
 import numpy as np
 import viser
 
 from explorer.app.actions import SetPose
+from explorer.app.assigning import Assigner
 from explorer.app.panels.design import DesignPanel
 from explorer.app.panels.move import MovePanel
 from explorer.app.panels.singularity import SingularityPanel
@@ -18,10 +19,8 @@ from explorer.app.panels.view import ViewPanel
 from explorer.app.scene import Scene
 from explorer.app.scene.camera import Cameras, ViewName, framing
 from explorer.app.scene.placing import Placed, scene_scale
-from explorer.app.scene.shapes import Update
 from explorer.app.session import Session, Who
 from explorer.app.state import Frame, State
-from explorer.app.viser_gaps import set_marks
 from explorer.pose import Pose
 
 TITLE = "Flagged 4-4 explorer"
@@ -44,6 +43,7 @@ class Page:
         self._server = server
         self._complained: dict[str, float] = {}
         self._frame = Frame(state)
+        self._assigner = Assigner(server)
         self.session = Session(state, self._draw, self._complain, self._report)
         gui = server.gui
         gui.configure_theme(
@@ -97,10 +97,7 @@ class Page:
         for panel in self._panels:
             updates.extend(panel.updates(frame))
         self._frame = frame
-        # Nothing is computed in here: the block holds up every browser.
-        with self._server.atomic():
-            for update in updates:
-                _assign(update)
+        self._assigner.assign(updates)
 
     def _dragged(self, event: viser.TransformControlsEvent) -> None:
         if event.client_id is None:
@@ -140,13 +137,3 @@ class Page:
     def _report(self, error: Exception) -> None:
         traceback.print_exception(error, file=sys.stderr)
         self._complain(f"Something went wrong in the explorer itself: {error}", None)
-
-
-def _assign(update: Update) -> None:
-    handle, name, value = update
-    if handle is set_marks:
-        set_marks(
-            *cast("tuple[viser.GuiSliderHandle[float], tuple[tuple[float, str], ...]]", value)
-        )
-    else:
-        setattr(handle, name, value)

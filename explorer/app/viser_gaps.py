@@ -17,12 +17,22 @@ def start_viser(host: str, port: int) -> viser.ViserServer:
         return viser.ViserServer(host=host, port=port, verbose=False)
 
 
-def set_marks(slider: viser.GuiSliderHandle[float], marks: tuple[Mark, ...]) -> None:
-    """Put other marks below a slider; its constructor takes them, its handle does not."""
-    from viser import _messages
+class MarksOf:
+    """The marks below a slider: its constructor takes them, its handle does not."""
 
-    handle: Any = slider
-    handle._marks = tuple(_messages.GuiSliderMark(value, label) for value, label in marks)
+    def __init__(self, slider: viser.GuiSliderHandle[float]) -> None:
+        self._slider: Any = slider
+
+    @property
+    def marks(self) -> tuple[Mark, ...]:
+        """Position and label of each mark."""
+        return tuple((mark.value, mark.label) for mark in self._slider._marks)
+
+    @marks.setter
+    def marks(self, marks: tuple[Mark, ...]) -> None:
+        from viser import _messages
+
+        self._slider._marks = tuple(_messages.GuiSliderMark(value, label) for value, label in marks)
 
 
 def refuse_tunnels(server: viser.ViserServer) -> None:

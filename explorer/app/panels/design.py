@@ -9,9 +9,9 @@ import msgspec
 import viser
 
 from explorer.app.actions import Action, Open, Reset, SetHold, SetLimits, SetUnit, SetVariable
+from explorer.app.assigning import Update
 from explorer.app.controls import Controls
 from explorer.app.panels.ranges import coordinate_span, length_span, variable_span
-from explorer.app.scene.shapes import Update
 from explorer.app.session import Session
 from explorer.app.state import Frame, Hold, State
 from explorer.design import LENGTHS, VARIABLES, Design, Limits, Pair, Range

@@ -17,10 +17,10 @@ from explorer.app.actions import (
     SetView,
     UseNearest,
 )
+from explorer.app.assigning import Update
 from explorer.app.controls import Controls, Span
 from explorer.app.panels.html import alert
 from explorer.app.panels.ranges import coordinate_span, length_span
-from explorer.app.scene.shapes import Update
 from explorer.app.session import Session
 from explorer.app.state import Frame, State
 from explorer.app.viser_gaps import Mark

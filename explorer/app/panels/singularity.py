@@ -9,10 +9,10 @@ from html import escape
 import viser
 
 from explorer.app.actions import SetView
+from explorer.app.assigning import Update
 from explorer.app.colours import CLEAR, FAR, FAR_WARNINGS, SINGULAR, WARNED, css, proximity_colour
 from explorer.app.controls import Controls
 from explorer.app.panels.html import DIM, scientific, signed
-from explorer.app.scene.shapes import Update
 from explorer.app.session import Session
 from explorer.app.state import Frame
 from explorer.singularity import INCIDENCES, mode_name

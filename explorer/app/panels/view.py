@@ -8,8 +8,8 @@ from dataclasses import replace
 import viser
 
 from explorer.app.actions import SetView
+from explorer.app.assigning import Update
 from explorer.app.controls import Controls
-from explorer.app.scene.shapes import Update
 from explorer.app.session import Session
 from explorer.app.state import Frame
 from explorer.singularity import TETRAHEDRA

@@ -11,12 +11,12 @@ from typing import Protocol
 
 import viser
 
+from explorer.app.assigning import Update
 from explorer.app.scene.bodies import Bodies
 from explorer.app.scene.flags import Flags
 from explorer.app.scene.legs import Legs, TwinLegs
 from explorer.app.scene.marks import DragHandle, Ghosts, Labels
 from explorer.app.scene.placing import Placed
-from explorer.app.scene.shapes import Update
 from explorer.app.scene.tetrahedra import Tetrahedra
 
 

@@ -7,10 +7,11 @@ from collections.abc import Iterator
 import numpy as np
 import viser
 
+from explorer.app.assigning import Update
 from explorer.app.colours import BASE_BODY, PLATFORM_BODY
 from explorer.app.scene.legs import PLATE_TOP
 from explorer.app.scene.placing import Placed
-from explorer.app.scene.shapes import Mesh, Update, plate
+from explorer.app.scene.shapes import Mesh, plate
 
 PLATE_THICKNESS = 0.22
 PLATFORM_THICKNESS = 0.2

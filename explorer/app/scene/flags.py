@@ -11,10 +11,11 @@ from collections.abc import Iterator
 import numpy as np
 import viser
 
+from explorer.app.assigning import Update
 from explorer.app.colours import proximity_colour
 from explorer.app.scene.legs import guide_span
 from explorer.app.scene.placing import Placed
-from explorer.app.scene.shapes import Update, cylinder, sphere, turned_to
+from explorer.app.scene.shapes import cylinder, sphere, turned_to
 from explorer.arrays import FloatArray
 
 POINT_RADIUS = 0.36

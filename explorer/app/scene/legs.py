@@ -11,9 +11,10 @@ from collections.abc import Iterator
 import numpy as np
 import viser
 
+from explorer.app.assigning import Update
 from explorer.app.colours import BALL, CARRIAGE, JOINT, RAIL, ROD, TUBE
 from explorer.app.scene.placing import Placed
-from explorer.app.scene.shapes import Balls, Boxes, Rods, Update
+from explorer.app.scene.shapes import Balls, Boxes, Rods
 from explorer.arrays import FloatArray
 
 TWIN = (("a1", "b1"), ("a1", "b2"), ("a1", "b3"), ("a2", "b2"), ("a2", "b3"), ("a3", "b4"))

@@ -7,10 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 import viser
 
+from explorer.app.assigning import Update
 from explorer.app.colours import GHOST
 from explorer.app.scene.bodies import platform_plate
 from explorer.app.scene.placing import Placed
-from explorer.app.scene.shapes import Update
 from explorer.arrays import FloatArray
 from explorer.pose import quaternion_from_rotation
 from explorer.singularity import mode_name

@@ -12,12 +12,11 @@ from typing import Any, TypeAlias
 
 import numpy as np
 import viser
+from scipy.spatial import ConvexHull
 
+from explorer.app.assigning import Update
 from explorer.app.colours import Rgb
 from explorer.arrays import FloatArray, IntArray
-
-Update: TypeAlias = tuple[Any, str, object]
-"""A handle, the property to assign, and its value: computed first, assigned together."""
 
 Mesh: TypeAlias = tuple[FloatArray, IntArray]
 
@@ -149,22 +148,26 @@ def box() -> Mesh:
     from trimesh import creation
 
     untyped: Any = creation
-    return _sharp(untyped.box())
+    return _sharp(np.asarray(untyped.box().triangles, dtype=np.float64))
 
 
 def plate(points: FloatArray, radius: float, bottom: float, top: float) -> Mesh:
     """Return the hull of discs of a radius around points (n, 2), from z = bottom to top."""
-    from trimesh import convex
-
-    angles = np.linspace(0.0, 2.0 * np.pi, 4 * SECTIONS, endpoint=False)
+    angles = np.linspace(0.0, 2.0 * np.pi, 2 * SECTIONS, endpoint=False)
     disc = radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)
     outline = (points[:, None, :] + disc).reshape(-1, 2)
-    layers = [np.pad(outline, ((0, 0), (0, 1)), constant_values=z) for z in (bottom, top)]
-    untyped: Any = convex
-    return _sharp(untyped.convex_hull(np.concatenate(layers)))
+    rim = outline[ConvexHull(outline).vertices]
+    count = len(rim)
+    low, high = (np.pad(rim, ((0, 0), (0, 1)), constant_values=z) for z in (bottom, top))
+    i = np.arange(count)
+    j = (i + 1) % count
+    wall = np.concatenate([np.stack([i, j, count + j], 1), np.stack([i, count + j, count + i], 1)])
+    fan = np.stack([np.zeros(count - 2, int), i[1:-1], i[2:]], axis=1)
+    corners = np.concatenate([low, high])
+    faces = np.concatenate([wall, fan[:, ::-1], count + fan])
+    return _sharp(corners[faces])
 
 
-def _sharp(mesh: Any) -> Mesh:
-    """Return the mesh with corners of its own for each triangle, so that edges are sharp."""
-    triangles = np.asarray(mesh.triangles, dtype=np.float64)
+def _sharp(triangles: FloatArray) -> Mesh:
+    """Return triangles (n, 3, 3) as a mesh with corners of their own, so that edges are sharp."""
     return triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3)

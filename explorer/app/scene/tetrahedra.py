@@ -8,9 +8,9 @@ from collections.abc import Iterator
 import numpy as np
 import viser
 
+from explorer.app.assigning import Update
 from explorer.app.colours import OUTLINE, proximity_colour
 from explorer.app.scene.placing import Placed
-from explorer.app.scene.shapes import Update
 from explorer.singularity import TETRAHEDRA
 
 FACES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
