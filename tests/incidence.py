@@ -47,7 +47,9 @@ def sine_of_lines(
     return float(np.prod(np.linalg.svd(directions, compute_uv=False)))
 
 
-def permutation_of_flags(position: FloatArray, rotation: FloatArray) -> tuple[int, ...]:
+def permutation_of_flags(
+    position: FloatArray, rotation: FloatArray, tolerance: float = 1e-6
+) -> tuple[int, ...]:
     """Return the relative position of the two flags from ranks of homogeneous coordinates.
 
     The flags are spanned by (point, direction of the line, direction of the plane), and
@@ -65,7 +67,7 @@ def permutation_of_flags(position: FloatArray, rotation: FloatArray) -> tuple[in
                 meet[i, j] = min(i, j)
             elif i and j:
                 spanned = np.hstack([base[:, :i], platform[:, :j]])
-                meet[i, j] = i + j - np.linalg.matrix_rank(spanned, tol=1e-6)
+                meet[i, j] = i + j - np.linalg.matrix_rank(spanned, tol=tolerance)
     matrix = meet[1:, 1:] - meet[:-1, 1:] - meet[1:, :-1] + meet[:-1, :-1]
     assert ((matrix == 0) | (matrix == 1)).all()
     assert (matrix.sum(axis=0) == 1).all()

@@ -53,7 +53,7 @@ REFERENCE: list[dict[str, Any]] = json.loads(
 )["cases"]
 
 # Roundings that a chain of some fifty operations grows to, in the worst of many thousands.
-ROUNDINGS = 2000.0
+ROUNDINGS = 100.0
 
 
 def squared_margin_error(case: Case) -> float:
@@ -462,7 +462,8 @@ def test_feasible_flips_exactly_where_a_discriminant_changes_sign(
         else:
             outside = middle
 
-    error = squared_margin_error(case)
+    # What closes but for rounding counts as closing, by a cautious bound of the rounding.
+    error = 20.0 * squared_margin_error(case)
     at_flip = discriminants(case.design, trial(0.5 * (inside + outside)))
     values = np.linspace(inside - 0.5 * case.size, inside + 0.5 * case.size, 41)
     values = np.abs(values) if joint in (0, 2, 4, 5) else values
@@ -470,7 +471,7 @@ def test_feasible_flips_exactly_where_a_discriminant_changes_sign(
     least = discriminants(case.design, rows).min(axis=1)
     feasible = forward(case.design, rows).feasible
     # At 1 - c² < 0 the reported one is the smallest factor, so it too is negative.
-    assert at_flip.min() <= error
+    assert abs(float(at_flip.min())) <= error
     assert feasible[least > 0.0].all()
     assert not feasible[least < -error].any()
 
