@@ -12,7 +12,7 @@ import viser
 
 from explorer.app.page import TITLE, Page
 from explorer.app.state import opened
-from explorer.app.viser_gaps import refuse_tunnels, start_viser
+from explorer.app.viser_gaps import refuse_tunnels, start_viser, stop_viser
 from explorer.compiled import warm_in_background
 from explorer.design import Design
 from explorer.errors import ServerError
@@ -38,7 +38,7 @@ class Running:
     def stop(self) -> None:
         """Stop the server and the session."""
         self.page.session.stop()
-        self.viser.stop()
+        stop_viser(self.viser)
 
 
 def start(
@@ -65,7 +65,7 @@ def start(
     _check_free(host, port)
     server = start_viser(host, port)
     if port not in (0, server.get_port()):
-        server.stop()
+        stop_viser(server)
         raise _taken(port)
     refuse_tunnels(server)
     page = Page(server, state, docked=docked)

@@ -17,6 +17,16 @@ def start_viser(host: str, port: int) -> viser.ViserServer:
         return viser.ViserServer(host=host, port=port, verbose=False)
 
 
+def stop_viser(server: viser.ViserServer) -> None:
+    """Stop a server, without the line that its thread prints to standard output."""
+    internals: Any = server
+    with contextlib.redirect_stdout(io.StringIO()):
+        server.stop()
+        thread = getattr(internals._websock_server, "_server_thread", None)  # noqa: SLF001
+        if thread is not None:
+            thread.join(timeout=5.0)
+
+
 class MarksOf:
     """The marks below a slider: its constructor takes them, its handle does not."""
 

@@ -1,0 +1,169 @@
+"""What is drawn, looked at without a browser: colours, marks, framing, text."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from explorer.app.colours import FAR, FAR_WARNINGS, SINGULAR, Rgb, proximity_colour
+from explorer.app.controls import Span, decimals
+from explorer.app.panels.move import interval_marks
+from explorer.app.panels.ranges import coordinate_span, length_span, round_up, variable_span
+from explorer.app.panels.singularity import summary
+from explorer.app.scene.camera import FIELD_OF_VIEW, VIEWS, ViewName, framing, outermost_points
+from explorer.app.scene.placing import Placed, round_step
+from explorer.app.scene.shapes import cylinder, plate, sphere, turned_to
+from explorer.app.state import Frame, opened
+from explorer.arrays import FloatArray, IntArray
+from explorer.design import Design
+from explorer.design_file import PRESETS
+from explorer.pose import Pose
+
+OPTIMAL = PRESETS["paper-optimal"]
+
+
+def luminance(colour: Rgb) -> float:
+    """Return the relative luminance of an sRGB colour, 0 to 1."""
+    linear = (np.array(colour) / 255.0) ** 2.2
+    return float(linear @ [0.2126, 0.7152, 0.0722])
+
+
+def as_deuteranope(colour: Rgb) -> FloatArray:
+    """Return the colour as seen without green cones (Viénot, Brettel and Mollon 1999)."""
+    linear = (np.array(colour) / 255.0) ** 2.2
+    matrix = [[0.367, 0.861, -0.228], [0.280, 0.673, 0.047], [-0.012, 0.043, 0.969]]
+    return np.clip(matrix @ linear, 0.0, 1.0) ** (1 / 2.2) * 255.0
+
+
+def test_a_margin_of_zero_is_singular_and_a_large_one_is_far() -> None:
+    assert proximity_colour(0.0, 1.0) == SINGULAR
+    assert proximity_colour(FAR_WARNINGS, 1.0) == proximity_colour(1e9, 1.0) == FAR
+
+
+@given(st.floats(0.0, 1e3), st.floats(1e-6, 1e3))
+def test_colour_depends_on_the_size_of_the_margin_over_the_warning_length(
+    margin: float, warn: float
+) -> None:
+    assert proximity_colour(margin, warn) == proximity_colour(-margin, warn)
+    assert proximity_colour(margin * 8, warn * 8) == proximity_colour(margin, warn)
+
+
+def test_luminance_grows_on_either_side_towards_the_warning_length() -> None:
+    below = [luminance(proximity_colour(x, 1.0)) for x in np.linspace(0.0, 0.999, 30)]
+    above = [luminance(proximity_colour(x, 1.0)) for x in np.linspace(1.0, FAR_WARNINGS, 30)]
+    assert below == sorted(below)
+    assert above == sorted(above, reverse=True)
+
+
+def test_warned_and_clear_are_told_apart_without_green_cones() -> None:
+    warned = [as_deuteranope(proximity_colour(x, 1.0)) for x in np.linspace(0.0, 0.99, 20)]
+    clear = [as_deuteranope(proximity_colour(x, 1.0)) for x in np.linspace(1.0, FAR_WARNINGS, 20)]
+    assert min(float(np.linalg.norm(a - b)) for a in warned for b in clear) > 60.0
+
+
+@pytest.mark.parametrize("view", VIEWS)
+@pytest.mark.parametrize("aspect", [0.5, 1.0, 2.5])
+@pytest.mark.parametrize("design", PRESETS.values(), ids=str)
+def test_every_view_holds_the_whole_mechanism(
+    design: Design, view: ViewName, aspect: float
+) -> None:
+    placed = Placed(Frame(opened(design)))
+    eye, target = framing(placed, view, aspect)
+    forward = (target - eye) / np.linalg.norm(target - eye)
+    right = np.cross(forward, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    up = np.cross(right, forward)
+    seen = outermost_points(placed) - eye
+    depth = seen @ forward
+    half = np.tan(0.5 * FIELD_OF_VIEW)
+    across = np.abs(seen @ right) / (half * aspect * depth)
+    upward = np.abs(seen @ up) / (half * depth)
+    assert depth.min() > 0.0
+    assert across.max() <= 1.0
+    assert upward.max() <= 1.0
+    # And no farther away than that needs.
+    assert max(across.max(), upward.max()) > 0.9
+
+
+@given(st.floats(1e-20, 1e20))
+def test_scenes_are_about_ten_units_large_whatever_the_design(reach: float) -> None:
+    step = round_step(reach / 10.0)
+    assert 6.3 <= reach / step <= 15.9
+    assert float(f"{step:.0e}"[0]) in (1.0, 2.0, 5.0)
+
+
+@given(st.lists(st.floats(-28, 28), min_size=2, max_size=6).filter(lambda v: len(v) % 2 == 0))
+def test_marks_stand_at_the_ends_of_the_intervals_and_their_labels_apart(
+    ends: list[float],
+) -> None:
+    ordered = sorted(ends)
+    intervals = tuple(zip(ordered[::2], ordered[1::2], strict=True))
+    span = Span(-30.0, 30.0, 0.01)
+    marks = interval_marks(intervals, span)
+    assert [position for position, _ in marks] == ordered
+    assert any(text for _, text in marks)
+    labelled = [position for position, text in marks if text]
+    assert all(b - a >= 0.2 * 60.0 for a, b in itertools.pairwise(labelled))
+
+
+@given(st.floats(1e-9, 1e9))
+def test_slider_ranges_are_round_and_hold_the_design(size: float) -> None:
+    design = Design(
+        a3=(size, 0.4 * size), b1=(0.4 * size, -0.1 * size), b2=0.3 * size, b3=0.1 * size
+    )
+    state = opened(design)
+    for span in (length_span(state), coordinate_span(state), variable_span(state)):
+        assert span.low < span.high
+        assert span.high >= 1.5 * size * (1.0 - 1e-12)
+        assert span.step < size / 100.0
+    assert round_up(31.0) == 31.0
+
+
+@pytest.mark.parametrize(("step", "digits"), [(1.0, 0), (0.1, 1), (0.001, 3), (10.0, 0), (0.25, 2)])
+def test_number_fields_show_the_decimals_of_their_step(step: float, digits: int) -> None:
+    assert decimals(step) == digits
+
+
+@given(st.lists(st.tuples(*[st.floats(-1, 1)] * 3), min_size=1, max_size=8))
+def test_rods_point_where_they_should(directions: list[tuple[float, float, float]]) -> None:
+    array = np.array(directions)
+    lengths = np.linalg.norm(array, axis=1)
+    wxyz = turned_to(array)
+    assert np.allclose(np.linalg.norm(wxyz, axis=1), 1.0)
+    for quaternion, direction, length in zip(wxyz, array, lengths, strict=True):
+        if length > 1e-6:
+            w, x, y, z = quaternion.tolist()
+            turned = Pose((0.0, 0.0, 0.0), (w, x, y, z)).rotation[:, 2]
+            assert np.allclose(turned, direction / length, atol=1e-6)
+
+
+def closed_volume(vertices: FloatArray, faces: IntArray) -> float:
+    """Return the volume by the divergence theorem; positive if all faces look outwards."""
+    a, b, c = np.moveaxis(vertices[faces], 1, 0)
+    return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0)
+
+
+def test_primitive_meshes_are_closed_and_look_outwards() -> None:
+    assert closed_volume(*cylinder()) == pytest.approx(np.pi, rel=0.02)
+    assert closed_volume(*sphere()) == pytest.approx(4.0 / 3.0 * np.pi, rel=0.02)
+    square = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 3.0], [0.0, 3.0]])
+    expected = 0.5 * (4 * 3 + 2 * (4 + 3) * 0.5 + np.pi * 0.25)
+    assert closed_volume(*plate(square, 0.5, 1.0, 1.5)) == pytest.approx(expected, rel=0.01)
+
+
+def test_the_summary_names_what_the_pose_breaks_and_how_near_it_is() -> None:
+    clear = summary(Frame(opened(OPTIMAL)))
+    assert "Clear of singularities" in clear
+    assert "Within all limits" in clear
+    assert "−9.000" in clear
+    near = summary(Frame(opened(OPTIMAL, Pose.of_yaw_pitch_roll((10, 5, 0.5), (-73.1, 0, 0)))))
+    assert "Near a singularity" in near
+    flat = summary(Frame(opened(OPTIMAL, Pose.of_yaw_pitch_roll((10, 5, 0), (-73.1, 20, 0)))))
+    assert "(4, 3, 1, 2)" in flat
+    assert "Singular<" in flat
+    outside = summary(Frame(opened(OPTIMAL, Pose.of_yaw_pitch_roll((10, 5, 19), (-73.1, 0, 0)))))
+    assert "box z = 19 is above its maximum 18" in outside

@@ -1,0 +1,141 @@
+"""The session: what is posted from many threads at once comes out whole and newest."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Sequence
+
+import pytest
+
+from explorer.app.actions import Action, SetJoint, SetPosition, SetVariable
+from explorer.app.jobs import LatestWins
+from explorer.app.session import Session
+from explorer.app.state import Frame, State, opened
+from explorer.design_file import PRESETS
+
+
+class Watched:
+    """A session whose frames, complaints and faults are kept."""
+
+    def __init__(self) -> None:
+        self.frames: list[Frame] = []
+        self.complaints: list[tuple[str, int | None]] = []
+        self.faults: list[Exception] = []
+        self.gate = threading.Event()
+        self.gate.set()
+        self.session = Session(
+            opened(PRESETS["paper-optimal"]),
+            self._draw,
+            lambda message, who: self.complaints.append((message, who)),
+            self.faults.append,
+        )
+
+    def _draw(self, frame: Frame) -> None:
+        self.gate.wait(10.0)
+        self.frames.append(frame)
+
+
+@pytest.fixture
+def watched() -> Watched:
+    return Watched()
+
+
+def test_of_a_burst_only_the_newest_is_computed_and_it_is_what_remains(watched: Watched) -> None:
+    watched.gate.clear()
+    for i in range(500):
+        value = 11.0 + 0.001 * i
+        watched.session.post("slider", lambda _, value=value: SetJoint(0, value), stamp=float(i))
+    watched.gate.set()
+    assert watched.session.wait_until_idle()
+    assert watched.session.state.joints[0] == 11.0 + 0.001 * 499
+    # One that was under way, and one for all the rest.
+    assert len(watched.frames) <= 3
+    assert watched.frames[-1].state is watched.session.state
+
+
+def test_events_that_overtake_each_other_end_with_the_one_that_happened_last(
+    watched: Watched,
+) -> None:
+    watched.gate.clear()
+    watched.session.do(SetPosition(0, 9.0))
+    for stamp in (3.0, 1.0, 2.0):
+        watched.session.post(
+            "slider", lambda _, value=stamp: SetPosition(1, value), stamp=stamp + time.time()
+        )
+    watched.gate.set()
+    assert watched.session.wait_until_idle()
+    assert watched.session.state.pose.position[1] == 3.0
+
+
+def test_controls_of_one_burst_are_applied_in_the_order_they_happened(watched: Watched) -> None:
+    watched.gate.clear()
+    watched.session.do(SetPosition(0, 9.0))
+    now = time.time()
+    watched.session.post("a", lambda s: SetPosition(2, 2 * s.pose.position[2]), stamp=now + 2)
+    watched.session.post("b", lambda _: SetPosition(2, 5.0), stamp=now + 1)
+    watched.gate.set()
+    assert watched.session.wait_until_idle()
+    assert watched.session.state.pose.position[2] == 10.0
+
+
+def test_a_refused_change_tells_who_asked_keeps_the_state_and_draws_it_again(
+    watched: Watched,
+) -> None:
+    before = watched.session.state
+    watched.session.do(SetVariable("a3y", 0.0), who=7)
+    assert watched.session.wait_until_idle()
+    ((message, who),) = watched.complaints
+    assert "degenerate" in message
+    assert who == 7
+    assert watched.session.state == before
+    assert watched.frames[-1].state == before
+
+
+def test_an_unexpected_fault_is_reported_and_the_session_goes_on(watched: Watched) -> None:
+    def broken(_: State) -> Action:
+        raise RuntimeError("broken on purpose")
+
+    watched.session.post("broken", broken)
+    assert watched.session.wait_until_idle()
+    assert [str(fault) for fault in watched.faults] == ["broken on purpose"]
+    watched.session.do(SetPosition(0, 9.0))
+    assert watched.session.wait_until_idle()
+    assert watched.session.state.pose.position[0] == 9.0
+
+
+def test_many_threads_lose_nothing(watched: Watched) -> None:
+    def run(axis: int) -> None:
+        for i in range(100):
+            watched.session.post(axis, lambda _, i=i: SetPosition(axis, 5.0 + 0.01 * i))
+
+    threads = [threading.Thread(target=run, args=(axis,)) for axis in range(3)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert watched.session.wait_until_idle()
+    assert watched.session.state.pose.position == pytest.approx((5.99, 5.99, 5.99))
+
+
+def test_a_stopped_queue_drops_what_waits_and_ends_its_thread() -> None:
+    handled: list[int] = []
+    gate = threading.Event()
+
+    def handle(items: Sequence[int]) -> None:
+        gate.wait(10.0)
+        handled.extend(items)
+
+    queue: LatestWins[int] = LatestWins(handle, "test queue")
+    queue.post("a", 0.0, 1)
+    while queue.is_waiting("a"):
+        time.sleep(0.001)
+    queue.post("a", 1.0, 2)
+    stopper = threading.Thread(target=queue.stop)
+    stopper.start()
+    while queue.is_waiting("a"):
+        time.sleep(0.001)
+    gate.set()
+    stopper.join()
+    assert handled == [1]
+    assert "test queue" not in [thread.name for thread in threading.enumerate()]
