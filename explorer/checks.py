@@ -6,19 +6,34 @@ All of them raise `DesignError`.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Set
 from typing import Any, cast
 
 from explorer.errors import DesignError
 
+# The determinant multiplies seven numbers, which must not overflow.
+LARGEST_NUMBER = 1e40
+
+# What Python would read as numbers, or as several, but no person means so.
+_NOT_A_NUMBER = (str, bytes, bytearray, bool)
+_NOT_A_SEQUENCE = (str, bytes, bytearray, Set, Mapping)
+
 
 def number(name: str, value: object) -> float:
     """Return the value as a finite float."""
+    refusal = DesignError(f"{name} must be a number; got {_shown(value)}")
+    if isinstance(value, _NOT_A_NUMBER):
+        raise refusal
     try:
         checked = float(cast("Any", value))
     except (TypeError, ValueError, OverflowError):
-        raise DesignError(f"{name} must be a number; got {value!r}") from None
+        raise refusal from None
     if not math.isfinite(checked):
         raise DesignError(f"{name} must be a finite number; got {checked}")
+    if abs(checked) > LARGEST_NUMBER:
+        raise DesignError(
+            f"{name} must not exceed {LARGEST_NUMBER:g} in magnitude; got {checked:g}"
+        )
     return checked
 
 
@@ -48,19 +63,41 @@ def ordered(name: str, low: object, high: object) -> tuple[float, float]:
 
 def two(name: str, value: Any) -> tuple[Any, Any]:
     """Return the two entries of the value."""
-    try:
-        first, second = value
-    except (TypeError, ValueError):
-        raise DesignError(f"{name} must be two values; got {value!r}") from None
-    return first, second
+    entries = _entries(value)
+    if len(entries) != 2:
+        raise DesignError(f"{name} must be two values; got {_shown(value)}")
+    return entries[0], entries[1]
 
 
 def numbers(name: str, value: Any, count: int) -> list[float]:
     """Return the entries of the value, `count` finite floats."""
+    entries = _entries(value)
+    if len(entries) != count:
+        raise DesignError(f"{name} must be {count} numbers; got {_shown(value)}")
+    return [number(name, entry) for entry in entries]
+
+
+def instance(name: str, value: object, *kinds: type) -> None:
+    """Check that the value is of one of the kinds, which files cannot get wrong but code can."""
+    if not isinstance(value, kinds):
+        wanted = " or ".join(kind.__name__ for kind in kinds)
+        raise DesignError(f"{name} must be of type {wanted}; got {_shown(value)}")
+
+
+def _entries(value: Any) -> list[Any]:
+    if isinstance(value, _NOT_A_SEQUENCE):
+        return []
     try:
-        values = list(value)
+        return list(value)
     except TypeError:
-        values = []
-    if len(values) != count:
-        raise DesignError(f"{name} must be {count} numbers; got {value!r}")
-    return [number(name, entry) for entry in values]
+        return []
+
+
+def _shown(value: object) -> str:
+    """Return the value on one line, in short."""
+    try:
+        text = " ".join(repr(value).split())
+    except ValueError:
+        # Python refuses to print integers of thousands of digits.
+        text = f"a huge {type(value).__name__}"
+    return text if len(text) <= 80 else f"{text[:77]}..."

@@ -12,7 +12,7 @@ from typing import Literal, cast
 
 import msgspec
 
-from explorer.checks import not_negative, number, numbers, ordered, positive, two
+from explorer.checks import instance, not_negative, number, numbers, ordered, positive, two
 from explorer.errors import DesignError
 from explorer.pose import Pose, Triple
 
@@ -129,6 +129,11 @@ class Design(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     home: Pose | None = None
 
     def __post_init__(self) -> None:
+        if self.schema != 1:
+            raise DesignError(f"schema must be 1; got {self.schema!r}")
+        instance("name", self.name, str)
+        instance("limits", self.limits, Limits)
+        instance("home", self.home, Pose, type(None))
         _set(self, "a3", tuple(numbers("a3", self.a3, 2)))
         _set(self, "b1", tuple(numbers("b1", self.b1, 2)))
         _set(self, "b2", number("b2", self.b2))

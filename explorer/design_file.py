@@ -37,7 +37,7 @@ def decode_design(data: bytes, source: str) -> Design:
     try:
         return msgspec.json.decode(data, type=Design)
     except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
-        raise DesignError(f"{source}: {error}".replace("\n", " ")) from None
+        raise DesignError(" ".join(f"{source}: {error}".split())) from None
 
 
 def encode_design(design: Design) -> bytes:

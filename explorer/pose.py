@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from explorer.arrays import FloatArray, finite_array
+from explorer.checks import LARGEST_NUMBER
 from explorer.errors import InputError
 
 Triple = tuple[float, float, float]
@@ -29,15 +30,23 @@ class Pose(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         quaternion: (w, x, y, z), platform to base; kept at unit length.
 
     Raises:
-        InputError: not finite, or a quaternion of length zero.
+        InputError: not three and four finite numbers, a position beyond 1e40, or a
+            quaternion of length zero.
     """
 
     position: Triple
     quaternion: Quadruple
 
     def __post_init__(self) -> None:
-        finite_array("position", self.position, (3,))
+        position = finite_array("position", self.position, (3,))
         quaternion = finite_array("quaternion", self.quaternion, (4,))
+        if position.ndim != 1 or quaternion.ndim != 1:
+            raise InputError("a pose has one position and one quaternion, not a batch")
+        farthest = float(np.abs(position).max())
+        if farthest > LARGEST_NUMBER:
+            raise InputError(
+                f"position must not exceed {LARGEST_NUMBER:g} in magnitude; got {farthest:g}"
+            )
         size = float(np.abs(quaternion).max())
         if size == 0.0:
             raise InputError("quaternion must not be all zeros; no rotation is (1, 0, 0, 0)")

@@ -22,7 +22,7 @@ def stop_viser(server: viser.ViserServer) -> None:
     internals: Any = server
     with contextlib.redirect_stdout(io.StringIO()):
         server.stop()
-        thread = getattr(internals._websock_server, "_server_thread", None)  # noqa: SLF001
+        thread = getattr(internals._websock_server, "_server_thread", None)
         if thread is not None:
             thread.join(timeout=5.0)
 
