@@ -2,19 +2,19 @@
 
 Each of the three discriminants of `explorer.trilateration` is a polynomial of degree at
 most four in a carriage position or in the square of a length. Their real roots bound the
-intervals, so nothing is sampled.
+intervals, so nothing is sampled: one trial in each gap says whether the lengths close.
 """
 
 from __future__ import annotations
 
-import math
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
 
 from explorer.arrays import FloatArray
 from explorer.design import JOINTS, LENGTHS, Design
-from explorer.kinematics import checked_joints, forward
+from explorer.kinematics import LARGEST_RATIO, checked_joints, forward
 
 Interval = tuple[float, float]
 
@@ -31,13 +31,15 @@ def feasible_intervals(design: Design, joints: FloatArray) -> tuple[tuple[Interv
     held = checked_joints(design, joints)
     # Dividing by the largest length keeps the roots near one, whatever the units.
     scale = max(map(abs, (*design.variables, *held.tolist())))
-    polynomials = _discriminants(design, held / scale, scale)
-    roots = _real_roots(polynomials)
-    return tuple(
-        tuple((_unscaled(j, low, scale), _unscaled(j, high, scale)) for low, high in found)
-        for j in range(len(JOINTS))
-        for found in [_where_positive(polynomials[:, j], roots[j], _IS_LENGTH[j])]
-    )
+    polynomials, joint_of = _discriminants(design, held / scale, scale)
+    largest = LARGEST_RATIO * max(map(abs, design.variables))
+    breaks = [
+        _breaks(offset + slope * np.array(roots), scale, largest, is_length)
+        for roots, (offset, slope), is_length in zip(
+            _real_roots(polynomials), joint_of.tolist(), _IS_LENGTH, strict=True
+        )
+    ]
+    return _between(design, held, breaks)
 
 
 def nearest_feasible(
@@ -67,28 +69,30 @@ def nearest_feasible(
     return None
 
 
-def _unscaled(joint: int, unknown: float, scale: float) -> float:
-    return (math.sqrt(unknown) if _IS_LENGTH[joint] else unknown) * scale
+def _discriminants(
+    design: Design, joints: FloatArray, scale: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return κ1², κ2², κ3² and 1 - c² over scale², shape (4, 6, 5), and the joints, (6, 2).
 
-
-def _discriminants(design: Design, joints: FloatArray, scale: float) -> FloatArray:
-    """Return κ1², κ2², κ3² and 1 - c² over scale², shape (4, 6, 5).
-
-    Row j of the middle axis has the joint j (or its square) left as the unknown; the last
-    axis holds ascending coefficients. The algebra is that of `trilateration.solve_rows`.
-    The fourth is there because two negative factors of κ2² would pass for closing.
+    Row j of the middle axis leaves one unknown, which is moderate even where joint j can
+    hardly move; the last axis holds ascending coefficients of it. Row j of the joints is
+    (offset, slope): joint j over scale, or its square, is offset + slope * unknown. The
+    algebra is that of `trilateration.solve_rows`. 1 - c² is there because two negative
+    factors of κ2² would pass for closing.
     """
     values, squares = np.zeros((6, 6, 3)), np.zeros((6, 6, 3))
     values[:, :, 0], squares[:, :, 0] = joints[:, None], joints[:, None] ** 2
-    for joint, is_length in enumerate(_IS_LENGTH):
-        unknown = (squares if is_length else values)[joint, joint]
-        unknown[:] = (0.0, 1.0, 0.0)
+    a3x, a3y, b1x, b1y, b2, b3 = (v / scale for v in design.variables)
+    one, unknown = np.eye(3)[:2]
+
+    # The carriages move within b2b3 of each other, and the radii differ by as much at most.
+    span = b3 - b2
+    values[1, 1] = values[3, 1] - span * unknown
+    values[3, 3] = values[1, 3] + span * unknown
+    squares[2, 2] = squares[4, 2] + span * unknown
+    squares[4, 4] = squares[2, 4] + span * unknown
     d1, d3 = values[1], values[3]
     l1_2, d2_2, d4_2, l4_2 = squares[0], squares[2], squares[4], squares[5]
-    a3x, a3y, b1x, b1y, b2, b3 = (v / scale for v in design.variables)
-    one = np.array([1.0, 0.0, 0.0])
-
-    span = b3 - b2
     c = (d3 - d1) / span
     px = d1 - b2 * c
     s2 = one - _product(c, c)[:, :3]
@@ -96,12 +100,26 @@ def _discriminants(design: Design, joints: FloatArray, scale: float) -> FloatArr
     r2 = (1.0 - t) * d2_2 + t * d4_2 - t * (1.0 - t) * span * span * s2
     w = (d4_2 - d2_2 - (b3 + b2) * span * s2) / (2.0 * span)
     from_a3 = px - a3x * one
-    py = (_product(from_a3, from_a3)[:, :3] + r2 + a3y * a3y * one - l4_2) / (2.0 * a3y)
+    l4_2_at_0 = _product(from_a3, from_a3)[:, :3] + r2 + a3y * a3y * one
+    py = (l4_2_at_0 - l4_2) / (2.0 * a3y)
+    py[5] = unknown
     p2 = _product(px, px)[:, :3] + r2
     along = _product(c, px)[:, :3] + w
-    across = (l1_2 - p2 - (b1x * b1x + b1y * b1y) * one - 2.0 * b1x * along) / (2.0 * b1y)
+    l1_2_at_0 = p2 + (b1x * b1x + b1y * b1y) * one + 2.0 * b1x * along
+    across = (l1_2 - l1_2_at_0) / (2.0 * b1y)
+    across[0] = unknown
+    joint_of = np.stack(
+        [
+            l1_2_at_0[0] + 2.0 * b1y * unknown,
+            d1[1],
+            d2_2[2],
+            d3[3],
+            d4_2[4],
+            l4_2_at_0[5] - 2.0 * a3y * unknown,
+        ]
+    )
     room = ((0, 0), (0, 2))
-    return np.stack(
+    polynomials = np.stack(
         [
             np.pad(p2, room) - _product(along, along) - _product(across, across),
             _product(s2, r2) - _product(w, w),
@@ -109,6 +127,7 @@ def _discriminants(design: Design, joints: FloatArray, scale: float) -> FloatArr
             np.pad(s2, room),
         ]
     )
+    return polynomials, joint_of[:, :2]
 
 
 def _product(a: FloatArray, b: FloatArray) -> FloatArray:
@@ -120,7 +139,7 @@ def _product(a: FloatArray, b: FloatArray) -> FloatArray:
 
 
 def _real_roots(polynomials: FloatArray) -> list[list[float]]:
-    """Return the real roots of the polynomials (4, 6, 5), sorted, for each of the six."""
+    """Return the real roots of the polynomials (4, 6, 5), for each of the six."""
     found: list[list[float]] = [[] for _ in JOINTS]
     rows = polynomials.reshape(-1, 5)
     # Coefficients that are rounding noise beside the largest have no say in the degree.
@@ -138,27 +157,44 @@ def _real_roots(polynomials: FloatArray) -> list[list[float]]:
         real = np.abs(values.imag) <= 1e-6 * (1.0 + np.abs(values))
         for row, roots, keep in zip(chosen.tolist(), values.real, real, strict=True):
             found[row % len(JOINTS)].extend(roots[keep].tolist())
-    return [sorted(roots) for roots in found]
-
-
-def _where_positive(polynomials: FloatArray, roots: list[float], is_length: bool) -> list[Interval]:
-    """Return the intervals between roots in which all polynomials (4, 5) are positive.
-
-    |d1 - d3| and with it every length is bounded, so none reaches beyond the roots.
-    """
-    breaks = [0.0, *(root for root in roots if root > 0.0)] if is_length else roots
-    if len(breaks) < 2:
-        return []
-    ends = np.array(breaks)
-    middles = 0.5 * (ends[:-1] + ends[1:])
-    powers = middles[:, None] ** np.arange(5)
-    positive = (powers @ polynomials.T >= 0.0).all(axis=1) & (ends[1:] > ends[:-1])
-    found: list[Interval] = []
-    for low, high, inside in zip(breaks[:-1], breaks[1:], positive.tolist(), strict=True):
-        if not inside:
-            continue
-        if found and found[-1][1] == low:
-            found[-1] = (found[-1][0], high)
-        else:
-            found.append((low, high))
     return found
+
+
+def _breaks(ends: FloatArray, scale: float, largest: float, is_length: bool) -> list[float]:
+    """Return where the lengths may begin or cease to close, ascending, from scaled ends.
+
+    |d1 - d3| and with it every length is bounded by a few times the largest of the others,
+    so nothing closes beyond the ends, and one far off is that of a vanishing term.
+    """
+    values = np.sort(ends)
+    if is_length:
+        values = np.sqrt(np.append(0.0, values[values > 0.0]))
+    values = values * scale
+    return values[np.abs(values) <= largest].tolist()
+
+
+def _between(
+    design: Design, joints: FloatArray, breaks: list[list[float]]
+) -> tuple[tuple[Interval, ...], ...]:
+    """Return, per joint, the intervals between breaks in whose middle the lengths close.
+
+    The forward kinematics decides, so that a discriminant that is zero but for rounding,
+    as in every singular pose, counts as closing here as it does there.
+    """
+    gaps = [
+        (joint, low, high)
+        for joint, ends in enumerate(breaks)
+        for low, high in itertools.pairwise(ends)
+        if low < high
+    ]
+    trials = np.repeat(joints[None, :], len(gaps), axis=0)
+    for trial, (joint, low, high) in zip(trials, gaps, strict=True):
+        trial[joint] = 0.5 * (low + high)
+    found: list[list[Interval]] = [[] for _ in JOINTS]
+    closes = forward(design, trials).feasible.tolist()
+    for joint, low, high in itertools.compress(gaps, closes):
+        start = low
+        if found[joint] and found[joint][-1][1] == low:
+            start = found[joint].pop()[0]
+        found[joint].append((start, high))
+    return tuple(tuple(intervals) for intervals in found)
