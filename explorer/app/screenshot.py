@@ -70,19 +70,40 @@ def take(
         PictureError: the browser did not start or did not draw in time.
     """
     with headless_browser() as browser:
-        running = start(design, pose, port=0, docked=panels)
+        data = picture(browser, design, pose, view=view, size=size, panels=panels, prepare=prepare)
+    _write(out, data)
+
+
+def picture(
+    browser: Browser,
+    design: Design,
+    pose: Pose | None,
+    *,
+    view: ViewName,
+    size: tuple[int, int],
+    panels: bool = False,
+    prepare: Callable[[Running], None] | None = None,
+) -> bytes:
+    """Return a picture as `take` writes it, from a browser that serves for many.
+
+    Raises:
+        PictureError: the browser did not draw in time.
+    """
+    running = start(design, pose, port=0, docked=panels)
+    try:
+        if prepare is not None:
+            prepare(running)
+            running.page.session.wait_until_idle()
+        page = open_page(browser, running, size)
         try:
-            if prepare is not None:
-                prepare(running)
-                running.page.session.wait_until_idle()
-            page = open_page(browser, running, size)
             if not panels:
                 page.add_style_tag(content=SCENE_ALONE)
             running.page.point_cameras(view)
-            data = stable_picture(page)
+            return stable_picture(page)
         finally:
-            running.stop()
-    _write(out, data)
+            page.close()
+    finally:
+        running.stop()
 
 
 @contextmanager
