@@ -10,7 +10,9 @@ from typing import Literal, get_args
 import numpy as np
 import viser
 
+from explorer.app.scene.flags import flag_corners
 from explorer.app.scene.legs import guide_span
+from explorer.app.scene.marks import ghost_points
 from explorer.app.scene.placing import Placed
 from explorer.arrays import FloatArray
 
@@ -37,30 +39,36 @@ def framing(placed: Placed, view: ViewName, aspect: float) -> tuple[FloatArray, 
         aspect: Width over height of the picture.
     """
     points = outermost_points(placed)
-    target = 0.5 * (points.min(axis=0) + points.max(axis=0))
-    corners = points - target
+    centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
     forward = -np.array(DIRECTIONS[view]) / np.linalg.norm(DIRECTIONS[view])
     right = np.cross(forward, [0.0, 0.0, 1.0])
     right /= np.linalg.norm(right)
     up = np.cross(right, forward)
     half = math.tan(0.5 * FIELD_OF_VIEW)
-    depth = corners @ forward
-    needed = np.maximum(
-        np.abs(corners @ up) / half - depth,
-        np.abs(corners @ right) / (half * max(aspect, 0.2)) - depth,
-    )
-    return target - 1.02 * float(needed.max()) * forward, target
+    depth = (points - centre) @ forward
+    distance, target = 0.0, centre
+    for axis, slope in ((up, half), (right, half * max(aspect, 0.2))):
+        # From the distance D, shifted by s, a point at x is seen if |x - s| <= slope (D + depth).
+        along = (points - centre) @ axis
+        low, high = float((along + slope * depth).min()), float((along - slope * depth).max())
+        distance = max(distance, 0.5 * (high - low) / slope)
+        target = target + 0.5 * (low + high) * axis
+    return target - 1.02 * distance * forward, target
 
 
 def outermost_points(placed: Placed) -> FloatArray:
-    """Return what must be in the picture, shape (n, 3): joints, bodies and flag lines."""
+    """Return what must be in the picture, shape (n, 3): joints, bodies and flags."""
+    view = placed.frame.state.view
     joints = np.array(list(placed.points.values()))
-    if placed.frame.state.view.ghosts:
-        joints = np.concatenate([joints, placed.scale * placed.frame.snapshot.modes.position])
+    if view.ghosts:
+        joints = np.concatenate([joints, ghost_points(placed).reshape(-1, 3)])
     around = np.array(np.meshgrid(*[(-0.8, 0.8)] * 3)).reshape(3, -1).T
     low, high = guide_span(placed)
-    line = np.array([[low - 1.0, 0.0, 0.0], [high + 1.0, 0.0, 0.0]])
-    return np.concatenate([(joints[:, None] + around).reshape(-1, 3), line])
+    guide = np.array([[low, 0.0, 0.0], [high, 0.0, 0.0]])
+    seen = [(joints[:, None] + around).reshape(-1, 3), guide]
+    if view.flags:
+        seen.append(flag_corners(placed))
+    return np.concatenate(seen)
 
 
 @dataclass(frozen=True)

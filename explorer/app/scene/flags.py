@@ -53,17 +53,14 @@ class Flag:
             thickness_units="screen",
         )
 
-    def updates(
-        self, placed: Placed, line: tuple[float, float], hang: float, size: float
-    ) -> Iterator[Update]:
-        """Yield what draws it with the line over an x range and the plane hanging to y."""
+    def updates(self, placed: Placed, corners: FloatArray, size: float) -> Iterator[Update]:
+        """Yield what draws it with a plane of four corners, the first two on its line."""
         state = placed.frame.state
         margins = placed.frame.snapshot.margins
         point, along, plane = (
             proximity_colour(float(margins[k]), state.warn_below) for k in self._kappas
         )
-        low, high = line
-        corners = np.array([[low, 0, 0], [high, 0, 0], [high, hang, 0], [low, hang, 0]], float)
+        low, high = corners[:2, 0].tolist()
         for handle in (self._point, self._line, self._plane, self._hem):
             yield handle, "visible", state.view.flags
         yield self._point, "color", point
@@ -86,21 +83,36 @@ class Flags:
 
     def updates(self, placed: Placed) -> Iterator[Update]:
         """Yield what draws the flags of this frame."""
-        low, high = guide_span(placed)
-        hang = 1.2 * float(placed.points["a3"][1])
-        yield from self._base.updates(placed, (low - 1.0, high + 1.0), hang, 1.0)
-
-        local = placed.platform_points
-        stations = [float(local[name][0]) for name in ("b1", "b2", "b3", "b4")]
-        beyond = 0.16 * placed.reach
-        side = float(local["b1"][1])
-        hang = side + np.copysign(0.5 * beyond, side)
+        yield from self._base.updates(placed, _base_corners(placed), 1.0)
         yield from self._platform.updates(
-            placed,
-            (min(stations) - beyond, max(stations) + beyond),
-            hang,
-            max(0.6, placed.thickness),
+            placed, _platform_corners(placed), max(0.6, placed.thickness)
         )
+
+
+def flag_corners(placed: Placed) -> FloatArray:
+    """Return the corners of both planes in the scene, shape (8, 3)."""
+    rotation = placed.frame.snapshot.rotation
+    platform = placed.points["b4"] + _platform_corners(placed) @ rotation.T
+    return np.concatenate([_base_corners(placed), platform])
+
+
+def _base_corners(placed: Placed) -> FloatArray:
+    low, high = guide_span(placed)
+    return _hanging(low - 1.0, high + 1.0, 1.2 * float(placed.points["a3"][1]))
+
+
+def _platform_corners(placed: Placed) -> FloatArray:
+    local = placed.platform_points
+    stations = [float(local[name][0]) for name in ("b1", "b2", "b3", "b4")]
+    beyond = 0.16 * placed.reach
+    side = float(local["b1"][1])
+    hang = side + float(np.copysign(0.5 * beyond, side))
+    return _hanging(min(stations) - beyond, max(stations) + beyond, hang)
+
+
+def _hanging(low: float, high: float, hang: float) -> FloatArray:
+    """Return the corners of a plane that hangs from a line along x to y, shape (4, 3)."""
+    return np.array([[low, 0, 0], [high, 0, 0], [high, hang, 0], [low, hang, 0]], float)
 
 
 def _outline(corners: FloatArray) -> FloatArray:

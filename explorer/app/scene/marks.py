@@ -80,8 +80,8 @@ class Ghosts:
             yield handle, "visible", visible
         if not visible:
             return
+        others = _others(placed)
         solution = placed.frame.snapshot.modes
-        others = [mode for mode in range(8) if mode != state.mode]
         positions = placed.scale * solution.position[others]
         rotations = solution.rotation[others]
         vertices, faces = platform_plate(placed)
@@ -91,17 +91,11 @@ class Ghosts:
             yield plate, "faces", faces.astype(np.uint32)
             yield plate, "position", tuple(position.tolist())
             yield plate, "wxyz", tuple(wxyz.tolist())
-        tips = self._tips(placed, positions, rotations)
+        tips = ghost_points(placed)
         yield self._legs, "points", self._leg_lines(placed, tips).astype(np.float32)
         for label, mode, tip in zip(self._names, others, tips[:, 0], strict=True):
             yield label, "text", mode_name(mode)
             yield label, "position", tuple(tip.tolist())
-
-    @staticmethod
-    def _tips(placed: Placed, positions: FloatArray, rotations: FloatArray) -> FloatArray:
-        """Return b1 … b4 of each ghost, shape (7, 4, 3)."""
-        local = np.array(list(placed.platform_points.values()))
-        return positions[:, None] + np.einsum("mij,nj->mni", rotations, local)
 
     @staticmethod
     def _leg_lines(placed: Placed, tips: FloatArray) -> FloatArray:
@@ -109,6 +103,19 @@ class Ghosts:
         bases[:, 1:3, 0] = tips[:, 1:3, 0]
         bases[:, 3] = placed.points["a3"]
         return np.stack([bases, tips], axis=2).reshape(-1, 2, 3)
+
+
+def ghost_points(placed: Placed) -> FloatArray:
+    """Return b1 … b4 of the seven other assembly modes in the scene, shape (7, 4, 3)."""
+    others = _others(placed)
+    solution = placed.frame.snapshot.modes
+    local = np.array(list(placed.platform_points.values()))
+    turned = np.einsum("mij,nj->mni", solution.rotation[others], local)
+    return placed.scale * solution.position[others][:, None] + turned
+
+
+def _others(placed: Placed) -> list[int]:
+    return [mode for mode in range(8) if mode != placed.frame.state.mode]
 
 
 class DragHandle:
