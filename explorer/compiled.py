@@ -16,14 +16,18 @@ import sys
 import threading
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Generic, ParamSpec
+from types import FunctionType
+from typing import Any, Generic, ParamSpec, TypeVar
 
 Arguments = ParamSpec("Arguments")
+Result = TypeVar("Result")
 
 # From this many rows on, compiling (or loading from the cache) beats interpreting.
 MANY_ROWS = 256
 
 _kernels: list[Kernel[...]] = []
+# Functions that kernels call, and their compiled forms once there are any.
+_helpers: dict[Callable[..., Any], Any] = {}
 _compiling = threading.RLock()
 
 
@@ -67,9 +71,10 @@ class Kernel(Generic[Arguments]):
             kept = settings.CACHE_DIR
             settings.CACHE_DIR = str(cache_folder())
             try:
+                source = _with_compiled_helpers(self._function)
                 self._compiled = numba.njit(
                     self._signature, cache=True, nogil=True, error_model="numpy"
-                )(self._function)
+                )(source)
             finally:
                 settings.CACHE_DIR = kept
 
@@ -81,6 +86,29 @@ def kernel(signature: str) -> Callable[[Callable[Arguments, None]], Kernel[Argum
         return Kernel(function, signature)
 
     return decorate
+
+
+def helper(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
+    """Mark a function that kernels call: plain where they are, compiled where they are."""
+    _helpers[function] = None
+    return function
+
+
+def _with_compiled_helpers(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Return the function with compiled helpers in the place of the plain ones it names."""
+    import numba
+
+    namespace = dict(function.__globals__)
+    for name in function.__code__.co_names:
+        called = namespace.get(name)
+        if isinstance(called, FunctionType) and called in _helpers:
+            if _helpers[called] is None:
+                plain = _with_compiled_helpers(called)
+                _helpers[called] = numba.njit(cache=True, nogil=True, error_model="numpy")(plain)
+            namespace[name] = _helpers[called]
+    copy = FunctionType(function.__code__, namespace, function.__name__, function.__defaults__)
+    copy.__module__, copy.__qualname__ = function.__module__, function.__qualname__
+    return copy
 
 
 def warm() -> None:
@@ -100,8 +128,13 @@ def warm_in_background() -> threading.Thread:
         if not is_cached():
             modules = sorted({each.__module__ for each in _kernels})
             code = f"import {', '.join(modules)}; from explorer.compiled import warm; warm()"
+            # The child must find these very sources, wherever it is started.
+            paths = {"PYTHONPATH": str(Path(__file__).parents[1])}
             subprocess.run(  # noqa: S603 - our own interpreter and our own words
-                [sys.executable, "-c", code], check=False, capture_output=True
+                [sys.executable, "-P", "-c", code],
+                check=False,
+                capture_output=True,
+                env={**os.environ, **paths},
             )
         warm()
 
