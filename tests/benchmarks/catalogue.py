@@ -1,0 +1,22 @@
+"""All benchmarks by name: the name is that of a module here with a function `run`."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Iterable, Mapping
+
+from benchmarks.table import Row
+
+BENCHMARKS: Mapping[str, str] = {
+    "forward_batch": "joint vectors per second of the forward kinematics, one core",
+    "forward_once": "one call of the forward kinematics",
+    "forward_error": "error of the forward kinematics over the reference cases",
+}
+"""Each benchmark and what it measures, in the order of the table."""
+
+
+def measure(name: str) -> list[Row]:
+    """Run a benchmark and return its rows; only now is what it needs imported."""
+    run = importlib.import_module(f"benchmarks.{name}").run
+    rows: Iterable[Row] = run()
+    return list(rows)
