@@ -11,6 +11,8 @@ BENCHMARKS: Mapping[str, str] = {
     "forward_batch": "joint vectors per second of the forward kinematics, one core",
     "forward_once": "one call of the forward kinematics",
     "forward_error": "error of the forward kinematics over the reference cases",
+    "page": "from starting the explorer to the first byte of its page",
+    "command": "wall time of one command",
 }
 """Each benchmark and what it measures, in the order of the table."""
 

@@ -1,0 +1,77 @@
+"""The explorer started as a person does, from the command line of this checkout."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+from urllib.parse import urlsplit
+
+ROOT = Path(__file__).resolve().parents[2]
+EXPLORER = (sys.executable, "-m", "explorer")
+
+
+def run_to_end(*command: str) -> None:
+    """Run a command and wait for it; its output is dropped.
+
+    Raises:
+        subprocess.CalledProcessError: it did not end well.
+    """
+    subprocess.run(command, cwd=ROOT, check=True, capture_output=True)
+
+
+def first_byte(cache: Path | None = None) -> float:
+    """Return the seconds from starting the explorer to the first byte of its page.
+
+    Args:
+        cache: The folder to keep compiled code in; the user's own if None.
+    """
+    environment = os.environ if cache is None else {**os.environ, "XDG_CACHE_HOME": str(cache)}
+    start = time.perf_counter()
+    process = subprocess.Popen(
+        [*EXPLORER, "serve", "--no-open", "--port", "0"],
+        cwd=ROOT,
+        env=environment,
+        stderr=subprocess.PIPE,
+        text=True,
+        # It may have started a process to compile in, which must end with it.
+        start_new_session=True,
+    )
+    try:
+        assert process.stderr is not None
+        _get_first_byte(_address(process.stderr.readline()))
+        return time.perf_counter() - start
+    finally:
+        _end(process)
+
+
+def _address(line: str) -> str:
+    found = re.search(r"http://\S+", line)
+    if found is None:
+        raise RuntimeError(f"the explorer names no address but says {line!r}")
+    return found[0]
+
+
+def _get_first_byte(address: str) -> None:
+    parts = urlsplit(address)
+    assert parts.hostname is not None
+    assert parts.port is not None
+    with socket.create_connection((parts.hostname, parts.port), timeout=60) as connection:
+        connection.sendall(f"GET / HTTP/1.1\r\nHost: {parts.netloc}\r\n\r\n".encode())
+        if not connection.recv(1):
+            raise RuntimeError("the explorer closed the connection without an answer")
+
+
+def _end(process: subprocess.Popen[str]) -> None:
+    if sys.platform == "win32":
+        process.kill()
+    else:
+        os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    if process.stderr is not None:
+        process.stderr.close()
