@@ -11,6 +11,8 @@ BENCHMARKS: Mapping[str, str] = {
     "forward_batch": "joint vectors per second of the forward kinematics, one core",
     "forward_once": "one call of the forward kinematics",
     "forward_error": "error of the forward kinematics over the reference cases",
+    "slider": "from the arrival of a slider's event to the last message of its frame",
+    "drag_sockets": "lag of two long drags at once, seen by bare websocket clients",
     "page": "from starting the explorer to the first byte of its page",
     "command": "wall time of one command",
 }

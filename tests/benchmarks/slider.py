@@ -1,0 +1,194 @@
+"""From the arrival of an event at the server to the last message of the frame it makes.
+
+A client in another process sends the events over a real websocket and reads all that
+comes back. An event ends when a frame with its value, or with a newer one, is assigned.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable, Generator, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from itertools import chain
+from typing import Any
+
+from benchmarks.socket_client import Drag, HandleDrag, SliderDrag, dragging_process
+from benchmarks.sweeps import sweep
+from benchmarks.table import Row, seconds
+from benchmarks.timing import Spread
+from explorer import PRESETS, Pose
+from explorer.app.actions import Reset
+from explorer.app.assigning import Assigner, Update
+from explorer.app.panels.move import JOINT_LABELS
+from explorer.app.scene.placing import scene_scale
+from explorer.app.server import Running, start
+from explorer.app.state import State
+from explorer.compiled import warm
+
+ROUNDS, EVENTS, WARM_UP_EVENTS = 3, 100, 20
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A way to move the mechanism: its events, and where their values arrive.
+
+    Attributes:
+        name: In the table.
+        drag: The drag of a number of events from a state.
+        sent: The value in a message of it.
+        arrived: The same value in a state.
+    """
+
+    name: str
+    drag: Callable[[State, int], Drag]
+    sent: Callable[[Any], float]
+    arrived: Callable[[State], float]
+
+
+def _value(message: Any) -> float:
+    return float(message.updates["value"])
+
+
+def _handle_drag(state: State, count: int) -> HandleDrag:
+    scale = scene_scale(state)
+    x, y, z = (scale * v for v in state.pose.position)
+    quaternion = state.pose.quaternion
+    return HandleDrag("/handle", [Pose((v, y, z), quaternion) for v in sweep(x, 1.0, count)])
+
+
+KINDS = (
+    Kind(
+        "leg slider l1",
+        lambda state, count: SliderDrag(JOINT_LABELS["l1"], sweep(state.joints[0], 1.0, count)),
+        _value,
+        lambda state: state.joints[0],
+    ),
+    Kind(
+        "pose slider x",
+        lambda state, count: SliderDrag("x", sweep(state.pose.position[0], 2.0, count)),
+        _value,
+        lambda state: state.pose.position[0],
+    ),
+    Kind(
+        "design slider b1x",
+        lambda state, count: SliderDrag("b1x", sweep(state.design.b1[0], 1.0, count)),
+        _value,
+        lambda state: state.design.b1[0],
+    ),
+    Kind(
+        "drag handle",
+        _handle_drag,
+        lambda message: float(message.position[0]),
+        lambda state: state.pose.position[0] * scene_scale(state),
+    ),
+)
+
+
+class Stopwatch:
+    """Runs from the arrival of each event to the end of the first frame not older than it."""
+
+    def __init__(self, kind: Kind) -> None:
+        self._kind = kind
+        self._waiting: deque[tuple[float, float]] = deque()
+        self._worked: float | None = None
+        self.durations: list[float] = []
+        # Of the processor, per frame: other work on the machine does not show in it.
+        self.work: list[float] = []
+
+    def arrive(self, message: Any) -> None:
+        """Note the arrival of a message."""
+        now = time.perf_counter()
+        if type(message).__name__ in ("GuiUpdateMessage", "TransformControlsUpdateMessage"):
+            self._waiting.append((now, self._kind.sent(message)))
+
+    def drawn(self, state: State) -> None:
+        """Note the end of a frame, on the thread that makes them all."""
+        now, worked = time.perf_counter(), time.thread_time()
+        if self._worked is not None:
+            self.work.append(worked - self._worked)
+        self._worked = worked
+        shown = self._kind.arrived(state)
+        waiting = list(self._waiting)
+        for index, (_, value) in enumerate(waiting):
+            if abs(value - shown) < 1e-9:
+                self.durations += [now - arrival for arrival, _ in waiting[: index + 1]]
+                for _ in range(index + 1):
+                    self._waiting.popleft()
+                return
+
+
+@contextmanager
+def timed(running: Running, stopwatch: Stopwatch) -> Generator[None]:
+    """Let the stopwatch hear of every message that arrives and of every frame's end."""
+    internals: Any = running.viser
+    server = internals._websock_server
+    handle, assign = server._handle_incoming_message, Assigner.assign
+
+    def arriving(client_id: int, message: Any) -> Any:
+        stopwatch.arrive(message)
+        return handle(client_id, message)
+
+    def assigning(self: Assigner, updates: Iterable[Update]) -> int:
+        count = assign(self, updates)
+        stopwatch.drawn(running.page.session.state)
+        return count
+
+    server._handle_incoming_message = arriving
+    Assigner.assign = assigning
+    try:
+        yield
+    finally:
+        Assigner.assign = assign
+        del server._handle_incoming_message
+
+
+def run() -> Iterator[Row]:
+    """Yield a row of the slowest kind and one of each kind."""
+    found = measure()
+    for kind in [kind for kind, watches in found.items() if not all(w.durations for w in watches)]:
+        yield Row(f"  {kind}", "broken: its events make no frames")
+        del found[kind]
+    spreads = {
+        kind: Spread.of(list(chain(*(watch.durations for watch in watches))))
+        for kind, watches in found.items()
+    }
+    worst = max(spreads, key=lambda kind: spreads[kind].p95)
+    calmest = min(Spread.of(watch.durations).p95 for watch in found[worst])
+    yield Row(
+        "event to last message of its frame, p95 of the slowest kind",
+        f"{seconds(spreads[worst].p95)} ({worst}); best of {ROUNDS} rounds {seconds(calmest)}",
+        "5 ms",
+    )
+    for kind, spread in spreads.items():
+        count = sum(len(watch.durations) for watch in found[kind])
+        work = Spread.of(list(chain(*(watch.work for watch in found[kind]))))
+        yield Row(
+            f"  {kind}, {count} of {ROUNDS * EVENTS} events",
+            f"p50 {seconds(spread.p50)}, p95 {seconds(spread.p95)}, max {seconds(spread.longest)}; "
+            f"processor p50 {seconds(work.p50)}",
+        )
+
+
+def measure() -> dict[str, list[Stopwatch]]:
+    """Return the stopwatch of every round, by kind."""
+    running = start(PRESETS["paper-optimal"], port=0)
+    warm()
+    found: dict[str, list[Stopwatch]] = {kind.name: [] for kind in KINDS}
+    session = running.page.session
+    try:
+        with dragging_process() as drag:
+            # The kinds take turns, so that no disturbance falls on one alone.
+            for events in (WARM_UP_EVENTS, *[EVENTS] * ROUNDS):
+                for kind in KINDS:
+                    session.do(Reset())
+                    session.wait_until_idle()
+                    stopwatch = Stopwatch(kind)
+                    with timed(running, stopwatch):
+                        drag(running.url, [kind.drag(session.state, events)])
+                    if events == EVENTS:
+                        found[kind.name].append(stopwatch)
+    finally:
+        running.stop()
+    return found
