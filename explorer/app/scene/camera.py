@@ -12,7 +12,7 @@ import viser
 
 from explorer.app.scene.flags import flag_corners
 from explorer.app.scene.legs import guide_span
-from explorer.app.scene.marks import ghost_points
+from explorer.app.scene.marks import ghost_points, handle_tips
 from explorer.app.scene.placing import Placed
 from explorer.arrays import FloatArray
 
@@ -53,11 +53,11 @@ def framing(placed: Placed, view: ViewName, aspect: float) -> tuple[FloatArray, 
         low, high = float((along + slope * depth).min()), float((along - slope * depth).max())
         distance = max(distance, 0.5 * (high - low) / slope)
         target = target + 0.5 * (low + high) * axis
-    return target - 1.02 * distance * forward, target
+    return target - 1.05 * distance * forward, target
 
 
 def outermost_points(placed: Placed) -> FloatArray:
-    """Return what must be in the picture, shape (n, 3): joints, bodies and flags."""
+    """Return what must be in the picture, shape (n, 3): all but the grid."""
     view = placed.frame.state.view
     joints = np.array(list(placed.points.values()))
     if view.ghosts:
@@ -68,6 +68,8 @@ def outermost_points(placed: Placed) -> FloatArray:
     seen = [(joints[:, None] + around).reshape(-1, 3), guide]
     if view.flags:
         seen.append(flag_corners(placed))
+    if view.handle:
+        seen.append(handle_tips(placed))
     return np.concatenate(seen)
 
 

@@ -18,6 +18,10 @@ from explorer.singularity import mode_name
 BASE_LABELS = ("a1", "a2", "a3")
 PLATFORM_LABELS = ("b1", "b2", "b3", "b4")
 
+HANDLE_SCALE = 1.9
+# From the gizmo's origin to the tip of an arrow, as viser draws it.
+HANDLE_REACH = 1.25 * HANDLE_SCALE
+
 
 class Labels:
     """The names of the attachment points."""
@@ -114,6 +118,11 @@ def ghost_points(placed: Placed) -> FloatArray:
     return placed.scale * solution.position[others][:, None] + turned
 
 
+def handle_tips(placed: Placed) -> FloatArray:
+    """Return the tips of the gizmo's three arrows in the scene, shape (3, 3)."""
+    return placed.points["b4"] + HANDLE_REACH * placed.frame.snapshot.rotation.T
+
+
 def _others(placed: Placed) -> list[int]:
     return [mode for mode in range(8) if mode != placed.frame.state.mode]
 
@@ -123,7 +132,7 @@ class DragHandle:
 
     def __init__(self, scene: viser.SceneApi) -> None:
         self.handle = scene.add_transform_controls(
-            "/handle", scale=1.9, line_width=2.0, depth_test=False, opacity=0.85
+            "/handle", scale=HANDLE_SCALE, line_width=2.0, depth_test=False, opacity=0.85
         )
 
     def updates(self, placed: Placed) -> Iterator[Update]:
