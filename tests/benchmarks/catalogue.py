@@ -13,6 +13,7 @@ BENCHMARKS: Mapping[str, str] = {
     "forward_error": "error of the forward kinematics over the reference cases",
     "slider": "from the arrival of a slider's event to the last message of its frame",
     "drag_sockets": "lag of two long drags at once, seen by bare websocket clients",
+    "drag_browser": "lag of two long drags at once, seen in two tabs of a real browser",
     "page": "from starting the explorer to the first byte of its page",
     "command": "wall time of one command",
 }
