@@ -45,7 +45,8 @@ class Kernel(Generic[Arguments]):
         self._signature = signature
         self._compiled: Callable[Arguments, None] | None = None
         functools.update_wrapper(self, function)
-        self.name = f"{function.__module__.rpartition('.')[2]}.{function.__name__}"
+        self.module = function.__module__
+        self._name = f"{function.__module__.rpartition('.')[2]}.{function.__name__}"
         _kernels.append(self)
 
     def __call__(self, rows: int, *args: Arguments.args, **kwargs: Arguments.kwargs) -> None:
@@ -55,15 +56,26 @@ class Kernel(Generic[Arguments]):
         (self._compiled or self._function)(*args, **kwargs)
 
     @property
+    def is_cached(self) -> bool:
+        """Whether an earlier process has compiled it."""
+        return any(cache_folder().glob(f"**/{self._name}-*.nbi"))
+
+    @property
     def ready(self) -> bool:
         """Whether the compiled form is in use."""
         return self._compiled is not None
 
-    def compile(self) -> None:
-        """Compile now, or load what an earlier process has compiled."""
+    def compile(self, *, here: bool = False) -> None:
+        """Load what has been compiled before, or have it compiled and load it.
+
+        Args:
+            here: Compile in this process, rather than in a child that fills the cache.
+        """
         with _compiling:
             if self._compiled is not None:
                 return
+            if not here and not self.is_cached:
+                _compile_in_child([self.module])
             import numba
             from numba.core import config
 
@@ -112,41 +124,42 @@ def _with_compiled_helpers(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def warm() -> None:
-    """Compile every kernel that has been imported, so that small calls are fast too."""
+    """Make every kernel that has been imported compiled, so that small calls are fast too."""
+    missing = sorted({each.module for each in _kernels if not (each.ready or each.is_cached)})
+    if missing:
+        _compile_in_child(missing)
     for each in _kernels:
         each.compile()
 
 
+def compile_here() -> None:
+    """Compile every kernel that has been imported in this process, into the cache."""
+    for each in _kernels:
+        each.compile(here=True)
+
+
 def warm_in_background() -> threading.Thread:
-    """Warm without holding up this process; calls run interpreted meanwhile.
-
-    Compiling would hold the interpreter lock for seconds. A child process does it and
-    fills the cache, from which this process then loads in a fraction of a second.
-    """
-
-    def run() -> None:
-        if not is_cached():
-            modules = sorted({each.__module__ for each in _kernels})
-            code = f"import {', '.join(modules)}; from explorer.compiled import warm; warm()"
-            # The child must find these very sources, wherever it is started.
-            paths = {"PYTHONPATH": str(Path(__file__).parents[1])}
-            subprocess.run(  # noqa: S603 - our own interpreter and our own words
-                [sys.executable, "-P", "-c", code],
-                check=False,
-                capture_output=True,
-                env={**os.environ, **paths},
-            )
-        warm()
-
-    thread = threading.Thread(target=run, name="warm kernels", daemon=True)
+    """Warm in a thread; calls run interpreted meanwhile."""
+    thread = threading.Thread(target=warm, name="warm kernels", daemon=True)
     thread.start()
     return thread
 
 
-def is_cached() -> bool:
-    """Whether the cache folder holds a compiled form of every imported kernel."""
-    names = {path.name.split("-")[0] for path in cache_folder().glob("**/*.nbi")}
-    return all(each.name in names for each in _kernels)
+def _compile_in_child(modules: list[str]) -> None:
+    """Have another process fill the cache; should it fail, this one compiles for itself.
+
+    Compiling here would hold the interpreter lock for seconds, and at a level of
+    optimisation that takes three times as long for kernels that run no faster.
+    """
+    code = f"import {', '.join(modules)}; from explorer.compiled import compile_here as c; c()"
+    # The child must find these very sources, wherever it is started.
+    changed = {"PYTHONPATH": str(Path(__file__).parents[1]), "NUMBA_OPT": "1"}
+    subprocess.run(  # noqa: S603 - our own interpreter and our own words
+        [sys.executable, "-P", "-c", code],
+        check=False,
+        capture_output=True,
+        env={**os.environ, **changed},
+    )
 
 
 @functools.cache

@@ -38,6 +38,35 @@ def _set(struct: msgspec.Struct, name: str, value: object) -> None:
     msgspec.structs.force_setattr(struct, name, value)
 
 
+class Swing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """How far a leg may swing in its universal and ball joints; None for no bound.
+
+    Each is the half-angle, in degrees, of a cone about the leg's direction in the home
+    pose: fixed in the base for the universal joints, in the platform for the ball joints.
+
+    Raises:
+        DesignError: not between 0 and 180.
+    """
+
+    a1: float | None = None
+    a3: float | None = None
+    b1: float | None = None
+    b2: float | None = None
+    b3: float | None = None
+    b4: float | None = None
+
+    def __post_init__(self) -> None:
+        for name in self.__struct_fields__:
+            angle = getattr(self, name)
+            if angle is not None:
+                checked = positive(f"limits.swing.{name}", angle)
+                if checked > 180.0:
+                    raise DesignError(
+                        f"limits.swing.{name} is a half-angle of at most 180°; got {checked:g}"
+                    )
+                _set(self, name, checked)
+
+
 class Limits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What the actuators, the guide and the user allow, all in design units.
 
@@ -49,6 +78,7 @@ class Limits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         margin: smallest |margin| together with the home's sign triple; 0 demands only
             the sign triple, None nothing.
         leg_radii: radii of the four capsule legs, in the order of the legs.
+        swing: half-angles of the cones that the joints keep the legs in.
 
     Raises:
         DesignError: not finite, negative where a length is meant, or reversed.
@@ -63,6 +93,7 @@ class Limits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     box: tuple[Triple, Triple] | None = None
     margin: float | None = 0.0
     leg_radii: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    swing: Swing = Swing()
 
     def __post_init__(self) -> None:
         for name in LENGTHS:
@@ -93,6 +124,7 @@ class Limits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             _set(self, "box", (tuple(low for low, _ in pairs), tuple(high for _, high in pairs)))
         if self.margin is not None:
             _set(self, "margin", not_negative("limits.margin", self.margin))
+        instance("limits.swing", self.swing, Swing)
         radii = numbers("limits.leg_radii", self.leg_radii, 4)
         _set(self, "leg_radii", tuple(not_negative("limits.leg_radii", r) for r in radii))
 

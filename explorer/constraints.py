@@ -1,0 +1,295 @@
+"""The limits of a design as primitive solids in the space of p, at one orientation.
+
+At a fixed rotation each limit is a ball, a cylinder along x, a half-space or a cone of
+positions (design.md, section 6), and the constant-orientation workspace their intersection. Every
+primitive carries how its own parameters move with the design variables, the yaw and its
+limit, so that derivatives of volumes follow by the chain rule.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from explorer.arrays import FloatArray, finite_array
+from explorer.design import VARIABLES, Design, Swing
+from explorer.home import home_pose
+from explorer.kinematics import attachment_points
+from explorer.pose import checked_rotation
+from explorer.singularity import margins, mode_of, signs_of
+
+YAW = "yaw"
+"""The parameter of a rotation of the platform about the base's z-axis, in radians."""
+
+Rates: TypeAlias = Mapping[str, FloatArray]
+"""By parameter: the rates of a primitive's own parameters, centre or normal first."""
+
+X, Y, Z = np.eye(3)
+
+
+@dataclass(frozen=True)
+class Round:
+    """A ball, or a cylinder along x, of positions.
+
+    Attributes:
+        name: The limit, such as "l1 maximum".
+        centre: Shape (3,); of a cylinder x counts for nothing.
+        radius: In design units.
+        is_ball: A ball, or else a cylinder.
+        inside: Whether the limit keeps p inside, or else outside.
+        rates: Of (centre, radius), shape (4,) each.
+    """
+
+    name: str
+    centre: FloatArray
+    radius: float
+    is_ball: bool
+    inside: bool
+    rates: Rates = field(default_factory=dict[str, FloatArray])
+
+    def slack(self, p: FloatArray) -> FloatArray:
+        """Return by how much positions (..., 3) keep the limit; negative where they do not."""
+        off = p - self.centre
+        distance = np.sqrt(
+            off[..., 1] ** 2 + off[..., 2] ** 2 + (off[..., 0] ** 2 if self.is_ball else 0.0)
+        )
+        return self.radius - distance if self.inside else distance - self.radius
+
+
+@dataclass(frozen=True)
+class HalfSpace:
+    """The positions with normal · p <= offset.
+
+    Attributes:
+        name: The limit, such as "box z minimum".
+        normal: Shape (3,), of unit length but for those of κ2.
+        offset: In design units.
+        rates: Of (normal, offset), shape (4,) each.
+    """
+
+    name: str
+    normal: FloatArray
+    offset: float
+    rates: Rates = field(default_factory=dict[str, FloatArray])
+
+    def slack(self, p: FloatArray) -> FloatArray:
+        """Return by how much positions (..., 3) keep the limit; negative where they do not."""
+        return self.offset - p @ self.normal
+
+
+@dataclass(frozen=True)
+class Cone:
+    """The positions in which a leg keeps to the cone of a joint.
+
+    Attributes:
+        name: The limit, such as "swing a1".
+        apex: Shape (3,).
+        axis: Shape (3,), of unit length.
+        half_angle: In radians.
+        flat: Whether only the yz-part of p counts, as for the legs on the guide.
+    """
+
+    name: str
+    apex: FloatArray
+    axis: FloatArray
+    half_angle: float
+    flat: bool
+
+    def slack(self, p: FloatArray) -> FloatArray:
+        """Return the angle left to the cone at positions (..., 3), in radians."""
+        off = (p - self.apex) * (np.array([0.0, 1.0, 1.0]) if self.flat else 1.0)
+        along = off @ self.axis
+        across = np.linalg.norm(np.cross(off, self.axis), axis=-1)
+        return self.half_angle - np.arctan2(across, along)
+
+
+@dataclass(frozen=True)
+class Never:
+    """A limit that no position keeps, at this orientation."""
+
+    name: str
+
+    def slack(self, p: FloatArray) -> FloatArray:
+        """Return minus infinity for positions (..., 3)."""
+        return np.full(p.shape[:-1], -math.inf)
+
+
+Constraint: TypeAlias = Round | HalfSpace | Cone | Never
+
+
+def constraints(design: Design, rotation: ArrayLike) -> tuple[Constraint, ...]:
+    """Return the limits of a design at an orientation, in the order of the design file.
+
+    Args:
+        design: The manipulator.
+        rotation: Platform to base, shape (3, 3).
+
+    Raises:
+        InputError: not a rotation.
+    """
+    r = checked_rotation(rotation)
+    return (
+        *_lengths(design, r),
+        *_guide(design, r),
+        *_box(design),
+        *_margins(design, r),
+        *_swings(design, r),
+    )
+
+
+def slacks(limits: tuple[Constraint, ...], position: ArrayLike) -> FloatArray:
+    """Return by how much positions (..., 3) keep each of n limits, shape (..., n).
+
+    In design units, but for cones in radians.
+    """
+    p = finite_array("position", position, (3,))
+    return np.stack([limit.slack(p) for limit in limits], axis=-1)
+
+
+def _turning(vector: FloatArray) -> FloatArray:
+    """Return the rate of a vector that turns about z with the platform."""
+    return np.array([-vector[1], vector[0], 0.0])
+
+
+def _four(vector: FloatArray, last: float = 0.0) -> FloatArray:
+    return np.array([*vector, last])
+
+
+def _lengths(design: Design, r: FloatArray) -> Iterator[Constraint]:
+    u, v = r[:, 0], r[:, 1]
+    b1x, b1y = design.b1
+    arm = b1x * u + b1y * v
+    a3 = np.array([*design.a3, 0.0])
+    yz = np.array([0.0, 1.0, 1.0])
+    legs: tuple[tuple[str, FloatArray, bool, dict[str, FloatArray]], ...] = (
+        ("l1", -arm, True, {"b1x": -u, "b1y": -v, YAW: -_turning(arm)}),
+        ("d2", -design.b2 * u * yz, False, {"b2": -u * yz, YAW: -design.b2 * _turning(u) * yz}),
+        ("d4", -design.b3 * u * yz, False, {"b3": -u * yz, YAW: -design.b3 * _turning(u) * yz}),
+        ("l4", a3, True, {"a3x": X, "a3y": Y}),
+    )
+    for name, centre, is_ball, moves in legs:
+        low, high = design.length_range(name)
+        rates = {key: _four(rate) for key, rate in moves.items()}
+        if low > 0.0:
+            least = f"{name} minimum"
+            own = {**rates, least: _four(np.zeros(3), 1.0)}
+            yield Round(least, centre, low, is_ball, inside=False, rates=own)
+        most = f"{name} maximum"
+        own = {**rates, most: _four(np.zeros(3), 1.0)}
+        if getattr(design.limits, name)[1] is None:
+            # Tied to the reach, which moves with a3 and has no parameter of its own.
+            del own[most]
+            for key, share in zip(("a3x", "a3y"), a3 / design.reach, strict=False):
+                own[key] = own.get(key, np.zeros(4)) + _four(np.zeros(3), float(share))
+        yield Round(most, centre, high, is_ball, inside=True, rates=own)
+
+
+def _guide(design: Design, r: FloatArray) -> Iterator[Constraint]:
+    u = r[:, 0]
+    if design.limits.guide is not None:
+        low, high = design.limits.guide
+        for joint, variable, b in (("d1", "b2", design.b2), ("d3", "b3", design.b3)):
+            shift, turning = b * float(u[0]), b * float(_turning(u)[0])
+            yield HalfSpace(
+                f"{joint} minimum",
+                -X,
+                shift - low,
+                {
+                    variable: _four(np.zeros(3), float(u[0])),
+                    YAW: _four(np.zeros(3), turning),
+                    "guide minimum": _four(np.zeros(3), -1.0),
+                },
+            )
+            yield HalfSpace(
+                f"{joint} maximum",
+                X,
+                high - shift,
+                {
+                    variable: _four(np.zeros(3), -float(u[0])),
+                    YAW: _four(np.zeros(3), -turning),
+                    "guide maximum": _four(np.zeros(3), 1.0),
+                },
+            )
+    # |d1 - d3| is the same in every position.
+    if abs((design.b3 - design.b2) * float(u[0])) < design.limits.gap:
+        yield Never("gap |d1 − d3|")
+
+
+def _box(design: Design) -> Iterator[Constraint]:
+    if design.limits.box is None:
+        return
+    for axis, name, low, high in zip((X, Y, Z), "xyz", *design.limits.box, strict=True):
+        least, most = f"box {name} minimum", f"box {name} maximum"
+        yield HalfSpace(least, -axis, -low, {least: _four(np.zeros(3), -1.0)})
+        yield HalfSpace(most, axis, high, {most: _four(np.zeros(3), 1.0)})
+
+
+def _margins(design: Design, r: FloatArray) -> Iterator[Constraint]:
+    least = design.limits.margin
+    if least is None:
+        return
+    u, n = r[:, 0], r[:, 2]
+    # κ = k·p; the home's sign triple says on which side of zero it lies.
+    gradients = (
+        ("margin κ1", -n, -_turning(n)),
+        ("margin κ2", np.cross(X, u), np.cross(X, _turning(u))),
+        ("margin κ3", Z, np.zeros(3)),
+    )
+    for (name, k, turning), sign in zip(gradients, home_signs(design), strict=True):
+        if not np.any(k):
+            yield Never(name)
+            continue
+        rates = {YAW: _four(-sign * turning), "margin": _four(np.zeros(3), -1.0)}
+        yield HalfSpace(name, -sign * k, -least, rates)
+
+
+def _swings(design: Design, r: FloatArray) -> Iterator[Constraint]:
+    swing = design.limits.swing
+    if swing == Swing():
+        return
+    home = home_pose(design)
+    at_home = attachment_points(design, home.position, home.rotation)
+    # Of each joint: the leg's direction at home, and where in p the leg has no length.
+    base_to_tip = {
+        "1": at_home.b1,
+        "2": at_home.b2 * [0.0, 1.0, 1.0],
+        "3": at_home.b3 * [0.0, 1.0, 1.0],
+        "4": at_home.b4 - at_home.a3,
+    }
+    b1x, b1y = design.b1
+    apexes = {
+        "1": -(b1x * r[:, 0] + b1y * r[:, 1]),
+        "2": -design.b2 * r[:, 0],
+        "3": -design.b3 * r[:, 0],
+        "4": at_home.a3,
+    }
+    with_platform = r @ home.rotation.T
+    for joint in swing.__struct_fields__:
+        degrees = getattr(swing, joint)
+        if degrees is None:
+            continue
+        leg = "4" if joint == "a3" else joint[1]
+        direction = base_to_tip[leg]
+        length = float(np.linalg.norm(direction))
+        if length == 0.0:
+            yield Never(f"swing {joint}")
+            continue
+        axis = direction / length
+        if joint.startswith("b"):
+            axis = with_platform @ axis
+        yield Cone(f"swing {joint}", apexes[leg], axis, math.radians(degrees), leg in "23")
+
+
+def home_signs(design: Design) -> tuple[int, int, int]:
+    """Return the sign triple of the design's home pose."""
+    home = home_pose(design)
+    return signs_of(int(mode_of(margins(home.position, home.rotation))))
+
+
+PARAMETERS = (*VARIABLES, YAW)
+"""What every workspace depends on, besides its limits."""
