@@ -72,13 +72,12 @@ def nearest_feasible(
 def _discriminants(
     design: Design, joints: FloatArray, scale: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Return κ1², κ2², κ3² and 1 - c² over scale², shape (4, 6, 5), and the joints, (6, 2).
+    """Return κ1², κ2², κ3² over scale², shape (3, 6, 5), and the joints, shape (6, 2).
 
     Row j of the middle axis leaves one unknown, which is moderate even where joint j can
     hardly move; the last axis holds ascending coefficients of it. Row j of the joints is
     (offset, slope): joint j over scale, or its square, is offset + slope * unknown. The
-    algebra is that of `trilateration.solve_rows`. 1 - c² is there because two negative
-    factors of κ2² would pass for closing.
+    algebra is that of `trilateration.solve_rows`.
     """
     values, squares = np.zeros((6, 6, 3)), np.zeros((6, 6, 3))
     values[:, :, 0], squares[:, :, 0] = joints[:, None], joints[:, None] ** 2
@@ -124,7 +123,6 @@ def _discriminants(
             np.pad(p2, room) - _product(along, along) - _product(across, across),
             _product(s2, r2) - _product(w, w),
             np.pad(r2, room) - _product(py, py),
-            np.pad(s2, room),
         ]
     )
     return polynomials, joint_of[:, :2]
@@ -139,7 +137,7 @@ def _product(a: FloatArray, b: FloatArray) -> FloatArray:
 
 
 def _real_roots(polynomials: FloatArray) -> list[list[float]]:
-    """Return the real roots of the polynomials (4, 6, 5), for each of the six."""
+    """Return the real roots of the polynomials (3, 6, 5), for each of the six."""
     found: list[list[float]] = [[] for _ in JOINTS]
     rows = polynomials.reshape(-1, 5)
     # Coefficients that are rounding noise beside the largest have no say in the degree.

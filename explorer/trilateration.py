@@ -22,6 +22,8 @@ from explorer.compiled import kernel
 EPSILON = 2.0**-52
 # A discriminant within this many rounding bounds below zero counts as zero.
 ROUNDINGS = 8.0
+# The square of a length that is nothing beside one, yet far from where squares underflow.
+NOTHING = 1e-200
 
 
 @kernel("void(f8[::1], f8[:,::1], f8[:,:,::1], f8[:,:,:,::1], b1[::1], f8[:,::1])")
@@ -117,10 +119,10 @@ def solve_rows(  # noqa: PLR0915 - one loop body, so that nothing is stored betw
             and k2 >= -ROUNDINGS * (ek2 + es2 + er2 if s2 < 0.0 or r2 < 0.0 else ek2)
             and k3 >= -ROUNDINGS * ek3
         )
-        square = scale * scale
-        discriminants[row, 0] = k1 * square
-        discriminants[row, 1] = k2 * square
-        discriminants[row, 2] = k3 * square
+        unit = scale * scale
+        discriminants[row, 0] = k1 * unit
+        discriminants[row, 1] = k2 * unit
+        discriminants[row, 2] = k3 * unit
 
         # Where a discriminant is negative, the nearest scalars that close take over.
         c = min(1.0, max(-1.0, c))
@@ -136,10 +138,10 @@ def solve_rows(  # noqa: PLR0915 - one loop body, so that nothing is stored betw
             pz = kappa3 if lower & 1 else -kappa3
             turn = kappa2 if lower & 2 else -kappa2
             uy, uz = w * py + turn * pz, w * pz - turn * py
-            size = math.sqrt(uy * uy + uz * uz)
+            square = uy * uy + uz * uz
             # Of length s by construction, but near the guide only after dividing by it.
-            if size > 0.0:
-                stretch = s / size
+            if square > NOTHING:
+                stretch = s / math.sqrt(square)
                 uy, uz = uy * stretch, uz * stretch
             else:
                 uy, uz = s, 0.0
@@ -153,7 +155,7 @@ def solve_rows(  # noqa: PLR0915 - one loop body, so that nothing is stored betw
             square_h = ex * ex + ey * ey + ez * ez
             cosine, sine = 1.0, 0.0
             # If little is left e was all rounding: a1 is on the line, any normal of u does.
-            if square_h > 0.25 * rough:
+            if square_h > max(0.25 * rough, NOTHING):
                 inverse = 1.0 / math.sqrt(square_h)
                 ex, ey, ez = ex * inverse, ey * inverse, ez * inverse
                 cosine = min(1.0, max(-1.0, across * inverse))

@@ -17,7 +17,10 @@ def tetrahedron_volume(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArra
     """Return the volume from the determinant of the four points' homogeneous coordinates."""
     points = np.stack([a, b, c, d])
     size = float(np.abs(points).max()) or 1.0
-    matrix = np.column_stack([points / size, np.ones(4)])
+    scaled = points / size
+    # LAPACK divides by pivots, so a subnormal one would overflow.
+    scaled[np.abs(scaled) < 1e-200] = 0.0
+    matrix = np.column_stack([scaled, np.ones(4)])
     return abs(float(np.linalg.det(matrix))) * size**3 / 6.0
 
 

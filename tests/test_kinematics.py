@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from strategies import (
     EPSILON,
+    QUARTER_TURNS,
     Case,
     all_cases,
     amplification,
@@ -609,3 +610,26 @@ def test_carriages_may_be_on_the_negative_side() -> None:
 def test_unusable_poses_are_refused(position: Any, rotation: Any) -> None:
     with pytest.raises(InputError):
         inverse(PRESETS["paper-initial"], position, rotation)
+
+
+@pytest.mark.parametrize("turn", range(0, 24, 5))
+def test_positions_that_underflow_still_give_rigid_poses(compiled: None, turn: int) -> None:
+    design = PRESETS["paper-initial"]
+    directions = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 2, 3], [0, -1, 3], [2, 1, 0]])
+    shrinks = 10.0 ** -np.arange(1.0, 320.0)
+    joints = inverse(design, shrinks[:, None, None] * directions, QUARTER_TURNS[turn])
+    solved = forward(design, joints)
+    assert solved.feasible.all()
+    check_finite_and_rigid(solved)
+
+
+@given(quarter_turns(), st.integers(40, 110))
+def test_platforms_near_the_guide_and_askew_give_rigid_poses(
+    rotation: FloatArray, exponent: int
+) -> None:
+    design = PRESETS["paper-optimal"]
+    near_guide = np.array([3.0, 3.0 * 10.0**-exponent, -4.0 * 10.0**-exponent])
+    tilted = rotation @ rotation_from_quaternion([0.8, 0.3, -0.2, 0.5])
+    solved = forward(design, inverse(design, near_guide, tilted))
+    assert solved.feasible
+    check_finite_and_rigid(solved)
