@@ -21,6 +21,7 @@ from explorer.pose import Pose
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
+    from viser import ClientHandle
 
 CHROMIUM_FLAGS = (
     "--no-sandbox",
@@ -94,11 +95,12 @@ def picture(
         if prepare is not None:
             prepare(running)
             running.page.session.wait_until_idle()
-        page = open_page(browser, running, size)
+        page, client = open_page(browser, running, size)
         try:
             if not panels:
                 page.add_style_tag(content=SCENE_ALONE)
             running.page.point_cameras(view)
+            settle(page, client)
             return stable_picture(page)
         finally:
             page.close()
@@ -140,19 +142,48 @@ def headless_browser() -> Generator[Browser]:
             browser.close()
 
 
-def open_page(browser: Browser, running: Running, size: tuple[int, int]) -> Page:
-    """Open the explorer in a new tab and wait until it is connected."""
+def open_page(
+    browser: Browser, running: Running, size: tuple[int, int]
+) -> tuple[Page, ClientHandle]:
+    """Open the explorer in a new tab and wait until it is connected.
+
+    Raises:
+        PictureError: it does not connect in time.
+    """
     known = set(running.viser.get_clients())
     page = browser.new_page(viewport={"width": size[0], "height": size[1]})
     page.goto(running.url)
     # viser tells of software rendering; a picture is not the place for it.
     page.add_style_tag(content=".mantine-Notifications-root { display: none !important; }")
     deadline = time.monotonic() + PATIENCE_SECONDS
-    while not set(running.viser.get_clients()) - known:
-        if time.monotonic() > deadline:
-            raise PictureError("the page did not connect to the explorer in time")
+    while time.monotonic() < deadline:
+        for number, client in running.viser.get_clients().items():
+            if number not in known:
+                return page, client
         page.wait_for_timeout(50)
-    return page
+    raise PictureError("the page did not connect to the explorer in time")
+
+
+def settle(page: Page, client: ClientHandle) -> None:
+    """Wait until a tab has drawn all that was sent to it, with its panels laid out.
+
+    Raises:
+        PictureError: it does not draw in time.
+    """
+    deadline = time.monotonic() + PATIENCE_SECONDS
+    while True:
+        # A frame that comes back tells that all that was sent before it has arrived.
+        try:
+            client.get_render(16, 16, timeout=PATIENCE_SECONDS)
+        except (TimeoutError, RuntimeError):
+            raise PictureError("the page did not draw in time") from None
+        box = page.locator("canvas").first.bounding_box()
+        # Docked panels narrow the canvas, and the camera is then put again.
+        if box is not None and abs(client.camera.aspect - box["width"] / box["height"]) < 1e-3:
+            return
+        if time.monotonic() > deadline:
+            raise PictureError("the page did not come to rest in time")
+        page.wait_for_timeout(50)
 
 
 def stable_picture(page: Page) -> bytes:
@@ -162,11 +193,10 @@ def stable_picture(page: Page) -> bytes:
         PictureError: it keeps changing.
     """
     deadline = time.monotonic() + PATIENCE_SECONDS
-    # The page fades in; what is the same before that is not done.
-    page.wait_for_timeout(1500)
     last = page.screenshot()
     while time.monotonic() < deadline:
-        page.wait_for_timeout(400)
+        # Longer than what fades in takes.
+        page.wait_for_timeout(300)
         data = page.screenshot()
         if data == last:
             return data
