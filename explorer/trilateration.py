@@ -148,14 +148,17 @@ def solve_rows(  # noqa: PLR0915 - one loop body, so that nothing is stored betw
 
             # e: from the line b2b3 to a1, backwards; f: the same turned about u.
             ex, ey, ez = px - along * c, py - along * uy, pz - along * uz
-            rough = ex * ex + ey * ey + ez * ez
-            # Near the line cancellation leaves e leaning along u, so project once more.
-            lean = ex * c + ey * uy + ez * uz
-            ex, ey, ez = ex - lean * c, ey - lean * uy, ez - lean * uz
             square_h = ex * ex + ey * ey + ez * ez
+            on_line = square_h < NOTHING
+            if square_h < 0.01 * (px * px + r * r):
+                # Cancellation leaves e leaning along u, so project once more. If little is
+                # left it was all rounding: a1 is on the line, and any normal of u does.
+                lean = ex * c + ey * uy + ez * uz
+                ex, ey, ez = ex - lean * c, ey - lean * uy, ez - lean * uz
+                rough, square_h = square_h, ex * ex + ey * ey + ez * ez
+                on_line = square_h <= max(0.25 * rough, NOTHING)
             cosine, sine = 1.0, 0.0
-            # If little is left e was all rounding: a1 is on the line, any normal of u does.
-            if square_h > max(0.25 * rough, NOTHING):
+            if not on_line:
                 inverse = 1.0 / math.sqrt(square_h)
                 ex, ey, ez = ex * inverse, ey * inverse, ez * inverse
                 cosine = min(1.0, max(-1.0, across * inverse))
