@@ -99,6 +99,8 @@ def picture(
         try:
             if not panels:
                 page.add_style_tag(content=SCENE_ALONE)
+            # The size of the canvas, and with it the framing, is known only then.
+            settle(page, client)
             running.page.point_cameras(view)
             settle(page, client)
             return stable_picture(page)

@@ -29,6 +29,9 @@ DIRECTIONS: dict[ViewName, tuple[float, float, float]] = {
     "top": (0.0, -1e-4, 1.0),
 }
 
+# How many earlier places of a camera count as not moved by hand.
+REMEMBERED = 4
+
 
 def framing(placed: Placed, view: ViewName, aspect: float) -> tuple[FloatArray, FloatArray]:
     """Return the eye and the target, in scene units, that show the whole mechanism.
@@ -76,8 +79,9 @@ def outermost_points(placed: Placed) -> FloatArray:
 @dataclass(frozen=True)
 class _Aimed:
     view: ViewName
-    eye: FloatArray
     aspect: float
+    # Where the camera was put, the last time last. A browser may still tell of one before.
+    eyes: tuple[FloatArray, ...]
 
 
 class Cameras:
@@ -99,7 +103,9 @@ class Cameras:
         given = client.camera.aspect
         aspect = given if math.isfinite(given) and given > 0.0 else 1.0
         eye, target = framing(self._placed(), view, aspect)
-        self._aimed[client.client_id] = _Aimed(view, eye, given)
+        aimed = self._aimed.get(client.client_id)
+        before = (client.camera.position,) if aimed is None else aimed.eyes[-REMEMBERED:]
+        self._aimed[client.client_id] = _Aimed(view, given, (*before, eye))
         with client.atomic():
             client.camera.fov = FIELD_OF_VIEW
             client.camera.up_direction = (0.0, 0.0, 1.0)
@@ -119,7 +125,7 @@ class Cameras:
         aimed = self._aimed.get(client.client_id)
         if aimed is None or client.camera.aspect == aimed.aspect:
             return
-        distance = float(np.linalg.norm(aimed.eye - client.camera.look_at))
-        moved = float(np.abs(client.camera.position - aimed.eye).max())
+        distance = float(np.linalg.norm(aimed.eyes[-1] - client.camera.look_at))
+        moved = min(float(np.abs(client.camera.position - eye).max()) for eye in aimed.eyes)
         if moved <= 1e-3 * distance:
             self.point(client, aimed.view)

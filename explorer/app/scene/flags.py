@@ -48,7 +48,8 @@ class Flag:
         self._hem = scene.add_line_segments(
             f"{root}/flag/hem",
             np.zeros((4, 2, 3)),
-            (0, 0, 0),
+            # One colour for all could not become many: the browser would draw white.
+            np.zeros((4, 2, 3), dtype=np.uint8),
             thickness=1.5,
             thickness_units="screen",
         )

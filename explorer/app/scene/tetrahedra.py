@@ -39,7 +39,8 @@ class Tetrahedra:
             scene.add_line_segments(
                 f"/tetrahedra/{index}/edges",
                 np.zeros((6, 2, 3)),
-                (0, 0, 0),
+                # One colour for all could not become many: the browser would draw white.
+                np.zeros((6, 2, 3), dtype=np.uint8),
                 thickness=1.5,
                 thickness_units="screen",
             )
