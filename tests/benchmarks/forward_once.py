@@ -22,7 +22,7 @@ def run() -> Iterator[Row]:
         for joints in rows:
             forward(DESIGN, joints)
 
-    duration = best_of(15, calls) / CALLS
+    duration = best_of(100, calls) / CALLS
     root = searches().seconds_each
     yield Row(
         "one forward call, all 8 modes",

@@ -147,12 +147,10 @@ def timed(running: Running, stopwatch: Stopwatch) -> Generator[None]:
 def run() -> Iterator[Row]:
     """Yield a row of the slowest kind and one of each kind."""
     found = measure()
-    for kind in [kind for kind, watches in found.items() if not all(w.durations for w in watches)]:
-        yield Row(f"  {kind}", "broken: its events make no frames")
-        del found[kind]
     spreads = {
         kind: Spread.of(list(chain(*(watch.durations for watch in watches))))
         for kind, watches in found.items()
+        if all(watch.durations for watch in watches)
     }
     worst = max(spreads, key=lambda kind: spreads[kind].p95)
     calmest = min(Spread.of(watch.durations).p95 for watch in found[worst])
@@ -169,6 +167,8 @@ def run() -> Iterator[Row]:
             f"p50 {seconds(spread.p50)}, p95 {seconds(spread.p95)}, max {seconds(spread.longest)}; "
             f"processor p50 {seconds(work.p50)}",
         )
+    for kind in found.keys() - spreads.keys():
+        yield Row(f"  {kind}", "broken: its events make no frames")
 
 
 def measure() -> dict[str, list[Stopwatch]]:
