@@ -93,7 +93,7 @@ def workspace_volume(design: Design, rotation: ArrayLike | None = None) -> Volum
     else:
         volume, gradient = _volume_of_slices(region)
         error = 1e-12 * volume
-    because = _what_empties(limits) if volume <= 0.0 else ()
+    because = what_empties(limits) if volume <= 0.0 else ()
     return Volume(max(0.0, volume), error, gradient, because)
 
 
@@ -236,7 +236,7 @@ def _volume_of_columns(region: Region) -> tuple[float, float]:
     return volumes[1], abs(volumes[1] - volumes[0])
 
 
-def _what_empties(limits: tuple[Constraint, ...]) -> tuple[str, ...]:
+def what_empties(limits: tuple[Constraint, ...]) -> tuple[str, ...]:
     """Return the limits without any one of which something would be left."""
     names = tuple(dict.fromkeys(limit.name for limit in limits))
     alone = tuple(

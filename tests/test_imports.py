@@ -35,7 +35,7 @@ LAYERS = (
         "constraints",
         "region",
     ),
-    ("snapshot", "solids", "nodes", "workspace"),
+    ("snapshot", "facets", "primitives", "solids", "orientations", "nodes", "workspace"),
     ("optimise", "sweep"),
     ("export",),
     ("app", "cli", "__main__"),

@@ -1,0 +1,206 @@
+"""From limits to closed meshes: what of each limit's primitive solid meets the workspace.
+
+Everything is done in a frame in which the workspace has size one, so that designs of any
+size are tessellated alike. Limits that hold all over the workspace's box are left out.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from explorer.arrays import FloatArray
+from explorer.constraints import Cone, Constraint, HalfSpace, Round
+from explorer.errors import InputError
+from explorer.facets import (
+    Box,
+    Facets,
+    ball,
+    ball_faces,
+    cone,
+    cylinder,
+    facing,
+    half_space,
+    step_of,
+    wedge,
+)
+from explorer.region import region_of
+from explorer.workspace import bounds
+
+# Chords may be off by this share of the size of the workspace unless told otherwise.
+DEFAULT_TOLERANCE = 1.0 / 500.0
+# The most faces that primitives may have together.
+MOST_FACES = 2_000_000
+# A cone that is off a plane by less than this share of the tolerance is that plane.
+FLAT = 1e-3
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A primitive solid that is yet to be tessellated, in the frame of a workspace.
+
+    Attributes:
+        name: Its limit, "" for the surroundings.
+        cuts: Whether the limit keeps p outside, or else inside.
+        faces: About how many it will have.
+        make: Makes them.
+    """
+
+    name: str
+    cuts: bool
+    faces: int
+    make: Callable[[], Facets]
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Where workspaces are tessellated, and how finely.
+
+    Attributes:
+        middle: Of the workspaces, in design units, shape (3,).
+        scale: Their largest extent, in design units.
+        tolerance: Largest distance of a face from the true surface, in design units.
+        box: Holds them, in this frame.
+    """
+
+    middle: FloatArray
+    scale: float
+    tolerance: float
+    box: Box
+
+    @property
+    def chord(self) -> float:
+        """The tolerance in this frame."""
+        return self.tolerance / self.scale
+
+    def to(self, points: FloatArray) -> FloatArray:
+        """Return points (..., 3) in this frame."""
+        return (points - self.middle) / self.scale
+
+    def back(self, points: FloatArray) -> FloatArray:
+        """Return points (..., 3) of this frame in design units."""
+        return points * self.scale + self.middle
+
+
+def frame_of(
+    families: Sequence[Sequence[Constraint]], reach: float, tolerance: float | None
+) -> Frame:
+    """Return the frame for the workspaces of families of limits.
+
+    Args:
+        families: Each with the limits of one workspace.
+        reach: Of the design, in design units.
+        tolerance: In design units; a 500th of the reach, or of the largest extent if that
+            is smaller, if None.
+
+    Raises:
+        InputError: the tolerance is not positive.
+    """
+    if tolerance is not None and not (math.isfinite(tolerance) and tolerance > 0.0):
+        raise InputError(f"the tolerance must be positive; got {tolerance:g}")
+    boxes = [box for box in map(_box_of, families) if box is not None]
+    # Where all are empty any frame will do.
+    lows = np.min([low for low, _ in boxes], axis=0) if boxes else np.zeros(3)
+    highs = np.max([high for _, high in boxes], axis=0) if boxes else np.full(3, reach)
+    middle, scale = 0.5 * (lows + highs), float((highs - lows).max())
+    chord = tolerance or DEFAULT_TOLERANCE * min(reach, scale)
+    return Frame(middle, scale, chord, Box((lows - middle) / scale, (highs - middle) / scale))
+
+
+def pieces_of(limits: Sequence[Constraint], frame: Frame) -> list[Piece]:
+    """Return the primitives whose intersection, less those that cut, keeps all limits.
+
+    () if nothing does, as far as that is seen at once.
+    """
+    ends = _box_of(limits)
+    if ends is None:
+        return []
+    region = region_of(limits)
+    box = Box(frame.to(ends[0]), frame.to(ends[1]))
+    planes = [end for end in (region.of_low, region.of_high, *region.of_planes) if end is not None]
+    found = [Piece("", False, 12, box.surroundings)]
+    for each in (
+        *(_half_space(plane, box, frame) for plane in planes),
+        *_rounds(region.of_rounds, box, frame),
+        *(_cone(limit, frame) for limit in limits if isinstance(limit, Cone)),
+    ):
+        if each is False:
+            return []
+        if each is not True:
+            found.append(each)
+    return found
+
+
+def _box_of(limits: Sequence[Constraint]) -> tuple[FloatArray, FloatArray] | None:
+    region = region_of(limits)
+    lows, highs = bounds(region)
+    return None if region.is_empty or not (lows < highs).all() else (lows, highs)
+
+
+def _half_space(plane: HalfSpace, box: Box, frame: Frame) -> Piece | bool:
+    """Return the piece, or whether the box keeps or breaks the limit all over."""
+    length = float(np.linalg.norm(plane.normal))
+    normal = plane.normal / length
+    offset = (plane.offset / length - float(normal @ frame.middle)) / frame.scale
+    heights = box.corners @ normal
+    if float(heights.max()) < offset:
+        return True
+    if float(heights.min()) >= offset:
+        return False
+    return Piece(plane.name, False, 12, partial(half_space, normal, offset, frame.box))
+
+
+def _rounds(rounds: Sequence[Round], box: Box, frame: Frame) -> Iterator[Piece | bool]:
+    """Yield the pieces, or whether the box keeps or breaks the limit all over."""
+    kin: dict[tuple[bool, bytes], list[Round]] = {}
+    for each in rounds:
+        kin.setdefault((each.is_ball, each.centre.tobytes()), []).append(each)
+    for group in kin.values():
+        # Concentric surfaces share a pattern, so that shells thinner than a chord are whole.
+        start = 0 if group[0].is_ball else 1
+        centre = frame.to(group[0].centre)[start:]
+        radii = [each.radius / frame.scale for each in group]
+        near, far = box.distances(centre)
+        parts = [
+            facing(centre, radius, frame.box, frame.chord) for radius in radii if radius > near
+        ]
+        angle = max((part[1] for part in parts), default=math.pi)
+        step = step_of(max(radii), frame.chord)
+        for each, radius in zip(group, radii, strict=True):
+            if radius <= near or radius > far:
+                yield (radius <= near) != each.inside
+                continue
+            towards = parts[0][0]
+            if each.is_ball:
+                faces = ball_faces(angle, step)
+                make = partial(ball, centre, radius, towards, angle, step)
+            else:
+                faces = math.ceil(8.0 * angle / step)
+                make = partial(cylinder, centre, radius, towards, angle, step, frame.box)
+            yield Piece(each.name, not each.inside, faces, make)
+
+
+def _cone(limit: Cone, frame: Frame) -> Piece | bool:
+    """Return the piece, or True if all positions keep the limit."""
+    if limit.half_angle >= math.pi:
+        return True
+    apex, axis, angle = frame.to(limit.apex), limit.axis, limit.half_angle
+    if limit.flat:
+        # The apex of a wedge is a line along x: that point of it counts which is nearest.
+        apex = np.array([frame.box.middle[0], apex[1], apex[2]])
+    farthest = frame.box.distances(apex)[1]
+    if abs(math.cos(angle)) * farthest <= FLAT * frame.chord:
+        offset = -float(axis @ apex)
+        return Piece(limit.name, False, 12, partial(half_space, -axis, offset, frame.box))
+    cuts = angle > 0.5 * math.pi
+    if cuts:
+        axis, angle = -axis, math.pi - angle
+    if limit.flat:
+        return Piece(limit.name, cuts, 16, partial(wedge, apex[1:], axis[1:], angle, frame.box))
+    step = step_of(farthest, frame.chord)
+    faces = math.ceil(12.0 * math.pi / step)
+    return Piece(limit.name, cuts, faces, partial(cone, apex, axis, angle, step, frame.box))

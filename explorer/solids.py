@@ -1,0 +1,276 @@
+"""Workspaces as watertight meshes: the limits' primitive solids, combined by booleans.
+
+The only module that uses manifold3d. Each face remembers the limit that it comes from.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from explorer.arrays import FloatArray, IntArray
+from explorer.constraints import Constraint, constraints
+from explorer.design import Design
+from explorer.errors import ExplorerError, InputError
+from explorer.facets import Facets
+from explorer.pose import checked_rotation
+from explorer.primitives import MOST_FACES, Frame, Piece, frame_of, pieces_of
+from explorer.workspace import home_rotation, what_empties
+
+if TYPE_CHECKING:
+    from manifold3d import Manifold
+
+HULL = "convex hull"
+"""What the faces of a convex hull come from."""
+
+
+@dataclass(frozen=True)
+class Solid:
+    """A closed mesh, in design units.
+
+    Attributes:
+        vertices: Shape (n, 3).
+        faces: Indices of vertices, counter-clockwise from outside, shape (m, 3).
+        limit_of_face: Which of the limits each face comes from, shape (m,).
+        limits: Names of limits, such as "l1 maximum".
+        tolerance: Largest distance of the faces from the true surface.
+        empty_because: The limits that empty it, see `explorer.workspace.Volume`; () if it
+            is not empty.
+    """
+
+    vertices: FloatArray
+    faces: NDArray[np.int32]
+    limit_of_face: IntArray
+    limits: tuple[str, ...]
+    tolerance: float
+    empty_because: tuple[str, ...] = ()
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether it has no face; a workspace thinner than the tolerance may have none."""
+        return len(self.faces) == 0
+
+    @cached_property
+    def volume(self) -> float:
+        """The volume within the mesh, in cubed design units."""
+        if self.is_empty:
+            return 0.0
+        middle = 0.5 * (self.vertices.min(axis=0) + self.vertices.max(axis=0))
+        a, b, c = ((self.vertices - middle)[self.faces[:, k]] for k in range(3))
+        return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6.0
+
+    @cached_property
+    def is_watertight(self) -> bool:
+        """Whether each edge is used exactly twice, in opposite directions."""
+        if self.is_empty:
+            return False
+        edges = self.faces.astype(np.int64)[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+        many = len(self.vertices)
+        there, back = np.sort(edges @ [many, 1]), np.sort(edges @ [1, many])
+        return bool((np.diff(there) > 0).all() and (there == back).all())
+
+
+def workspace_solid(
+    design: Design, rotation: ArrayLike | None = None, tolerance: float | None = None
+) -> Solid:
+    """Return the constant-orientation workspace as a mesh.
+
+    Args:
+        design: The manipulator.
+        rotation: Platform to base, shape (3, 3); that of the home pose if None.
+        tolerance: Largest distance of a face from the true surface, in design units; a
+            500th of the reach, or of the workspace if that is smaller, if None.
+
+    Raises:
+        InputError: not a rotation, or a tolerance that is not positive or too small.
+        ExplorerError: a boolean fails.
+    """
+    r = home_rotation(design) if rotation is None else checked_rotation(rotation)
+    limits = constraints(design, r)
+    solid = _common(design, limits, tolerance)
+    return replace(solid, empty_because=what_empties(limits)) if solid.is_empty else solid
+
+
+def limited_solid(
+    design: Design, limits: Sequence[Constraint], tolerance: float | None = None
+) -> Solid:
+    """Return what keeps these limits as a mesh, such as a workspace with a cut through it.
+
+    Args:
+        design: The manipulator.
+        limits: Such as those of `explorer.constraints.constraints`, and more.
+        tolerance: As of `workspace_solid`.
+
+    Raises:
+        InputError: a tolerance that is not positive or too small.
+        ExplorerError: a boolean fails.
+    """
+    return _common(design, limits, tolerance)
+
+
+def reachable_solid(design: Design, rotations: ArrayLike, tolerance: float | None = None) -> Solid:
+    """Return the positions that the platform can have in some of the orientations, as a mesh.
+
+    Args:
+        design: The manipulator.
+        rotations: Platform to base, shape (n, 3, 3).
+        tolerance: As of `workspace_solid`.
+
+    Raises:
+        InputError: not rotations, or a tolerance that is not positive or too small.
+        ExplorerError: a boolean fails.
+    """
+    from manifold3d import Manifold, OpType
+
+    families = _families(design, rotations)
+    frame = frame_of(families, design.reach, tolerance)
+    names = _names(families)
+    bodies, origins = _bodies(families, frame, names)
+    solid = _solid(Manifold.batch_boolean(bodies, OpType.Add), origins, frame, names)
+    if not solid.is_empty:
+        return solid
+    because = dict.fromkeys(name for limits in families for name in what_empties(limits))
+    return replace(solid, empty_because=tuple(because))
+
+
+def dexterous_solid(design: Design, rotations: ArrayLike, tolerance: float | None = None) -> Solid:
+    """Return the positions that the platform can have in all of the orientations, as a mesh.
+
+    Args:
+        design: The manipulator.
+        rotations: Platform to base, shape (n, 3, 3).
+        tolerance: As of `workspace_solid`.
+
+    Raises:
+        InputError: not rotations, or a tolerance that is not positive or too small.
+        ExplorerError: a boolean fails.
+    """
+    limits = [limit for family in _families(design, rotations) for limit in family]
+    solid = _common(design, limits, tolerance)
+    if not solid.is_empty:
+        return solid
+    names = _names([limits])
+    alone = tuple(
+        name
+        for name in names
+        if not _common(design, [x for x in limits if x.name != name], tolerance).is_empty
+    )
+    return replace(solid, empty_because=alone or names)
+
+
+def convex_hull(solid: Solid) -> Solid:
+    """Return the convex hull of a mesh; every face of it comes from `HULL`.
+
+    Raises:
+        ExplorerError: the hull fails.
+    """
+    from manifold3d import Manifold
+
+    if solid.is_empty:
+        return solid
+    lows, highs = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
+    middle, scale = 0.5 * (lows + highs), float((highs - lows).max())
+    points = (solid.vertices - middle) / scale
+    shapes: Any = Manifold
+    vertices, faces, _ = _mesh_of(shapes.hull_points(points))
+    origin = np.zeros(len(faces), dtype=np.int64)
+    return Solid(vertices * scale + middle, faces, origin, (HULL,), solid.tolerance)
+
+
+def _families(design: Design, rotations: ArrayLike) -> list[tuple[Constraint, ...]]:
+    matrices = checked_rotation(rotations)
+    if matrices.ndim != 3 or not len(matrices):
+        raise InputError(f"rotations must have the shape (n, 3, 3); got {matrices.shape}")
+    return [constraints(design, r) for r in matrices]
+
+
+def _names(families: Sequence[Sequence[Constraint]]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(limit.name for limits in families for limit in limits))
+
+
+def _common(design: Design, limits: Sequence[Constraint], tolerance: float | None) -> Solid:
+    """Return what keeps all limits."""
+    frame, names = frame_of([limits], design.reach, tolerance), _names([limits])
+    bodies, origins = _bodies([limits], frame, names)
+    return _solid(bodies[0], origins, frame, names)
+
+
+def _bodies(
+    families: Sequence[Sequence[Constraint]], frame: Frame, names: tuple[str, ...]
+) -> tuple[list[Manifold], dict[int, int]]:
+    """Return what keeps all limits of each family, and the limits by the ids of bodies."""
+    everything = [pieces_of(limits, frame) for limits in families]
+    faces = sum(piece.faces for pieces in everything for piece in pieces)
+    if faces > MOST_FACES:
+        # Faces of balls are as many as the tolerance is small, others fewer.
+        least = frame.tolerance * faces / MOST_FACES
+        raise InputError(
+            f"a tolerance of {frame.tolerance:g} takes about {faces:.2g} triangles; at most "
+            f"{MOST_FACES:,} are made, so it must be at least about {least:.2g}"
+        )
+    origins: dict[int, int] = {}
+    return [_body(pieces, origins, names) for pieces in everything], origins
+
+
+def _body(pieces: Sequence[Piece], origins: dict[int, int], names: tuple[str, ...]) -> Manifold:
+    from manifold3d import Manifold, OpType
+
+    if not pieces:
+        return Manifold()
+    kept: list[Manifold] = []
+    cut: list[Manifold] = []
+    for piece in pieces:
+        own = Manifold.reserve_ids(1)
+        if piece.name:
+            origins[own] = names.index(piece.name)
+        (cut if piece.cuts else kept).append(_manifold_of(piece.make(), own))
+    common = Manifold.batch_boolean(kept, OpType.Intersect)
+    return Manifold.batch_boolean([common, *cut], OpType.Subtract)
+
+
+def _manifold_of(shape: Facets, own: int) -> Manifold:
+    from manifold3d import Manifold, Mesh64
+
+    vertices, faces = shape
+    return Manifold(
+        Mesh64(
+            np.ascontiguousarray(vertices),
+            faces.astype(np.uint64),
+            run_index=np.array([0, faces.size], dtype=np.uint64),
+            run_original_id=np.array([own], dtype=np.uint32),
+        )
+    )
+
+
+def _solid(body: Manifold, origins: dict[int, int], frame: Frame, names: tuple[str, ...]) -> Solid:
+    vertices, faces, ids = _mesh_of(body)
+    which, inverse = np.unique(ids, return_inverse=True)
+    of_id = np.array([origins[int(each)] for each in which], dtype=np.int64)
+    return Solid(frame.back(vertices), faces, of_id[inverse], names, frame.tolerance)
+
+
+def _mesh_of(body: Manifold) -> tuple[FloatArray, NDArray[np.int32], NDArray[np.uint32]]:
+    """Return vertices, faces, and of each face the id of the body that it comes from.
+
+    Raises:
+        ExplorerError: a boolean failed.
+    """
+    from manifold3d import Error
+
+    status = body.status()
+    if status != Error.NoError:
+        raise ExplorerError(f"the solid could not be made: manifold3d reports {status.name}")
+    mesh: Any = body.to_mesh64()
+    faces = np.asarray(mesh.tri_verts, dtype=np.int32)
+    if len(mesh.merge_from_vert):
+        same = np.arange(len(mesh.vert_properties), dtype=np.int32)
+        same[mesh.merge_from_vert] = mesh.merge_to_vert
+        faces = same[faces]
+    runs = np.diff(np.asarray(mesh.run_index, dtype=np.int64)) // 3
+    ids = np.repeat(np.asarray(mesh.run_original_id), runs)
+    return np.array(mesh.vert_properties[:, :3]), faces, ids
