@@ -24,6 +24,8 @@ EPSILON = 2.0**-52
 ROUNDINGS = 8.0
 # The square of a length that is nothing beside one, yet far from where squares underflow.
 NOTHING = 1e-200
+# The square of an angle that is more than rounding.
+LEANING = 1e-29
 
 
 @kernel("void(f8[::1], f8[:,::1], f8[:,:,::1], f8[:,:,:,::1], b1[::1], f8[:,::1])")
@@ -149,11 +151,11 @@ def solve_rows(  # noqa: PLR0915 - one loop body, so that nothing is stored betw
             # e: from the line b2b3 to a1, backwards; f: the same turned about u.
             ex, ey, ez = px - along * c, py - along * uy, pz - along * uz
             square_h = ex * ex + ey * ey + ez * ez
+            lean = ex * c + ey * uy + ez * uz
             on_line = square_h < NOTHING
-            if square_h < 0.01 * (px * px + r * r):
-                # Cancellation leaves e leaning along u, so project once more. If little is
-                # left it was all rounding: a1 is on the line, and any normal of u does.
-                lean = ex * c + ey * uy + ez * uz
+            if lean * lean > LEANING * square_h:
+                # Near the line cancellation leaves e leaning along u, so project once more. If
+                # little is left it was all rounding: a1 is on the line, any normal of u does.
                 ex, ey, ez = ex - lean * c, ey - lean * uy, ez - lean * uz
                 rough, square_h = square_h, ex * ex + ey * ey + ez * ez
                 on_line = square_h <= max(0.25 * rough, NOTHING)

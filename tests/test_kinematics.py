@@ -617,10 +617,12 @@ def test_positions_that_underflow_still_give_rigid_poses(compiled: None, turn: i
     design = PRESETS["paper-initial"]
     directions = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 2, 3], [0, -1, 3], [2, 1, 0]])
     shrinks = 10.0 ** -np.arange(1.0, 320.0)
-    joints = inverse(design, shrinks[:, None, None] * directions, QUARTER_TURNS[turn])
-    solved = forward(design, joints)
-    assert solved.feasible.all()
-    check_finite_and_rigid(solved)
+    yaw = np.array([[0.6, -0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 0.0, 1.0]])
+    for rotation in (QUARTER_TURNS[turn], yaw @ QUARTER_TURNS[turn]):
+        joints = inverse(design, shrinks[:, None, None] * directions, rotation)
+        solved = forward(design, joints)
+        assert solved.feasible.all()
+        check_finite_and_rigid(solved)
 
 
 @given(quarter_turns(), st.integers(40, 110))
