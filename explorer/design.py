@@ -164,6 +164,8 @@ class Design(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         if self.schema != 1:
             raise DesignError(f"schema must be 1; got {self.schema!r}")
         instance("name", self.name, str)
+        if len(self.name) > 100 or not self.name.isprintable():
+            raise DesignError("name must be one printable line of at most 100 characters")
         instance("limits", self.limits, Limits)
         instance("home", self.home, Pose, type(None))
         _set(self, "a3", tuple(numbers("a3", self.a3, 2)))

@@ -6,6 +6,8 @@ and x axes, in this order, so R = Rz(yaw) Ry(pitch) Rx(roll).
 
 from __future__ import annotations
 
+import functools
+
 import msgspec
 import numpy as np
 from numpy.typing import ArrayLike
@@ -59,8 +61,8 @@ class Pose(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     @property
     def rotation(self) -> FloatArray:
-        """The rotation matrix, platform to base, shape (3, 3)."""
-        return rotation_from_quaternion(self.quaternion)
+        """The rotation matrix, platform to base, shape (3, 3), read-only."""
+        return _rotation(self.quaternion)
 
     @staticmethod
     def of(position: ArrayLike, rotation: ArrayLike) -> Pose:
@@ -120,3 +122,11 @@ def checked_rotation(rotation: ArrayLike) -> FloatArray:
     if (np.linalg.det(matrix) < 0.0).any():
         raise InputError("rotation must have determinant +1; this one is a reflection")
     return matrix
+
+
+@functools.lru_cache(64)
+def _rotation(quaternion: Quadruple) -> FloatArray:
+    rotation = rotation_from_quaternion(quaternion)
+    # It is shared between all who ask.
+    rotation.flags.writeable = False
+    return rotation

@@ -6,7 +6,7 @@ The page, the command line, reports and tests all read this; none computes its o
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -116,11 +116,10 @@ def evaluate(design: Design, pose: Pose) -> Snapshot:
         stratum_dimension=inversions(flags),
         mode=int(mode_of(margin)),
         proximity=float(np.abs(margin).min()) / design.reach,
-        violations=violations(
-            design, position, joints, margin, signs_of(int(mode_of(_home_margins(home))))
-        ),
+        violations=violations(design, position, joints, margin, _home_signs(home)),
     )
 
 
-def _home_margins(home: Pose) -> FloatArray:
-    return margins(home.position, home.rotation)
+@lru_cache(64)
+def _home_signs(home: Pose) -> tuple[int, int, int]:
+    return signs_of(int(mode_of(margins(home.position, home.rotation))))

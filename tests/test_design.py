@@ -356,7 +356,7 @@ def complete_designs(draw: st.DrawFn) -> Design:
     """Draw a design with every field set or left to its default."""
     return msgspec.structs.replace(
         draw(designs()),
-        name=draw(st.text()),
+        name=draw(st.text(max_size=100).filter(str.isprintable)),
         unit_mm=draw(st.floats(1e-3, 1e3)),
         node_step=draw(st.none() | st.floats(1e-3, 1e3)),
         limits=draw(limits()),

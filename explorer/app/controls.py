@@ -74,11 +74,9 @@ class Control(Generic[Value]):
         """Yield what makes the control show the frame."""
         if self._disabled is not None:
             yield self.handle, "disabled", self._disabled(frame.state)
-        # A newer change is on its way: what it says counts.
-        if self._session.is_waiting(self):
-            return
         value = self._read(frame)
-        if value != self._given:
+        # A newer change is on its way: what it says counts.
+        if value != self._given and not self._session.is_waiting(self):
             self._given = value
             yield self.handle, "value", value
 
@@ -102,16 +100,19 @@ class Slider(Control[float]):
         self._span = span
         self._marks = marks
         self._marks_of = MarksOf(handle)
+        self._range: tuple[float, float, float] | None = None
 
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield what makes the slider show the frame, its range and marks first."""
         span = self._span(frame.state)
         value = self._read(frame)
         low, high = min(span.low, value), max(span.high, value)
-        yield self._slider, "min", low
-        yield self._slider, "max", high
-        yield self._slider, "step", span.step
-        yield self._slider, "precision", decimals(span.step)
+        if (low, high, span.step) != self._range:
+            self._range = (low, high, span.step)
+            yield self._slider, "min", low
+            yield self._slider, "max", high
+            yield self._slider, "step", span.step
+            yield self._slider, "precision", decimals(span.step)
         if self._marks is not None:
             yield self._marks_of, "marks", self._marks(frame)
         yield from super().updates(frame)

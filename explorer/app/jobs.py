@@ -1,14 +1,25 @@
-"""Work that must not pile up: one thread, and of each kind of event only the newest.
+"""Work that must not pile up: of each kind only the newest waits.
 
 viser runs callbacks at the same time and in no order, so none of them computes. They
-leave word here; what is waiting when the thread comes round is handled in one go.
+leave word for one thread; what is waiting when it comes round is handled in one go. Heavy
+work leaves the process altogether, since much of it holds the interpreter lock.
 """
 
 from __future__ import annotations
 
+import contextlib
+import itertools
+import os
+import pickle
+import subprocess
+import sys
 import threading
 from collections.abc import Callable, Sequence
-from typing import Generic, TypeVar
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, Any, Generic, TypeVar, cast
+
+from explorer.app.worker import Order, Reply, read_frame, write_frame
 
 Item = TypeVar("Item")
 
@@ -78,3 +89,132 @@ class LatestWins(Generic[Item]):
                 self._waiting.clear()
                 self._busy = True
             self._handle(items)
+
+
+@dataclass(frozen=True)
+class _Request:
+    order: Order
+    done: Callable[[Any], None]
+    failed: Callable[[str], None]
+
+
+class Worker:
+    """A child process for heavy work; of each kind of request only the newest waits.
+
+    It is started when it is first needed, and again should it die. Results come in the
+    order of the requests, on a thread of their own.
+
+    Args:
+        report: Called with a message when the process died or failed unexpectedly.
+    """
+
+    def __init__(self, report: Callable[[str], None]) -> None:
+        self._report = report
+        self._waiting: dict[object, _Request] = {}
+        self._condition = threading.Condition()
+        self._process: subprocess.Popen[bytes] | None = None
+        self._stopped = False
+        self._busy = False
+        self._numbers = itertools.count()
+        self._thread = threading.Thread(target=self._run, name="worker", daemon=True)
+        self._thread.start()
+
+    def submit(
+        self,
+        key: object,
+        task: str,
+        arguments: tuple[Any, ...],
+        done: Callable[[Any], None],
+        failed: Callable[[str], None],
+    ) -> None:
+        """Ask for a task; one of the same key that still waits is dropped.
+
+        Args:
+            key: What it is about.
+            task: The name of a function in `explorer.app.tasks`.
+            arguments: For it; they and the result must pickle.
+            done: Called with the result.
+            failed: Called with a message for people instead.
+        """
+        with self._condition:
+            order = Order(next(self._numbers), task, arguments)
+            self._waiting.pop(key, None)
+            self._waiting[key] = _Request(order, done, failed)
+            self._condition.notify_all()
+
+    def wait_until_idle(self, timeout: float) -> bool:
+        """Wait until nothing waits and nothing runs; say whether that came about."""
+        with self._condition:
+            return self._condition.wait_for(
+                lambda: not self._waiting and not self._busy, timeout=timeout
+            )
+
+    def stop(self) -> None:
+        """End the process, whatever it is doing."""
+        with self._condition:
+            self._stopped = True
+            self._waiting.clear()
+            self._condition.notify_all()
+            process = self._process
+        if process is not None:
+            process.kill()
+        self._thread.join(timeout=5.0)
+
+    def _run(self) -> None:
+        while True:
+            with self._condition:
+                self._busy = False
+                self._condition.notify_all()
+                self._condition.wait_for(lambda: self._waiting or self._stopped)
+                if self._stopped:
+                    break
+                request = self._waiting.pop(next(iter(self._waiting)))
+                self._busy = True
+            self._serve(request)
+        if self._process is not None:
+            self._end(self._process)
+
+    def _serve(self, request: _Request) -> None:
+        try:
+            process = self._alive()
+            # Both are pipes, as they were asked for.
+            write_frame(cast("IO[bytes]", process.stdin), request.order)
+            reply: Reply = read_frame(cast("IO[bytes]", process.stdout))
+        except (OSError, EOFError, pickle.UnpicklingError):
+            with self._condition:
+                process, self._process = self._process, None
+                stopped = self._stopped
+            if process is not None:
+                self._end(process)
+            if not stopped:
+                message = "The worker process died; the next change starts it again."
+                self._report(message)
+                request.failed(message)
+            return
+        if reply.problem is None:
+            request.done(reply.value)
+        else:
+            if not reply.expected:
+                self._report(f"Something went wrong in the worker: {reply.problem}")
+            request.failed(reply.problem)
+
+    def _alive(self) -> subprocess.Popen[bytes]:
+        with self._condition:
+            if self._process is None or self._process.poll() is not None:
+                paths = {"PYTHONPATH": str(Path(__file__).parents[2])}
+                self._process = subprocess.Popen(
+                    [sys.executable, "-P", "-c", "from explorer.app.worker import main; main()"],
+                    stdin=subprocess.PIPE,
+                    stdout=subprocess.PIPE,
+                    env={**os.environ, **paths},
+                )
+            return self._process
+
+    @staticmethod
+    def _end(process: subprocess.Popen[bytes]) -> None:
+        for pipe in (process.stdin, process.stdout):
+            if pipe is not None:
+                with contextlib.suppress(OSError):
+                    pipe.close()
+        process.kill()
+        process.wait()

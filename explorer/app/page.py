@@ -12,15 +12,18 @@ import viser
 
 from explorer.app.actions import SetPose
 from explorer.app.assigning import Assigner
+from explorer.app.jobs import Worker
 from explorer.app.panels.design import DesignPanel
 from explorer.app.panels.move import MovePanel
 from explorer.app.panels.singularity import SingularityPanel
 from explorer.app.panels.view import ViewPanel
+from explorer.app.panels.workspace import WorkspaceNumbers, WorkspacePanel, tolerance_of
 from explorer.app.scene import Scene
 from explorer.app.scene.camera import Cameras, ViewName, framing
 from explorer.app.scene.placing import Placed, scene_scale
 from explorer.app.session import Session, Who
 from explorer.app.state import Frame, State
+from explorer.app.workspace_feed import WorkspaceFeed, workspace_rotation
 from explorer.pose import Pose
 
 TITLE = "Flagged 4-4 explorer"
@@ -45,24 +48,30 @@ class Page:
         self._frame = Frame(state)
         self._assigner = Assigner(server)
         self.session = Session(state, self._draw, self._complain, self._report)
+        self.worker = Worker(lambda message: self._complain(message, None))
+        self.feed = WorkspaceFeed(self.worker, self.session.redraw)
         gui = server.gui
         gui.configure_theme(
             show_logo=False, show_share_button=False, control_width="large", brand_color=BRAND
         )
         gui.set_panel_label(TITLE)
-        self._scene = Scene(server)
-        self._cameras = Cameras(lambda: Placed(self._frame))
+        self._scene = Scene(server, self.feed)
+        self._cameras = Cameras(self._placed)
         self._add_view_buttons(gui)
         tabs = gui.add_tab_group()
         with tabs.add_tab("Move", viser.Icon.ARROWS_MOVE):
             move = MovePanel(gui, self.session)
         with tabs.add_tab("Design", viser.Icon.RULER_2):
             design = DesignPanel(gui, self.session)
+        with tabs.add_tab("Workspace", viser.Icon.CUBE):
+            self._workspace = WorkspacePanel(gui, self.session, self._export)
         with tabs.add_tab("View", viser.Icon.EYE):
             view = ViewPanel(gui, self.session)
         side = gui.add_panel()
         with side.add_tab("Singularity", viser.Icon.FLAG):
             singularity = SingularityPanel(gui, self.session)
+        with side.add_tab("Workspace", viser.Icon.CUBE):
+            self._numbers = WorkspaceNumbers(gui)
         self._panels = (move, design, view, singularity)
         if docked:
             gui.main_panel.dock_right()
@@ -75,6 +84,21 @@ class Page:
         server.on_client_connect(self._cameras.connected)
         server.on_client_disconnect(self._cameras.disconnected)
         self._draw(self._frame)
+
+    def stop(self) -> None:
+        """End the session and the worker."""
+        self.session.stop()
+        self.worker.stop()
+
+    def wait_until_drawn(self, timeout: float = 30.0) -> bool:
+        """Wait until the newest state and its workspace are drawn; say whether they are."""
+        deadline = time.monotonic() + timeout
+        idle = True
+        # Drawing may ask the worker, whose answer is drawn again.
+        for _ in range(2):
+            idle = idle and self.session.wait_until_idle(deadline - time.monotonic())
+            idle = idle and self.worker.wait_until_idle(deadline - time.monotonic())
+        return idle and self.session.wait_until_idle(deadline - time.monotonic())
 
     def point_cameras(self, view: ViewName) -> None:
         """Point the camera of every open browser."""
@@ -92,12 +116,19 @@ class Page:
                 self._cameras.point(event.client, VIEW_LABELS[buttons.value])
 
     def _draw(self, frame: Frame) -> None:
-        placed = Placed(frame)
-        updates = self._scene.updates(placed)
+        self._frame = frame
+        updates = self._scene.updates(self._placed())
         for panel in self._panels:
             updates.extend(panel.updates(frame))
-        self._frame = frame
+        for panel in (self._workspace, self._numbers):
+            updates.extend(panel.updates(frame, self.feed))
         self._assigner.assign(updates)
+        self.feed.follow(frame)
+
+    def _placed(self) -> Placed:
+        drawing = self.feed.drawing
+        extent = None if drawing is None else drawing.extent
+        return Placed(self._frame, None if extent is None else np.array(extent))
 
     def _dragged(self, event: viser.TransformControlsEvent) -> None:
         if event.client_id is None:
@@ -109,7 +140,23 @@ class Page:
             w, i, j, k = np.asarray(handle.wxyz, dtype=np.float64).tolist()
             return SetPose(Pose((x, y, z), (w, i, j, k)))
 
-        self.session.post(handle, change, stamp=handle.update_timestamp, who=event.client_id)
+        self.session.post("drag", change, stamp=handle.update_timestamp, who=event.client_id)
+
+    def _export(self, what: str, file_format: str, client_id: int | None) -> None:
+        client = self._server.get_clients().get(-1 if client_id is None else client_id)
+        if client is None:
+            return
+        state = self.session.state
+        rotation = tuple(tuple(row) for row in workspace_rotation(Frame(state)).tolist())
+        self.worker.submit(
+            ("export", client_id, what),
+            "export_mesh",
+            (state.design, rotation, tolerance_of(state), what, file_format),
+            lambda data: client.send_file_download(
+                f"{state.design.name}-{what}.{file_format}", data, save_immediately=True
+            ),
+            lambda problem: self._complain(problem, client_id),
+        )
 
     def _aim_initial_camera(self) -> None:
         eye, target = framing(Placed(self._frame), "isometric", aspect=1.2)

@@ -94,7 +94,7 @@ def picture(
     try:
         if prepare is not None:
             prepare(running)
-            running.page.session.wait_until_idle()
+            running.page.wait_until_drawn()
         page, client = open_page(browser, running, size)
         try:
             if not panels:

@@ -37,7 +37,7 @@ class Running:
 
     def stop(self) -> None:
         """Stop the server and the session."""
-        self.page.session.stop()
+        self.page.stop()
         stop_viser(self.viser)
 
 

@@ -27,6 +27,32 @@ WARN_SHARE = 0.05
 
 
 @dataclass(frozen=True)
+class WorkspaceView:
+    """How the constant-orientation workspace is shown.
+
+    Attributes:
+        solid: Whether the solid is drawn.
+        hull: Whether its convex hull is drawn.
+        planes: Whether the three singularity planes are drawn.
+        orientation: Whether it is that of the present pose, or of the home pose.
+        colour: By what its surface is coloured.
+        cut: The axis along which it is cut open, or None.
+        level: Where it is cut, in design units.
+        tolerance: Largest distance of a facet from the true surface, in design units; None
+            for a share of the reach.
+    """
+
+    solid: bool = False
+    hull: bool = False
+    planes: bool = False
+    orientation: Literal["pose", "home"] = "pose"
+    colour: Literal["plain", "margin", "condition"] = "plain"
+    cut: Literal["x", "y", "z"] | None = None
+    level: float = 0.0
+    tolerance: float | None = None
+
+
+@dataclass(frozen=True)
 class View:
     """What is shown, and how.
 
@@ -37,6 +63,7 @@ class View:
         twin: Whether the 6-4 twin's six legs replace the four.
         warn_below: Margins below this length are warned of, in design units; None for a
             share of the reach.
+        workspace: How the workspace is shown.
     """
 
     flags: bool = True
@@ -49,6 +76,7 @@ class View:
     ghosts: bool = False
     twin: bool = False
     warn_below: float | None = None
+    workspace: WorkspaceView = field(default_factory=WorkspaceView)
 
 
 @dataclass(frozen=True)

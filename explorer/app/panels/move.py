@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
-import numpy as np
 import viser
 
 from explorer.app.actions import (
@@ -151,7 +150,7 @@ def interval_marks(intervals: tuple[Interval, ...], span: Span) -> tuple[Mark, .
     marks: list[Mark] = []
     labelled = -1.0
     for low, high in intervals:
-        start, end = (float(np.clip(v, span.low, span.high)) for v in (low, high))
+        start, end = (min(max(v, span.low), span.high) for v in (low, high))
         first, last = ((v - span.low) / (span.high - span.low) for v in (start, end))
         texts = (f"{low:.3g}".replace("-", "−"), f"{high:.3g}".replace("-", "−"))
         if first - labelled < LABEL_ROOM:

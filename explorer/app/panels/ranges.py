@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 
 from explorer.app.controls import Span
@@ -18,20 +19,32 @@ def fine_step(size: float, parts: float) -> float:
 
 def length_span(state: State) -> Span:
     """Return the range of a length."""
-    reach = state.base.reach
+    return _length_span(state.base.reach)
+
+
+@functools.lru_cache(64)
+def _length_span(reach: float) -> Span:
     return Span(0.0, round_up(REACHES * reach), fine_step(reach, 2e3))
 
 
 def coordinate_span(state: State) -> Span:
     """Return the range of a coordinate."""
-    reach = state.base.reach
+    return _coordinate_span(state.base.reach)
+
+
+@functools.lru_cache(64)
+def _coordinate_span(reach: float) -> Span:
     edge = round_up(REACHES * reach)
     return Span(-edge, edge, fine_step(reach, 2e3))
 
 
 def variable_span(state: State) -> Span:
     """Return the range of a design variable, in steps as fine as the paper's figures."""
-    size = max(map(abs, state.base.variables))
+    return _variable_span(max(map(abs, state.base.variables)))
+
+
+@functools.lru_cache(64)
+def _variable_span(size: float) -> Span:
     edge = round_up(REACHES * size)
     return Span(-edge, edge, fine_step(size, 1e5))
 

@@ -18,6 +18,8 @@ from explorer.app.scene.legs import Legs, TwinLegs
 from explorer.app.scene.marks import DragHandle, Ghosts, Labels
 from explorer.app.scene.placing import Placed
 from explorer.app.scene.tetrahedra import Tetrahedra
+from explorer.app.scene.workspace import WorkspaceScene
+from explorer.app.workspace_feed import WorkspaceFeed
 
 
 class Part(Protocol):
@@ -31,7 +33,7 @@ class Part(Protocol):
 class Scene:
     """All that is drawn in three dimensions."""
 
-    def __init__(self, server: viser.ViserServer) -> None:
+    def __init__(self, server: viser.ViserServer, feed: WorkspaceFeed) -> None:
         scene = server.scene
         scene.set_up_direction("+z")
         self.drag_handle = DragHandle(scene)
@@ -44,6 +46,7 @@ class Scene:
             Tetrahedra(scene),
             Labels(scene),
             Ghosts(scene),
+            WorkspaceScene(scene, feed),
             self.drag_handle,
         )
 

@@ -73,6 +73,9 @@ def outermost_points(placed: Placed) -> FloatArray:
         seen.append(flag_corners(placed))
     if view.handle:
         seen.append(handle_tips(placed))
+    if placed.extent is not None:
+        ends = placed.scale * placed.extent
+        seen.append(np.array(np.meshgrid(*ends.T)).reshape(3, -1).T)
     return np.concatenate(seen)
 
 

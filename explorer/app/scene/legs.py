@@ -92,7 +92,8 @@ class Legs:
         ends: list[FloatArray] = []
         for base, tip in ((bases[0], tips[0]), (bases[3], tips[3])):
             first = np.array([1.0, 0.0, 0.0])
-            second = np.cross(first, tip - base)
+            # The other axis of the cross, perpendicular to the first and to the leg.
+            second = np.array([0.0, base[2] - tip[2], tip[1] - base[1]])
             norm = float(np.linalg.norm(second))
             second = second / norm if norm > 1e-9 else np.array([0.0, 1.0, 0.0])
             reach = PIN_HALF_LENGTH * size

@@ -35,9 +35,15 @@ def scene_scale(state: State) -> float:
 
 @dataclass(frozen=True)
 class Placed:
-    """A frame with its points in scene units."""
+    """A frame with its points in scene units.
+
+    Attributes:
+        frame: What is drawn.
+        extent: (lows, highs) of a workspace that is drawn too, in design units, or None.
+    """
 
     frame: Frame
+    extent: FloatArray | None = None
 
     @cached_property
     def scale(self) -> float:

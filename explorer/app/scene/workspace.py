@@ -1,0 +1,196 @@
+"""The workspace around the mechanism: solid, hull, slice, and the three singular planes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TypeAlias
+
+import numpy as np
+import viser
+from numpy.typing import NDArray
+
+from explorer.app.assigning import Update
+from explorer.app.colours import OUTLINE, Rgb, proximity_colour
+from explorer.app.scene.placing import Placed
+from explorer.app.tasks import PLAIN, Shell, WorkspaceDrawing, band_colours
+from explorer.app.workspace_feed import WorkspaceFeed, workspace_rotation
+from explorer.arrays import FloatArray
+from explorer.constraints import Cone, HalfSpace, Never, Round, constraints
+
+ArrayPair: TypeAlias = tuple[NDArray[np.float32], NDArray[np.uint32]]
+
+EMPTY: ArrayPair = np.zeros((3, 3), dtype=np.float32), np.array([[0, 1, 2]], dtype=np.uint32)
+SOLID_OPACITY = 0.42
+CUT_OPACITY = 0.96
+PLANE_OPACITY = 0.12
+
+
+class WorkspaceScene:
+    """Draws what the feed has, and where p leaves it the limit that is broken."""
+
+    def __init__(self, scene: viser.SceneApi, feed: WorkspaceFeed) -> None:
+        self._feed = feed
+        self._colours: tuple[Rgb, ...] = (PLAIN, *band_colours())
+        self._shells = [
+            scene.add_mesh_simple(
+                f"/workspace/shell/{index}",
+                *EMPTY,
+                color=colour,
+                side="double",
+                flat_shading=True,
+                cast_shadow=False,
+                receive_shadow=False,
+                visible=False,
+            )
+            for index, colour in enumerate(self._colours)
+        ]
+        self._hull = scene.add_mesh_simple(
+            "/workspace/hull", *EMPTY, color=(90, 100, 116), wireframe=True, visible=False
+        )
+        self._planes = [_SingularPlane(scene, index) for index in range(3)]
+        self._broken = scene.add_line_segments(
+            "/workspace/broken/lines",
+            np.zeros((1, 2, 3)),
+            OUTLINE,
+            thickness=4.0,
+            thickness_units="screen",
+            visible=False,
+        )
+        self._broken_label = scene.add_label(
+            "/workspace/broken/label", "limit", font_screen_scale=0.9, visible=False
+        )
+        self._placed_for: tuple[WorkspaceDrawing, float] | None = None
+        self._scaled: dict[Rgb, ArrayPair] = {}
+        self._scaled_hull = EMPTY
+
+    def updates(self, placed: Placed) -> Iterator[Update]:
+        """Yield what draws the workspace of this frame."""
+        view = placed.frame.state.view.workspace
+        drawing = self._feed.drawing
+        self._scale(drawing, placed.scale)
+        opaque = drawing is not None and drawing.request.cut is not None
+        for colour, handle in zip(self._colours, self._shells, strict=True):
+            shell = self._scaled.get(colour)
+            yield handle, "visible", view.solid and shell is not None
+            if view.solid and shell is not None:
+                yield handle, "opacity", CUT_OPACITY if opaque else SOLID_OPACITY
+                yield handle, "vertices", shell[0]
+                yield handle, "faces", shell[1]
+        has_hull = view.hull and drawing is not None and drawing.hull is not None
+        yield self._hull, "visible", has_hull
+        if has_hull:
+            yield self._hull, "vertices", self._scaled_hull[0]
+            yield self._hull, "faces", self._scaled_hull[1]
+        for plane in self._planes:
+            yield from plane.updates(placed)
+        yield from self._broken_limit(placed)
+
+    def _scale(self, drawing: WorkspaceDrawing | None, scale: float) -> None:
+        """Bring a new drawing into scene units, once, so that it is compared by identity."""
+        if drawing is None:
+            self._placed_for, self._scaled = None, {}
+        elif self._placed_for is None or (
+            self._placed_for[0] is not drawing or self._placed_for[1] != scale
+        ):
+            self._placed_for = drawing, scale
+            self._scaled = {shell.colour: _scaled(shell, scale) for shell in drawing.shells}
+            if drawing.hull is not None:
+                self._scaled_hull = _scaled(drawing.hull, scale)
+
+    def _broken_limit(self, placed: Placed) -> Iterator[Update]:
+        """Show the limit that p breaks the most: from p to the nearest place that keeps it."""
+        frame = placed.frame
+        shown = frame.state.view.workspace.solid and frame.state.unclosed is None
+        worst: tuple[float, str, FloatArray] | None = None
+        if shown and frame.snapshot.violations:
+            p = np.array(frame.state.pose.position)
+            for limit in constraints(frame.state.design, workspace_rotation(frame)):
+                if isinstance(limit, Never | Cone):
+                    continue
+                slack = float(limit.slack(p))
+                if slack < 0.0 and (worst is None or slack < worst[0]):
+                    worst = slack, limit.name, _nearest(limit, p)
+        for handle in (self._broken, self._broken_label):
+            yield handle, "visible", worst is not None
+        if worst is not None:
+            ends = placed.scale * np.array([frame.state.pose.position, worst[2]])
+            yield self._broken, "points", ends[None].astype(np.float32)
+            yield self._broken_label, "text", f"{worst[1]}: {-worst[0]:.3g} beyond"
+            yield self._broken_label, "position", tuple(ends[1].tolist())
+
+
+class _SingularPlane:
+    """One of the three planes of singular positions, all through a1."""
+
+    def __init__(self, scene: viser.SceneApi, index: int) -> None:
+        self._index = index
+        self._mesh = scene.add_mesh_simple(
+            f"/singular/{index + 1}/plane",
+            np.zeros((4, 3)),
+            np.array([[0, 1, 2], [0, 2, 3]]),
+            opacity=PLANE_OPACITY,
+            side="double",
+            cast_shadow=False,
+            receive_shadow=False,
+            visible=False,
+        )
+        self._hem = scene.add_line_segments(
+            f"/singular/{index + 1}/hem",
+            np.zeros((4, 2, 3)),
+            (0, 0, 0),
+            thickness=1.5,
+            thickness_units="screen",
+            visible=False,
+        )
+        self._label = scene.add_label(
+            f"/singular/{index + 1}/label", f"κ{index + 1} = 0", visible=False
+        )
+
+    def updates(self, placed: Placed) -> Iterator[Update]:
+        """Yield what draws it in this frame."""
+        state, snapshot = placed.frame.state, placed.frame.snapshot
+        r = snapshot.rotation
+        normal = (-r[:, 2], np.cross([1.0, 0.0, 0.0], r[:, 0]), np.array([0.0, 0.0, 1.0]))[
+            self._index
+        ]
+        length = float(np.linalg.norm(normal))
+        # With parallel lines every position is singular, and there is no plane to draw.
+        shown = state.view.workspace.planes and length > 1e-9
+        for handle in (self._mesh, self._hem, self._label):
+            yield handle, "visible", shown
+        if not shown:
+            return
+        colour = proximity_colour(float(snapshot.margins[self._index]), state.warn_below)
+        along = np.cross(normal / length, [0.0, 1.0, 0.0])
+        if np.linalg.norm(along) < 0.1:
+            along = np.array([1.0, 0.0, 0.0])
+        along /= np.linalg.norm(along)
+        across = np.cross(normal / length, along)
+        half = 1.1 * placed.reach
+        corners = half * np.array([a * along + b * across for a, b in CORNERS])
+        yield self._mesh, "color", colour
+        yield self._mesh, "vertices", corners.astype(np.float32)
+        segments = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
+        yield self._hem, "points", segments.astype(np.float32)
+        yield self._hem, "colors", np.tile(np.array(colour, dtype=np.uint8), (4, 2, 1))
+        yield self._label, "position", tuple(corners[2].tolist())
+
+
+CORNERS = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
+
+
+def _scaled(shell: Shell, scale: float) -> ArrayPair:
+    vertices = np.asarray(shell.vertices * scale, dtype=np.float32)
+    return vertices, np.asarray(shell.faces, dtype=np.uint32)
+
+
+def _nearest(limit: Round | HalfSpace, p: FloatArray) -> FloatArray:
+    """Return the place nearest to p on the surface of a limit."""
+    if isinstance(limit, HalfSpace):
+        excess = float(limit.normal @ p) - limit.offset
+        return p - limit.normal * excess / float(limit.normal @ limit.normal)
+    axes = np.array([1.0 if limit.is_ball else 0.0, 1.0, 1.0])
+    off = (p - limit.centre) * axes
+    distance = float(np.linalg.norm(off))
+    outward = off / distance if distance > 0.0 else np.array([0.0, 0.0, 1.0])
+    return p + outward * (limit.radius - distance)
