@@ -142,6 +142,12 @@ class Worker:
             self._waiting[key] = _Request(order, done, failed)
             self._condition.notify_all()
 
+    @property
+    def process_id(self) -> int | None:
+        """The child's process, None if it has not been needed yet."""
+        process = self._process
+        return None if process is None else process.pid
+
     def wait_until_idle(self, timeout: float) -> bool:
         """Wait until nothing waits and nothing runs; say whether that came about."""
         with self._condition:

@@ -1,0 +1,232 @@
+"""The worker process: heavy work leaves the page alive, dies without harm, and is not stale."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from collections.abc import Iterator
+from dataclasses import replace
+from queue import Queue
+from typing import Any
+
+import numpy as np
+import pytest
+
+from explorer.app.actions import SetLimits, SetVariable, SetView
+from explorer.app.jobs import Worker
+from explorer.app.state import Frame, State, opened
+from explorer.app.tasks import (
+    BAND_EDGES,
+    WorkspaceDrawing,
+    WorkspaceRequest,
+    band_colours,
+    draw_workspace,
+    split_at,
+)
+from explorer.app.workspace_feed import WorkspaceFeed
+from explorer.design import Limits
+from explorer.design_file import PRESETS
+from explorer.home import home_pose
+from explorer.workspace import workspace_volume
+
+OPTIMAL = PRESETS["paper-optimal"]
+PATIENCE = 120.0
+
+
+def a_request(**changes: Any) -> WorkspaceRequest:
+    rotation = tuple(tuple(row) for row in home_pose(OPTIMAL).rotation.tolist())
+    plain = WorkspaceRequest(OPTIMAL, rotation, "plain", None, 0.0, 0.2, hull=False, warn_below=1.0)
+    return replace(plain, **changes)
+
+
+class Answers:
+    """What came back, in order."""
+
+    def __init__(self) -> None:
+        self.queue: Queue[Any] = Queue()
+
+    def done(self, value: Any) -> None:
+        self.queue.put(value)
+
+    def failed(self, problem: str) -> None:
+        self.queue.put(problem)
+
+    def next(self) -> Any:
+        return self.queue.get(timeout=PATIENCE)
+
+
+@pytest.fixture
+def reports() -> list[str]:
+    return []
+
+
+@pytest.fixture
+def worker(reports: list[str]) -> Iterator[Worker]:
+    made = Worker(reports.append)
+    yield made
+    made.stop()
+
+
+def submit(worker: Worker, answers: Answers, key: object, request: WorkspaceRequest) -> None:
+    worker.submit(key, "draw_workspace", (request,), answers.done, answers.failed)
+
+
+def test_a_task_runs_in_another_process_and_its_result_comes_back(worker: Worker) -> None:
+    answers = Answers()
+    submit(worker, answers, "w", a_request())
+    drawing = answers.next()
+    assert isinstance(drawing, WorkspaceDrawing)
+    assert drawing.volume == pytest.approx(workspace_volume(OPTIMAL).volume, rel=1e-12)
+    assert worker.process_id not in (None, os.getpid())
+
+
+def test_of_one_key_only_the_newest_request_waits(worker: Worker) -> None:
+    answers = Answers()
+    for i in range(40):
+        submit(worker, answers, "w", a_request(tolerance=0.2 + 0.01 * i))
+    assert worker.wait_until_idle(PATIENCE)
+    results = [answers.next() for _ in range(answers.queue.qsize())]
+    assert len(results) <= 3
+    assert results[-1].request.tolerance == pytest.approx(0.2 + 0.01 * 39)
+
+
+def test_a_refused_task_answers_with_its_reason_and_the_worker_goes_on(
+    worker: Worker, reports: list[str]
+) -> None:
+    answers = Answers()
+    submit(worker, answers, "w", a_request(tolerance=1e-9))
+    assert "tolerance" in answers.next()
+    assert not reports
+    submit(worker, answers, "w", a_request())
+    assert isinstance(answers.next(), WorkspaceDrawing)
+
+
+def test_a_killed_worker_is_told_of_and_started_again(worker: Worker, reports: list[str]) -> None:
+    answers = Answers()
+    submit(worker, answers, "w", a_request())
+    assert isinstance(answers.next(), WorkspaceDrawing)
+    first = worker.process_id
+    assert first is not None
+    # Stopped first, so that the next request surely finds it in the middle of its work.
+    os.kill(first, signal.SIGSTOP)
+    submit(worker, answers, "w", a_request())
+    os.kill(first, signal.SIGKILL)
+    assert "died" in answers.next()
+    assert len(reports) == 1
+    submit(worker, answers, "w", a_request())
+    assert isinstance(answers.next(), WorkspaceDrawing)
+    assert worker.process_id not in (None, first)
+
+
+def test_stopping_ends_the_process_whatever_it_does(reports: list[str]) -> None:
+    worker = Worker(reports.append)
+    answers = Answers()
+    submit(worker, answers, "w", a_request())
+    answers.next()
+    pid = worker.process_id
+    assert pid is not None
+    os.kill(pid, signal.SIGSTOP)
+    submit(worker, answers, "w", a_request())
+    worker.stop()
+    with pytest.raises(ProcessLookupError):
+        os.kill(pid, 0)
+    assert not reports
+
+
+class Followed:
+    """A feed that is followed, and how often it asked to be drawn again."""
+
+    def __init__(self, worker: Worker) -> None:
+        self.drawn = threading.Semaphore(0)
+        self.feed = WorkspaceFeed(worker, self.drawn.release)
+
+    def follow(self, state: State) -> None:
+        self.feed.follow(Frame(state))
+
+
+def shown(state: State, **changes: Any) -> State:
+    workspace = replace(state.view.workspace, solid=True, **changes)
+    return SetView(replace(state.view, workspace=workspace)).apply(state)
+
+
+def test_the_drawing_follows_the_design_and_ends_with_its_newest(worker: Worker) -> None:
+    followed = Followed(worker)
+    state = shown(opened(OPTIMAL))
+    for i in range(25):
+        state = SetVariable("a3x", 18.0 + 0.05 * i).apply(state)
+        followed.follow(state)
+    assert worker.wait_until_idle(PATIENCE)
+    drawing = followed.feed.drawing
+    assert drawing is not None
+    assert followed.feed.is_current
+    assert drawing.request.design.a3[0] == 18.0 + 0.05 * 24
+
+
+def test_nothing_is_asked_for_that_is_not_shown(worker: Worker) -> None:
+    followed = Followed(worker)
+    followed.follow(opened(OPTIMAL))
+    assert worker.wait_until_idle(PATIENCE)
+    assert worker.process_id is None
+    assert followed.feed.drawing is None
+
+
+def test_an_empty_workspace_is_an_answer_that_names_what_empties_it() -> None:
+    limits = Limits(l1=(0.0, 1.0), box=((10.0, 10.0, 10.0), (11.0, 11.0, 11.0)))
+    state = SetLimits(limits).apply(opened(OPTIMAL))
+    drawing = draw_workspace(a_request(design=state.design, hull=True, cut="x", level=1.0))
+    assert drawing.volume == 0.0
+    assert drawing.shells == ()
+    assert drawing.extent is None
+    assert "l1 maximum" in drawing.empty_because
+
+
+def area(triangles: np.ndarray[Any, np.dtype[np.float64]]) -> float:
+    a, b, c = np.moveaxis(triangles, 1, 0)
+    return 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+
+
+@pytest.mark.parametrize("colour", ["margin", "condition"])
+def test_coloured_bands_cover_the_same_surface(colour: str) -> None:
+    plain = draw_workspace(a_request()).shells[0]
+    banded = draw_workspace(a_request(colour=colour)).shells
+    assert len(banded) > 1
+    total = sum(area(shell.vertices[shell.faces]) for shell in banded)
+    assert total == pytest.approx(area(plain.vertices[plain.faces]), rel=1e-9)
+
+
+def test_bands_hold_the_values_they_stand_for() -> None:
+    for shell in draw_workspace(a_request(colour="margin")).shells:
+        index = band_colours().index(shell.colour)
+        # At this orientation κ1 and κ3 are ∓z, and κ2 is z times a sine below one.
+        sine = abs(float(home_pose(OPTIMAL).rotation[1, 0]))
+        values = sine * shell.vertices[:, 2]
+        assert values.min() >= BAND_EDGES[index] - 1e-9
+        if index + 1 < len(BAND_EDGES):
+            assert values.max() <= BAND_EDGES[index + 1] + 1e-9
+
+
+def test_splitting_triangles_keeps_their_area_and_separates_their_values() -> None:
+    rng = np.random.default_rng(7)
+    triangles = rng.normal(size=(500, 3, 3))
+    values = triangles @ [0.3, -1.0, 0.5]
+    low, high, high_values = split_at(triangles, values, 0.2)
+    assert area(low) + area(high) == pytest.approx(area(triangles), rel=1e-12)
+    assert (low @ [0.3, -1.0, 0.5] <= 0.2 + 1e-12).all()
+    assert (high_values >= 0.2 - 1e-12).all()
+    assert np.allclose(high @ [0.3, -1.0, 0.5], high_values)
+
+
+def test_a_cut_shows_the_slice_where_it_cuts() -> None:
+    drawing = draw_workspace(a_request(cut="z", level=5.0, hull=True))
+    assert drawing.extent is not None
+    assert drawing.extent[1][2] == pytest.approx(18.0, abs=1e-6)
+    highest = max(float(shell.vertices[:, 2].max()) for shell in drawing.shells)
+    assert highest == pytest.approx(5.0, abs=1e-6)
+    slice_map = drawing.slice_map
+    assert slice_map is not None
+    assert slice_map.axes == ("x", "y")
+    share = float((slice_map.pixels[..., 3] > 0).mean())
+    assert 0.3 < share < 1.0
+    assert drawing.hull_volume is not None
+    assert drawing.hull_volume >= drawing.mesh_volume * (1.0 - 1e-12)
