@@ -12,6 +12,7 @@ import sys
 from dataclasses import dataclass
 from typing import IO, Any
 
+from explorer.compiled import warm_in_background
 from explorer.errors import ExplorerError
 
 
@@ -54,6 +55,8 @@ def main() -> None:
     answers = os.fdopen(os.dup(1), "wb")
     # Whatever a library prints must not get between the frames.
     os.dup2(2, 1)
+    # Until the kernels are compiled, or loaded, they run interpreted.
+    warm_in_background()
     while True:
         try:
             order: Order = read_frame(sys.stdin.buffer)

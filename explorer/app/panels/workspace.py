@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from explorer.app.actions import Action, SetView
 from explorer.app.assigning import Update
-from explorer.app.colours import FAR_WARNINGS, css
+from explorer.app.colours import css
 from explorer.app.controls import Controls, Span
 from explorer.app.panels.html import DIM, alert
-from explorer.app.panels.ranges import coordinate_span, fine_step
+from explorer.app.panels.ranges import coordinate_span, fine_step, round_up
 from explorer.app.session import Session
 from explorer.app.state import Frame, State
 from explorer.app.tasks import (
@@ -123,7 +123,11 @@ class WorkspacePanel:
                 f"{across} from {slice_map.lows[0]:.4g} to {slice_map.highs[0]:.4g}, "
                 f"{up} from {slice_map.lows[1]:.4g} to {slice_map.highs[1]:.4g} upwards"
             )
-            yield self._caption, "content", f'<div style="{DIM};padding:2px 10px">{text}</div>'
+            yield (
+                self._caption,
+                "content",
+                f'<div style="{DIM};font-size:12px;padding:2px 10px">{text}</div>',
+            )
             yield self._map, "image", _picture(slice_map.pixels)
 
     def _add_export(self, gui: viser.GuiApi, what: str, export: Export) -> None:
@@ -217,12 +221,17 @@ def _legend(colour: str, warn_below: float) -> str:
         else (WARN_CONDITION, "1 / cond J")
     )
     bands = "".join(f'<div style="flex:1;background:{css(band)}"></div>' for band in band_colours())
-    ticks = "".join(f"<span>{edge * unit:.2g}</span>" for edge in (*BAND_EDGES[::3],))
+    # All bands are drawn equally wide, so the values at their edges are not evenly spaced.
+    share = 100.0 / len(BAND_EDGES)
+    ticks = "".join(
+        f'<span style="position:absolute;left:{index * share:g}%;transform:translateX('
+        f'{"0" if index == 0 else "-50%"})">{BAND_EDGES[index] * unit:.2g}</span>'
+        for index in (0, 2, 4, 6, 9)
+    )
     return (
         f'<div style="{DIM};margin-bottom:3px">{name}</div>'
         f'<div style="display:flex;height:11px;border-radius:2px;overflow:hidden">{bands}</div>'
-        f'<div style="display:flex;justify-content:space-between;font-size:11px;{DIM}">{ticks}'
-        f"<span>≥ {FAR_WARNINGS * unit:.2g}</span></div>"
+        f'<div style="position:relative;height:18px;font-size:11px;{DIM}">{ticks}</div>'
     )
 
 
@@ -240,7 +249,7 @@ def _picture(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
 def _tolerance_span(state: State) -> Span:
     reach = state.base.reach
     step = fine_step(reach, 5e3)
-    return Span(step, 0.05 * reach, step)
+    return Span(step, round_up(0.05 * reach), step)
 
 
 def _changed(state: State, **changes: Any) -> Action:

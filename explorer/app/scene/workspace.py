@@ -45,7 +45,12 @@ class WorkspaceScene:
             for index, colour in enumerate(self._colours)
         ]
         self._hull = scene.add_mesh_simple(
-            "/workspace/hull", *EMPTY, color=(90, 100, 116), wireframe=True, visible=False
+            "/workspace/hull",
+            *EMPTY,
+            color=(90, 100, 116),
+            wireframe=True,
+            opacity=0.3,
+            visible=False,
         )
         self._planes = [_SingularPlane(scene, index) for index in range(3)]
         self._broken = scene.add_line_segments(
