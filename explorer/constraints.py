@@ -60,6 +60,10 @@ class Round:
         )
         return self.radius - distance if self.inside else distance - self.radius
 
+    def distance(self, p: FloatArray) -> FloatArray:
+        """Return the distances of positions (..., 3) from the surface."""
+        return np.abs(self.slack(p))
+
 
 @dataclass(frozen=True)
 class HalfSpace:
@@ -80,6 +84,10 @@ class HalfSpace:
     def slack(self, p: FloatArray) -> FloatArray:
         """Return by how much positions (..., 3) keep the limit; negative where they do not."""
         return self.offset - p @ self.normal
+
+    def distance(self, p: FloatArray) -> FloatArray:
+        """Return the distances of positions (..., 3) from the surface."""
+        return np.abs(self.slack(p)) / float(np.linalg.norm(self.normal))
 
 
 @dataclass(frozen=True)
@@ -102,10 +110,14 @@ class Cone:
 
     def slack(self, p: FloatArray) -> FloatArray:
         """Return the angle left to the cone at positions (..., 3), in radians."""
-        off = (p - self.apex) * (np.array([0.0, 1.0, 1.0]) if self.flat else 1.0)
-        along = off @ self.axis
-        across = np.linalg.norm(np.cross(off, self.axis), axis=-1)
-        return self.half_angle - np.arctan2(across, along)
+        return self.half_angle - angle_between(self._leg(p), self.axis)
+
+    def distance(self, p: FloatArray) -> FloatArray:
+        """Return the distances of positions (..., 3) from the surface, near it."""
+        return np.abs(self.slack(p)) * np.linalg.norm(self._leg(p), axis=-1)
+
+    def _leg(self, p: FloatArray) -> FloatArray:
+        return (p - self.apex) * (np.array([0.0, 1.0, 1.0]) if self.flat else 1.0)
 
 
 @dataclass(frozen=True)
@@ -117,6 +129,10 @@ class Never:
     def slack(self, p: FloatArray) -> FloatArray:
         """Return minus infinity for positions (..., 3)."""
         return np.full(p.shape[:-1], -math.inf)
+
+    def distance(self, p: FloatArray) -> FloatArray:
+        """Return infinity for positions (..., 3): it has no surface."""
+        return np.full(p.shape[:-1], math.inf)
 
 
 Constraint: TypeAlias = Round | HalfSpace | Cone | Never
@@ -248,41 +264,82 @@ def _margins(design: Design, r: FloatArray) -> Iterator[Constraint]:
         yield HalfSpace(name, -sign * k, -least, rates)
 
 
-def _swings(design: Design, r: FloatArray) -> Iterator[Constraint]:
+@dataclass(frozen=True)
+class JointCone:
+    """The cone that a universal or ball joint keeps its leg in, about the home's direction.
+
+    Attributes:
+        joint: Such as "a1".
+        leg: 1 to 4.
+        axis: The leg's direction in the home pose, from base to platform, of unit length;
+            in the platform frame for the ball joints, else in the base's. None where the
+            leg has no length at home: no pose keeps such a cone.
+        half_angle: In radians.
+        in_platform: In which frame the axis is.
+    """
+
+    joint: str
+    leg: int
+    axis: FloatArray | None
+    half_angle: float
+    in_platform: bool
+
+
+def joint_cones(design: Design) -> tuple[JointCone, ...]:
+    """Return the cones of the joints that a design bounds."""
     swing = design.limits.swing
     if swing == Swing():
-        return
+        return ()
     home = home_pose(design)
-    at_home = attachment_points(design, home.position, home.rotation)
-    # Of each joint: the leg's direction at home, and where in p the leg has no length.
-    base_to_tip = {
-        "1": at_home.b1,
-        "2": at_home.b2 * [0.0, 1.0, 1.0],
-        "3": at_home.b3 * [0.0, 1.0, 1.0],
-        "4": at_home.b4 - at_home.a3,
-    }
-    b1x, b1y = design.b1
-    apexes = {
-        "1": -(b1x * r[:, 0] + b1y * r[:, 1]),
-        "2": -design.b2 * r[:, 0],
-        "3": -design.b3 * r[:, 0],
-        "4": at_home.a3,
-    }
-    with_platform = r @ home.rotation.T
+    at_home = legs(design, np.array(home.position), home.rotation)
+    found: list[JointCone] = []
     for joint in swing.__struct_fields__:
         degrees = getattr(swing, joint)
         if degrees is None:
             continue
-        leg = "4" if joint == "a3" else joint[1]
-        direction = base_to_tip[leg]
+        leg = 4 if joint == "a3" else int(joint[1])
+        direction = at_home[leg - 1]
         length = float(np.linalg.norm(direction))
-        if length == 0.0:
-            yield Never(f"swing {joint}")
+        in_platform = joint.startswith("b")
+        axis = direction / length if length > 0.0 else None
+        if axis is not None and in_platform:
+            axis = home.rotation.T @ axis
+        found.append(JointCone(joint, leg, axis, math.radians(degrees), in_platform))
+    return tuple(found)
+
+
+def legs(design: Design, position: FloatArray, rotation: FloatArray) -> FloatArray:
+    """Return the four legs of a pose as vectors from base to platform, shape (4, 3).
+
+    Those on the guide are perpendicular to it.
+    """
+    points = attachment_points(design, position, rotation)
+    across = np.array([0.0, 1.0, 1.0])
+    return np.array([points.b1, points.b2 * across, points.b3 * across, points.b4 - points.a3])
+
+
+def angle_between(vector: FloatArray, axis: FloatArray) -> FloatArray:
+    """Return the angles (...) of vectors (..., 3) and an axis (3,), in radians."""
+    across = np.linalg.norm(np.cross(vector, axis), axis=-1)
+    return np.asarray(np.arctan2(across, vector @ axis))
+
+
+def _swings(design: Design, r: FloatArray) -> Iterator[Constraint]:
+    b1x, b1y = design.b1
+    # Where in p each leg has no length.
+    apexes = (
+        -(b1x * r[:, 0] + b1y * r[:, 1]),
+        -design.b2 * r[:, 0],
+        -design.b3 * r[:, 0],
+        np.array([*design.a3, 0.0]),
+    )
+    for each in joint_cones(design):
+        name = f"swing {each.joint}"
+        if each.axis is None:
+            yield Never(name)
             continue
-        axis = direction / length
-        if joint.startswith("b"):
-            axis = with_platform @ axis
-        yield Cone(f"swing {joint}", apexes[leg], axis, math.radians(degrees), leg in "23")
+        axis = r @ each.axis if each.in_platform else each.axis
+        yield Cone(name, apexes[each.leg - 1], axis, each.half_angle, each.leg in (2, 3))
 
 
 def home_signs(design: Design) -> tuple[int, int, int]:

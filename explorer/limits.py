@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from explorer.arrays import FloatArray
+from explorer.constraints import angle_between, joint_cones, legs
 from explorer.design import JOINTS, LENGTHS, Design
 
 # A pose on a limit is within it, whatever its last bits say.
@@ -16,8 +18,8 @@ class Violation:
     """A broken limit.
 
     Attributes:
-        limit: What is limited: a joint, "gap |d1 − d3|", "box x", "margin κ1", ….
-        value: What it is, in design units.
+        limit: What is limited: a joint, "gap |d1 − d3|", "box x", "margin κ1", "swing a1", ….
+        value: What it is, in design units; of a swing in degrees.
         bound: What it may be at the most, or at the least.
         above: Whether the value exceeds the bound, rather than falling short of it.
     """
@@ -33,13 +35,15 @@ class Violation:
             text = f"{self.limit} = {self.value:.4g}, but it is {sign} in the home mode"
             return text.replace("-", "−")
         relation = "above its maximum" if self.above else "below its minimum"
-        text = f"{self.limit} = {self.value:.4g} is {relation} {self.bound:.4g}"
+        unit = "°" if self.limit.startswith("swing") else ""
+        text = f"{self.limit} = {self.value:.4g}{unit} is {relation} {self.bound:.4g}{unit}"
         return text.replace("-", "−")
 
 
 def violations(
     design: Design,
     position: FloatArray,
+    rotation: FloatArray,
     joints: FloatArray,
     margin: FloatArray,
     home_signs: tuple[int, int, int],
@@ -49,6 +53,7 @@ def violations(
     Args:
         design: The manipulator.
         position: b4 in the base frame, shape (3,).
+        rotation: Platform to base, shape (3, 3).
         joints: Those of the pose, shape (6,).
         margin: Those of the pose, shape (3,).
         home_signs: The sign triple of the home pose.
@@ -78,4 +83,16 @@ def violations(
             # In the home mode a margin lies on the home's side of zero.
             low, high = (limits.margin, None) if sign > 0 else (None, -limits.margin)
             check(f"margin κ{index}", value, low, high)
+    cones = joint_cones(design)
+    if cones:
+        vectors = legs(design, position, rotation)
+        for cone in cones:
+            # A leg without a length at home has no direction to swing about.
+            angle = math.pi
+            if cone.axis is not None:
+                axis = rotation @ cone.axis if cone.in_platform else cone.axis
+                angle = float(angle_between(vectors[cone.leg - 1], axis))
+            if angle > cone.half_angle + SLACK or cone.axis is None:
+                swing, most = math.degrees(angle), math.degrees(cone.half_angle)
+                found.append(Violation(f"swing {cone.joint}", swing, most, above=True))
     return tuple(found)

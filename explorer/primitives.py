@@ -185,13 +185,19 @@ def _rounds(rounds: Sequence[Round], box: Box, frame: Frame) -> Iterator[Piece |
 
 
 def _cone(limit: Cone, frame: Frame) -> Piece | bool:
-    """Return the piece, or True if all positions keep the limit."""
-    if limit.half_angle >= math.pi:
-        return True
+    """Return the piece, or whether all positions or none keep the limit."""
     apex, axis, angle = frame.to(limit.apex), limit.axis, limit.half_angle
     if limit.flat:
-        # The apex of a wedge is a line along x: that point of it counts which is nearest.
+        # The leg is perpendicular to x, so that only a section of its cone counts: a wedge.
+        across = math.hypot(axis[1], axis[2])
+        cosine = math.cos(angle)
+        if abs(cosine) >= across:
+            return cosine <= 0.0
+        axis, angle = np.array([0.0, axis[1], axis[2]]) / across, math.acos(cosine / across)
+        # Its edge is a line along x: that point of it counts which is nearest.
         apex = np.array([frame.box.middle[0], apex[1], apex[2]])
+    if angle >= math.pi:
+        return True
     farthest = frame.box.distances(apex)[1]
     if abs(math.cos(angle)) * farthest <= FLAT * frame.chord:
         offset = -float(axis @ apex)
@@ -200,7 +206,8 @@ def _cone(limit: Cone, frame: Frame) -> Piece | bool:
     if cuts:
         axis, angle = -axis, math.pi - angle
     if limit.flat:
-        return Piece(limit.name, cuts, 16, partial(wedge, apex[1:], axis[1:], angle, frame.box))
+        make = partial(wedge, apex[1:], axis[1:], angle, frame.box)
+        return Piece(limit.name, cuts, 16, make)
     step = step_of(farthest, frame.chord)
     faces = math.ceil(12.0 * math.pi / step)
     return Piece(limit.name, cuts, faces, partial(cone, apex, axis, angle, step, frame.box))

@@ -116,7 +116,7 @@ def evaluate(design: Design, pose: Pose) -> Snapshot:
         stratum_dimension=inversions(flags),
         mode=int(mode_of(margin)),
         proximity=float(np.abs(margin).min()) / design.reach,
-        violations=violations(design, position, joints, margin, _home_signs(home)),
+        violations=violations(design, position, rotation, joints, margin, _home_signs(home)),
     )
 
 

@@ -125,16 +125,17 @@ def reachable_solid(design: Design, rotations: ArrayLike, tolerance: float | Non
         InputError: not rotations, or a tolerance that is not positive or too small.
         ExplorerError: a boolean fails.
     """
-    from manifold3d import Manifold, OpType
-
     families = _families(design, rotations)
     frame = frame_of(families, design.reach, tolerance)
     names = _names(families)
-    bodies, origins = _bodies(families, frame, names)
-    solid = _solid(Manifold.batch_boolean(bodies, OpType.Add), origins, frame, names)
+    bodies, _ = _bodies(families, frame, names)
+    vertices, faces, _ = _mesh_of(_union(bodies))
+    points = frame.back(vertices)
+    limits = [limit for family in families for limit in family]
+    solid = Solid(points, faces, _nearest(limits, points, faces, names), names, frame.tolerance)
     if not solid.is_empty:
         return solid
-    because = dict.fromkeys(name for limits in families for name in what_empties(limits))
+    because = dict.fromkeys(name for family in families for name in what_empties(family))
     return replace(solid, empty_because=tuple(because))
 
 
@@ -231,6 +232,35 @@ def _body(pieces: Sequence[Piece], origins: dict[int, int], names: tuple[str, ..
         (cut if piece.cuts else kept).append(_manifold_of(piece.make(), own))
     common = Manifold.batch_boolean(kept, OpType.Intersect)
     return Manifold.batch_boolean([common, *cut], OpType.Subtract)
+
+
+def _union(bodies: Sequence[Manifold]) -> Manifold:
+    """Return the union, in pairs and pairs of pairs.
+
+    Surfaces that bodies share are cut along all their other surfaces. Without what a body
+    was made of those cuts heal, and without healing the faces of 64 bodies are millions.
+    """
+    while len(bodies) > 1:
+        pairs = zip(bodies[::2], bodies[1::2], strict=False)
+        left = bodies[len(bodies) // 2 * 2 :]
+        bodies = [*((one + other).as_original().simplify(0.0) for one, other in pairs), *left]
+    return bodies[0]
+
+
+def _nearest(
+    limits: Sequence[Constraint],
+    vertices: FloatArray,
+    faces: NDArray[np.int32],
+    names: tuple[str, ...],
+) -> IntArray:
+    """Return the limits on whose surfaces the faces lie, as indices of names, shape (m,)."""
+    found = np.zeros(len(faces), dtype=np.int64)
+    least = np.full(len(faces), np.inf)
+    for limit in limits:
+        off = limit.distance(vertices)[faces].max(axis=1)
+        found[off < least] = names.index(limit.name)
+        least = np.minimum(off, least)
+    return found
 
 
 def _manifold_of(shape: Facets, own: int) -> Manifold:

@@ -28,6 +28,8 @@ from explorer.slice_volume import integrate_slices
 NODES = 10
 # Columns an axis for workspaces with cones, whose slices are no circles.
 COLUMNS = 400
+# As many are enough to see that there is a volume.
+COARSE_COLUMNS = 80
 # The most nodes that are counted.
 MOST_NODES = 50_000_000
 # A grid has its nodes at multiples of reach / 15 unless the design says otherwise.
@@ -219,14 +221,14 @@ def _volume_of_slices(region: Region) -> tuple[float, dict[str, float]]:
     return float(result[0]), gradient
 
 
-def _volume_of_columns(region: Region) -> tuple[float, float]:
+def _volume_of_columns(region: Region, columns: int = COLUMNS) -> tuple[float, float]:
     if region.is_empty:
         return 0.0, 0.0
     lows, highs = bounds(region)
     if not (lows < highs).all():
         return 0.0, 0.0
     volumes: list[float] = []
-    for many in (COLUMNS // 2, COLUMNS):
+    for many in (columns // 2, columns):
         total = np.zeros(1)
         column_lengths(
             many * many, region.rounds, region.planes, region.cones, lows, highs, many, total
@@ -252,5 +254,5 @@ def _has_volume(limits: tuple[Constraint, ...]) -> bool:
         return True
     region = region_of(limits)
     if len(region.cones):
-        return _volume_of_columns(region)[0] > 0.0
+        return _volume_of_columns(region, COARSE_COLUMNS)[0] > 0.0
     return _volume_of_slices(region)[0] > 0.0

@@ -34,7 +34,7 @@ def broken(
     design: Design, position: FloatArray, rotation: FloatArray, signs: Signs = ALL_POSITIVE
 ) -> tuple[Violation, ...]:
     joints = inverse(design, position, rotation)
-    return violations(design, position, joints, margins(position, rotation), signs)
+    return violations(design, position, rotation, joints, margins(position, rotation), signs)
 
 
 ranges = st.tuples(st.floats(0.0, 20.0), st.floats(0.0, 20.0)).map(
