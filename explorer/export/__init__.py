@@ -1,0 +1,1 @@
+"""Files for other programs, written from what the package computes."""
