@@ -11,9 +11,11 @@ from __future__ import annotations
 import functools
 import hashlib
 import os
+import shutil
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 from types import FunctionType
@@ -160,6 +162,15 @@ def _compile_in_child(modules: list[str]) -> None:
         capture_output=True,
         env={**os.environ, **changed},
     )
+    _forget_old_caches()
+
+
+def _forget_old_caches() -> None:
+    """Remove what was compiled for sources that have not been used for a month."""
+    month = 30 * 24 * 3600
+    for folder in cache_folder().parent.glob("*"):
+        if folder != cache_folder() and time.time() - folder.stat().st_mtime > month:
+            shutil.rmtree(folder, ignore_errors=True)
 
 
 @functools.cache

@@ -148,6 +148,10 @@ class Worker:
         process = self._process
         return None if process is None else process.pid
 
+    def start(self) -> None:
+        """Start the process before it is needed."""
+        self.submit("start", "ready", (), lambda _: None, lambda _: None)
+
     def wait_until_idle(self, timeout: float) -> bool:
         """Wait until nothing waits and nothing runs; say whether that came about."""
         with self._condition:

@@ -100,6 +100,7 @@ def serve(
         )
     sys.stderr.flush()
     warm_in_background()
+    running.page.worker.start()
     if open_browser:
         threading.Thread(target=webbrowser.open, args=(running.url,), daemon=True).start()
     try:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import pickle
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import IO, Any
 
@@ -55,6 +56,8 @@ def main() -> None:
     answers = os.fdopen(os.dup(1), "wb")
     # Whatever a library prints must not get between the frames.
     os.dup2(2, 1)
+    from explorer.app import tasks
+
     # Until the kernels are compiled, or loaded, they run interpreted.
     warm_in_background()
     while True:
@@ -62,14 +65,12 @@ def main() -> None:
             order: Order = read_frame(sys.stdin.buffer)
         except EOFError:
             return
-        write_frame(answers, _done(order))
+        write_frame(answers, _done(getattr(tasks, order.task), order))
 
 
-def _done(order: Order) -> Reply:
-    from explorer.app import tasks
-
+def _done(task: Callable[..., Any], order: Order) -> Reply:
     try:
-        return Reply(order.number, getattr(tasks, order.task)(*order.arguments))
+        return Reply(order.number, task(*order.arguments))
     except ExplorerError as error:
         return Reply(order.number, problem=str(error))
     except Exception as error:  # noqa: BLE001 - the parent tells, and the worker goes on

@@ -10,7 +10,7 @@ import viser
 
 from explorer.app.actions import Action, Open, Reset, SetHold, SetLimits, SetUnit, SetVariable
 from explorer.app.assigning import Update
-from explorer.app.controls import Controls
+from explorer.app.controls import Controls, Span
 from explorer.app.panels.ranges import coordinate_span, length_span, variable_span
 from explorer.app.session import Session
 from explorer.app.state import Frame, Hold, State
@@ -28,6 +28,16 @@ VARIABLE_HINTS = {
 }
 HOLDS: dict[str, Hold] = {"hold the pose": "pose", "hold the legs": "legs"}
 NO_PRESET = "—"
+SWINGS = {
+    "a1": "U joint",
+    "a3": "U joint",
+    "b1": "ball",
+    "b2": "ball",
+    "b3": "ball",
+    "b4": "ball",
+}
+# A half-angle, in degrees, that bounds nothing.
+NO_SWING = 180.0
 
 
 class DesignPanel:
@@ -69,6 +79,9 @@ class DesignPanel:
             self._add_guide()
             self._add_box()
             self._add_margin()
+        with gui.add_folder("Swing of the joints (°)", expand_by_default=False):
+            for name, kind in SWINGS.items():
+                self._add_swing(name, kind)
 
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield what makes the panel show the frame."""
@@ -203,6 +216,21 @@ class DesignPanel:
             lambda state, value: _limited(state, "margin", value),
             length_span,
             disabled=lambda state: state.design.limits.margin is None,
+        )
+
+    def _add_swing(self, name: str, kind: str) -> None:
+        def write(state: State, value: float) -> Action:
+            bound = value if value < NO_SWING else None
+            swing = msgspec.structs.replace(state.design.limits.swing, **{name: bound})
+            return _limited(state, "swing", swing)
+
+        self._controls.slider(
+            f"{name} {kind}",
+            f"How far leg {'4' if name == 'a3' else name[1]} may swing in this joint from its "
+            "direction at home; 180 for no bound.",
+            lambda frame: getattr(frame.state.design.limits.swing, name) or NO_SWING,
+            write,
+            lambda _: Span(1.0, NO_SWING, 0.5),
         )
 
 

@@ -23,6 +23,8 @@ EMPTY: ArrayPair = np.zeros((3, 3), dtype=np.float32), np.array([[0, 1, 2]], dty
 SOLID_OPACITY = 0.42
 CUT_OPACITY = 0.96
 PLANE_OPACITY = 0.12
+HULL_COLOUR: Rgb = (90, 100, 116)
+HULL_OPACITY = 0.3
 
 
 class WorkspaceScene:
@@ -47,9 +49,9 @@ class WorkspaceScene:
         self._hull = scene.add_mesh_simple(
             "/workspace/hull",
             *EMPTY,
-            color=(90, 100, 116),
+            color=HULL_COLOUR,
             wireframe=True,
-            opacity=0.3,
+            opacity=HULL_OPACITY,
             visible=False,
         )
         self._planes = [_SingularPlane(scene, index) for index in range(3)]
