@@ -210,9 +210,10 @@ def _bodies(
     if faces > MOST_FACES:
         # Faces of balls are as many as the tolerance is small, others fewer.
         least = frame.tolerance * faces / MOST_FACES
+        fewer = ", or the orientations fewer" if len(families) > 1 else ""
         raise InputError(
             f"a tolerance of {frame.tolerance:g} takes about {faces:.2g} triangles; at most "
-            f"{MOST_FACES:,} are made, so it must be at least about {least:.2g}"
+            f"{MOST_FACES:,} are made, so it must be at least about {least:.2g}{fewer}"
         )
     origins: dict[int, int] = {}
     return [_body(pieces, origins, names) for pieces in everything], origins

@@ -23,6 +23,8 @@ COMMANDS: Mapping[str, str] = {
     "inverse": "Find the joints of a pose.",
     "forward": "Find the eight assembly modes of the joints.",
     "singularity": "Tell how near a pose is to a singularity, and to which.",
+    "workspace": "Measure the workspace: exact volume and gradient, the paper's nodes, a mesh.",
+    "export": "Write the workspace, or its convex hull, as a mesh for other programs.",
     "screenshot": "Draw a pose into a PNG file.",
 }
 """Each command's name, which is that of its module, and what it does."""

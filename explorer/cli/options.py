@@ -43,11 +43,8 @@ _THE_HOME = tyro.conf.arg(help_behavior_hint="(default: that of the home pose)")
 
 
 @dataclass(frozen=True, kw_only=True)
-class PoseOptions:
-    """Which pose a command is about; what is not given is that of the design's home."""
-
-    position: Annotated[Triple | None, numbers("--position", "x y z"), _THE_HOME] = None
-    """Position of b4 in the base frame, in design units."""
+class OrientationOptions:
+    """Which orientation a command is about; that of the design's home unless given."""
 
     quaternion: Annotated[Quadruple | None, numbers("--quaternion", "w x y z"), _THE_HOME] = None
     """Orientation of the platform; need not be of unit length."""
@@ -59,8 +56,8 @@ class PoseOptions:
     ] = None
     """Orientation of the platform: degrees about its own z, then y, then x axis."""
 
-    def pose(self, design: Design) -> Pose:
-        """Return the pose, from the design's home where no option says otherwise.
+    def oriented(self, design: Design) -> Pose:
+        """Return the home pose of the design, with the orientation given.
 
         Raises:
             InputError: two orientations, or a quaternion of length zero.
@@ -68,7 +65,23 @@ class PoseOptions:
         if self.quaternion is not None and self.yaw_pitch_roll is not None:
             raise InputError("give one of --quaternion and --yaw-pitch-roll, not both")
         home = home_pose(design)
-        position = home.position if self.position is None else self.position
         if self.yaw_pitch_roll is not None:
-            return Pose.of_yaw_pitch_roll(position, self.yaw_pitch_roll)
-        return Pose(position, self.quaternion or home.quaternion)
+            return Pose.of_yaw_pitch_roll(home.position, self.yaw_pitch_roll)
+        return Pose(home.position, self.quaternion or home.quaternion)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PoseOptions(OrientationOptions):
+    """Which pose a command is about; what is not given is that of the design's home."""
+
+    position: Annotated[Triple | None, numbers("--position", "x y z"), _THE_HOME] = None
+    """Position of b4 in the base frame, in design units."""
+
+    def pose(self, design: Design) -> Pose:
+        """Return the pose, from the design's home where no option says otherwise.
+
+        Raises:
+            InputError: two orientations, or a quaternion of length zero.
+        """
+        oriented = self.oriented(design)
+        return oriented if self.position is None else Pose(self.position, oriented.quaternion)

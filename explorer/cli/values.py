@@ -11,7 +11,7 @@ from tyro.constructors import PrimitiveConstructorSpec
 from explorer.cli.usage import UsageError
 from explorer.design import LARGEST_SIZE
 
-_COUNTS = {3: "three", 4: "four", 6: "six"}
+_COUNTS = {2: "two", 3: "three", 4: "four", 6: "six"}
 
 
 def numbers(option: str, order: str) -> PrimitiveConstructorSpec[Any]:
@@ -48,6 +48,24 @@ def numbers(option: str, order: str) -> PrimitiveConstructorSpec[Any]:
     )
 
 
+def positive(option: str) -> PrimitiveConstructorSpec[Any]:
+    """Return how to read an option that takes one finite number above zero."""
+
+    def read(words: list[str]) -> float:
+        value = _number(option, words[0])
+        if not (math.isfinite(value) and value > 0.0):
+            raise UsageError(f"{option} must be a positive number; got {words[0]}")
+        return value
+
+    return PrimitiveConstructorSpec(
+        nargs=1,
+        metavar="NUMBER",
+        instance_from_str=read,
+        is_instance=lambda value: value is None or isinstance(value, float),
+        str_from_instance=lambda value: [str(value)],
+    )
+
+
 def whole_number(option: str, low: int, high: int) -> PrimitiveConstructorSpec[Any]:
     """Return how to read an option that takes a whole number in a range, ends included."""
 
@@ -64,7 +82,7 @@ def whole_number(option: str, low: int, high: int) -> PrimitiveConstructorSpec[A
         nargs=1,
         metavar="N",
         instance_from_str=read,
-        is_instance=lambda value: isinstance(value, int),
+        is_instance=lambda value: value is None or isinstance(value, int),
         str_from_instance=lambda value: [str(value)],
     )
 
