@@ -93,6 +93,7 @@ class LatestWins(Generic[Item]):
 
 @dataclass(frozen=True)
 class _Request:
+    key: object
     order: Order
     done: Callable[[Any], None]
     failed: Callable[[str], None]
@@ -101,8 +102,8 @@ class _Request:
 class Worker:
     """A child process for heavy work; of each kind of request only the newest waits.
 
-    It is started when it is first needed, and again should it die. Results come in the
-    order of the requests, on a thread of their own.
+    It is started when it is first needed, and again should it die. Results come on a
+    thread of their own.
 
     Args:
         report: Called with a message when the process died or failed unexpectedly.
@@ -110,14 +111,12 @@ class Worker:
 
     def __init__(self, report: Callable[[str], None]) -> None:
         self._report = report
-        self._waiting: dict[object, _Request] = {}
-        self._condition = threading.Condition()
+        self._numbers = itertools.count()
         self._process: subprocess.Popen[bytes] | None = None
         self._stopped = False
-        self._busy = False
-        self._numbers = itertools.count()
-        self._thread = threading.Thread(target=self._run, name="worker", daemon=True)
-        self._thread.start()
+        # Of the process: it must not be started after it was told to stop.
+        self._lock = threading.Lock()
+        self._queue: LatestWins[_Request] = LatestWins(self._serve_all, "worker")
 
     def submit(
         self,
@@ -136,11 +135,9 @@ class Worker:
             done: Called with the result.
             failed: Called with a message for people instead.
         """
-        with self._condition:
-            order = Order(next(self._numbers), task, arguments)
-            self._waiting.pop(key, None)
-            self._waiting[key] = _Request(order, done, failed)
-            self._condition.notify_all()
+        number = next(self._numbers)
+        request = _Request(key, Order(number, task, arguments), done, failed)
+        self._queue.post(key, number, request)
 
     @property
     def process_id(self) -> int | None:
@@ -154,52 +151,38 @@ class Worker:
 
     def wait_until_idle(self, timeout: float) -> bool:
         """Wait until nothing waits and nothing runs; say whether that came about."""
-        with self._condition:
-            return self._condition.wait_for(
-                lambda: not self._waiting and not self._busy, timeout=timeout
-            )
+        return self._queue.wait_until_idle(timeout)
 
     def stop(self) -> None:
         """End the process, whatever it is doing."""
-        with self._condition:
+        with self._lock:
             self._stopped = True
-            self._waiting.clear()
-            self._condition.notify_all()
-            process = self._process
-        if process is not None:
-            process.kill()
-        self._thread.join(timeout=5.0)
+            if self._process is not None:
+                _end(self._process)
+        self._queue.stop()
 
-    def _run(self) -> None:
-        while True:
-            with self._condition:
-                self._busy = False
-                self._condition.notify_all()
-                self._condition.wait_for(lambda: self._waiting or self._stopped)
-                if self._stopped:
-                    break
-                request = self._waiting.pop(next(iter(self._waiting)))
-                self._busy = True
-            self._serve(request)
-        if self._process is not None:
-            self._end(self._process)
+    def _serve_all(self, requests: Sequence[_Request]) -> None:
+        for request in requests:
+            # What has become out of date while others were served is left out.
+            if not self._queue.is_waiting(request.key):
+                self._serve(request)
 
     def _serve(self, request: _Request) -> None:
+        process = self._alive()
+        if process is None:
+            return
         try:
-            process = self._alive()
             # Both are pipes, as they were asked for.
             write_frame(cast("IO[bytes]", process.stdin), request.order)
             reply: Reply = read_frame(cast("IO[bytes]", process.stdout))
-        except (OSError, EOFError, pickle.UnpicklingError):
-            with self._condition:
-                process, self._process = self._process, None
-                stopped = self._stopped
-            if process is not None:
-                self._end(process)
-            if not stopped:
-                message = "The worker process died; the next change starts it again."
-                self._report(message)
-                request.failed(message)
+        except (OSError, ValueError, EOFError, pickle.UnpicklingError):
+            with self._lock:
+                _end(process)
+                if self._stopped:
+                    return
+            message = "The worker process died; the next change starts it again."
+            self._report(message)
+            request.failed(message)
             return
         if reply.problem is None:
             request.done(reply.value)
@@ -208,8 +191,11 @@ class Worker:
                 self._report(f"Something went wrong in the worker: {reply.problem}")
             request.failed(reply.problem)
 
-    def _alive(self) -> subprocess.Popen[bytes]:
-        with self._condition:
+    def _alive(self) -> subprocess.Popen[bytes] | None:
+        """Return the process, started if need be; None once it is to stop."""
+        with self._lock:
+            if self._stopped:
+                return None
             if self._process is None or self._process.poll() is not None:
                 paths = {"PYTHONPATH": str(Path(__file__).parents[2])}
                 self._process = subprocess.Popen(
@@ -220,11 +206,12 @@ class Worker:
                 )
             return self._process
 
-    @staticmethod
-    def _end(process: subprocess.Popen[bytes]) -> None:
-        for pipe in (process.stdin, process.stdout):
-            if pipe is not None:
-                with contextlib.suppress(OSError):
-                    pipe.close()
-        process.kill()
-        process.wait()
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    process.kill()
+    process.wait()
+    for pipe in (process.stdin, process.stdout):
+        if pipe is not None:
+            # What was written and not read cannot be flushed any more.
+            with contextlib.suppress(OSError):
+                pipe.close()
