@@ -15,7 +15,7 @@ from explorer.app.assigning import Update
 from explorer.app.colours import proximity_colour
 from explorer.app.scene.legs import guide_span
 from explorer.app.scene.placing import Placed
-from explorer.app.scene.shapes import cylinder, sphere, turned_to
+from explorer.app.scene.shapes import Patch, cylinder, sphere, turned_to
 from explorer.arrays import FloatArray
 
 POINT_RADIUS = 0.36
@@ -36,23 +36,7 @@ class Flag:
         self._line = scene.add_mesh_simple(
             f"{root}/flag/line", *cylinder(), wxyz=ALONG_X, cast_shadow=False
         )
-        self._plane = scene.add_mesh_simple(
-            f"{root}/flag/plane",
-            np.zeros((4, 3)),
-            np.array([[0, 1, 2], [0, 2, 3]]),
-            opacity=PLANE_OPACITY,
-            side="double",
-            cast_shadow=False,
-            receive_shadow=False,
-        )
-        self._hem = scene.add_line_segments(
-            f"{root}/flag/hem",
-            np.zeros((4, 2, 3)),
-            # One colour for all could not become many: the browser would draw white.
-            np.zeros((4, 2, 3), dtype=np.uint8),
-            thickness=1.5,
-            thickness_units="screen",
-        )
+        self._patch = Patch(scene, f"{root}/flag", opacity=PLANE_OPACITY)
 
     def updates(self, placed: Placed, corners: FloatArray, size: float) -> Iterator[Update]:
         """Yield what draws it with a plane of four corners, the first two on its line."""
@@ -62,17 +46,15 @@ class Flag:
             proximity_colour(float(margins[k]), state.warn_below) for k in self._kappas
         )
         low, high = corners[:2, 0].tolist()
-        for handle in (self._point, self._line, self._plane, self._hem):
+        for handle in (self._point, self._line):
             yield handle, "visible", state.view.flags
+        yield from self._patch.shown(state.view.flags)
         yield self._point, "color", point
         yield self._point, "scale", POINT_RADIUS * size
         yield self._line, "color", along
         yield self._line, "position", (low, 0.0, 0.0)
         yield self._line, "scale", (LINE_RADIUS * size, LINE_RADIUS * size, high - low)
-        yield self._plane, "color", plane
-        yield self._plane, "vertices", corners.astype(np.float32)
-        yield self._hem, "points", _outline(corners).astype(np.float32)
-        yield self._hem, "colors", np.tile(np.array(plane, dtype=np.uint8), (4, 2, 1))
+        yield from self._patch.spanned(corners, plane)
 
 
 class Flags:
@@ -114,7 +96,3 @@ def _platform_corners(placed: Placed) -> FloatArray:
 def _hanging(low: float, high: float, hang: float) -> FloatArray:
     """Return the corners of a plane that hangs from a line along x to y, shape (4, 3)."""
     return np.array([[low, 0, 0], [high, 0, 0], [high, hang, 0], [low, hang, 0]], float)
-
-
-def _outline(corners: FloatArray) -> FloatArray:
-    return np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)

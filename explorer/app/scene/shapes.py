@@ -102,6 +102,46 @@ class Boxes(Instances):
         yield from self.placed(0.5 * (lows + highs), upright, highs - lows)
 
 
+class Patch:
+    """A translucent quadrilateral with a hem."""
+
+    def __init__(
+        self, scene: viser.SceneApi, name: str, *, opacity: float, visible: bool = True
+    ) -> None:
+        self._plane = scene.add_mesh_simple(
+            f"{name}/plane",
+            np.zeros((4, 3)),
+            np.array([[0, 1, 2], [0, 2, 3]]),
+            opacity=opacity,
+            side="double",
+            cast_shadow=False,
+            receive_shadow=False,
+            visible=visible,
+        )
+        self._hem = scene.add_line_segments(
+            f"{name}/hem",
+            np.zeros((4, 2, 3)),
+            # One colour for all could not become many: the browser would draw white.
+            np.zeros((4, 2, 3), dtype=np.uint8),
+            thickness=1.5,
+            thickness_units="screen",
+            visible=visible,
+        )
+
+    def shown(self, visible: bool) -> Iterator[Update]:
+        """Yield what shows or hides it."""
+        yield self._plane, "visible", visible
+        yield self._hem, "visible", visible
+
+    def spanned(self, corners: FloatArray, colour: Rgb) -> Iterator[Update]:
+        """Yield what spans it between corners (4, 3)."""
+        hem = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
+        yield self._plane, "color", colour
+        yield self._plane, "vertices", corners.astype(np.float32)
+        yield self._hem, "points", hem.astype(np.float32)
+        yield self._hem, "colors", np.tile(np.array(colour, dtype=np.uint8), (4, 2, 1))
+
+
 def turned_to(directions: FloatArray) -> FloatArray:
     """Return quaternions (n, 4) that turn the z-axis to directions (n, 3)."""
     lengths = np.linalg.norm(directions, axis=1, keepdims=True)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from explorer.app.assigning import Update
 from explorer.app.colours import OUTLINE, Rgb, proximity_colour
 from explorer.app.scene.placing import Placed
+from explorer.app.scene.shapes import Patch
 from explorer.app.tasks import PLAIN, Shell, WorkspaceDrawing, band_colours
 from explorer.app.workspace_feed import WorkspaceFeed, workspace_rotation
 from explorer.arrays import FloatArray
@@ -131,24 +132,7 @@ class _SingularPlane:
 
     def __init__(self, scene: viser.SceneApi, index: int) -> None:
         self._index = index
-        self._mesh = scene.add_mesh_simple(
-            f"/singular/{index + 1}/plane",
-            np.zeros((4, 3)),
-            np.array([[0, 1, 2], [0, 2, 3]]),
-            opacity=PLANE_OPACITY,
-            side="double",
-            cast_shadow=False,
-            receive_shadow=False,
-            visible=False,
-        )
-        self._hem = scene.add_line_segments(
-            f"/singular/{index + 1}/hem",
-            np.zeros((4, 2, 3)),
-            (0, 0, 0),
-            thickness=1.5,
-            thickness_units="screen",
-            visible=False,
-        )
+        self._patch = Patch(scene, f"/singular/{index + 1}", opacity=PLANE_OPACITY, visible=False)
         self._label = scene.add_label(
             f"/singular/{index + 1}/label", f"κ{index + 1} = 0", visible=False
         )
@@ -163,8 +147,8 @@ class _SingularPlane:
         length = float(np.linalg.norm(normal))
         # With parallel lines every position is singular, and there is no plane to draw.
         shown = state.view.workspace.planes and length > 1e-9
-        for handle in (self._mesh, self._hem, self._label):
-            yield handle, "visible", shown
+        yield from self._patch.shown(shown)
+        yield self._label, "visible", shown
         if not shown:
             return
         colour = proximity_colour(float(snapshot.margins[self._index]), state.warn_below)
@@ -175,11 +159,7 @@ class _SingularPlane:
         across = np.cross(normal / length, along)
         half = 1.1 * placed.reach
         corners = half * np.array([a * along + b * across for a, b in CORNERS])
-        yield self._mesh, "color", colour
-        yield self._mesh, "vertices", corners.astype(np.float32)
-        segments = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
-        yield self._hem, "points", segments.astype(np.float32)
-        yield self._hem, "colors", np.tile(np.array(colour, dtype=np.uint8), (4, 2, 1))
+        yield from self._patch.spanned(corners, colour)
         yield self._label, "position", tuple(corners[2].tolist())
 
 
