@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import socket
 import sys
 import threading
@@ -99,6 +100,9 @@ def serve(
             "change what you do here, without a password.\n"
         )
     sys.stderr.flush()
+    # What is there now stays; the collector need not look at it again in mid-drag.
+    gc.collect()
+    gc.freeze()
     warm_in_background()
     running.page.worker.start()
     if open_browser:

@@ -42,7 +42,6 @@ class Bodies:
             shadow_opacity=0.1,
             position=(0.0, 0.0, PLATE_TOP - PLATE_THICKNESS - 0.01),
         )
-        self._shapes: dict[object, tuple[Mesh, Mesh]] = {}
 
     def updates(self, placed: Placed) -> Iterator[Update]:
         """Yield what draws the bodies of this frame."""
@@ -52,18 +51,12 @@ class Bodies:
         for body in (self._base, self._platform):
             yield body, "visible", state.view.bodies
         yield self._grid, "visible", state.view.grid
-        for handle, (vertices, faces) in zip(
-            (self._base, self._platform), self._meshes(placed), strict=True
+        for handle, (vertices, faces) in (
+            (self._base, _base_plate(placed)),
+            (self._platform, platform_plate(placed)),
         ):
             yield handle, "vertices", vertices.astype(np.float32)
             yield handle, "faces", faces.astype(np.uint32)
-
-    def _meshes(self, placed: Placed) -> tuple[Mesh, Mesh]:
-        design = placed.frame.state.design
-        key = (design.variables, design.a2x, placed.scale, placed.facing)
-        if key not in self._shapes:
-            self._shapes = {key: (_base_plate(placed), platform_plate(placed))}
-        return self._shapes[key]
 
 
 def _base_plate(placed: Placed) -> Mesh:

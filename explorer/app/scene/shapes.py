@@ -193,9 +193,16 @@ def box() -> Mesh:
 
 def plate(points: FloatArray, radius: float, bottom: float, top: float) -> Mesh:
     """Return the hull of discs of a radius around points (n, 2), from z = bottom to top."""
+    return _plate(tuple((x, y) for x, y in points.tolist()), radius, bottom, top)
+
+
+@functools.lru_cache(maxsize=8)
+def _plate(
+    points: tuple[tuple[float, float], ...], radius: float, bottom: float, top: float
+) -> Mesh:
     angles = np.linspace(0.0, 2.0 * np.pi, 2 * SECTIONS, endpoint=False)
     disc = radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    outline = (points[:, None, :] + disc).reshape(-1, 2)
+    outline = (np.array(points)[:, None, :] + disc).reshape(-1, 2)
     rim = outline[ConvexHull(outline).vertices]
     count = len(rim)
     low, high = (np.pad(rim, ((0, 0), (0, 1)), constant_values=z) for z in (bottom, top))
