@@ -10,6 +10,7 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from explorer.clearance import PAIRS, LegClearances, leg_clearances
     from explorer.design import JOINTS, VARIABLES, Design, Limits
     from explorer.design_file import PRESETS, decode_design, encode_design, load_design
     from explorer.errors import (
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from explorer.strata import stratum
 
 _HOMES = {
+    "clearance": ("PAIRS", "LegClearances", "leg_clearances"),
     "design": ("JOINTS", "VARIABLES", "Design", "Limits"),
     "design_file": ("PRESETS", "decode_design", "encode_design", "load_design"),
     "errors": (
@@ -59,12 +61,14 @@ _MODULE_OF = {name: module for module, names in _HOMES.items() for name in names
 
 __all__ = [
     "JOINTS",
+    "PAIRS",
     "PRESETS",
     "VARIABLES",
     "Design",
     "DesignError",
     "ExplorerError",
     "InputError",
+    "LegClearances",
     "Limits",
     "MissingExtraError",
     "NoAnswerError",
@@ -79,6 +83,7 @@ __all__ = [
     "home_pose",
     "inverse",
     "jacobian",
+    "leg_clearances",
     "load_design",
     "margins",
     "quaternion_from_rotation",
