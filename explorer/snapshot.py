@@ -11,6 +11,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from explorer.arrays import FloatArray
+from explorer.clearance import LegClearances, leg_clearances
 from explorer.design import Design
 from explorer.feasibility import Interval, feasible_intervals
 from explorer.home import home_pose
@@ -75,6 +76,11 @@ class Snapshot:
     def signs(self) -> tuple[int, int, int]:
         """The sign triple of the mode."""
         return signs_of(self.mode)
+
+    @cached_property
+    def clearances(self) -> LegClearances:
+        """The clearances of the six pairs of legs."""
+        return leg_clearances(self.design, np.array(self.pose.position), self.rotation)
 
     @cached_property
     def modes(self) -> ForwardKinematics:

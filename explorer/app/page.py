@@ -14,6 +14,7 @@ from explorer.app.actions import SetPose
 from explorer.app.assigning import Assigner
 from explorer.app.jobs import Worker
 from explorer.app.panels.design import DesignPanel
+from explorer.app.panels.legs import LegsPanel
 from explorer.app.panels.move import MovePanel
 from explorer.app.panels.singularity import SingularityPanel
 from explorer.app.panels.view import ViewPanel
@@ -72,7 +73,9 @@ class Page:
             singularity = SingularityPanel(gui, self.session)
         with side.add_tab("Workspace", viser.Icon.CUBE):
             self._numbers = WorkspaceNumbers(gui)
-        self._panels = (move, design, view, singularity)
+        with side.add_tab("Legs", viser.Icon.ARROWS_HORIZONTAL):
+            legs = LegsPanel(gui)
+        self._panels = (move, design, view, singularity, legs)
         if docked:
             gui.main_panel.dock_right()
             gui.main_panel.set_width(350)

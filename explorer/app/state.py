@@ -59,6 +59,7 @@ class View:
     Attributes:
         flags, bodies, legs, labels, grid, handle: Whether each is drawn.
         tetrahedra: Whether each of the three is drawn.
+        clearance: Whether the closest pair of legs is marked.
         ghosts: Whether the seven other assembly modes are drawn.
         twin: Whether the 6-4 twin's six legs replace the four.
         warn_below: Margins below this length are warned of, in design units; None for a
@@ -73,6 +74,7 @@ class View:
     grid: bool = True
     handle: bool = True
     tetrahedra: tuple[bool, bool, bool] = (True, True, True)
+    clearance: bool = False
     ghosts: bool = False
     twin: bool = False
     warn_below: float | None = None

@@ -11,7 +11,7 @@ import viser
 from explorer.app.actions import Action, Open, Reset, SetHold, SetLimits, SetUnit, SetVariable
 from explorer.app.assigning import Update
 from explorer.app.controls import Controls, Span
-from explorer.app.panels.ranges import coordinate_span, length_span, variable_span
+from explorer.app.panels.ranges import coordinate_span, length_span, radius_span, variable_span
 from explorer.app.session import Session
 from explorer.app.state import Frame, Hold, State
 from explorer.design import LENGTHS, VARIABLES, Design, Limits, Pair, Range
@@ -79,6 +79,9 @@ class DesignPanel:
             self._add_guide()
             self._add_box()
             self._add_margin()
+        with gui.add_folder("Radii of the legs (design units)", expand_by_default=False):
+            for leg in range(4):
+                self._add_radius(leg)
         with gui.add_folder("Swing of the joints (°)", expand_by_default=False):
             for name, kind in SWINGS.items():
                 self._add_swing(name, kind)
@@ -216,6 +219,20 @@ class DesignPanel:
             lambda state, value: _limited(state, "margin", value),
             length_span,
             disabled=lambda state: state.design.limits.margin is None,
+        )
+
+    def _add_radius(self, leg: int) -> None:
+        def write(state: State, value: float) -> Action:
+            radii = list(state.design.limits.leg_radii)
+            radii[leg] = value
+            return _limited(state, "leg_radii", tuple(radii))
+
+        self._controls.slider(
+            f"leg {leg + 1}",
+            f"Radius of leg {leg + 1} as a capsule about its axis; clearances are less it.",
+            lambda frame: frame.state.design.limits.leg_radii[leg],
+            write,
+            radius_span,
         )
 
     def _add_swing(self, name: str, kind: str) -> None:

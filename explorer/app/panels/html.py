@@ -7,6 +7,9 @@ from html import escape
 from explorer.app.colours import OUTLINE, css
 
 DIM = "color:var(--mantine-color-dimmed)"
+# What keeps its bounds, and what does not.
+WITHIN = "#2b8a57"
+BEYOND = "#c43408"
 
 
 def alert(title: str, body: str) -> str:

@@ -27,6 +27,12 @@ def _length_span(reach: float) -> Span:
     return Span(0.0, round_up(REACHES * reach), fine_step(reach, 2e3))
 
 
+def radius_span(state: State) -> Span:
+    """Return the range of the radius of a leg."""
+    reach = state.base.reach
+    return Span(0.0, round_up(0.1 * reach), fine_step(reach, 5e3))
+
+
 def coordinate_span(state: State) -> Span:
     """Return the range of a coordinate."""
     return _coordinate_span(state.base.reach)

@@ -12,15 +12,12 @@ from explorer.app.actions import SetView
 from explorer.app.assigning import Update
 from explorer.app.colours import CLEAR, FAR, FAR_WARNINGS, SINGULAR, WARNED, css, proximity_colour
 from explorer.app.controls import Controls
-from explorer.app.panels.html import DIM, scientific, signed
+from explorer.app.panels.html import BEYOND, DIM, WITHIN, scientific, signed
 from explorer.app.session import Session
 from explorer.app.state import Frame
 from explorer.singularity import INCIDENCES, mode_name
 from explorer.snapshot import Snapshot
 from explorer.strata import GENERIC
-
-WITHIN = "#2b8a57"
-BEYOND = "#c43408"
 
 
 class SingularityPanel:

@@ -43,6 +43,12 @@ class ViewPanel:
                 lambda frame: frame.state.view.twin,
                 lambda state, on: SetView(replace(state.view, twin=on)),
             )
+            self._controls.checkbox(
+                "Closest pair",
+                "Mark the two legs that are closest to each other, and their clearance.",
+                lambda frame: frame.state.view.clearance,
+                lambda state, on: SetView(replace(state.view, clearance=on)),
+            )
 
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield what makes the panel show the frame."""

@@ -13,6 +13,7 @@ import viser
 
 from explorer.app.assigning import Update
 from explorer.app.scene.bodies import Bodies
+from explorer.app.scene.clearance import ClearanceScene
 from explorer.app.scene.flags import Flags
 from explorer.app.scene.legs import Legs, TwinLegs
 from explorer.app.scene.marks import DragHandle, Ghosts, Labels
@@ -46,6 +47,7 @@ class Scene:
             Tetrahedra(scene),
             Labels(scene),
             Ghosts(scene),
+            ClearanceScene(scene),
             WorkspaceScene(scene, feed),
             self.drag_handle,
         )

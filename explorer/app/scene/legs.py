@@ -12,10 +12,12 @@ import numpy as np
 import viser
 
 from explorer.app.assigning import Update
-from explorer.app.colours import BALL, CARRIAGE, JOINT, RAIL, ROD, TUBE
+from explorer.app.colours import BALL, CARRIAGE, JOINT, OUTLINE, RAIL, ROD, TUBE
 from explorer.app.scene.placing import Placed
 from explorer.app.scene.shapes import Balls, Boxes, Rods
 from explorer.arrays import FloatArray
+from explorer.clearance import PAIRS
+from explorer.snapshot import Snapshot
 
 TWIN = (("a1", "b1"), ("a1", "b2"), ("a1", "b3"), ("a2", "b2"), ("a2", "b3"), ("a3", "b4"))
 """The six legs of the 6-4 twin, base point and platform point."""
@@ -52,6 +54,12 @@ class Telescopes:
             size * np.repeat([TUBE_RADIUS, ROD_RADIUS, COLLAR_RADIUS, SOCKET_RADIUS], count),
         )
 
+    def alarmed(self, alarms: list[bool]) -> Iterator[Update]:
+        """Yield what colours those that raise an alarm."""
+        tubes = [OUTLINE if alarm else TUBE for alarm in alarms]
+        rods = [OUTLINE if alarm else ROD for alarm in alarms]
+        yield from self._rods.coloured([*tubes, *rods, *[JOINT] * (2 * len(alarms))])
+
     def shown(self, visible: bool) -> Iterator[Update]:
         """Yield what shows or hides them."""
         yield from self._rods.shown(visible)
@@ -80,6 +88,7 @@ class Legs:
         bases = np.array([p["a1"], d1, d3, p["a3"]])
         tips = np.array([p["b1"], p["b2"], p["b3"], p["b4"]])
         yield from self._actuators.along(placed, bases, tips)
+        yield from self._actuators.alarmed(colliding_legs(placed.frame.snapshot))
         yield from self._balls.at(
             np.concatenate([tips, bases[[0, 3]]]),
             size * np.array([BALL_RADIUS] * 4 + [1.2 * TUBE_RADIUS] * 2),
@@ -149,6 +158,16 @@ class TwinLegs:
         heads = np.array([p["b1"], p["b2"], p["b3"], p["b4"]])
         yield from self._balls.at(np.concatenate([feet, heads]), np.full(7, BALL_RADIUS * size))
         yield from self._posts.between(feet + [0.0, 0.0, PLATE_TOP], feet, np.full(3, 0.2 * size))
+
+
+def colliding_legs(snapshot: Snapshot) -> list[bool]:
+    """Return which of the four legs collide with another."""
+    pairs = [
+        pair
+        for pair, clearance in zip(PAIRS, snapshot.clearances.clearance.tolist(), strict=True)
+        if clearance < 0.0
+    ]
+    return [any(leg in pair for pair in pairs) for leg in (1, 2, 3, 4)]
 
 
 def guide_span(placed: Placed) -> tuple[float, float]:

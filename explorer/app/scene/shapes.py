@@ -34,7 +34,6 @@ class Instances:
         colours: list[Rgb],
         *,
         opacity: float | None = None,
-        cast_shadow: bool = True,
     ) -> None:
         count = len(colours)
         vertices, faces = mesh
@@ -47,7 +46,8 @@ class Instances:
             batched_scales=np.ones((count, 3)),
             batched_colors=np.array(colours, dtype=np.uint8),
             opacity=opacity,
-            cast_shadow=cast_shadow,
+            # What is seen through casts no shadow.
+            cast_shadow=opacity is None,
             lod="off",
         )
 
@@ -59,6 +59,10 @@ class Instances:
         yield self.handle, "batched_wxyzs", wxyzs.astype(np.float32)
         yield self.handle, "batched_scales", scales.astype(np.float32)
 
+    def coloured(self, colours: list[Rgb]) -> Iterator[Update]:
+        """Yield what gives each its colour."""
+        yield self.handle, "batched_colors", np.array(colours, dtype=np.uint8)
+
     def shown(self, visible: bool) -> Iterator[Update]:
         """Yield what shows or hides all of them."""
         yield self.handle, "visible", visible
@@ -67,8 +71,15 @@ class Instances:
 class Rods(Instances):
     """Cylinders between pairs of points."""
 
-    def __init__(self, scene: viser.SceneApi, name: str, colours: list[Rgb]) -> None:
-        super().__init__(scene, name, cylinder(), colours)
+    def __init__(
+        self,
+        scene: viser.SceneApi,
+        name: str,
+        colours: list[Rgb],
+        *,
+        opacity: float | None = None,
+    ) -> None:
+        super().__init__(scene, name, cylinder(), colours, opacity=opacity)
 
     def between(self, starts: FloatArray, ends: FloatArray, radii: FloatArray) -> Iterator[Update]:
         """Yield what lays the cylinders from starts (n, 3) to ends (n, 3)."""
@@ -81,8 +92,15 @@ class Rods(Instances):
 class Balls(Instances):
     """Spheres."""
 
-    def __init__(self, scene: viser.SceneApi, name: str, colours: list[Rgb]) -> None:
-        super().__init__(scene, name, sphere(), colours)
+    def __init__(
+        self,
+        scene: viser.SceneApi,
+        name: str,
+        colours: list[Rgb],
+        *,
+        opacity: float | None = None,
+    ) -> None:
+        super().__init__(scene, name, sphere(), colours, opacity=opacity)
 
     def at(self, centres: FloatArray, radii: FloatArray) -> Iterator[Update]:
         """Yield what puts the spheres at centres (n, 3)."""
