@@ -96,6 +96,9 @@ def integrate_slices(
             lower, upper = xs[split - 1], xs[split]
             while upper - lower > BISECTED * (b - a):
                 middle = 0.5 * (lower + upper)
+                if not lower < middle < upper:
+                    # Neighbouring numbers, in a piece far narrower than where it lies.
+                    break
                 _, mark = slice_area(
                     middle, circles, planes, bearings, radii, arcs, names, span, moments
                 )
