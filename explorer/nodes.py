@@ -14,6 +14,7 @@ from explorer.compiled import helper, kernel
 
 # Ends of z-intervals in one column: two a surface and two of the column.
 ENDS = 64
+DOUBLE_ROOT = 1e-12
 
 
 @helper
@@ -104,8 +105,9 @@ def add_crossings(a: float, b: float, c: float, ends: FloatArray, count: int) ->
             count += 1
         return count
     square = b * b - a * c
-    if square > 0.0:
-        root = math.sqrt(square)
+    # Rounding may hide a double root, which a cone of 90° has; one too many does no harm.
+    if square > -DOUBLE_ROOT * b * b:
+        root = math.sqrt(max(0.0, square))
         ends[count], ends[count + 1] = (-b - root) / a, (-b + root) / a
         count += 2
     return count

@@ -172,8 +172,7 @@ def bounds(region: Region) -> tuple[FloatArray, FloatArray]:
             highs[start:] = np.minimum(highs[start:], centre[start:] + radius)
     for row in region.planes:
         for axis in (1, 2):
-            others = np.delete(row[:3], axis)
-            if not np.any(others):
+            if row[0] == 0.0 and row[3 - axis] == 0.0:
                 end = float(row[3] / row[axis])
                 if row[axis] > 0.0:
                     highs[axis] = min(float(highs[axis]), end)
@@ -189,7 +188,8 @@ def _quadrature() -> tuple[FloatArray, FloatArray]:
 
 
 def _volume_of_slices(region: Region) -> tuple[float, dict[str, float]]:
-    if region.is_empty:
+    lows, highs = bounds(region)
+    if region.is_empty or not (lows < highs).all():
         return 0.0, {}
     result = np.zeros(5)
     by_round, by_plane = np.zeros((len(region.rounds), 4)), np.zeros((len(region.planes), 4))
