@@ -69,18 +69,18 @@ class Page:
         with tabs.add_tab("View", viser.Icon.EYE):
             view = ViewPanel(gui, self.session)
         side = gui.add_panel()
-        with side.add_tab("Singularity", viser.Icon.FLAG):
+        with side.add_tab("Singularity"):
             singularity = SingularityPanel(gui, self.session)
-        with side.add_tab("Workspace", viser.Icon.CUBE):
+        with side.add_tab("Workspace"):
             self._numbers = WorkspaceNumbers(gui)
-        with side.add_tab("Legs", viser.Icon.ARROWS_HORIZONTAL):
+        with side.add_tab("Legs"):
             legs = LegsPanel(gui)
         self._panels = (move, design, view, singularity, legs)
         if docked:
             gui.main_panel.dock_right()
             gui.main_panel.set_width(350)
             side.dock_left()
-            side.set_width(250)
+            side.set_width(270)
 
         self._scene.drag_handle.handle.on_update(self._dragged)
         self._aim_initial_camera()
