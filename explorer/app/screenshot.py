@@ -37,6 +37,7 @@ CHROMIUM_FLAGS = (
 )
 # A software renderer on a busy machine takes seconds for a large picture.
 PATIENCE_SECONDS = 60.0
+NUDGE_SECONDS = 2.0
 # Whatever neither holds the canvas nor is it.
 SCENE_ALONE = "body *:not(:has(canvas)):not(canvas) { visibility: hidden !important; }"
 
@@ -173,19 +174,27 @@ def settle(page: Page, client: ClientHandle) -> None:
         PictureError: it does not draw in time.
     """
     deadline = time.monotonic() + PATIENCE_SECONDS
-    while True:
-        # A frame that comes back tells that all that was sent before it has arrived.
-        try:
-            client.get_render(16, 16, timeout=PATIENCE_SECONDS)
-        except (TimeoutError, RuntimeError):
-            raise PictureError("the page did not draw in time") from None
-        box = page.locator("canvas").first.bounding_box()
-        # Docked panels narrow the canvas, and the camera is then put again.
-        if box is not None and abs(client.camera.aspect - box["width"] / box["height"]) < 1e-3:
-            return
-        if time.monotonic() > deadline:
+    asked = time.monotonic()
+    while not _knows_its_size(page, client):
+        now = time.monotonic()
+        if now > deadline:
             raise PictureError("the page did not come to rest in time")
+        if now > asked + NUDGE_SECONDS:
+            # A browser may tell its size before it has changed; any move makes it tell again.
+            client.camera.position = client.camera.position * (1.0 + 1e-4)
+            asked = now
         page.wait_for_timeout(50)
+    # A frame that comes back tells that all that was sent before it has arrived.
+    try:
+        client.get_render(16, 16, timeout=PATIENCE_SECONDS)
+    except (TimeoutError, RuntimeError):
+        raise PictureError("the page did not draw in time") from None
+
+
+def _knows_its_size(page: Page, client: ClientHandle) -> bool:
+    """Whether the server knows the size of the canvas, which docked panels narrow."""
+    box = page.locator("canvas").first.bounding_box()
+    return box is not None and abs(client.camera.aspect - box["width"] / box["height"]) < 1e-3
 
 
 def stable_picture(page: Page) -> bytes:
