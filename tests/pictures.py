@@ -1,0 +1,108 @@
+"""The named scenes that the README shows, and the script that makes their pictures again.
+
+From the checkout, all of them or only some: python tests/pictures.py [names]
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+from playwright.sync_api import Browser
+
+from explorer.app.actions import Action, SetJoint, SetView
+from explorer.app.scene.camera import ViewName
+from explorer.app.screenshot import headless_browser, picture
+from explorer.app.server import Running
+from explorer.app.state import View
+from explorer.design import JOINTS
+from explorer.design_file import PRESETS
+from explorer.pose import Pose
+
+FOLDER = Path(__file__).resolve().parents[1] / "assets" / "pictures"
+DESIGN = PRESETS["paper-optimal"]
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What a picture shows: the paper's optimum, and what was done to it.
+
+    Attributes:
+        pose: Of the platform; the home pose if None.
+        actions: Done before the picture is taken.
+        view: From where to look.
+        panels: Whether the panels are in the picture.
+        size: Width and height in pixels.
+    """
+
+    pose: Pose | None = None
+    actions: tuple[Action, ...] = ()
+    view: ViewName = "isometric"
+    panels: bool = False
+    size: tuple[int, int] = (1280, 800)
+
+
+SCENES = {
+    "home": Scene(),
+    "page": Scene(panels=True),
+    # κ2 is small, the other two are not: both lines are orange and all else is blue.
+    "near-singular": Scene(
+        pose=Pose.of_yaw_pitch_roll((9, 8, 7.5), (-38, 24, 8)),
+        actions=(SetView(View(handle=False)),),
+        panels=True,
+    ),
+    # From the side no two of the eight names lie on one another.
+    "modes": Scene(
+        actions=(
+            SetView(
+                View(
+                    handle=False,
+                    ghosts=True,
+                    flags=False,
+                    grid=False,
+                    tetrahedra=(False, False, False),
+                )
+            ),
+        ),
+        view="side",
+        size=(900, 800),
+    ),
+    "unclosed": Scene(actions=(SetJoint(JOINTS.index("l1"), 20.0),), panels=True),
+    "twin": Scene(actions=(SetView(View(handle=False, twin=True)),)),
+}
+
+
+def draw(browser: Browser, scene: Scene) -> bytes:
+    """Return the picture of a scene as PNG."""
+
+    def prepare(running: Running) -> None:
+        for action in scene.actions:
+            running.page.session.do(action)
+
+    return picture(
+        browser,
+        DESIGN,
+        scene.pose,
+        view=scene.view,
+        size=scene.size,
+        panels=scene.panels,
+        prepare=prepare,
+    )
+
+
+def main(names: list[str]) -> None:
+    """Make the pictures with these names, or all."""
+    unknown = sorted(set(names) - set(SCENES))
+    if unknown:
+        sys.exit(f"no scene {', '.join(unknown)}; there are {', '.join(SCENES)}")
+    FOLDER.mkdir(exist_ok=True)
+    with headless_browser() as browser:
+        for name in names or SCENES:
+            out = FOLDER / f"{name}.png"
+            out.write_bytes(draw(browser, SCENES[name]))
+            print(out)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
