@@ -1,0 +1,219 @@
+"""A tab of the explorer as a person uses it: inputs are found by the words beside them."""
+
+from __future__ import annotations
+
+import math
+import re
+import time
+from collections.abc import Callable
+
+import numpy as np
+import viser
+from playwright.sync_api import Browser, ConsoleMessage, Locator
+
+from explorer.app.scene.camera import ViewName, framing
+from explorer.app.scene.placing import Placed
+from explorer.app.screenshot import PATIENCE_SECONDS, settle
+from explorer.app.server import Running
+from explorer.app.state import Frame, State
+from explorer.arrays import FloatArray
+
+# Small, since what the pictures look like is tested elsewhere; panels and scene side by side.
+SIZE = (860, 480)
+
+# All that a console may say: what it logs, and these warnings. The first is viser's three.js
+# about itself, the second the software renderer about reading a frame back.
+TOLERATED_WARNINGS = (
+    re.compile(r"^THREE\.Clock: This module has been deprecated"),
+    re.compile(r"GL Driver Message .* GPU stall due to ReadPixels"),
+)
+TOLERATED_KINDS = ("log", "info", "debug")
+
+# The slider as a whole is what its label is for; its thumb moves along it.
+TRACK = "[id]:has([role=slider])"
+
+
+class Tab:
+    """One page of an explorer.
+
+    Args:
+        browser: In which it is opened.
+        running: The explorer.
+    """
+
+    def __init__(self, browser: Browser, running: Running) -> None:
+        self.running = running
+        self.requests: list[str] = []
+        self._complaints: list[str] = []
+        self._context = browser.new_context(viewport={"width": SIZE[0], "height": SIZE[1]})
+        self._context.set_default_timeout(1000 * PATIENCE_SECONDS)
+        self._context.on("console", self._said)
+        self._context.on("weberror", lambda error: self._complaints.append(str(error.error)))
+        self._context.on("request", lambda request: self.requests.append(request.url))
+        self._context.on("requestfailed", lambda request: self._complaints.append(request.url))
+        self.page = self._context.new_page()
+        known = set(running.viser.get_clients())
+        self.page.goto(running.url)
+        self._arrive(known)
+
+    def close(self) -> None:
+        """Close the tab."""
+        self._context.close()
+
+    def complaints(self) -> list[str]:
+        """Return what the console said that is not tolerated, errors and failed requests."""
+        return self._complaints
+
+    def reload(self) -> None:
+        """Load the page again."""
+        known = set(self.running.viser.get_clients())
+        self.page.reload()
+        self._arrive(known)
+
+    @property
+    def client(self) -> viser.ClientHandle:
+        """The tab as the server knows it."""
+        return self.running.viser.get_clients()[self._client_id]
+
+    @property
+    def state(self) -> State:
+        """The state of the explorer."""
+        return self.running.page.session.state
+
+    def label(self, words: str) -> Locator:
+        """Return the words beside an input; any white space is one blank."""
+        pattern = r"\s+".join(map(re.escape, words.split()))
+        return self.page.locator("label").filter(has_text=re.compile(rf"^\s*{pattern}\s*$"))
+
+    def row(self, words: str) -> Locator:
+        """Return the input, or the inputs, with these words beside them."""
+        return self.label(words).locator("xpath=ancestor::*[.//input][1]")
+
+    def slider(self, words: str) -> Locator:
+        """Return the thumb of a slider."""
+        return self.row(words).get_by_role("slider")
+
+    def field(self, words: str) -> Locator:
+        """Return a number field, that of a slider or one of its own."""
+        return self.row(words).locator("input[inputmode=decimal]")
+
+    def shown(self, words: str) -> float:
+        """Return the value at which a slider stands."""
+        value = self.slider(words).get_attribute("aria-valuenow")
+        assert value is not None
+        return float(value)
+
+    def type(self, words: str, text: str) -> None:
+        """Type into a number field, key by key."""
+        field = self.field(words)
+        field.click()
+        field.press("ControlOrMeta+a")
+        field.press_sequentially(text)
+
+    def drag(self, words: str, share: float, steps: int = 10) -> float:
+        """Drag a slider to a share of its range by mouse; return the value that stands for."""
+        thumb = self.slider(words)
+        thumb.scroll_into_view_if_needed()
+        at, track = thumb.bounding_box(), self.row(words).locator(TRACK).bounding_box()
+        assert at is not None
+        assert track is not None
+        mouse = self.page.mouse
+        mouse.move(at["x"] + 0.5 * at["width"], at["y"] + 0.5 * at["height"])
+        mouse.down()
+        x, y = track["x"] + share * track["width"], track["y"] + 0.5 * track["height"]
+        mouse.move(x, y, steps=steps)
+        mouse.up()
+        low, high = (float(thumb.get_attribute(f"aria-value{end}") or "") for end in ("min", "max"))
+        return low + share * (high - low)
+
+    def choose(self, words: str, option: str) -> None:
+        """Choose from a list."""
+        self.row(words).get_by_role("combobox").click()
+        self.page.get_by_role("option", name=option, exact=True).click()
+
+    def switch(self, words: str, *, on: bool) -> None:
+        """Switch a checkbox."""
+        self.row(words).locator("input[type=checkbox]").set_checked(on)
+
+    def push(self, words: str) -> None:
+        """Click a button."""
+        self.page.get_by_role("button", name=words, exact=True).click()
+
+    def turn_to(self, name: str) -> None:
+        """Turn to another tab of the right panel."""
+        self.page.get_by_role("tab", name=name, exact=True).click()
+
+    def wait_for(self, condition: Callable[[], bool], what: str) -> None:
+        """Wait until a condition is met.
+
+        Raises:
+            AssertionError: it is not in time.
+        """
+        deadline = time.monotonic() + PATIENCE_SECONDS
+        while not condition():
+            assert time.monotonic() < deadline, f"never came about: {what}"
+            self.page.wait_for_timeout(20)
+
+    def wait_until_shown(self, words: str, value: float, tolerance: float = 1e-9) -> None:
+        """Wait until a slider and its field stand at a value."""
+
+        def stands() -> bool:
+            text = self.field(words).input_value()
+            digits = len(text.partition(".")[2])
+            return (
+                abs(self.shown(words) - value) <= tolerance
+                and abs(float(text) - value) <= tolerance + 0.5001 * 10.0**-digits
+            )
+
+        self.wait_for(stands, f"{words} at {value}")
+
+    def look_from(self, view: ViewName) -> None:
+        """Push the button of a view and wait until the camera stands where it should."""
+        settle(self.page, self.client)
+        self.push(view.capitalize())
+
+        def is_there() -> bool:
+            camera = self.client.camera
+            eye, _ = framing(Placed(Frame(self.state)), view, camera.aspect)
+            return bool(np.allclose(camera.position, eye, atol=1e-3))
+
+        self.wait_for(is_there, f"the {view} view")
+        settle(self.page, self.client)
+
+    def picture(self) -> bytes:
+        """Return a picture of the scene, drawn after all that has been asked for."""
+        assert self.running.page.session.wait_until_idle()
+        settle(self.page, self.client)
+        return self.page.locator("canvas").first.screenshot()
+
+    def on_screen(self, point: FloatArray) -> tuple[float, float]:
+        """Return where a point of the scene (3,) is in the page."""
+        camera = self.client.camera
+        eye, target = np.array(camera.position), np.array(camera.look_at)
+        forward = (target - eye) / np.linalg.norm(target - eye)
+        right = np.cross(forward, [0.0, 0.0, 1.0])
+        right /= np.linalg.norm(right)
+        up = np.cross(right, forward)
+        depth = (point - eye) @ forward * math.tan(0.5 * camera.fov)
+        box = self.page.locator("canvas").first.bounding_box()
+        assert box is not None
+        across = float((point - eye) @ right / depth) * box["height"] / 2
+        upward = float((point - eye) @ up / depth) * box["height"] / 2
+        return box["x"] + box["width"] / 2 + across, box["y"] + box["height"] / 2 - upward
+
+    def _arrive(self, known: set[int]) -> None:
+        # It lies over the panels, so whoever wants to use them closes it first.
+        self.page.locator("#webgl-software-rendering").get_by_role("button").click()
+        self.label("l1 leg 1").wait_for()
+        self.wait_for(lambda: bool(self._new(known)), "a connection")
+        (self._client_id,) = self._new(known)
+
+    def _new(self, known: set[int]) -> set[int]:
+        return set(self.running.viser.get_clients()) - known
+
+    def _said(self, message: ConsoleMessage) -> None:
+        if message.type in TOLERATED_KINDS:
+            return
+        if message.type == "warning" and any(w.search(message.text) for w in TOLERATED_WARNINGS):
+            return
+        self._complaints.append(f"{message.type}: {message.text}")

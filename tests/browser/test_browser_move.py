@@ -1,0 +1,193 @@
+"""Moving the mechanism in a real page: by sliders, fields, modes and the gizmo."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import cast
+
+import numpy as np
+import pytest
+from conftest import OpenTab
+from playwright.sync_api import expect
+from tab import Tab
+
+from explorer.app.panels.move import JOINT_LABELS, MODES
+from explorer.app.scene.marks import HANDLE_REACH
+from explorer.app.scene.placing import Placed
+from explorer.app.state import Frame, joints_of
+from explorer.design import JOINTS
+from explorer.home import home_pose
+from explorer.kinematics import forward
+
+LABELS = [JOINT_LABELS[name] for name in JOINTS]
+MODE_LABEL = "κ1 κ2 κ3"
+
+
+def assert_page_shows_state(tab: Tab) -> None:
+    """Wait until every slider of legs and pose stands where the state says."""
+    state = tab.state
+    for label, value in zip(LABELS, state.joints, strict=True):
+        tab.wait_until_shown(label, value)
+    for label, value in zip("xyz", state.pose.position, strict=True):
+        tab.wait_until_shown(label, value)
+    for label, value in zip(
+        ("yaw (°)", "pitch (°)", "roll (°)"), state.yaw_pitch_roll, strict=True
+    ):
+        tab.wait_until_shown(label, value)
+
+
+def test_the_page_loads_without_a_complaint_and_asks_nobody_else(tab: Tab) -> None:
+    assert_page_shows_state(tab)
+    tab.picture()
+    own = (tab.running.url, f"blob:{tab.running.url}", "data:")
+    assert [url for url in tab.requests if not url.startswith(own)] == []
+    assert tab.complaints() == []
+
+
+@pytest.mark.parametrize(("joint", "typed"), [(0, 12.5), (1, 10.4), (5, 14.25)])
+def test_a_length_typed_in_its_field_moves_the_mechanism(
+    tab: Tab, joint: int, typed: float
+) -> None:
+    before = tab.state
+    tab.type(LABELS[joint], f"{typed:g}")
+    tab.wait_for(lambda: tab.state.joints[joint] == typed, "the length that was typed")
+    state = tab.state
+    others = [i for i in range(6) if i != joint]
+    assert [state.joints[i] for i in others] == [before.joints[i] for i in others]
+    assert state.pose != before.pose
+    np.testing.assert_allclose(joints_of(state.design, state.pose), state.joints, atol=1e-9)
+    assert_page_shows_state(tab)
+
+
+def test_a_leg_slider_dragged_by_mouse_moves_the_mechanism(tab: Tab) -> None:
+    before = tab.state
+    goal = tab.drag(LABELS[5], 0.5)
+    tab.wait_for(lambda: abs(tab.state.joints[5] - goal) < 0.2, "the length dragged to")
+    assert tab.state.unclosed is None
+    assert tab.state.pose != before.pose
+    assert tab.state.joints[:5] == before.joints[:5]
+    assert_page_shows_state(tab)
+
+
+def test_a_pose_slider_moves_the_legs(tab: Tab) -> None:
+    before = tab.state
+    goal = tab.drag("y", 0.6)
+    tab.wait_for(lambda: abs(tab.state.pose.position[1] - goal) < 0.4, "the y dragged to")
+    assert tab.state.pose.position[::2] == before.pose.position[::2]
+    assert tab.state.joints != before.joints
+    tab.type("roll (°)", "12")
+    tab.wait_for(lambda: tab.state.yaw_pitch_roll[2] == 12.0, "the roll that was typed")
+    assert_page_shows_state(tab)
+
+
+def test_choosing_a_mode_keeps_the_legs_and_takes_that_assembly(tab: Tab) -> None:
+    before = tab.state
+    other = before.mode ^ 0b101
+    tab.choose(MODE_LABEL, re.sub(r"\s+", " ", MODES[other]))
+    tab.wait_for(lambda: tab.state.mode == other, "the mode that was chosen")
+    solution = forward(before.design, before.joints)
+    np.testing.assert_allclose(tab.state.pose.position, solution.position[other], atol=1e-9)
+    np.testing.assert_allclose(tab.state.joints, before.joints, atol=1e-9)
+    assert_page_shows_state(tab)
+
+
+def test_lengths_that_cannot_close_leave_the_pose_and_offer_the_nearest(tab: Tab) -> None:
+    alert = tab.page.get_by_role("alert").filter(has_text="These lengths cannot close")
+    button = tab.page.get_by_role("button", name="Use the nearest length")
+    expect(alert).to_be_hidden()
+    expect(button).to_be_hidden()
+
+    before = tab.state
+    tab.type(LABELS[0], "25")
+    alert.wait_for()
+    unclosed = tab.state.unclosed
+    assert unclosed is not None
+    assert tab.state.pose == before.pose
+    assert tab.state.joints[0] == 25.0
+    nearest = cast("float", unclosed.nearest)
+    expect(alert).to_contain_text(f"{nearest:.6g}")
+    # What was asked for stays in its field; all else is as it was.
+    assert_page_shows_state(tab)
+
+    button.click()
+    expect(alert).to_be_hidden()
+    expect(button).to_be_hidden()
+    assert tab.state.unclosed is None
+    assert math.isclose(tab.state.joints[0], nearest)
+    np.testing.assert_allclose(
+        joints_of(tab.state.design, tab.state.pose), tab.state.joints, atol=1e-6
+    )
+    assert_page_shows_state(tab)
+
+
+def test_home_brings_back_the_home_pose(tab: Tab) -> None:
+    tab.type("z", "6.5")
+    tab.wait_for(lambda: tab.state.pose.position[2] == 6.5, "the z that was typed")
+    tab.push("Home pose")
+    home = home_pose(tab.state.design)
+    tab.wait_for(lambda: tab.state.pose == home, "the home pose")
+    assert_page_shows_state(tab)
+
+
+@pytest.mark.parametrize("axis", [1, 2])
+def test_dragging_an_arrow_of_the_gizmo_moves_the_platform_along_it(tab: Tab, axis: int) -> None:
+    tab.look_from("isometric")
+    before = tab.state
+    placed = Placed(Frame(before))
+    arrow = before.pose.rotation[:, axis]
+    tip = placed.points["b4"] + 0.7 * HANDLE_REACH * arrow
+    mouse = tab.page.mouse
+    mouse.move(*tab.on_screen(tip))
+    mouse.down()
+    mouse.move(*tab.on_screen(tip + 1.5 * arrow), steps=8)
+    mouse.up()
+    tab.wait_for(lambda: tab.state.pose != before.pose, "another pose")
+    tab.picture()
+    moved = placed.scale * (np.array(tab.state.pose.position) - before.pose.position)
+    assert moved @ arrow == pytest.approx(1.5, abs=0.3)
+    np.testing.assert_allclose(moved, (moved @ arrow) * arrow, atol=1e-3)
+    np.testing.assert_allclose(tab.state.pose.rotation, before.pose.rotation, atol=1e-6)
+    assert_page_shows_state(tab)
+
+
+def test_a_reload_keeps_the_state(tab: Tab) -> None:
+    tab.type(LABELS[2], "9.9")
+    tab.wait_for(lambda: tab.state.joints[2] == 9.9, "the length that was typed")
+    before = tab.state
+    tab.reload()
+    assert tab.state == before
+    assert_page_shows_state(tab)
+
+
+def test_two_tabs_stay_in_step(open_tab: OpenTab) -> None:
+    one, other = open_tab(), open_tab()
+    one.type(LABELS[3], "11.2")
+    other.wait_until_shown(LABELS[3], 11.2)
+    other.type("x", "9.5")
+    one.wait_until_shown("x", 9.5)
+    for tab in (one, other):
+        assert_page_shows_state(tab)
+
+
+def test_sixty_values_in_a_row_end_with_the_last_in_every_tab(open_tab: OpenTab) -> None:
+    one, other = open_tab(), open_tab()
+    field = one.field(LABELS[5])
+    for hundredths in range(1241, 1301):
+        field.fill(f"{hundredths / 100:g}")
+    for tab in (one, other):
+        tab.wait_until_shown(LABELS[5], 13.0)
+    assert one.running.page.session.wait_until_idle()
+    assert one.state.joints[5] == 13.0
+    for tab in (one, other):
+        assert_page_shows_state(tab)
+
+
+def test_a_slider_thrown_about_ends_where_the_mouse_left_it_in_every_tab(open_tab: OpenTab) -> None:
+    one, other = open_tab(), open_tab()
+    goal = one.drag("x", 0.62, steps=60)
+    one.wait_for(lambda: abs(one.state.pose.position[0] - goal) < 0.4, "the x dragged to")
+    assert one.running.page.session.wait_until_idle()
+    for tab in (one, other):
+        assert_page_shows_state(tab)
+    assert abs(one.state.pose.position[0] - goal) < 0.4

@@ -1,0 +1,65 @@
+"""What is shown and from where, in a real page: every switch, every view."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+
+from likeness import decoded, likeness
+from tab import Tab
+
+from explorer.app.panels.view import SWITCHES
+from explorer.app.scene.camera import VIEWS
+from explorer.app.state import View
+from explorer.singularity import TETRAHEDRA
+
+
+def shows(name: str) -> Callable[[View], bool]:
+    return lambda view: getattr(view, name)
+
+
+def shows_tetrahedron(index: int) -> Callable[[View], bool]:
+    return lambda view: view.tetrahedra[index]
+
+
+def test_every_switch_of_the_view_switches_its_part_and_no_other(tab: Tab) -> None:
+    tab.turn_to("View")
+    switches = {label: shows(name) for name, label, _ in SWITCHES}
+    for index, points in enumerate(TETRAHEDRA):
+        switches[f"κ{index + 1}: {' '.join(points)}"] = shows_tetrahedron(index)
+    switches["6-4 twin"] = shows("twin")
+    before = tab.state.view
+    for label, part in switches.items():
+        was = part(before)
+        tab.switch(label, on=not was)
+        tab.wait_for(lambda part=part, was=was: part(tab.state.view) != was, label)
+        changed = [other for other, p in switches.items() if p(tab.state.view) != p(before)]
+        assert changed == [label]
+        tab.switch(label, on=was)
+        tab.wait_for(lambda: tab.state.view == before, f"{label} as before")
+
+
+def test_ghosts_are_switched_beside_the_modes(tab: Tab) -> None:
+    before = tab.picture()
+    tab.switch("Other modes as ghosts", on=True)
+    tab.wait_for(lambda: tab.state.view.ghosts, "the ghosts")
+    # They hang below the base too, where there was nothing.
+    spot = likeness(decoded(before), decoded(tab.picture())).spot
+    assert spot > 5.0
+
+
+def test_the_warning_length_turns_the_word_of_the_panel(tab: Tab) -> None:
+    assert tab.page.get_by_text("Clear of singularities").is_visible()
+    tab.type("Warn below", "30")
+    tab.page.get_by_text("Near a singularity").wait_for()
+    assert tab.state.view.warn_below == 30.0
+
+
+def test_each_view_frames_the_mechanism_from_its_side(tab: Tab) -> None:
+    pictures: list[bytes] = []
+    for view in VIEWS:
+        tab.look_from(view)
+        pictures.append(tab.picture())
+    for one, other in itertools.combinations(map(decoded, pictures), 2):
+        spot = likeness(one, other).spot
+        assert spot > 10.0
