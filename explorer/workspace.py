@@ -8,6 +8,7 @@ boundary included, times the cube of the step; it overstates a volume by its sur
 from __future__ import annotations
 
 import math
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -15,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.arrays import FloatArray
-from explorer.constraints import Constraint, HalfSpace, Round, constraints
+from explorer.constraints import Cone, Constraint, HalfSpace, Never, Round, constraints
 from explorer.design import Design
 from explorer.errors import InputError
 from explorer.home import home_pose
@@ -30,6 +31,8 @@ NODES = 10
 COLUMNS = 400
 # As many are enough to see that there is a volume.
 COARSE_COLUMNS = 80
+# Radius of a ball around all limits, as a multiple of the farthest of them.
+SURROUNDINGS = 4.0
 # The most nodes that are counted.
 MOST_NODES = 50_000_000
 # A grid has its nodes at multiples of reach / 15 unless the design says otherwise.
@@ -45,8 +48,7 @@ class Volume:
         error: An estimate of the absolute error.
         gradient: Derivatives by parameter: the design variables, "yaw" (radians), and
             the limits that bound it, such as "l1 maximum". Empty where cones bound it.
-        empty_because: The limits without any one of which it would not be empty; all of
-            them if it takes more than one. () if it is not empty.
+        empty_because: The limits that empty it, see `what_empties`; () if it is not empty.
     """
 
     volume: float
@@ -238,21 +240,46 @@ def _volume_of_columns(region: Region, columns: int = COLUMNS) -> tuple[float, f
     return volumes[1], abs(volumes[1] - volumes[0])
 
 
-def what_empties(limits: tuple[Constraint, ...]) -> tuple[str, ...]:
-    """Return the limits without any one of which something would be left."""
+def what_empties(limits: Sequence[Constraint]) -> tuple[str, ...]:
+    """Return the limits that empty a workspace that is empty.
+
+    Those without any one of which something would be left, or if there is none, limits
+    that leave nothing together but of which each is needed for that.
+    """
     names = tuple(dict.fromkeys(limit.name for limit in limits))
-    alone = tuple(
-        name
-        for name in names
-        if _has_volume(tuple(limit for limit in limits if limit.name != name))
-    )
-    return alone or names
+    around = _surroundings(limits)
+
+    def is_empty(left: Collection[str]) -> bool:
+        return not _has_volume([*(limit for limit in limits if limit.name in left), around])
+
+    alone = tuple(name for name in names if not is_empty({*names} - {name}))
+    if alone:
+        return alone
+    needed = {*names}
+    for name in names:
+        if is_empty(needed - {name}):
+            needed.remove(name)
+    return tuple(name for name in names if name in needed)
 
 
-def _has_volume(limits: tuple[Constraint, ...]) -> bool:
-    if not any(isinstance(c, Round) and c.is_ball and c.inside for c in limits):
-        return True
+def _has_volume(limits: Sequence[Constraint]) -> bool:
     region = region_of(limits)
     if len(region.cones):
         return _volume_of_columns(region, COARSE_COLUMNS)[0] > 0.0
     return _volume_of_slices(region)[0] > 0.0
+
+
+def _surroundings(limits: Sequence[Constraint]) -> Round:
+    """Return a ball far around all limits, since a region has to have an end."""
+    sizes = [1e-300]
+    for limit in limits:
+        match limit:
+            case Round():
+                sizes.append(limit.radius + float(np.abs(limit.centre).max()))
+            case HalfSpace():
+                sizes.append(abs(limit.offset) / float(np.linalg.norm(limit.normal)))
+            case Cone():
+                sizes.append(float(np.abs(limit.apex).max()))
+            case Never():
+                pass
+    return Round("", np.zeros(3), SURROUNDINGS * max(sizes), is_ball=True, inside=True)
