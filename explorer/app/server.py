@@ -93,21 +93,21 @@ def serve(
         ServerError: the address or the port cannot be had.
     """
     running = start(design, host=host, port=port)
-    sys.stderr.write(f"{TITLE}: {running.url}   (Ctrl-C stops it)\n")
-    if host not in LOOPBACK:
-        sys.stderr.write(
-            f"Listening on {host}: whoever reaches this machine over the network can see and "
-            "change what you do here, without a password.\n"
-        )
-    sys.stderr.flush()
-    # What is there now stays; the collector need not look at it again in mid-drag.
-    gc.collect()
-    gc.freeze()
-    warm_in_background()
-    running.page.worker.start()
-    if open_browser:
-        threading.Thread(target=webbrowser.open, args=(running.url,), daemon=True).start()
     try:
+        sys.stderr.write(f"{TITLE}: {running.url}   (Ctrl-C stops it)\n")
+        if host not in LOOPBACK:
+            sys.stderr.write(
+                f"Listening on {host}: whoever reaches this machine over the network can see and "
+                "change what you do here, without a password.\n"
+            )
+        sys.stderr.flush()
+        # What is there now stays; the collector need not look at it again in mid-drag.
+        gc.collect()
+        gc.freeze()
+        warm_in_background()
+        running.page.worker.start()
+        if open_browser:
+            threading.Thread(target=webbrowser.open, args=(running.url,), daemon=True).start()
         threading.Event().wait()
     except KeyboardInterrupt:
         sys.stderr.write("Stopped.\n")
