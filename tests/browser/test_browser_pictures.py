@@ -33,8 +33,8 @@ SCENE_LIMIT = Likeness(structure=0.05, colour=0.8, spot=5.5)
 # Text in another font of the same size measures (0.24, 1.8) and any spot; a message that
 # appears (0.24, 3.3). What the panels say is tested in words.
 PANELS_LIMIT = Likeness(structure=0.3, colour=2.5, spot=100.0)
-# The columns of the scene between the docked panels.
-BETWEEN_PANELS = slice(254, 926)
+# Columns of the scene alone, between the docked panels.
+BETWEEN_PANELS = slice(280, 920)
 
 Alteration = Callable[["Stage"], None]
 
