@@ -6,7 +6,7 @@ From the checkout, all of them or only some: python tests/pictures.py [names]
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from playwright.sync_api import Browser
@@ -15,13 +15,16 @@ from explorer.app.actions import Action, SetJoint, SetView
 from explorer.app.scene.camera import ViewName
 from explorer.app.screenshot import headless_browser, picture
 from explorer.app.server import Running
-from explorer.app.state import View
+from explorer.app.state import View, WorkspaceView
 from explorer.design import JOINTS
 from explorer.design_file import PRESETS
 from explorer.pose import Pose
 
 FOLDER = Path(__file__).resolve().parents[1] / "assets" / "pictures"
 DESIGN = PRESETS["paper-optimal"]
+
+# The mechanism without what would hide the workspace, or hide in it.
+BARE = View(handle=False, tetrahedra=(False, False, False))
 
 
 @dataclass(frozen=True)
@@ -70,6 +73,19 @@ SCENES = {
     ),
     "unclosed": Scene(actions=(SetJoint(JOINTS.index("l1"), 20.0),), panels=True),
     "twin": Scene(actions=(SetView(View(handle=False, twin=True)),)),
+    "workspace": Scene(
+        actions=(SetView(replace(BARE, workspace=WorkspaceView(solid=True))),),
+    ),
+    "workspace-cut": Scene(
+        actions=(
+            SetView(
+                replace(
+                    BARE,
+                    workspace=WorkspaceView(solid=True, colour="margin", cut="y", level=5.0),
+                )
+            ),
+        ),
+    ),
 }
 
 

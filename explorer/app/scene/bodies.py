@@ -15,6 +15,7 @@ from explorer.app.scene.shapes import Mesh, plate
 
 PLATE_THICKNESS = 0.22
 PLATFORM_THICKNESS = 0.2
+PLATFORM_OPACITY = 0.82
 
 
 class Bodies:
@@ -27,7 +28,7 @@ class Bodies:
         empty = np.zeros((3, 3)), np.array([[0, 1, 2]])
         self._base = scene.add_mesh_simple("/base/body", *empty, color=BASE_BODY)
         self._platform = scene.add_mesh_simple(
-            "/platform/body", *empty, color=PLATFORM_BODY, opacity=0.82, side="double"
+            "/platform/body", *empty, color=PLATFORM_BODY, opacity=PLATFORM_OPACITY, side="double"
         )
         self._grid = scene.add_grid(
             "/grid",
@@ -50,6 +51,9 @@ class Bodies:
         yield self._frame, "wxyz", state.pose.quaternion
         for body in (self._base, self._platform):
             yield body, "visible", state.view.bodies
+        # Within the translucent workspace the browser would leave a translucent body out.
+        within = state.view.workspace.solid
+        yield self._platform, "opacity", None if within else PLATFORM_OPACITY
         yield self._grid, "visible", state.view.grid
         for handle, (vertices, faces) in (
             (self._base, _base_plate(placed)),
