@@ -1,0 +1,102 @@
+"""`explorer export` writes the whole file, or none and says why."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+import trimesh
+
+import explorer
+from explorer.cli import run
+from explorer.export.mesh import FORMATS
+from explorer.solids import convex_hull, workspace_solid
+
+OPTIMAL = explorer.PRESETS["paper-optimal"]
+untyped: Any = trimesh
+
+
+@pytest.mark.parametrize("file_format", FORMATS)
+def test_the_suffix_tells_the_format(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, file_format: str
+) -> None:
+    out = tmp_path / f"workspace.{file_format.upper()}"
+    assert run(["export", "workspace", "--out", str(out), "--json"]) == 0
+    captured = capsys.readouterr()
+    assert captured.err == ""
+    solid = workspace_solid(OPTIMAL)
+    assert json.loads(captured.out) == {
+        "file": str(out),
+        "format": file_format,
+        "volume": pytest.approx(solid.volume, rel=1e-12),
+        "triangles": len(solid.faces),
+    }
+    assert out.stat().st_size > 1000
+    assert [each.name for each in tmp_path.iterdir()] == [out.name]
+
+
+def test_a_hull_in_a_format_of_its_own_at_an_orientation(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    out = tmp_path / "hull"
+    words = ["--format", "ply", "--tolerance", "0.5", "--yaw-pitch-roll", "-60", "5", "0"]
+    assert run(["export", "hull", "--out", str(out), *words]) == 0
+    assert capsys.readouterr().out == f"{out}\n"
+    rotation = explorer.rotation_from_yaw_pitch_roll([-60.0, 5.0, 0.0])
+    expected = convex_hull(workspace_solid(OPTIMAL, rotation, 0.5)).volume
+    found = untyped.load(out, file_type="ply", process=False)
+    assert found.is_watertight
+    assert found.volume == pytest.approx(expected * OPTIMAL.unit_mm**3, rel=1e-9)
+
+
+def test_an_empty_workspace_has_no_file(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    out = tmp_path / "empty.stl"
+    argv = ["export", "workspace", "--out", str(out), "--yaw-pitch-roll", "0", "0", "0"]
+    assert run(argv) == 1
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert "empty: margin κ2" in captured.err
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "words"),
+    [
+        ("file.step", [], "no mesh format 'step'; there are 3mf, stl, glb, obj, ply"),
+        ("file.stl", ["--format", "iges"], "no mesh format 'iges'"),
+        ("file", [], "give --format"),
+        ("missing/file.stl", [], "no folder"),
+        (".", ["--format", "stl"], "it is a folder"),
+        ("file.stl", ["--tolerance", "0"], "--tolerance must be a positive number"),
+        ("file.stl", ["--tolerance", "1e-9"], "at most 2,000,000 are made"),
+        ("file.stl", ["--design", "no-such"], "no preset and no file"),
+    ],
+)
+def test_what_cannot_be_written_is_refused_with_one_line(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, name: str, options: list[str], words: str
+) -> None:
+    assert run(["export", "workspace", "--out", str(tmp_path / name), *options]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.count("\n") == 1
+    assert words in captured.err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_existing_file_survives_a_refusal(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    out = tmp_path / "file.stl"
+    out.write_bytes(b"old")
+    assert run(["export", "hull", "--out", str(out), "--tolerance", "1e-9"]) == 2
+    assert out.read_bytes() == b"old"
+    assert capsys.readouterr().out == ""
+
+
+def test_what_to_write_and_where_must_be_given(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["export", "workspace"]) == 2
+    assert "missing --out" in capsys.readouterr().err
+    assert run(["export", "mechanism", "--out", "x.stl"]) == 2
+    assert "workspace" in capsys.readouterr().err

@@ -1,0 +1,178 @@
+"""`explorer workspace` answers what the package measures, and refuses what it cannot."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+
+import explorer
+from explorer.cli import run
+from explorer.orientations import cone_of_directions, orientation_capability, yaw_pitch_roll_range
+from explorer.solids import convex_hull, dexterous_solid, reachable_solid, workspace_solid
+from explorer.workspace import workspace_nodes, workspace_volume
+
+OPTIMAL = explorer.PRESETS["paper-optimal"]
+COARSE = ["--tolerance", "0.4"]
+KEYS = {
+    *("volume", "gradient", "empty_because", "node_step", "node_count", "node_volume"),
+    *("extent", "mesh"),
+}
+
+
+def answer(capsys: pytest.CaptureFixture[str], *argv: str) -> dict[str, Any]:
+    """Return the one JSON object that the command writes, and nothing else."""
+    assert run(["workspace", *argv, "--json"]) == 0
+    captured = capsys.readouterr()
+    assert captured.err == ""
+    assert captured.out.count("\n") == 1
+    found: dict[str, Any] = json.loads(captured.out)
+    return found
+
+
+def refusal(capsys: pytest.CaptureFixture[str], *argv: str) -> str:
+    """Return the one line on standard error of arguments that are refused with status 2."""
+    assert run(["workspace", *argv]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.count("\n") == 1
+    return captured.err
+
+
+def test_the_answer_is_what_the_package_measures(capsys: pytest.CaptureFixture[str]) -> None:
+    found = answer(capsys)
+    assert set(found) == KEYS
+    volume, nodes, solid = (
+        workspace_volume(OPTIMAL),
+        workspace_nodes(OPTIMAL),
+        workspace_solid(OPTIMAL),
+    )
+    assert found["volume"] == pytest.approx(volume.volume, rel=1e-12)
+    assert found["gradient"].keys() == volume.gradient.keys()
+    assert found["empty_because"] == []
+    assert (found["node_count"], found["node_volume"], found["node_step"]) == (999, 7992.0, 2.0)
+    assert found["extent"] == [list(ends) for ends in nodes.extent or ()]
+    assert found["mesh"] == {
+        "volume": pytest.approx(solid.volume, rel=1e-12),
+        "triangles": len(solid.faces),
+        "watertight": True,
+    }
+
+
+def test_orientation_step_and_tolerance_count(capsys: pytest.CaptureFixture[str]) -> None:
+    found = answer(capsys, "--yaw-pitch-roll", "-60", "5", "2", "--step", "3", *COARSE, "--hull")
+    rotation = explorer.rotation_from_yaw_pitch_roll([-60.0, 5.0, 2.0])
+    assert found["volume"] == pytest.approx(workspace_volume(OPTIMAL, rotation).volume, rel=1e-9)
+    assert found["node_count"] == workspace_nodes(OPTIMAL, rotation, 3.0).count
+    solid = workspace_solid(OPTIMAL, rotation, 0.4)
+    assert found["mesh"]["triangles"] == len(solid.faces)
+    assert found["hull_volume"] == pytest.approx(convex_hull(solid).volume, rel=1e-9)
+
+
+def test_table_1_is_reproduced_beside_what_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
+    found = answer(capsys, "--table1")
+    initial, optimal = found["table1"]
+    assert (initial["node_count"], optimal["node_count"]) == (2468, 999)
+    assert optimal["printed"]["node_volume"] == optimal["node_volume"] == 7992.0
+    assert initial["printed"]["node_volume"] is None
+    for row in (initial, optimal):
+        # To the three decimals that are printed.
+        np.testing.assert_allclose(row["extent"], row["printed"]["extent"], atol=5e-4)
+        assert row["volume"] < row["node_volume"]
+    assert optimal["volume"] == pytest.approx(7053.044, abs=1e-3)
+    assert "node volume exceeds" in found["note"]
+    assert run(["workspace", "--table1"]) == 0
+    text = capsys.readouterr().out
+    for word in ("paper-initial", "paper-optimal", "10.052", "7992", "7053.04", "2468", "999"):
+        assert word in text
+    assert found["note"] in text
+
+
+def test_an_empty_workspace_is_an_answer(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    limits = msgspec.structs.replace(OPTIMAL.limits, gap=50.0)
+    file = tmp_path / "empty.json"
+    file.write_bytes(explorer.encode_design(msgspec.structs.replace(OPTIMAL, limits=limits)))
+    found = answer(capsys, "--design", str(file), "--hull")
+    assert found["volume"] == found["node_count"] == found["hull_volume"] == 0
+    assert found["extent"] is None
+    assert found["empty_because"] == ["gap |d1 − d3|"]
+    assert found["mesh"] == {"volume": 0.0, "triangles": 0, "watertight": False}
+    assert run(["workspace", "--design", str(file)]) == 0
+    assert "empty because of gap |d1 − d3|" in capsys.readouterr().out
+
+
+def test_ranges_and_tilts_have_reachable_and_dexterous_volumes(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    found = answer(
+        capsys, "--yaw-range", "-80", "-65", "--roll-range", "0", "6", "--samples", "3", *COARSE
+    )
+    home = explorer.yaw_pitch_roll_from_rotation(explorer.home_pose(OPTIMAL).rotation)
+    pitch = float(home[1])
+    rotations = yaw_pitch_roll_range([-80.0, pitch, 0.0], [-65.0, pitch, 6.0], [3, 1, 3])
+    assert found["orientations"] == 9
+    for key, make in (("reachable_mesh", reachable_solid), ("dexterous_mesh", dexterous_solid)):
+        assert set(found[key]) == {"volume", "triangles", "watertight"}
+        assert found[key]["volume"] == pytest.approx(make(OPTIMAL, rotations, 0.4).volume, rel=1e-6)
+    assert found["dexterous_mesh"]["volume"] < found["mesh"]["volume"]
+    assert found["mesh"]["volume"] < found["reachable_mesh"]["volume"]
+    tilted = answer(capsys, "--tilt", "8", "--samples", "5", *COARSE)
+    rotations = cone_of_directions(explorer.home_pose(OPTIMAL).rotation, 8.0, 5)
+    assert tilted["orientations"] == 5
+    volume = reachable_solid(OPTIMAL, rotations, 0.4).volume
+    assert tilted["reachable_mesh"]["volume"] == pytest.approx(volume, rel=1e-6)
+
+
+def test_capability_is_of_all_orientations_or_of_those_asked_for(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    position = ["--capability", "10", "5", "9"]
+    found = answer(capsys, *position, "--samples", "2000", *COARSE)
+    share = orientation_capability(OPTIMAL, [10.0, 5.0, 9.0], 2000)
+    assert found["orientation_capability"] == pytest.approx(share, abs=1e-12)
+    assert 0.0 < share < 1.0
+    near = answer(capsys, *position, "--tilt", "1", *COARSE)
+    assert near["orientation_capability"] == 1.0
+
+
+def test_text_for_people_has_each_measure(capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["--hull", "--tilt", "5", "--samples", "3", "--capability", "10", "5", "9", *COARSE]
+    assert run(["workspace", *words]) == 0
+    captured = capsys.readouterr()
+    assert captured.err == ""
+    for word in ("exact volume", "node volume", "999 nodes", "mesh", "convex hull", "reachable"):
+        assert word in captured.out
+    for word in ("dexterous", "3 orientations", "watertight", "b1x", "capability"):
+        assert word in captured.out
+    assert all(line == line.rstrip() for line in captured.out.splitlines())
+
+
+@pytest.mark.parametrize(
+    ("argv", "words"),
+    [
+        (["--yaw-range", "5", "-5"], "yaw: the low end 5° exceeds the high end -5°"),
+        (["--pitch-range", "5"], "--pitch-range needs two numbers in the order low high; got 1"),
+        (["--step", "0"], "--step must be a positive number; got 0"),
+        (["--step", "-1"], "--step must be a positive number; got -1"),
+        (["--step", "nan"], "--step must be a positive number"),
+        (["--step", "0.01"], "at most 50,000,000 are counted"),
+        (["--tolerance", "0"], "--tolerance must be a positive number; got 0"),
+        (["--tolerance", "1e-9"], "at most 2,000,000 are made"),
+        (["--tilt", "200"], "within 0° to 180°; got 200°"),
+        (["--tilt", "5", "--yaw-range", "1", "2"], "not both"),
+        (["--samples", "0"], "--samples must lie within 1 to"),
+        (["--samples", "3"], "--samples needs"),
+        (["--capability", "1", "2"], "--capability needs three numbers in the order x y z"),
+        (["--quaternion", "1", "0", "0", "0", "--yaw-pitch-roll", "1", "2", "3"], "not both"),
+    ],
+)
+def test_unusable_options_are_refused(
+    capsys: pytest.CaptureFixture[str], argv: list[str], words: str
+) -> None:
+    assert words in refusal(capsys, *argv)
