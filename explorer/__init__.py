@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from explorer.singularity import jacobian, margins
     from explorer.snapshot import Snapshot, evaluate
     from explorer.strata import stratum
+    from explorer.tetrahedra import tetrahedra_overlap
 
 _HOMES = {
     "clearance": ("PAIRS", "LegClearances", "leg_clearances"),
@@ -56,6 +57,7 @@ _HOMES = {
     "singularity": ("jacobian", "margins"),
     "snapshot": ("Snapshot", "evaluate"),
     "strata": ("stratum",),
+    "tetrahedra": ("tetrahedra_overlap",),
 }
 _MODULE_OF = {name: module for module, names in _HOMES.items() for name in names}
 
@@ -90,6 +92,7 @@ __all__ = [
     "rotation_from_quaternion",
     "rotation_from_yaw_pitch_roll",
     "stratum",
+    "tetrahedra_overlap",
     "yaw_pitch_roll_from_rotation",
 ]
 

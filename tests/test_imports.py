@@ -30,6 +30,7 @@ LAYERS = (
         "feasibility",
         "segments",
         "clearance",
+        "overlap_lanes",
         "tetrahedra",
         "interference",
         "moves",
