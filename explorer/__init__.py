@@ -31,7 +31,9 @@ if TYPE_CHECKING:
     )
     from explorer.singularity import jacobian, margins
     from explorer.snapshot import Snapshot, evaluate
+    from explorer.solids import Solid, convex_hull, workspace_solid
     from explorer.strata import stratum
+    from explorer.workspace import NodeCount, Volume, workspace_nodes, workspace_volume
     from explorer.tetrahedra import tetrahedra_overlap
 
 _HOMES = {
@@ -56,7 +58,9 @@ _HOMES = {
     ),
     "singularity": ("jacobian", "margins"),
     "snapshot": ("Snapshot", "evaluate"),
+    "solids": ("Solid", "convex_hull", "workspace_solid"),
     "strata": ("stratum",),
+    "workspace": ("NodeCount", "Volume", "workspace_nodes", "workspace_volume"),
     "tetrahedra": ("tetrahedra_overlap",),
 }
 _MODULE_OF = {name: module for module, names in _HOMES.items() for name in names}
@@ -74,9 +78,13 @@ __all__ = [
     "Limits",
     "MissingExtraError",
     "NoAnswerError",
+    "NodeCount",
     "Pose",
     "Snapshot",
+    "Solid",
+    "Volume",
     "attachment_points",
+    "convex_hull",
     "decode_design",
     "discriminants",
     "encode_design",
@@ -93,6 +101,9 @@ __all__ = [
     "rotation_from_yaw_pitch_roll",
     "stratum",
     "tetrahedra_overlap",
+    "workspace_nodes",
+    "workspace_solid",
+    "workspace_volume",
     "yaw_pitch_roll_from_rotation",
 ]
 
