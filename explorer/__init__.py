@@ -33,8 +33,8 @@ if TYPE_CHECKING:
     from explorer.snapshot import Snapshot, evaluate
     from explorer.solids import Solid, convex_hull, workspace_solid
     from explorer.strata import stratum
-    from explorer.workspace import NodeCount, Volume, workspace_nodes, workspace_volume
     from explorer.tetrahedra import tetrahedra_overlap
+    from explorer.workspace import NodeCount, Volume, workspace_nodes, workspace_volume
 
 _HOMES = {
     "clearance": ("PAIRS", "LegClearances", "leg_clearances"),
