@@ -21,7 +21,16 @@ if TYPE_CHECKING:
         NoAnswerError,
     )
     from explorer.home import home_pose
+    from explorer.interference import step_is_free, step_overlaps, swept_tetrahedra
     from explorer.kinematics import attachment_points, discriminants, forward, inverse
+    from explorer.moves import (
+        MoveClearance,
+        MoveClearances,
+        move_clearance,
+        move_clearances,
+        moves_are_clear,
+        poses_between,
+    )
     from explorer.pose import (
         Pose,
         quaternion_from_rotation,
@@ -48,7 +57,16 @@ _HOMES = {
         "NoAnswerError",
     ),
     "home": ("home_pose",),
+    "interference": ("step_is_free", "step_overlaps", "swept_tetrahedra"),
     "kinematics": ("attachment_points", "discriminants", "forward", "inverse"),
+    "moves": (
+        "MoveClearance",
+        "MoveClearances",
+        "move_clearance",
+        "move_clearances",
+        "moves_are_clear",
+        "poses_between",
+    ),
     "pose": (
         "Pose",
         "quaternion_from_rotation",
@@ -77,6 +95,8 @@ __all__ = [
     "LegClearances",
     "Limits",
     "MissingExtraError",
+    "MoveClearance",
+    "MoveClearances",
     "NoAnswerError",
     "NodeCount",
     "Pose",
@@ -96,10 +116,17 @@ __all__ = [
     "leg_clearances",
     "load_design",
     "margins",
+    "move_clearance",
+    "move_clearances",
+    "moves_are_clear",
+    "poses_between",
     "quaternion_from_rotation",
     "rotation_from_quaternion",
     "rotation_from_yaw_pitch_roll",
+    "step_is_free",
+    "step_overlaps",
     "stratum",
+    "swept_tetrahedra",
     "tetrahedra_overlap",
     "workspace_nodes",
     "workspace_solid",

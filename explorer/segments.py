@@ -43,6 +43,12 @@ def clamped(value: float, over: float) -> float:
 
 
 @helper
+def minus(a: Vector, b: Vector) -> Vector:
+    """Return a − b."""
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+
+
+@helper
 def dot3(a: Vector, b: Vector) -> float:
     """Return a · b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
@@ -103,9 +109,9 @@ def closest_shares(u: Vector, v: Vector, r: Vector) -> tuple[float, float]:
 def write_closest(first: FloatArray, second: FloatArray, points: FloatArray) -> float:
     """Write the closest points of two segments, each of shape (2, 3); return the distance."""
     a, b = (first[0, 0], first[0, 1], first[0, 2]), (second[0, 0], second[0, 1], second[0, 2])
-    u = (first[1, 0] - a[0], first[1, 1] - a[1], first[1, 2] - a[2])
-    v = (second[1, 0] - b[0], second[1, 1] - b[1], second[1, 2] - b[2])
-    r = (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+    u = minus((first[1, 0], first[1, 1], first[1, 2]), a)
+    v = minus((second[1, 0], second[1, 1], second[1, 2]), b)
+    r = minus(a, b)
     s, t = closest_shares(u, v, r)
     for axis in range(3):
         points[0, axis] = a[axis] + s * u[axis]

@@ -47,7 +47,7 @@ from explorer.overlap_lanes import (
     test_faces,
     write_sections,
 )
-from explorer.segments import Vector, closest_shares, cross3, dot3
+from explorer.segments import Vector, closest_shares, cross3, dot3, minus
 
 # Flat bodies at least this wide and this much inclined, as shares, have a section that is
 # sure where its vertices and ends are this clear.
@@ -60,12 +60,6 @@ UNSURE, APART, OVERLAPPING = 0, 1, 2
 def vertex(body: FloatArray, k: int) -> Vector:
     """Return a row of a (4, 3) array."""
     return (body[k, 0], body[k, 1], body[k, 2])
-
-
-@helper
-def minus(a: Vector, b: Vector) -> Vector:
-    """Return a − b."""
-    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
 @helper

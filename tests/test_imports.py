@@ -33,6 +33,7 @@ LAYERS = (
         "overlap_lanes",
         "tetrahedra",
         "interference",
+        "move_bounds",
         "moves",
         "breaks",
         "slices",
