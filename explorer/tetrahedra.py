@@ -11,6 +11,8 @@ of test, from the cheapest on; each answers only where it is sure and hands on t
 3. where both are flat, their sections with the line in which their planes meet;
 4. else (touching, parallel planes, segments, points) every axis edge × edge one by one,
    and the shortest connections of edges, which are the axes within a common plane.
+
+The first three look at many pairs side by side, see `explorer.overlap_lanes`.
 """
 
 from __future__ import annotations
@@ -127,11 +129,11 @@ def settle(
         elif state[HEIGHT + k] <= 0.0:
             known = by_sections(faces, state, k)
         if known == UNSURE:
-            for axis in range(3):
-                for vertex in range(4):
-                    at = (3 * vertex + axis) * LANES + k
-                    bodies[0, vertex, axis] = vertices[at]
-                    bodies[1, vertex, axis] = vertices[at + BODY * LANES]
+            for corner in range(4):
+                for axis in range(3):
+                    at = (3 * corner + axis) * LANES + k
+                    bodies[0, corner, axis] = vertices[at]
+                    bodies[1, corner, axis] = vertices[at + BODY * LANES]
             known = by_all_axes(bodies, state[TOLERANCE + k])
         overlap[rows[k]] = known == OVERLAPPING
 
@@ -228,11 +230,11 @@ def overlap_rows(p: FloatArray, q: FloatArray, overlap: BoolArray, odd: IntArray
     for start in range(0, p.shape[0], LANES):
         many = min(LANES, p.shape[0] - start)
         for k in range(many):
-            for vertex in range(4):
+            for corner in range(4):
                 for axis in range(3):
-                    at = (3 * vertex + axis) * LANES + k
-                    numbers[at] = p[start + k, vertex, axis]
-                    numbers[at + 12 * LANES] = q[start + k, vertex, axis]
+                    at = (3 * corner + axis) * LANES + k
+                    numbers[at] = p[start + k, corner, axis]
+                    numbers[at + 12 * LANES] = q[start + k, corner, axis]
         sort_out(numbers, vertices, faces, state, known[:many])
         for k in range(many):
             odd[0] += state[ODD + k] != 0.0

@@ -1,0 +1,84 @@
+"""Overlap of tetrahedra beside python-fcl, clearances of the legs, and whole moves."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from benchmarks.samples import DESIGN, SIZE, around_home
+from benchmarks.table import Row, per_second, seconds, times
+from benchmarks.timing import best_of
+from explorer import leg_clearances, moves_are_clear, tetrahedra_overlap
+from explorer.arrays import BoolArray, FloatArray
+from explorer.compiled import warm
+
+PAIRS_COUNT = 200_000
+# Of the same pairs, as many as an object each for.
+OBJECTS = 2_000
+POSES = 100_000
+MOVES = 20_000
+ROUNDS = 20
+
+
+def mixed_pairs(count: int) -> tuple[FloatArray, FloatArray]:
+    """Return pairs in random order of which two in five overlap, one in two with a flat one."""
+    rng = np.random.default_rng(1)
+    p, q = rng.uniform(-1.0, 1.0, (2, count, 4, 3))
+    flat, both = rng.uniform(size=count) < 0.5, rng.uniform(size=count) < 0.5
+    q[flat, 3] = q[flat, 2]
+    p[flat & both, 3] = p[flat & both, 2]
+    return p, q + 0.3 * rng.uniform(-1.0, 1.0, (count, 1, 3))
+
+
+def run() -> Iterator[Row]:
+    """Yield the rows."""
+    p, q = mixed_pairs(PAIRS_COUNT)
+    samples = around_home(POSES)
+    positions, rotations = samples.positions, samples.rotations
+    warm()
+    overlap = tetrahedra_overlap(p, q)
+    rate = PAIRS_COUNT / best_of(ROUNDS, lambda: tetrahedra_overlap(p, q))
+    yield Row(
+        f"pairs of tetrahedra, {overlap.mean():.0%} overlapping, one core",
+        per_second(rate),
+        "12 million/s",
+        _fcl(p[:OBJECTS], q[:OBJECTS], overlap[:OBJECTS], rate),
+    )
+    yield Row(
+        f"clearances of all six pairs of legs in {POSES:,} poses, with the points",
+        seconds(best_of(ROUNDS, lambda: leg_clearances(DESIGN, positions, rotations))),
+        "100 ms",
+    )
+    start, end = positions[:MOVES], positions[:MOVES] + 0.02 * SIZE
+    turn = rotations[:MOVES]
+    duration = best_of(ROUNDS // 4, lambda: moves_are_clear(DESIGN, start, turn, end, turn))
+    yield Row("one straight move proved free of collisions", seconds(duration / MOVES))
+
+
+def _fcl(p: FloatArray, q: FloatArray, overlap: BoolArray, rate: float) -> str:
+    """Ask python-fcl for the same pairs, its objects made beforehand."""
+    fcl: Any = importlib.import_module("fcl")
+    triangles = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
+    faces = np.concatenate([np.full((4, 1), 3), triangles], axis=1).ravel()
+
+    def bodies(points: FloatArray) -> list[Any]:
+        return [fcl.CollisionObject(fcl.Convex(body, 4, faces)) for body in points]
+
+    first, second = bodies(p), bodies(q)
+    request = fcl.CollisionRequest()
+
+    def ask() -> list[bool]:
+        return [
+            bool(fcl.collide(a, b, request, fcl.CollisionResult()))
+            for a, b in zip(first, second, strict=True)
+        ]
+
+    differ = int((np.array(ask()) != overlap).sum())
+    fcl_rate = len(p) / best_of(ROUNDS, ask)
+    return (
+        f"python-fcl, objects made beforehand: {per_second(fcl_rate)}, {differ} of {len(p):,} "
+        f"answers differ; {times(rate / fcl_rate)}"
+    )
