@@ -151,7 +151,8 @@ def moves_are_clear(
 
     Much faster than `move_clearances`, since it ends as soon as that is certain. True is
     a proof; a least clearance that exceeds the asked one by less than the default
-    tolerance of `move_clearance` may count as one that does not. Other arguments and errors are those of `move_clearances`.
+    tolerance of `move_clearance` may count as one that does not. Other arguments and
+    errors are those of `move_clearances`.
     """
     moves = _Moves.of(design, start_position, start_rotation, end_position, end_rotation)
     bound, _, _ = moves.least(design, moves.tolerance(design, None), clearance)
