@@ -50,6 +50,12 @@ def _first_odd(array: FloatArray) -> str:
     return str(float(array[~np.isfinite(array)].flat[0]))
 
 
+def for_kernel(array: FloatArray) -> FloatArray:
+    """Return the array as compiled kernels take it: contiguous, and not read-only."""
+    contiguous = np.ascontiguousarray(array)
+    return contiguous if contiguous.flags.writeable else contiguous.copy()
+
+
 def batch_shape(*arrays: tuple[FloatArray, int]) -> tuple[int, ...]:
     """Return the common leading shape of arrays given with their number of trailing axes.
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from explorer.arrays import BoolArray, FloatArray, batch_shape, finite_array
+from explorer.arrays import BoolArray, FloatArray, batch_shape, finite_array, for_kernel
 from explorer.design import JOINTS, LENGTHS, Design
 from explorer.errors import InputError
 from explorer.pose import checked_rotation
@@ -156,7 +156,7 @@ def _solve(
 ) -> tuple[FloatArray, FloatArray, BoolArray, FloatArray]:
     q = checked_joints(design, joints)
     batch = q.shape[:-1]
-    rows = np.ascontiguousarray(q.reshape(-1, 6))
+    rows = for_kernel(q.reshape(-1, 6))
     count = len(rows)
     position = np.empty((count, 8, 3))
     rotation = np.empty((count, 8, 3, 3))

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from explorer.arrays import BoolArray, FloatArray, finite_array
+from explorer.arrays import BoolArray, FloatArray, finite_array, for_kernel
 from explorer.compiled import kernel
 from explorer.constraints import home_signs, joint_cones
 from explorer.design import JOINTS, LENGTHS, Design
@@ -185,8 +185,8 @@ def orientations_within(design: Design, position: ArrayLike, rotations: ArrayLik
     keep_limits(
         len(r),
         np.array(design.variables),
-        np.ascontiguousarray(p),
-        np.ascontiguousarray(r),
+        for_kernel(p),
+        for_kernel(r),
         ranges + [-slack, slack],
         demands - [0.0, slack],
         cones,

@@ -37,6 +37,7 @@ from explorer import (
     InputError,
     discriminants,
     forward,
+    home_pose,
     inverse,
     margins,
     rotation_from_quaternion,
@@ -635,3 +636,14 @@ def test_platforms_near_the_guide_and_askew_give_rigid_poses(
     solved = forward(design, inverse(design, near_guide, tilted))
     assert solved.feasible
     check_finite_and_rigid(solved)
+
+
+def test_joints_may_be_read_only_in_a_batch_of_any_size() -> None:
+    design = PRESETS["paper-optimal"]
+    home = home_pose(design)
+    joints = np.broadcast_to(inverse(design, home.position, home.rotation), (300, 6))
+    assert not joints.flags.writeable
+    assert forward(design, joints).feasible.all()
+    kept = np.array(joints)
+    kept.flags.writeable = False
+    assert forward(design, kept).feasible.all()
