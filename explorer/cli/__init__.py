@@ -23,6 +23,7 @@ COMMANDS: Mapping[str, str] = {
     "inverse": "Find the joints of a pose.",
     "forward": "Find the eight assembly modes of the joints.",
     "singularity": "Tell how near a pose is to a singularity, and to which.",
+    "interference": "Tell how far the legs keep from each other, in a pose or over a move.",
     "workspace": "Measure the workspace: exact volume and gradient, the paper's nodes, a mesh.",
     "export": "Write the workspace, or its convex hull, as a mesh for other programs.",
     "screenshot": "Draw a pose into a PNG file.",

@@ -14,21 +14,25 @@ from explorer.design import LARGEST_SIZE
 _COUNTS = {2: "two", 3: "three", 4: "four", 6: "six"}
 
 
-def numbers(option: str, order: str) -> PrimitiveConstructorSpec[Any]:
+def numbers(option: str, order: str, *, or_one: bool = False) -> PrimitiveConstructorSpec[Any]:
     """Return how to read an option that takes one finite number for each name.
 
     Args:
         option: The option, such as ``--joints``.
         order: The names of the numbers in their order, separated by blanks.
+        or_one: Whether one number may stand for all of them.
     """
     names = order.split()
 
     def read(words: list[str]) -> tuple[float, ...]:
         values = [_number(option, word) for word in words]
+        if or_one and len(values) == 1:
+            values *= len(names)
         if len(values) != len(names):
+            alternative = ", or one for all" if or_one else ""
             raise UsageError(
-                f"{option} needs {_COUNTS[len(names)]} numbers in the order {order}; "
-                f"got {len(values)}"
+                f"{option} needs {_COUNTS[len(names)]} numbers in the order {order}"
+                f"{alternative}; got {len(values)}"
             )
         for name, value in zip(names, values, strict=True):
             if not math.isfinite(value):

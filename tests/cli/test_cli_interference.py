@@ -1,0 +1,284 @@
+"""`explorer interference` answers what the package computes, and refuses what it cannot."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+
+import explorer
+from explorer.clearance import leg_axes
+from explorer.cli import run
+
+OPTIMAL = explorer.PRESETS["paper-optimal"]
+HOME = explorer.home_pose(OPTIMAL)
+POSITION = (8.0, -2.5, 11.0)
+ANGLES = (-60.0, 12.5, -7.0)
+POSE = ["--position", "8", "-2.5", "1.1e1", "--yaw-pitch-roll", "-60", "12.5", "-7"]
+END = explorer.Pose.of_yaw_pitch_roll((14.0, -2.0, 6.0), (-20.0, 0.0, 15.0))
+MOVE = ["--to", "14", "-2", "6", "--to-yaw-pitch-roll", "-20", "0", "15"]
+RADII = (0.1, 0.2, 0.6, 0.3)
+
+
+def answer(capsys: pytest.CaptureFixture[str], *argv: str) -> dict[str, Any]:
+    """Return the one JSON object that the command writes, and nothing else."""
+    assert run(["interference", *argv, "--json"]) == 0
+    captured = capsys.readouterr()
+    assert captured.err == ""
+    assert captured.out.count("\n") == 1
+    found: dict[str, Any] = json.loads(captured.out)
+    return found
+
+
+def text(capsys: pytest.CaptureFixture[str], *argv: str) -> str:
+    """Return what the command writes for people."""
+    assert run(["interference", *argv]) == 0
+    captured = capsys.readouterr()
+    assert captured.err == ""
+    assert "\x1b" not in captured.out
+    assert all(line == line.rstrip() for line in captured.out.splitlines())
+    return captured.out
+
+
+def refusal(capsys: pytest.CaptureFixture[str], *argv: str) -> str:
+    """Return the one line on standard error of arguments that are refused with status 2."""
+    assert run(["interference", *argv]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.count("\n") == 1
+    return captured.err
+
+
+def column(found: dict[str, Any], key: str) -> list[Any]:
+    return [pair[key] for pair in found["pairs"]]
+
+
+def with_radii(radii: tuple[float, float, float, float]) -> explorer.Design:
+    limits = msgspec.structs.replace(OPTIMAL.limits, leg_radii=radii)
+    return msgspec.structs.replace(OPTIMAL, limits=limits)
+
+
+@pytest.fixture
+def joined(tmp_path: Path) -> str:
+    """A design whose legs 2 and 4 share the joint b4."""
+    file = tmp_path / "joined.json"
+    file.write_bytes(
+        explorer.encode_design(explorer.Design(a3=(10, 4), b1=(4, -1), b2=0.0, b3=2.0))
+    )
+    return str(file)
+
+
+def test_a_pose_gives_the_clearances_of_its_pairs_of_legs(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    found = answer(capsys, *POSE, "--radii", *map(str, RADII))
+    expected = explorer.evaluate(
+        with_radii(RADII), explorer.Pose.of_yaw_pitch_roll(POSITION, ANGLES)
+    )
+    legs = expected.clearances
+    assert set(found) == {
+        *("pairs", "closest", "is_clear", "radii", "within_limits", "violations"),
+    }
+    assert column(found, "legs") == [list(pair) for pair in explorer.PAIRS]
+    assert column(found, "distance") == legs.distance.tolist()
+    assert column(found, "clearance") == legs.clearance.tolist()
+    assert column(found, "points") == legs.points.tolist()
+    assert column(found, "collides") == (legs.clearance < 0.0).tolist()
+    assert found["is_clear"] is not any(column(found, "collides"))
+    assert found["closest"] == list(explorer.PAIRS[int(legs.clearance.argmin())])
+    assert found["radii"] == list(RADII)
+    assert found["within_limits"] is (not expected.violations)
+
+
+def test_without_options_it_is_the_home_pose(capsys: pytest.CaptureFixture[str]) -> None:
+    legs = explorer.evaluate(OPTIMAL, HOME).clearances
+    assert column(answer(capsys), "clearance") == legs.clearance.tolist()
+
+
+def test_one_radius_stands_for_all_and_those_of_the_file_for_none(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    thick = answer(capsys, "--radii", "0.4")
+    assert thick["radii"] == [0.4] * 4
+    assert thick["is_clear"] is False
+    assert thick["closest"] == [2, 3]
+    file = tmp_path / "thick.json"
+    file.write_bytes(explorer.encode_design(with_radii((0.4, 0.4, 0.4, 0.4))))
+    assert answer(capsys, "--design", str(file)) == thick
+    assert answer(capsys, "--design", str(file), "--radii", "0") == answer(capsys)
+
+
+def test_the_limits_that_the_pose_breaks_are_named(capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["--position", "30", "5", "9"]
+    found = answer(capsys, *words)
+    assert found["within_limits"] is False
+    assert any("box x" in each for each in found["violations"])
+    shown = text(capsys, *words)
+    assert "outside the limits" in shown
+    assert all(each in shown for each in found["violations"])
+    assert "the pose is within the limits" in text(capsys)
+
+
+def test_a_move_gives_both_answers_side_by_side(capsys: pytest.CaptureFixture[str]) -> None:
+    found = answer(capsys, *MOVE, "--steps", "3", "--radii", *map(str, RADII))
+    expected = explorer.move_clearance(with_radii(RADII), HOME, END, steps=3)
+    for key in ("clearance", "bound", "share", "points", "overlaps"):
+        np.testing.assert_allclose(column(found, key), getattr(expected, key), atol=1e-12)
+    assert found["closest"] == list(explorer.PAIRS[expected.closest])
+    assert (found["is_clear"], found["is_free"]) == (expected.is_clear, expected.is_free)
+    assert (found["steps"], found["tolerance"]) == (3, expected.tolerance)
+    assert found["within_limits"] is True
+    assert found["start"]["position"] == list(HOME.position)
+    assert found["end"]["position"] == list(END.position)
+
+
+def test_the_clearance_of_a_move_is_that_of_the_pose_given_with_it(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    start, end = np.array(HOME.position), np.array(END.position)
+    for index, pair in enumerate(answer(capsys, *MOVE, "--radii", "0.2")["pairs"]):
+        along = start + pair["share"] * (end - start)
+        np.testing.assert_allclose(pair["position"], along, atol=1e-12)
+        there = answer(
+            capsys,
+            *("--position", *map(repr, pair["position"])),
+            *("--quaternion", *map(repr, pair["quaternion"])),
+            *("--radii", "0.2"),
+        )["pairs"][index]
+        assert pair["clearance"] == pytest.approx(there["clearance"], abs=1e-9)
+        np.testing.assert_allclose(pair["points"], there["points"], atol=1e-6)
+
+
+@pytest.mark.parametrize("preset", ["paper-initial", "paper-optimal"])
+@pytest.mark.parametrize("words", [MOVE, MOVE[:4], ["--to-quaternion", "1", "0.5", "-0.2", "0"]])
+def test_no_end_of_a_leg_goes_farther_in_a_step_than_the_node_step(
+    capsys: pytest.CaptureFixture[str], preset: str, words: list[str]
+) -> None:
+    design = explorer.PRESETS[preset]
+    found = answer(capsys, "--design", preset, *words)
+    start, end = (
+        explorer.Pose(tuple(found[key]["position"]), tuple(found[key]["quaternion"]))
+        for key in ("start", "end")
+    )
+    step = design.node_step or design.reach / 15.0
+
+    def farthest(steps: int) -> float:
+        shares = np.linspace(0.0, 1.0, steps + 1)
+        axes = leg_axes(design, *explorer.poses_between(start, end, shares))
+        return float(np.linalg.norm(np.diff(axes, axis=0), axis=-1).max())
+
+    assert farthest(found["steps"]) <= step * (1.0 + 1e-9)
+    if words == MOVE[:4]:
+        # A move without a turn has no more steps than it needs.
+        assert farthest(found["steps"] - 1) > step
+
+
+def test_without_a_position_to_go_to_the_platform_turns_where_it_is(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    by_angles = answer(capsys, "--to-yaw-pitch-roll", "-20", "0", "15")
+    assert by_angles["start"]["position"] == by_angles["end"]["position"] == list(HOME.position)
+    quaternion = map(repr, END.quaternion)
+    by_quaternion = answer(capsys, "--to-quaternion", *quaternion)
+    np.testing.assert_allclose(
+        column(by_angles, "clearance"), column(by_quaternion, "clearance"), rtol=1e-9
+    )
+
+
+def test_a_move_keeps_the_orientation_unless_told_otherwise(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    found = answer(capsys, *POSE, "--to", "14", "-2", "6")
+    assert found["end"]["quaternion"] == found["start"]["quaternion"]
+
+
+def test_a_move_that_leaves_the_limits_tells_at_which_end(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    found = answer(capsys, "--to", "30", "5", "9")
+    assert found["within_limits"] is found["end"]["within_limits"] is False
+    assert found["start"]["within_limits"] is True
+    assert any("box x" in each for each in found["end"]["violations"])
+    shown = text(capsys, "--to", "30", "5", "9")
+    assert "the start is within the limits" in shown
+    assert "the end is outside the limits" in shown
+
+
+def test_legs_that_share_a_joint_are_null_and_said_in_words(
+    capsys: pytest.CaptureFixture[str], joined: str
+) -> None:
+    index = explorer.PAIRS.index((2, 4))
+    pair = answer(capsys, "--design", joined)["pairs"][index]
+    assert pair["distance"] is pair["clearance"] is None
+    assert pair["collides"] is False
+    moved = answer(capsys, "--design", joined, *MOVE)["pairs"][index]
+    assert moved["clearance"] is moved["bound"] is None
+    assert moved["overlaps"] is False
+    for words in ([], MOVE):
+        (row,) = [
+            line
+            for line in text(capsys, "--design", joined, *words).splitlines()
+            if line.startswith("2–4")
+        ]
+        assert "joined" in row
+        assert "inf" not in row
+
+
+def test_text_for_people_has_a_row_for_each_pair(capsys: pytest.CaptureFixture[str]) -> None:
+    for words in ([], MOVE):
+        found = answer(capsys, "--radii", "0.4", *words)
+        rows = [
+            line.split()
+            for line in text(capsys, "--radii", "0.4", *words).splitlines()
+            if line[1:2] == "–"
+        ]
+        assert [row[0] for row in rows] == [f"{i}–{j}" for i, j in explorer.PAIRS]
+        at = 1 if words else 2
+        for row, clearance in zip(rows, column(found, "clearance"), strict=True):
+            assert float(row[at]) == pytest.approx(clearance, rel=1e-5)
+            assert float(row[at + 1]) == pytest.approx(clearance * OPTIMAL.unit_mm, rel=1e-5)
+            assert ("collide" in row) is (clearance < 0.0)
+        if words:
+            assert [row[-1] == "overlap" for row in rows] == column(found, "overlaps")
+
+
+def test_the_verdict_tells_clear_legs_from_those_that_touch_and_collide(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert "the legs are clear; closest 2–3" in text(capsys)
+    assert "legs collide: 2–3; closest 2–3" in text(capsys, "--radii", "0.4")
+    # With the two lines perpendicular both carriages stand in one place.
+    assert "legs touch: 2–3; closest 2–3" in text(capsys, "--quaternion", "1", "0", "0", "-1")
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        (["--to", "10", "5", "9"], "a move needs two poses that differ"),
+        (["--steps", "4"], "--to"),
+        (["--steps", "0", *MOVE], "--steps must lie within 1"),
+        ([*MOVE, "--to-quaternion", "1", "0", "0", "0"], "not both"),
+        (["--to-quaternion", "0", "0", "0", "0"], "quaternion"),
+        (["--to", "1", "2"], "--to needs three numbers in the order x y z; got 2"),
+        (["--to", "1e9", "2", "3"], "give their number with --steps"),
+        (["--radii", "0.1", "-1", "0", "0"], "leg_radii must not be negative; got -1"),
+        (["--radii", "-0.5"], "leg_radii must not be negative; got -0.5"),
+        (["--radii", "1", "2"], "--radii needs four numbers in the order r1 r2 r3 r4, or one"),
+        (["--radii", "nan"], "finite"),
+        (["--too", "1", "2", "3"], "did you mean --to?"),
+    ],
+)
+def test_what_cannot_be_used_is_refused_with_what_would_work(
+    capsys: pytest.CaptureFixture[str], words: list[str], reason: str
+) -> None:
+    assert reason in refusal(capsys, *words)
+
+
+def test_many_steps_can_be_asked_for_where_they_are_not_taken(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert answer(capsys, "--to", "1e9", "2", "3", "--steps", "7")["steps"] == 7
