@@ -12,6 +12,7 @@ import msgspec
 import numpy as np
 
 from explorer.app.state import (
+    Gesture,
     Hold,
     Joints,
     State,
@@ -27,6 +28,9 @@ from explorer.errors import InputError
 from explorer.feasibility import feasible_intervals, nearest_feasible
 from explorer.kinematics import discriminants, forward
 from explorer.pose import Pose, Triple
+
+# A hand that has not moved a control for longer, in seconds, begins a new gesture with it.
+PAUSE_SECONDS = 0.6
 
 
 class Action(Protocol):
@@ -247,6 +251,42 @@ class SetView:
         if warn is not None and not (np.isfinite(warn) and warn > 0.0):
             raise InputError(f"the warning length must be positive; got {warn:g}")
         return replace(state, view=self.view)
+
+
+@dataclass(frozen=True)
+class ByHand:
+    """An action with its origin, by which the many events of one drag become one gesture.
+
+    Attributes:
+        action: What is done.
+        source: The control that it came from; one of its own for what is no drag.
+        time: When it happened, in seconds.
+    """
+
+    action: Action
+    source: object
+    time: float
+
+    def apply(self, state: State) -> State:
+        """Return the next state, with the gesture that led to its pose."""
+        after = self.action.apply(state)
+        return replace(after, gesture=self._gesture(state, after))
+
+    def _gesture(self, before: State, after: State) -> Gesture | None:
+        is_jump = isinstance(self.action, Open | Reset | SetMode)
+        if is_jump or after.design.variables != before.design.variables:
+            # The legs did not go from one to the other.
+            return None
+        gesture = before.gesture
+        if (
+            gesture is not None
+            and gesture.source == self.source
+            and self.time - gesture.last <= PAUSE_SECONDS
+        ):
+            return replace(gesture, last=max(gesture.last, self.time))
+        if after.pose == before.pose:
+            return gesture
+        return Gesture(before.pose, self.source, self.time)
 
 
 def moved(state: State, pose: Pose, yaw_pitch_roll: Triple | None = None) -> State:

@@ -31,6 +31,7 @@ RAIL: Rgb = (128, 138, 152)
 CARRIAGE: Rgb = (104, 115, 132)
 GHOST: Rgb = (120, 134, 156)
 OUTLINE: Rgb = (190, 24, 60)
+SWEPT: Rgb = (92, 60, 156)
 
 
 def proximity_colour(margin: float, warn_below: float) -> Rgb:

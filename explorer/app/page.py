@@ -74,7 +74,7 @@ class Page:
         with side.add_tab("Workspace"):
             self._numbers = WorkspaceNumbers(gui)
         with side.add_tab("Legs"):
-            legs = LegsPanel(gui)
+            legs = LegsPanel(gui, self.session)
         self._panels = (move, design, view, singularity, legs)
         if docked:
             gui.main_panel.dock_right()

@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from explorer.app.actions import Action
+from explorer.app.actions import Action, ByHand
 from explorer.app.jobs import LatestWins
 from explorer.app.state import Frame, State
 from explorer.errors import ExplorerError
@@ -22,6 +22,8 @@ Who = int | None
 @dataclass(frozen=True)
 class _Posted:
     change: Change
+    key: object
+    stamp: float
     who: Who
 
 
@@ -64,7 +66,8 @@ class Session:
             stamp: When the event happened; now if None.
             who: The client to tell should it not be possible.
         """
-        self._jobs.post(key, time.time() if stamp is None else stamp, _Posted(change, who))
+        at = time.time() if stamp is None else stamp
+        self._jobs.post(key, at, _Posted(change, key, at, who))
 
     def do(self, action: Action, *, who: Who = None) -> None:
         """Ask for an action that must not be merged with another of its kind."""
@@ -90,7 +93,8 @@ class Session:
         try:
             for item in items:
                 try:
-                    self._state = item.change(self._state).apply(self._state)
+                    action = ByHand(item.change(self._state), item.key, item.stamp)
+                    self._state = action.apply(self._state)
                 except ExplorerError as error:
                     self._complain(str(error), item.who)
             # Drawn also after a refusal: the control that asked for it must go back.

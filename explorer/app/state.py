@@ -13,8 +13,10 @@ from typing import Literal
 import numpy as np
 
 from explorer.design import JOINTS, Design
+from explorer.errors import InputError
 from explorer.home import home_pose
 from explorer.kinematics import inverse
+from explorer.moves import MoveClearance, move_clearance
 from explorer.pose import Pose, Triple, yaw_pitch_roll_from_rotation
 from explorer.singularity import TETRAHEDRA, margins, mode_of
 from explorer.snapshot import Snapshot, evaluate
@@ -60,6 +62,7 @@ class View:
         flags, bodies, legs, labels, grid, handle: Whether each is drawn.
         tetrahedra: Whether each of the three is drawn.
         clearance: Whether the closest pair of legs is marked.
+        swept: Whether the tetrahedra are drawn that the legs swept in the last move.
         ghosts: Whether the seven other assembly modes are drawn.
         twin: Whether the 6-4 twin's six legs replace the four.
         warn_below: Margins below this length are warned of, in design units; None for a
@@ -75,6 +78,7 @@ class View:
     handle: bool = True
     tetrahedra: tuple[bool, bool, bool] = (True, True, True)
     clearance: bool = False
+    swept: bool = False
     ghosts: bool = False
     twin: bool = False
     warn_below: float | None = None
@@ -110,6 +114,21 @@ class Unclosed:
 
 
 @dataclass(frozen=True)
+class Gesture:
+    """A move of the platform by one hand, however many events it came in.
+
+    Attributes:
+        start: The pose in which it began.
+        source: What was moved by it, for instance a slider.
+        last: When its last event happened, in seconds.
+    """
+
+    start: Pose
+    source: object
+    last: float
+
+
+@dataclass(frozen=True)
 class State:
     """Everything that the page shows follows from this.
 
@@ -123,6 +142,8 @@ class State:
         hold: What stays when the design changes.
         unclosed: Why the joints asked for do not close, if they do not.
         view: What is shown.
+        gesture: What brought the platform to its pose; None where nothing moved it there,
+            as after a change of the design.
     """
 
     design: Design
@@ -134,6 +155,7 @@ class State:
     hold: Hold = "pose"
     unclosed: Unclosed | None = None
     view: View = field(default_factory=View)
+    gesture: Gesture | None = None
 
     @property
     def warn_below(self) -> float:
@@ -185,3 +207,15 @@ class Frame:
     def snapshot(self) -> Snapshot:
         """The design in its pose."""
         return evaluate(self.state.design, self.state.pose)
+
+    @cached_property
+    def last_move(self) -> MoveClearance | None:
+        """The straight move from where the last gesture began, in one step; None without one."""
+        gesture = self.state.gesture
+        if gesture is None:
+            return None
+        try:
+            return move_clearance(self.state.design, gesture.start, self.state.pose)
+        except InputError:
+            # There and back again: a move of no length, the one thing that is refused.
+            return None

@@ -18,6 +18,7 @@ from explorer.app.scene.flags import Flags
 from explorer.app.scene.legs import Legs, TwinLegs
 from explorer.app.scene.marks import DragHandle, Ghosts, Labels
 from explorer.app.scene.placing import Placed
+from explorer.app.scene.swept import SweptTetrahedra
 from explorer.app.scene.tetrahedra import Tetrahedra
 from explorer.app.scene.workspace import WorkspaceScene
 from explorer.app.workspace_feed import WorkspaceFeed
@@ -48,6 +49,7 @@ class Scene:
             Labels(scene),
             Ghosts(scene),
             ClearanceScene(scene),
+            SweptTetrahedra(scene),
             WorkspaceScene(scene, feed),
             self.drag_handle,
         )

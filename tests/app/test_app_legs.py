@@ -1,0 +1,398 @@
+"""The legs on the page: clearances, capsules, radii and the swept tetrahedra, without a browser."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Generator, Iterable
+from dataclasses import replace
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+import viser
+
+from explorer.app.actions import ByHand, SetLimits, SetPose, SetPosition, SetView
+from explorer.app.assigning import Update
+from explorer.app.colours import OUTLINE, SWEPT, TUBE
+from explorer.app.panels.design import DesignPanel
+from explorer.app.panels.html import BEYOND, WITHIN
+from explorer.app.panels.legs import LegsPanel, clearance_table, move_table
+from explorer.app.panels.ranges import radius_span
+from explorer.app.scene.clearance import ClearanceScene
+from explorer.app.scene.legs import Legs
+from explorer.app.scene.placing import Placed
+from explorer.app.scene.swept import SweptTetrahedra
+from explorer.app.session import Session
+from explorer.app.state import Frame, State, opened
+from explorer.app.viser_gaps import start_viser, stop_viser
+from explorer.clearance import PAIRS, leg_axes, leg_clearances
+from explorer.design import Design
+from explorer.design_file import PRESETS
+from explorer.interference import step_overlaps, swept_tetrahedra
+from explorer.moves import move_clearance
+from explorer.pose import Pose
+
+OPTIMAL = PRESETS["paper-optimal"]
+JOINED = Design(a3=(10, 4), b1=(4, -1), b2=0.0, b3=2.0)
+END = Pose.of_yaw_pitch_roll((14.0, -2.0, 6.0), (-20.0, 0.0, 15.0))
+
+
+@pytest.fixture(scope="module")
+def server() -> Generator[viser.ViserServer]:
+    made = start_viser("127.0.0.1", 0)
+    yield made
+    stop_viser(made)
+
+
+class Desk:
+    """A session whose complaints are kept, and hands that use the page's controls."""
+
+    def __init__(self, state: State) -> None:
+        self.complaints: list[str] = []
+        self.session = Session(
+            state, lambda _: None, lambda message, _: self.complaints.append(message), self._fail
+        )
+
+    @property
+    def state(self) -> State:
+        assert self.session.wait_until_idle()
+        return self.session.state
+
+    def use(self, handle: Any, value: object) -> None:
+        """Set an input as a browser does: the value first, then word of it with a client."""
+        handle.value = value
+        event = viser.GuiEvent(client=None, client_id=1, target=handle)
+        for callback in handle._impl.update_cb:
+            callback(event)
+
+    def _fail(self, error: Exception) -> None:
+        raise error
+
+
+@pytest.fixture
+def desk() -> Generator[Desk]:
+    made = Desk(opened(OPTIMAL))
+    yield made
+    made.session.stop()
+
+
+def thick(state: State, *radii: float) -> State:
+    """Return the state with radii of the legs: four, or one for all."""
+    r1, r2, r3, r4 = radii if len(radii) == 4 else radii * 4
+    limits = msgspec.structs.replace(state.design.limits, leg_radii=(r1, r2, r3, r4))
+    return SetLimits(limits).apply(state)
+
+
+def swept(end: Pose = END, start: State | None = None) -> State:
+    """Return the state after a move, its swept tetrahedra shown."""
+    begin = opened(OPTIMAL) if start is None else start
+    shown = SetView(replace(begin.view, swept=True)).apply(begin)
+    return ByHand(SetPose(end), "drag", 100.0).apply(shown)
+
+
+def random_states(count: int) -> list[State]:
+    """Return the optimum in poses all about its home, with legs of different radii."""
+    rng = np.random.default_rng(7)
+    return [
+        thick(
+            opened(
+                OPTIMAL,
+                Pose.of_yaw_pitch_roll(rng.uniform(-8.0, 15.0, 3), rng.uniform(-80, 80, 3)),
+            ),
+            *rng.uniform(0.0, 1.5, 4).tolist(),
+        )
+        for _ in range(count)
+    ]
+
+
+def by_name(updates: Iterable[Update]) -> dict[str, dict[str, Any]]:
+    """Return the values that are assigned, by the name of the node and the property."""
+    found: dict[str, dict[str, Any]] = {}
+    for handle, name, value in updates:
+        found.setdefault(handle.name, {})[name] = value
+    return found
+
+
+def rows_of(html: str) -> list[list[str]]:
+    """Return the cells of the rows of an HTML table, without the heading."""
+    rows = re.findall(r"<tr.*?</tr>", html)
+    return [
+        [re.sub("<.*?>", "", cell) for cell in re.findall(r"<td.*?</td>", row)] for row in rows[1:]
+    ]
+
+
+def number(text: str) -> float:
+    return float(text.replace("−", "-").rstrip(" %"))
+
+
+def clearances(state: State) -> np.ndarray[Any, np.dtype[np.float64]]:
+    return leg_clearances(state.design, state.pose.position, state.pose.rotation).clearance
+
+
+# The panel
+
+
+@pytest.mark.parametrize("state", random_states(12))
+def test_the_table_shows_the_clearance_of_each_pair(state: State) -> None:
+    expected = clearances(state)
+    html = clearance_table(Frame(state))
+    rows = rows_of(html)
+    assert [row[0] for row in rows] == [f"{i} – {j}" for i, j in PAIRS]
+    assert [number(row[1]) for row in rows] == pytest.approx(expected.tolist(), rel=1e-3)
+    millimetres = (expected * OPTIMAL.unit_mm).tolist()
+    assert [number(row[2]) for row in rows] == pytest.approx(millimetres, rel=1e-3)
+    collides = bool((expected < 0.0).any())
+    assert ("Legs collide" in html) is collides
+    assert ("Legs are clear" in html) is not collides
+    lines = re.findall(r"<tr.*?</tr>", html)[1:]
+    assert [BEYOND in line for line in lines] == (expected < 0.0).tolist()
+    assert [i for i, line in enumerate(lines) if "600" in line] == [int(expected.argmin())]
+
+
+def test_random_states_collide_and_keep_clear() -> None:
+    collided = [bool((clearances(state) < 0.0).any()) for state in random_states(12)]
+    assert {True, False} == set(collided)
+
+
+def test_legs_that_share_a_joint_are_called_joined() -> None:
+    index = PAIRS.index((2, 4))
+    assert rows_of(clearance_table(Frame(opened(JOINED))))[index] == ["2 – 4", "joined", ""]
+    state = swept(start=opened(JOINED))
+    assert rows_of(move_table(Frame(state)))[index] == ["2 – 4", "", "joined", ""]
+
+
+@pytest.mark.parametrize("radius", [0.0, 0.3, 0.4])
+def test_the_last_move_is_judged_by_both_tests(radius: float) -> None:
+    state = thick(swept(), radius)
+    home = opened(OPTIMAL).pose
+    exact = move_clearance(state.design, home, END)
+    overlaps = step_overlaps(
+        OPTIMAL, home.position, home.rotation, END.position, END.rotation
+    ).tolist()
+    html = move_table(Frame(state))
+    rows = rows_of(html)
+    assert [row[0] for row in rows] == [f"{i} – {j}" for i, j in PAIRS]
+    assert [row[1] == "overlap" for row in rows] == overlaps
+    assert [number(row[2]) for row in rows] == pytest.approx(exact.clearance.tolist(), rel=1e-3)
+    assert [number(row[3]) for row in rows] == pytest.approx(
+        (100.0 * exact.share).tolist(), abs=0.5
+    )
+    assert ("Clear all the way" in html) is exact.is_clear
+    assert ("collide or touch" in html) is not exact.is_clear
+    named = [f"{i} – {j}" for (i, j), is_so in zip(PAIRS, overlaps, strict=True) if is_so]
+    assert f"overlap of {', '.join(named)}<" in html
+
+
+def test_a_short_move_along_z_is_free_by_both_tests() -> None:
+    html = move_table(Frame(swept(Pose((10.0, 5.0, 8.0), opened(OPTIMAL).pose.quaternion))))
+    assert "no overlap" in html
+    assert WITHIN in html
+    assert BEYOND not in html
+
+
+def test_without_a_move_the_panel_says_how_to_make_one() -> None:
+    assert "Move the platform" in move_table(Frame(opened(OPTIMAL)))
+
+
+def test_the_last_move_is_shown_on_request(server: viser.ViserServer, desk: Desk) -> None:
+    panel = LegsPanel(server.gui, desk.session)
+    checkboxes: list[Any] = []
+    for handle, name, value in panel.updates(Frame(desk.state)):
+        setattr(handle, name, value)
+        if isinstance(handle, viser.GuiCheckboxHandle):
+            checkboxes.append(handle)
+    (checkbox,) = checkboxes
+    assert checkbox.value is False
+    for on in (True, False):
+        desk.use(checkbox, on)
+        assert desk.state.view.swept is on
+        updates = list(panel.updates(Frame(desk.state)))
+        shown = [v for h, n, v in updates if isinstance(h, viser.GuiHtmlHandle) and n == "visible"]
+        assert shown == [on]
+
+
+# The scene
+
+
+@pytest.mark.parametrize("state", random_states(12))
+def test_legs_that_collide_are_coloured(server: viser.ViserServer, state: State) -> None:
+    drawn = by_name(Legs(server.scene).updates(Placed(Frame(state))))
+    tubes = drawn["/legs/actuators"]["batched_colors"][:4].tolist()
+    beyond = [pair for pair, c in zip(PAIRS, clearances(state).tolist(), strict=True) if c < 0.0]
+    for leg, colour in zip((1, 2, 3, 4), tubes, strict=True):
+        assert tuple(colour) == (OUTLINE if any(leg in pair for pair in beyond) else TUBE)
+
+
+def test_the_closest_pair_is_marked_wherever_the_platform_goes(server: viser.ViserServer) -> None:
+    scene = ClearanceScene(server.scene)
+    marked: set[tuple[int, int]] = set()
+    for state in random_states(12):
+        shown = SetView(replace(state.view, clearance=True)).apply(state)
+        placed = Placed(Frame(shown))
+        drawn = by_name(scene.updates(placed))
+        found = leg_clearances(state.design, state.pose.position, state.pose.rotation)
+        pair = int(found.clearance.argmin())
+        first, second = PAIRS[pair]
+        marked.add(PAIRS[pair])
+        line, label = drawn["/clearance/line"], drawn["/clearance/label"]
+        assert line["visible"] is label["visible"] is True
+        ends = line["points"][0]
+        length = float(np.linalg.norm(ends[1] - ends[0]))
+        assert length == pytest.approx(placed.scale * found.distance[pair], rel=1e-4)
+        # Each end lies on the axis of its leg.
+        axes = placed.scale * leg_axes(state.design, state.pose.position, state.pose.rotation)
+        for end, leg in zip(ends, (first, second), strict=True):
+            base, tip = axes[leg - 1]
+            along = np.linalg.norm(end - base) + np.linalg.norm(tip - end)
+            assert along == pytest.approx(float(np.linalg.norm(tip - base)), rel=1e-4)
+        np.testing.assert_allclose(label["position"], ends.mean(axis=0), rtol=1e-5, atol=1e-5)
+        assert label["text"] == f"legs {first}–{second}: {found.clearance[pair]:.3g}"
+    assert len(marked) > 1
+
+
+@pytest.mark.parametrize("view", [{}, {"clearance": True, "twin": True}])
+def test_the_closest_pair_is_marked_on_request_and_not_on_the_twin(
+    server: viser.ViserServer, view: dict[str, bool]
+) -> None:
+    state = opened(OPTIMAL)
+    shown = SetView(replace(state.view, **view)).apply(state)
+    drawn = by_name(ClearanceScene(server.scene).updates(Placed(Frame(shown))))
+    assert drawn["/clearance/line"] == drawn["/clearance/label"] == {"visible": False}
+
+
+@pytest.mark.parametrize("state", random_states(4))
+def test_legs_with_radii_are_drawn_as_capsules(server: viser.ViserServer, state: State) -> None:
+    placed = Placed(Frame(state))
+    drawn = by_name(ClearanceScene(server.scene).updates(placed))
+    rods, ends = drawn["/clearance/rods"], drawn["/clearance/ends"]
+    axes = placed.scale * leg_axes(OPTIMAL, state.pose.position, state.pose.rotation)
+    radii = placed.scale * np.array(state.design.limits.leg_radii)
+    assert rods["visible"] is ends["visible"] is True
+    np.testing.assert_allclose(rods["batched_positions"], axes[:, 0], rtol=1e-5, atol=1e-5)
+    lengths = np.linalg.norm(axes[:, 1] - axes[:, 0], axis=1)
+    expected = np.stack([radii, radii, lengths], axis=1)
+    np.testing.assert_allclose(rods["batched_scales"], expected, rtol=1e-5)
+    np.testing.assert_allclose(ends["batched_positions"], axes.reshape(8, 3), rtol=1e-5, atol=1e-5)
+    np.testing.assert_allclose(ends["batched_scales"][:, 0], np.repeat(radii, 2), rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("radius", "view"), [(0.0, {}), (0.3, {"twin": True}), (0.3, {"legs": False})]
+)
+def test_there_are_no_capsules_without_radii_or_without_legs(
+    server: viser.ViserServer, radius: float, view: dict[str, bool]
+) -> None:
+    state = thick(opened(OPTIMAL), radius)
+    shown = SetView(replace(state.view, **view)).apply(state)
+    drawn = by_name(ClearanceScene(server.scene).updates(Placed(Frame(shown))))
+    assert drawn["/clearance/rods"] == drawn["/clearance/ends"] == {"visible": False}
+
+
+def test_the_tetrahedra_of_the_last_move_are_drawn(server: viser.ViserServer) -> None:
+    state, home = swept(), opened(OPTIMAL).pose
+    placed = Placed(Frame(state))
+    drawn = by_name(SweptTetrahedra(server.scene).updates(placed))
+    assert all(each["visible"] is True for each in drawn.values())
+    bodies = placed.scale * swept_tetrahedra(
+        OPTIMAL, home.position, home.rotation, END.position, END.rotation
+    )
+    overlaps = step_overlaps(OPTIMAL, home.position, home.rotation, END.position, END.rotation)
+    beyond = [pair for pair, is_so in zip(PAIRS, overlaps, strict=True) if is_so]
+    colours = [OUTLINE if any(leg in pair for pair in beyond) else SWEPT for leg in (1, 2, 3, 4)]
+    # A move in which some overlap and some do not.
+    assert set(colours) == {OUTLINE, SWEPT}
+    for leg, body, colour in zip((1, 2, 3, 4), bodies, colours, strict=True):
+        mesh = drawn[f"/swept/{leg}"]
+        np.testing.assert_allclose(mesh["vertices"], body, rtol=1e-5, atol=1e-5)
+        assert mesh["color"] == colour
+    lines = drawn["/swept/edges"]
+    assert lines["points"].shape == lines["colors"].shape == (20, 2, 3)
+    assert [tuple(c) for c in lines["colors"][::5, 0].tolist()] == colours
+    # The legs where they were, over the edges.
+    starts = placed.scale * leg_axes(OPTIMAL, home.position, home.rotation)
+    np.testing.assert_allclose(drawn["/swept/starts"]["points"], starts, rtol=1e-5, atol=1e-5)
+
+
+def test_each_face_of_a_swept_body_is_drawn_once(server: viser.ViserServer) -> None:
+    scene = SweptTetrahedra(server.scene)
+    drawn = {
+        handle.name: handle
+        for handle, _, _ in scene.updates(Placed(Frame(swept())))
+        if isinstance(handle, viser.MeshHandle)
+    }
+    bodies = swept_tetrahedra(
+        OPTIMAL,
+        *(np.array(opened(OPTIMAL).pose.position), opened(OPTIMAL).pose.rotation),
+        *(np.array(END.position), END.rotation),
+    )
+    for leg, body in zip((1, 2, 3, 4), bodies, strict=True):
+        corners = body[np.asarray(drawn[f"/swept/{leg}"].faces)]
+        a, b, c = np.moveaxis(corners, 1, 0)
+        normals = np.cross(b - a, c - a)
+        area = float(np.linalg.norm(normals, axis=1).sum()) / 2.0
+        if leg in (1, 4):
+            u, v = body[2] - body[0], body[3] - body[0]
+            assert area == pytest.approx(float(np.linalg.norm(np.cross(u, v))) / 2.0)
+        else:
+            # A closed surface: the faces' normals add up to nothing.
+            np.testing.assert_allclose(normals.sum(axis=0), 0.0, atol=1e-9 * area)
+            assert len(corners) == 4
+
+
+@pytest.mark.parametrize("view", [{"swept": False}, {"swept": True, "twin": True}])
+def test_what_is_not_shown_costs_nothing(server: viser.ViserServer, view: dict[str, bool]) -> None:
+    state = swept()
+    frame = Frame(SetView(replace(state.view, **view)).apply(state))
+    drawn = by_name(SweptTetrahedra(server.scene).updates(Placed(frame)))
+    assert list(drawn.values()) == [{"visible": False}] * 6
+    assert "last_move" not in vars(frame)
+
+
+def test_nothing_is_drawn_where_nothing_moved(server: viser.ViserServer) -> None:
+    scene = SweptTetrahedra(server.scene)
+    back = ByHand(SetPosition(0, 10.0), "x", 0.1)
+    there = ByHand(SetPosition(0, 12.0), "x", 0.0)
+    shown = SetView(replace(opened(OPTIMAL).view, swept=True)).apply(opened(OPTIMAL))
+    for state in (shown, back.apply(there.apply(shown))):
+        drawn = by_name(scene.updates(Placed(Frame(state))))
+        assert list(drawn.values()) == [{"visible": False}] * 6
+
+
+# The radii
+
+
+def radius_sliders(server: viser.ViserServer, desk: Desk) -> list[Any]:
+    """Return the four sliders of a new Design panel, showing the state."""
+    panel = DesignPanel(server.gui, desk.session)
+    handles: dict[str, Any] = {}
+    for handle, name, value in panel.updates(Frame(desk.state)):
+        setattr(handle, name, value)
+        if isinstance(handle, viser.GuiSliderHandle):
+            handles[handle.label] = handle
+    return [handles[f"leg {leg}"] for leg in (1, 2, 3, 4)]
+
+
+def test_each_radius_has_a_slider_that_sets_it_alone(server: viser.ViserServer, desk: Desk) -> None:
+    expected = [0.0] * 4
+    span = radius_span(desk.state)
+    for leg, slider in enumerate(radius_sliders(server, desk)):
+        assert (slider.min, slider.max, slider.value) == (0.0, span.high, 0.0)
+        expected[leg] = 0.1 * (leg + 1)
+        desk.use(slider, expected[leg])
+        assert desk.state.design.limits.leg_radii == pytest.approx(expected)
+    assert desk.complaints == []
+    sums = [expected[i - 1] + expected[j - 1] for i, j in PAIRS]
+    np.testing.assert_allclose(clearances(desk.state), clearances(opened(OPTIMAL)) - sums)
+
+
+@pytest.mark.parametrize("radius", [-0.5, float("nan")])
+def test_a_radius_that_cannot_be_is_refused_and_changes_nothing(
+    server: viser.ViserServer, desk: Desk, radius: float
+) -> None:
+    before = desk.state
+    # What no slider offers may still be typed, or sent by anyone.
+    desk.use(radius_sliders(server, desk)[2], radius)
+    assert desk.state == before
+    (complaint,) = desk.complaints
+    assert complaint.startswith("limits.leg_radii must ")
