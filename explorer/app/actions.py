@@ -30,7 +30,7 @@ from explorer.kinematics import discriminants, forward
 from explorer.pose import Pose, Triple
 
 # A hand that has not moved a control for longer, in seconds, begins a new gesture with it.
-PAUSE_SECONDS = 0.6
+PAUSE_SECONDS = 1.0
 
 
 class Action(Protocol):

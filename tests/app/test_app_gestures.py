@@ -89,7 +89,7 @@ def test_a_pause_or_another_control_begins_a_new_move(
 
 def test_events_that_arrive_late_do_not_end_a_move(moved: State) -> None:
     late = ByHand(SetPosition(0, 15.0), "x", 99.0).apply(moved)
-    on = ByHand(SetPosition(0, 16.0), "x", 100.0 + PAUSE_SECONDS).apply(late)
+    on = ByHand(SetPosition(0, 16.0), "x", 100.0 + 0.99 * PAUSE_SECONDS).apply(late)
     assert start_of(late) == start_of(on) == OPTIMAL.home
 
 
@@ -178,12 +178,13 @@ def test_the_session_tells_gestures_by_key_and_time() -> None:
         assert session.wait_until_idle()
         return start_of(session.state)
 
-    assert post("x", 11.0, 10.0) == OPTIMAL.home
-    assert post("x", 12.0, 10.3) == OPTIMAL.home
+    pauses = PAUSE_SECONDS
+    assert post("x", 11.0, 10.0 * pauses) == OPTIMAL.home
+    assert post("x", 12.0, 10.9 * pauses) == OPTIMAL.home
     session.redraw()
-    assert post("x", 13.0, 10.0 + 0.3 + PAUSE_SECONDS) == OPTIMAL.home
-    assert post("drag", 14.0, 11.0).position[0] == 13.0
-    assert post("drag", 15.0, 12.0).position[0] == 14.0
+    assert post("x", 13.0, 11.8 * pauses) == OPTIMAL.home
+    assert post("drag", 14.0, 11.9 * pauses).position[0] == 13.0
+    assert post("drag", 15.0, 13.0 * pauses).position[0] == 14.0
     session.do(GoHome())
     assert session.wait_until_idle()
     assert start_of(session.state).position[0] == 15.0

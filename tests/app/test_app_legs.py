@@ -179,7 +179,7 @@ def test_the_last_move_is_judged_by_both_tests(radius: float) -> None:
         (100.0 * exact.share).tolist(), abs=0.5
     )
     assert ("Clear all the way" in html) is exact.is_clear
-    assert ("collide or touch" in html) is not exact.is_clear
+    assert ("Legs collide on the way" in html) is not exact.is_clear
     named = [f"{i} – {j}" for (i, j), is_so in zip(PAIRS, overlaps, strict=True) if is_so]
     assert f"overlap of {', '.join(named)}<" in html
 
@@ -189,6 +189,12 @@ def test_a_short_move_along_z_is_free_by_both_tests() -> None:
     assert "no overlap" in html
     assert WITHIN in html
     assert BEYOND not in html
+
+
+def test_legs_without_radii_that_meet_on_the_way_touch() -> None:
+    # With the two lines perpendicular both carriages stand in one place.
+    turned = Pose(opened(OPTIMAL).pose.position, (1.0, 0.0, 0.0, -1.0))
+    assert "Legs touch on the way" in move_table(Frame(swept(turned)))
 
 
 def test_without_a_move_the_panel_says_how_to_make_one() -> None:

@@ -80,7 +80,8 @@ def move_table(frame: Frame) -> str:
     if move.is_clear:
         exact, colour = "Clear all the way", WITHIN
     else:
-        exact, colour = "Legs collide or touch on the way", BEYOND
+        word = "collide" if min(clearances) < 0.0 else "touch"
+        exact, colour = f"Legs {word} on the way", BEYOND
     rows = "".join(
         _move_row(
             PAIRS[index],
