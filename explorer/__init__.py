@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from explorer.home import home_pose
     from explorer.interference import step_is_free, step_overlaps, swept_tetrahedra
     from explorer.kinematics import attachment_points, discriminants, forward, inverse
+    from explorer.least_clearance import LeastClearances, least_clearances
     from explorer.moves import (
         MoveClearance,
         MoveClearances,
@@ -31,6 +32,11 @@ if TYPE_CHECKING:
         moves_are_clear,
         poses_between,
     )
+    from explorer.nearest_singular import (
+        NearestSingularity,
+        nearest_singular_poses,
+        nearest_singularities,
+    )
     from explorer.pose import (
         Pose,
         quaternion_from_rotation,
@@ -38,9 +44,12 @@ if TYPE_CHECKING:
         rotation_from_yaw_pitch_roll,
         yaw_pitch_roll_from_rotation,
     )
+    from explorer.radius_curve import RadiusCurve, radius_curve
+    from explorer.reachable import PairCost, ReachableWorkspace, reachable_workspace
     from explorer.singularity import jacobian, margins
     from explorer.snapshot import Snapshot, evaluate
-    from explorer.solids import Solid, convex_hull, workspace_solid
+    from explorer.solid import Solid
+    from explorer.solids import convex_hull, workspace_solid
     from explorer.strata import stratum
     from explorer.tetrahedra import tetrahedra_overlap
     from explorer.workspace import NodeCount, Volume, workspace_nodes, workspace_volume
@@ -59,6 +68,7 @@ _HOMES = {
     "home": ("home_pose",),
     "interference": ("step_is_free", "step_overlaps", "swept_tetrahedra"),
     "kinematics": ("attachment_points", "discriminants", "forward", "inverse"),
+    "least_clearance": ("LeastClearances", "least_clearances"),
     "moves": (
         "MoveClearance",
         "MoveClearances",
@@ -67,16 +77,27 @@ _HOMES = {
         "moves_are_clear",
         "poses_between",
     ),
+    "nearest_singular": (
+        "NearestSingularity",
+        "nearest_singular_poses",
+        "nearest_singularities",
+    ),
     "pose": (
+        "PairCost",
         "Pose",
+        "RadiusCurve",
+        "ReachableWorkspace",
         "quaternion_from_rotation",
         "rotation_from_quaternion",
         "rotation_from_yaw_pitch_roll",
         "yaw_pitch_roll_from_rotation",
     ),
+    "radius_curve": ("RadiusCurve", "radius_curve"),
+    "reachable": ("PairCost", "ReachableWorkspace", "reachable_workspace"),
     "singularity": ("jacobian", "margins"),
     "snapshot": ("Snapshot", "evaluate"),
-    "solids": ("Solid", "convex_hull", "workspace_solid"),
+    "solid": ("Solid",),
+    "solids": ("convex_hull", "workspace_solid"),
     "strata": ("stratum",),
     "workspace": ("NodeCount", "Volume", "workspace_nodes", "workspace_volume"),
     "tetrahedra": ("tetrahedra_overlap",),
@@ -92,14 +113,19 @@ __all__ = [
     "DesignError",
     "ExplorerError",
     "InputError",
+    "LeastClearances",
     "LegClearances",
     "Limits",
     "MissingExtraError",
     "MoveClearance",
     "MoveClearances",
+    "NearestSingularity",
     "NoAnswerError",
     "NodeCount",
+    "PairCost",
     "Pose",
+    "RadiusCurve",
+    "ReachableWorkspace",
     "Snapshot",
     "Solid",
     "Volume",
@@ -113,14 +139,19 @@ __all__ = [
     "home_pose",
     "inverse",
     "jacobian",
+    "least_clearances",
     "leg_clearances",
     "load_design",
     "margins",
     "move_clearance",
     "move_clearances",
     "moves_are_clear",
+    "nearest_singular_poses",
+    "nearest_singularities",
     "poses_between",
     "quaternion_from_rotation",
+    "radius_curve",
+    "reachable_workspace",
     "rotation_from_quaternion",
     "rotation_from_yaw_pitch_roll",
     "step_is_free",

@@ -115,6 +115,52 @@ def leg_clearances(design: Design, position: ArrayLike, rotation: ArrayLike) -> 
     )
 
 
+def distance_gradients(
+    design: Design, position: ArrayLike, rotation: ArrayLike, found: LegClearances
+) -> FloatArray:
+    """Return the rates of the distances of all pairs with the position, shape (..., 6, 3).
+
+    Zero where the axes of a pair cross, where a distance has no rate, and for a pair that
+    shares a joint.
+
+    Args:
+        design: The manipulator.
+        position: b4 in the base frame, shape (..., 3), in design units.
+        rotation: Platform to base, shape (..., 3, 3).
+        found: The clearances there.
+    """
+    off = found.points[..., 0, :] - found.points[..., 1, :]
+    length = np.linalg.norm(off, axis=-1, keepdims=True)
+    normal = off / np.where(length > 0.0, length, 1.0)
+    return normal * point_rates(leg_axes(design, position, rotation), found.points)
+
+
+def point_rates(axes: FloatArray, points: FloatArray) -> FloatArray:
+    """Return by how much more the first of two points moves than the second with p, by axis.
+
+    Args:
+        axes: Of the legs, shape (..., 4, 2, 3).
+        points: Of each pair, one on each axis, shape (..., 6, 2, 3).
+
+    Returns:
+        The diagonals of the matrices that the positions are multiplied with, shape
+        (..., 6, 3): platform ends move as p does, a base end on the guide along x only.
+    """
+    sides: list[FloatArray] = []
+    for side in (0, 1):
+        which = [pair[side] - 1 for pair in PAIRS]
+        base, end = axes[..., which, 0, :], axes[..., which, 1, :]
+        along = end - base
+        square = (along * along).sum(axis=-1)
+        share = ((points[..., side, :] - base) * along).sum(axis=-1)
+        share = share / np.where(square > 0.0, square, 1.0)
+        rates = np.repeat(share[..., None], 3, axis=-1)
+        on_guide = [leg in (1, 2) for leg in which]
+        rates[..., on_guide, 0] = 1.0
+        sides.append(rates)
+    return sides[0] - sides[1]
+
+
 @kernel("void(f8[:,:,:,::1], f8[:,::1], f8[:,:,:,::1])")
 def pair_rows(axes: FloatArray, distance: FloatArray, points: FloatArray) -> None:
     """Write the distances and closest points of the six pairs of four axes.

@@ -149,14 +149,31 @@ def moves_are_clear(
 ) -> BoolArray:
     """Return whether all pairs keep more than a clearance all along, shape (...).
 
+    Arguments and errors are those of `pairs_are_clear`.
+    """
+    arrays = (start_position, start_rotation, end_position, end_rotation)
+    return np.asarray(pairs_are_clear(design, *arrays, clearance=clearance).all(axis=-1))
+
+
+def pairs_are_clear(
+    design: Design,
+    start_position: ArrayLike,
+    start_rotation: ArrayLike,
+    end_position: ArrayLike,
+    end_rotation: ArrayLike,
+    *,
+    clearance: float = 0.0,
+) -> BoolArray:
+    """Return which pairs keep more than a clearance all along, shape (..., 6).
+
     Much faster than `move_clearances`, since it ends as soon as that is certain. True is
     a proof; a least clearance that exceeds the asked one by less than the default
-    tolerance of `move_clearance` may count as one that does not. Other arguments and
-    errors are those of `move_clearances`.
+    tolerance of `move_clearance` may count as one that does not. A pair that shares a
+    joint is clear. Other arguments and errors are those of `move_clearances`.
     """
     moves = _Moves.of(design, start_position, start_rotation, end_position, end_rotation)
     bound, _, _ = moves.least(design, moves.tolerance(design, None), clearance)
-    return np.asarray((bound > radii_of_pairs(design) + clearance).all(axis=-1))
+    return np.asarray(bound > radii_of_pairs(design) + clearance)
 
 
 def move_clearance(

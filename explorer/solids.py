@@ -5,9 +5,9 @@ The only module that uses manifold3d. Each face remembers the limit that it come
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import itertools
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,59 +20,16 @@ from explorer.errors import ExplorerError, InputError
 from explorer.facets import Facets
 from explorer.pose import checked_rotation
 from explorer.primitives import MOST_FACES, Frame, Piece, frame_of, pieces_of
+from explorer.solid import Solid
 from explorer.workspace import home_rotation, what_empties
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
 
+CORNERS = np.array(list(itertools.product((0, 1), repeat=3)))
+
 HULL = "convex hull"
 """What the faces of a convex hull come from."""
-
-
-@dataclass(frozen=True)
-class Solid:
-    """A closed mesh, in design units.
-
-    Attributes:
-        vertices: Shape (n, 3).
-        faces: Indices of vertices, counter-clockwise from outside, shape (m, 3).
-        limit_of_face: Which of the limits each face comes from, shape (m,).
-        limits: Names of limits, such as "l1 maximum".
-        tolerance: Largest distance of the faces from the true surface.
-        empty_because: The limits that empty it, see `explorer.workspace.Volume`; () if it
-            is not empty.
-    """
-
-    vertices: FloatArray
-    faces: NDArray[np.int32]
-    limit_of_face: IntArray
-    limits: tuple[str, ...]
-    tolerance: float
-    empty_because: tuple[str, ...] = ()
-
-    @property
-    def is_empty(self) -> bool:
-        """Whether it has no face; a workspace thinner than the tolerance may have none."""
-        return len(self.faces) == 0
-
-    @cached_property
-    def volume(self) -> float:
-        """The volume within the mesh, in cubed design units."""
-        if self.is_empty:
-            return 0.0
-        middle = 0.5 * (self.vertices.min(axis=0) + self.vertices.max(axis=0))
-        a, b, c = ((self.vertices - middle)[self.faces[:, k]] for k in range(3))
-        return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6.0
-
-    @cached_property
-    def is_watertight(self) -> bool:
-        """Whether each edge is used exactly twice, in opposite directions."""
-        if self.is_empty:
-            return False
-        edges = self.faces.astype(np.int64)[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-        many = len(self.vertices)
-        there, back = np.sort(edges @ [many, 1]), np.sort(edges @ [1, many])
-        return bool((np.diff(there) > 0).all() and (there == back).all())
 
 
 def workspace_solid(
@@ -111,6 +68,114 @@ def limited_solid(
         ExplorerError: a boolean fails.
     """
     return _common(design, limits, tolerance)
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Where a value on a grid of positions is zero; what is below zero is cut out.
+
+    Attributes:
+        values: At the nodes, shape (nx, ny, nz).
+        lows: Of the first node, in design units, shape (3,).
+        step: Between nodes on each axis, in design units, shape (3,).
+        settle: Takes points of the interpolated surface and for each a kept node beside
+            it, both of shape (n, 3), and returns the points on the true surface.
+        names: What faces of it come from.
+        name_of: Takes points (n, 3) and returns the indices of their names, shape (n,).
+    """
+
+    values: FloatArray
+    lows: FloatArray
+    step: FloatArray
+    settle: Callable[[FloatArray, FloatArray], FloatArray]
+    names: tuple[str, ...]
+    name_of: Callable[[FloatArray], IntArray]
+
+
+def carved_solid(
+    design: Design,
+    limits: Sequence[Constraint],
+    surface: Surface | None,
+    seed: FloatArray,
+    tolerance: float | None = None,
+) -> Solid:
+    """Return the connected part that holds a position of what limits and a surface leave.
+
+    Args:
+        design: The manipulator.
+        limits: Such as those of `explorer.constraints.constraints`.
+        surface: What else bounds it, if anything.
+        seed: The position, shape (3,).
+        tolerance: As of `workspace_solid`; the surface keeps to its own grid.
+
+    Raises:
+        InputError: a tolerance that is not positive or too small.
+        ExplorerError: a boolean fails.
+    """
+    frame, names = frame_of([limits], design.reach, tolerance), _names([limits])
+    bodies, origins = _bodies([limits], frame, names)
+    body = bodies[0]
+    if surface is not None:
+        blocked = _below_zero(surface, frame)
+        origins[blocked.original_id()] = len(names)
+        body = body - blocked
+    parts = [_solid(part, origins, frame, names) for part in body.decompose()]
+    if not parts:
+        return _solid(body, origins, frame, names)
+
+    def nearness(part: Solid) -> tuple[float, float]:
+        # A seed on the surface is half within; one off by rounding goes to the nearest.
+        off = float(np.linalg.norm(part.vertices - seed, axis=1).min())
+        return round(part.winding(seed), 1), -off
+
+    solid = max(parts, key=nearness)
+    if surface is None:
+        return solid
+    of_face = solid.limit_of_face.copy()
+    cut = np.flatnonzero(of_face == len(names))
+    centres = solid.vertices[solid.faces[cut]].mean(axis=1)
+    of_face[cut] = len(names) + surface.name_of(centres)
+    return replace(solid, limit_of_face=of_face, limits=(*names, *surface.names))
+
+
+def _below_zero(surface: Surface, frame: Frame) -> Manifold:
+    """Return what a surface cuts out, as a closed mesh in a frame."""
+    from manifold3d import Manifold
+
+    below = np.argwhere(surface.values < 0.0)
+    if not len(below):
+        return Manifold()
+    first = np.maximum(below.min(axis=0) - 1, 0)
+    beyond = np.minimum(below.max(axis=0) + 2, surface.values.shape)
+    x, y, z = (slice(int(a), int(b)) for a, b in zip(first, beyond, strict=True))
+    values, lows = surface.values[x, y, z], surface.lows + first * surface.step
+    # manifold3d asks at the nodes and at the middles of cells, also half a cell beyond.
+    padded = np.pad(values, 1, mode="edge")
+    middles = np.zeros([count + 1 for count in values.shape])
+    for corner in CORNERS:
+        x, y, z = (
+            slice(int(a), int(a) + many) for a, many in zip(corner, middles.shape, strict=True)
+        )
+        middles += padded[x, y, z] / len(CORNERS)
+    table = np.zeros([2 * count + 1 for count in values.shape])
+    table[1::2, 1::2, 1::2], table[::2, ::2, ::2] = -values, -middles
+    rows: list[list[list[float]]] = table.tolist()
+
+    def value(x: float, y: float, z: float) -> float:
+        return rows[int(2.0 * x + 1.5)][int(2.0 * y + 1.5)][int(2.0 * z + 1.5)]
+
+    def settled(places: FloatArray) -> FloatArray:
+        where = np.array(places)
+        most = np.array(values.shape) - 2
+        corners = np.clip(np.floor(where), 0, most).astype(np.int64)[:, None, :] + CORNERS
+        kept = values[corners[..., 0], corners[..., 1], corners[..., 2]].argmax(axis=1)
+        beside = corners[np.arange(len(where)), kept]
+        points = surface.settle(lows + where * surface.step, lows + beside * surface.step)
+        return frame.to(points)
+
+    last = [count - 1.0 for count in values.shape]
+    shapes: Any = Manifold
+    return shapes.level_set(value, [0.0, 0.0, 0.0, *last], 1.0).warp_batch(settled).as_original()
 
 
 def reachable_solid(design: Design, rotations: ArrayLike, tolerance: float | None = None) -> Solid:

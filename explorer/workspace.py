@@ -115,24 +115,13 @@ def workspace_nodes(
         InputError: not a rotation, a step that is not positive, or too fine a grid.
     """
     r = home_rotation(design) if rotation is None else checked_rotation(rotation)
-    width = step if step is not None else design.node_step or design.reach / STEPS_IN_REACH
-    if not (math.isfinite(width) and width > 0.0):
-        raise InputError(f"the node step must be positive; got {width:g}")
+    width = node_step_of(design, step)
     region = region_of(constraints(design, r))
     empty = NodeCount(width, 0, 0.0, None)
     if region.low > region.high:
         return empty
-    lows, highs = bounds(region)
-    # Nodes on a boundary count, so the grid may not lose one to rounding.
-    first = np.ceil(lows / width - 1e-9)
-    last = np.floor(highs / width + 1e-9)
-    many = np.maximum(0.0, last - first + 1.0)
-    if float(np.prod(many)) > MOST_NODES:
-        coarsest = width * (float(np.prod(many)) / MOST_NODES) ** (1.0 / 3.0)
-        raise InputError(
-            f"a node step of {width:g} makes {float(np.prod(many)):.3g} nodes; at most "
-            f"{MOST_NODES:,} are counted, so from about {coarsest:.2g} on"
-        )
+    first, many = node_range(region, width)
+    check_node_count(many, width, MOST_NODES)
     counts = many.astype(np.int64)
     if not counts.all():
         return empty
@@ -160,6 +149,37 @@ def workspace_nodes(
         int(found[0]) * width**3,
         ((low_x, low_y, low_z), (high_x, high_y, high_z)),
     )
+
+
+def node_step_of(design: Design, step: float | None = None) -> float:
+    """Return the step of the paper's grid: as asked, or the design's, or reach / 15.
+
+    Raises:
+        InputError: it is not positive.
+    """
+    width = step if step is not None else design.node_step or design.reach / STEPS_IN_REACH
+    if not (math.isfinite(width) and width > 0.0):
+        raise InputError(f"the node step must be positive; got {width:g}")
+    return width
+
+
+def node_range(region: Region, step: float) -> tuple[FloatArray, FloatArray]:
+    """Return the first index and the number of the nodes around a region, each (3,)."""
+    lows, highs = bounds(region)
+    # Nodes on a boundary count, so the grid may not lose one to rounding.
+    first = np.ceil(lows / step - 1e-9)
+    return first, np.maximum(0.0, np.floor(highs / step + 1e-9) - first + 1.0)
+
+
+def check_node_count(many: FloatArray, step: float, most: int) -> None:
+    """Raise an `InputError` if a grid with so many nodes an axis has too many."""
+    count = float(np.prod(many))
+    if count > most:
+        coarsest = step * (count / most) ** (1.0 / 3.0)
+        raise InputError(
+            f"a node step of {step:g} makes {count:.3g} nodes; at most {most:,} are counted, "
+            f"so from about {coarsest:.2g} on"
+        )
 
 
 def bounds(region: Region) -> tuple[FloatArray, FloatArray]:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from explorer.arrays import BoolArray, FloatArray
-from explorer.solids import Solid
+from explorer.solid import Solid
 
 
 def corners_of(solid: Solid) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -18,7 +18,8 @@ import trimesh
 from explorer import PRESETS, Design, ExplorerError, InputError, NoAnswerError, decode_design
 from explorer.export.files import check_writable, write_whole
 from explorer.export.mesh import FORMATS, colour_of, mesh_bytes, write_mesh
-from explorer.solids import HULL, Solid, convex_hull, workspace_solid
+from explorer.solid import Solid
+from explorer.solids import HULL, convex_hull, workspace_solid
 
 OPTIMAL = msgspec.structs.replace(PRESETS["paper-optimal"], unit_mm=7.5)
 SOLID = workspace_solid(OPTIMAL)

@@ -17,7 +17,8 @@ from explorer.design import Design
 from explorer.errors import InputError
 from explorer.region import region_of
 from explorer.singularity import inverse_condition, jacobian, margins
-from explorer.solids import Solid, convex_hull, limited_solid, workspace_solid
+from explorer.solid import Solid
+from explorer.solids import convex_hull, limited_solid, workspace_solid
 from explorer.workspace import NodeCount, bounds, workspace_nodes, workspace_volume
 
 Axis = Literal["x", "y", "z"]

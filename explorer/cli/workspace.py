@@ -17,7 +17,7 @@ from explorer.workspace import NodeCount, Volume, workspace_nodes, workspace_vol
 
 if TYPE_CHECKING:
     from explorer.arrays import FloatArray
-    from explorer.solids import Solid
+    from explorer.solid import Solid
 
 Ends = tuple[float, float]
 

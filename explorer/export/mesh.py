@@ -24,7 +24,7 @@ from explorer.arrays import FloatArray
 from explorer.design import Design
 from explorer.errors import ExplorerError, InputError, NoAnswerError
 from explorer.export.files import write_whole
-from explorer.solids import Solid
+from explorer.solid import Solid
 
 Rgb: TypeAlias = tuple[int, int, int]
 

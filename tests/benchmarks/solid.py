@@ -13,7 +13,8 @@ from benchmarks.timing import best_of
 from explorer.arrays import FloatArray
 from explorer.compiled import warm
 from explorer.constraints import HalfSpace, Round, constraints
-from explorer.solids import Solid, workspace_solid
+from explorer.solid import Solid
+from explorer.solids import workspace_solid
 from explorer.workspace import home_rotation, workspace_volume
 
 ERROR = 1e-3

@@ -1,0 +1,155 @@
+"""How the reachable workspace shrinks as all legs grow thicker.
+
+Every position has a radius up to which it can be reached from the start: that of the way
+there whose narrowest place is widest. One spanning tree of a grid tells all of them, and so
+the whole curve at once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import msgspec
+import numpy as np
+from numpy.typing import ArrayLike
+
+from explorer.arrays import FloatArray, IntArray
+from explorer.clearance import leg_clearances
+from explorer.design import Design
+from explorer.home import home_pose
+from explorer.least_clearance import least_clearances
+from explorer.moves import move_clearances
+from explorer.pose import checked_rotation
+from explorer.reachable_nodes import Survey, middles_over, survey
+from explorer.solids import workspace_solid
+from explorer.start import check_start
+from explorer.workspace import home_rotation, workspace_volume
+
+DEFAULT_CELLS = 40
+POINTS = 60
+# Of the narrowest place of a step, as a share of the reach.
+TOLERANCE = 1e-4
+
+
+@dataclass(frozen=True)
+class RadiusCurve:
+    """Reachable volume against one radius of all four legs, in design units.
+
+    Attributes:
+        radii: From 0 to the radius at which nothing is left, shape (n,).
+        volumes: Reachable with them, shape (n,), in cubed design units; counted in cells
+            of a grid as shares of the exact volume within the limits.
+        harmless: The largest radius with which no two legs collide anywhere within the
+            limits; 0 if some touch without a radius.
+        harmless_bound: Certified not to exceed it.
+    """
+
+    radii: FloatArray
+    volumes: FloatArray
+    harmless: float
+    harmless_bound: float
+
+    def radius_at(self, share: float) -> float:
+        """Return the radius at which this share of the first volume is left."""
+        at = np.interp(-share * float(self.volumes[0]), -self.volumes, self.radii)
+        return float(at)
+
+
+def radius_curve(
+    design: Design,
+    rotation: ArrayLike | None = None,
+    *,
+    start: ArrayLike | None = None,
+    cells: int = DEFAULT_CELLS,
+) -> RadiusCurve:
+    """Return the reachable volume against the radius of all legs; the design's count not.
+
+    Args:
+        design: The manipulator.
+        rotation: Platform to base, shape (3, 3); that of the home pose if None.
+        start: The position that is to be connected, shape (3,); that of the home if None.
+        cells: Of the grid, on each axis of the workspace's extent.
+
+    Raises:
+        InputError: the start breaks a limit, or legs cross there.
+    """
+    r = home_rotation(design) if rotation is None else checked_rotation(rotation)
+    p = np.array(home_pose(design).position) if start is None else np.array(start, dtype=float)
+    thin = with_radius(design, 0.0)
+    whole = workspace_solid(thin, r)
+    if whole.is_empty:
+        return RadiusCurve(np.zeros(1), np.zeros(1), 0.0, 0.0)
+    check_start(thin, r, p)
+    least = least_clearances(thin, r)
+    lows, highs = whole.vertices.min(axis=0), whole.vertices.max(axis=0)
+    found = survey(thin, r, middles_over(lows, highs, cells))
+    widest = 0.5 * _widest(found, p)[found.within]
+    radii = np.linspace(0.0, float(widest.max(initial=0.0)), POINTS)
+    # A cell is reached with radii up to its own; none has less than nothing.
+    left = len(widest) - np.searchsorted(np.sort(widest), radii, side="left")
+    left[1:] = np.minimum(left[1:], left[0])
+    shares = left / max(1, len(widest))
+    return RadiusCurve(
+        radii,
+        shares * workspace_volume(thin, r).volume,
+        0.5 * max(0.0, float(least.clearance.min())),
+        0.5 * max(0.0, float(least.bound.min())),
+    )
+
+
+def with_radius(design: Design, radius: float) -> Design:
+    """Return a design whose four legs have one radius."""
+    limits = msgspec.structs.replace(design.limits, leg_radii=(radius,) * 4)
+    return msgspec.structs.replace(design, limits=limits)
+
+
+def _widest(found: Survey, start: FloatArray) -> FloatArray:
+    """Return the least distance of legs on the best way to each node, −1 if there is none."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
+
+    allowed = found.within.ravel()
+    many = len(allowed)
+    distance = found.clearance.reshape(many, -1).min(axis=1)
+    steps = allowed[found.first] & allowed[found.second] & found.clear.all(axis=1)
+    first, second = found.first[steps], found.second[steps]
+    linked = np.flatnonzero(found.linked(start))
+    at_start = float(leg_clearances(found.design, start, found.rotation).clearance.min())
+    # The start is one node more.
+    first = np.append(first, np.full(len(linked), many))
+    second = np.append(second, linked)
+    distance = np.append(distance, at_start)
+    positions = np.vstack([found.grid.positions.reshape(-1, 3), start])
+    width = _narrowest(found, positions, distance, first, second)
+    # The tree of least weight has the widest ways; a weight of zero would be no step.
+    weight = 1.0 + width.max(initial=0.0) - width
+    graph = coo_array((weight, (first, second)), shape=(many + 1, many + 1)).tocsr()
+    tree = minimum_spanning_tree(graph)
+    order, before = breadth_first_order(tree, many, directed=False)
+    both = (tree + tree.T).tocsr()
+    after = order[1:]
+    weights: FloatArray = np.asarray(both[after, before[after]], dtype=np.float64).ravel()
+    widths = 1.0 + width.max(initial=0.0) - weights
+    best: list[float] = [-1.0] * (many + 1)
+    best[many] = at_start
+    preceding: list[int] = before[after].tolist()
+    for node, one_before, step in zip(after.tolist(), preceding, widths.tolist(), strict=True):
+        best[node] = min(best[one_before], step)
+    return np.array(best[:many]).reshape(found.within.shape)
+
+
+def _narrowest(
+    found: Survey, positions: FloatArray, distance: FloatArray, first: IntArray, second: IntArray
+) -> FloatArray:
+    """Return the least distance of legs over each step.
+
+    It is that of one of the ends, but for steps near a crossing, which are looked at.
+    """
+    width = np.minimum(distance[first], distance[second])
+    length = np.linalg.norm(positions[second] - positions[first], axis=1)
+    near = np.flatnonzero(width < length)
+    design, r = found.design, found.rotation
+    a, b = positions[first[near]], positions[second[near]]
+    looked = move_clearances(design, a, r, b, r, tolerance=TOLERANCE * design.reach)
+    width[near] = np.maximum(0.0, np.minimum(width[near], looked.clearance.min(axis=-1)))
+    return width

@@ -1,0 +1,270 @@
+"""The reachable workspace: what the home pose leads to without a collision of legs.
+
+A component of a grid of nodes and certified steps tells on which side of the collisions
+the home lies; the solid is that of the limits, exact where they bound it, carved along the
+collision surface. See section 7 of design.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from explorer.arrays import FloatArray, IntArray
+from explorer.clearance import PAIRS, radii_of_pairs
+from explorer.collision_surface import nearest_pair, settle
+from explorer.constraints import Constraint, constraints
+from explorer.design import Design
+from explorer.errors import InputError
+from explorer.home import home_pose
+from explorer.least_clearance import LeastClearances, least_clearances
+from explorer.pose import checked_rotation
+from explorer.reachable_nodes import (
+    ALL_PAIRS,
+    Grid,
+    Survey,
+    grid_over,
+    survey,
+)
+from explorer.region import region_of
+from explorer.solid import Solid
+from explorer.solids import Surface, carved_solid, workspace_solid
+from explorer.start import check_start
+from explorer.workspace import (
+    check_node_count,
+    home_rotation,
+    node_range,
+    node_step_of,
+    workspace_volume,
+)
+
+# Nodes on each axis of the workspace's extent, and of the grid beyond it on either side.
+DEFAULT_NODES = 40
+FEWEST_NODES, MOST_NODES = 8, 160
+BEYOND = 2
+# Where legs without radii merely touch, the surface is put this share of the reach beyond,
+# since it may coincide with a limit.
+TOUCHING = 1e-4
+# Nodes of the paper's grid, whose steps are all looked at.
+MOST_PAPER_NODES = 2_000_000
+CUBE = np.ones((3, 3, 3), dtype=np.bool_)
+PAIR_NAMES = tuple(f"legs {first}–{second}" for first, second in PAIRS)
+"""What the faces come from that lie where a pair begins to collide."""
+
+
+@dataclass(frozen=True)
+class PairCost:
+    """What one pair of legs means for a workspace.
+
+    Attributes:
+        legs: Such as (1, 2).
+        clearance: The least within the limits, in design units; below zero in collision,
+            inf for a pair that shares a joint.
+        bound: Certified not to be undercut there.
+        blocked_volume: What this pair alone takes from the workspace, in cubed design
+            units: where it collides, and what it cuts off from the home pose.
+    """
+
+    legs: tuple[int, int]
+    clearance: float
+    bound: float
+    blocked_volume: float
+
+
+@dataclass(frozen=True)
+class ReachableWorkspace:
+    """A constant-orientation workspace within the limits, and what of it can be reached.
+
+    Attributes:
+        volume: Within the limits, exact, in cubed design units.
+        reachable_volume: Of what can be reached.
+        solid: What can be reached.
+        step: Of the paper's grid of nodes, see `explorer.workspace.NodeCount`.
+        node_count: How many of its nodes lie within the limits.
+        reachable_node_count: How many of these can be reached by steps of the grid.
+        pairs: In the order of `PAIRS`.
+    """
+
+    volume: float
+    reachable_volume: float
+    solid: Solid
+    step: float
+    node_count: int
+    reachable_node_count: int
+    pairs: tuple[PairCost, ...]
+
+    @property
+    def harmless_radius(self) -> float:
+        """By how much all radii may grow before any two legs collide, 0 if some touch."""
+        return max(0.0, 0.5 * min(pair.clearance for pair in self.pairs))
+
+
+def reachable_workspace(
+    design: Design,
+    rotation: ArrayLike | None = None,
+    *,
+    start: ArrayLike | None = None,
+    nodes: int = DEFAULT_NODES,
+    node_step: float | None = None,
+    tolerance: float | None = None,
+) -> ReachableWorkspace:
+    """Return what can be reached at one orientation without a collision of legs.
+
+    Args:
+        design: The manipulator; the radii are those of its limits.
+        rotation: Platform to base, shape (3, 3); that of the home pose if None.
+        start: The position that is to be connected, shape (3,); that of the home if None.
+        nodes: Of the grid, on each axis of the workspace's extent.
+        node_step: Of the paper's grid of nodes, as of `explorer.workspace_nodes`.
+        tolerance: Of the solid where limits bound it, as of `explorer.workspace_solid`.
+            Where collisions do, faces are as long as the step of the grid.
+
+    Raises:
+        InputError: the start collides or breaks a limit, or a number is out of range.
+    """
+    r = home_rotation(design) if rotation is None else checked_rotation(rotation)
+    p = np.array(home_pose(design).position) if start is None else np.array(start, dtype=float)
+    if not FEWEST_NODES <= nodes <= MOST_NODES:
+        raise InputError(
+            f"the nodes on an axis must be from {FEWEST_NODES} to {MOST_NODES}; got {nodes}"
+        )
+    limits = constraints(design, r)
+    whole = workspace_solid(design, r, tolerance)
+    step = node_step_of(design, node_step)
+    least = least_clearances(design, r)
+    if whole.is_empty:
+        pairs = (_cost(pair, least, 0.0) for pair in ALL_PAIRS)
+        return ReachableWorkspace(0.0, 0.0, whole, step, 0, 0, tuple(pairs))
+    check_start(design, r, p)
+    volume = workspace_volume(design, r).volume
+    carver = _Carver(design, r, limits, p, whole, volume, tolerance, nodes)
+    blocking = [pair for pair in ALL_PAIRS if least.bound[pair] <= 0.0 and carver.blocks(pair)]
+    solid, reachable = carver.carved(blocking)
+    costs = [
+        _cost(pair, least, _blocked(carver, pair, blocking, volume - reachable))
+        for pair in ALL_PAIRS
+    ]
+    within, reached = _paper_nodes(design, r, limits, p, step)
+    return ReachableWorkspace(volume, reachable, solid, step, within, reached, tuple(costs))
+
+
+def _blocked(carver: _Carver, pair: int, blocking: Sequence[int], all_blocked: float) -> float:
+    if pair not in blocking:
+        return 0.0
+    if len(blocking) == 1:
+        return all_blocked
+    return max(0.0, carver.volume - carver.carved([pair])[1])
+
+
+def _cost(pair: int, least: LeastClearances, blocked: float) -> PairCost:
+    clearance, bound = float(least.clearance[pair]), float(least.bound[pair])
+    return PairCost(PAIRS[pair], clearance, bound, blocked)
+
+
+def _paper_nodes(
+    design: Design,
+    rotation: FloatArray,
+    limits: tuple[Constraint, ...],
+    start: FloatArray,
+    step: float,
+) -> tuple[int, int]:
+    """Return how many nodes of the paper's grid are within the limits, and are reached."""
+    first, many = node_range(region_of(limits), step)
+    check_node_count(many, step, MOST_PAPER_NODES)
+    if not many.all():
+        return 0, 0
+    x, y, z = many.astype(int).tolist()
+    found = survey(design, rotation, Grid(first * step, np.full(3, step), (x, y, z)))
+    return int(found.within.sum()), int(found.reached(start).sum())
+
+
+class _Carver:
+    """Carves the workspace within the limits along the collisions of chosen pairs.
+
+    Args:
+        design: The manipulator.
+        rotation: Platform to base, shape (3, 3).
+        limits: Of the design at that orientation.
+        start: A position without trouble, shape (3,).
+        whole: The workspace within the limits.
+        volume: Its exact volume.
+        tolerance: Of the solid.
+        nodes: On each axis.
+    """
+
+    def __init__(
+        self,
+        design: Design,
+        rotation: FloatArray,
+        limits: tuple[Constraint, ...],
+        start: FloatArray,
+        whole: Solid,
+        volume: float,
+        tolerance: float | None,
+        nodes: int,
+    ) -> None:
+        self.design, self.rotation, self.limits, self.start = design, rotation, limits, start
+        self.whole, self.volume, self.tolerance, self.nodes = whole, volume, tolerance, nodes
+        self.radii = radii_of_pairs(design)
+
+    @cached_property
+    def survey(self) -> Survey:
+        """The grid; made only if some pair may collide at all."""
+        lows, highs = self.whole.vertices.min(axis=0), self.whole.vertices.max(axis=0)
+        grid = grid_over(lows, highs, self.nodes, BEYOND)
+        return survey(self.design, self.rotation, grid)
+
+    def blocks(self, pair: int) -> bool:
+        """Whether a pair that may collide takes any volume.
+
+        Legs without radii take none where they cross, but for what they cut off.
+        """
+        if self.radii[pair] > 0.0:
+            return True
+        found = self.survey
+        cut = found.reached(self.start, ()) & ~found.reached(self.start, [pair])
+        return bool((cut & (found.clearance[..., pair] > 0.0)).any())
+
+    def carved(self, pairs: Sequence[int]) -> tuple[Solid, float]:
+        """Return the part with the start where none of these pairs collides, and its volume."""
+        args = (self.design, self.limits)
+        if not pairs:
+            solid = carved_solid(*args, None, self.start, self.tolerance)
+        else:
+            surface = self._surface(pairs)
+            solid = carved_solid(*args, surface, self.start, self.tolerance)
+        # What facets lack at the limits they lack of both, so the difference is exact there.
+        return solid, max(0.0, self.volume - max(0.0, self.whole.volume - solid.volume))
+
+    def _surface(self, pairs: Sequence[int]) -> Surface:
+        from scipy.ndimage import binary_dilation
+
+        found, (design, rotation) = self.survey, (self.design, self.rotation)
+        reached = found.reached(self.start, pairs)
+        flooded = found.flooded(reached, pairs)
+        clearance = np.minimum(found.clearance[..., list(pairs)].min(axis=-1), design.reach)
+        # Beyond a wall that has no thickness the distance from it counts as negative.
+        values = clearance * np.where(flooded, 1.0, -np.sign(clearance))
+        touching = TOUCHING * design.reach
+        if not self.radii[list(pairs)].all():
+            values = values + touching
+        # Far from what is within the limits there is nothing to cut.
+        near: Any = binary_dilation(found.within, CUBE)
+        values[~near] = np.abs(values[~near])
+
+        def name_of(points: FloatArray) -> IntArray:
+            return nearest_pair(design, rotation, pairs, points)
+
+        return Surface(
+            values,
+            found.grid.lows,
+            found.grid.step,
+            partial(settle, design, rotation, pairs, touching, found.grid.step),
+            PAIR_NAMES,
+            name_of,
+        )
