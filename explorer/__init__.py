@@ -83,10 +83,7 @@ _HOMES = {
         "nearest_singularities",
     ),
     "pose": (
-        "PairCost",
         "Pose",
-        "RadiusCurve",
-        "ReachableWorkspace",
         "quaternion_from_rotation",
         "rotation_from_quaternion",
         "rotation_from_yaw_pitch_roll",
