@@ -1,0 +1,403 @@
+"""Problems of optimal design: what may change, what is wanted, what must hold.
+
+A problem is a plain value: it goes to another process, into a file, and back. It starts
+from a design, whose own limits (the box among them) bound its workspace as always.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import Literal, get_args
+
+import msgspec
+
+from explorer.checks import LARGEST_NUMBER
+from explorer.design import DEGENERATE_RATIO, LENGTHS, VARIABLES, Design, Limits, Swing
+from explorer.errors import InputError
+from explorer.home import home_pose
+from explorer.pose import Pose, Triple, yaw_pitch_roll_from_rotation
+
+ObjectiveName = Literal["match-volume", "smallest-reach", "largest-volume", "largest-margin"]
+
+OBJECTIVES: tuple[ObjectiveName, ...] = get_args(ObjectiveName)
+"""What can be wanted: the volume that is demanded (the paper's F = |1 − V/V′|), the
+smallest reach with it, the largest volume, the largest worst margin over the required box."""
+
+YAW = "yaw"
+REACH = "reach"
+SHIFTS = ("shift x", "shift y", "shift z")
+OPTIONAL = (YAW, REACH, *SHIFTS)
+"""What may change besides the six design variables: the yaw of home in degrees, one maximum
+for all four lengths, and how far the required box is shifted along each axis."""
+
+Box = tuple[Triple, Triple]
+
+# Default bounds, as multiples of the start's largest variable.
+A3_WITHIN, B_WITHIN = 3.0, 1.0
+# How near a design may come to a degenerate one by default, as such a share.
+LEAST = 0.05
+# Where clearances are demanded by default: from this margin on, as a share of the reach.
+MARGIN_OF_CLEARANCE = 0.05
+# Degrees of yaw that may change, and that stay between the two lines.
+YAW_WITHIN, LINES_APART = 45.0, 5.0
+
+
+class Variable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Something that may change, within bounds.
+
+    Attributes:
+        name: One of `VARIABLES` or `OPTIONAL`.
+        low, high: In design units; of the yaw in degrees.
+    """
+
+    name: str
+    low: float
+    high: float
+
+
+class Demands(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What must hold besides the design's own limits; None is no demand.
+
+    Attributes:
+        volume: Of the workspace, exact, in cubed design units: to match, or at least.
+        reach: The largest length allowed.
+        clearance: Smallest clearance of each pair of legs, radii taken off, wherever in the
+            workspace every margin is at least `clearance_margin`. Nearer to a singularity
+            legs may have to meet: with a level platform all four lie in the base at κ3 = 0.
+        clearance_margin: See above, in design units.
+        least: Smallest |a3y|, |b1y| and |b3 − b2|, at zero of which a design is degenerate.
+        stroke_ratio: Longest over shortest of each actuator: raises its minimum length to
+            its maximum over this ratio, so that the workspace is what such strokes reach.
+        required_box: (lows, highs) of positions that must lie in the workspace.
+    """
+
+    volume: float | None = None
+    reach: float | None = None
+    clearance: float | None = None
+    clearance_margin: float = 0.0
+    least: float = 0.0
+    stroke_ratio: float | None = None
+    required_box: Box | None = None
+
+
+class Problem(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A problem of optimal design.
+
+    Attributes:
+        start: Where to begin; its home pose is given, so that it does not jump about.
+        objective: One of `OBJECTIVES`.
+        variables: What may change; everything else stays as in the start.
+        demands: What must hold.
+
+    Raises:
+        InputError: bounds that cross or leave the start out, numbers that are not finite or
+            out of range, or an objective that nothing free has an influence on.
+    """
+
+    start: Design
+    objective: ObjectiveName
+    variables: tuple[Variable, ...]
+    demands: Demands = Demands()
+
+    def __post_init__(self) -> None:
+        if self.start.home is None:
+            home = home_pose(self.start)
+            with_home = msgspec.structs.replace(self.start, home=home)
+            msgspec.structs.force_setattr(self, "start", with_home)
+        if self.objective not in OBJECTIVES:
+            raise InputError(f"no objective {self.objective!r}; there are {', '.join(OBJECTIVES)}")
+        if self.start.limits.swing != Swing():
+            raise InputError(
+                "the volume has no gradient while joints bound the swing of legs: take "
+                "limits.swing out of the design to optimise it"
+            )
+        _check_variables(self)
+        _check_demands(self)
+        _check_objective(self)
+
+    @property
+    def size(self) -> float:
+        """The start's largest variable, which lengths are scaled by."""
+        return max(map(abs, self.start.variables))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of the variables."""
+        return tuple(each.name for each in self.variables)
+
+    @property
+    def start_values(self) -> tuple[float, ...]:
+        """The values of the variables at the start."""
+        return tuple(start_value(self.start, each.name) for each in self.variables)
+
+    def design_at(self, values: Iterable[float]) -> Design:
+        """Return the design with these values of the variables.
+
+        Raises:
+            DesignError: the values make a degenerate design.
+        """
+        given = dict(zip(self.names, values, strict=True))
+        start = self.start
+        own = zip(VARIABLES, start.variables, strict=True)
+        design = start.with_variables([given.get(name, value) for name, value in own])
+        if YAW in given:
+            home = home_pose(start)
+            _, pitch, roll = yaw_pitch_roll_from_rotation(home.rotation).tolist()
+            home = Pose.of_yaw_pitch_roll(home.position, (given[YAW], pitch, roll))
+            design = msgspec.structs.replace(design, home=home)
+        limits = design.limits
+        if REACH in given:
+            ranges = {name: (getattr(limits, name)[0], given[REACH]) for name in LENGTHS}
+            limits = _with_lengths(limits, ranges)
+            design = msgspec.structs.replace(design, limits=limits)
+        ratio = self.demands.stroke_ratio
+        if ratio is not None:
+            ranges = {
+                name: (
+                    max(getattr(limits, name)[0], design.length_range(name)[1] / ratio),
+                    getattr(limits, name)[1],
+                )
+                for name in LENGTHS
+            }
+            design = msgspec.structs.replace(design, limits=_with_lengths(limits, ranges))
+        return design
+
+    @property
+    def wanted_volume(self) -> float:
+        """The volume that is demanded.
+
+        Raises:
+            InputError: none is.
+        """
+        if self.demands.volume is None:
+            raise InputError("this problem demands no volume")
+        return self.demands.volume
+
+    def required_box_at(self, values: Iterable[float]) -> Box:
+        """Return the required box where these values of the variables shift it to.
+
+        Raises:
+            InputError: no box is required.
+        """
+        if self.demands.required_box is None:
+            raise InputError("this problem requires no box within the workspace")
+        given = dict(zip(self.names, values, strict=True))
+        x, y, z = (given.get(name, 0.0) for name in SHIFTS)
+        (ax, ay, az), (bx, by, bz) = self.demands.required_box
+        return (ax + x, ay + y, az + z), (bx + x, by + y, bz + z)
+
+
+def make_problem(
+    start: Design,
+    objective: ObjectiveName,
+    *,
+    volume: float | None = None,
+    reach: float | None = None,
+    clearance: float | None = None,
+    clearance_margin: float | None = None,
+    least: float | None = None,
+    stroke_ratio: float | None = None,
+    required_box: Box | None = None,
+    free: Iterable[str] = (),
+    bounds: Iterable[Variable] = (),
+) -> Problem:
+    """Return a problem with sensible bounds and margins where none are given.
+
+    Args:
+        start: Where to begin.
+        objective: One of `OBJECTIVES`.
+        volume: See `Demands`; the start's own for the smallest reach if None.
+        reach: See `Demands`; the start's own for the largest volume if None.
+        clearance: See `Demands`.
+        clearance_margin: See `Demands`; a 20th of the start's reach if None.
+        least: See `Demands`; if None a 20th of the start's largest variable, or less where
+            the start itself is half as far from degenerate.
+        stroke_ratio: See `Demands`.
+        required_box: See `Demands`.
+        free: What of `OPTIONAL` may change besides the six design variables.
+        bounds: Variables with bounds in the place of the default ones.
+
+    Raises:
+        InputError: see `Problem`.
+    """
+    given = {each.name: each for each in bounds}
+    names = [*VARIABLES, *free, *(name for name in given if name not in VARIABLES)]
+    variables = [given.get(name) or default_variable(start, name) for name in dict.fromkeys(names)]
+    size = max(map(abs, start.variables))
+    if volume is None and objective == "smallest-reach":
+        volume = _own_volume(start)
+    if reach is None and objective == "largest-volume":
+        reach = longest_length(start)
+    if least is None:
+        least = min(LEAST * size, 0.5 * min(abs(distance_of(start, name)) for name in DISTANCES))
+    if clearance_margin is None:
+        clearance_margin = MARGIN_OF_CLEARANCE * start.reach
+    return Problem(
+        start=start,
+        objective=objective,
+        variables=tuple(variables),
+        demands=Demands(
+            volume=volume,
+            reach=reach,
+            clearance=clearance,
+            clearance_margin=clearance_margin,
+            least=least,
+            stroke_ratio=stroke_ratio,
+            required_box=required_box,
+        ),
+    )
+
+
+def default_variable(start: Design, name: str) -> Variable:
+    """Return a variable with bounds that leave room around a start.
+
+    Raises:
+        InputError: no such variable.
+    """
+    size = max(map(abs, start.variables))
+    value = start_value(start, name)
+    if name in ("a3x", "a3y"):
+        return Variable(name, -A3_WITHIN * size, A3_WITHIN * size)
+    if name in VARIABLES:
+        return Variable(name, -B_WITHIN * size, B_WITHIN * size)
+    if name == REACH:
+        return Variable(name, value / A3_WITHIN, A3_WITHIN * value)
+    if name in SHIFTS:
+        return Variable(name, -size, size)
+    # Between the two yaws at which the lines are parallel, if the start is.
+    below = 180.0 * math.floor(value / 180.0)
+    low = max(value - YAW_WITHIN, min(value, below + LINES_APART))
+    high = min(value + YAW_WITHIN, max(value, below + 180.0 - LINES_APART))
+    return Variable(name, low, high)
+
+
+DISTANCES = ("a3y", "b1y", "b3 − b2")
+"""What makes a design degenerate at zero."""
+
+
+def distance_of(design: Design, name: str) -> float:
+    """Return one of `DISTANCES`, with its sign."""
+    return {"a3y": design.a3[1], "b1y": design.b1[1]}.get(name, design.b3 - design.b2)
+
+
+def start_value(start: Design, name: str) -> float:
+    """Return the value of a variable in a design.
+
+    Raises:
+        InputError: no such variable.
+    """
+    if name in VARIABLES:
+        return start.variables[VARIABLES.index(name)]
+    if name == YAW:
+        return float(yaw_pitch_roll_from_rotation(home_pose(start).rotation)[0])
+    if name == REACH:
+        return longest_length(start)
+    if name in SHIFTS:
+        return 0.0
+    raise InputError(f"no variable {name!r}; there are {', '.join((*VARIABLES, *OPTIONAL))}")
+
+
+def longest_length(design: Design) -> float:
+    """Return the largest of the four maximum lengths."""
+    return max(design.length_range(name)[1] for name in LENGTHS)
+
+
+def _own_volume(start: Design) -> float:
+    from explorer.workspace import workspace_volume
+
+    volume = workspace_volume(start).volume
+    if volume <= 0.0:
+        raise InputError("the start has an empty workspace: say which volume is wanted")
+    return volume
+
+
+def _with_lengths(limits: Limits, ranges: Mapping[str, tuple[float, float | None]]) -> Limits:
+    return msgspec.structs.replace(limits, **ranges)
+
+
+def _check_variables(problem: Problem) -> None:
+    names = problem.names
+    if not names:
+        raise InputError("nothing may change: name at least one variable")
+    if len(set(names)) < len(names):
+        raise InputError(f"each variable may be named once; got {', '.join(names)}")
+    for each, value in zip(problem.variables, problem.start_values, strict=True):
+        unit = "°" if each.name == YAW else ""
+        for end in (each.low, each.high):
+            if not abs(end) <= LARGEST_NUMBER:
+                raise InputError(f"the bounds of {each.name} must be finite numbers; got {end}")
+        if each.low > each.high:
+            raise InputError(
+                f"the bounds of {each.name} cross: low {each.low:g}{unit}, high {each.high:g}{unit}"
+            )
+        if not each.low <= value <= each.high:
+            raise InputError(
+                f"the start has {each.name} = {value:g}{unit}, outside its bounds "
+                f"{each.low:g}{unit} to {each.high:g}{unit}: widen them or start elsewhere"
+            )
+        if each.name == REACH and each.low <= 0.0:
+            raise InputError(f"the reach must stay positive; its low bound is {each.low:g}")
+        if each.name in SHIFTS and problem.demands.required_box is None:
+            raise InputError(f"{each.name} shifts the required box, and none is given")
+
+
+def _check_demands(problem: Problem) -> None:
+    demands = problem.demands
+    for name, value in (
+        ("volume", demands.volume),
+        ("reach", demands.reach),
+        ("clearance", demands.clearance),
+    ):
+        if value is not None and not 0.0 < value <= LARGEST_NUMBER:
+            raise InputError(f"the {name} demanded must be a positive number; got {value:g}")
+    for name, value in (("clearance margin", demands.clearance_margin), ("least", demands.least)):
+        if not 0.0 <= value <= LARGEST_NUMBER:
+            raise InputError(f"the {name} must be a number of at least zero; got {value:g}")
+    if demands.clearance is not None and not demands.clearance_margin > 0.0:
+        raise InputError(
+            "clearance can be demanded only off the singular planes, where legs may have to "
+            "meet: give a positive clearance margin"
+        )
+    ratio = demands.stroke_ratio
+    if ratio is not None and not 1.0 < ratio <= LARGEST_NUMBER:
+        raise InputError(f"a stroke ratio is longest over shortest, above 1; got {ratio:g}")
+    for name in DISTANCES:
+        distance = abs(distance_of(problem.start, name))
+        # A start made of rounded numbers may lie on the bound.
+        if distance < demands.least * (1.0 - DEGENERATE_RATIO):
+            raise InputError(
+                f"the start has |{name}| = {distance:g}, below the least allowed "
+                f"{demands.least:g}: start elsewhere or lower it"
+            )
+    if demands.required_box is not None:
+        for axis, low, high in zip("xyz", *demands.required_box, strict=True):
+            if not (abs(low) <= LARGEST_NUMBER and abs(high) <= LARGEST_NUMBER):
+                raise InputError(f"the required box must be finite; got {axis} {low} to {high}")
+            if low > high:
+                raise InputError(f"the required box is reversed: {axis} {low:g} to {high:g}")
+
+
+def _check_objective(problem: Problem) -> None:
+    limits = problem.start.limits
+    names, demands = problem.names, problem.demands
+    tied = all(getattr(limits, name)[1] is None for name in LENGTHS)
+    match problem.objective:
+        case "match-volume" | "smallest-reach":
+            if demands.volume is None:
+                raise InputError(f"{problem.objective} needs a volume")
+            if problem.objective == "smallest-reach" and not (REACH in names or tied):
+                raise InputError(
+                    "the design fixes maximum lengths: set them to null (the reach |a3|), or "
+                    "let the reach change as a variable of its own"
+                )
+        case "largest-volume":
+            pass
+        case "largest-margin":
+            if demands.required_box is None:
+                raise InputError("largest-margin needs a required box to be margins over")
+            if not {YAW, *SHIFTS} & {*names}:
+                raise InputError(
+                    "margins do not depend on the design variables: let the yaw or the place "
+                    "of the required box (shift x, shift y, shift z) change"
+                )
