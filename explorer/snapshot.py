@@ -23,6 +23,7 @@ from explorer.kinematics import (
     inverse,
 )
 from explorer.limits import Violation, violations
+from explorer.nearest_singular import NearestSingularity, nearest_singularities
 from explorer.pose import Pose
 from explorer.singularity import (
     determinant,
@@ -81,6 +82,11 @@ class Snapshot:
     def clearances(self) -> LegClearances:
         """The clearances of the six pairs of legs."""
         return leg_clearances(self.design, np.array(self.pose.position), self.rotation)
+
+    @cached_property
+    def nearest(self) -> tuple[NearestSingularity, NearestSingularity, NearestSingularity]:
+        """The nearest singular pose of each incidence, in the order κ1, κ2, κ3."""
+        return nearest_singularities(self.design, self.pose)
 
     @cached_property
     def modes(self) -> ForwardKinematics:

@@ -28,7 +28,7 @@ def inversions(permutation: tuple[int, ...]) -> int:
     return sum(a > b for a, b in itertools.combinations(permutation, 2))
 
 
-def _ranks(permutation: tuple[int, ...]) -> IntArray:
+def ranks(permutation: tuple[int, ...]) -> IntArray:
     """Return r_ij, shape (3, 3): entries of the permutation's first i rows in j columns."""
     return np.array([[sum(v <= j for v in permutation[:i]) for j in (1, 2, 3)] for i in (1, 2, 3)])
 
@@ -38,7 +38,7 @@ STRATA: tuple[tuple[int, ...], ...] = tuple(
 )
 """The 24 permutations by dimension, from both flags coinciding to the generic one."""
 
-_RANKS_OF_STRATA = np.stack([_ranks(w) for w in STRATA])
+_RANKS_OF_STRATA = np.stack([ranks(w) for w in STRATA])
 
 
 def stratum(position: ArrayLike, rotation: ArrayLike, length: float | None = None) -> IntArray:

@@ -4,8 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from explorer.bruhat import incidences, words
 from explorer.cli.options import DesignOptions, JsonOptions, PoseOptions
-from explorer.cli.output import figure, heading, pose_table, table, write_json, write_lines
+from explorer.cli.output import (
+    degrees,
+    figure,
+    figures,
+    heading,
+    pose_table,
+    table,
+    write_json,
+    write_lines,
+)
+from explorer.pose import yaw_pitch_roll_from_rotation
 from explorer.singularity import INCIDENCES, TETRAHEDRA, mode_name
 from explorer.snapshot import Snapshot, evaluate
 
@@ -15,7 +26,8 @@ class Singularity(JsonOptions, PoseOptions, DesignOptions):
     """Tell how near a pose is to a singularity, and to which.
 
     Each of the three margins is zero where one of three tetrahedra is flat; together their
-    signs name the assembly mode.
+    signs name the assembly mode. The nearest singular poses are nearest in the
+    root-mean-square way of the platform's points b1 to b4.
     """
 
     def run(self) -> None:
@@ -38,6 +50,16 @@ class Singularity(JsonOptions, PoseOptions, DesignOptions):
                     "mode": snapshot.mode,
                     "signs": list(snapshot.signs),
                     "proximity": snapshot.proximity,
+                    "incidences": list(incidences(snapshot.stratum)),
+                    "nearest": [
+                        {
+                            "incidence": each.incidence,
+                            "distance": each.distance,
+                            "position": list(each.pose.position),
+                            "quaternion": list(each.pose.quaternion),
+                        }
+                        for each in snapshot.nearest
+                    ],
                 }
             )
         else:
@@ -48,6 +70,8 @@ class Singularity(JsonOptions, PoseOptions, DesignOptions):
                 _margin_table(snapshot),
                 "",
                 _measures(snapshot),
+                "",
+                _nearest_table(snapshot),
             )
 
 
@@ -70,13 +94,29 @@ def _margin_table(snapshot: Snapshot) -> str:
 
 def _measures(snapshot: Snapshot) -> str:
     stratum = " ".join(map(str, snapshot.stratum))
+    names = [INCIDENCES[index - 1] for index in incidences(snapshot.stratum)]
     return table(
         [
+            ("singular", " and ".join(names) or "no"),
             ("assembly mode", f"{snapshot.mode} ({mode_name(snapshot.mode)})"),
-            ("stratum", f"{stratum}, dimension {snapshot.stratum_dimension}"),
+            (
+                "stratum",
+                f"{stratum}, dimension {snapshot.stratum_dimension}: {words(snapshot.stratum)}",
+            ),
             ("det J", figure(snapshot.determinant)),
             ("inverse condition", f"{figure(snapshot.inverse_condition)} (0 singular, 1 best)"),
             ("proximity", f"{figure(snapshot.proximity)} (least |κ| over the reach)"),
         ],
         "<<",
     )
+
+
+def _nearest_table(snapshot: Snapshot) -> str:
+    rows = [("nearest with", "units", "mm", "at x", "y", "z", "yaw", "pitch", "roll")]
+    for each in snapshot.nearest:
+        x, y, z = figures(each.pose.position)
+        angles = yaw_pitch_roll_from_rotation(each.pose.rotation).tolist()
+        yaw, pitch, roll = degrees(angles)
+        distance = (figure(each.distance), figure(each.distance * snapshot.design.unit_mm))
+        rows.append((f"κ{each.incidence} = 0", *distance, x, y, z, yaw, pitch, roll))
+    return table(rows, "<>>>>>>>>")

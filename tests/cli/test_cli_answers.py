@@ -68,6 +68,16 @@ def test_singularity_gives_what_the_snapshot_holds(capsys: pytest.CaptureFixture
         "mode": expected.mode,
         "signs": list(expected.signs),
         "proximity": expected.proximity,
+        "incidences": [],
+        "nearest": [
+            {
+                "incidence": index + 1,
+                "distance": expected.nearest[index].distance,
+                "position": list(expected.nearest[index].pose.position),
+                "quaternion": list(expected.nearest[index].pose.quaternion),
+            }
+            for index in range(3)
+        ],
     }
 
 
@@ -75,6 +85,20 @@ def test_singularity_of_a_singular_pose_is_an_answer(capsys: pytest.CaptureFixtu
     found = answer(capsys, "singularity", "--position", "0", "0", "0")
     assert found["determinant"] == 0.0
     assert found["stratum_dimension"] < 5
+    assert found["incidences"] == [1, 2, 3]
+    assert [each["distance"] for each in found["nearest"]] == [0.0, 0.0, 0.0]
+    assert all(each["position"] == [0.0, 0.0, 0.0] for each in found["nearest"])
+
+
+def test_singularity_says_which_incidence_a_pose_has(capsys: pytest.CaptureFixture[str]) -> None:
+    argv = ["singularity", "--position", "10", "5", "0", "--yaw-pitch-roll", "-70", "20", "30"]
+    assert run(argv) == 0
+    text = capsys.readouterr().out
+    (row,) = [line for line in text.splitlines() if line.startswith("singular ")]
+    assert row.split(maxsplit=1)[1] == "b4 on the base plane"
+    assert "stratum            4 3 1 2, dimension 5: b4 on the base plane" in text
+    (row,) = [line for line in text.splitlines() if line.startswith("κ3 = 0")]
+    assert [float(word) for word in row.split()[3:7]] == [0.0, 0.0, 10.0, 5.0]
 
 
 def test_forward_of_inverse_holds_the_pose_in_its_mode(

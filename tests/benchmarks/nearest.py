@@ -1,0 +1,52 @@
+"""The nearest singular pose of all three incidences, beside SLSQP from many starts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from multistart import searched_distance
+
+from benchmarks.samples import DESIGN, around_home
+from benchmarks.table import Row, seconds, times
+from benchmarks.timing import best_of
+from explorer import Pose, nearest_singular_poses, nearest_singularities
+from explorer.compiled import warm
+
+CALLS, POSES, SEARCHES = 200, 5_000, 10
+# So many that the search, too, finds the nearest for nearly all poses.
+STARTS = 12
+
+
+def run() -> Iterator[Row]:
+    """Yield the rows."""
+    positions, rotations, _ = around_home(POSES)
+    poses = [Pose.of(p, r) for p, r in zip(positions[:CALLS], rotations[:CALLS], strict=True)]
+    warm()
+
+    def calls() -> None:
+        for pose in poses:
+            nearest_singularities(DESIGN, pose)
+
+    duration = best_of(5, calls) / CALLS
+    exact = nearest_singular_poses(DESIGN, positions[:SEARCHES], rotations[:SEARCHES]).distance
+    searched = np.empty((SEARCHES, 3))
+
+    def search() -> None:
+        for index in range(SEARCHES):
+            for incidence in (1, 2, 3):
+                searched[index, incidence - 1] = searched_distance(
+                    DESIGN, positions[index], rotations[index], incidence, STARTS
+                )
+
+    search_time = best_of(1, search) / SEARCHES
+    yield Row(
+        "nearest singular pose, all three incidences",
+        seconds(duration),
+        "1 ms",
+        f"SLSQP from {STARTS} starts: {seconds(search_time)}, "
+        f"apart by {np.abs(searched - exact).max():.1g} at the most; "
+        f"{times(search_time / duration)}",
+    )
+    batch = best_of(3, lambda: nearest_singular_poses(DESIGN, positions, rotations)) / POSES
+    yield Row(f"the same in a batch of {POSES:,}, each, one core", seconds(batch))
