@@ -26,6 +26,7 @@ LAYERS = (
         "singularity",
         "strata",
         "bruhat",
+        "uncoupled",
         "displacement",
         "nearest_plane",
         "nearest_lines",

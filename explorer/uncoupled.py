@@ -1,0 +1,125 @@
+"""Six motions that move exactly one margin each, and how far each goes (design.md, section 5).
+
+A flag keeps its point, its line and its plane in three of them: along the axis x the point
+moves on its line, about x the plane turns about the line, about z the line turns in the plane.
+So each moves what only one incidence is about. In a translation the margin changes linearly;
+in a rotation by an angle θ it is κ cos θ + κ' sin θ, which vanishes every half turn.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from explorer.arrays import FloatArray
+from explorer.errors import InputError
+from explorer.pose import Pose
+from explorer.singularity import margins
+
+# A margin that changes by less than this share of a translation is one that does not.
+NO_RATE = 1e-15
+
+
+@dataclass(frozen=True)
+class Travel:
+    """How far a motion goes to the singularity, either side; in units or in radians.
+
+    Attributes:
+        low: Backwards, not above zero; −inf for never.
+        high: Forwards, not below zero; inf for never.
+    """
+
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class UncoupledMotion:
+    """A motion on an axis of one of the frames that moves one margin and no other.
+
+    Attributes:
+        frame: Whose axis it is on: the platform's go through b4, the base's through a1.
+        kind: Along the axis or about it.
+        axis: Of the frame.
+        incidence: 1, 2 or 3: of which margin.
+    """
+
+    frame: Literal["platform", "base"]
+    kind: Literal["translation", "rotation"]
+    axis: Literal["x", "z"]
+    incidence: int
+
+    @property
+    def name(self) -> str:
+        """Such as "along the platform's x"."""
+        return (
+            f"{'along' if self.kind == 'translation' else 'about'} the {self.frame}'s {self.axis}"
+        )
+
+    def line(self, pose: Pose) -> tuple[FloatArray, FloatArray]:
+        """Return a point of the axis and its unit direction, (3,) each, in the base frame."""
+        unit = np.eye(3)["xyz".index(self.axis)]
+        if self.frame == "base":
+            return np.zeros(3), unit
+        return np.array(pose.position), pose.rotation @ unit
+
+    def moved(self, pose: Pose, amount: float) -> Pose:
+        """Return the pose after the motion.
+
+        Args:
+            pose: Before it.
+            amount: In design units of a translation, in radians of a rotation.
+
+        Raises:
+            InputError: an amount that is not finite.
+        """
+        if not math.isfinite(amount):
+            raise InputError(f"a motion {self.name} needs a finite amount; got {amount}")
+        point, direction = self.line(pose)
+        position = np.array(pose.position)
+        if self.kind == "translation":
+            x, y, z = (position + amount * direction).tolist()
+            return Pose((x, y, z), pose.quaternion)
+        turn = Rotation.from_rotvec(amount * direction).as_matrix()
+        return Pose.of(point + turn @ (position - point), turn @ pose.rotation)
+
+    def rate(self, pose: Pose) -> float:
+        """Return how fast the margin changes with the amount, in units per unit or radian."""
+        # Along the axis all changes are linear; about it a quarter turn later κ is κ'.
+        if self.kind == "rotation":
+            later = self.moved(pose, 0.5 * math.pi)
+            return float(margins(later.position, later.rotation)[self.incidence - 1])
+        along = self.line(pose)[1]
+        return float(margins(along, pose.rotation)[self.incidence - 1])
+
+    def travel(self, pose: Pose) -> Travel:
+        """Return how far the motion goes until the margin is zero, forwards and backwards.
+
+        On the singular set both are zero. A rotation's are half a turn apart.
+        """
+        margin = float(margins(pose.position, pose.rotation)[self.incidence - 1])
+        rate = self.rate(pose)
+        if margin == 0.0:
+            return Travel(0.0, 0.0)
+        if self.kind == "rotation":
+            high = math.atan2(-margin, rate) % math.pi
+            return Travel(high - math.pi, high)
+        if abs(rate) <= NO_RATE:
+            return Travel(-math.inf, math.inf)
+        way = -margin / rate
+        return Travel(way, math.inf) if way < 0.0 else Travel(-math.inf, way)
+
+
+UNCOUPLED = (
+    UncoupledMotion("platform", "rotation", "x", 1),
+    UncoupledMotion("platform", "rotation", "z", 2),
+    UncoupledMotion("platform", "translation", "x", 3),
+    UncoupledMotion("base", "translation", "x", 1),
+    UncoupledMotion("base", "rotation", "z", 2),
+    UncoupledMotion("base", "rotation", "x", 3),
+)
+"""The six motions: three of each frame, in the order of the margins that they move."""
