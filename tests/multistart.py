@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize
@@ -25,7 +27,6 @@ def searched_distance(
     rotation: FloatArray,
     incidence: int,
     starts: int,
-    seed: int = 0,
 ) -> float:
     """Return the least root-mean-square way found to a pose with an incidence.
 
@@ -35,6 +36,34 @@ def searched_distance(
         rotation: Platform to base, shape (3, 3).
         incidence: 1, 2 or 3.
         starts: How many, from the pose itself to any rotation at all.
+    """
+
+    def margin(p: FloatArray, r: FloatArray) -> list[float]:
+        if incidence == 1:
+            return [float(r[:, 2] @ p)]
+        if incidence == 2:
+            return [float(r[1, 0] * p[2] - r[2, 0] * p[1])]
+        return [float(p[2])]
+
+    return searched_least(design, position, rotation, margin, starts)
+
+
+def searched_least(
+    design: Design,
+    position: FloatArray,
+    rotation: FloatArray,
+    condition: Callable[[FloatArray, FloatArray], list[float]],
+    starts: int,
+    seed: int = 0,
+) -> float:
+    """Return the least root-mean-square way found to a pose that meets conditions.
+
+    Args:
+        design: The manipulator, of ordinary size.
+        position: b4, shape (3,).
+        rotation: Platform to base, shape (3, 3).
+        condition: What vanishes there, independent of each other, of position and rotation.
+        starts: How many, from the pose itself to any rotation at all.
         seed: Of the starts.
     """
     rng = np.random.default_rng(seed)
@@ -43,21 +72,18 @@ def searched_distance(
 
     def pose(x: FloatArray) -> tuple[FloatArray, FloatArray]:
         turn = Rotation.from_rotvec(x[3:]).as_matrix()
-        return position + size * x[:3], turn @ rotation
+        return position / size + x[:3], turn @ rotation
 
     def square(x: FloatArray) -> float:
         p, r = pose(x)
-        way = (p - position) + points @ (r - rotation).T
-        return float((way**2).sum()) / (4.0 * size**2)
+        way = (p - position / size) + points @ (r - rotation).T / size
+        return float((way**2).sum()) / 4.0
 
-    def margin(x: FloatArray) -> float:
-        p, r = pose(x)
-        if incidence == 1:
-            return float(r[:, 2] @ p) / size
-        if incidence == 2:
-            return float(r[1, 0] * p[2] - r[2, 0] * p[1]) / size
-        return float(p[2]) / size
+    def off(x: FloatArray) -> FloatArray:
+        return np.array(condition(*pose(x)))
 
+    # The stubs know only conditions of one number.
+    vanishing: Any = {"type": "eq", "fun": off}
     best = np.inf
     for index in range(starts):
         start = np.zeros(6)
@@ -69,9 +95,9 @@ def searched_distance(
                 square,
                 start,
                 method="SLSQP",
-                constraints={"type": "eq", "fun": margin},
+                constraints=vanishing,
                 options={"ftol": 1e-16, "maxiter": 200},
             )
-        if abs(margin(np.asarray(found.x))) < 1e-9:
+        if np.abs(off(np.asarray(found.x))).max() < 1e-9:
             best = min(best, float(found.fun))
     return size * float(np.sqrt(best))

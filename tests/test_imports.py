@@ -31,6 +31,7 @@ LAYERS = (
         "nearest_plane",
         "nearest_lines",
         "nearest_singular",
+        "nearest_stratum",
         "limits",
         "home",
         "feasibility",
