@@ -18,7 +18,6 @@ from explorer.clearance import PAIRS, joined_pairs, leg_axes, pair_rows, radii_o
 from explorer.constraints import YAW, HalfSpace, Round
 from explorer.optimise.demands import Measured
 from explorer.optimise.state import State
-from explorer.singularity import margins
 
 # Sharpness of the smooth extremes, over the clearance demanded.
 SHARPNESS = 60.0
@@ -33,16 +32,14 @@ class ClearanceDemand:
 
     Args:
         clearance: To keep.
-        margin: From which margin on.
         positions: Shape (k, 3).
     """
 
     is_equality = False
     names = tuple(f"clearance of legs {first} and {second}" for first, second in PAIRS)
 
-    def __init__(self, clearance: float, margin: float, positions: FloatArray) -> None:
+    def __init__(self, clearance: float, positions: FloatArray) -> None:
         self.clearance = clearance
-        self.margin = margin
         self.positions = positions
 
     def measure(self, state: State) -> Measured:
@@ -85,11 +82,8 @@ class ClearanceDemand:
         return distance, points, axes
 
     def _outside(self, state: State) -> FloatArray:
-        """Return how far positions are outside each limit, or too near to singular, (k, w)."""
-        p = self.positions
-        ways = [-limit.slack(p) for limit in state.limits]
-        near = self.margin - np.abs(margins(p, state.rotation))
-        return np.column_stack([*ways, near])
+        """Return how far positions are outside each limit, shape (k, w)."""
+        return np.column_stack([-limit.slack(self.positions) for limit in state.limits])
 
     def _outside_slopes(self, state: State, p: FloatArray) -> list[FloatArray]:
         """Return the derivatives of `_outside`, w of shape (k, n)."""
@@ -99,12 +93,6 @@ class ClearanceDemand:
                 slopes.append(-state.slack(limit, p)[1])
             else:
                 slopes.append(np.zeros((len(p), len(state.u))))
-        u, normal = state.rotation[:, 0], state.rotation[:, 2]
-        turned = np.array([[normal[1], -normal[0], 0.0], [0.0, 0.0, u[0]], [0.0, 0.0, 0.0]])
-        signs = np.sign(margins(p, state.rotation))
-        rates = -signs * (p @ turned.T)
-        turning = state.along({YAW: 1.0})
-        slopes.extend(np.outer(rates[:, index], turning) for index in range(3))
         return slopes
 
 

@@ -26,6 +26,7 @@ from explorer.optimise.demands import (
     box_margins,
 )
 from explorer.optimise.problem import Problem
+from explorer.optimise.starts import first_positions
 from explorer.optimise.state import State, scales
 
 
@@ -56,17 +57,16 @@ class Model:
     Args:
         problem: The problem.
         start: Values of its variables to start from.
-        positions: Where clearance is demanded, shape (k, 3).
     """
 
-    def __init__(self, problem: Problem, start: Sequence[float], positions: FloatArray) -> None:
+    def __init__(self, problem: Problem, start: Sequence[float]) -> None:
         self.problem = problem
         self.scales = scales(problem)
         self.count = len(problem.names)
         self.raises_worst = problem.objective == "largest-margin"
         u = np.array(start) / self.scales
         here = State(problem, u)
-        self.demands: list[Demand] = _demands(problem, here, positions)
+        self.demands: list[Demand] = _demands(problem, here)
         self.margins = next((d for d in self.demands if isinstance(d, MarginDemand)), None)
         if self.raises_worst:
             u = np.append(u, float(box_margins(here)[0].min()) / problem.size)
@@ -143,9 +143,8 @@ class Model:
     def _objective(self, state: State, u: FloatArray) -> tuple[float, FloatArray]:
         match self.problem.objective:
             case "match-volume":
-                # Of all designs with the volume the one nearest to where the run began.
-                off = u - self.start
-                return 0.5 * float(off @ off), off
+                # The demand says it all; each step is the smallest that meets it to first order.
+                return 0.0, np.zeros(len(u))
             case "smallest-reach":
                 value, gradient = state.reach
                 return value / self.problem.size, gradient / self.problem.size
@@ -184,7 +183,7 @@ def reported(problem: Problem, state: State) -> float:
             return float(box_margins(state)[0].min())
 
 
-def _demands(problem: Problem, start: State, positions: FloatArray) -> list[Demand]:
+def _demands(problem: Problem, start: State) -> list[Demand]:
     demands = problem.demands
     found: list[Demand] = []
     if demands.volume is not None and problem.objective != "largest-volume":
@@ -201,5 +200,6 @@ def _demands(problem: Problem, start: State, positions: FloatArray) -> list[Dema
     if problem.objective == "largest-margin":
         found.append(MarginDemand())
     if demands.clearance is not None:
-        found.append(ClearanceDemand(demands.clearance, demands.clearance_margin, positions))
+        positions = first_positions(problem, start.design)
+        found.append(ClearanceDemand(demands.clearance, positions))
     return found

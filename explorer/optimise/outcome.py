@@ -59,6 +59,7 @@ class Run:
         best: Its best iterate.
         iterations: Steps of the solver.
         evaluations: Designs that were measured.
+        attempts: How often it began, at the start and elsewhere.
         holding: The demand or bound that holds it, "" if nothing does.
         message: One line for people.
     """
@@ -68,6 +69,7 @@ class Run:
     best: Iterate
     iterations: int
     evaluations: int
+    attempts: int
     holding: str
     message: str
 

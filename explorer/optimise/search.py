@@ -3,103 +3,161 @@
 Nothing is called converged on the solver's own word: a volume is matched when it is, an
 optimum is one when the conditions of an optimum hold, and a clearance is kept when it has
 been looked for over the whole workspace, between the solver's positions too.
+
+Clearances divide the designs into chambers: in the wall between two of them legs cross, and
+no solver that goes down a slope passes it. Where a chamber holds no answer, the search goes
+on in another.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
 
 from explorer.arrays import FloatArray
-from explorer.optimise.least_clearance import least_clearance
-from explorer.optimise.model import Evaluation, Model, reported
+from explorer.optimise.crossings import crossings
+from explorer.optimise.elsewhere import promising
+from explorer.optimise.model import Evaluation, Model
 from explorer.optimise.opening import opened
 from explorer.optimise.optimality import optimality
 from explorer.optimise.outcome import Iterate, Phase, Run, Status
 from explorer.optimise.problem import Problem
 from explorer.optimise.sqp import Stop, solve
-from explorer.optimise.starts import first_positions
 from explorer.optimise.state import State, scales
+from explorer.optimise.trail import MET, Trail
 
 # F = |1 − V/V′| from which on a volume is matched.
 MATCHED = 1e-10
-# Demands are met if none is missed by more than this, dimensionless.
-MET = 1e-8
 # An optimum's conditions hold if their residual is below this.
 OPTIMAL = 1e-5
 # Below this share of the volume wanted a workspace is opened first.
 OPEN = 0.01
-# How often a run is taken up again: after new positions to keep clear, or a stall.
+# How often an attempt is taken up again: after new positions to keep clear, or a stall.
 ROUNDS = 8
+# How often a search goes on elsewhere, and the steps of an attempt at a volume: Newton's
+# method on it is done in a dozen or not at all.
+ATTEMPTS = 8
+STEPS_TO_MATCH = 40
+
+
+class Attempt(NamedTuple):
+    """How one attempt ended."""
+
+    status: Status
+    holding: str
+    message: str
+    best: Iterate
 
 
 class Search:
-    """One run from one start."""
+    """One run.
 
-    def __init__(
-        self,
-        problem: Problem,
-        number: int,
-        start: Sequence[float],
-        most: int,
-        history: Sequence[Iterate],
-        record: Callable[[Iterate], None],
-        stop: Callable[[], bool] | None,
-    ) -> None:
+    Args:
+        problem: The problem.
+        start: Values of its variables to start from.
+        most: The most steps.
+        trail: Takes every iterate.
+    """
+
+    def __init__(self, problem: Problem, start: Sequence[float], most: int, trail: Trail) -> None:
         self.problem = problem
-        self.number = number
         self.start = tuple(start)
         self.left = most
-        self.history = history
-        self.record = record
-        self.stop = stop
+        self.trail = trail
         self.steps = 0
         self.evaluations = 0
-        self.best: Iterate | None = None
-        self.is_cancelled = False
         self.largest = 0.0
 
     def run(self) -> Run:
         """Search, and say how it ended."""
-        u = np.array(self.start) / scales(self.problem)
+        attempts = [self._attempt(self.start)]
+        elsewhere = None
+        while (
+            attempts[-1].status not in ("converged", "cancelled")
+            and self.left > 0
+            and len(attempts) < ATTEMPTS
+        ):
+            elsewhere = elsewhere or promising(self.problem, self.trail.run)
+            values = next(elsewhere, None)
+            if values is None:
+                break
+            attempts.append(self._attempt(values))
+        chosen = min(attempts, key=self._rank)
+        return Run(
+            start=self.start,
+            status=chosen.status,
+            best=chosen.best,
+            iterations=self.steps,
+            evaluations=self.evaluations,
+            attempts=len(attempts),
+            holding=chosen.holding,
+            message=self._message(chosen),
+        )
+
+    def _rank(self, attempt: Attempt) -> tuple[bool, tuple[float, float]]:
+        return attempt.status != "converged", self.trail.rank(attempt.best)
+
+    def _message(self, chosen: Attempt) -> str:
+        wanted = self.problem.demands.volume
+        if chosen.status == "infeasible" and wanted is not None and 0.0 < self.largest < wanted:
+            return (
+                f"no design within the bounds was found with a volume of {wanted:g}; the "
+                f"largest found is {self.largest:.6g}"
+            )
+        return chosen.message or _words(self.problem, chosen, self.steps)
+
+    def _attempt(self, values: Sequence[float]) -> Attempt:
+        """Look for an answer from some values of the variables."""
+        problem, trail = self.problem, self.trail
+        trail.begin()
         try:
-            self._before_each()
-            values = self.start
+            trail.before_each()
+            u = np.array(values) / scales(problem)
             if self._is_closed(u):
-                found = opened(self.problem, u, see=self._see_opening)
+                found = opened(problem, u, see=self._see_opening)
                 if found is None:
-                    because = State(self.problem, u).measured.empty_because
-                    return self._end(
-                        "infeasible",
-                        because[0] if because else "",
+                    because = State(problem, u).measured.empty_because
+                    words = (
                         f"the workspace is empty because of {', '.join(because)}, and no "
-                        "design nearby opens it",
+                        "design nearby opens it"
                     )
-                values = tuple((found * scales(self.problem)).tolist())
-            return self._solve(Model(self.problem, values, first_positions(self.problem)))
+                    return Attempt("infeasible", because[0] if because else "", words, trail.best)
+                values = (found * scales(problem)).tolist()
+            return self._solved(Model(problem, values))
         except Stop:
-            return self._end("cancelled", "", "cancelled")
+            if not trail.history:
+                trail.see_opening(State(problem, np.array(values) / scales(problem)))
+            return Attempt("cancelled", "", "", trail.best)
 
     def _is_closed(self, u: FloatArray) -> bool:
+        """Whether the workspace has to be opened first."""
         if self.problem.objective == "largest-margin" and self.problem.demands.volume is None:
             return False
         wanted = self.problem.demands.volume or self.problem.size**3
         return State(self.problem, u).volume < OPEN * wanted
 
-    def _solve(self, model: Model) -> Run:
+    def _see_opening(self, state: State) -> None:
+        self.trail.before_each()
+        self.steps += 1
+        self.evaluations += 1
+        self.left -= 1
+        self.trail.see_opening(state)
+
+    def _solved(self, model: Model) -> Attempt:
         at = model.at(model.start)
         has_grown = False
         for _ in range(ROUNDS):
             at = self._sqp(model, at.u, "solving", self._is_matched)
             if self._is_done(model, at):
-                crossings = self._crossings(at.state)
-                if not len(crossings):
+                missed = self._crossings(at.state)
+                if not len(missed):
                     break
-                model.add_positions(crossings)
+                model.add_positions(missed)
                 # What seemed best did not keep clear there.
-                self.best = None
+                self.trail.begin()
             elif self.left <= 0:
                 break
             elif self._is_short(at.state) and not has_grown:
@@ -107,15 +165,24 @@ class Search:
                 grown = self._grown(at)
                 if grown is None:
                     break
-                model = Model(self.problem, grown, model.positions)
+                model = Model(self.problem, grown)
                 at = model.at(model.start)
-        return self._end(*self._verdict(model, at))
+            elif self.problem.objective == "match-volume":
+                break
+        return self._verdict(model, at)
 
     def _is_done(self, model: Model, at: Evaluation) -> bool:
         """Whether a place is what is wanted, but for clearances between positions."""
         if self.problem.objective == "match-volume":
             return self._is_matched(model, at)
         return model.worst(at)[0] >= -MET and optimality(model, at).residual <= OPTIMAL
+
+    def _is_matched(self, model: Model, at: Evaluation) -> bool:
+        return (
+            self.problem.objective == "match-volume"
+            and model.reported(at) <= MATCHED
+            and model.worst(at)[0] >= -MET
+        )
 
     def _is_short(self, state: State) -> bool:
         """Whether the volume that is wanted has not been reached."""
@@ -127,13 +194,14 @@ class Search:
         demands = msgspec.structs.replace(self.problem.demands, volume=None)
         growing = msgspec.structs.replace(self.problem, objective="largest-volume", demands=demands)
         wanted = self.problem.wanted_volume
-        model = Model(growing, at.state.values.tolist(), first_positions(self.problem))
+        model = Model(growing, at.state.values.tolist())
 
         def is_enough(model: Model, now: Evaluation) -> bool:
             return now.state.volume >= wanted and model.worst(now)[0] >= -MET
 
         end = self._sqp(model, model.start, "growing", is_enough)
-        self.largest = max(self.largest, end.state.volume)
+        if model.worst(end)[0] >= -MET:
+            self.largest = max(self.largest, end.state.volume)
         return end.state.values.tolist() if is_enough(model, end) else None
 
     def _sqp(
@@ -144,129 +212,54 @@ class Search:
         is_enough: Callable[[Model, Evaluation], bool],
     ) -> Evaluation:
         def see(at: Evaluation) -> None:
-            self._see(model, at, phase)
+            self.trail.see(model, at, phase)
             if is_enough(model, at):
                 raise Stop
 
         before = model.evaluations
-        ended = solve(model, u, see=see, before_each=self._before_each, most=max(1, self.left))
+        most = max(1, self.left)
+        if self.problem.objective == "match-volume":
+            most = min(most, STEPS_TO_MATCH)
+        ended = solve(model, u, see=see, before_each=self.trail.before_each, most=most)
         self.evaluations += model.evaluations - before
         self.steps += ended.steps
         self.left -= ended.steps
-        if self.is_cancelled:
+        if self.trail.is_cancelled:
             raise Stop
         return ended.last
 
-    def _is_matched(self, model: Model, at: Evaluation) -> bool:
-        return (
-            self.problem.objective == "match-volume"
-            and model.reported(at) <= MATCHED
-            and model.worst(at)[0] >= -MET
-        )
-
     def _crossings(self, state: State) -> FloatArray:
-        """Return positions at which a clearance is not kept after all, shape (k, 3)."""
+        """Return positions at which the clearance is not kept after all, shape (k, 3)."""
         demands = self.problem.demands
         if demands.clearance is None:
             return np.zeros((0, 3))
-        self._before_each()
-        found = least_clearance(
-            state.design,
-            state.rotation,
-            margin=demands.clearance_margin,
-            enough=demands.clearance,
-            tolerance=0.05 * demands.clearance,
-        )
-        return found.positions[found.clearance < demands.clearance]
+        self.trail.before_each()
+        return crossings(state.design, state.rotation, demands.clearance, demands.clearance_margin)
 
-    def _before_each(self) -> None:
-        if self.stop is not None and self.stop():
-            self.is_cancelled = True
-            raise Stop
-
-    def _see_opening(self, state: State) -> None:
-        self._before_each()
-        self.steps += 1
-        self.evaluations += 1
-        because = state.measured.empty_because
-        self.record(
-            Iterate(
-                len(self.history),
-                self.number,
-                "opening",
-                state.design,
-                tuple(state.values.tolist()),
-                reported(self.problem, state),
-                state.volume,
-                because[0] if because else "",
-                -1.0 if because else 0.0,
-            )
-        )
-
-    def _see(self, model: Model, at: Evaluation, phase: Phase) -> None:
+    def _verdict(self, model: Model, at: Evaluation) -> Attempt:
+        """Say how an attempt ended, by its last place."""
         spare, worst = model.worst(at)
-        iterate = Iterate(
-            len(self.history),
-            self.number,
-            phase,
-            at.state.design,
-            tuple(at.state.values.tolist()),
-            reported(self.problem, at.state),
-            at.state.volume,
-            worst,
-            spare,
-        )
-        if self.best is None or self._rank(iterate) <= self._rank(self.best):
-            self.best = iterate
-        self.record(iterate)
-
-    def _rank(self, iterate: Iterate) -> tuple[float, float]:
-        larger = self.problem.objective in ("largest-volume", "largest-margin")
-        missed = -iterate.spare
-        wanted = self.problem.demands.volume
-        if self.problem.objective != "match-volume" and wanted is not None:
-            missed = max(missed, 1.0 - iterate.volume / wanted)
-        objective = -iterate.objective if larger else iterate.objective
-        return (missed if missed > MET else 0.0), objective
-
-    def _verdict(self, model: Model, at: Evaluation) -> tuple[Status, str, str]:
-        """Return how a run ended by its last place, what holds it, and words if special."""
-        spare, worst = model.worst(at)
-        holding = optimality(model, at).holding
+        holding, best = optimality(model, at).holding, self.trail.best
         is_done = self._is_done(model, at)
-        crossings = self._crossings(at.state) if is_done else np.zeros((0, 3))
-        if len(crossings):
+        missed = self._crossings(at.state) if is_done else np.zeros((0, 3))
+        if len(missed):
             words = (
                 f"a clearance of {self.problem.demands.clearance:g} is not kept everywhere, "
-                f"such as at {_shown(crossings[0])}"
+                f"such as at {_shown(missed[0])}"
             )
-            return "not converged", "clearance", words
+            return Attempt("not converged", "clearance", words, best)
         if is_done:
-            return "converged", holding, ""
+            return Attempt("converged", holding, "", best)
         if self.left <= 0:
-            return "not converged", worst if spare < -MET else holding, ""
-        if self._is_short(at.state) and 0.0 < self.largest < self.problem.wanted_volume:
-            words = (
-                f"no design within the bounds was found with a volume of "
-                f"{self.problem.wanted_volume:g}; the largest found is {self.largest:.6g}"
-            )
-            return "infeasible", holding, words
-        return ("infeasible", worst, "") if spare < -MET else ("stalled", holding, "")
-
-    def _end(self, status: Status, holding: str, message: str) -> Run:
-        best = self._best_so_far()
-        words = message or _words(self.problem, status, best, self.steps, holding)
-        return Run(self.start, status, best, self.steps, self.evaluations, holding, words)
-
-    def _best_so_far(self) -> Iterate:
-        """Return the best iterate, the start itself if the run ended before any."""
-        if self.best is None:
-            model = Model(self.problem, self.start, first_positions(self.problem))
-            self._see(model, model.at(model.start), "solving")
-        return self.best or self.history[-1]
+            return Attempt("not converged", worst if spare < -MET else holding, "", best)
+        if spare < -MET:
+            return Attempt("infeasible", worst, "", best)
+        if self._is_short(at.state):
+            return Attempt("infeasible", holding, "", best)
+        return Attempt("stalled", holding, "", best)
 
 
-def _words(problem: Problem, status: Status, best: Iterate, steps: int, holding: str) -> str:
+def _words(problem: Problem, attempt: Attempt, steps: int) -> str:
     """Return one line on how a run ended."""
     name = {
         "match-volume": "F",
@@ -274,13 +267,13 @@ def _words(problem: Problem, status: Status, best: Iterate, steps: int, holding:
         "largest-volume": "volume",
         "largest-margin": "worst margin",
     }[problem.objective]
-    found = f"{name} = {best.objective:.6g} after {steps} iterations"
-    held = f", held by {holding}" if holding else ""
-    match status:
+    found = f"{name} = {attempt.best.objective:.6g} after {steps} iterations"
+    held = f", held by {attempt.holding}" if attempt.holding else ""
+    match attempt.status:
         case "converged":
             return f"converged: {found}{held}"
         case "infeasible":
-            return f"no design found that meets all demands: {holding} is missed ({found})"
+            return f"no design was found that meets all demands: {found}{held}"
         case "not converged":
             return f"not converged: {found}{held}; allow more iterations or start elsewhere"
         case "stalled":

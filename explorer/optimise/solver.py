@@ -6,15 +6,16 @@ import time
 from collections.abc import Callable, Sequence
 
 from explorer.errors import InputError
-from explorer.optimise.outcome import Iterate, Outcome, Run
+from explorer.optimise.outcome import Outcome, Run
 from explorer.optimise.problem import Problem
-from explorer.optimise.search import MET, Search
+from explorer.optimise.search import Search
 from explorer.optimise.starts import more_starts
+from explorer.optimise.trail import Trail, Watch
 
-MOST_ITERATIONS = 200
+MOST_ITERATIONS = 300
 MOST_STARTS = 10_000
-
-Watch = Callable[[Iterate], None]
+# Objectives that differ by less than this share are the same.
+SAME = 1e-6
 
 
 def optimise_design(
@@ -46,35 +47,39 @@ def optimise_design(
     if iterations < 1:
         raise InputError(f"the number of iterations must be at least 1; got {iterations}")
     began = time.perf_counter()
-    history: list[Iterate] = []
-
-    def record(iterate: Iterate) -> None:
-        history.append(iterate)
-        if watch is not None:
-            watch(iterate)
-
+    trail = Trail(problem, watch, stop)
     runs: list[Run] = []
     for values in (problem.start_values, *more_starts(problem, starts - 1, seed)):
-        search = Search(problem, len(runs), values, iterations, history, record, stop)
-        runs.append(search.run())
+        trail.run = len(runs)
+        runs.append(Search(problem, values, iterations, trail).run())
         done = problem.objective == "match-volume" and runs[-1].status == "converged"
-        if done or runs[-1].status == "cancelled":
+        if done or trail.is_cancelled:
             break
+
     return Outcome(
-        problem, tuple(runs), _best(problem, runs), tuple(history), time.perf_counter() - began
+        problem=problem,
+        runs=tuple(runs),
+        chosen=_best(runs, trail),
+        history=tuple(trail.history),
+        seconds=time.perf_counter() - began,
     )
 
 
-def _best(problem: Problem, runs: Sequence[Run]) -> int:
-    """Return the index of the best run: those that converged first, then by what they found."""
-    larger = problem.objective in ("largest-volume", "largest-margin")
+def _best(runs: Sequence[Run], trail: Trail) -> int:
+    """Return the index of the best run: converged before others, then by what it found.
 
-    def rank(index: int) -> tuple[bool, float, float, int]:
-        best = runs[index].best
-        objective = -best.objective if larger else best.objective
-        if runs[index].status == "converged" and problem.objective == "match-volume":
-            objective = 0.0
-        missed = max(0.0, -best.spare)
-        return runs[index].status != "converged", missed > MET, objective, index
-
-    return min(range(len(runs)), key=rank)
+    Of runs that found the same the first one is taken.
+    """
+    best = 0
+    for index in range(1, len(runs)):
+        (missed, value), (least_missed, least) = (
+            trail.rank(runs[each].best) for each in (index, best)
+        )
+        converged = runs[index].status == "converged"
+        if converged != (runs[best].status == "converged"):
+            best = index if converged else best
+        elif missed != least_missed:
+            best = index if missed < least_missed else best
+        elif value < least - SAME * abs(least):
+            best = index
+    return best

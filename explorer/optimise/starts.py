@@ -7,11 +7,16 @@ from collections.abc import Iterator
 import numpy as np
 
 from explorer.arrays import FloatArray
+from explorer.design import Design
 from explorer.errors import DesignError
-from explorer.optimise.problem import DISTANCES, Problem, distance_of
+from explorer.home import home_pose
+from explorer.optimise.problem import DISTANCES, Problem, distance_of, longest_length
+from explorer.singularity import margins
 
 # Positions an axis at which clearance is demanded at first; more come where they matter.
-POSITIONS = 9
+IN_SPACE, IN_SURFACE = 7, 21
+# Margins that rise less than this along z have no height at which they are some value.
+STEEP = 1e-3
 # Tries for each start, before the bounds are taken to leave no room.
 TRIES = 64
 
@@ -42,14 +47,35 @@ def more_starts(problem: Problem, count: int, seed: int) -> Iterator[tuple[float
                 return
 
 
-def first_positions(problem: Problem) -> FloatArray:
+def first_positions(problem: Problem, design: Design) -> FloatArray:
     """Return the positions at which clearance is demanded at first, shape (k, 3).
 
-    They fill the box, or without one the cube of the start's reach.
+    They fill the box, or without one the cube of the design's reach, and lie closer in the
+    surface where the smallest margin is just the one from which on clearance is demanded:
+    with a level platform the legs of a column of positions come nearest at its foot.
     """
     if problem.demands.clearance is None:
         return np.zeros((0, 3))
-    reach = problem.start.reach
-    lows, highs = problem.start.limits.box or ((-reach,) * 3, (reach,) * 3)
-    axes = [np.linspace(low, high, POSITIONS) for low, high in zip(lows, highs, strict=True)]
-    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    reach = longest_length(design)
+    lows, highs = design.limits.box or ((-reach,) * 3, (reach,) * 3)
+
+    def grid(*counts: int) -> FloatArray:
+        shares = np.indices(counts).reshape(len(counts), -1).T / (np.array(counts) - 1.0)
+        start, end = np.array(lows)[: len(counts)], np.array(highs)[: len(counts)]
+        return start + (end - start) * shares
+
+    rotation, least = home_pose(design).rotation, problem.demands.clearance_margin
+    columns = grid(IN_SURFACE, IN_SURFACE)
+    foot = np.column_stack([columns, np.zeros(len(columns))])
+    # Margins are linear in z: κ = at the foot + rise · z.
+    at_foot = margins(foot, rotation)
+    rise = margins(np.array([0.0, 0.0, 1.0]), rotation)
+    found = [grid(IN_SPACE, IN_SPACE, IN_SPACE)]
+    for index in np.flatnonzero(np.abs(rise) > STEEP):
+        for side in (-1.0, 1.0):
+            height = (side * least - at_foot[:, index]) / rise[index]
+            found.append(np.column_stack([columns, height]))
+    positions = np.vstack(found)
+    within = (positions >= np.array(lows)).all(axis=1) & (positions <= np.array(highs)).all(axis=1)
+    clear = (np.abs(margins(positions, rotation)) >= least * (1.0 - 1e-9)).all(axis=1)
+    return positions[within & clear]

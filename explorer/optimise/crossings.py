@@ -1,0 +1,73 @@
+"""Where in a workspace a clearance is not kept: found, or proven to be nowhere.
+
+As p moves, the distance of two legs changes no faster than p itself. So a cell of positions
+keeps the distance at its middle less half its diagonal, and is cut in eight until that
+settles it. Cells that settle nothing at the finest size count as kept.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from explorer.arrays import FloatArray
+from explorer.clearance import PAIRS, leg_clearances
+from explorer.constraints import HalfSpace, constraints
+from explorer.design import Design
+from explorer.region import region_of
+from explorer.singularity import margins
+from explorer.workspace import bounds
+
+# Cells along the longest side at first.
+FIRST_CELLS = 12
+# Half-diagonal of the smallest cells, as a share of the clearance.
+FINEST = 0.1
+# Cells of one size that are looked at, at the most.
+MOST_CELLS = 100_000
+
+HALVES = np.array([[(-1.0, 1.0)[c >> a & 1] for a in range(3)] for c in range(8)])
+
+
+def crossings(design: Design, rotation: FloatArray, clearance: float, margin: float) -> FloatArray:
+    """Return the positions at which each pair of legs comes nearest, if nearer than allowed.
+
+    Args:
+        design: The manipulator.
+        rotation: Platform to base, shape (3, 3).
+        clearance: What every pair is to keep.
+        margin: Only positions whose margins are all at least this large count.
+
+    Returns:
+        Shape (k, 3), one position for each pair that does not keep it.
+    """
+    limits = constraints(design, rotation)
+    scale = np.array(
+        [float(np.linalg.norm(c.normal)) if isinstance(c, HalfSpace) else 1.0 for c in limits]
+    )
+    least, places = np.full(len(PAIRS), clearance), np.zeros((len(PAIRS), 3))
+    region = region_of(limits)
+    lows, highs = bounds(region)
+    if region.is_empty or not (lows < highs).all():
+        return places[:0]
+    many = np.maximum(1, np.ceil((highs - lows) / (highs - lows).max() * FIRST_CELLS)).astype(int)
+    half = 0.5 * (highs - lows) / many
+    middles = lows + half * (2.0 * np.indices(tuple(many.tolist())).reshape(3, -1).T + 1.0)
+    while 0 < len(middles) <= MOST_CELLS:
+        radius = float(np.linalg.norm(half))
+        near = (np.abs(margins(middles, rotation)) - margin).min(axis=1)
+        slack = np.column_stack([limit.slack(middles) for limit in limits]) / scale
+        inside = np.minimum(slack.min(axis=1), near)
+        middles, inside = middles[inside > -radius], inside[inside > -radius]
+        found = leg_clearances(design, middles, rotation).clearance
+        counted, at = found[inside >= 0.0], middles[inside >= 0.0]
+        if len(counted):
+            nearest = counted.argmin(axis=0)
+            value = counted[nearest, range(len(PAIRS))]
+            places = np.where((value < least)[:, None], at[nearest], places)
+            least = np.minimum(value, least)
+        if radius <= FINEST * clearance:
+            break
+        half = 0.5 * half
+        # Only what may hide less than is known already.
+        middles = middles[(found - radius < least).any(axis=1)]
+        middles = (middles[:, None, :] + half * HALVES).reshape(-1, 3)
+    return places[least < clearance]
