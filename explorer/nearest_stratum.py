@@ -193,7 +193,7 @@ class _Problem:
     def slope(self, angles: FloatArray) -> FloatArray:
         """Return the gradient (..., d) at angles (..., d), to the last digits."""
         steps = 1j * COMPLEX_STEP * np.eye(angles.shape[-1])
-        return np.asarray(self.value(angles[..., None, :] + steps).imag / COMPLEX_STEP)
+        return np.imag(self.value(angles[..., None, :] + steps)) / COMPLEX_STEP
 
     def least(self) -> tuple[float, FloatArray]:
         """Return the least square and its angles (d,)."""
@@ -258,7 +258,7 @@ def _nearest(design: Design, pose: Pose, closure: _Closure) -> Pose:
 
 @functools.cache
 def _grid(count: int) -> FloatArray:
-    steps = np.arange(GRID) * (2.0 * math.pi / GRID)
+    steps = np.linspace(0.0, 2.0 * math.pi, GRID, endpoint=False, dtype=np.float64)
     return np.stack(np.meshgrid(*[steps] * count, indexing="ij"), axis=-1)
 
 
