@@ -1,0 +1,115 @@
+"""Our optima beside the paper's, found anew: the page of findings in the README.
+
+All have the orientation of the paper's optimum, its box, and lengths up to the reach.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import msgspec
+
+from explorer.design import Design
+from explorer.design_file import PRESETS
+from explorer.optimise.facts import Facts, facts_of
+from explorer.optimise.problem import Box, Problem, Variable, make_problem
+from explorer.optimise.solver import optimise_design
+from explorer.workspace import workspace_volume
+
+PAPER_VOLUME = 8000.0
+"""The volume that the paper asks for, V′."""
+
+CLEARANCE = 0.2
+"""The clearance demanded where interference is on, in design units; the legs have no radii."""
+
+BOX: Box = ((8.0, 3.0, 7.0), (12.0, 7.0, 11.0))
+"""A box about the home position that lies in all workspaces but the initial one's, to
+compare margins over."""
+
+STEP = 2.0
+"""The step of the paper's nodes."""
+
+STARTS = 14
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A design and how it was found.
+
+    Attributes:
+        name: What it is.
+        iterations: None for a design that was given.
+        objective: F = |1 − V/V′| as whoever found it measures V; None if none was asked for.
+        seconds: How long it took, from all starts.
+        facts: Its measures.
+    """
+
+    name: str
+    iterations: int | None
+    objective: float | None
+    seconds: float | None
+    facts: Facts
+
+
+def paper_start() -> Design:
+    """Return the paper's initial design with the box of its optimum."""
+    initial, optimal = PRESETS["paper-initial"], PRESETS["paper-optimal"]
+    return msgspec.structs.replace(initial, limits=optimal.limits)
+
+
+def paper_problem(clearance: float | None = CLEARANCE) -> Problem:
+    """Return the paper's problem: from its initial design to a volume of 8000."""
+    return make_problem(paper_start(), "match-volume", volume=PAPER_VOLUME, clearance=clearance)
+
+
+def reach_problem(clearance: float | None = None) -> Problem:
+    """Return the smallest reach for the exact volume of the paper's optimum.
+
+    |b1y|, |a3y| and |b3 − b2| are at least 1 and every coordinate of b within ±10.
+    """
+    optimal = PRESETS["paper-optimal"]
+    bounds = [Variable(name, -10.0, 10.0) for name in ("b1x", "b1y", "b2", "b3")]
+    bounds += [Variable("a3x", -40.0, 40.0), Variable("a3y", 1.0, 40.0)]
+    return make_problem(
+        optimal,
+        "smallest-reach",
+        volume=workspace_volume(optimal).volume,
+        clearance=clearance,
+        clearance_margin=paper_problem().demands.clearance_margin,
+        least=1.0,
+        bounds=bounds,
+    )
+
+
+def findings(tell: Callable[[str], None]) -> Iterator[Finding]:
+    """Yield the designs of the page of findings.
+
+    Args:
+        tell: Told what is being looked for.
+    """
+    margin = paper_problem().demands.clearance_margin
+
+    def facts(design: Design) -> Facts:
+        return facts_of(design, clearance_margin=margin, box=BOX, step=STEP)
+
+    optimal = facts(PRESETS["paper-optimal"])
+    counted = abs(1.0 - optimal.node_volume / PAPER_VOLUME)
+    yield Finding("the paper's initial design", None, None, None, facts(paper_start()))
+    yield Finding("the paper's optimum, by nodes", 220, counted, None, optimal)
+    for name, problem, starts in (
+        ("volume 8000, interference off", paper_problem(None), 1),
+        ("volume 8000, interference on", paper_problem(), 1),
+        ("smallest reach, interference off", reach_problem(), STARTS),
+        ("smallest reach, interference on", reach_problem(CLEARANCE), STARTS),
+    ):
+        tell(name)
+        outcome = optimise_design(problem, starts=starts)
+        is_match = problem.objective == "match-volume"
+        yield Finding(
+            name,
+            outcome.iterations,
+            outcome.best.objective if is_match else None,
+            outcome.seconds,
+            facts(outcome.design),
+        )
