@@ -33,6 +33,8 @@ LAYERS = (
         "nearest_singular",
         "nearest_stratum",
         "performance",
+        "validity",
+        "move_validity",
         "limits",
         "home",
         "feasibility",

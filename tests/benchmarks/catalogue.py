@@ -17,6 +17,7 @@ BENCHMARKS: Mapping[str, str] = {
     "solid_page": "from a design slider to the updated solid",
     "interference": "overlap of tetrahedra, clearances of the legs, whole moves",
     "nearest": "nearest singular pose of all three incidences",
+    "validity": "whether poses and moves keep limits, margins and clearances",
     "capability": "share of all orientations that a position allows",
     "drag_sockets": "lag of two long drags at once, seen by bare websocket clients",
     "drag_browser": "lag of two long drags at once, seen in two tabs of a real browser",
