@@ -2,10 +2,13 @@
 
 As p moves, the distance of two legs changes no faster than p itself. So a cell of positions
 keeps the distance at its middle less half its diagonal, and is cut in eight until that
-settles it. Cells that settle nothing at the finest size count as kept.
+settles it. What is left open by cells of a tenth of the clearance, or when there are too many
+of them, counts as kept.
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 
@@ -23,11 +26,19 @@ FIRST_CELLS = 12
 FINEST = 0.1
 # Cells of one size that are looked at, at the most.
 MOST_CELLS = 100_000
+# Cells that are looked at in one go.
+AT_ONCE = 10_000
 
 HALVES = np.array([[(-1.0, 1.0)[c >> a & 1] for a in range(3)] for c in range(8)])
 
 
-def crossings(design: Design, rotation: FloatArray, clearance: float, margin: float) -> FloatArray:
+def crossings(
+    design: Design,
+    rotation: FloatArray,
+    clearance: float,
+    margin: float,
+    before_each: Callable[[], None],
+) -> FloatArray:
     """Return the positions at which each pair of legs comes nearest, if nearer than allowed.
 
     Args:
@@ -35,6 +46,7 @@ def crossings(design: Design, rotation: FloatArray, clearance: float, margin: fl
         rotation: Platform to base, shape (3, 3).
         clearance: What every pair is to keep.
         margin: Only positions whose margins are all at least this large count.
+        before_each: Called now and then; may raise.
 
     Returns:
         Shape (k, 3), one position for each pair that does not keep it.
@@ -57,7 +69,10 @@ def crossings(design: Design, rotation: FloatArray, clearance: float, margin: fl
         slack = np.column_stack([limit.slack(middles) for limit in limits]) / scale
         inside = np.minimum(slack.min(axis=1), near)
         middles, inside = middles[inside > -radius], inside[inside > -radius]
-        found = leg_clearances(design, middles, rotation).clearance
+        found = np.zeros((0, len(PAIRS)))
+        for part in np.array_split(middles, 1 + len(middles) // AT_ONCE):
+            before_each()
+            found = np.vstack([found, leg_clearances(design, part, rotation).clearance])
         counted, at = found[inside >= 0.0], middles[inside >= 0.0]
         if len(counted):
             nearest = counted.argmin(axis=0)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -14,12 +14,20 @@ from explorer.optimise.starts import more_starts
 CANDIDATES = 64
 
 
-def promising(problem: Problem, seed: int) -> Iterator[tuple[float, ...]]:
-    """Yield values of the variables that miss the demands by little, the best first."""
+def promising(
+    problem: Problem, seed: int, before_each: Callable[[], None]
+) -> Iterator[tuple[float, ...]]:
+    """Yield values of the variables that miss the demands by little, the best first.
+
+    Args:
+        problem: The problem.
+        seed: Of the sequence that they are taken from.
+        before_each: Called before each evaluation; may raise.
+    """
     candidates = list(more_starts(problem, CANDIDATES, seed))
     missed: list[float] = []
     for values in candidates:
-        model = Model(problem, values)
+        model = Model(problem, values, before_each)
         at = model.at(model.start)
         missed.append(
             float(np.abs(at.values[model.equalities]).sum()) - min(0.0, model.worst(at)[0])

@@ -6,7 +6,7 @@ all of them, which keeps the functions smooth.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -57,10 +57,17 @@ class Model:
     Args:
         problem: The problem.
         start: Values of its variables to start from.
+        before_each: Called before each evaluation; may raise to end the search.
     """
 
-    def __init__(self, problem: Problem, start: Sequence[float]) -> None:
+    def __init__(
+        self,
+        problem: Problem,
+        start: Sequence[float],
+        before_each: Callable[[], None] | None = None,
+    ) -> None:
         self.problem = problem
+        self._before_each = before_each
         self.scales = scales(problem)
         self.count = len(problem.names)
         self.raises_worst = problem.objective == "largest-margin"
@@ -123,6 +130,8 @@ class Model:
         return self._last
 
     def _evaluate(self, u: FloatArray) -> Evaluation:
+        if self._before_each is not None:
+            self._before_each()
         state = State(self.problem, u[: self.count])
         if not np.isfinite(u).all():
             raise DesignError("the solver asked for a design that is not finite")

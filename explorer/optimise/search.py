@@ -31,8 +31,6 @@ from explorer.optimise.trail import MET, Trail
 
 # F = |1 − V/V′| from which on a volume is matched.
 MATCHED = 1e-10
-# An optimum's conditions hold if their residual is below this.
-OPTIMAL = 1e-5
 # Below this share of the volume wanted a workspace is opened first.
 OPEN = 0.01
 # How often an attempt is taken up again: after new positions to keep clear, or a stall.
@@ -80,12 +78,18 @@ class Search:
             and self.left > 0
             and len(attempts) < ATTEMPTS
         ):
-            elsewhere = elsewhere or promising(self.problem, self.trail.run)
-            values = next(elsewhere, None)
+            if elsewhere is None:
+                elsewhere = promising(self.problem, self.trail.run, self.trail.before_each)
+            try:
+                values = next(elsewhere, None)
+            except Stop:
+                break
             if values is None:
                 break
             attempts.append(self._attempt(values))
         chosen = min(attempts, key=self._rank)
+        if self.trail.is_cancelled:
+            chosen = chosen._replace(status="cancelled", holding="", message="")
         return Run(
             start=self.start,
             status=chosen.status,
@@ -126,7 +130,7 @@ class Search:
                     )
                     return Attempt("infeasible", because[0] if because else "", words, trail.best)
                 values = (found * scales(problem)).tolist()
-            return self._solved(Model(problem, values))
+            return self._solved(Model(problem, values, trail.before_each))
         except Stop:
             if not trail.history:
                 trail.see_opening(State(problem, np.array(values) / scales(problem)))
@@ -165,7 +169,7 @@ class Search:
                 grown = self._grown(at)
                 if grown is None:
                     break
-                model = Model(self.problem, grown)
+                model = Model(self.problem, grown, self.trail.before_each)
                 at = model.at(model.start)
             elif self.problem.objective == "match-volume":
                 break
@@ -175,7 +179,7 @@ class Search:
         """Whether a place is what is wanted, but for clearances between positions."""
         if self.problem.objective == "match-volume":
             return self._is_matched(model, at)
-        return model.worst(at)[0] >= -MET and optimality(model, at).residual <= OPTIMAL
+        return model.worst(at)[0] >= -MET and optimality(model, at).is_optimal
 
     def _is_matched(self, model: Model, at: Evaluation) -> bool:
         return (
@@ -194,7 +198,7 @@ class Search:
         demands = msgspec.structs.replace(self.problem.demands, volume=None)
         growing = msgspec.structs.replace(self.problem, objective="largest-volume", demands=demands)
         wanted = self.problem.wanted_volume
-        model = Model(growing, at.state.values.tolist())
+        model = Model(growing, at.state.values.tolist(), self.trail.before_each)
 
         def is_enough(model: Model, now: Evaluation) -> bool:
             return now.state.volume >= wanted and model.worst(now)[0] >= -MET
@@ -220,7 +224,7 @@ class Search:
         most = max(1, self.left)
         if self.problem.objective == "match-volume":
             most = min(most, STEPS_TO_MATCH)
-        ended = solve(model, u, see=see, before_each=self.trail.before_each, most=most)
+        ended = solve(model, u, see=see, most=most)
         self.evaluations += model.evaluations - before
         self.steps += ended.steps
         self.left -= ended.steps
@@ -233,8 +237,13 @@ class Search:
         demands = self.problem.demands
         if demands.clearance is None:
             return np.zeros((0, 3))
-        self.trail.before_each()
-        return crossings(state.design, state.rotation, demands.clearance, demands.clearance_margin)
+        return crossings(
+            state.design,
+            state.rotation,
+            demands.clearance,
+            demands.clearance_margin,
+            self.trail.before_each,
+        )
 
     def _verdict(self, model: Model, at: Evaluation) -> Attempt:
         """Say how an attempt ended, by its last place."""

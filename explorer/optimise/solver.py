@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 
+from explorer.compiled import warm
 from explorer.errors import InputError
 from explorer.optimise.outcome import Outcome, Run
 from explorer.optimise.problem import Problem
@@ -46,6 +47,8 @@ def optimise_design(
         raise InputError(f"the number of starts must lie within 1 to {MOST_STARTS}; got {starts}")
     if iterations < 1:
         raise InputError(f"the number of iterations must be at least 1; got {iterations}")
+    # Thousands of evaluations repay the second that loading compiled kernels takes.
+    warm()
     began = time.perf_counter()
     trail = Trail(problem, watch, stop)
     runs: list[Run] = []

@@ -79,22 +79,19 @@ def solve(
     start: FloatArray,
     *,
     see: Callable[[Evaluation], None],
-    before_each: Callable[[], None],
     most: int,
 ) -> Ended:
-    """Run SLSQP on a model.
+    """Run SLSQP on a model, to the end or until `Stop` is raised.
 
     Args:
         model: What to minimise.
         start: Scaled variables, shape (n,), of a design that can exist.
         see: Called with each accepted iterate, the start among them; may raise `Stop`.
-        before_each: Called before each evaluation; may raise `Stop`.
         most: The most iterations.
     """
     seen: list[Evaluation] = []
 
     def at(u: FloatArray) -> Evaluation | None:
-        before_each()
         try:
             return model.at(u)
         except DesignError:

@@ -1,0 +1,75 @@
+"""How far a long search has got, on standard error: a bar in a terminal, else a line a second."""
+
+from __future__ import annotations
+
+import sys
+import time
+from types import TracebackType
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from explorer.optimise.outcome import Iterate
+
+WIDTH = 20
+# Seconds between two looks at it, in a terminal and elsewhere.
+IN_TERMINAL, ELSEWHERE = 0.05, 1.0
+
+
+class Progress:
+    """A bar that shows the iterates of an optimisation.
+
+    Args:
+        starts: How many starts there are.
+        iterations: The most steps of each.
+        objective: What people call the objective, such as "F".
+    """
+
+    def __init__(self, starts: int, iterations: int, objective: str) -> None:
+        self.starts = starts
+        self.iterations = iterations
+        self.objective = objective
+        self.is_terminal = sys.stderr.isatty()
+        self._steps = 0
+        self._run: int = 0
+        self._shown = 0.0
+        self._last = 0
+
+    def __enter__(self) -> Progress:
+        """Begin."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Leave the line to whatever comes next."""
+        if self._last and self.is_terminal:
+            sys.stderr.write("\r" + " " * self._last + "\r")
+            sys.stderr.flush()
+
+    def see(self, iterate: Iterate) -> None:
+        """Show an iterate, unless the last one was shown a moment ago."""
+        if iterate.run != self._run:
+            self._run, self._steps = iterate.run, 0
+        self._steps += 1
+        now = time.monotonic()
+        if now - self._shown < (IN_TERMINAL if self.is_terminal else ELSEWHERE):
+            return
+        self._shown = now
+        share = (iterate.run + min(1.0, self._steps / self.iterations)) / self.starts
+        full = round(WIDTH * share)
+        text = (
+            f"[{'#' * full}{'.' * (WIDTH - full)}] start {iterate.run + 1} of {self.starts}, "
+            f"{iterate.phase} {self._steps}: {self.objective} {iterate.objective:.6g}, "
+            f"volume {iterate.volume:.6g}"
+        )
+        if iterate.spare < -1e-8:
+            text += f", missed: {iterate.worst}"
+        if self.is_terminal:
+            sys.stderr.write("\r" + text.ljust(self._last)[:200])
+            self._last = len(text)
+        else:
+            sys.stderr.write(text + "\n")
+        sys.stderr.flush()
