@@ -47,7 +47,7 @@ if TYPE_CHECKING:
         rotation_from_yaw_pitch_roll,
         yaw_pitch_roll_from_rotation,
     )
-    from explorer.radius_curve import RadiusCurve, radius_curve
+    from explorer.radii import RadiusCurve, radius_curve
     from explorer.reachable import PairCost, ReachableWorkspace, reachable_workspace
     from explorer.singularity import jacobian, margins
     from explorer.snapshot import Snapshot, evaluate
@@ -95,7 +95,7 @@ _HOMES = {
         "rotation_from_yaw_pitch_roll",
         "yaw_pitch_roll_from_rotation",
     ),
-    "radius_curve": ("RadiusCurve", "radius_curve"),
+    "radii": ("RadiusCurve", "radius_curve"),
     "reachable": ("PairCost", "ReachableWorkspace", "reachable_workspace"),
     "singularity": ("jacobian", "margins"),
     "snapshot": ("Snapshot", "evaluate"),

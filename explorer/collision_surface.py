@@ -18,6 +18,9 @@ from explorer.design import Design
 # Newton steps onto the surface; each may go this share of a cell, all together at most one.
 STEPS = 6
 SHARE = 0.3
+# Strides towards a collision, and what counts as before it, a share of a cell.
+STRIDES = 16
+NEAR = 0.05
 # Slopes of clearance over position below this are not followed.
 LEAST_SLOPE = 0.02
 
@@ -44,15 +47,17 @@ def settle(
     """
     if not len(points):
         return points
-    which = nearest_pair(design, rotation, pairs, points)
-    # A line apart from another has a side, a segment beyond its end has none.
-    side = np.sign(_apart(design, rotation, which, kept)[0])
-    radii = radii_of_pairs(design)[which]
+    # Legs may pass through one another between the two, so the way there is followed.
+    hit, which, passed = _first_hit(design, rotation, pairs, step, kept, points)
+    side = np.sign(_apart(design, rotation, which, kept)[3])[:, 0]
+    has_side = _apart(design, rotation, which, points)[2][:, 0]
+    radii = radii_of_pairs(design)[which[:, 0]]
     target = np.where(radii > 0.0, 0.0, -touching)
-    at = points.copy()
+    at = np.where((passed & ~has_side)[:, None], hit, points)
     for _ in range(STEPS):
-        value, gradient, crosses = _apart(design, rotation, which, at)
-        turned = np.where(crosses, side, 1.0)
+        values, gradients, sides, _ = _apart(design, rotation, which, at)
+        value, gradient, has_side = values[:, 0], gradients[:, 0], sides[:, 0]
+        turned = np.where(has_side, side, 1.0)
         value, gradient = value * turned - radii, gradient * turned[:, None]
         square = dot(gradient, gradient)
         ratio = np.where(square > LEAST_SLOPE**2, (target - value) / np.maximum(square, 1e-300), 0)
@@ -60,8 +65,34 @@ def settle(
         cells = np.abs(move / step).max(axis=1)
         at += move * np.minimum(1.0, SHARE / np.maximum(cells, 1e-300))[:, None]
     astray = np.abs((at - points) / step).max(axis=1) > 1.0
-    at[astray] = points[astray]
+    at[astray] = np.where(passed[:, None], hit, points)[astray]
     return at
+
+
+def _first_hit(
+    design: Design,
+    rotation: FloatArray,
+    pairs: Sequence[int],
+    step: FloatArray,
+    start: FloatArray,
+    end: FloatArray,
+) -> tuple[FloatArray, IntArray, BoolArray]:
+    """Return where the way from start to end first meets a collision, else the end.
+
+    A clearance is safe to go, as it changes no faster than the position. All of shape
+    (n, 3); then the pair, shape (n, 1), and whether it is met before the end, shape (n,).
+    """
+    way = end - start
+    length = np.linalg.norm(way, axis=1)
+    near = NEAR * float(step.min())
+    chosen = np.asarray(pairs, dtype=np.int64)
+    gone, at = np.zeros(len(start)), start
+    clearance = leg_clearances(design, at, rotation).clearance[:, chosen]
+    for _ in range(STRIDES):
+        gone = np.minimum(length, gone + np.maximum(clearance.min(axis=1), 0.0))
+        at = start + (gone / np.maximum(length, 1e-300))[:, None] * way
+        clearance = leg_clearances(design, at, rotation).clearance[:, chosen]
+    return at, chosen[clearance.argmin(axis=1)][:, None], gone < length - near
 
 
 def nearest_pair(
@@ -74,31 +105,41 @@ def nearest_pair(
 
 def _apart(
     design: Design, rotation: FloatArray, which: IntArray, at: FloatArray
-) -> tuple[FloatArray, FloatArray, BoolArray]:
-    """Return how far a pair is apart at each position, its rates, and whether it has a side.
+) -> tuple[FloatArray, FloatArray, BoolArray, FloatArray]:
+    """Return how far pairs are apart at positions, its rates, and on which side they are.
 
-    Where the closest points lie between the ends, that is the signed distance of the lines.
+    Where the closest points lie between the ends, that is the signed distance of the lines,
+    which tells the side; whether they do comes third, the signed distance itself last.
+
+    Args:
+        design: The manipulator.
+        rotation: Platform to base, shape (3, 3).
+        which: Indices of m pairs, shape (m,), or for each position, shape (n, m).
+        at: Positions, shape (n, 3).
+
+    Returns:
+        Shapes (n, m), (n, m, 3), (n, m) and (n, m).
     """
     found = leg_clearances(design, at, rotation)
     axes = leg_axes(design, at, rotation)
-    rows = np.arange(len(at))
+    rows = np.arange(len(at))[:, None]
     ends = np.array(PAIRS)[which] - 1
-    one, two = axes[rows, ends[:, 0]], axes[rows, ends[:, 1]]
-    u, v = one[:, 1] - one[:, 0], two[:, 1] - two[:, 0]
+    one, two = axes[rows, ends[..., 0]], axes[rows, ends[..., 1]]
+    u, v = one[..., 1, :] - one[..., 0, :], two[..., 1, :] - two[..., 0, :]
     normal = np.cross(u, v)
-    length = np.linalg.norm(normal, axis=1)
-    scale = np.linalg.norm(u, axis=1) * np.linalg.norm(v, axis=1)
-    points = found.points[rows, which]
-    off = points[:, 0] - points[:, 1]
+    length = np.linalg.norm(normal, axis=-1)
+    scale = np.linalg.norm(u, axis=-1) * np.linalg.norm(v, axis=-1)
+    normal = normal / np.where(length > 0.0, length, 1.0)[..., None]
+    signed = dot(one[..., 0, :] - two[..., 0, :], normal)
     distance = found.distance[rows, which]
-    safe = np.where(length > 0.0, length, 1.0)
-    normal = normal / safe[:, None]
-    signed = dot(one[:, 0] - two[:, 0], normal)
-    crosses = (length > 1e-6 * scale) & (np.abs(np.abs(signed) - distance) <= 1e-9 * design.reach)
-    outward = off / np.where(distance > 0.0, distance, 1.0)[:, None]
+    has_side = (length > 1e-6 * scale) & (np.abs(np.abs(signed) - distance) <= 1e-9 * design.reach)
+    points = found.points[rows, which]
+    off = points[..., 0, :] - points[..., 1, :]
+    outward = off / np.where(distance > 0.0, distance, 1.0)[..., None]
     rates = point_rates(axes, found.points)[rows, which]
     return (
-        np.where(crosses, signed, distance),
-        np.where(crosses[:, None], normal, outward) * rates,
-        crosses,
+        np.where(has_side, signed, distance),
+        np.where(has_side[..., None], normal, outward) * rates,
+        has_side,
+        signed,
     )

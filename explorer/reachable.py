@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from explorer.arrays import FloatArray, IntArray
+from explorer.arrays import BoolArray, FloatArray, IntArray
 from explorer.clearance import PAIRS, radii_of_pairs
 from explorer.collision_surface import nearest_pair, settle
 from explorer.constraints import Constraint, constraints
@@ -26,6 +26,7 @@ from explorer.least_clearance import LeastClearances, least_clearances
 from explorer.pose import checked_rotation
 from explorer.reachable_nodes import (
     ALL_PAIRS,
+    SLACK,
     Grid,
     Survey,
     grid_over,
@@ -228,7 +229,7 @@ class _Carver:
             return True
         found = self.survey
         cut = found.reached(self.start, ()) & ~found.reached(self.start, [pair])
-        return bool((cut & (found.clearance[..., pair] > 0.0)).any())
+        return bool((cut & (found.clearance[..., pair] > SLACK * self.design.reach)).any())
 
     def carved(self, pairs: Sequence[int]) -> tuple[Solid, float]:
         """Return the part with the start where none of these pairs collides, and its volume."""
@@ -240,6 +241,22 @@ class _Carver:
             solid = carved_solid(*args, surface, self.start, self.tolerance)
         # What facets lack at the limits they lack of both, so the difference is exact there.
         return solid, max(0.0, self.volume - max(0.0, self.whole.volume - solid.volume))
+
+    def _thin(self, flooded: BoolArray, clearance: FloatArray, pairs: Sequence[int]) -> IntArray:
+        """Return the nodes nearest to legs' collisions that lie between two reached nodes.
+
+        Legs thinner than a step may collide between nodes of which none collides. With one
+        of the two cut out the surface has a place to settle on either side.
+        """
+        found = self.survey
+        thick = [pair for pair in pairs if self.radii[pair] > 0.0]
+        hit = ~found.clear[:, thick].all(axis=1)
+        first, second = found.first[hit], found.second[hit]
+        free = flooded.ravel()
+        between = free[first] & free[second]
+        first, second = first[between], second[between]
+        least = clearance.ravel()
+        return np.where(least[first] < least[second], first, second)
 
     def _surface(self, pairs: Sequence[int]) -> Surface:
         from scipy.ndimage import binary_dilation
@@ -253,6 +270,7 @@ class _Carver:
         touching = TOUCHING * design.reach
         if not self.radii[list(pairs)].all():
             values = values + touching
+        values.ravel()[self._thin(flooded, clearance, pairs)] = -touching
         # Far from what is within the limits there is nothing to cut.
         near: Any = binary_dilation(found.within, CUBE)
         values[~near] = np.abs(values[~near])

@@ -22,7 +22,8 @@ from explorer.design import Design
 from explorer.moves import pairs_are_clear
 
 ALL_PAIRS = tuple(range(len(PAIRS)))
-# A node on a limit keeps it; a share of the reach.
+# A node on a limit keeps it, and one where axes are as near as this touches; shares of
+# the reach.
 SLACK = 1e-9
 
 
@@ -171,7 +172,8 @@ def survey(design: Design, rotation: FloatArray, grid: Grid) -> Survey:
     # At a fixed orientation a clearance changes by no more than the position does, so that
     # most steps are clear beyond doubt, or not clear because an end is not.
     clear = a + b > (1.0 + SLACK) * length[:, None]
-    doubtful = np.flatnonzero((~clear & (a > 0.0) & (b > 0.0)).any(axis=-1))
+    apart = (a > slack) & (b > slack)
+    doubtful = np.flatnonzero((~clear & apart).any(axis=-1))
     nodes = positions.reshape(-1, 3)
     clear[doubtful] |= pairs_are_clear(
         design, nodes[first[doubtful]], rotation, nodes[second[doubtful]], rotation
@@ -184,5 +186,5 @@ def survey(design: Design, rotation: FloatArray, grid: Grid) -> Survey:
         clearance=clearance,
         first=first,
         second=second,
-        clear=clear & (a > 0.0) & (b > 0.0),
+        clear=clear & apart,
     )
