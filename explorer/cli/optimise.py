@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 Six = tuple[float, float, float, float, float, float]
 
 _OPTIONAL = tyro.conf.arg(help_behavior_hint="(optional)")
+_FILE = tyro.conf.arg(metavar="FILE", help_behavior_hint="(optional)")
 
 
 def _words(option: str, metavar: str) -> PrimitiveConstructorSpec[Any]:
@@ -109,10 +110,10 @@ class Optimise(JsonOptions, DesignOptions):
     ] = None
     """Smallest |a3y|, |b1y| and |b3 − b2|, which a degenerate design has at zero."""
 
-    free: Annotated[tuple[str, ...], _words("--free", "yaw|reach|shift x|…")] = ()
-    """What else may change: yaw, reach, or the required box by 'shift x', 'shift y', 'shift z'."""
+    free: Annotated[tuple[str, ...], _words("--free", "yaw|reach|shift-x|…"), _OPTIONAL] = ()
+    """What else may change: yaw, reach, or the required box by shift-x, shift-y, shift-z."""
 
-    bounds: Annotated[tuple[str, ...], _words("--bounds", "NAME=LOW:HIGH")] = ()
+    bounds: Annotated[tuple[str, ...], _words("--bounds", "NAME=LOW:HIGH …"), _OPTIONAL] = ()
     """Bounds of variables, such as b1x=-10:10 yaw=-90:-45."""
 
     starts: Annotated[int, whole_number("--starts", 1, 10_000)] = 1
@@ -124,16 +125,16 @@ class Optimise(JsonOptions, DesignOptions):
     iterations: Annotated[int, whole_number("--iterations", 1, 100_000)] = 300
     """The most steps from each start."""
 
-    out: Annotated[Path | None, _OPTIONAL] = None
+    out: Annotated[Path | None, _FILE] = None
     """Write the design found to this file, and the record of the search beside it."""
 
     record: Annotated[
         Path | None,
-        tyro.conf.arg(help_behavior_hint="(default: OUT with .record.json)"),
+        tyro.conf.arg(metavar="FILE", help_behavior_hint="(default: OUT with .record.json)"),
     ] = None
     """Write problem, history and versions to this file, whether or not a design was found."""
 
-    repeat: Annotated[Path | None, _OPTIONAL] = None
+    repeat: Annotated[Path | None, _FILE] = None
     """Run the problem in a record again, instead of one given by options."""
 
     findings: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False

@@ -26,7 +26,7 @@ smallest reach with it, the largest volume, the largest worst margin over the re
 
 YAW = "yaw"
 REACH = "reach"
-SHIFTS = ("shift x", "shift y", "shift z")
+SHIFTS = ("shift-x", "shift-y", "shift-z")
 OPTIONAL = (YAW, REACH, *SHIFTS)
 """What may change besides the six design variables: the yaw of home in degrees, one maximum
 for all four lengths, and how far the required box is shifted along each axis."""
@@ -399,5 +399,5 @@ def _check_objective(problem: Problem) -> None:
             if not {YAW, *SHIFTS} & {*names}:
                 raise InputError(
                     "margins do not depend on the design variables: let the yaw or the place "
-                    "of the required box (shift x, shift y, shift z) change"
+                    "of the required box (shift-x, shift-y, shift-z) change"
                 )
