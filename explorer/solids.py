@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from explorer.arrays import FloatArray, IntArray
-from explorer.constraints import Constraint, constraints
+from explorer.constraints import Constraint, HalfSpace, constraints
 from explorer.design import Design
 from explorer.errors import ExplorerError, InputError
 from explorer.facets import Facets
@@ -51,23 +51,6 @@ def workspace_solid(
     limits = constraints(design, r)
     solid = _common(design, limits, tolerance)
     return replace(solid, empty_because=what_empties(limits)) if solid.is_empty else solid
-
-
-def limited_solid(
-    design: Design, limits: Sequence[Constraint], tolerance: float | None = None
-) -> Solid:
-    """Return what keeps these limits as a mesh, such as a workspace with a cut through it.
-
-    Args:
-        design: The manipulator.
-        limits: Such as those of `explorer.constraints.constraints`, and more.
-        tolerance: As of `workspace_solid`.
-
-    Raises:
-        InputError: a tolerance that is not positive or too small.
-        ExplorerError: a boolean fails.
-    """
-    return _common(design, limits, tolerance)
 
 
 @dataclass(frozen=True)
@@ -248,6 +231,34 @@ def convex_hull(solid: Solid) -> Solid:
     return Solid(vertices * scale + middle, faces, origin, (HULL,), solid.tolerance)
 
 
+def cut_solid(solid: Solid, half_space: HalfSpace) -> Solid:
+    """Return what of a mesh lies in a half-space; faces in its plane come from its name.
+
+    Raises:
+        ExplorerError: the boolean fails.
+    """
+    from manifold3d import Manifold
+
+    if solid.is_empty:
+        return solid
+    lows, highs = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
+    middle, scale = 0.5 * (lows + highs), float((highs - lows).max())
+    order = np.argsort(solid.limit_of_face, kind="stable")
+    used, counts = np.unique(solid.limit_of_face, return_counts=True)
+    first = Manifold.reserve_ids(len(used))
+    shape = (solid.vertices - middle) / scale, solid.faces[order].astype(np.int64)
+    body = _manifold_of(shape, tuple(range(first, first + len(used))), tuple(counts.tolist()))
+    length = float(np.linalg.norm(half_space.normal))
+    x, y, z = (-half_space.normal / length).tolist()
+    offset = (half_space.offset - float(half_space.normal @ middle)) / (length * scale)
+    vertices, faces, ids = _mesh_of(body.trim_by_plane((x, y, z), -offset))
+    names = (*solid.limits, half_space.name)
+    of_face = np.full(len(ids), len(solid.limits), dtype=np.int64)
+    for index, limit in enumerate(used.tolist()):
+        of_face[ids == first + index] = limit
+    return Solid(vertices * scale + middle, faces, of_face, names, solid.tolerance)
+
+
 def _families(design: Design, rotations: ArrayLike) -> list[tuple[Constraint, ...]]:
     matrices = checked_rotation(rotations)
     if matrices.ndim != 3 or not len(matrices):
@@ -295,7 +306,9 @@ def _body(pieces: Sequence[Piece], origins: dict[int, int], names: tuple[str, ..
         own = Manifold.reserve_ids(1)
         if piece.name:
             origins[own] = names.index(piece.name)
-        (cut if piece.cuts else kept).append(_manifold_of(piece.make(), own))
+        shape = piece.make()
+        made = _manifold_of(shape, (own,), (len(shape[1]),))
+        (cut if piece.cuts else kept).append(made)
     common = Manifold.batch_boolean(kept, OpType.Intersect)
     return Manifold.batch_boolean([common, *cut], OpType.Subtract)
 
@@ -329,7 +342,8 @@ def _nearest(
     return found
 
 
-def _manifold_of(shape: Facets, own: int) -> Manifold:
+def _manifold_of(shape: Facets, ids: tuple[int, ...], counts: tuple[int, ...]) -> Manifold:
+    """Return a body; so many of its faces, in their order, have each of the ids."""
     from manifold3d import Manifold, Mesh64
 
     vertices, faces = shape
@@ -337,8 +351,8 @@ def _manifold_of(shape: Facets, own: int) -> Manifold:
         Mesh64(
             np.ascontiguousarray(vertices),
             faces.astype(np.uint64),
-            run_index=np.array([0, faces.size], dtype=np.uint64),
-            run_original_id=np.array([own], dtype=np.uint32),
+            run_index=np.cumsum([0, *counts], dtype=np.uint64) * np.uint64(3),
+            run_original_id=np.array(ids, dtype=np.uint32),
         )
     )
 

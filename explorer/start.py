@@ -24,8 +24,21 @@ STARTS = 6
 CLEAR = 1e-6
 
 
+class StartError(InputError):
+    """A position from which nothing can be reached.
+
+    Attributes:
+        nearest: The nearest position without trouble at the same orientation, shape (3,);
+            None if there is none.
+    """
+
+    def __init__(self, message: str, nearest: FloatArray | None) -> None:
+        super().__init__(message)
+        self.nearest = nearest
+
+
 def check_start(design: Design, rotation: FloatArray, position: FloatArray) -> None:
-    """Raise an `InputError` if a position, that of the home pose say, cannot be used.
+    """Raise a `StartError` if a position, that of the home pose say, cannot be used.
 
     It names the limits or pairs of legs, and the nearest position where all is well.
     """
@@ -35,9 +48,10 @@ def check_start(design: Design, rotation: FloatArray, position: FloatArray) -> N
     text = f"nothing can be reached from {_shown(position)}: {'; '.join(trouble)}"
     nearest = nearest_clear_position(design, rotation, position)
     if nearest is None:
-        raise InputError(f"{text}; at this orientation no other position is better")
-    raise InputError(
-        f"{text}; the nearest position without trouble at this orientation is {_shown(nearest)}"
+        raise StartError(f"{text}; at this orientation no other position is better", None)
+    raise StartError(
+        f"{text}; the nearest position without trouble at this orientation is {_shown(nearest)}",
+        nearest,
     )
 
 

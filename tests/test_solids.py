@@ -26,8 +26,8 @@ from explorer.solids import (
     HULL,
     Solid,
     convex_hull,
+    cut_solid,
     dexterous_solid,
-    limited_solid,
     reachable_solid,
     workspace_solid,
 )
@@ -255,13 +255,43 @@ def test_an_empty_solid_names_what_empties_it() -> None:
     assert workspace_solid(OPTIMAL, np.eye(3)).empty_because == ("margin κ2",)
 
 
-def test_more_limits_cut_further() -> None:
-    limits = constraints(OPTIMAL, home_rotation(OPTIMAL))
-    half = HalfSpace("cut", np.array([0.0, 0.0, 1.0]), 9.0)
-    lower = limited_solid(OPTIMAL, [*limits, half])
-    rest = limited_solid(OPTIMAL, [*limits, HalfSpace("cut", -half.normal, -9.0)])
-    assert "cut" in lower.limits
-    assert lower.volume + rest.volume == pytest.approx(workspace_solid(OPTIMAL).volume, rel=1e-4)
+@pytest.mark.parametrize("seed", range(12))
+def test_a_cut_parts_a_solid_in_two(seed: int) -> None:
+    design, rotation = ordinary_case(seed)
+    solid = workspace_solid(design, rotation)
+    rng = np.random.default_rng(seed)
+    normal: FloatArray = 3.0 * rng.normal(size=3)
+    heights = solid.vertices @ normal
+    level = float(rng.uniform(float(heights.min()), float(heights.max())))
+    below = cut_solid(solid, HalfSpace("cut", normal, level))
+    above = cut_solid(solid, HalfSpace("cut", -normal, -level))
+    assert below.volume + above.volume == pytest.approx(solid.volume, rel=1e-9)
+    for part, sign in ((below, 1.0), (above, -1.0)):
+        assert part.is_watertight
+        assert (sign * (part.vertices @ normal - level) <= 1e-9 * np.abs(heights).max()).all()
+        # Faces in the plane are the cut's, and the others those of the limits as before.
+        assert part.limits == (*solid.limits, "cut")
+        in_plane = (np.abs(part.vertices @ normal - level) <= 1e-9 * np.abs(heights).max())[
+            part.faces
+        ].all(axis=1)
+        np.testing.assert_array_equal(part.limit_of_face == len(solid.limits), in_plane)
+        kept = Solid(
+            part.vertices,
+            part.faces[~in_plane],
+            part.limit_of_face[~in_plane],
+            solid.limits,
+            solid.tolerance,
+        )
+        assert_keeps_to_its_limits(kept, design, rotation)
+
+
+def test_a_cut_beside_a_solid_leaves_all_of_it_or_nothing() -> None:
+    solid = workspace_solid(OPTIMAL)
+    up = np.array([0.0, 0.0, 1.0])
+    assert cut_solid(solid, HalfSpace("cut", up, 30.0)).volume == pytest.approx(solid.volume)
+    nothing = cut_solid(solid, HalfSpace("cut", up, -1.0))
+    assert nothing.is_empty
+    assert cut_solid(nothing, HalfSpace("cut", up, 1.0)).is_empty
 
 
 @pytest.mark.parametrize("seed", range(10))

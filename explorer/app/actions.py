@@ -152,6 +152,18 @@ class SetPose:
 
 
 @dataclass(frozen=True)
+class StartThere:
+    """Move to a pose, and let what can be reached be reached from there."""
+
+    pose: Pose
+
+    def apply(self, state: State) -> State:
+        """Return the next state."""
+        workspace = replace(state.view.workspace, start="pose")
+        return moved(replace(state, view=replace(state.view, workspace=workspace)), self.pose)
+
+
+@dataclass(frozen=True)
 class SetMode:
     """Jump to another assembly mode of the same joints."""
 

@@ -7,10 +7,11 @@ so the last value of each property is remembered here.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeGuard, cast
 
 import numpy as np
 import viser
+from numpy.typing import NDArray
 
 Update: TypeAlias = tuple[Any, str, object]
 """A handle, the property to assign, and its value: computed first, assigned together."""
@@ -57,4 +58,13 @@ def _same(a: object, b: object) -> bool:
         return True
     if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
         return np.array_equal(np.asarray(a), np.asarray(b))
+    if is_columns(a) and is_columns(b):
+        return len(a) == len(b) and all(map(_same, a, b))
     return a == b
+
+
+def is_columns(value: object) -> TypeGuard[tuple[NDArray[Any], ...]]:
+    """Whether a value is the data of a chart, a tuple of arrays."""
+    if not isinstance(value, tuple):
+        return False
+    return any(isinstance(each, np.ndarray) for each in cast("tuple[object, ...]", value))

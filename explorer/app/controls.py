@@ -188,10 +188,12 @@ class Controls:
         options: tuple[str, ...],
         read: Callable[[Frame], str],
         write: Callable[[State, str], Action],
+        *,
+        disabled: Callable[[State], bool] | None = None,
     ) -> None:
         """Add a list to choose from."""
         handle = self._gui.add_dropdown(label, options, hint=hint)
-        self._controls.append(Control[str](self._session, handle, read, write))
+        self._controls.append(Control[str](self._session, handle, read, write, disabled))
 
     def button(
         self,

@@ -18,13 +18,20 @@ from explorer.app.panels.legs import LegsPanel
 from explorer.app.panels.move import MovePanel
 from explorer.app.panels.singularity import SingularityPanel
 from explorer.app.panels.view import ViewPanel
-from explorer.app.panels.workspace import WorkspaceNumbers, WorkspacePanel, tolerance_of
+from explorer.app.panels.workspace import WorkspacePanel, tolerance_of
+from explorer.app.panels.workspace_numbers import WorkspaceNumbers
 from explorer.app.scene import Scene
 from explorer.app.scene.camera import Cameras, ViewName, framing
 from explorer.app.scene.placing import Placed, scene_scale
 from explorer.app.session import Session, Who
 from explorer.app.state import Frame, State
-from explorer.app.workspace_feed import WorkspaceFeed, workspace_rotation
+from explorer.app.tasks import exported_name
+from explorer.app.workspace_feed import (
+    RadiusFeed,
+    WorkspaceFeed,
+    workspace_rows,
+    workspace_start,
+)
 from explorer.pose import Pose
 
 TITLE = "Flagged 4-4 explorer"
@@ -51,6 +58,7 @@ class Page:
         self.session = Session(state, self._draw, self._complain, self._report)
         self.worker = Worker(lambda message: self._complain(message, None))
         self.feed = WorkspaceFeed(self.worker, self.session.redraw)
+        self.radius_feed = RadiusFeed(self.worker, self.session.redraw)
         gui = server.gui
         gui.configure_theme(
             show_logo=False, show_share_button=False, control_width="large", brand_color=BRAND
@@ -74,8 +82,8 @@ class Page:
         with side.add_tab("Workspace"):
             self._numbers = WorkspaceNumbers(gui)
         with side.add_tab("Legs"):
-            legs = LegsPanel(gui, self.session)
-        self._panels = (move, design, view, singularity, legs)
+            self._legs = LegsPanel(gui, self.session)
+        self._panels = (move, design, view, singularity)
         if docked:
             gui.main_panel.dock_right()
             gui.main_panel.set_width(350)
@@ -120,13 +128,16 @@ class Page:
 
     def _draw(self, frame: Frame) -> None:
         self._frame = frame
+        # First, so that what is asked for is called out of date until it arrives.
+        for feed in (self.feed, self.radius_feed):
+            feed.follow(frame)
         updates = self._scene.updates(self._placed())
         for panel in self._panels:
             updates.extend(panel.updates(frame))
         for panel in (self._workspace, self._numbers):
             updates.extend(panel.updates(frame, self.feed))
+        updates.extend(self._legs.updates(frame, self.radius_feed))
         self._assigner.assign(updates)
-        self.feed.follow(frame)
 
     def _placed(self) -> Placed:
         drawing = self.feed.drawing
@@ -150,13 +161,22 @@ class Page:
         if client is None:
             return
         state = self.session.state
-        rotation = tuple(tuple(row) for row in workspace_rotation(Frame(state)).tolist())
+        frame, region = Frame(state), state.view.workspace.region
+        name = f"{state.design.name}-{exported_name(region, what).replace(' ', '-')}"
         self.worker.submit(
             ("export", client_id, what),
             "export_mesh",
-            (state.design, rotation, tolerance_of(state), what, file_format),
+            (
+                state.design,
+                workspace_rows(frame),
+                tolerance_of(state),
+                region,
+                workspace_start(frame),
+                what,
+                file_format,
+            ),
             lambda data: client.send_file_download(
-                f"{state.design.name}-{what}.{file_format}", data, save_immediately=True
+                f"{name}.{file_format}", data, save_immediately=True
             ),
             lambda problem: self._complain(problem, client_id),
         )

@@ -34,6 +34,9 @@ class WorkspaceView:
 
     Attributes:
         solid: Whether the solid is drawn.
+        region: Whether it is all that is within the limits, or what of it can be reached
+            without a collision of legs.
+        start: Whether it is to be reached from the home position, or from the present one.
         hull: Whether its convex hull is drawn.
         planes: Whether the three singularity planes are drawn.
         orientation: Whether it is that of the present pose, or of the home pose.
@@ -45,6 +48,8 @@ class WorkspaceView:
     """
 
     solid: bool = False
+    region: Literal["limits", "reachable"] = "limits"
+    start: Literal["home", "pose"] = "home"
     hull: bool = False
     planes: bool = False
     orientation: Literal["pose", "home"] = "pose"
@@ -63,6 +68,7 @@ class View:
         tetrahedra: Whether each of the three is drawn.
         clearance: Whether the closest pair of legs is marked.
         swept: Whether the tetrahedra are drawn that the legs swept in the last move.
+        radius_curve: Whether the reachable volume is drawn against the radius of the legs.
         ghosts: Whether the seven other assembly modes are drawn.
         twin: Whether the 6-4 twin's six legs replace the four.
         warn_below: Margins below this length are warned of, in design units; None for a
@@ -79,6 +85,7 @@ class View:
     tetrahedra: tuple[bool, bool, bool] = (True, True, True)
     clearance: bool = False
     swept: bool = False
+    radius_curve: bool = False
     ghosts: bool = False
     twin: bool = False
     warn_below: float | None = None

@@ -2,39 +2,36 @@
 
 from __future__ import annotations
 
-import itertools
 import time
 from dataclasses import dataclass
-from typing import Any, Literal
+from functools import lru_cache
+from typing import Literal, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
-from explorer.app.colours import FAR_WARNINGS, Rgb, proximity_colour
+from explorer.app.bands import PLAIN, Colouring, Measure, Shell
+from explorer.app.slice_map import AXES, CUT, Axis, SliceMap, slice_map
 from explorer.arrays import FloatArray
-from explorer.constraints import HalfSpace, constraints, slacks
+from explorer.constraints import HalfSpace
 from explorer.design import Design
-from explorer.errors import InputError
-from explorer.region import region_of
-from explorer.singularity import inverse_condition, jacobian, margins
+from explorer.errors import ExplorerError, InputError
+from explorer.least_clearance import LeastClearances, least_clearances
+from explorer.pose import Triple
+from explorer.radii import RadiusCurve, radius_curve
+from explorer.reachable import PairCost, ReachableWorkspace, reachable_workspace
 from explorer.solid import Solid
-from explorer.solids import convex_hull, limited_solid, workspace_solid
-from explorer.workspace import NodeCount, bounds, workspace_nodes, workspace_volume
+from explorer.solids import convex_hull, cut_solid, workspace_solid
+from explorer.start import StartError
+from explorer.workspace import NodeCount, workspace_nodes, workspace_volume
 
-Axis = Literal["x", "y", "z"]
-Measure = Literal["plain", "margin", "condition"]
+Region = Literal["limits", "reachable"]
+Rows: TypeAlias = tuple[tuple[float, ...], ...]
+"""Of a matrix."""
 
-AXES: tuple[Axis, ...] = ("x", "y", "z")
-# An inverse condition number below this is coloured as a warning.
-WARN_CONDITION = 0.01
-# Colours come in bands, so that a surface tells how much and not only where less.
-BAND_EDGES = (0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 2.5, 3.0, FAR_WARNINGS)
-PLAIN: Rgb = (110, 150, 196)
-# Shares of the reach: the longest edge of a coloured facet, the chord tolerance of a live solid.
-COLOURED_EDGE = 0.08
+# Of the reach: the chord tolerance of a live solid.
 LIVE_TOLERANCE = 0.004
-# Pixels on the longer side of the map of a slice.
-MAP_PIXELS = 110
+# Workspaces that are kept, so that to cut or colour one takes no time.
+KEPT = 4
 
 
 @dataclass(frozen=True)
@@ -44,6 +41,8 @@ class WorkspaceRequest:
     Attributes:
         design: The manipulator.
         rotation: Platform to base, rows of the matrix.
+        region: All that is within the limits, or what of it can be reached.
+        start: From where it is to be reached; None for the home position.
         colour: By what the surface is coloured.
         cut: The axis along which it is cut open, or None.
         level: Where.
@@ -53,7 +52,9 @@ class WorkspaceRequest:
     """
 
     design: Design
-    rotation: tuple[tuple[float, ...], ...]
+    rotation: Rows
+    region: Region
+    start: Triple | None
     colour: Measure
     cut: Axis | None
     level: float
@@ -63,22 +64,28 @@ class WorkspaceRequest:
 
 
 @dataclass(frozen=True)
-class Shell:
-    """A part of a surface in one colour: vertices (n, 3) in design units, faces (m, 3)."""
+class Trouble:
+    """Why nothing can be reached, and from which position something can, if from any."""
 
-    colour: Rgb
-    vertices: FloatArray
-    faces: NDArray[np.int32]
+    reason: str
+    nearest: Triple | None
 
 
 @dataclass(frozen=True)
-class SliceMap:
-    """A picture of the slice: pixels (h, w, 4), from its lows to its highs on two axes."""
+class Reached:
+    """What of a workspace can be reached.
 
-    pixels: NDArray[np.uint8]
-    axes: tuple[Axis, Axis]
-    lows: tuple[float, float]
-    highs: tuple[float, float]
+    Attributes:
+        volume: In cubed design units.
+        node_count: Of the paper's grid.
+        pairs: What each pair of legs means for it, in the order of `PAIRS`.
+        harmless_radius: By how much all radii may grow before any two legs collide.
+    """
+
+    volume: float
+    node_count: int
+    pairs: tuple[PairCost, ...]
+    harmless_radius: float
 
 
 @dataclass(frozen=True)
@@ -90,12 +97,14 @@ class WorkspaceDrawing:
         shells: The surface.
         hull: The convex hull, if asked for.
         slice_map: The map of the slice, if it is cut.
-        volume: Exact, see `explorer.workspace`.
+        volume: Within the limits; exact, see `explorer.workspace`.
         error: Of the exact volume.
+        reached: What can be reached, if that was asked for and there is no trouble.
+        trouble: Why all that is within the limits is drawn instead.
         mesh_volume: Of the uncut solid.
         hull_volume: Of the hull, if asked for.
         extent: (lows, highs) of the solid, None if it is empty.
-        nodes: The paper's node count, None if the grid is too fine.
+        nodes: The paper's node count within the limits, None if the grid is too fine.
         empty_because: The limits that empty it.
         seconds: How long it took.
     """
@@ -106,6 +115,8 @@ class WorkspaceDrawing:
     slice_map: SliceMap | None
     volume: float
     error: float
+    reached: Reached | None
+    trouble: Trouble | None
     mesh_volume: float
     hull_volume: float | None
     extent: tuple[FloatArray, FloatArray] | None
@@ -114,166 +125,103 @@ class WorkspaceDrawing:
     seconds: float
 
 
+@dataclass(frozen=True)
+class RadiusRequest:
+    """Of what to draw the reachable volume against the radius of the legs.
+
+    Attributes:
+        design: The manipulator; its legs without radii, since these do not count.
+        rotation: Platform to base, rows of the matrix.
+        start: From where it is to be reached; None for the home position.
+    """
+
+    design: Design
+    rotation: Rows
+    start: Triple | None
+
+
+@dataclass(frozen=True)
+class RadiusDrawing:
+    """The reachable volume against the radius, and where legs come the closest.
+
+    Attributes:
+        request: What was asked for.
+        curve: None if there is trouble.
+        least: Of legs without radii, anywhere within the limits.
+        trouble: Why there is no curve.
+    """
+
+    request: RadiusRequest
+    curve: RadiusCurve | None
+    least: LeastClearances
+    trouble: Trouble | None
+
+
 def ready() -> None:
     """Do nothing: the process that was asked has started."""
 
 
 def draw_workspace(request: WorkspaceRequest) -> WorkspaceDrawing:
     """Return the workspace, drawn and measured."""
-    start = time.perf_counter()
+    begin = time.perf_counter()
     design, rotation = request.design, np.array(request.rotation)
     tolerance = request.tolerance or LIVE_TOLERANCE * design.reach
     measured = workspace_volume(design, rotation)
-    solid = workspace_solid(design, rotation, tolerance)
+    whole = workspace_solid(design, rotation, tolerance)
+    found = None
+    if request.region == "reachable":
+        found = _reachable(design, request.rotation, request.start, tolerance)
+    found, trouble = (None, found) if isinstance(found, Trouble) else (found, None)
+    solid = whole if found is None else found.solid
     hull = convex_hull(solid) if request.hull and not solid.is_empty else None
-    shown, slice_map = solid, None
+    colouring = Colouring(design, rotation, request.colour, request.warn_below)
+    shown, mapped = solid, None
     if request.cut is not None and not solid.is_empty:
         # The half that looks at the isometric camera is taken away.
         side = -1.0 if request.cut == "y" else 1.0
-        knife = HalfSpace("cut", side * np.eye(3)[AXES.index(request.cut)], side * request.level)
-        limits = (*constraints(design, rotation), knife)
-        shown = limited_solid(design, limits, tolerance)
-        slice_map = _slice_map(request, rotation)
+        knife = HalfSpace(CUT, side * np.eye(3)[AXES.index(request.cut)], side * request.level)
+        shown = cut_solid(solid, knife)
+        both = (None, None) if found is None else (cut_solid(whole, knife), shown)
+        mapped = slice_map(colouring, request.cut, request.level, *both)
     try:
         nodes = workspace_nodes(design, rotation)
     except InputError:
         nodes = None
-    vertices = solid.vertices
     return WorkspaceDrawing(
         request=request,
-        shells=_shells(request, rotation, shown),
+        shells=colouring.shells(shown),
         hull=None if hull is None else Shell(PLAIN, hull.vertices, hull.faces),
-        slice_map=slice_map,
+        slice_map=mapped,
         volume=measured.volume,
         error=measured.error,
+        reached=None if found is None else _reached(found),
+        trouble=trouble,
         mesh_volume=solid.volume,
         hull_volume=None if hull is None else hull.volume,
-        extent=None if solid.is_empty else (vertices.min(axis=0), vertices.max(axis=0)),
+        extent=_extent(solid),
         nodes=nodes,
         empty_because=measured.empty_because,
-        seconds=time.perf_counter() - start,
+        seconds=time.perf_counter() - begin,
     )
 
 
-def band_colours() -> tuple[Rgb, ...]:
-    """Return the colour of each band, of values as multiples of the warning value."""
-    edges = (*BAND_EDGES, 1.5 * BAND_EDGES[-1])
-    return tuple(proximity_colour(0.5 * (a + b), 1.0) for a, b in itertools.pairwise(edges))
-
-
-def _shells(request: WorkspaceRequest, rotation: FloatArray, solid: Solid) -> tuple[Shell, ...]:
-    if solid.is_empty:
-        return ()
-    if request.colour == "plain":
-        return (Shell(PLAIN, solid.vertices, solid.faces),)
-    from trimesh import remesh
-
-    untyped: Any = remesh
-    edge = COLOURED_EDGE * request.design.reach
-    vertices, faces = untyped.subdivide_to_size(solid.vertices, solid.faces, edge, max_iter=12)
-    rest = np.asarray(vertices, dtype=np.float64)[np.asarray(faces)]
-    share = _measured(request, rotation, rest.reshape(-1, 3)).reshape(-1, 3)
-    shells: list[Shell] = []
-    for colour, edge in zip(band_colours(), (*BAND_EDGES[1:], np.inf), strict=True):
-        band, rest, share = split_at(rest, share, edge)
-        if len(band):
-            corners = np.arange(3 * len(band), dtype=np.int32).reshape(-1, 3)
-            shells.append(Shell(colour, band.reshape(-1, 3), corners))
-    return tuple(shells)
-
-
-def split_at(
-    triangles: FloatArray, values: FloatArray, level: float
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Split triangles along the line where a value that is linear on each is a level.
-
-    Args:
-        triangles: Shape (n, 3, 3).
-        values: At their corners, shape (n, 3).
-        level: Where to split.
-
-    Returns:
-        The triangles below, the triangles above, and the values of those above.
-    """
-    high = values >= level
-    count = high.sum(axis=1)
-    low_side, high_side = [triangles[count == 0]], [triangles[count == 3]]
-    high_values = [values[count == 3]]
-    for lone_is_high, mixed in ((True, count == 1), (False, count == 2)):
-        if not mixed.any():
-            continue
-        t, v, h = triangles[mixed], values[mixed], high[mixed]
-        # Turn each so that the corner alone on its side comes first.
-        lone = np.argmax(h == lone_is_high, axis=1)
-        order = (lone[:, None] + np.arange(3)) % 3
-        t = np.take_along_axis(t, order[:, :, None], axis=1)
-        v = np.take_along_axis(v, order, axis=1)
-        share = ((level - v[:, :1]) / (v[:, 1:] - v[:, :1]))[:, :, None]
-        cut = t[:, :1] + share * (t[:, 1:] - t[:, :1])
-        tip = np.stack([t[:, 0], cut[:, 0], cut[:, 1]], axis=1)
-        base = np.concatenate(
-            [
-                np.stack([cut[:, 0], t[:, 1], t[:, 2]], axis=1),
-                np.stack([cut[:, 0], t[:, 2], cut[:, 1]], axis=1),
-            ]
-        )
-        at = np.full(len(t), level)
-        tip_values = np.stack([v[:, 0], at, at], axis=1)
-        base_values = np.concatenate(
-            [np.stack([at, v[:, 1], v[:, 2]], axis=1), np.stack([at, v[:, 2], at], axis=1)]
-        )
-        (high_side if lone_is_high else low_side).append(tip)
-        (low_side if lone_is_high else high_side).append(base)
-        high_values.append(tip_values if lone_is_high else base_values)
-    return np.concatenate(low_side), np.concatenate(high_side), np.concatenate(high_values)
-
-
-def _measured(request: WorkspaceRequest, rotation: FloatArray, points: FloatArray) -> FloatArray:
-    """Return what colours points (n, 3), as multiples of the value to warn below."""
-    if request.colour != "condition":
-        return np.abs(margins(points, rotation)).min(axis=-1) / request.warn_below
-    rates = jacobian(request.design, points, rotation)
-    return inverse_condition(rates, request.design.reach) / WARN_CONDITION
-
-
-def _slice_map(request: WorkspaceRequest, rotation: FloatArray) -> SliceMap | None:
-    if request.cut is None:
-        return None
-    limits = constraints(request.design, rotation)
-    lows, highs = bounds(region_of(limits))
-    if not np.isfinite([lows, highs]).all() or not (lows < highs).all():
-        return None
-    cut = AXES.index(request.cut)
-    first, second = (axis for axis in range(3) if axis != cut)
-    width, height = float(highs[first] - lows[first]), float(highs[second] - lows[second])
-    pixel = max(width, height) / MAP_PIXELS
-    columns = lows[first] + pixel * (np.arange(max(1, round(width / pixel))) + 0.5)
-    rows = lows[second] + pixel * (np.arange(max(1, round(height / pixel))) + 0.5)
-    points = np.zeros((len(rows), len(columns), 3))
-    points[..., cut] = request.level
-    points[..., first] = columns
-    # The first row of a picture is at the top.
-    points[..., second] = rows[::-1, None]
-    inside = np.asarray((slacks(limits, points) >= 0.0).all(axis=-1))
-    pixels = np.zeros((*inside.shape, 4), dtype=np.uint8)
-    if inside.any():
-        share = _measured(request, rotation, points[inside])
-        table = np.array([proximity_colour(s, 1.0) for s in np.linspace(0.0, FAR_WARNINGS, 201)])
-        index = np.clip(np.rint(share / FAR_WARNINGS * 200.0), 0, 200).astype(np.int64)
-        pixels[inside, :3] = table[index]
-        pixels[inside, 3] = 255
-    return SliceMap(
-        pixels,
-        (AXES[first], AXES[second]),
-        (float(lows[first]), float(lows[second])),
-        (float(highs[first]), float(highs[second])),
-    )
+def draw_radius_curve(request: RadiusRequest) -> RadiusDrawing:
+    """Return the reachable volume against the radius of all legs."""
+    design, rotation = request.design, np.array(request.rotation)
+    least = least_clearances(design, rotation)
+    try:
+        curve = radius_curve(design, rotation, start=request.start)
+    except ExplorerError as error:
+        return RadiusDrawing(request, None, least, _trouble(error))
+    return RadiusDrawing(request, curve, least, None)
 
 
 def export_mesh(
     design: Design,
-    rotation: tuple[tuple[float, ...], ...],
+    rotation: Rows,
     tolerance: float,
+    region: Region,
+    start: Triple | None,
     what: str,
     file_format: str,
 ) -> bytes:
@@ -283,14 +231,57 @@ def export_mesh(
         design: The manipulator.
         rotation: Platform to base, rows of the matrix.
         tolerance: Chord tolerance, in design units.
+        region: All that is within the limits, or what of it can be reached.
+        start: From where it is to be reached; None for the home position.
         what: "workspace" or "hull".
         file_format: As of `explorer.export.mesh`.
 
     Raises:
-        ExplorerError: an empty workspace, or a library that is missing.
+        ExplorerError: an empty workspace, nothing to be reached, or a library that is missing.
     """
     from explorer.export.mesh import mesh_bytes
 
-    solid = workspace_solid(design, np.array(rotation), tolerance)
-    name = f"{design.name} {what}"
+    if region == "limits":
+        solid = workspace_solid(design, np.array(rotation), tolerance)
+    else:
+        found = _reachable(design, rotation, start, tolerance)
+        if isinstance(found, Trouble):
+            raise InputError(found.reason)
+        solid = found.solid
+    name = f"{design.name} {exported_name(region, what)}"
     return mesh_bytes(convex_hull(solid) if what == "hull" else solid, file_format, design, name)
+
+
+def exported_name(region: Region, what: str) -> str:
+    """Return what a file is called that holds a "workspace" or a "hull"."""
+    return what if region == "limits" else f"reachable {what}"
+
+
+@lru_cache(maxsize=KEPT)
+def _reachable(
+    design: Design, rotation: Rows, start: Triple | None, tolerance: float
+) -> ReachableWorkspace | Trouble:
+    try:
+        return reachable_workspace(design, np.array(rotation), start=start, tolerance=tolerance)
+    except ExplorerError as error:
+        return _trouble(error)
+
+
+def _trouble(error: ExplorerError) -> Trouble:
+    nearest = error.nearest if isinstance(error, StartError) else None
+    if nearest is None:
+        return Trouble(str(error), None)
+    x, y, z = nearest.tolist()
+    return Trouble(str(error), (x, y, z))
+
+
+def _reached(found: ReachableWorkspace) -> Reached:
+    return Reached(
+        found.reachable_volume, found.reachable_node_count, found.pairs, found.harmless_radius
+    )
+
+
+def _extent(solid: Solid) -> tuple[FloatArray, FloatArray] | None:
+    if solid.is_empty:
+        return None
+    return solid.vertices.min(axis=0), solid.vertices.max(axis=0)

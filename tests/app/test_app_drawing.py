@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from explorer.app.bands import COLLIDING, PLAIN
 from explorer.app.colours import FAR, FAR_WARNINGS, SINGULAR, Rgb, proximity_colour
 from explorer.app.controls import Span, decimals
 from explorer.app.panels.move import interval_marks
@@ -63,6 +64,12 @@ def test_warned_and_clear_are_told_apart_without_green_cones() -> None:
     warned = [as_deuteranope(proximity_colour(x, 1.0)) for x in np.linspace(0.0, 0.99, 20)]
     clear = [as_deuteranope(proximity_colour(x, 1.0)) for x in np.linspace(1.0, FAR_WARNINGS, 20)]
     assert min(float(np.linalg.norm(a - b)) for a in warned for b in clear) > 60.0
+
+
+def test_collisions_are_told_from_limits_without_green_cones_and_in_grey() -> None:
+    off = as_deuteranope(COLLIDING) - as_deuteranope(PLAIN)
+    assert float(np.linalg.norm(off)) > 60.0
+    assert luminance(PLAIN) > 2.0 * luminance(COLLIDING)
 
 
 @pytest.mark.parametrize("view", VIEWS)

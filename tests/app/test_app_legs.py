@@ -7,14 +7,15 @@ from collections.abc import Generator, Iterable
 from dataclasses import replace
 from typing import Any
 
-import msgspec
 import numpy as np
 import pytest
 import viser
+from desk import Desk, number, rows_of, thick
 
-from explorer.app.actions import ByHand, SetLimits, SetPose, SetPosition, SetView
+from explorer.app.actions import ByHand, SetPose, SetPosition, SetView
 from explorer.app.assigning import Update
 from explorer.app.colours import OUTLINE, SWEPT, TUBE
+from explorer.app.jobs import Worker
 from explorer.app.panels.design import DesignPanel
 from explorer.app.panels.html import BEYOND, WITHIN
 from explorer.app.panels.legs import LegsPanel, clearance_table, move_table
@@ -23,9 +24,9 @@ from explorer.app.scene.clearance import ClearanceScene
 from explorer.app.scene.legs import Legs
 from explorer.app.scene.placing import Placed
 from explorer.app.scene.swept import SweptTetrahedra
-from explorer.app.session import Session
 from explorer.app.state import Frame, State, opened
 from explorer.app.viser_gaps import start_viser, stop_viser
+from explorer.app.workspace_feed import RadiusFeed
 from explorer.clearance import PAIRS, leg_axes, leg_clearances
 from explorer.design import Design
 from explorer.design_file import PRESETS
@@ -34,6 +35,8 @@ from explorer.moves import move_clearance
 from explorer.pose import Pose
 
 OPTIMAL = PRESETS["paper-optimal"]
+# Started when it is first needed, and so never.
+UNUSED = Worker(lambda _: None)
 JOINED = Design(a3=(10, 4), b1=(4, -1), b2=0.0, b3=2.0)
 END = Pose.of_yaw_pitch_roll((14.0, -2.0, 6.0), (-20.0, 0.0, 15.0))
 
@@ -45,43 +48,11 @@ def server() -> Generator[viser.ViserServer]:
     stop_viser(made)
 
 
-class Desk:
-    """A session whose complaints are kept, and hands that use the page's controls."""
-
-    def __init__(self, state: State) -> None:
-        self.complaints: list[str] = []
-        self.session = Session(
-            state, lambda _: None, lambda message, _: self.complaints.append(message), self._fail
-        )
-
-    @property
-    def state(self) -> State:
-        assert self.session.wait_until_idle()
-        return self.session.state
-
-    def use(self, handle: Any, value: object) -> None:
-        """Set an input as a browser does: the value first, then word of it with a client."""
-        handle.value = value
-        event = viser.GuiEvent(client=None, client_id=1, target=handle)
-        for callback in handle._impl.update_cb:
-            callback(event)
-
-    def _fail(self, error: Exception) -> None:
-        raise error
-
-
 @pytest.fixture
 def desk() -> Generator[Desk]:
     made = Desk(opened(OPTIMAL))
     yield made
     made.session.stop()
-
-
-def thick(state: State, *radii: float) -> State:
-    """Return the state with radii of the legs: four, or one for all."""
-    r1, r2, r3, r4 = radii if len(radii) == 4 else radii * 4
-    limits = msgspec.structs.replace(state.design.limits, leg_radii=(r1, r2, r3, r4))
-    return SetLimits(limits).apply(state)
 
 
 def swept(end: Pose = END, start: State | None = None) -> State:
@@ -112,18 +83,6 @@ def by_name(updates: Iterable[Update]) -> dict[str, dict[str, Any]]:
     for handle, name, value in updates:
         found.setdefault(handle.name, {})[name] = value
     return found
-
-
-def rows_of(html: str) -> list[list[str]]:
-    """Return the cells of the rows of an HTML table, without the heading."""
-    rows = re.findall(r"<tr.*?</tr>", html)
-    return [
-        [re.sub("<.*?>", "", cell) for cell in re.findall(r"<td.*?</td>", row)] for row in rows[1:]
-    ]
-
-
-def number(text: str) -> float:
-    return float(text.replace("−", "-").rstrip(" %"))
 
 
 def clearances(state: State) -> np.ndarray[Any, np.dtype[np.float64]]:
@@ -202,20 +161,21 @@ def test_without_a_move_the_panel_says_how_to_make_one() -> None:
 
 
 def test_the_last_move_is_shown_on_request(server: viser.ViserServer, desk: Desk) -> None:
-    panel = LegsPanel(server.gui, desk.session)
+    panel, feed = LegsPanel(server.gui, desk.session), RadiusFeed(UNUSED, lambda: None)
     checkboxes: list[Any] = []
-    for handle, name, value in panel.updates(Frame(desk.state)):
+    for handle, name, value in panel.updates(Frame(desk.state), feed):
         setattr(handle, name, value)
         if isinstance(handle, viser.GuiCheckboxHandle):
             checkboxes.append(handle)
-    (checkbox,) = checkboxes
+    checkbox, _ = checkboxes
     assert checkbox.value is False
     for on in (True, False):
         desk.use(checkbox, on)
         assert desk.state.view.swept is on
-        updates = list(panel.updates(Frame(desk.state)))
+        updates = list(panel.updates(Frame(desk.state), feed))
         shown = [v for h, n, v in updates if isinstance(h, viser.GuiHtmlHandle) and n == "visible"]
-        assert shown == [on]
+        # The words of the radius curve are not shown.
+        assert shown == [on, False]
 
 
 # The scene

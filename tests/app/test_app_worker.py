@@ -14,16 +14,10 @@ import numpy as np
 import pytest
 
 from explorer.app.actions import SetLimits, SetVariable, SetView
+from explorer.app.bands import BAND_EDGES, band_colours, split_at
 from explorer.app.jobs import Worker
 from explorer.app.state import Frame, State, opened
-from explorer.app.tasks import (
-    BAND_EDGES,
-    WorkspaceDrawing,
-    WorkspaceRequest,
-    band_colours,
-    draw_workspace,
-    split_at,
-)
+from explorer.app.tasks import WorkspaceDrawing, WorkspaceRequest, draw_workspace
 from explorer.app.workspace_feed import WorkspaceFeed
 from explorer.design import Limits
 from explorer.design_file import PRESETS
@@ -36,7 +30,18 @@ PATIENCE = 120.0
 
 def a_request(**changes: Any) -> WorkspaceRequest:
     rotation = tuple(tuple(row) for row in home_pose(OPTIMAL).rotation.tolist())
-    plain = WorkspaceRequest(OPTIMAL, rotation, "plain", None, 0.0, 0.2, hull=False, warn_below=1.0)
+    plain = WorkspaceRequest(
+        design=OPTIMAL,
+        rotation=rotation,
+        region="limits",
+        start=None,
+        colour="plain",
+        cut=None,
+        level=0.0,
+        tolerance=0.2,
+        hull=False,
+        warn_below=1.0,
+    )
     return replace(plain, **changes)
 
 

@@ -1,4 +1,4 @@
-"""How close the legs come to each other, pair by pair: in the pose, and in the last move."""
+"""How close the legs come to each other: in the pose, in the last move, and as they grow."""
 
 from __future__ import annotations
 
@@ -12,8 +12,10 @@ from explorer.app.actions import SetView
 from explorer.app.assigning import Update
 from explorer.app.controls import Controls
 from explorer.app.panels.html import BEYOND, DIM, WITHIN, scientific
+from explorer.app.panels.radius_plot import RadiusPlot
 from explorer.app.session import Session
 from explorer.app.state import Frame
+from explorer.app.workspace_feed import RadiusFeed
 from explorer.clearance import PAIRS
 
 BOX = (
@@ -25,7 +27,7 @@ RIGHT = '<td style="text-align:right">'
 
 
 class LegsPanel:
-    """The table of clearances, and on request that of the last move."""
+    """The table of clearances, and on request that of the last move and the radius curve."""
 
     def __init__(self, gui: viser.GuiApi, session: Session) -> None:
         self._pose = gui.add_html("")
@@ -39,14 +41,24 @@ class LegsPanel:
                 lambda state, on: SetView(replace(state.view, swept=on)),
             )
             self._move = gui.add_html("", visible=False)
+        with gui.add_folder("Thicker legs"):
+            self._controls.checkbox(
+                "Volume against radius",
+                "Draw how much of the workspace can be reached if all four legs have one "
+                "radius; the orientation and the start are those of the tab Workspace.",
+                lambda frame: frame.state.view.radius_curve,
+                lambda state, on: SetView(replace(state.view, radius_curve=on)),
+            )
+            self._plot = RadiusPlot(gui)
 
-    def updates(self, frame: Frame) -> Iterator[Update]:
+    def updates(self, frame: Frame, feed: RadiusFeed) -> Iterator[Update]:
         """Yield what makes the panel show the frame."""
         yield self._pose, "content", clearance_table(frame)
         yield from self._controls.updates(frame)
         yield self._move, "visible", frame.state.view.swept
         if frame.state.view.swept:
             yield self._move, "content", move_table(frame)
+        yield from self._plot.updates(frame, feed)
 
 
 def clearance_table(frame: Frame) -> str:

@@ -10,10 +10,11 @@ import viser
 from numpy.typing import NDArray
 
 from explorer.app.assigning import Update
+from explorer.app.bands import COLLIDING, PLAIN, Shell, band_colours
 from explorer.app.colours import OUTLINE, Rgb, proximity_colour
 from explorer.app.scene.placing import Placed
 from explorer.app.scene.shapes import Patch
-from explorer.app.tasks import PLAIN, Shell, WorkspaceDrawing, band_colours
+from explorer.app.tasks import WorkspaceDrawing
 from explorer.app.workspace_feed import WorkspaceFeed, workspace_rotation
 from explorer.arrays import FloatArray
 from explorer.constraints import Cone, HalfSpace, Never, Round, constraints
@@ -22,6 +23,8 @@ ArrayPair: TypeAlias = tuple[NDArray[np.float32], NDArray[np.uint32]]
 
 EMPTY: ArrayPair = np.zeros((3, 3), dtype=np.float32), np.array([[0, 1, 2]], dtype=np.uint32)
 SOLID_OPACITY = 0.42
+# Of where legs collide, which is to be seen through the rest.
+COLLIDING_OPACITY = 0.8
 CUT_OPACITY = 0.96
 PLANE_OPACITY = 0.12
 HULL_COLOUR: Rgb = (90, 100, 116)
@@ -33,7 +36,8 @@ class WorkspaceScene:
 
     def __init__(self, scene: viser.SceneApi, feed: WorkspaceFeed) -> None:
         self._feed = feed
-        self._colours: tuple[Rgb, ...] = (PLAIN, *band_colours())
+        # Collisions are made first, and so drawn first: what is in front of them shows them.
+        self._colours: tuple[Rgb, ...] = (COLLIDING, PLAIN, *band_colours())
         self._shells = [
             scene.add_mesh_simple(
                 f"/workspace/shell/{index}",
@@ -76,12 +80,12 @@ class WorkspaceScene:
         view = placed.frame.state.view.workspace
         drawing = self._feed.drawing
         self._scale(drawing, placed.scale)
-        opaque = drawing is not None and drawing.request.cut is not None
+        is_cut = drawing is not None and drawing.request.cut is not None
         for colour, handle in zip(self._colours, self._shells, strict=True):
             shell = self._scaled.get(colour)
             yield handle, "visible", view.solid and shell is not None
             if view.solid and shell is not None:
-                yield handle, "opacity", CUT_OPACITY if opaque else SOLID_OPACITY
+                yield handle, "opacity", _opacity(colour, is_cut=is_cut)
                 yield handle, "vertices", shell[0]
                 yield handle, "faces", shell[1]
         has_hull = view.hull and drawing is not None and drawing.hull is not None
@@ -164,6 +168,12 @@ class _SingularPlane:
 
 
 CORNERS = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
+
+
+def _opacity(colour: Rgb, *, is_cut: bool) -> float:
+    if is_cut:
+        return CUT_OPACITY
+    return COLLIDING_OPACITY if colour == COLLIDING else SOLID_OPACITY
 
 
 def _scaled(shell: Shell, scale: float) -> ArrayPair:

@@ -1,0 +1,577 @@
+"""The reachable workspace on the page: requests, drawings, numbers, messages, files."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable, Generator
+from dataclasses import replace
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+import viser
+from desk import Desk, number, rows_of, thick
+from hypothesis import given
+from hypothesis import strategies as st
+
+from explorer.app import tasks
+from explorer.app.actions import GoHome, SetLimits, SetPosition, SetView
+from explorer.app.assigning import Assigner
+from explorer.app.bands import COLLIDING, PLAIN
+from explorer.app.panels.legs import LegsPanel
+from explorer.app.panels.radius_plot import chart_of, common_radius, radius_words, volume_at
+from explorer.app.panels.workspace import WorkspacePanel
+from explorer.app.panels.workspace_numbers import workspace_summary
+from explorer.app.state import Frame, State, opened
+from explorer.app.tasks import (
+    WorkspaceDrawing,
+    draw_radius_curve,
+    draw_workspace,
+    export_mesh,
+    exported_name,
+)
+from explorer.app.viser_gaps import start_viser, stop_viser
+from explorer.app.workspace_feed import RadiusFeed, WorkspaceFeed
+from explorer.arrays import FloatArray
+from explorer.clearance import PAIRS, leg_clearances
+from explorer.compiled import warm
+from explorer.constraints import constraints, slacks
+from explorer.design_file import PRESETS
+from explorer.errors import InputError
+from explorer.least_clearance import least_clearances
+from explorer.radii import RadiusCurve, radius_curve
+from explorer.reachable import reachable_workspace
+from explorer.start import StartError, check_start
+
+OPTIMAL = PRESETS["paper-optimal"]
+RADIUS = 0.2
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _warm_kernels() -> None:  # pyright: ignore[reportUnusedFunction]
+    warm()
+
+
+@pytest.fixture(scope="module")
+def server() -> Generator[viser.ViserServer]:
+    made = start_viser("127.0.0.1", 0)
+    yield made
+    stop_viser(made)
+
+
+@pytest.fixture
+def desk() -> Generator[Desk]:
+    made = Desk(shown(beyond_its_limits()))
+    yield made
+    made.session.stop()
+
+
+class Here:
+    """Stands for the worker: does what is asked when it is told to, here, and counts."""
+
+    def __init__(self) -> None:
+        self.asked: list[tuple[str, Any]] = []
+        self._waiting: list[Callable[[], None]] = []
+
+    def submit(
+        self,
+        key: object,
+        task: str,
+        arguments: tuple[Any, ...],
+        done: Callable[[Any], None],
+        failed: Callable[[str], None],
+    ) -> None:
+        del key, failed
+        self.asked.append((task, arguments[0]))
+        self._waiting.append(lambda: done(getattr(tasks, task)(*arguments)))
+
+    def work(self) -> None:
+        """Do what waits."""
+        while self._waiting:
+            self._waiting.pop(0)()
+
+
+def shown(state: State, **changes: Any) -> State:
+    """Return the state with the reachable workspace shown."""
+    asked = {"solid": True, "region": "reachable", **changes}
+    workspace = replace(state.view.workspace, **asked)
+    return SetView(replace(state.view, workspace=workspace)).apply(state)
+
+
+def _no_export(what: str, file_format: str, client_id: int | None) -> None:
+    pytest.fail(f"{what}, {file_format} and {client_id} were exported")
+
+
+def curve_shown(state: State) -> State:
+    return SetView(replace(state.view, radius_curve=True)).apply(state)
+
+
+def with_limits(state: State, **limits: Any) -> State:
+    return SetLimits(msgspec.structs.replace(state.design.limits, **limits)).apply(state)
+
+
+def beyond_its_limits() -> State:
+    """Return the optimum with a leg 4 that is too short for its home."""
+    return with_limits(opened(OPTIMAL), l4=(0.0, 12.5))
+
+
+def feed_of(state: State) -> tuple[WorkspaceFeed, Here]:
+    """Return a feed that has drawn a state."""
+    here = Here()
+    feed = WorkspaceFeed(here, lambda: None)  # pyright: ignore[reportArgumentType]
+    feed.follow(Frame(state))
+    here.work()
+    return feed, here
+
+
+def radius_feed_of(state: State) -> tuple[RadiusFeed, Here]:
+    """Return a feed that has drawn the radius curve of a state."""
+    here = Here()
+    feed = RadiusFeed(here, lambda: None)  # pyright: ignore[reportArgumentType]
+    feed.follow(Frame(state))
+    here.work()
+    return feed, here
+
+
+def drawing_of(state: State) -> WorkspaceDrawing:
+    drawing = feed_of(state)[0].drawing
+    assert drawing is not None
+    return drawing
+
+
+def clearance_at(state: State, points: FloatArray) -> FloatArray:
+    """Return the least clearance of any two legs at positions (n, 3)."""
+    return leg_clearances(state.design, points, state.pose.rotation).clearance.min(axis=-1)
+
+
+def area(triangles: FloatArray) -> float:
+    a, b, c = np.moveaxis(triangles, 1, 0)
+    return 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+
+
+def surface(drawing: WorkspaceDrawing) -> float:
+    return sum(area(shell.vertices[shell.faces]) for shell in drawing.shells)
+
+
+THICK = shown(thick(opened(OPTIMAL), RADIUS))
+
+
+# The drawing
+
+
+def test_the_drawing_holds_what_the_library_finds() -> None:
+    drawing = drawing_of(THICK)
+    expected = reachable_workspace(THICK.design, tolerance=tasks.LIVE_TOLERANCE * OPTIMAL.reach)
+    assert drawing.reached is not None
+    assert drawing.trouble is None
+    assert drawing.volume == expected.volume
+    assert drawing.reached.volume == expected.reachable_volume
+    assert drawing.reached.node_count == expected.reachable_node_count
+    assert drawing.reached.pairs == expected.pairs
+    assert drawing.reached.harmless_radius == expected.harmless_radius
+    assert drawing.nodes is not None
+    assert drawing.nodes.count == expected.node_count
+    assert drawing.mesh_volume == pytest.approx(expected.reachable_volume, rel=1e-3)
+
+
+def test_faces_where_legs_begin_to_collide_have_a_colour_of_their_own() -> None:
+    shells = {shell.colour: shell for shell in drawing_of(THICK).shells}
+    assert set(shells) == {PLAIN, COLLIDING}
+    collide = shells[COLLIDING].vertices[shells[COLLIDING].faces].reshape(-1, 3)
+    # Where two pairs begin at once an edge cuts the corner, by less than a step of the grid.
+    off = np.abs(clearance_at(THICK, collide))
+    assert float(np.median(off)) < 1e-6
+    assert float(np.quantile(off, 0.98)) < 0.1
+    plain = shells[PLAIN].vertices[shells[PLAIN].faces].mean(axis=1)
+    limits = constraints(THICK.design, THICK.pose.rotation)
+    on_limits = np.abs(slacks(limits, plain)).min(axis=-1)
+    assert float(on_limits.max()) < 2.0 * tasks.LIVE_TOLERANCE * OPTIMAL.reach
+    whole = drawing_of(shown(THICK, region="limits"))
+    assert [shell.colour for shell in whole.shells] == [PLAIN]
+
+
+@pytest.mark.parametrize("colour", ["margin", "condition"])
+def test_the_measures_colour_the_same_surface(colour: str) -> None:
+    banded = drawing_of(shown(THICK, colour=colour))
+    assert len(banded.shells) > 1
+    assert not {PLAIN, COLLIDING} & {shell.colour for shell in banded.shells}
+    assert surface(banded) == pytest.approx(surface(drawing_of(THICK)), rel=1e-9)
+
+
+def test_a_hull_holds_what_is_reached_and_no_more_than_that_of_all() -> None:
+    drawing, whole = (
+        drawing_of(shown(THICK, hull=True, region=region)) for region in ("reachable", "limits")
+    )
+    assert drawing.hull_volume is not None
+    assert whole.hull_volume is not None
+    assert drawing.mesh_volume <= drawing.hull_volume <= whole.hull_volume
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_a_cut_takes_one_side_and_maps_what_is_reached(axis: int) -> None:
+    level = (12.0, -10.0, 0.3)[axis]
+    state = shown(THICK, cut="xyz"[axis], level=level)
+    drawing = drawing_of(state)
+    side = -1.0 if axis == 1 else 1.0
+    vertices = np.concatenate([shell.vertices for shell in drawing.shells])
+    assert float((side * (vertices[:, axis] - level)).max()) == pytest.approx(0.0, abs=1e-9)
+    slice_map = drawing.slice_map
+    assert slice_map is not None
+    height, width = slice_map.pixels.shape[:2]
+    (x0, y0), (x1, y1) = slice_map.lows, slice_map.highs
+    up, across = np.indices((height, width)) + 0.5
+    points = np.full((height, width, 3), level)
+    first, second = (i for i in range(3) if i != axis)
+    points[..., first] = x0 + (x1 - x0) * across / width
+    points[..., second] = y1 - (y1 - y0) * up / height
+    clearance = clearance_at(state, points.reshape(-1, 3)).reshape(height, width)
+    alpha = slice_map.pixels[..., 3]
+    kept, blocked = alpha == 255, (alpha > 0) & (alpha < 255)
+    assert kept.any()
+    assert blocked.any()
+    # The surface of collisions has facets as long as a step of its grid.
+    assert float(clearance[kept].min()) > -0.1
+    assert float(clearance[blocked].max()) < 0.1
+    assert clearance[kept].mean() > 0.0 > clearance[blocked].mean()
+
+
+def test_cutting_and_colouring_reach_for_nothing_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    calls: list[float] = []
+
+    def counted(*args: Any, **kwargs: Any) -> Any:
+        calls.append(0.0)
+        return reachable_workspace(*args, **kwargs)
+
+    monkeypatch.setattr(tasks, "reachable_workspace", counted)
+    state = shown(thick(opened(OPTIMAL), 0.15))
+    for changes in (
+        {},
+        {"cut": "x", "level": 3.0},
+        {"cut": "y", "level": 4.0},
+        {"colour": "margin"},
+        {"hull": True},
+    ):
+        assert drawing_of(shown(state, **changes)).reached is not None
+    assert len(calls) == 1
+    drawing_of(thick(state, 0.16))
+    assert len(calls) == 2
+
+
+# What is asked for
+
+
+def test_a_move_asks_anew_only_where_it_matters() -> None:
+    def asks_anew(state: State) -> bool:
+        feed, here = feed_of(state)
+        feed.follow(Frame(SetPosition(2, 8.0).apply(state)))
+        return len(here.asked) > 1
+
+    assert not asks_anew(THICK)
+    assert asks_anew(shown(THICK, start="pose"))
+    # The start of ways counts for nothing where there are none.
+    assert not asks_anew(shown(THICK, start="pose", region="limits"))
+
+
+def test_an_old_failure_is_forgotten_once_a_newer_drawing_is_there() -> None:
+    feed, here = feed_of(THICK)
+    feed.follow(Frame(shown(THICK, colour="margin")))
+    feed._failed("too late")  # pyright: ignore[reportPrivateUsage]
+    assert feed.problem == "too late"
+    here.work()
+    assert feed.problem is None
+    assert feed.is_current
+
+
+def test_the_curve_is_computed_on_request_only_and_not_for_other_radii() -> None:
+    feed, here = radius_feed_of(opened(OPTIMAL))
+    assert here.asked == []
+    assert feed.drawing is None
+    state = curve_shown(opened(OPTIMAL))
+    feed.follow(Frame(state))
+    assert [task for task, _ in here.asked] == ["draw_radius_curve"]
+    for same in (thick(state, 0.3), SetPosition(0, 11.0).apply(state)):
+        feed.follow(Frame(same))
+    assert len(here.asked) == 1
+    feed.follow(Frame(with_limits(state, margin=1.0)))
+    assert len(here.asked) == 2
+    assert here.asked[-1][1].design.limits.margin == 1.0
+    feed.follow(Frame(opened(OPTIMAL)))
+    assert len(here.asked) == 2
+
+
+def test_the_columns_of_a_chart_are_sent_once(server: viser.ViserServer) -> None:
+    chart = server.gui.add_uplot((np.zeros(2), np.zeros(2)), ({}, {}))
+    assigner = Assigner(server)
+    for y, differing in ((1.0, 1), (1.0, 0), (2.0, 1)):
+        columns = (np.arange(3.0), np.full(3, y))
+        assert assigner.assign([(chart, "data", columns)]) == differing
+    assert assigner.assign([(chart, "data", (np.arange(3.0),))]) == 1
+
+
+# The numbers
+
+
+def summary(state: State, *, drawn: State | None = None) -> str:
+    feed, _ = feed_of(state if drawn is None else drawn)
+    feed.follow(Frame(state))
+    return workspace_summary(Frame(state), feed)
+
+
+def test_the_numbers_are_those_of_the_library() -> None:
+    expected = drawing_of(THICK)
+    reached = expected.reached
+    assert reached is not None
+    html = summary(THICK)
+    assert f"{reached.volume:.6g} units³" in html
+    assert f"{100.0 * reached.volume / expected.volume:.4g} % of the {expected.volume:.6g}" in html
+    assert f"{reached.node_count} of 999" in html
+    assert "Legs 1 – 4, 2 – 4, 3 – 4 collide" in html
+    rows = [row for row in rows_of(html) if len(row) == 3]
+    assert [row[0] for row in rows] == ["legs"] + [f"{i} – {j}" for i, j in PAIRS]
+    for (_, clearance, blocked), pair in zip(rows[1:], reached.pairs, strict=True):
+        assert number(clearance) == pytest.approx(pair.clearance, rel=5e-3)
+        assert (blocked == "–") is (pair.blocked_volume == 0.0)
+        if blocked != "–":
+            assert number(blocked) == pytest.approx(pair.blocked_volume, rel=5e-3)
+
+
+def test_where_no_pair_collides_the_numbers_say_so_and_how_far_each_is_from_it() -> None:
+    state = with_limits(shown(opened(OPTIMAL)), margin=1.0)
+    html = summary(state)
+    assert "No pair collides" in html
+    assert "100 % of the" in html
+    least = least_clearances(state.design).clearance
+    radius = 0.5 * float(least.min())
+    assert f"radii larger by up to {radius:.4g}" in html
+    rows = [row for row in rows_of(html) if len(row) == 3][1:]
+    assert [number(row[1]) for row in rows] == pytest.approx(least.tolist(), rel=5e-3)
+    assert {row[2] for row in rows} == {"–"}
+
+
+def test_while_it_computes_the_numbers_say_so() -> None:
+    assert "computing" not in summary(THICK)
+    within = shown(THICK, region="limits")
+    assert "computing" in summary(THICK, drawn=within)
+    # What was there stays until there is something newer.
+    assert "7053.04 units³" in summary(THICK, drawn=within)
+
+
+def test_an_empty_workspace_names_what_empties_it() -> None:
+    state = with_limits(shown(opened(OPTIMAL)), l1=(0.0, 1.0), box=((10.0,) * 3, (11.0,) * 3))
+    html = summary(state)
+    assert "The workspace is empty" in html
+    assert "l1 maximum" in html
+
+
+# A start that is none
+
+
+def test_a_home_in_trouble_leaves_the_solid_and_says_what_would_do() -> None:
+    state = shown(beyond_its_limits())
+    home = np.array(state.pose.position)
+    drawing, whole = drawing_of(state), drawing_of(shown(state, region="limits"))
+    trouble = drawing.trouble
+    assert drawing.reached is None
+    assert trouble is not None
+    with pytest.raises(StartError) as refused:
+        check_start(state.design, state.pose.rotation, home)
+    assert trouble.reason == str(refused.value)
+    assert "l4 = 13.01 is above its maximum 12.5" in trouble.reason
+    assert trouble.nearest is not None
+    check_start(state.design, state.pose.rotation, np.array(trouble.nearest))
+    # On the sphere that home is beyond.
+    off = np.linalg.norm(np.array(trouble.nearest) - [*OPTIMAL.a3, 0.0])
+    assert float(off) == pytest.approx(12.5, abs=1e-3)
+    for got, expected in zip(drawing.shells, whole.shells, strict=True):
+        np.testing.assert_array_equal(got.vertices, expected.vertices)
+    assert "from the home position nothing can be reached" in summary(state)
+
+
+def test_legs_that_collide_everywhere_are_told_without_a_button(
+    server: viser.ViserServer, desk: Desk
+) -> None:
+    state = shown(thick(opened(OPTIMAL), 0.4))
+    panel = WorkspacePanel(server.gui, desk.session, _no_export)
+    feed, _ = feed_of(state)
+    updates = list(panel.updates(Frame(state), feed))
+    button = next(h for h, _, _ in updates if isinstance(h, viser.GuiButtonHandle))
+    assert (button, "visible", False) in updates
+    assert any("legs 2 and 3 overlap" in str(v) for _, name, v in updates if name == "content")
+
+
+def test_the_button_goes_where_ways_can_start(server: viser.ViserServer, desk: Desk) -> None:
+    panel = WorkspacePanel(server.gui, desk.session, _no_export)
+    feed, here = feed_of(desk.state)
+    content = visible = ""
+    button: Any = None
+    for handle, name, value in panel.updates(Frame(desk.state), feed):
+        setattr(handle, name, value)
+        if isinstance(handle, viser.GuiButtonHandle) and name == "visible":
+            button, visible = handle, value
+        if name == "content":
+            content = str(value)
+    assert "The home position is no start" in content
+    assert visible is True
+    drawing = feed.drawing
+    assert drawing is not None
+    assert drawing.trouble is not None
+    before = desk.state
+    desk.click(button)
+    after = desk.state
+    assert desk.complaints == []
+    assert after.pose.position == drawing.trouble.nearest
+    np.testing.assert_allclose(after.pose.rotation, before.pose.rotation, atol=1e-12)
+    assert after.view.workspace == replace(before.view.workspace, start="pose")
+    assert after.design == before.design
+    feed.follow(Frame(after))
+    here.work()
+    assert feed.drawing is not None
+    assert feed.drawing.trouble is None
+    assert feed.drawing.reached is not None
+    updates = list(panel.updates(Frame(after), feed))
+    assert (button, "visible", False) in updates
+    # Home again, the present position is the one in trouble.
+    feed.follow(Frame(GoHome().apply(after)))
+    here.work()
+    assert feed.drawing.trouble is not None
+
+
+# Files
+
+
+@pytest.mark.parametrize("what", ["workspace", "hull"])
+def test_what_is_reached_is_exported(what: str) -> None:
+    drawing = drawing_of(shown(THICK, hull=True))
+    rows = drawing.request.rotation
+    tolerance = tasks.LIVE_TOLERANCE * OPTIMAL.reach
+    data = export_mesh(THICK.design, rows, tolerance, "reachable", None, what, "stl")
+    import trimesh
+
+    untyped: Any = trimesh
+    mesh = untyped.load(io.BytesIO(data), file_type="stl")
+    expected = drawing.mesh_volume if what == "workspace" else drawing.hull_volume
+    assert expected is not None
+    assert float(mesh.volume) == pytest.approx(expected * OPTIMAL.unit_mm**3, rel=1e-4)
+    assert exported_name("reachable", what) == f"reachable {what}"
+    assert exported_name("limits", what) == what
+
+
+def test_where_nothing_is_reached_nothing_is_exported() -> None:
+    state = shown(beyond_its_limits())
+    rows = drawing_of(state).request.rotation
+    with pytest.raises(InputError, match="nothing can be reached from"):
+        export_mesh(state.design, rows, 0.1, "reachable", None, "workspace", "stl")
+
+
+# The radius curve
+
+
+def curve(*volumes: float) -> RadiusCurve:
+    return RadiusCurve(np.linspace(0.0, 0.5, len(volumes)), np.array(volumes), 0.05, 0.05)
+
+
+@given(st.lists(st.floats(1.0, 1e3), min_size=2, max_size=30), st.none() | st.floats(0.0, 2.0))
+def test_the_chart_shows_the_curve_and_marks_on_it(
+    values: list[float], radius: float | None
+) -> None:
+    drawn = curve(*sorted(values, reverse=True))
+    x, y, present, most, harmless = chart_of(drawn, radius)
+    assert (np.diff(x) >= 0.0).all()
+    assert (np.diff(y) <= 1e-9).all()
+    assert y[-1] == 0.0
+    assert x[-1] > 0.5
+    at = np.searchsorted(x, drawn.radii)
+    np.testing.assert_allclose(y[at], drawn.volumes)
+    marked = (radius, drawn.radius_at(0.99), drawn.harmless)
+    for column, expected in zip((present, most, harmless), marked, strict=True):
+        (points,) = np.nonzero(np.isfinite(column))
+        if expected is None:
+            assert len(points) == 0
+            continue
+        (point,) = points
+        assert x[point] == expected
+        assert column[point] == pytest.approx(volume_at(drawn, expected))
+    assert volume_at(drawn, 0.6) == 0.0
+
+
+def test_the_words_of_the_curve_are_those_of_the_library() -> None:
+    state = thick(curve_shown(opened(OPTIMAL)), RADIUS)
+    html = radius_words(Frame(state), radius_feed_of(state)[0])
+    expected = radius_curve(OPTIMAL)
+    rows = rows_of("<tr></tr>" + html)
+    assert [row[0] for row in rows] == ["present radius", "99 % left up to", "harmless up to"]
+    assert number(rows[0][1]) == RADIUS
+    share = 100.0 * volume_at(expected, RADIUS) / float(expected.volumes[0])
+    assert number(rows[0][2]) == pytest.approx(share, rel=5e-3)
+    assert number(rows[1][1]) == pytest.approx(expected.radius_at(0.99), rel=5e-3)
+    assert rows[2][1] == "0"
+    assert "touch within the limits, where z = 0: legs 1 and 4 at (0, 0, 0)" in html
+    least = least_clearances(OPTIMAL)
+    for pair in (PAIRS.index((2, 4)), PAIRS.index((3, 4))):
+        x, y = (f"{v:.3g}".replace("-", "−") for v in least.position[pair, :2])
+        assert f"legs {PAIRS[pair][0]} and {PAIRS[pair][1]} at ({x}, {y}, 0)" in html
+
+
+def test_a_harmless_radius_is_told_with_the_pair_that_ends_it() -> None:
+    state = with_limits(curve_shown(opened(OPTIMAL)), margin=1.0)
+    html = radius_words(Frame(state), radius_feed_of(state)[0])
+    least = least_clearances(state.design)
+    first, second = PAIRS[int(least.clearance.argmin())]
+    assert f"The first to collide within the limits: legs {first} and {second} at (" in html
+    assert f"{0.5 * least.clearance.min():.3g}" in html
+
+
+def test_radii_that_differ_are_not_marked() -> None:
+    state = thick(curve_shown(opened(OPTIMAL)), 0.1, 0.1, 0.1, 0.2)
+    assert common_radius(state.design) is None
+    assert "they differ" in radius_words(Frame(state), radius_feed_of(state)[0])
+
+
+def test_without_a_start_or_a_workspace_the_words_say_why() -> None:
+    troubled = curve_shown(beyond_its_limits())
+    html = radius_words(Frame(troubled), radius_feed_of(troubled)[0])
+    assert "l4 = 13.01 is above its maximum 12.5" in html
+    empty = with_limits(troubled, l1=(0.0, 1.0), box=((10.0,) * 3, (11.0,) * 3))
+    assert "The workspace is empty" in radius_words(Frame(empty), radius_feed_of(empty)[0])
+
+
+def test_the_chart_is_there_once_it_is_computed(server: viser.ViserServer, desk: Desk) -> None:
+    panel = LegsPanel(server.gui, desk.session)
+    state = curve_shown(opened(OPTIMAL))
+    here = Here()
+    feed = RadiusFeed(here, lambda: None)  # pyright: ignore[reportArgumentType]
+
+    def chart(state: State) -> dict[str, Any]:
+        feed.follow(Frame(state))
+        updates = list(panel.updates(Frame(state), feed))
+        return {name: v for h, name, v in updates if isinstance(h, viser.GuiUplotHandle)}
+
+    assert chart(opened(OPTIMAL)) == {"visible": False}
+    assert chart(state) == {"visible": False}
+    assert "Computing" in radius_words(Frame(state), feed)
+    here.work()
+    drawn = chart(state)
+    assert drawn["visible"] is True
+    expected = draw_radius_curve(here.asked[0][1]).curve
+    assert expected is not None
+    for got, column in zip(drawn["data"], chart_of(expected, 0.0), strict=True):
+        np.testing.assert_array_equal(got, column)
+    # The very same columns again, until something changes.
+    assert chart(state)["data"] is drawn["data"]
+    assert chart(thick(state, 0.1))["data"] is not drawn["data"]
+    # A new limit: the old curve, called out of date, until the new one is there.
+    narrow = with_limits(state, margin=1.0)
+    assert chart(narrow)["visible"] is True
+    assert "computing" in radius_words(Frame(narrow), feed)
+    here.work()
+    assert "computing" not in radius_words(Frame(narrow), feed)
+
+
+def test_the_drawing_of_a_trouble_pickles_like_any_other() -> None:
+    import pickle
+
+    drawing = drawing_of(shown(beyond_its_limits()))
+    again: WorkspaceDrawing = pickle.loads(pickle.dumps(drawing))
+    assert again.trouble == drawing.trouble
+    assert draw_workspace(again.request).trouble == drawing.trouble
