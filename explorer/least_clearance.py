@@ -115,6 +115,7 @@ def least_clearances(
     for pair in np.flatnonzero(np.isfinite(best) & (best > floor)):
         best[pair], places[pair] = _polished(design, r, limits, int(pair), best[pair], places[pair])
     best[best <= CROSSING * design.reach] = 0.0
+    places[np.abs(places) <= CROSSING * design.reach] = 0.0
     bound = np.where(joined, math.inf, np.minimum(settled, best))
     return LeastClearances(best - radii, bound - radii, places)
 

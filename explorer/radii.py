@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.arrays import FloatArray, IntArray
-from explorer.clearance import leg_clearances
+from explorer.clearance import PAIRS, leg_clearances
 from explorer.design import Design
 from explorer.home import home_pose
 from explorer.least_clearance import least_clearances
@@ -29,6 +29,8 @@ DEFAULT_CELLS = 40
 POINTS = 60
 # Of the narrowest place of a step, as a share of the reach.
 TOLERANCE = 1e-4
+# Radii that differ by less than this share are one.
+SAME = 1e-9
 
 
 @dataclass(frozen=True)
@@ -36,18 +38,23 @@ class RadiusCurve:
     """Reachable volume against one radius of all four legs, in design units.
 
     Attributes:
-        radii: From 0 to the radius at which nothing is left, shape (n,).
+        radii: From 0 to the radius beyond which nothing is left, which comes twice, shape
+            (n,).
         volumes: Reachable with them, shape (n,), in cubed design units; counted in cells
             of a grid as shares of the exact volume within the limits.
         harmless: The largest radius with which no two legs collide anywhere within the
             limits; 0 if some touch without a radius.
         harmless_bound: Certified not to exceed it.
+        closest_legs: The pair that comes closest, None if none has a clearance.
+        closest_position: Where it does, shape (3,).
     """
 
     radii: FloatArray
     volumes: FloatArray
     harmless: float
     harmless_bound: float
+    closest_legs: tuple[int, int] | None
+    closest_position: FloatArray
 
     def radius_at(self, share: float) -> float:
         """Return the radius at which this share of the first volume is left."""
@@ -78,22 +85,24 @@ def radius_curve(
     thin = with_radius(design, 0.0)
     whole = workspace_solid(thin, r)
     if whole.is_empty:
-        return RadiusCurve(np.zeros(1), np.zeros(1), 0.0, 0.0)
+        return RadiusCurve(np.zeros(1), np.zeros(1), 0.0, 0.0, None, np.full(3, np.nan))
     check_start(thin, r, p)
     least = least_clearances(thin, r)
     lows, highs = whole.vertices.min(axis=0), whole.vertices.max(axis=0)
     found = survey(thin, r, middles_over(lows, highs, cells))
     widest = 0.5 * _widest(found, p)[found.within]
     radii = np.linspace(0.0, float(widest.max(initial=0.0)), POINTS)
-    # A cell is reached with radii up to its own; none has less than nothing.
-    left = len(widest) - np.searchsorted(np.sort(widest), radii, side="left")
-    left[1:] = np.minimum(left[1:], left[0])
-    shares = left / max(1, len(widest))
+    # A cell is reached with radii up to its own, to rounding.
+    left = len(widest) - np.searchsorted(np.sort(widest), (1.0 - SAME) * radii)
+    shares = np.append(left / max(1, len(widest)), 0.0)
+    closest = int(least.clearance.argmin())
     return RadiusCurve(
-        radii,
+        np.append(radii, radii[-1]),
         shares * workspace_volume(thin, r).volume,
         0.5 * max(0.0, float(least.clearance.min())),
         0.5 * max(0.0, float(least.bound.min())),
+        PAIRS[closest] if np.isfinite(least.clearance[closest]) else None,
+        least.position[closest],
     )
 
 

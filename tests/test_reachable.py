@@ -165,6 +165,7 @@ def test_faces_say_what_they_come_from() -> None:
     centres = solid.vertices[solid.faces].mean(axis=1)
     clearance = leg_clearances(design, centres, home_rotation(design)).clearance
     seen: set[str] = set()
+    offs: FloatArray = np.zeros(0)
     for index, name in enumerate(solid.limits):
         own = solid.limit_of_face == index
         if not own.any():
@@ -172,10 +173,12 @@ def test_faces_say_what_they_come_from() -> None:
         seen.add(name)
         if name.startswith("legs"):
             pair = [f"legs {i}–{j}" for i, j in PAIRS].index(name)
-            off = np.abs(clearance[own, pair])
-            assert off.max() < 0.25
-            assert np.median(off) < 0.05
-    assert {"legs 2–4", "legs 3–4", "l4 maximum"} <= seen
+            offs = np.append(offs, np.abs(clearance[own, pair]))
+    # Where legs 3 and 4 collide in these orientations 2 and 4 do too.
+    assert {"legs 2–4", "l4 maximum"} <= seen
+    # A quarter of a cell at the most where two walls meet.
+    assert offs.max() < 0.25
+    assert np.quantile(offs, 0.95) < 0.02
 
 
 def test_a_pair_is_told_what_it_costs_alone() -> None:

@@ -6,13 +6,12 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
-import msgspec
 import numpy as np
 import tyro
 
 from explorer.arrays import BoolArray, FloatArray
 from explorer.clearance import PAIRS
-from explorer.cli.options import DesignOptions, JsonOptions, PoseOptions
+from explorer.cli.options import DesignOptions, JsonOptions, PoseOptions, RadiiOptions
 from explorer.cli.output import figure, figures, heading, pose_table, table, write_json, write_lines
 from explorer.cli.values import numbers, whole_number
 from explorer.design import Design
@@ -29,20 +28,13 @@ _OPTIONAL = tyro.conf.arg(help_behavior_hint="(optional)")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Interference(JsonOptions, PoseOptions, DesignOptions):
+class Interference(JsonOptions, RadiiOptions, PoseOptions, DesignOptions):
     """Tell how far the legs keep from each other, in a pose or over a move.
 
     Legs are capsules about their axes; the clearance of two is the distance of the axes less
     both radii, and below zero they collide. A straight move is judged twice: exactly, and by the
     paper's test of swept tetrahedra, which knows no radii and depends on the number of steps.
     """
-
-    radii: Annotated[
-        Quadruple | None,
-        numbers("--radii", "r1 r2 r3 r4", or_one=True),
-        tyro.conf.arg(help_behavior_hint="(default: those of the design)"),
-    ] = None
-    """Radii of the four legs in design units, or one for all."""
 
     to: Annotated[Triple | None, numbers("--to", "x y z"), _OPTIONAL] = None
     """Move b4 straight to this position, in design units."""
@@ -72,7 +64,7 @@ class Interference(JsonOptions, PoseOptions, DesignOptions):
         Raises:
             InputError: a design, pose, move or number that cannot be used.
         """
-        design = self._with_radii(self.load())
+        design = self.with_radii(self.load())
         start = self.pose(design)
         end = self._end(start)
         if end is None:
@@ -87,12 +79,6 @@ class Interference(JsonOptions, PoseOptions, DesignOptions):
 
         steps = _steps_of(design, start, end) if self.steps is None else self.steps
         self._write_move(design, move_clearance(design, start, end, steps=steps))
-
-    def _with_radii(self, design: Design) -> Design:
-        if self.radii is None:
-            return design
-        limits = msgspec.structs.replace(design.limits, leg_radii=self.radii)
-        return msgspec.structs.replace(design, limits=limits)
 
     def _end(self, start: Pose) -> Pose | None:
         """Return where the move goes, None if there is none."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
+import msgspec
 import tyro
 
 from explorer.cli.values import numbers
@@ -37,6 +38,29 @@ class JsonOptions:
 
     json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
     """Answer with one JSON object on standard output, and nothing else there."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RadiiOptions:
+    """How thick the legs are."""
+
+    radii: Annotated[
+        Quadruple | None,
+        numbers("--radii", "r1 r2 r3 r4", or_one=True),
+        tyro.conf.arg(help_behavior_hint="(default: those of the design)"),
+    ] = None
+    """Radii of the four legs in design units, or one for all."""
+
+    def with_radii(self, design: Design) -> Design:
+        """Return the design with the radii that are asked for.
+
+        Raises:
+            DesignError: a radius is negative.
+        """
+        if self.radii is None:
+            return design
+        limits = msgspec.structs.replace(design.limits, leg_radii=self.radii)
+        return msgspec.structs.replace(design, limits=limits)
 
 
 _THE_HOME = tyro.conf.arg(help_behavior_hint="(default: that of the home pose)")

@@ -7,10 +7,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING
 
 from explorer.cli.streams import write
 from explorer.design import Design
 from explorer.pose import Pose, yaw_pitch_roll_from_rotation
+
+if TYPE_CHECKING:
+    from explorer.solid import Solid
 
 
 def write_json(answer: Mapping[str, object]) -> None:
@@ -82,3 +86,12 @@ def pose_table(design: Design, pose: Pose) -> str:
         ],
         "<<",
     )
+
+
+def mesh_json(solid: Solid) -> dict[str, object]:
+    """Return the measures of a mesh, as in the contract."""
+    return {
+        "volume": solid.volume,
+        "triangles": len(solid.faces),
+        "watertight": solid.is_watertight,
+    }

@@ -7,8 +7,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from explorer.cli.options import DesignOptions, JsonOptions, OrientationOptions
-from explorer.cli.output import degrees, figure, heading, table, write_json, write_lines
+from explorer.cli.collisions import (
+    curve_json,
+    curve_table,
+    interference_json,
+    interference_table,
+)
+from explorer.cli.options import DesignOptions, JsonOptions, OrientationOptions, RadiiOptions
+from explorer.cli.output import degrees, figure, heading, mesh_json, table, write_json, write_lines
 from explorer.cli.values import numbers, positive, whole_number
 from explorer.design import Design
 from explorer.errors import InputError
@@ -17,6 +23,8 @@ from explorer.workspace import NodeCount, Volume, workspace_nodes, workspace_vol
 
 if TYPE_CHECKING:
     from explorer.arrays import FloatArray
+    from explorer.radii import RadiusCurve
+    from explorer.reachable import ReachableWorkspace
     from explorer.solid import Solid
 
 Ends = tuple[float, float]
@@ -29,7 +37,7 @@ _OPTIONAL = tyro.conf.arg(help_behavior_hint="(optional)")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Workspace(JsonOptions, OrientationOptions, DesignOptions):
+class Workspace(JsonOptions, RadiiOptions, OrientationOptions, DesignOptions):
     """Measure the workspace: exact volume and gradient, the paper's nodes, a mesh.
 
     With ranges or a tilt also the volumes that some (reachable) and all (dexterous) of these
@@ -52,6 +60,12 @@ class Workspace(JsonOptions, OrientationOptions, DesignOptions):
 
     hull: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
     """Measure the convex hull too."""
+
+    interference: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    """Measure too what the home pose leads to without a collision of legs, and each pair's cost."""
+
+    radius_curve: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    """Tell too how that shrinks as one radius of all legs grows, and which is harmless."""
 
     yaw_range: Annotated[Ends | None, numbers("--yaw-range", "low high"), _OPTIONAL] = None
     """Orientations with a yaw from low to high, in degrees, else as the orientation given."""
@@ -87,7 +101,7 @@ class Workspace(JsonOptions, OrientationOptions, DesignOptions):
         if self.table1:
             self._write_table_one()
             return
-        design = self.load()
+        design = self.with_radii(self.load())
         pose = self.oriented(design)
         orientations = self._orientations(pose)
         findings = self._findings(design, pose, orientations)
@@ -121,7 +135,25 @@ class Workspace(JsonOptions, OrientationOptions, DesignOptions):
             reachable=reachable,
             dexterous=dexterous,
             capability=self._share(design, orientations),
+            interference=self._interference(design, pose),
+            curve=self._curve(design, pose),
         )
+
+    def _interference(self, design: Design, pose: Pose) -> ReachableWorkspace | None:
+        if not self.interference:
+            return None
+        from explorer.reachable import reachable_workspace
+
+        return reachable_workspace(
+            design, pose.rotation, node_step=self.step, tolerance=self.tolerance
+        )
+
+    def _curve(self, design: Design, pose: Pose) -> RadiusCurve | None:
+        if not self.radius_curve:
+            return None
+        from explorer.radii import radius_curve
+
+        return radius_curve(design, pose.rotation)
 
     def _orientations(self, pose: Pose) -> FloatArray | None:
         """Return the set of orientations that is asked for, shape (n, 3, 3)."""
@@ -179,6 +211,8 @@ class _Findings:
     reachable: Solid | None
     dexterous: Solid | None
     capability: float | None
+    interference: ReachableWorkspace | None
+    curve: RadiusCurve | None
 
     def as_json(self) -> dict[str, object]:
         extent = self.nodes.extent
@@ -190,16 +224,20 @@ class _Findings:
             "node_count": self.nodes.count,
             "node_volume": self.nodes.volume,
             "extent": None if extent is None else [list(ends) for ends in extent],
-            "mesh": _mesh_json(self.solid),
+            "mesh": mesh_json(self.solid),
         }
         if self.hull is not None:
             answer["hull_volume"] = self.hull.volume
         if self.reachable is not None and self.dexterous is not None:
             answer["orientations"] = self.orientations
-            answer["reachable_mesh"] = _mesh_json(self.reachable)
-            answer["dexterous_mesh"] = _mesh_json(self.dexterous)
+            answer["reachable_mesh"] = mesh_json(self.reachable)
+            answer["dexterous_mesh"] = mesh_json(self.dexterous)
         if self.capability is not None:
             answer["orientation_capability"] = self.capability
+        if self.interference is not None:
+            answer |= interference_json(self.interference)
+        if self.curve is not None:
+            answer["radius_curve"] = curve_json(self.curve)
         return answer
 
     def as_lines(self, design: Design) -> list[str]:
@@ -222,6 +260,10 @@ class _Findings:
         for name, solid in (("reachable", self.reachable), ("dexterous", self.dexterous)):
             if solid is not None:
                 add(name, solid.volume, f"{self.orientations} orientations, {_mesh_remark(solid)}")
+        found = self.interference
+        if found is not None:
+            remark = f"{found.reachable_node_count} of {found.node_count} nodes"
+            add("without collisions", found.reachable_volume, remark)
         lines = [table(rows, "<>><")]
         if self.nodes.extent is not None:
             lines += ["", "extent of the nodes"]
@@ -237,15 +279,11 @@ class _Findings:
             lines += ["", table(moves, "<>")]
         if self.capability is not None:
             lines += ["", f"orientation capability {100.0 * self.capability:.2f} %"]
+        if found is not None:
+            lines += ["", interference_table(design, found)]
+        if self.curve is not None:
+            lines += ["", curve_table(design, self.curve)]
         return lines
-
-
-def _mesh_json(solid: Solid) -> dict[str, object]:
-    return {
-        "volume": solid.volume,
-        "triangles": len(solid.faces),
-        "watertight": solid.is_watertight,
-    }
 
 
 def _mesh_remark(solid: Solid) -> str:

@@ -13,6 +13,7 @@ import pytest
 import explorer
 from explorer.cli import run
 from explorer.orientations import cone_of_directions, orientation_capability, yaw_pitch_roll_range
+from explorer.radii import with_radius
 from explorer.solids import convex_hull, dexterous_solid, reachable_solid, workspace_solid
 from explorer.workspace import workspace_nodes, workspace_volume
 
@@ -176,3 +177,68 @@ def test_unusable_options_are_refused(
     capsys: pytest.CaptureFixture[str], argv: list[str], words: str
 ) -> None:
     assert words in refusal(capsys, *argv)
+
+
+def test_interference_adds_what_can_be_reached(capsys: pytest.CaptureFixture[str]) -> None:
+    found = answer(capsys, "--interference", "--radii", "0.2")
+    assert set(found) == KEYS | {
+        *("reachable_volume", "reachable_node_count", "harmless_radius", "pairs"),
+        "reachable_solid",
+    }
+    expected = explorer.reachable_workspace(with_radius(OPTIMAL, 0.2))
+    assert found["reachable_volume"] == pytest.approx(expected.reachable_volume, rel=1e-9)
+    assert found["reachable_volume"] < found["volume"]
+    assert found["reachable_node_count"] == expected.reachable_node_count < found["node_count"]
+    assert found["reachable_solid"]["watertight"]
+    assert [tuple(pair["legs"]) for pair in found["pairs"]] == list(explorer.PAIRS)
+    for pair, own in zip(found["pairs"], expected.pairs, strict=True):
+        assert set(pair) == {"legs", "clearance", "bound", "blocked_volume"}
+        assert pair["clearance"] == pytest.approx(own.clearance, abs=1e-9)
+        assert pair["blocked_volume"] == pytest.approx(own.blocked_volume, rel=1e-6)
+    assert run(["workspace", "--interference", "--radii", "0.2", "--radius-curve"]) == 0
+    text = capsys.readouterr().out
+    assert "943 of 999 nodes" in text
+    assert "any radius takes something" in text
+
+
+def test_nothing_can_be_reached_of_an_empty_workspace(capsys: pytest.CaptureFixture[str]) -> None:
+    level = ("--yaw-pitch-roll", "0", "0", "0")
+    found = answer(capsys, "--interference", *level)
+    assert found["reachable_volume"] == found["reachable_node_count"] == 0
+    assert [pair["clearance"] for pair in found["pairs"]] == [None] * 6
+    assert run(["workspace", "--interference", *level]) == 0
+    assert "joined" not in capsys.readouterr().out
+
+
+def test_a_pair_that_shares_a_joint_has_no_clearance(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    joined = explorer.Design(a3=(10.0, 4.0), b1=(4.0, -3.0), b2=0.0, b3=2.0)
+    file = tmp_path / "joined.json"
+    file.write_bytes(explorer.encode_design(joined))
+    found = answer(capsys, "--design", str(file), "--interference", "--radius-curve", *COARSE)
+    assert found["pairs"][4] == {
+        "legs": [2, 4],
+        "clearance": None,
+        "bound": None,
+        "blocked_volume": 0.0,
+    }
+    radii, volumes = (found["radius_curve"][key] for key in ("radii", "volumes"))
+    assert radii[0] == 0.0
+    assert radii == sorted(radii)
+    assert volumes == sorted(volumes, reverse=True)
+    assert volumes[-1] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        (("--interference", "--radii", "-0.1"), "must not be negative"),
+        (("--interference", "--radii", "0.5"), "legs 2 and 3 overlap by 0.3306"),
+        (("--interference", "--radii", "1", "2"), "--radii"),
+    ],
+)
+def test_interference_that_cannot_be_told_is_refused(
+    capsys: pytest.CaptureFixture[str], words: tuple[str, ...], reason: str
+) -> None:
+    assert reason in refusal(capsys, *words)

@@ -1,0 +1,88 @@
+"""What collisions of legs take from a workspace, for `explorer workspace`."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from explorer.cli.output import figure, mesh_json, table
+from explorer.design import Design
+
+if TYPE_CHECKING:
+    from explorer.radii import RadiusCurve
+    from explorer.reachable import ReachableWorkspace
+
+# Of the radius curve in a table.
+ROWS = 10
+
+
+def interference_json(found: ReachableWorkspace) -> dict[str, object]:
+    """Return the keys that interference adds to those of the workspace."""
+    return {
+        "reachable_volume": found.reachable_volume,
+        "reachable_node_count": found.reachable_node_count,
+        "harmless_radius": _finite(found.harmless_radius),
+        "pairs": [
+            {
+                "legs": list(pair.legs),
+                # A pair that shares a joint is left out of every test.
+                "clearance": _finite(pair.clearance),
+                "bound": _finite(pair.bound),
+                "blocked_volume": pair.blocked_volume,
+            }
+            for pair in found.pairs
+        ],
+        "reachable_solid": mesh_json(found.solid),
+    }
+
+
+def interference_table(design: Design, found: ReachableWorkspace) -> str:
+    """Return what each pair of legs means for the workspace, a line each."""
+    radii = "  ".join(f"{radius:g}" for radius in design.limits.leg_radii)
+    rows = [("legs", "least clearance", "certified", "blocked alone (units³)")]
+    for pair in found.pairs:
+        legs = f"{pair.legs[0]} and {pair.legs[1]}"
+        if math.isinf(pair.clearance):
+            rows.append((legs, "none" if found.solid.is_empty else "joined", "", figure(0.0)))
+        else:
+            rows.append(
+                (legs, figure(pair.clearance), figure(pair.bound), figure(pair.blocked_volume))
+            )
+    return f"radii of the legs  {radii}\n" + table(rows, "<>>>")
+
+
+def curve_json(curve: RadiusCurve) -> dict[str, object]:
+    """Return the curve as plain values."""
+    return {
+        "radii": curve.radii.tolist(),
+        "volumes": curve.volumes.tolist(),
+        "harmless": curve.harmless,
+        "harmless_bound": curve.harmless_bound,
+        "closest": None if curve.closest_legs is None else list(curve.closest_legs),
+    }
+
+
+def curve_table(design: Design, curve: RadiusCurve) -> str:
+    """Return the curve at a few radii, and the radius that is harmless."""
+    rows = [("radius of all legs", "mm", "reachable (units³)", "share")]
+    # The last radius comes twice: beyond it nothing is left.
+    last = max(0, len(curve.radii) - 2)
+    for index in sorted({round(last * row / ROWS) for row in range(ROWS + 1)}):
+        radius, volume = float(curve.radii[index]), float(curve.volumes[index])
+        share = volume / float(curve.volumes[0]) if curve.volumes[0] > 0.0 else 0.0
+        millimetres = figure(radius * design.unit_mm)
+        rows.append((figure(radius), millimetres, figure(volume), f"{100.0 * share:.1f} %"))
+    lines = [table(rows, ">>>>")]
+    if curve.closest_legs is not None:
+        i, j = curve.closest_legs
+        place = ", ".join(f"{x:.4g}" for x in curve.closest_position)
+        if curve.harmless > 0.0:
+            lines.append(f"no legs collide up to a radius of {figure(curve.harmless)}")
+            lines.append(f"legs {i} and {j} come closest, at ({place})")
+        else:
+            lines.append(f"any radius takes something: legs {i} and {j} touch at ({place})")
+    return "\n".join(lines)
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
