@@ -2,8 +2,8 @@
 
 As p moves, the distance of two legs changes no faster than p itself. So a cell of positions
 keeps the distance at its middle less half its diagonal, and is cut in eight until that
-settles it. What is left open by cells of a tenth of the clearance, or when there are too many
-of them, counts as kept.
+settles it. What is left open by cells of a tenth of the clearance, or of a pair by too many
+cells, counts as kept.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from collections.abc import Callable
 import numpy as np
 
 from explorer.arrays import FloatArray
-from explorer.clearance import PAIRS, leg_clearances
+from explorer.clearance import PAIRS, leg_clearances, radii_of_pairs
 from explorer.constraints import HalfSpace, constraints
 from explorer.design import Design
 from explorer.region import region_of
@@ -24,8 +24,8 @@ from explorer.workspace import bounds
 FIRST_CELLS = 12
 # Half-diagonal of the smallest cells, as a share of the clearance.
 FINEST = 0.1
-# Cells of one size that are looked at, at the most.
-MOST_CELLS = 100_000
+# Cells of one size that are cut for a pair, at the most.
+MOST_CELLS = 12_000
 # Cells that are looked at in one go.
 AT_ONCE = 10_000
 
@@ -63,7 +63,10 @@ def crossings(
     many = np.maximum(1, np.ceil((highs - lows) / (highs - lows).max() * FIRST_CELLS)).astype(int)
     half = 0.5 * (highs - lows) / many
     middles = lows + half * (2.0 * np.indices(tuple(many.tolist())).reshape(3, -1).T + 1.0)
-    while 0 < len(middles) <= MOST_CELLS:
+    # Legs 2 and 3 stand upright on the guide, in planes that keep their distance.
+    upright = abs((design.b3 - design.b2) * float(rotation[0, 0])) - radii_of_pairs(design)
+    asked = np.array([pair != (2, 3) for pair in PAIRS]) | (upright < clearance)
+    while len(middles) and asked.any():
         radius = float(np.linalg.norm(half))
         near = (np.abs(margins(middles, rotation)) - margin).min(axis=1)
         slack = np.column_stack([limit.slack(middles) for limit in limits]) / scale
@@ -82,7 +85,9 @@ def crossings(
         if radius <= FINEST * clearance:
             break
         half = 0.5 * half
-        # Only what may hide less than is known already.
-        middles = middles[(found - radius < least).any(axis=1)]
+        # Only what may hide less than is known already, and pairs that it tells much about.
+        hides = found - radius < least
+        asked &= hides.sum(axis=0) <= MOST_CELLS
+        middles = middles[hides[:, asked].any(axis=1)]
         middles = (middles[:, None, :] + half * HALVES).reshape(-1, 3)
     return places[least < clearance]

@@ -1,0 +1,188 @@
+"""`explorer optimise` finds designs, writes them whole or not at all, and owns up to failure."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import explorer
+from explorer.cli import run
+from explorer.cli.found import findings_table
+from explorer.compiled import warm
+from explorer.optimise.facts import facts_of
+from explorer.optimise.findings import Finding
+from explorer.optimise.record import load_record
+
+BOX = ["--box", "0", "-12", "0", "20", "22", "18"]
+PAPER = ["--design", "paper-initial", *BOX, "--target-volume", "8000"]
+CONTRACT = {"design", "objective", "volume", "iterations", "evaluations", "seconds", "converged"}
+IMPOSSIBLE = ["--target-volume", "30000", "--bounds", "a3x=5:22", "a3y=1:12"]
+
+
+def answer(capsys: pytest.CaptureFixture[str], *argv: str, status: int = 0) -> dict[str, Any]:
+    """Return the one JSON object that the command writes on standard output."""
+    assert run(["optimise", *argv, "--json"]) == status
+    captured = capsys.readouterr()
+    assert captured.out.count("\n") == 1
+    found: dict[str, Any] = json.loads(captured.out)
+    return found
+
+
+def refusal(capsys: pytest.CaptureFixture[str], *argv: str) -> str:
+    """Return the one line on standard error of arguments that are refused with status 2."""
+    assert run(["optimise", *argv]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.count("\n") == 1
+    return captured.err
+
+
+def test_the_papers_problem_is_solved(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    out = tmp_path / "design.json"
+    found = answer(capsys, *PAPER, "--clearance", "0.2", "--out", str(out))
+    assert set(found) >= CONTRACT
+    assert found["converged"] is True
+    assert found["objective"] <= 1e-9
+    assert found["iterations"] <= 15
+    design = explorer.load_design(str(out))
+    assert json.loads(explorer.encode_design(design)) == found["design"]
+    assert explorer.workspace_volume(design).volume == found["volume"]
+    assert found["volume"] == pytest.approx(8000.0, rel=1e-9)
+    # The box is the one asked for; the orientation and the ties to the reach are the start's.
+    start = explorer.PRESETS["paper-initial"]
+    assert design.limits.box == ((0.0, -12.0, 0.0), (20.0, 22.0, 18.0))
+    assert design.home == start.home
+    assert design.limits.l1 == (0.0, None)
+    assert found["files"] == [str(out), str(tmp_path / "design.record.json")]
+
+
+def test_a_record_repeats_its_search(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    kept = tmp_path / "run.json"
+    first = answer(capsys, *PAPER, "--seed", "3", "--record", str(kept))
+    record = load_record(kept)
+    assert record.settings.seed == 3
+    assert record.design.variables[0] == first["design"]["a3"][0]
+    again = answer(capsys, "--repeat", str(kept))
+    assert {**again, "seconds": 0, "files": []} == {**first, "seconds": 0, "files": []}
+
+
+def test_people_see_the_start_beside_what_was_found(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["optimise", *PAPER]) == 0
+    captured = capsys.readouterr()
+    assert "converged: F = " in captured.out
+    lines = {line.split("  ")[0]: line.split() for line in captured.out.splitlines() if line}
+    assert lines["a3x"][1] == "10.0000"
+    assert lines["exact volume"][2:4] == ["870.697", "8000.00"]
+    assert "start 1 of 1" in captured.err
+
+
+def test_without_convergence_the_best_is_told_and_no_design_is_written(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    out, kept = tmp_path / "design.json", tmp_path / "run.json"
+    out.write_text("as it was")
+    found = answer(capsys, *IMPOSSIBLE, "--out", str(out), "--record", str(kept), status=1)
+    assert found["converged"] is False
+    assert found["status"] == "infeasible"
+    assert found["volume"] == pytest.approx(float(found["message"].rsplit(" ", 1)[1]), rel=1e-3)
+    assert out.read_text() == "as it was"
+    assert found["files"] == [str(kept)]
+    assert load_record(kept).runs[0].status == "infeasible"
+    assert run(["optimise", *IMPOSSIBLE]) == 1
+    captured = capsys.readouterr()
+    last = captured.err.splitlines()[-1]
+    assert last.startswith("explorer: no design within the bounds was found with a volume of 30000")
+    assert "best so far" in captured.out
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["design.json", "run.json"]
+
+
+def test_other_objectives_and_variables(capsys: pytest.CaptureFixture[str]) -> None:
+    required = ["--required-box", "8", "4", "6", "12", "8", "10"]
+    margin = answer(
+        capsys, "--objective", "largest-margin", *required, "--free", "yaw", "--least", "0.5"
+    )
+    assert margin["objective"] == pytest.approx(6.0, abs=1e-6)
+    assert set(margin["values"]) == {"a3x", "a3y", "b1x", "b1y", "b2", "b3", "yaw"}
+    smallest = answer(
+        capsys,
+        *("--objective", "smallest-reach", "--starts", "2", "--least", "1"),
+        *("--bounds", "b1x=-10:10", "b1y=-10:10", "b2=-10:10", "b3=-10:10", "a3y=1:40"),
+    )
+    assert smallest["objective"] == smallest["reach"] <= 17.90
+    assert len(smallest["runs"]) == 2
+    largest = answer(capsys, "--objective", "largest-volume", "--target-reach", "15")
+    assert largest["reach"] <= 15.0 + 1e-6
+    stroke = answer(capsys, "--target-volume", "5000", "--stroke-ratio", "2")
+    low, high = stroke["design"]["limits"]["l1"]
+    assert (low, high) == (pytest.approx(stroke["reach"] / 2.0), None)
+
+
+@pytest.mark.parametrize(
+    ("argv", "words"),
+    [
+        ([], "--target-volume"),
+        (["--target-volume", "nan"], "positive number; got nan"),
+        (["--target-volume", "0"], "positive number"),
+        (["--target-volume", "9", "--bounds", "a3x=5:3"], "bounds of a3x cross"),
+        (["--target-volume", "9", "--bounds", "a3x=5:nan"], "must be finite numbers; got nan"),
+        (["--target-volume", "9", "--bounds", "a3x=20:30"], "outside its bounds 20 to 30"),
+        (["--target-volume", "9", "--bounds", "a3x"], "NAME=LOW:HIGH"),
+        (["--target-volume", "9", "--bounds", "a3x=1:b"], "NAME=LOW:HIGH"),
+        (["--target-volume", "9", "--bounds"], "needs at least one value"),
+        (["--target-volume", "9", "--free", "width"], "no variable 'width'"),
+        (["--target-volume", "9", "--box", "1", "2"], "--box needs six numbers"),
+        (["--target-volume", "9", "--box", "1", "2", "3", "0", "4", "5"], "box x"),
+        (["--target-volume", "9", "--box", "1", "2", "nan", "2", "4", "5"], "finite number"),
+        (["--target-volume", "9", "--starts", "0"], "--starts must lie within"),
+        (["--target-volume", "9", "--out", "/nowhere/design.json"], "there is no folder"),
+        (["--repeat", "/nowhere/run.json"], "cannot read"),
+        (["--objective", "largest-margin"], "needs a required box"),
+        (["--objective", "largest"], "--objective"),
+    ],
+)
+def test_bad_input_is_one_line(
+    capsys: pytest.CaptureFixture[str], argv: list[str], words: str
+) -> None:
+    assert words in refusal(capsys, *argv)
+
+
+def test_an_interrupted_search_leaves_files_as_they_were(tmp_path: Path) -> None:
+    warm()
+    out = tmp_path / "design.json"
+    out.write_text("as it was")
+    argv = ["--objective", "smallest-reach", "--starts", "5000", "--out", str(out)]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "explorer", "optimise", *argv],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": str(Path(explorer.__file__).parents[1])},
+    )
+    assert process.stderr is not None
+    # Its first progress says that the search is under way.
+    assert "start 1 of 5000" in process.stderr.readline()
+    time.sleep(0.2)
+    process.send_signal(signal.SIGINT)
+    written, complaint = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert written == ""
+    assert "Traceback" not in complaint
+    assert out.read_text() == "as it was"
+    assert [path.name for path in tmp_path.iterdir()] == ["design.json"]
+
+
+def test_the_page_of_findings_has_a_row_for_each() -> None:
+    facts = facts_of(explorer.PRESETS["paper-optimal"], box=((8.0, 3.0, 7.0), (12.0, 7.0, 11.0)))
+    found = [Finding("given", None, None, None, facts), Finding("ours", 5, 1e-13, 0.1, facts)]
+    page = findings_table(found).splitlines()
+    assert [line.split()[0] for line in page[1:3]] == ["given", "ours"]
+    assert page[1].split()[1:3] == ["–", "–"]
+    assert {"5", "1.0e-13", "7053.044", "999", "20.4223"} <= {*page[2].split()}
