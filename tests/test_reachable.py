@@ -178,7 +178,7 @@ def test_faces_say_what_they_come_from() -> None:
     assert {"legs 2–4", "l4 maximum"} <= seen
     # A quarter of a cell at the most where two walls meet.
     assert offs.max() < 0.25
-    assert np.quantile(offs, 0.95) < 0.02
+    assert np.quantile(offs, 0.95) < 0.05
 
 
 def test_a_pair_is_told_what_it_costs_alone() -> None:
