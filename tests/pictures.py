@@ -11,7 +11,7 @@ from pathlib import Path
 
 from playwright.sync_api import Browser
 
-from explorer.app.actions import Action, SetJoint, SetView
+from explorer.app.actions import Action, SetJoint, SetLimits, SetView
 from explorer.app.scene.camera import ViewName
 from explorer.app.screenshot import headless_browser, picture
 from explorer.app.server import Running
@@ -19,6 +19,7 @@ from explorer.app.state import View, WorkspaceView
 from explorer.design import JOINTS
 from explorer.design_file import PRESETS
 from explorer.pose import Pose
+from explorer.radii import with_radius
 
 FOLDER = Path(__file__).resolve().parents[1] / "assets" / "pictures"
 DESIGN = PRESETS["paper-optimal"]
@@ -84,6 +85,13 @@ SCENES = {
                     workspace=WorkspaceView(solid=True, colour="margin", cut="y", level=5.0),
                 )
             ),
+        ),
+    ),
+    # Where legs 2 and 4 collide, low on both sides, shows through the solid.
+    "reachable": Scene(
+        actions=(
+            SetLimits(with_radius(DESIGN, 0.2).limits),
+            SetView(replace(BARE, workspace=WorkspaceView(solid=True, region="reachable"))),
         ),
     ),
 }

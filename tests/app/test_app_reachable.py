@@ -467,8 +467,12 @@ def test_where_nothing_is_reached_nothing_is_exported() -> None:
 # The radius curve
 
 
+CURVE = radius_curve(OPTIMAL)
+
+
 def curve(*volumes: float) -> RadiusCurve:
-    return RadiusCurve(np.linspace(0.0, 0.5, len(volumes)), np.array(volumes), 0.05, 0.05)
+    radii = np.append(np.linspace(0.0, 0.5, len(volumes)), 0.5)
+    return replace(CURVE, radii=radii, volumes=np.array([*volumes, 0.0]), harmless=0.05)
 
 
 @given(st.lists(st.floats(1.0, 1e3), min_size=2, max_size=30), st.none() | st.floats(0.0, 2.0))
@@ -482,7 +486,7 @@ def test_the_chart_shows_the_curve_and_marks_on_it(
     assert y[-1] == 0.0
     assert x[-1] > 0.5
     at = np.searchsorted(x, drawn.radii)
-    np.testing.assert_allclose(y[at], drawn.volumes)
+    np.testing.assert_allclose(y[at[:-1]], drawn.volumes[:-1])
     marked = (radius, drawn.radius_at(0.99), drawn.harmless)
     for column, expected in zip((present, most, harmless), marked, strict=True):
         (points,) = np.nonzero(np.isfinite(column))
@@ -498,7 +502,7 @@ def test_the_chart_shows_the_curve_and_marks_on_it(
 def test_the_words_of_the_curve_are_those_of_the_library() -> None:
     state = thick(curve_shown(opened(OPTIMAL)), RADIUS)
     html = radius_words(Frame(state), radius_feed_of(state)[0])
-    expected = radius_curve(OPTIMAL)
+    expected = CURVE
     rows = rows_of("<tr></tr>" + html)
     assert [row[0] for row in rows] == ["present radius", "99 % left up to", "harmless up to"]
     assert number(rows[0][1]) == RADIUS

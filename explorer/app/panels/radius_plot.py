@@ -76,7 +76,7 @@ class RadiusPlot:
         if shown:
             yield self._words, "content", radius_words(frame, feed)
         curve = None if drawing is None else drawing.curve
-        has_chart = curve is not None and float(curve.volumes[0]) > 0.0
+        has_chart = curve is not None and float(curve.radii[-1]) > 0.0
         yield self._chart, "visible", has_chart
         if curve is None or not has_chart:
             return
@@ -105,7 +105,13 @@ def marks_of(curve: RadiusCurve | None, radius: float | None) -> tuple[Mark, Mar
 
 def volume_at(curve: RadiusCurve, radius: float) -> float:
     """Return the reachable volume at a radius, 0 beyond that at which nothing is left."""
-    return float(np.interp(radius, curve.radii, curve.volumes, right=0.0))
+    return float(np.interp(radius, *_before_the_fall(curve), right=0.0))
+
+
+def _before_the_fall(curve: RadiusCurve) -> tuple[FloatArray, FloatArray]:
+    """Return radii, each once, and volumes: at the last radius what it leaves, not nothing."""
+    first = np.append(True, np.diff(curve.radii) > 0.0)
+    return curve.radii[first], curve.volumes[first]
 
 
 def chart_of(curve: RadiusCurve, radius: float | None) -> tuple[FloatArray, ...]:
@@ -117,11 +123,11 @@ def chart_of(curve: RadiusCurve, radius: float | None) -> tuple[FloatArray, ...]
     marked = [mark.radius for mark in marks if mark.radius is not None]
     last = float(curve.radii[-1])
     end = max(BEYOND_LAST * last, BEYOND_PRESENT * max(marked))
-    inner = np.unique([*curve.radii, *(each for each in marked if each <= last)])
+    radii, volumes = _before_the_fall(curve)
+    inner = np.unique([*radii, *(each for each in marked if each <= last)])
     outer = np.unique([last, *(each for each in marked if each > last), end])
     x = np.concatenate([inner, outer])
-    volumes = np.interp(inner, curve.radii, curve.volumes)
-    y = np.concatenate([volumes, np.zeros(len(outer))])
+    y = np.concatenate([np.interp(inner, radii, volumes), np.zeros(len(outer))])
     columns = [x, y]
     for mark in marks:
         column = np.full(len(x), np.nan)

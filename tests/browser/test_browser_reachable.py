@@ -1,0 +1,109 @@
+"""The reachable workspace in a real page: another mesh, a page alive, messages, files."""
+
+from __future__ import annotations
+
+import os
+import signal
+
+import msgspec
+import pytest
+from likeness import decoded
+from playwright.sync_api import expect
+from tab import Tab
+
+from explorer.app.actions import SetLimits
+from explorer.app.panels.move import JOINT_LABELS
+from explorer.app.screenshot import PATIENCE_SECONDS
+from explorer.radii import with_radius
+
+# Pixels that tell a surface from the edge of something.
+MANY = 300
+
+
+@pytest.fixture
+def tab(tab: Tab) -> Tab:
+    """A tab with legs of radius 0.2, both its workspace tabs open."""
+    limits = with_radius(tab.state.design, 0.2).limits
+    tab.running.page.session.do(SetLimits(limits))
+    for each in tab.page.get_by_role("tab", name="Workspace", exact=True).all():
+        each.click()
+    return tab
+
+
+def red_pixels(tab: Tab) -> int:
+    """Return how much of the scene is red, as collisions are and a little of the handle."""
+    red, _, blue = (decoded(tab.picture())[..., i] for i in range(3))
+    return int((red > blue + 0.1).sum())
+
+
+def wait_until_drawn(tab: Tab) -> None:
+    assert tab.running.page.wait_until_drawn(PATIENCE_SECONDS)
+
+
+def test_the_reachable_solid_takes_the_place_of_the_other_and_the_page_stays_alive(
+    tab: Tab,
+) -> None:
+    page = tab.running.page
+    tab.switch("Solid", on=True)
+    tab.page.get_by_text("exact volume").wait_for()
+    wait_until_drawn(tab)
+    assert red_pixels(tab) < MANY
+    process = page.worker.process_id
+    assert process is not None
+    # A worker that is never done: whatever happens now happens while it computes.
+    os.kill(process, signal.SIGSTOP)
+    try:
+        tab.choose("Region", "reachable")
+        tab.page.get_by_text("computing …").wait_for()
+        tab.turn_to("Move")
+        before = tab.state
+        goal = tab.drag(JOINT_LABELS["l4"], 0.5)
+        tab.wait_for(lambda: abs(tab.state.joints[5] - goal) < 0.2, "the length dragged to")
+        tab.wait_until_shown(JOINT_LABELS["l4"], tab.state.joints[5])
+        assert tab.state.pose != before.pose
+        assert red_pixels(tab) < MANY
+        assert not page.feed.is_current
+        tab.push("Home pose")
+        tab.wait_for(lambda: tab.state.pose == before.pose, "the home pose")
+    finally:
+        os.kill(process, signal.SIGCONT)
+    tab.page.get_by_text("can be reached").wait_for()
+    wait_until_drawn(tab)
+    expect(tab.page.get_by_text("computing …")).to_be_hidden()
+    drawing = page.feed.drawing
+    assert drawing is not None
+    assert drawing.reached is not None
+    expect(tab.page.get_by_text(f"{drawing.reached.volume:.6g} units³")).to_be_visible()
+    assert red_pixels(tab) > MANY
+
+    tab.page.get_by_role("tab", name="Workspace", exact=True).last.click()
+    with tab.page.expect_download() as download:
+        tab.push("Export workspace")
+    assert download.value.suggested_filename == "paper-optimal-reachable-workspace.3mf"
+
+
+def test_a_home_that_is_no_start_is_told_and_the_button_goes_to_one(tab: Tab) -> None:
+    limits = msgspec.structs.replace(tab.state.design.limits, l4=(0.0, 12.5))
+    tab.running.page.session.do(SetLimits(limits))
+    tab.switch("Solid", on=True)
+    tab.choose("Region", "reachable")
+    alert = tab.page.get_by_role("alert").filter(has_text="The home position is no start")
+    alert.wait_for()
+    expect(alert).to_contain_text("l4 = 13.01 is above its maximum 12.5; the nearest position")
+    home = tab.state.pose
+    tab.push("Go there")
+    tab.wait_for(lambda: tab.state.pose != home, "another pose")
+    expect(alert).to_be_hidden()
+    tab.page.get_by_text("can be reached").wait_for()
+
+
+def test_the_curve_is_drawn_when_it_is_asked_for(tab: Tab) -> None:
+    tab.turn_to("Legs")
+    chart = tab.page.locator(".uplot canvas")
+    expect(chart).to_be_hidden()
+    tab.switch("Volume against radius", on=True)
+    chart.wait_for()
+    expect(tab.page.get_by_text("harmless up to")).to_be_visible()
+    expect(tab.page.get_by_text("legs 1 and 4 at (0, 0, 0)")).to_be_visible()
+    tab.switch("Volume against radius", on=False)
+    expect(chart).to_be_hidden()
