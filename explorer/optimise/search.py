@@ -151,8 +151,7 @@ class Search:
         self.trail.see_opening(state)
 
     def _solved(self, model: Model) -> Attempt:
-        at = model.at(model.start)
-        has_grown = False
+        at, missed, has_grown = model.at(model.start), np.zeros((0, 3)), False
         for _ in range(ROUNDS):
             at = self._sqp(model, at.u, "solving", self._is_matched)
             if self._is_done(model, at):
@@ -173,7 +172,7 @@ class Search:
                 at = model.at(model.start)
             elif self.problem.objective == "match-volume":
                 break
-        return self._verdict(model, at)
+        return self._verdict(model, at, missed)
 
     def _is_done(self, model: Model, at: Evaluation) -> bool:
         """Whether a place is what is wanted, but for clearances between positions."""
@@ -245,13 +244,12 @@ class Search:
             self.trail.before_each,
         )
 
-    def _verdict(self, model: Model, at: Evaluation) -> Attempt:
-        """Say how an attempt ended, by its last place."""
+    def _verdict(self, model: Model, at: Evaluation, missed: FloatArray) -> Attempt:
+        """Say how an attempt ended, by its last place and where legs are too near there."""
         spare, worst = model.worst(at)
         holding, best = optimality(model, at).holding, self.trail.best
         is_done = self._is_done(model, at)
-        missed = self._crossings(at.state) if is_done else np.zeros((0, 3))
-        if len(missed):
+        if is_done and len(missed):
             words = (
                 f"a clearance of {self.problem.demands.clearance:g} is not kept everywhere, "
                 f"such as at {_shown(missed[0])}"
