@@ -145,6 +145,7 @@ class WorkspacePanel:
                 f"{across} from {slice_map.lows[0]:.4g} to {slice_map.highs[0]:.4g}, "
                 f"{up} from {slice_map.lows[1]:.4g} to {slice_map.highs[1]:.4g} upwards"
             )
+            text = text.replace("-", "−")
             if drawing.reached is not None:
                 text += "; pale red: within the limits and out of reach"
             yield (
