@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from explorer.clearance import PAIRS, LegClearances, leg_clearances
+    from explorer.crossings import path_margins
     from explorer.design import JOINTS, VARIABLES, Design, Limits
     from explorer.design_file import PRESETS, decode_design, encode_design, load_design
     from explorer.errors import (
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from explorer.interference import step_is_free, step_overlaps, swept_tetrahedra
     from explorer.kinematics import attachment_points, discriminants, forward, inverse
     from explorer.least_clearance import LeastClearances, least_clearances
+    from explorer.move_validity import moves_are_valid
     from explorer.moves import (
         MoveClearance,
         MoveClearances,
@@ -37,9 +39,12 @@ if TYPE_CHECKING:
         nearest_singular_poses,
         nearest_singularities,
     )
+    from explorer.nearest_stratum import nearest_in_stratum
     from explorer.optimise.outcome import Iterate, Outcome, Run
     from explorer.optimise.problem import Demands, Problem, Variable, make_problem
     from explorer.optimise.solver import optimise_design
+    from explorer.performance import singularity_free_ball
+    from explorer.planning import NoPathError, PlannedPath, plan_path
     from explorer.pose import (
         Pose,
         quaternion_from_rotation,
@@ -50,14 +55,25 @@ if TYPE_CHECKING:
     from explorer.radii import RadiusCurve, radius_curve
     from explorer.reachable import PairCost, ReachableWorkspace, reachable_workspace
     from explorer.singularity import jacobian, margins
+    from explorer.slice_fields import slice_field
     from explorer.snapshot import Snapshot, evaluate
     from explorer.solid import Solid
     from explorer.solids import convex_hull, workspace_solid
     from explorer.strata import stratum
     from explorer.tetrahedra import tetrahedra_overlap
+    from explorer.uncoupled import UNCOUPLED
+    from explorer.validity import poses_are_valid
     from explorer.workspace import NodeCount, Volume, workspace_nodes, workspace_volume
 
 _HOMES = {
+    "crossings": ("path_margins",),
+    "nearest_stratum": ("nearest_in_stratum",),
+    "uncoupled": ("UNCOUPLED",),
+    "performance": ("singularity_free_ball",),
+    "slice_fields": ("slice_field",),
+    "validity": ("poses_are_valid",),
+    "move_validity": ("moves_are_valid",),
+    "planning": ("NoPathError", "PlannedPath", "plan_path"),
     "clearance": ("PAIRS", "LegClearances", "leg_clearances"),
     "design": ("JOINTS", "VARIABLES", "Design", "Limits"),
     "design_file": ("PRESETS", "decode_design", "encode_design", "load_design"),
@@ -111,6 +127,7 @@ __all__ = [
     "JOINTS",
     "PAIRS",
     "PRESETS",
+    "UNCOUPLED",
     "VARIABLES",
     "Demands",
     "Design",
@@ -126,9 +143,11 @@ __all__ = [
     "MoveClearances",
     "NearestSingularity",
     "NoAnswerError",
+    "NoPathError",
     "NodeCount",
     "Outcome",
     "PairCost",
+    "PlannedPath",
     "Pose",
     "Problem",
     "RadiusCurve",
@@ -156,15 +175,22 @@ __all__ = [
     "move_clearance",
     "move_clearances",
     "moves_are_clear",
+    "moves_are_valid",
+    "nearest_in_stratum",
     "nearest_singular_poses",
     "nearest_singularities",
     "optimise_design",
+    "path_margins",
+    "plan_path",
+    "poses_are_valid",
     "poses_between",
     "quaternion_from_rotation",
     "radius_curve",
     "reachable_workspace",
     "rotation_from_quaternion",
     "rotation_from_yaw_pitch_roll",
+    "singularity_free_ball",
+    "slice_field",
     "step_is_free",
     "step_overlaps",
     "stratum",

@@ -47,8 +47,13 @@ class Rules:
     cones: FloatArray
 
     @staticmethod
-    def of(design: Design) -> Rules:
-        """Return the rules of a design."""
+    def of(design: Design, signs: tuple[int, int, int] | None = None) -> Rules:
+        """Return the rules of a design.
+
+        Args:
+            design: The manipulator.
+            signs: The sign triple to demand instead of the home's, and at all events.
+        """
         limits, slack = design.limits, SLACK * design.reach
         row = np.empty(COUNT)
         row[:LENGTH_LOWS] = design.variables
@@ -62,7 +67,9 @@ class Rules:
         row[BOX_LOWS:BOX_HIGHS] = np.array(lows) - slack
         row[BOX_HIGHS:MARGIN] = np.array(highs) + slack
         row[MARGIN] = -math.inf if limits.margin is None else limits.margin - slack
-        row[SIGNS:RADII] = home_signs(design)
+        if signs is not None:
+            row[MARGIN] = (limits.margin or 0.0) - slack
+        row[SIGNS:RADII] = signs or home_signs(design)
         # A pair that shares a joint has no clearance to keep.
         row[RADII:] = np.where(joined_pairs(design), -1.0, radii_of_pairs(design))
         cones = [

@@ -24,6 +24,7 @@ COMMANDS: Mapping[str, str] = {
     "forward": "Find the eight assembly modes of the joints.",
     "singularity": "Tell how near a pose is to a singularity, and to which.",
     "interference": "Tell how far the legs keep from each other, in a pose or over a move.",
+    "path": "Plan a path between two poses that keeps limits, margins and clearances.",
     "workspace": "Measure the workspace: exact volume and gradient, the paper's nodes, a mesh.",
     "optimise": "Look for the best design: a volume to match, the smallest reach, …",
     "export": "Write the workspace, or its convex hull, as a mesh for other programs.",

@@ -114,7 +114,8 @@ def suggestion(word: str, known: Iterable[str]) -> str | None:
 def _check_options(command: type[Command], argv: Sequence[str]) -> None:
     known = ["--help"]
     for field in dataclasses.fields(command):
-        option = field.name.replace("_", "-")
+        # A name that is a word of Python, such as from, has an underscore behind it.
+        option = field.name.rstrip("_").replace("_", "-")
         known.append(f"--{option}")
         if isinstance(field.default, bool):
             known.append(f"--no-{option}")

@@ -11,7 +11,7 @@ from tyro.constructors import PrimitiveConstructorSpec
 from explorer.cli.usage import UsageError
 from explorer.design import LARGEST_SIZE
 
-_COUNTS = {2: "two", 3: "three", 4: "four", 6: "six"}
+_COUNTS = {2: "two", 3: "three", 4: "four", 6: "six", 7: "seven"}
 
 
 def numbers(option: str, order: str, *, or_one: bool = False) -> PrimitiveConstructorSpec[Any]:
@@ -49,6 +49,37 @@ def numbers(option: str, order: str, *, or_one: bool = False) -> PrimitiveConstr
         instance_from_str=read,
         is_instance=lambda value: value is None or isinstance(value, tuple),
         str_from_instance=lambda value: [str(entry) for entry in value or ()],
+    )
+
+
+def pose_numbers(option: str) -> PrimitiveConstructorSpec[Any]:
+    """Return how to read an option that takes a position, an orientation after it or not.
+
+    Three numbers are a position; six go on with yaw, pitch and roll, seven with a quaternion.
+    """
+    orders = {
+        count: numbers(option, order).instance_from_str
+        for count, order in (
+            (3, "x y z"),
+            (6, "x y z yaw pitch roll"),
+            (7, "x y z qw qx qy qz"),
+        )
+    }
+
+    def read(words: list[str]) -> tuple[float, ...]:
+        if len(words) not in orders:
+            raise UsageError(
+                f"{option} needs a position x y z, and may go on with yaw pitch roll or with a "
+                f"quaternion w x y z; got {len(words)} numbers"
+            )
+        return orders[len(words)](words)
+
+    return PrimitiveConstructorSpec(
+        nargs="*",
+        metavar="X Y Z [...]",
+        instance_from_str=read,
+        is_instance=lambda value: value is None or isinstance(value, tuple),
+        str_from_instance=lambda value: [str(each) for each in value or ()],
     )
 
 

@@ -1,0 +1,35 @@
+"""Trajectories as tables of comma-separated values: time, joints and pose in each row."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from explorer.design import JOINTS
+from explorer.export.files import write_whole
+from explorer.trajectory import Trajectory
+
+COLUMNS = ("time_s", *JOINTS, "x", "y", "z", "qw", "qx", "qy", "qz")
+"""The names of the columns; lengths are in design units, angles nowhere."""
+
+
+def trajectory_csv(trajectory: Trajectory) -> str:
+    """Return a trajectory as text: a line of names, then a line for each sample.
+
+    Numbers are written so that they read back to the last bit.
+    """
+    rows = np.column_stack(
+        [trajectory.time, trajectory.joints, trajectory.position, trajectory.quaternion]
+    )
+    lines = [",".join(COLUMNS), *(",".join(map(repr, row)) for row in rows.tolist())]
+    return "\n".join(lines) + "\n"
+
+
+def write_trajectory(trajectory: Trajectory, path: Path) -> None:
+    """Write a trajectory into a file.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    write_whole(path, trajectory_csv(trajectory).encode())

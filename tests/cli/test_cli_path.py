@@ -1,0 +1,127 @@
+"""What `explorer path` answers, and how it says that there is no path."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import explorer
+from explorer.cli import run
+from explorer.pose import rotation_from_yaw_pitch_roll
+
+PRESET = explorer.PRESETS["paper-optimal"]
+HOME = explorer.home_pose(PRESET)
+
+
+def answer(capsys: pytest.CaptureFixture[str], *argv: str, status: int = 0) -> dict[str, Any]:
+    assert run(["path", *argv, "--json"]) == status
+    captured = capsys.readouterr()
+    assert captured.out.count("\n") == 1
+    assert bool(captured.err) == bool(status)
+    return json.loads(captured.out)
+
+
+def test_a_path_has_its_corners_and_its_course_over_time(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    file = tmp_path / "path.csv"
+    words = ["--to", "12", "8", "7", "--radii", "0.2", "--samples", "21", "--speed", "2"]
+    found = answer(capsys, *words, "--out", str(file))
+    assert found["found"] is True
+    assert found["reason"] is None
+    assert found["poses"][0]["position"] == list(HOME.position)
+    assert found["poses"][-1] == {"position": [12.0, 8.0, 7.0], "quaternion": list(HOME.quaternion)}
+    course = found["trajectory"]
+    assert course["time"][-1] == found["duration"] > 0.0
+    assert found["length"] == pytest.approx(float(np.linalg.norm([2.0, 3.0, 2.0])))
+    joints = explorer.inverse(
+        PRESET, course["position"], explorer.rotation_from_quaternion(course["quaternion"])
+    )
+    np.testing.assert_allclose(course["joints"], joints, atol=1e-9)
+    with file.open(encoding="utf-8", newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert len(rows) == len(course["time"]) == 21
+    assert [float(row["l4"]) for row in rows] == [q[5] for q in course["joints"]]
+    assert found["file"] == str(file)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["--from", "9", "6", "8", "--from-yaw-pitch-roll", "-70", "5", "3", "--to", "10", "6", "8"],
+        ["--from", "9", "6", "8", "-70", "5", "3", "--to", "10", "6", "8"],
+        [
+            *("--from", "9", "6", "8", "-70", "5", "3"),
+            *("--to", "10", "6", "8", "--to-yaw-pitch-roll", "-70", "5", "3"),
+        ],
+    ],
+)
+def test_a_pose_can_be_given_in_several_ways(
+    capsys: pytest.CaptureFixture[str], words: list[str]
+) -> None:
+    found = answer(capsys, *words)
+    rotation = rotation_from_yaw_pitch_roll((-70.0, 5.0, 3.0))
+    for end, place in ((0, [9.0, 6.0, 8.0]), (-1, [10.0, 6.0, 8.0])):
+        assert found["poses"][end]["position"] == place
+        np.testing.assert_allclose(
+            explorer.rotation_from_quaternion(found["poses"][end]["quaternion"]),
+            rotation,
+            atol=1e-12,
+        )
+
+
+def test_a_quaternion_can_follow_the_position(capsys: pytest.CaptureFixture[str]) -> None:
+    words = [*map(repr, HOME.quaternion)]
+    found = answer(capsys, "--to", "11", "6", "8", *words)
+    assert found["poses"][-1] == {"position": [11.0, 6.0, 8.0], "quaternion": list(HOME.quaternion)}
+
+
+def test_no_path_is_an_answer_with_status_1_and_a_reason(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    found = answer(capsys, "--to", "12", "8", "-7", status=1)
+    assert found == {"found": False, "reason": "other mode", "poses": []}
+    assert run(["path", "--to", "12", "8", "-7"]) == 1
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert "mode 1 (− − +)" in captured.err
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--to", "40", "8", "7"], "the goal is outside the limits: "),
+        (["--from", "40", "8", "7", "--to", "12", "8", "7"], "the start is outside the limits"),
+        (["--to", "12", "8", "0"], "the goal is singular (a1 on the platform plane and"),
+        (["--to", "1", "2"], "--to needs a position x y z"),
+        ([], "say where the path ends with --to"),
+        (["--to", "12", "8", "7", "0", "0", "0", "--to-quaternion", "1", "0", "0", "0"], "already"),
+        (["--to", "12", "8", "7", "--seconds", "0"], "--seconds must be a positive number"),
+        (["--to", "12", "8", "7", "--samples", "1"], "--samples must lie within"),
+        (["--to", "12", "8", "7", "--out", "/nowhere/path.csv"], "there is no folder"),
+        (["--form", "12", "8", "7"], "did you mean --from?"),
+    ],
+)
+def test_bad_input_is_one_line_and_status_2(
+    capsys: pytest.CaptureFixture[str], words: list[str], message: str
+) -> None:
+    assert run(["path", *words]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.count("\n") == 1
+    assert message in captured.err
+
+
+def test_text_for_people_tells_ends_length_and_margins(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert run(["path", "--to", "12", "8", "7"]) == 0
+    text = capsys.readouterr().out
+    assert "moves       1, each proved to keep limits and clearances" in text
+    assert "least |κ|" in text
+    assert all(line == line.rstrip() for line in text.splitlines())
