@@ -66,15 +66,8 @@ if TYPE_CHECKING:
     from explorer.workspace import NodeCount, Volume, workspace_nodes, workspace_volume
 
 _HOMES = {
-    "crossings": ("path_margins",),
-    "nearest_stratum": ("nearest_in_stratum",),
-    "uncoupled": ("UNCOUPLED",),
-    "performance": ("singularity_free_ball",),
-    "slice_fields": ("slice_field",),
-    "validity": ("poses_are_valid",),
-    "move_validity": ("moves_are_valid",),
-    "planning": ("NoPathError", "PlannedPath", "plan_path"),
     "clearance": ("PAIRS", "LegClearances", "leg_clearances"),
+    "crossings": ("path_margins",),
     "design": ("JOINTS", "VARIABLES", "Design", "Limits"),
     "design_file": ("PRESETS", "decode_design", "encode_design", "load_design"),
     "errors": (
@@ -88,6 +81,7 @@ _HOMES = {
     "interference": ("step_is_free", "step_overlaps", "swept_tetrahedra"),
     "kinematics": ("attachment_points", "discriminants", "forward", "inverse"),
     "least_clearance": ("LeastClearances", "least_clearances"),
+    "move_validity": ("moves_are_valid",),
     "moves": (
         "MoveClearance",
         "MoveClearances",
@@ -104,6 +98,9 @@ _HOMES = {
     "optimise.outcome": ("Iterate", "Outcome", "Run"),
     "optimise.problem": ("Demands", "Problem", "Variable", "make_problem"),
     "optimise.solver": ("optimise_design",),
+    "nearest_stratum": ("nearest_in_stratum",),
+    "performance": ("singularity_free_ball",),
+    "planning": ("NoPathError", "PlannedPath", "plan_path"),
     "pose": (
         "Pose",
         "quaternion_from_rotation",
@@ -114,12 +111,15 @@ _HOMES = {
     "radii": ("RadiusCurve", "radius_curve"),
     "reachable": ("PairCost", "ReachableWorkspace", "reachable_workspace"),
     "singularity": ("jacobian", "margins"),
+    "slice_fields": ("slice_field",),
     "snapshot": ("Snapshot", "evaluate"),
     "solid": ("Solid",),
     "solids": ("convex_hull", "workspace_solid"),
     "strata": ("stratum",),
-    "workspace": ("NodeCount", "Volume", "workspace_nodes", "workspace_volume"),
     "tetrahedra": ("tetrahedra_overlap",),
+    "uncoupled": ("UNCOUPLED",),
+    "validity": ("poses_are_valid",),
+    "workspace": ("NodeCount", "Volume", "workspace_nodes", "workspace_volume"),
 }
 _MODULE_OF = {name: module for module, names in _HOMES.items() for name in names}
 

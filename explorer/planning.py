@@ -35,6 +35,19 @@ DEFAULT_SECONDS = 2.0
 LONGEST_MOVE = 0.25
 
 Reason = Literal["other mode", "other order", "out of time"]
+EndReason = Literal["outside limits", "singular"]
+
+
+class EndError(InputError):
+    """A start or goal that no path can have.
+
+    Attributes:
+        reason: Why not; the message says which end, and by which limits or incidences.
+    """
+
+    def __init__(self, reason: EndReason, message: str) -> None:
+        super().__init__(message)
+        self.reason: EndReason = reason
 
 
 class NoPathError(NoAnswerError):
@@ -89,8 +102,8 @@ def plan_path(
         seed: Of the shortcuts that smooth it.
 
     Raises:
-        InputError: a start or goal that is singular or outside the limits; the message
-            says which. Or no time at all.
+        EndError: a start or goal that is singular or outside the limits; it says which.
+        InputError: no time at all.
         NoPathError: there is no path, or none was found in time.
         MissingExtraError: OMPL is not installed, and the straight move is not valid.
     """
@@ -137,7 +150,10 @@ def _check_not_singular(name: str, snapshot: Snapshot) -> None:
     found = incidences(snapshot.stratum)
     if found:
         words = " and ".join(INCIDENCES[index - 1] for index in found)
-        raise InputError(f"the {name} is singular ({words}); a path may neither start nor end so")
+        raise EndError(
+            "singular",
+            f"the {name} is singular ({words}); a path may neither start nor end so",
+        )
 
 
 def _check_same_mode(start: Snapshot, goal: Snapshot) -> None:
@@ -167,7 +183,7 @@ def _check_within(name: str, snapshot: Snapshot, signs: tuple[int, int, int]) ->
             shown = f"{value:.4g}".replace("-", "−")
             broken.append(f"legs {first} and {second} collide (clearance {shown})")
     if broken:
-        raise InputError(f"the {name} is outside the limits: {'; '.join(broken)}")
+        raise EndError("outside limits", f"the {name} is outside the limits: {'; '.join(broken)}")
 
 
 def _check_same_order(start: Snapshot, goal: Snapshot) -> None:

@@ -59,7 +59,7 @@ def vanishing(w: Stratum, p: FloatArray, r: FloatArray) -> list[float]:
 
 
 @given(ordinary_cases())
-@settings(max_examples=15)
+@settings(max_examples=10)
 def test_each_pose_is_in_its_stratum_or_one_in_its_closure(case: Case) -> None:
     pose = pose_of(case)
     for w, found in nearest_in_strata(case.design, pose).items():
@@ -77,12 +77,12 @@ def test_nothing_nearer_is_found_by_slsqp_from_many_starts(w: Stratum) -> None:
     searched = searched_least(
         OPTIMAL, position, rotation, lambda p, r: vanishing(w, p, r), starts=8
     )
-    assert found.distance == pytest.approx(searched, abs=1e-7)
+    assert found.distance == pytest.approx(searched, abs=1e-8)
     assert found.distance <= searched + 1e-8
 
 
 @given(ordinary_cases())
-@settings(max_examples=15)
+@settings(max_examples=10)
 def test_a_stratum_in_a_closure_is_no_nearer(case: Case) -> None:
     found = nearest_in_strata(case.design, pose_of(case))
     for upper in STRATA:
@@ -91,7 +91,7 @@ def test_a_stratum_in_a_closure_is_no_nearer(case: Case) -> None:
 
 
 @given(ordinary_cases(), positions(), rotations(), st.sampled_from((1.0, 1e-2, 1e-5)))
-@settings(max_examples=15)
+@settings(max_examples=10)
 def test_a_distance_changes_no_more_than_the_platform_moves(
     case: Case, shift: FloatArray, turn: FloatArray, share: float
 ) -> None:
@@ -104,7 +104,7 @@ def test_a_distance_changes_no_more_than_the_platform_moves(
 
 
 @given(designs(), positions(), rotations())
-@settings(max_examples=15)
+@settings(max_examples=10)
 def test_designs_of_any_size_have_their_nearest_poses(
     design: object, place: FloatArray, rotation: FloatArray
 ) -> None:

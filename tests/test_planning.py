@@ -29,7 +29,7 @@ from explorer import (
 )
 from explorer.crossings import path_margins
 from explorer.displacement import displacement
-from explorer.planning import NoPathError, PlannedPath, plan_path
+from explorer.planning import EndError, NoPathError, PlannedPath, plan_path
 from explorer.smoothing import Smoother
 from explorer.validity import Rules, poses_are_valid
 
@@ -169,8 +169,10 @@ def test_a_start_or_goal_outside_the_limits_is_told_with_each_limit() -> None:
     x, y, z = HOME.position
     far = Pose((40.0, y, z), HOME.quaternion)
     broken = [str(each) for each in evaluate(DESIGN, far).violations]
-    with pytest.raises(InputError, match="the goal is outside the limits") as caught:
+    with pytest.raises(EndError, match="the goal is outside the limits") as caught:
         plan_path(DESIGN, HOME, far)
+    assert isinstance(caught.value, InputError)
+    assert caught.value.reason == "outside limits"
     assert len(broken) >= 2
     assert all(each in str(caught.value) for each in broken)
     with pytest.raises(InputError, match="the start is outside the limits"):
@@ -185,8 +187,9 @@ def test_a_singular_start_or_goal_is_told_with_its_incidence(height: float, word
     x, y, _ = HOME.position
     singular = Pose.of_yaw_pitch_roll((x, y, height), (-70.0, 20.0, 30.0))
     for ends in ((singular, HOME), (HOME, singular)):
-        with pytest.raises(InputError, match=words):
+        with pytest.raises(EndError, match=words) as caught:
             plan_path(DESIGN, *ends)
+        assert caught.value.reason == "singular"
 
 
 def test_margins_of_the_limits_are_kept() -> None:

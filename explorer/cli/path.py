@@ -93,7 +93,7 @@ class Path(JsonOptions, RadiiOptions, DesignOptions):
         """
         from explorer.export.files import check_writable
         from explorer.export.trajectory import write_trajectory
-        from explorer.planning import NoPathError, plan_path
+        from explorer.planning import EndError, NoPathError, plan_path
         from explorer.trajectory import trajectory
 
         design = self.with_radii(self.load())
@@ -109,7 +109,7 @@ class Path(JsonOptions, RadiiOptions, DesignOptions):
             check_writable(self.out)
         try:
             path = plan_path(design, start, goal, seconds=self.seconds)
-        except NoPathError as error:
+        except (EndError, NoPathError) as error:
             if self.json:
                 write_json({"found": False, "reason": error.reason, "poses": []})
             raise

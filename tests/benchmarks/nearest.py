@@ -1,4 +1,4 @@
-"""The nearest singular pose of all three incidences, beside SLSQP from many starts."""
+"""The nearest singular poses beside SLSQP from many starts, all strata, and crossings."""
 
 from __future__ import annotations
 
@@ -6,14 +6,17 @@ from collections.abc import Iterator
 
 import numpy as np
 from multistart import searched_distance
+from scipy.spatial.transform import Rotation
 
-from benchmarks.samples import DESIGN, around_home
+from benchmarks.samples import DESIGN, SIZE, around_home
 from benchmarks.table import Row, seconds, times
 from benchmarks.timing import best_of
 from explorer import Pose, nearest_singular_poses, nearest_singularities
 from explorer.compiled import warm
+from explorer.crossings import path_margins
+from explorer.nearest_stratum import nearest_in_strata
 
-CALLS, POSES, SEARCHES = 200, 5_000, 10
+CALLS, POSES, SEARCHES, MOVES = 200, 5_000, 10, 100
 # So many that the search, too, finds the nearest for nearly all poses.
 STARTS = 12
 
@@ -50,3 +53,18 @@ def run() -> Iterator[Row]:
     )
     batch = best_of(3, lambda: nearest_singular_poses(DESIGN, positions, rotations)) / POSES
     yield Row(f"the same in a batch of {POSES:,}, each, one core", seconds(batch))
+    strata = best_of(3, lambda: nearest_in_strata(DESIGN, poses[0]))
+    yield Row("nearest pose in each of the 24 strata", seconds(strata))
+    rng = np.random.default_rng(1)
+    turns = Rotation.random(2 * MOVES, random_state=rng).as_matrix()
+    places = SIZE * rng.uniform(-1.0, 1.0, (2 * MOVES, 3))
+    ends = [Pose.of(p, r) for p, r in zip(places, turns, strict=True)]
+
+    def cross() -> None:
+        for start, end in zip(ends[::2], ends[1::2], strict=True):
+            path_margins([start, end])
+
+    yield Row(
+        "a straight move to anywhere: margins at 101 samples, all crossings",
+        seconds(best_of(3, cross) / MOVES),
+    )

@@ -92,6 +92,14 @@ def test_no_path_is_an_answer_with_status_1_and_a_reason(
     assert "mode 1 (− − +)" in captured.err
 
 
+@pytest.mark.parametrize(("height", "reason"), [("30", "outside limits"), ("0", "singular")])
+def test_an_end_that_no_path_can_have_is_bad_input_with_a_reason(
+    capsys: pytest.CaptureFixture[str], height: str, reason: str
+) -> None:
+    found = answer(capsys, "--to", "12", "8", height, status=2)
+    assert found == {"found": False, "reason": reason, "poses": []}
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
