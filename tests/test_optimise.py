@@ -79,7 +79,8 @@ def assert_is_sound(outcome: Outcome) -> None:
         slack = 1e-12 * problem.size
         assert variable.low - slack <= value <= variable.high + slack
     for name in DISTANCES:
-        assert abs(distance_of(outcome.design, name)) >= problem.demands.least - 1e-6
+        least = problem.demands.least - 1e-6 * problem.size
+        assert abs(distance_of(outcome.design, name)) >= least
     assert math.isfinite(best.objective)
     assert outcome.run.message
     assert "\n" not in outcome.run.message
@@ -377,6 +378,33 @@ def test_problems_and_outcomes_go_to_another_process_and_back() -> None:
     assert pickle.loads(pickle.dumps(outcome)) == outcome
 
 
+@pytest.mark.parametrize("seed", range(12))
+def test_searches_from_random_designs_of_any_size_end_with_a_word(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    size = float(random.choice([1e-20, 1e-6, 1.0, 1e6, 1e20]))
+    a3x, a3y, b1x, b1y, b2, b3 = (size * random.uniform(-1.0, 1.0, 6)).tolist()
+    limits: dict[str, Any] = {
+        "l1": (float(random.choice([0.0, 0.3])) * size, None),
+        "d4": (0.0, None if seed % 3 else size),
+        "guide": None if seed % 2 else (-size, size),
+        "gap": float(random.choice([0.0, 0.02])) * size,
+        "margin": None if seed % 5 == 0 else 0.01 * size,
+        "leg_radii": [0.01 * size] * 4,
+    }
+    design = Design(a3=(a3x, a3y), b1=(b1x, b1y), b2=b2, b3=b3)
+    problem = make_problem(
+        with_limits(design, **limits),
+        "match-volume" if seed % 4 else "largest-volume",
+        volume=0.1 * size**3,
+        clearance=0.02 * size if seed % 2 else None,
+        free=["yaw"] if seed % 3 else [],
+    )
+    outcome = optimise_design(problem, iterations=25)
+    assert_is_sound(outcome)
+    record = record_of(outcome, Settings())
+    assert decode_record(encode_record(record), "here") == record
+
+
 # Where a clearance is not kept
 
 
@@ -450,13 +478,13 @@ Change = Callable[[], Problem]
             lambda: make_problem(
                 OPTIMAL, "match-volume", volume=9.0, bounds=[Variable("b2", math.nan, 9.0)]
             ),
-            "bounds of b2 must be finite",
+            "bound of b2 must be a finite number",
         ),
         (
             lambda: make_problem(
                 OPTIMAL, "match-volume", volume=9.0, bounds=[Variable("b2", 0.0, math.inf)]
             ),
-            "bounds of b2 must be finite",
+            "bound of b2 must be a finite number",
         ),
         (
             lambda: make_problem(
@@ -468,12 +496,15 @@ Change = Callable[[], Problem]
         (lambda: make_problem(OPTIMAL, "match-volume"), "match-volume needs a volume"),
         (
             lambda: make_problem(OPTIMAL, "match-volume", volume=math.nan),
-            "positive number; got nan",
+            "volume demanded must be a positive, finite number; got nan",
         ),
-        (lambda: make_problem(OPTIMAL, "match-volume", volume=-1.0), "positive number; got -1"),
+        (
+            lambda: make_problem(OPTIMAL, "match-volume", volume=-1.0),
+            "volume demanded must be a positive, finite number; got -1",
+        ),
         (
             lambda: make_problem(OPTIMAL, "match-volume", volume=9.0, clearance=math.nan),
-            "clearance demanded must be a positive number",
+            "clearance demanded must be a finite number",
         ),
         (
             lambda: make_problem(
@@ -483,7 +514,7 @@ Change = Callable[[], Problem]
         ),
         (
             lambda: make_problem(OPTIMAL, "match-volume", volume=9.0, least=math.nan),
-            "least must be a number",
+            "least must be a finite number",
         ),
         (
             lambda: make_problem(OPTIMAL, "match-volume", volume=9.0, least=5.0),
@@ -507,7 +538,7 @@ Change = Callable[[], Problem]
                 volume=9.0,
                 required_box=((0.0, 0.0, 5.0), (1.0, -1.0, 6.0)),
             ),
-            "required box is reversed: y 0 to -1",
+            "required box y: the low end 0 exceeds the high end -1",
         ),
         (
             lambda: make_problem(OPTIMAL, "match-volume", volume=9.0, free=["shift-x"]),

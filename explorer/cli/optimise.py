@@ -251,12 +251,13 @@ def _as_variable(word: str) -> Variable:
     from explorer.optimise.problem import Variable
 
     match = re.fullmatch(r"([^=]+)=([^:]+):([^:]+)", word)
-    refusal = UsageError(
-        f"--bounds takes NAME=LOW:HIGH, such as b1x=-10:10; got {word!r}", "explorer optimise"
-    )
-    if match is None:
-        raise refusal
     try:
-        return Variable(match[1].strip(), float(match[2]), float(match[3]))
+        ends = [float(end) for end in match.groups()[1:]] if match else []
     except ValueError:
-        raise refusal from None
+        ends = []
+    if match is None or not ends:
+        raise UsageError(
+            f"--bounds takes NAME=LOW:HIGH, such as b1x=-10:10; got {word!r}",
+            "explorer optimise",
+        )
+    return Variable(match[1].strip(), *ends)

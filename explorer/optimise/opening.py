@@ -24,6 +24,8 @@ SEARCHED = 13
 # How much moving the position costs beside changing the design.
 COST_OF_PLACE = 0.01
 MOST_ITERATIONS = 60
+# What each limit is missed by where there is no design.
+NO_DESIGN = -1e3
 
 
 def room(problem: Problem) -> float:
@@ -50,6 +52,7 @@ def opened(
     if here.design.limits.gap > 0.0:
         sides.append(GapDemand(here))
     names = [each.name for each in here.limits if isinstance(each, Round | HalfSpace)]
+    count = len(names) + sum(len(side.names) for side in sides)
     place = _least_broken(here) / size
     first = np.concatenate([start, place])
     last: list[tuple[FloatArray, FloatArray, FloatArray]] = []
@@ -63,10 +66,13 @@ def opened(
             state = State(problem, x[:n])
             found = {each.name: each for each in state.limits}
         except DesignError:
-            return np.full(len(names) + 4, -1e3), np.zeros((len(names) + 4, len(x)))
+            return np.full(count, NO_DESIGN), np.zeros((count, len(x)))
         for name in names:
             limit = found.get(name)
             if not isinstance(limit, Round | HalfSpace):
+                # One that can never be kept where it is now.
+                values.append(NO_DESIGN)
+                rows.append(np.zeros(len(x)))
                 continue
             slack, by_u, by_p = state.slack(limit, x[None, n:] * size)
             norm = float(np.linalg.norm(limit.normal)) if isinstance(limit, HalfSpace) else 1.0

@@ -12,7 +12,7 @@ from typing import Literal, get_args
 
 import msgspec
 
-from explorer.checks import LARGEST_NUMBER
+from explorer.checks import not_negative, number, numbers, ordered, positive, two
 from explorer.design import DEGENERATE_RATIO, LENGTHS, VARIABLES, Design, Limits, Swing
 from explorer.errors import InputError
 from explorer.home import home_pose
@@ -41,6 +41,8 @@ LEAST = 0.05
 MARGIN_OF_CLEARANCE = 0.05
 # Degrees of yaw that may change, and that stay between the two lines.
 YAW_WITHIN, LINES_APART = 45.0, 5.0
+# How small a reach of its own may become, as a share of the start's.
+LEAST_REACH = 1e-3
 
 
 class Variable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -54,6 +56,11 @@ class Variable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     name: str
     low: float
     high: float
+
+    def __post_init__(self) -> None:
+        for field in ("low", "high"):
+            value = number(f"the {field} bound of {self.name}", getattr(self, field))
+            msgspec.structs.force_setattr(self, field, value)
 
 
 class Demands(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -79,6 +86,34 @@ class Demands(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     least: float = 0.0
     stroke_ratio: float | None = None
     required_box: Box | None = None
+
+    def __post_init__(self) -> None:
+        if self.volume is not None and not 0.0 < self.volume < math.inf:
+            # Of a huge design it exceeds what other numbers may be.
+            raise InputError(
+                f"the volume demanded must be a positive, finite number; got {self.volume:g}"
+            )
+        for field in ("reach", "clearance", "stroke_ratio"):
+            value = getattr(self, field)
+            if value is not None:
+                called = f"the {field.replace('_', ' ')} demanded"
+                msgspec.structs.force_setattr(self, field, positive(called, value))
+        for field in ("clearance_margin", "least"):
+            value = not_negative(f"the {field.replace('_', ' ')}", getattr(self, field))
+            msgspec.structs.force_setattr(self, field, value)
+        if self.required_box is not None:
+            lows, highs = two("the required box", self.required_box)
+            pairs = [
+                ordered(f"the required box {axis}", low, high)
+                for axis, low, high in zip(
+                    "xyz",
+                    numbers("the required box's lows", lows, 3),
+                    numbers("the required box's highs", highs, 3),
+                    strict=True,
+                )
+            ]
+            box = tuple(low for low, _ in pairs), tuple(high for _, high in pairs)
+            msgspec.structs.force_setattr(self, "required_box", box)
 
 
 class Problem(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -262,7 +297,7 @@ def default_variable(start: Design, name: str) -> Variable:
     if name in VARIABLES:
         return Variable(name, -B_WITHIN * size, B_WITHIN * size)
     if name == REACH:
-        return Variable(name, value / A3_WITHIN, A3_WITHIN * value)
+        return Variable(name, max(value / A3_WITHIN, _longest_minimum(start)), A3_WITHIN * value)
     if name in SHIFTS:
         return Variable(name, -size, size)
     # Between the two yaws at which the lines are parallel, if the start is.
@@ -303,6 +338,11 @@ def longest_length(design: Design) -> float:
     return max(design.length_range(name)[1] for name in LENGTHS)
 
 
+def _longest_minimum(design: Design) -> float:
+    """Return the largest of the four minimum lengths."""
+    return max(design.length_range(name)[0] for name in LENGTHS)
+
+
 def _own_volume(start: Design) -> float:
     from explorer.workspace import workspace_volume
 
@@ -317,16 +357,13 @@ def _with_lengths(limits: Limits, ranges: Mapping[str, tuple[float, float | None
 
 
 def _check_variables(problem: Problem) -> None:
-    names = problem.names
+    names, start = problem.names, problem.start
     if not names:
         raise InputError("nothing may change: name at least one variable")
     if len(set(names)) < len(names):
         raise InputError(f"each variable may be named once; got {', '.join(names)}")
     for each, value in zip(problem.variables, problem.start_values, strict=True):
         unit = "°" if each.name == YAW else ""
-        for end in (each.low, each.high):
-            if not abs(end) <= LARGEST_NUMBER:
-                raise InputError(f"the bounds of {each.name} must be finite numbers; got {end}")
         if each.low > each.high:
             raise InputError(
                 f"the bounds of {each.name} cross: low {each.low:g}{unit}, high {each.high:g}{unit}"
@@ -336,31 +373,24 @@ def _check_variables(problem: Problem) -> None:
                 f"the start has {each.name} = {value:g}{unit}, outside its bounds "
                 f"{each.low:g}{unit} to {each.high:g}{unit}: widen them or start elsewhere"
             )
-        if each.name == REACH and each.low <= 0.0:
-            raise InputError(f"the reach must stay positive; its low bound is {each.low:g}")
+        if each.name == REACH and not each.low >= max(LEAST_REACH * value, _longest_minimum(start)):
+            raise InputError(
+                f"the reach must stay above every minimum length, so its low bound above "
+                f"{max(LEAST_REACH * value, _longest_minimum(start)):g}; got {each.low:g}"
+            )
         if each.name in SHIFTS and problem.demands.required_box is None:
             raise InputError(f"{each.name} shifts the required box, and none is given")
 
 
 def _check_demands(problem: Problem) -> None:
     demands = problem.demands
-    for name, value in (
-        ("volume", demands.volume),
-        ("reach", demands.reach),
-        ("clearance", demands.clearance),
-    ):
-        if value is not None and not 0.0 < value <= LARGEST_NUMBER:
-            raise InputError(f"the {name} demanded must be a positive number; got {value:g}")
-    for name, value in (("clearance margin", demands.clearance_margin), ("least", demands.least)):
-        if not 0.0 <= value <= LARGEST_NUMBER:
-            raise InputError(f"the {name} must be a number of at least zero; got {value:g}")
     if demands.clearance is not None and not demands.clearance_margin > 0.0:
         raise InputError(
             "clearance can be demanded only off the singular planes, where legs may have to "
             "meet: give a positive clearance margin"
         )
     ratio = demands.stroke_ratio
-    if ratio is not None and not 1.0 < ratio <= LARGEST_NUMBER:
+    if ratio is not None and not ratio > 1.0:
         raise InputError(f"a stroke ratio is longest over shortest, above 1; got {ratio:g}")
     for name in DISTANCES:
         distance = abs(distance_of(problem.start, name))
@@ -370,12 +400,6 @@ def _check_demands(problem: Problem) -> None:
                 f"the start has |{name}| = {distance:g}, below the least allowed "
                 f"{demands.least:g}: start elsewhere or lower it"
             )
-    if demands.required_box is not None:
-        for axis, low, high in zip("xyz", *demands.required_box, strict=True):
-            if not (abs(low) <= LARGEST_NUMBER and abs(high) <= LARGEST_NUMBER):
-                raise InputError(f"the required box must be finite; got {axis} {low} to {high}")
-            if low > high:
-                raise InputError(f"the required box is reversed: {axis} {low:g} to {high:g}")
 
 
 def _check_objective(problem: Problem) -> None:

@@ -132,7 +132,7 @@ def test_other_objectives_and_variables(capsys: pytest.CaptureFixture[str]) -> N
         (["--target-volume", "nan"], "positive number; got nan"),
         (["--target-volume", "0"], "positive number"),
         (["--target-volume", "9", "--bounds", "a3x=5:3"], "bounds of a3x cross"),
-        (["--target-volume", "9", "--bounds", "a3x=5:nan"], "must be finite numbers; got nan"),
+        (["--target-volume", "9", "--bounds", "a3x=5:nan"], "must be a finite number; got nan"),
         (["--target-volume", "9", "--bounds", "a3x=20:30"], "outside its bounds 20 to 30"),
         (["--target-volume", "9", "--bounds", "a3x"], "NAME=LOW:HIGH"),
         (["--target-volume", "9", "--bounds", "a3x=1:b"], "NAME=LOW:HIGH"),
