@@ -1,38 +1,37 @@
 """Paths between two poses of one mode that keep all limits, margins and clearances.
 
-OMPL's RRT-Connect grows a tree of straight moves from either end over SE(3); each of its moves
-is proved valid as a whole (see `explorer.move_validity`), so that no step can be too
-coarse. What cannot be joined is told before: poses of different modes, and poses
-between which two legs would have to pass each other on the guide.
+What cannot be joined is told before any search: poses of different modes, and poses between
+which two legs would have to pass each other on the guide. The others are joined by a straight
+move or by `explorer.tree_search`; either way every move is proved valid as a whole.
 """
 
 from __future__ import annotations
 
-import importlib
+import dataclasses
 import math
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
-from explorer.arrays import BoolArray, FloatArray
 from explorer.bruhat import incidences
 from explorer.clearance import PAIRS
 from explorer.design import Design
-from explorer.errors import InputError, MissingExtraError, NoAnswerError
+from explorer.errors import InputError, NoAnswerError
 from explorer.limits import violations
-from explorer.move_validity import DEFAULT_TOLERANCE, valid_move_rows
 from explorer.pose import Pose
 from explorer.singularity import INCIDENCES, mode_name
 from explorer.smoothing import Smoother
 from explorer.snapshot import Snapshot, evaluate
-from explorer.validity import Rules, valid_rows
+from explorer.tree_search import TreeSearch, compile_checks, search_is_possible
+from explorer.validity import Rules
 
 DEFAULT_SECONDS = 2.0
-# Of the whole extent: the longest move of a tree.
-LONGEST_MOVE = 0.25
+# Of the reach, and of what the ends keep: the margins and clearances that paths had better keep.
+COMFORT, SHARE_OF_ENDS = 0.02, 0.5
+# Of the time: for a path that keeps them.
+SHARE_FOR_COMFORT = 0.5
 
 Reason = Literal["other mode", "other order", "out of time"]
 EndReason = Literal["outside limits", "singular"]
@@ -70,6 +69,8 @@ class PlannedPath:
         poses: Its corners, from the start to the goal.
         found: Those of the path as it was found, before smoothing.
         length: The root-mean-square way of b1 to b4 along it, in design units.
+        margin: What no |κ| is less than along it, but for the tolerance of moves.
+        clearance: What no two legs are nearer than along it.
         seconds: What finding and smoothing took.
         checked: How many moves were checked to find it.
     """
@@ -77,6 +78,8 @@ class PlannedPath:
     poses: tuple[Pose, ...]
     found: tuple[Pose, ...]
     length: float
+    margin: float
+    clearance: float
     seconds: float
     checked: int
 
@@ -91,8 +94,8 @@ def plan_path(
 ) -> PlannedPath:
     """Return a path from a pose to another that keeps limits, margins and clearances.
 
-    The margins keep the sign triple of the start, whatever mode the home has, and at least the
-    margin of the limits.
+    The margins keep the sign triple of the start, whatever mode the home has. Where it can, the
+    path also stays off singularities and collisions, by a share of what both ends keep.
 
     Args:
         design: The manipulator.
@@ -116,34 +119,88 @@ def plan_path(
     for name, snapshot in zip(("start", "goal"), ends, strict=True):
         _check_within(name, snapshot, ends[0].signs)
     _check_same_order(*ends)
-    rules = Rules.of(design, ends[0].signs)
     began = time.perf_counter()
-    smoother = Smoother(design, rules, seed)
-    if smoother.is_valid(start, goal):
-        length = float(smoother.lengths([start, goal])[0])
-        both = (start, goal)
-        return PlannedPath(both, both, length, time.perf_counter() - began, checked=1)
-    ompl = _Ompl.loaded()
-    # The first time on a machine takes seconds, which are not the path's.
-    valid_move_rows.compile()
-    valid_rows.compile()
-    began = time.perf_counter()
-    search = _Search(ompl, design, rules)
-    found = search.path(start, goal, seconds)
-    if found is None:
+    planner = _Planner(design, start, goal, seed)
+    exact = Rules.of(design, ends[0].signs)
+    margin, clearance = _comfort(*ends)
+    comfortable = exact.with_room(margin, clearance)
+    path = planner.straight(comfortable, margin, clearance)
+    if path is None and search_is_possible():
+        # The first time on a machine takes seconds, which are not the path's.
+        compile_checks()
+        began = time.perf_counter()
+        path = planner.searched(comfortable, margin, clearance, SHARE_FOR_COMFORT * seconds)
+    path = path or planner.straight(exact, 0.0, 0.0)
+    if path is None:
+        left = seconds - (time.perf_counter() - began)
+        path = planner.searched(exact, 0.0, 0.0, max(left, 0.0))
+    if path is None:
         raise NoPathError(
             "out of time",
-            f"no path was found within {seconds:g} s ({search.checked} moves tried); there may "
+            f"no path was found within {seconds:g} s ({planner.checked} moves tried); there may "
             "be one: allow more time, or go by a pose in between",
         )
-    poses = smoother.smoothed(found)
-    return PlannedPath(
-        poses=poses,
-        found=found,
-        length=float(smoother.lengths(poses).sum()),
-        seconds=time.perf_counter() - began,
-        checked=search.checked,
-    )
+    return dataclasses.replace(path, seconds=time.perf_counter() - began, checked=planner.checked)
+
+
+class _Planner:
+    """Looks for paths between two poses under one set of rules after another.
+
+    Attributes:
+        checked: How many moves have been checked to find one.
+    """
+
+    def __init__(self, design: Design, start: Pose, goal: Pose, seed: int) -> None:
+        self.checked = 0
+        self._design = design
+        self._ends = start, goal
+        self._seed = seed
+
+    def straight(self, rules: Rules, margin: float, clearance: float) -> PlannedPath | None:
+        """Return the straight move if it is valid."""
+        self.checked += 1
+        smoother = Smoother(self._design, rules, self._seed)
+        if not smoother.is_valid(*self._ends):
+            return None
+        return self._path(smoother, self._ends, self._ends, margin, clearance)
+
+    def searched(
+        self, rules: Rules, margin: float, clearance: float, seconds: float
+    ) -> PlannedPath | None:
+        """Return a path that OMPL finds, smoothed, or None if there was too little time."""
+        search = TreeSearch(self._design, rules)
+        found = search.path(*self._ends, seconds)
+        self.checked += search.checked
+        if found is None:
+            return None
+        smoother = Smoother(self._design, rules, self._seed)
+        return self._path(smoother, found, smoother.smoothed(found), margin, clearance)
+
+    def _path(
+        self,
+        smoother: Smoother,
+        found: tuple[Pose, ...],
+        poses: tuple[Pose, ...],
+        margin: float,
+        clearance: float,
+    ) -> PlannedPath:
+        return PlannedPath(
+            poses=poses,
+            found=found,
+            length=float(smoother.lengths(poses).sum()),
+            margin=max(smoother.design.limits.margin or 0.0, margin),
+            clearance=clearance,
+            seconds=0.0,
+            checked=0,
+        )
+
+
+def _comfort(start: Snapshot, goal: Snapshot) -> tuple[float, float]:
+    """Return the margin and the clearance that a path had better keep, as both ends do."""
+    most = COMFORT * start.design.reach
+    margin = min(float(np.abs(each.margins).min()) for each in (start, goal))
+    clearance = min(float(each.clearances.clearance.min()) for each in (start, goal))
+    return min(most, SHARE_OF_ENDS * margin), min(most, SHARE_OF_ENDS * clearance)
 
 
 def _check_not_singular(name: str, snapshot: Snapshot) -> None:
@@ -203,141 +260,3 @@ def _check_same_order(start: Snapshot, goal: Snapshot) -> None:
             f"on the guide the start has the order {', '.join(first)}, the goal "
             f"{', '.join(last)}: in between two legs would collide where they start",
         )
-
-
-@dataclass(frozen=True)
-class _Ompl:
-    """The modules of OMPL, which has no types."""
-
-    base: Any
-    geometric: Any
-
-    @staticmethod
-    def loaded() -> _Ompl:
-        try:
-            util: Any = importlib.import_module("ompl.util")
-            modules = _Ompl(
-                importlib.import_module("ompl.base"), importlib.import_module("ompl.geometric")
-            )
-        except ImportError:
-            raise MissingExtraError(
-                "planning a path needs OMPL: pip install 'flagged-explorer[planning]'"
-            ) from None
-        util.setLogLevel(util.LOG_NONE)
-        return modules
-
-
-class _Search:
-    """One search of OMPL over SE(3).
-
-    Attributes:
-        checked: How many moves have been checked.
-    """
-
-    def __init__(self, ompl: _Ompl, design: Design, rules: Rules) -> None:
-        self.checked = 0
-        self._ompl = ompl
-        self._design = design
-        self._rules = rules
-        self._tolerance = DEFAULT_TOLERANCE * design.reach
-        self._places: FloatArray = np.empty((2, 1, 3))
-        self._turns: FloatArray = np.empty((2, 1, 3, 3))
-        self._valid: BoolArray = np.empty(1, dtype=np.bool_)
-
-    def path(self, start: Pose, goal: Pose, seconds: float) -> tuple[Pose, ...] | None:
-        """Return the corners of a path, or None if there was too little time."""
-        base, geometric = self._ompl.base, self._ompl.geometric
-        space = base.SE3StateSpace()
-        bounds = base.RealVectorBounds(3)
-        lows, highs = _box(self._design, start, goal)
-        for axis in range(3):
-            bounds.setLow(axis, lows[axis])
-            bounds.setHigh(axis, highs[axis])
-        space.setBounds(bounds)
-        # Half the angle times the reach: a turn counts as what it does to b4 seen from a1.
-        space.setSubspaceWeight(1, self._design.reach)
-        setup = geometric.SimpleSetup(space)
-        information = setup.getSpaceInformation()
-        setup.setStateValidityChecker(self._state_is_valid)
-        validator = _validator(base, information, self._move_is_valid)
-        information.setMotionValidator(validator)
-        setup.setStartAndGoalStates(_state(space, start), _state(space, goal))
-        planner = geometric.RRTConnect(information)
-        planner.setRange(LONGEST_MOVE * space.getMaximumExtent())
-        setup.setPlanner(planner)
-        setup.solve(seconds)
-        if not setup.haveExactSolutionPath():
-            return None
-        states = setup.getSolutionPath().getStates()
-        # The ends as they were given, to the last bit.
-        return (start, *(_pose(state) for state in list(states)[1:-1]), goal)
-
-    def _read(self, which: int, state: Any) -> None:
-        place, turn, q = self._places[which, 0], self._turns[which, 0], state.rotation()
-        place[0], place[1], place[2] = state.getX(), state.getY(), state.getZ()
-        w, x, y, z = q.w, q.x, q.y, q.z
-        turn[0] = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)
-        turn[1] = 2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)
-        turn[2] = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)
-
-    def _state_is_valid(self, state: Any) -> bool:
-        self._read(0, state)
-        rules = self._rules
-        valid_rows(1, rules.row, rules.cones, self._places[0], self._turns[0], self._valid)
-        return bool(self._valid[0])
-
-    def _move_is_valid(self, start: Any, end: Any) -> bool:
-        self.checked += 1
-        self._read(0, start)
-        self._read(1, end)
-        rules = self._rules
-        valid_move_rows(
-            1,
-            rules.row,
-            rules.cones,
-            self._places[0],
-            self._turns[0],
-            self._places[1],
-            self._turns[1],
-            self._tolerance,
-            self._valid,
-        )
-        return bool(self._valid[0])
-
-
-def _validator(base: Any, information: Any, is_valid: Callable[[Any, Any], bool]) -> Any:
-    """Return OMPL's check of moves; a class made here, as its base is imported late."""
-
-    def check(_: Any, start: Any, end: Any) -> bool:
-        return is_valid(start, end)
-
-    kind = type("MoveValidator", (base.MotionValidator,), {"checkMotion": check})
-    return kind(information)
-
-
-def _box(design: Design, start: Pose, goal: Pose) -> tuple[list[float], list[float]]:
-    """Return lows and highs of the positions that can be within the limits."""
-    centre, radius = np.array([*design.a3, 0.0]), design.length_range("l4")[1]
-    lows, highs = centre - radius, centre + radius
-    if design.limits.box is not None:
-        lows = np.maximum(lows, design.limits.box[0])
-        highs = np.minimum(highs, design.limits.box[1])
-    # Both ends are within the limits, to rounding.
-    ends = np.array([start.position, goal.position])
-    spare = 1e-9 * design.reach
-    lows = np.minimum(lows, ends.min(axis=0)) - spare
-    highs = np.maximum(highs, ends.max(axis=0)) + spare
-    return lows.tolist(), highs.tolist()
-
-
-def _state(space: Any, pose: Pose) -> Any:
-    state = space.allocState()
-    state.setXYZ(*pose.position)
-    q = state.rotation()
-    q.w, q.x, q.y, q.z = pose.quaternion
-    return state
-
-
-def _pose(state: Any) -> Pose:
-    q = state.rotation()
-    return Pose((state.getX(), state.getY(), state.getZ()), (q.w, q.x, q.y, q.z))

@@ -87,6 +87,19 @@ class Rules:
         ]
         return Rules(row, np.array(cones, dtype=np.float64).reshape(-1, 7))
 
+    def with_room(self, margin: float, clearance: float) -> Rules:
+        """Return the rules with margins and clearances of at least so much, or what they were.
+
+        Args:
+            margin: In design units; where no margin is demanded, none is.
+            clearance: In design units, beyond the radii.
+        """
+        row = self.row.copy()
+        if row[MARGIN] > -math.inf:
+            row[MARGIN] = max(row[MARGIN], margin)
+        row[RADII:] = np.where(row[RADII:] < 0.0, row[RADII:], row[RADII:] + clearance)
+        return Rules(row, self.cones)
+
 
 def poses_are_valid(
     design: Design, position: ArrayLike, rotation: ArrayLike, *, rules: Rules | None = None

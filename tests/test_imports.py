@@ -63,6 +63,7 @@ LAYERS = (
         "workspace",
         "slice_fields",
         "smoothing",
+        "tree_search",
         "planning",
         "trajectory",
         "least_clearance",

@@ -66,13 +66,17 @@ def pairs() -> tuple[tuple[Pose, Pose], ...]:
 
 
 def assert_keeps_everything(path: PlannedPath, poses: tuple[Pose, ...]) -> None:
+    room = (path.margin - 2e-4 * DESIGN.reach, path.clearance - 1e-4 * DESIGN.reach)
     for start, end in itertools.pairwise(poses):
         positions, rotations = poses_between(start, end, np.linspace(0.0, 1.0, 50))
         assert poses_are_valid(DESIGN, positions, rotations).all()
-        assert moves_are_clear(DESIGN, positions[0], rotations[0], positions[-1], rotations[-1])
+        ends = (positions[0], rotations[0], positions[-1], rotations[-1])
+        assert moves_are_clear(DESIGN, *ends)
+        assert moves_are_clear(DESIGN, *ends, clearance=room[1]) or room[1] < 0.0
     margins = path_margins(poses)
     assert margins.crossings == ()
     assert margins.lies_in == ()
+    assert np.abs(margins.margins).min() >= room[0]
 
 
 @needs_ompl
@@ -93,14 +97,18 @@ def test_a_path_keeps_limits_margins_and_clearances_from_start_to_goal(index: in
 @needs_ompl
 def test_smoothing_makes_a_path_shorter_and_rounder() -> None:
     smoother = Smoother(DESIGN, Rules.of(DESIGN))
-    for start, goal in pairs()[:4]:
+    smooth = rough = 0.0
+    for start, goal in pairs()[:6]:
         path = plan_path(DESIGN, start, goal, seconds=20.0)
         straight = displacement(
             DESIGN, start.position, start.rotation, goal.position, goal.rotation
         )
         assert path.length == pytest.approx(float(smoother.lengths(path.poses).sum()))
         assert straight <= path.length + 1e-9
-        assert path.length < 0.95 * float(smoother.lengths(path.found).sum())
+        found = float(smoother.lengths(path.found).sum())
+        assert path.length <= found + 1e-9
+        smooth, rough = smooth + path.length, rough + found
+    assert smooth < 0.95 * rough
 
 
 def test_the_sharpest_corners_are_cut() -> None:
@@ -156,6 +164,36 @@ def test_poses_with_the_carriages_in_another_order_have_no_path() -> None:
         DESIGN, start.position, start.rotation, goal.position, goal.rotation
     ).clearance[3]
     assert least < -0.39
+
+
+@needs_ompl
+def test_paths_stay_off_singularities_and_collisions_as_far_as_their_ends_do() -> None:
+    kept: list[bool] = []
+    for start, goal in pairs():
+        path = plan_path(DESIGN, start, goal, seconds=20.0)
+        ends = [evaluate(DESIGN, each) for each in (start, goal)]
+        margin = min(0.02 * DESIGN.reach, *(0.5 * float(abs(e.margins).min()) for e in ends))
+        kept.append(path.margin == pytest.approx(margin))
+        assert kept[-1] or path.margin == 0.0
+        assert (path.clearance > 0.0) == (path.margin > 0.0)
+    assert np.mean(kept) > 0.7
+
+
+def test_room_is_added_to_what_rules_demand() -> None:
+    rules = Rules.of(DESIGN)
+    position, rotation = HOME.position, HOME.rotation
+    snapshot = evaluate(DESIGN, HOME)
+    margin = float(abs(snapshot.margins).min())
+    clearance = float(snapshot.clearances.clearance.min())
+    for room, valid in (
+        ((0.99 * margin, 0.99 * clearance), True),
+        ((1.01 * margin, 0.0), False),
+        ((0.0, 1.01 * clearance), False),
+    ):
+        demanding = rules.with_room(*room)
+        assert poses_are_valid(DESIGN, position, rotation, rules=demanding) == valid
+    free = Rules.of(limited(DESIGN, margin=None))
+    assert poses_are_valid(DESIGN, position, rotation, rules=free.with_room(2.0 * margin, 0.0))
 
 
 @needs_ompl

@@ -162,6 +162,8 @@ def _as_json(path: PlannedPath, timed: Trajectory, out: File | None) -> dict[str
             for each in path.poses
         ],
         "length": path.length,
+        "margin": path.margin,
+        "clearance": path.clearance,
         "seconds": path.seconds,
         "checked": path.checked,
         "duration": timed.duration,
@@ -192,6 +194,7 @@ def _as_lines(design: Design, path: PlannedPath, timed: Trajectory, out: File | 
             [
                 ("moves", f"{len(path.poses) - 1}, each proved to keep limits and clearances"),
                 ("length", f"{figure(path.length)} (root mean square of b1 to b4)"),
+                ("keeps", f"|κ| {figure(path.margin)}, clearance {figure(path.clearance)} or more"),
                 ("planned in", f"{path.seconds:.3g} s, {path.checked} moves checked"),
                 ("takes", f"{figure(timed.duration)} s"),
                 ("least |κ|", "  ".join(f"κ{i + 1} {figure(v)}" for i, v in enumerate(least))),
