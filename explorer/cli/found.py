@@ -8,6 +8,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+import msgspec
+
 from explorer.cli.output import figure, table
 from explorer.design import VARIABLES, Design
 from explorer.design_file import encode_design
@@ -28,11 +30,17 @@ CALLED: Mapping[str, str] = MappingProxyType(
 """What people call the value of each objective."""
 
 
+def found_design(outcome: Outcome) -> Design:
+    """Return the design of an outcome under a name of its own."""
+    name = f"{outcome.problem.start.name[:80]}, optimised"
+    return msgspec.structs.replace(outcome.design, name=name)
+
+
 def outcome_json(outcome: Outcome, written: Sequence[Path]) -> dict[str, object]:
     """Return an outcome as plain values."""
     best, run = outcome.best, outcome.run
     return {
-        "design": _design_json(outcome.design),
+        "design": _design_json(found_design(outcome)),
         "objective": best.objective,
         "objective_name": outcome.problem.objective,
         "volume": best.volume,

@@ -15,6 +15,7 @@ from explorer.cli.found import (
     CALLED,
     finding_json,
     findings_table,
+    found_design,
     outcome_json,
     outcome_lines,
 )
@@ -164,7 +165,7 @@ class Optimise(JsonOptions, DesignOptions):
         if self.json:
             write_json(outcome_json(outcome, written))
         else:
-            write_lines(heading(outcome.design), *outcome_lines(outcome, written))
+            write_lines(heading(found_design(outcome)), *outcome_lines(outcome, written))
         if not outcome.converged:
             raise NoAnswerError(outcome.run.message)
 
@@ -208,7 +209,7 @@ class Optimise(JsonOptions, DesignOptions):
 
         written: list[Path] = []
         if self.out is not None and outcome.converged:
-            write_whole(self.out, encode_design(outcome.design))
+            write_whole(self.out, encode_design(found_design(outcome)))
             written.append(self.out)
         if record is not None and (outcome.converged or self.record is not None):
             write_whole(record, encode_record(record_of(outcome, settings)))

@@ -88,11 +88,13 @@ class Demands(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     required_box: Box | None = None
 
     def __post_init__(self) -> None:
-        if self.volume is not None and not 0.0 < self.volume < math.inf:
+        if self.volume is not None:
             # Of a huge design it exceeds what other numbers may be.
-            raise InputError(
-                f"the volume demanded must be a positive, finite number; got {self.volume:g}"
-            )
+            if not 0.0 < self.volume < math.inf:
+                raise InputError(
+                    f"the volume demanded must be a positive, finite number; got {self.volume:g}"
+                )
+            msgspec.structs.force_setattr(self, "volume", float(self.volume))
         for field in ("reach", "clearance", "stroke_ratio"):
             value = getattr(self, field)
             if value is not None:
