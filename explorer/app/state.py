@@ -12,6 +12,8 @@ from typing import Literal
 
 import numpy as np
 
+from explorer.app.jog import Jog
+from explorer.app.singular_view import SingularView
 from explorer.design import JOINTS, Design
 from explorer.errors import InputError
 from explorer.home import home_pose
@@ -74,6 +76,7 @@ class View:
         warn_below: Margins below this length are warned of, in design units; None for a
             share of the reach.
         workspace: How the workspace is shown.
+        singular: How singularities are shown.
     """
 
     flags: bool = True
@@ -90,6 +93,7 @@ class View:
     twin: bool = False
     warn_below: float | None = None
     workspace: WorkspaceView = field(default_factory=WorkspaceView)
+    singular: SingularView = field(default_factory=SingularView)
 
 
 @dataclass(frozen=True)
@@ -151,6 +155,7 @@ class State:
         view: What is shown.
         gesture: What brought the platform to its pose; None where nothing moved it there,
             as after a change of the design.
+        jog: The uncoupled motion that was last used.
     """
 
     design: Design
@@ -163,6 +168,12 @@ class State:
     unclosed: Unclosed | None = None
     view: View = field(default_factory=View)
     gesture: Gesture | None = None
+    jog: Jog | None = None
+
+    @property
+    def jog_in_use(self) -> Jog | None:
+        """The uncoupled motion that brought the platform here; None once it is elsewhere."""
+        return self.jog if self.jog is not None and self.jog.pose == self.pose else None
 
     @property
     def warn_below(self) -> float:
