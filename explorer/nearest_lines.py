@@ -172,6 +172,10 @@ def least_on_torus(k: FloatArray, boxes: FloatArray) -> tuple[float, float, floa
     phi, sigma = polished(phi, sigma, k)
     best = value_at(phi, sigma, k)
     bound, first = math.inf, 0
+    # What bounds leave out grows with these, so boxes are longer where f bends less.
+    size_b = math.hypot(k[2], k[3])
+    bend_phi = math.hypot(math.hypot(k[0], k[1]), size_b) + k[4] * k[4] + k[5] * k[5]
+    bend_sigma = math.hypot(k[7], size_b) + k[8] * k[8]
     # The largest boxes first, so that what is left in the end is bounded evenly.
     while first < last:
         p, s, alpha, beta = boxes[first]
@@ -187,7 +191,7 @@ def least_on_torus(k: FloatArray, boxes: FloatArray) -> tuple[float, float, floa
         if low >= enough or last + 2 > ROOM:
             bound = min(bound, low)
             continue
-        halves_phi = alpha * math.hypot(1.0, math.hypot(k[4], k[5])) > beta
+        halves_phi = bend_phi * alpha * alpha > bend_sigma * beta * beta
         if halves_phi:
             alpha *= 0.5
         else:

@@ -35,7 +35,7 @@ class NearestPoses(NamedTuple):
         distance: The root-mean-square way of b1 to b4, shape (..., 3), in design units.
         bound: What no pose with the incidence undercuts, shape (..., 3). Its square is
             within 1e-8 of the distance's, relative, or 1e-13 of the platform's size squared;
-            but looser where the two lines nearly coincide.
+            but looser where the two lines nearly coincide, for the size of the platform.
         position: b4 of the nearest poses in the base frame, shape (..., 3, 3).
         rotation: Their rotations, platform to base, shape (..., 3, 3, 3).
     """

@@ -103,9 +103,14 @@ def test_a_distance_changes_no_more_than_the_platform_moves(
     assert (np.abs(here - there) <= moved + 1e-9 * case.size).all()
 
 
-def test_many_poses_have_a_proof_that_nothing_is_nearer() -> None:
-    found = nearest_singular_poses(OPTIMAL, *random_poses(1, 5000))
-    square = PlatformPoints.of(OPTIMAL).length ** 2
+@pytest.mark.parametrize("b1y", [-3.8858, 0.3, 1e-3, 20.0])
+@pytest.mark.parametrize("spread", [1.0, 30.0])
+def test_many_poses_have_a_proof_that_nothing_is_nearer(b1y: float, spread: float) -> None:
+    # Platforms from wide to nearly a line, and from near by to far off.
+    design = OPTIMAL.with_variable("b1y", b1y)
+    positions, rotations = random_poses(1, 500)
+    found = nearest_singular_poses(design, spread * positions, rotations)
+    square = PlatformPoints.of(design).length ** 2
     assert (found.bound <= found.distance).all()
     # A proof is one of squares: these are what it is good to.
     gap = found.distance**2 - found.bound**2
