@@ -11,7 +11,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from explorer.arrays import FloatArray
-from explorer.constraints import YAW, HalfSpace, Round
+from explorer.constraints import YAW, Constraint, HalfSpace, Round
 from explorer.home import home_pose
 from explorer.optimise.problem import SHIFTS, Box
 from explorer.optimise.state import State
@@ -140,34 +140,61 @@ class BoxDemand:
     """A required box within the workspace.
 
     What is within a ball, a cylinder or a half-space with all its corners is within it
-    altogether. Outside a ball, where a least length keeps it, counts the point of the box
-    that is nearest to the centre, or if that lies inside, how deep.
+    altogether; of a half-space its worst corner is enough. Outside a ball, where a least
+    length keeps it, counts the point of the box that is nearest to the centre, or if that
+    lies inside, how deep.
     """
 
     is_equality = False
 
     def __init__(self, start: State) -> None:
-        self.limits = tuple(limit.name for limit in start.limits)
-        self.names = tuple(f"required box within {name}" for name in self.limits for _ in range(8))
+        self.counts = {limit.name: _points_that_tell(limit) for limit in start.limits}
+        self.names = tuple(
+            f"required box within {name}"
+            for name, count in self.counts.items()
+            for _ in range(count)
+        )
 
     def measure(self, state: State) -> Measured:
-        """Return the slacks of the corners, eight for each limit, over the size."""
+        """Return the slacks of the points that tell of each limit, over the size."""
         size, n = state.problem.size, len(state.u)
-        corners = corners_of(state.box)
         found = {limit.name: limit for limit in state.limits}
-        values, gradients = np.full((len(self.limits), 8), -1.0), np.zeros((len(self.limits), 8, n))
-        for row, name in enumerate(self.limits):
+        values: list[FloatArray] = []
+        gradients: list[FloatArray] = []
+        for name, count in self.counts.items():
             limit = found.get(name)
-            if not isinstance(limit, Round | HalfSpace):
-                continue
-            if isinstance(limit, Round) and not limit.inside:
-                value, by_u, by_p = _outside(state, limit, state.box)
+            if isinstance(limit, Round | HalfSpace):
+                value, by_u, by_p = _slack_of_box(state, limit)
+                for axis, shift in enumerate(SHIFTS):
+                    by_u = by_u + np.outer(by_p[:, axis], state.along({shift: 1.0}))
+                values.append(value / size)
+                gradients.append(by_u / size)
             else:
-                value, by_u, by_p = state.slack(limit, corners)
-            for axis, shift in enumerate(SHIFTS):
-                by_u = by_u + np.outer(by_p[:, axis], state.along({shift: 1.0}))
-            values[row], gradients[row] = value / size, by_u / size
-        return Measured(values.ravel(), gradients.reshape(-1, n))
+                # It cannot be kept, in no position.
+                values.append(np.full(count, -1.0))
+                gradients.append(np.zeros((count, n)))
+        return Measured(np.concatenate(values), np.vstack(gradients))
+
+
+def _points_that_tell(limit: Constraint) -> int:
+    """Return how many points of a box tell whether it keeps a limit."""
+    if isinstance(limit, Round) and limit.inside:
+        return 8 if limit.is_ball else 4
+    return 1
+
+
+def _slack_of_box(
+    state: State, limit: Round | HalfSpace
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return what `State.slack` does, of the points of the required box that tell."""
+    corners = corners_of(state.box)
+    if isinstance(limit, HalfSpace):
+        worst = int((corners @ limit.normal).argmax())
+        return state.slack(limit, corners[worst : worst + 1])
+    if limit.inside:
+        # To a cylinder along x both ends along x are the same.
+        return state.slack(limit, corners if limit.is_ball else corners[::2])
+    return _outside(state, limit, state.box)
 
 
 def _outside(state: State, limit: Round, box: Box) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -192,11 +219,7 @@ def _outside(state: State, limit: Round, box: Box) -> tuple[FloatArray, FloatArr
         own = np.array([*normal, -1.0])
         by_u = state.along({name: float(own @ rate) for name, rate in limit.rates.items()})[None, :]
         by_p = -normal[None, :]
-    return (
-        np.repeat(slack, 8),
-        np.repeat(by_u, 8, axis=0),
-        np.repeat(by_p, 8, axis=0),
-    )
+    return slack, by_u, by_p
 
 
 def corners_of(box: Box) -> FloatArray:
@@ -212,13 +235,14 @@ class MarginDemand:
     """
 
     is_equality = False
-    names = tuple(f"margin κ{i} over the required box" for i in (1, 2, 3) for _ in range(8))
+    names = tuple(f"margin κ{i} over the required box" for i in (1, 2, 3))
 
     def measure(self, state: State) -> Measured:
-        """Return sign · κ at the corners, eight for each κ, over the size of the start."""
+        """Return sign · κ at the corner that is worst for each κ, over the size of the start."""
         value, gradient = box_margins(state)
-        size = state.problem.size
-        return Measured(value.ravel() / size, gradient.reshape(24, -1) / size)
+        worst = value.argmin(axis=1)
+        rows, size = np.arange(3), state.problem.size
+        return Measured(value[rows, worst] / size, gradient[rows, worst] / size)
 
 
 def box_margins(state: State) -> tuple[FloatArray, FloatArray]:
