@@ -52,8 +52,15 @@ class Open:
     design: Design
 
     def apply(self, state: State) -> State:
-        """Return the next state."""
-        return replace(opened(self.design, view=state.view), hold=state.hold)
+        """Return the next state.
+
+        Raises:
+            InputError: the design is being optimised.
+        """
+        _check_free(state)
+        optimisation = replace(state.optimisation, run=None, refusal=None)
+        after = opened(self.design, view=state.view)
+        return replace(after, hold=state.hold, optimisation=optimisation)
 
 
 @dataclass(frozen=True)
@@ -196,8 +203,10 @@ class SetVariable:
 
         Raises:
             DesignError: the design would be degenerate.
-            InputError: the legs are held and cannot close in the new design.
+            InputError: the legs are held and cannot close in the new design, or the
+                design is being optimised.
         """
+        _check_free(state)
         design = state.design.with_variable(self.name, self.value)
         if state.hold == "pose":
             return moved(replace(state, design=design), state.pose, state.yaw_pitch_roll)
@@ -221,7 +230,12 @@ class SetUnit:
     unit_mm: float
 
     def apply(self, state: State) -> State:
-        """Return the next state."""
+        """Return the next state.
+
+        Raises:
+            InputError: the design is being optimised.
+        """
+        _check_free(state)
         return replace(state, design=msgspec.structs.replace(state.design, unit_mm=self.unit_mm))
 
 
@@ -232,7 +246,12 @@ class SetLimits:
     limits: Limits
 
     def apply(self, state: State) -> State:
-        """Return the next state."""
+        """Return the next state.
+
+        Raises:
+            InputError: the design is being optimised.
+        """
+        _check_free(state)
         return replace(state, design=msgspec.structs.replace(state.design, limits=self.limits))
 
 
@@ -311,6 +330,16 @@ def moved(state: State, pose: Pose, yaw_pitch_roll: Triple | None = None) -> Sta
         mode=mode_at(pose, state.mode),
         unclosed=None,
     )
+
+
+def _check_free(state: State) -> None:
+    """Refuse to change the design while it is being optimised.
+
+    Raises:
+        InputError: it is.
+    """
+    if state.optimisation.is_on:
+        raise InputError("the design is being optimised: wait until that is done, or cancel it")
 
 
 def _unclosed(design: Design, joints: Joints, cause: SetJoint) -> Unclosed:

@@ -18,8 +18,9 @@ from explorer.app.assigning import Update
 from explorer.app.session import Session
 from explorer.app.state import Frame, State
 from explorer.app.viser_gaps import Mark, MarksOf
+from explorer.pose import Triple
 
-Value = TypeVar("Value", float, bool, str)
+Value = TypeVar("Value", float, bool, str, Triple)
 
 
 @dataclass(frozen=True)
@@ -40,6 +41,7 @@ class Control(Generic[Value]):
         read: Its value in a frame.
         write: The action that a new value asks for.
         disabled: Whether it is out of use in a state.
+        visible: Whether it is there at all in a state.
     """
 
     def __init__(
@@ -49,12 +51,14 @@ class Control(Generic[Value]):
         read: Callable[[Frame], Value],
         write: Callable[[State, Value], Action],
         disabled: Callable[[State], bool] | None = None,
+        visible: Callable[[State], bool] | None = None,
     ) -> None:
         self.handle = handle
         self._session = session
         self._read = read
         self._write = write
         self._disabled = disabled
+        self._visible = visible
         self._given: Value | None = None
         handle.on_update(self._changed)
 
@@ -74,6 +78,8 @@ class Control(Generic[Value]):
         """Yield what makes the control show the frame."""
         if self._disabled is not None:
             yield self.handle, "disabled", self._disabled(frame.state)
+        if self._visible is not None:
+            yield self.handle, "visible", self._visible(frame.state)
         value = self._read(frame)
         # A newer change is on its way: what it says counts.
         if value != self._given and not self._session.is_waiting(self):
@@ -165,10 +171,25 @@ class Controls:
         *,
         least: float,
         step: float,
+        visible: Callable[[State], bool] | None = None,
     ) -> None:
         """Add a number field."""
         handle = self._gui.add_number(label, least, min=least, step=step, hint=hint)
-        self._controls.append(Control(self._session, handle, read, write))
+        self._controls.append(Control(self._session, handle, read, write, visible=visible))
+
+    def triple(
+        self,
+        label: str,
+        hint: str,
+        read: Callable[[Frame], Triple],
+        write: Callable[[State, Triple], Action],
+        *,
+        step: float,
+        visible: Callable[[State], bool] | None = None,
+    ) -> None:
+        """Add three number fields side by side."""
+        handle = self._gui.add_vector3(label, (0.0, 0.0, 0.0), step=step, hint=hint)
+        self._controls.append(Control(self._session, handle, read, write, visible=visible))
 
     def checkbox(
         self,
@@ -176,10 +197,12 @@ class Controls:
         hint: str,
         read: Callable[[Frame], bool],
         write: Callable[[State, bool], Action],
+        *,
+        disabled: Callable[[State], bool] | None = None,
     ) -> None:
         """Add a checkbox."""
         handle = self._gui.add_checkbox(label, initial_value=False, hint=hint)
-        self._controls.append(Control(self._session, handle, read, write))
+        self._controls.append(Control(self._session, handle, read, write, disabled))
 
     def dropdown(
         self,

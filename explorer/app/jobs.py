@@ -19,9 +19,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any, Generic, TypeVar, cast
 
-from explorer.app.worker import Order, Reply, read_frame, write_frame
+from explorer.app.worker import Cancel, Order, Reply, Told, read_frame, write_frame
 
 Item = TypeVar("Item")
+
+# What can go wrong with a pipe to a process that has ended.
+GONE = (OSError, ValueError, EOFError, pickle.UnpicklingError)
 
 
 class LatestWins(Generic[Item]):
@@ -97,6 +100,7 @@ class _Request:
     order: Order
     done: Callable[[Any], None]
     failed: Callable[[str], None]
+    told: Callable[[Any], None] | None
 
 
 class Worker:
@@ -107,15 +111,31 @@ class Worker:
 
     Args:
         report: Called with a message when the process died or failed unexpectedly.
+        tasks: The module that holds the tasks.
+        died: What to say when the process died.
     """
 
-    def __init__(self, report: Callable[[str], None]) -> None:
+    def __init__(
+        self,
+        report: Callable[[str], None],
+        *,
+        tasks: str = "explorer.app.tasks",
+        died: str = "The worker process died; the next change starts it again.",
+    ) -> None:
         self._report = report
+        self._tasks = tasks
+        self._died = died
         self._numbers = itertools.count()
         self._process: subprocess.Popen[bytes] | None = None
         self._stopped = False
         # Of the process: it must not be started after it was told to stop.
         self._lock = threading.Lock()
+        # Of what is written to it, and of these three: the order that it does, the newest
+        # that was cancelled, and when the process is ended for not heeding that.
+        self._writing = threading.Lock()
+        self._doing: int | None = None
+        self._cancelled = -1
+        self._deadline: threading.Timer | None = None
         self._queue: LatestWins[_Request] = LatestWins(self._serve_all, "worker")
 
     def submit(
@@ -125,19 +145,44 @@ class Worker:
         arguments: tuple[Any, ...],
         done: Callable[[Any], None],
         failed: Callable[[str], None],
-    ) -> None:
+        told: Callable[[Any], None] | None = None,
+    ) -> int:
         """Ask for a task; one of the same key that still waits is dropped.
 
         Args:
             key: What it is about.
-            task: The name of a function in `explorer.app.tasks`.
+            task: The name of a function in the module of tasks.
             arguments: For it; they and the result must pickle.
             done: Called with the result.
             failed: Called with a message for people instead.
+            told: Called with what the task tells meanwhile. Given, the task takes a
+                `explorer.app.worker.Line` besides its arguments.
+
+        Returns:
+            A number to cancel it by.
         """
         number = next(self._numbers)
-        request = _Request(key, Order(number, task, arguments), done, failed)
-        self._queue.post(key, number, request)
+        order = Order(number, task, arguments, tells=told is not None)
+        self._queue.post(key, number, _Request(key, order, done, failed, told))
+        return number
+
+    def cancel(self, number: int, patience: float) -> None:
+        """Ask a task that tells, and all before it, to end early.
+
+        Args:
+            number: Of the task, as `submit` returned it.
+            patience: After so many seconds it ends together with its process.
+        """
+        with self._writing:
+            self._cancelled = max(self._cancelled, number)
+            if self._doing == number and self._process is not None:
+                with contextlib.suppress(*GONE):
+                    write_frame(cast("IO[bytes]", self._process.stdin), Cancel(number))
+            if self._deadline is not None:
+                self._deadline.cancel()
+            self._deadline = threading.Timer(patience, self._kill, (number,))
+            self._deadline.daemon = True
+            self._deadline.start()
 
     @property
     def process_id(self) -> int | None:
@@ -145,9 +190,9 @@ class Worker:
         process = self._process
         return None if process is None else process.pid
 
-    def start(self) -> None:
-        """Start the process before it is needed."""
-        self.submit("start", "ready", (), lambda _: None, lambda _: None)
+    def start(self, then: Callable[[], None] = lambda: None) -> None:
+        """Start the process before it is needed; `then` is called when it is there."""
+        self.submit("start", "ready", (), lambda _: then(), lambda _: None)
 
     def wait_until_idle(self, timeout: float) -> bool:
         """Wait until nothing waits and nothing runs; say whether that came about."""
@@ -172,24 +217,43 @@ class Worker:
         if process is None:
             return
         try:
-            # Both are pipes, as they were asked for.
-            write_frame(cast("IO[bytes]", process.stdin), request.order)
-            reply: Reply = read_frame(cast("IO[bytes]", process.stdout))
-        except (OSError, ValueError, EOFError, pickle.UnpicklingError):
+            self._hand_over(request.order, process)
+            reply = _replied(request, process)
+        except GONE:
             with self._lock:
                 _end(process)
                 if self._stopped:
                     return
-            message = "The worker process died; the next change starts it again."
-            self._report(message)
-            request.failed(message)
+            if self._cancelled < request.order.number:
+                self._report(self._died)
+            request.failed(self._died)
             return
+        finally:
+            with self._writing:
+                self._doing = None
+                # One that waits for its turn yet keeps its deadline.
+                if self._deadline is not None and self._cancelled <= request.order.number:
+                    self._deadline.cancel()
         if reply.problem is None:
             request.done(reply.value)
         else:
             if not reply.expected:
                 self._report(f"Something went wrong in the worker: {reply.problem}")
             request.failed(reply.problem)
+
+    def _hand_over(self, order: Order, process: subprocess.Popen[bytes]) -> None:
+        with self._writing:
+            # Both are pipes, as they were asked for.
+            stream = cast("IO[bytes]", process.stdin)
+            write_frame(stream, order)
+            self._doing = order.number
+            if order.tells and self._cancelled >= order.number:
+                write_frame(stream, Cancel(order.number))
+
+    def _kill(self, number: int) -> None:
+        with self._lock:
+            if self._doing == number and self._process is not None:
+                self._process.kill()
 
     def _alive(self) -> subprocess.Popen[bytes] | None:
         """Return the process, started if need be; None once it is to stop."""
@@ -198,13 +262,24 @@ class Worker:
                 return None
             if self._process is None or self._process.poll() is not None:
                 paths = {"PYTHONPATH": str(Path(__file__).parents[2])}
-                self._process = subprocess.Popen(
-                    [sys.executable, "-P", "-c", "from explorer.app.worker import main; main()"],
+                code = "import sys; from explorer.app.worker import main; main(sys.argv[1])"
+                self._process = subprocess.Popen(  # noqa: S603 - our own interpreter and words
+                    [sys.executable, "-P", "-c", code, self._tasks],
                     stdin=subprocess.PIPE,
                     stdout=subprocess.PIPE,
                     env={**os.environ, **paths},
                 )
             return self._process
+
+
+def _replied(request: _Request, process: subprocess.Popen[bytes]) -> Reply:
+    """Return the reply to a request; what is told before it is passed on."""
+    while True:
+        frame: Told | Reply = read_frame(cast("IO[bytes]", process.stdout))
+        if isinstance(frame, Reply):
+            return frame
+        if request.told is not None:
+            request.told(frame.value)
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:

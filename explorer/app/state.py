@@ -14,6 +14,7 @@ import numpy as np
 
 from explorer.app.jog import Jog
 from explorer.app.singular_view import SingularView
+from explorer.app.optimisation import Optimisation
 from explorer.design import JOINTS, Design
 from explorer.errors import InputError
 from explorer.home import home_pose

@@ -1,0 +1,285 @@
+"""What is to be optimised and how far that has got: a part of the state, frozen as all of it.
+
+The user's own state is kept aside while the page shows the iterates, so that it comes back
+exactly. What people ask for is a `Wish`; a `Problem` is made of it when they press the button.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import TYPE_CHECKING, Literal
+
+import msgspec
+import numpy as np
+
+from explorer.constraints import Never, constraints
+from explorer.design import VARIABLES, Design
+from explorer.home import home_pose
+from explorer.optimise.facts import Facts
+from explorer.optimise.outcome import Iterate, Outcome, Status
+from explorer.optimise.problem import (
+    SHIFTS,
+    YAW,
+    Box,
+    ObjectiveName,
+    Problem,
+    longest_length,
+    make_problem,
+)
+from explorer.optimise.trail import Trail
+from explorer.workspace import workspace_volume
+
+if TYPE_CHECKING:
+    from explorer.app.state import State
+
+PLACE = "place"
+"""Stands for the three shifts of the required box."""
+
+# The volume to match, unless one is given: more than the design has, by this factor or so.
+MORE = 1.1
+# Of the largest box about home in the workspace: the edge of the one that is suggested.
+SHARE_OF_BOX = 0.5
+# Positions on each edge of a box at which it is tried, and halvings of its edge.
+TRIED, HALVINGS = 5, 30
+
+
+@dataclass(frozen=True)
+class Wish:
+    """What people ask for; lengths in design units.
+
+    Attributes:
+        objective: What is wanted.
+        volume: To match, or at least; None for one that suits the design.
+        reach: The largest allowed; None for that of the design.
+        clearance: Every two legs are to keep; 0 for no demand.
+        free: What may change: of `VARIABLES`, `YAW` and `PLACE`.
+        starts: From how many designs to start.
+        with_box: Whether a box must lie within the workspace, whatever is wanted.
+        box: Which; None for one that suits the design.
+    """
+
+    objective: ObjectiveName = "match-volume"
+    volume: float | None = None
+    reach: float | None = None
+    clearance: float = 0.0
+    free: tuple[str, ...] = VARIABLES
+    starts: int = 1
+    with_box: bool = False
+    box: Box | None = None
+
+    @property
+    def needs_volume(self) -> bool:
+        """Whether a volume is asked for."""
+        return self.objective in ("match-volume", "smallest-reach")
+
+    @property
+    def needs_reach(self) -> bool:
+        """Whether a reach is asked for."""
+        return self.objective == "largest-volume"
+
+    @property
+    def needs_box(self) -> bool:
+        """Whether a box is asked for."""
+        return self.with_box or self.objective == "largest-margin"
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """How a run ended.
+
+    Attributes:
+        status: That of the outcome; "failed" if there is none.
+        message: One line for people.
+        best: The best iterate; None if there is none.
+        starts: That were tried.
+        converged: How many of them converged.
+        iterations: Of the best.
+        seconds: It took.
+    """
+
+    status: Status | Literal["failed"]
+    message: str
+    best: Iterate | None = None
+    starts: int = 0
+    converged: int = 0
+    iterations: int = 0
+    seconds: float | None = None
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """The measures of the user's own design and of the one found."""
+
+    before: Facts
+    after: Facts
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run of the optimiser.
+
+    Attributes:
+        number: Of the run, from 1.
+        problem: That is solved.
+        starts: From how many designs.
+        own: The state before it, to which to return.
+        phase: Whether it goes on, has been asked to end, or has ended.
+        iterates: Those that have been shown; the last one is what is drawn.
+        verdict: How it ended, once it has.
+        comparison: Of own and found design, once it is there.
+        accepted: Whether the result was accepted.
+    """
+
+    number: int
+    problem: Problem
+    starts: int
+    own: State
+    phase: Literal["running", "cancelling", "ended"] = "running"
+    iterates: tuple[Iterate, ...] = ()
+    verdict: Verdict | None = None
+    comparison: Comparison | None = None
+    accepted: bool = False
+
+    @property
+    def is_undecided(self) -> bool:
+        """Whether there is a result that was neither accepted nor given up."""
+        return self.best is not None and not self.accepted
+
+    @property
+    def best(self) -> Iterate | None:
+        """What was found, once it has ended."""
+        return None if self.verdict is None else self.verdict.best
+
+
+@dataclass(frozen=True)
+class Optimisation:
+    """All that the state knows of it.
+
+    Attributes:
+        wish: What is asked for.
+        run: The last run, or the one that goes on; None if there is none of this design.
+        count: Of all runs so far.
+        refusal: Why the last one was not begun, if it was not.
+    """
+
+    wish: Wish = field(default_factory=Wish)
+    run: Run | None = None
+    count: int = 0
+    refusal: str | None = None
+
+    @property
+    def is_on(self) -> bool:
+        """Whether a run goes on."""
+        return self.run is not None and self.run.phase != "ended"
+
+
+def wished_volume(state: State) -> float:
+    """Return the volume that is asked for."""
+    wish = state.optimisation.wish
+    if wish.volume is not None:
+        return wish.volume
+    return _volume(state.base, same=wish.objective == "smallest-reach")
+
+
+def wished_reach(state: State) -> float:
+    """Return the largest reach that is asked for."""
+    given = state.optimisation.wish.reach
+    return longest_length(state.base) if given is None else given
+
+
+def wished_box(state: State) -> Box:
+    """Return the box that is required."""
+    return state.optimisation.wish.box or box_within(state.base)
+
+
+def problem_of(state: State) -> Problem:
+    """Return the problem that is asked for, from the present design.
+
+    Raises:
+        ExplorerError: it cannot be asked like that.
+    """
+    wish = state.optimisation.wish
+    free = [name for name in wish.free if name in (*VARIABLES, YAW)]
+    if wish.needs_box and PLACE in wish.free:
+        free += SHIFTS
+    problem = make_problem(
+        state.design,
+        wish.objective,
+        volume=wished_volume(state) if wish.needs_volume else None,
+        reach=wished_reach(state) if wish.needs_reach else None,
+        clearance=None if wish.clearance == 0.0 else wish.clearance,
+        required_box=wished_box(state) if wish.needs_box else None,
+        free=[name for name in free if name not in VARIABLES],
+    )
+    variables = tuple(each for each in problem.variables if each.name in free)
+    return msgspec.structs.replace(problem, variables=variables)
+
+
+def verdict_of(outcome: Outcome) -> Verdict:
+    """Return how an outcome ended."""
+    run = outcome.run
+    return Verdict(
+        status=run.status,
+        message=run.message,
+        best=run.best,
+        starts=len(outcome.runs),
+        converged=sum(each.status == "converged" for each in outcome.runs),
+        iterations=run.iterations,
+        seconds=outcome.seconds,
+    )
+
+
+def cut_short(problem: Problem, iterates: tuple[Iterate, ...]) -> Verdict:
+    """Return how a run ended whose process had to be ended to end it."""
+    if not iterates:
+        return Verdict("cancelled", "cancelled before the first iterate")
+    best = min(iterates, key=Trail(problem, None, None).rank)
+    return Verdict(
+        "cancelled",
+        f"cancelled: {best.objective:.6g} is the best of {len(iterates)} iterates",
+        best,
+        starts=iterates[-1].run + 1,
+        iterations=sum(each.run == best.run for each in iterates) - 1,
+    )
+
+
+@lru_cache(maxsize=8)
+def box_within(design: Design) -> Box:
+    """Return a box in the workspace about the home position, or where that is not, a small one."""
+    home = home_pose(design)
+    limits = constraints(design, home.rotation)
+    middle = np.array(home.position)
+    grid = np.indices((TRIED,) * 3).reshape(3, -1).T / (TRIED - 1.0) - 0.5
+
+    def is_within(edge: float) -> bool:
+        at = middle + edge * grid
+        return all(
+            not isinstance(limit, Never) and bool((limit.slack(at) >= 0.0).all())
+            for limit in limits
+        )
+
+    low, high = 0.0, 2.0 * design.reach
+    for _ in range(HALVINGS):
+        half = 0.5 * (low + high)
+        low, high = (half, high) if is_within(half) else (low, half)
+    edge = SHARE_OF_BOX * low or 0.1 * design.reach
+    # Round numbers read better, and the box need not be just this one.
+    unit = 10.0 ** math.floor(math.log10(edge) - 1.0)
+    digits = max(0, -round(math.log10(unit)))
+    lows, highs = (
+        [round(float(value), digits) for value in middle + side * 0.5 * edge]
+        for side in (-1.0, 1.0)
+    )
+    return (lows[0], lows[1], lows[2]), (highs[0], highs[1], highs[2])
+
+
+@lru_cache(maxsize=8)
+def _volume(design: Design, *, same: bool) -> float:
+    """Return the volume of a design to six digits, or the next round one that is larger."""
+    volume = workspace_volume(design).volume or design.reach**3
+    if same:
+        return float(f"{volume:.6g}")
+    power = 10.0 ** math.floor(math.log10(MORE * volume))
+    return math.ceil(MORE * volume / power) * power

@@ -1,0 +1,184 @@
+"""Tasks that tell of themselves while they run, and are ended early: by a word, else by force."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from queue import Queue
+from typing import Any
+
+import pytest
+
+from explorer.app.jobs import Worker
+
+ROOT = Path(__file__).resolve().parents[2]
+TASKS = "tests.app.telling"
+PATIENCE = 120.0
+# Seconds that nothing here takes, however busy the machine is; and so few that all do.
+NEVER, AT_ONCE = 3600.0, 0.001
+
+
+class Ear:
+    """What was heard, in order: what was told, then how it ended."""
+
+    def __init__(self, worker: Worker) -> None:
+        self._worker = worker
+        self._heard: Queue[tuple[str, Any]] = Queue()
+        self.number = -1
+
+    def ask(self, task: str, *arguments: Any, tells: bool = True) -> None:
+        self.number = self._worker.submit(
+            "task",
+            task,
+            arguments,
+            lambda value: self._heard.put(("done", value)),
+            lambda problem: self._heard.put(("failed", problem)),
+            told=(lambda value: self._heard.put(("told", value))) if tells else None,
+        )
+
+    def next(self) -> tuple[str, Any]:
+        return self._heard.get(timeout=PATIENCE)
+
+    def all(self) -> tuple[list[Any], tuple[str, Any]]:
+        """Return all that was told from now on, and the end."""
+        told: list[Any] = []
+        while (heard := self.next())[0] == "told":
+            told.append(heard[1])
+        return told, heard
+
+
+@pytest.fixture
+def reports() -> list[str]:
+    return []
+
+
+@pytest.fixture
+def worker(reports: list[str]) -> Iterator[Worker]:
+    made = Worker(reports.append, tasks=TASKS, died="it died")
+    yield made
+    made.stop()
+
+
+@pytest.fixture
+def ear(worker: Worker) -> Ear:
+    return Ear(worker)
+
+
+def test_what_is_told_comes_whole_in_order_and_before_the_result(ear: Ear) -> None:
+    ear.ask("count", 500)
+    assert ear.all() == (list(range(500)), ("done", 500))
+
+
+def test_it_comes_while_the_task_runs_and_a_word_ends_the_task(
+    ear: Ear, worker: Worker, reports: list[str]
+) -> None:
+    ear.ask("count_until_cut")
+    # The task ends for no other reason, so this came before its end.
+    assert ear.next() == ("told", 0)
+    process = worker.process_id
+    worker.cancel(ear.number, NEVER)
+    told, end = ear.all()
+    assert end == ("done", len(told) + 1)
+    ear.ask("say", "again", tells=False)
+    assert ear.next() == ("done", "again")
+    assert worker.process_id == process
+    assert not reports
+
+
+def test_what_is_cancelled_before_it_was_begun_ends_at_once(ear: Ear, worker: Worker) -> None:
+    ear.ask("count_until_cut")
+    worker.cancel(ear.number, NEVER)
+    told, end = ear.all()
+    assert end == ("done", len(told))
+
+
+def test_the_next_task_is_not_cancelled_with_the_last(ear: Ear, worker: Worker) -> None:
+    ear.ask("count_until_cut")
+    worker.cancel(ear.number, NEVER)
+    ear.all()
+    ear.ask("count_until_cut")
+    for number in range(20):
+        assert ear.next() == ("told", number)
+    worker.cancel(ear.number, NEVER)
+    assert ear.all()[1][0] == "done"
+
+
+def test_who_does_not_heed_the_word_is_ended_by_force_and_nobody_complains(
+    ear: Ear, worker: Worker, reports: list[str]
+) -> None:
+    ear.ask("hang")
+    assert ear.next() == ("told", 0)
+    process = worker.process_id
+    worker.cancel(ear.number, AT_ONCE)
+    assert ear.next() == ("failed", "it died")
+    assert not reports
+    ear.ask("say", "again", tells=False)
+    assert ear.next() == ("done", "again")
+    assert worker.process_id != process
+
+
+def test_force_does_not_hit_the_next_task(ear: Ear, worker: Worker) -> None:
+    ear.ask("count_until_cut")
+    ear.next()
+    worker.cancel(ear.number, 0.2)
+    assert ear.all()[1][0] == "done"
+    process = worker.process_id
+    ear.ask("count_until_cut")
+    # Until the deadline of the first one has passed.
+    for each in threading.enumerate():
+        if isinstance(each, threading.Timer):
+            each.join()
+    worker.cancel(ear.number, NEVER)
+    assert ear.all()[1][0] == "done"
+    assert worker.process_id == process
+
+
+def test_a_refusal_and_a_death_after_some_words(
+    ear: Ear, worker: Worker, reports: list[str]
+) -> None:
+    ear.ask("refuse")
+    assert ear.all() == ([0], ("failed", "refused on purpose"))
+    assert not reports
+    ear.ask("die")
+    assert ear.all() == ([0], ("failed", "it died"))
+    assert reports == ["it died"]
+    ear.ask("count", 3)
+    assert ear.all() == ([0, 1, 2], ("done", 3))
+
+
+def test_no_process_is_left_when_the_parent_is_gone() -> None:
+    code = f"""
+import os, sys
+from explorer.app.jobs import Worker
+worker = Worker(print, tasks={TASKS!r})
+def told(value):
+    if value == 5:
+        print(worker.process_id, flush=True)
+        os._exit(0)
+worker.submit("task", "count_until_cut", (), print, print, told=told)
+worker.wait_until_idle(600.0)
+"""
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(
+        command, stdout=subprocess.PIPE, text=True, timeout=PATIENCE, cwd=ROOT, check=True
+    )
+    child = int(done.stdout)
+    assert child != os.getpid()
+    assert _has_ended(child)
+
+
+def _has_ended(process: int) -> bool:
+    for _ in range(1000):
+        try:
+            os.kill(process, 0)
+            state = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]
+        except (ProcessLookupError, FileNotFoundError):
+            return True
+        if state == "Z":
+            return True
+        threading.Event().wait(0.02)
+    return False
