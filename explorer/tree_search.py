@@ -56,7 +56,8 @@ class _Ompl:
             )
         except ImportError:
             raise MissingExtraError(
-                "planning a path needs OMPL: pip install 'flagged-explorer[planning]'"
+                "a path that is no straight move needs OMPL: pip install "
+                "'flagged-explorer[planning]'"
             ) from None
         _prepare(util)
         return modules
