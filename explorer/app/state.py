@@ -164,6 +164,7 @@ class State:
     pose: Pose
     yaw_pitch_roll: Triple
     joints: Joints
+        optimisation: What is to be optimised, and how far that has got.
     mode: int
     hold: Hold = "pose"
     unclosed: Unclosed | None = None
@@ -177,6 +178,7 @@ class State:
         return self.jog if self.jog is not None and self.jog.pose == self.pose else None
 
     @property
+    optimisation: Optimisation = field(default_factory=Optimisation)
     def warn_below(self) -> float:
         """The length below which margins are warned of, in design units."""
         given = self.view.warn_below
