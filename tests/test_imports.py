@@ -73,7 +73,7 @@ LAYERS = (
         "reachable",
         "radii",
     ),
-    ("optimise", "sweep"),
+    ("optimise", "sweep", "prototype"),
     ("export",),
     ("app", "cli", "__main__"),
 )

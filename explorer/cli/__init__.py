@@ -27,7 +27,7 @@ COMMANDS: Mapping[str, str] = {
     "path": "Plan a path between two poses that keeps limits, margins and clearances.",
     "workspace": "Measure the workspace: exact volume and gradient, the paper's nodes, a mesh.",
     "optimise": "Look for the best design: a volume to match, the smallest reach, …",
-    "export": "Write the workspace, or its convex hull, as a mesh for other programs.",
+    "export": "Write the workspace as a mesh, or the mechanism for simulation.",
     "screenshot": "Draw a pose into a PNG file.",
 }
 """Each command's name, which is that of its module, and what it does."""

@@ -1,9 +1,11 @@
-"""`explorer export`: the workspace as a mesh file."""
+"""`explorer export`: the workspace as a mesh, the mechanism for other programs."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated, Literal
 
 import tyro
@@ -13,15 +15,19 @@ from explorer.cli.output import write_json, write_lines
 from explorer.cli.values import positive
 from explorer.errors import InputError
 
+_OF_MESHES = "(workspace and hull; default: a 500th of the reach)"
+_OF_BODIES = "(simulation; default: 1240, printed PLA)"
+
 
 @dataclass(frozen=True, kw_only=True)
 class Export(JsonOptions, OrientationOptions, DesignOptions):
-    """Write the workspace, or its convex hull, as a mesh for other programs.
+    """Write the workspace as a mesh, or the mechanism for simulation.
 
-    Coordinates are those of the base frame in millimetres; GLB is in metres, as it must be.
+    Meshes have the coordinates of the base frame in millimetres; GLB is in metres, as it must
+    be. The simulation is an MJCF model in metres: every joint, closed loops, six servos.
     """
 
-    what: Annotated[Literal["workspace", "hull"], tyro.conf.Positional]
+    what: Annotated[Literal["workspace", "hull", "simulation"], tyro.conf.Positional]
     """What to write."""
 
     out: Path
@@ -30,52 +36,85 @@ class Export(JsonOptions, OrientationOptions, DesignOptions):
     format: Annotated[
         str | None,
         tyro.conf.arg(
-            metavar="3mf|stl|glb|obj|ply",
+            metavar="3mf|stl|glb|obj|ply|mjcf",
             help_behavior_hint="(default: the suffix of the file)",
         ),
     ] = None
     """The format: 3mf holds unit, names and colours, ply and obj double precision."""
 
     tolerance: Annotated[
-        float | None,
-        positive("--tolerance"),
-        tyro.conf.arg(help_behavior_hint="(default: a 500th of the reach)"),
+        float | None, positive("--tolerance"), tyro.conf.arg(help_behavior_hint=_OF_MESHES)
     ] = None
     """Largest distance of the mesh from the true surface, in design units."""
+
+    density: Annotated[
+        float | None, positive("--density"), tyro.conf.arg(help_behavior_hint=_OF_BODIES)
+    ] = None
+    """Density of the bodies, in kg/m³."""
 
     def run(self) -> None:
         """Write the file, and what is in it.
 
         Raises:
-            InputError: a design, orientation, format or file that cannot be used.
+            InputError: a design, option, format or file that cannot be used.
             NoAnswerError: the workspace is empty.
         """
         from explorer.export.files import check_writable
-        from explorer.export.mesh import check_format, write_mesh
 
         file_format = self.format or self.out.suffix.lower().removeprefix(".")
         if not file_format:
             raise InputError(
                 f"--out {str(self.out)!r} has no suffix to tell the format: give --format"
             )
-        check_format(file_format)
-        check_writable(self.out)
-        design = self.load()
-        rotation = self.oriented(design).rotation
-        from explorer.solids import convex_hull, workspace_solid
-
-        solid = workspace_solid(design, rotation, self.tolerance)
-        if self.what == "hull":
-            solid = convex_hull(solid)
-        write_mesh(solid, self.out, file_format, design, f"{self.what} of {design.name}")
+        facts = _WRITERS[self.what](self, file_format, lambda: check_writable(self.out))
         if self.json:
-            write_json(
-                {
-                    "file": str(self.out),
-                    "format": file_format,
-                    "volume": solid.volume,
-                    "triangles": len(solid.faces),
-                }
-            )
+            write_json({"file": str(self.out), **facts})
         else:
             write_lines(str(self.out))
+
+    def refuse(self, *options: str) -> None:
+        """Refuse options that say nothing about what is to be written.
+
+        Raises:
+            InputError: one of them was given.
+        """
+        for option in options:
+            if getattr(self, option) is not None:
+                raise InputError(f"--{option.replace('_', '-')} is not for {self.what}")
+
+
+Facts = dict[str, object]
+
+
+def _mesh(command: Export, file_format: str, check: Callable[[], None]) -> Facts:
+    from explorer.export.mesh import check_format, write_mesh
+
+    command.refuse("density")
+    check_format(file_format)
+    check()
+    design = command.load()
+    rotation = command.oriented(design).rotation
+    from explorer.solids import convex_hull, workspace_solid
+
+    solid = workspace_solid(design, rotation, command.tolerance)
+    if command.what == "hull":
+        solid = convex_hull(solid)
+    write_mesh(solid, command.out, file_format, design, f"{command.what} of {design.name}")
+    return {"format": file_format, "volume": solid.volume, "triangles": len(solid.faces)}
+
+
+def _simulation(command: Export, file_format: str, check: Callable[[], None]) -> Facts:
+    from explorer.export.simulation import DENSITY, write_simulation
+    from explorer.prototype.chains import BODIES, CHAIN_JOINTS
+
+    command.refuse("tolerance", "quaternion", "yaw_pitch_roll")
+    if file_format not in ("mjcf", "xml"):
+        raise InputError(f"no simulation format {file_format!r}; there is mjcf")
+    check()
+    write_simulation(command.load(), command.out, command.density or DENSITY)
+    return {"format": "mjcf", "bodies": list(BODIES[1:]), "joints": [*CHAIN_JOINTS, "platform"]}
+
+
+_WRITERS: Mapping[str, Callable[[Export, str, Callable[[], None]], Facts]] = MappingProxyType(
+    {"workspace": _mesh, "hull": _mesh, "simulation": _simulation}
+)

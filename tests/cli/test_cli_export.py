@@ -100,3 +100,48 @@ def test_what_to_write_and_where_must_be_given(capsys: pytest.CaptureFixture[str
     assert "missing --out" in capsys.readouterr().err
     assert run(["export", "mechanism", "--out", "x.stl"]) == 2
     assert "workspace" in capsys.readouterr().err
+
+
+def test_the_simulation_is_an_mjcf_model(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    from explorer.export.simulation import simulation_mjcf
+
+    out = tmp_path / "model.xml"
+    assert run(["export", "simulation", "--out", str(out), "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert (answer["file"], answer["format"]) == (str(out), "mjcf")
+    assert (len(answer["bodies"]), len(answer["joints"])) == (13, 13)
+    assert out.read_text(encoding="utf-8") == simulation_mjcf(OPTIMAL)
+    words = ["--format", "mjcf", "--density", "2700"]
+    assert run(["export", "simulation", "--out", str(out), *words]) == 0
+    assert out.read_text(encoding="utf-8") == simulation_mjcf(OPTIMAL, 2700.0)
+    assert capsys.readouterr().out == f"{out}\n"
+
+
+@pytest.mark.parametrize(
+    ("what", "name", "options", "words"),
+    [
+        ("simulation", "model.urdf", [], "no simulation format 'urdf'; there is mjcf"),
+        ("simulation", "model.xml", ["--tolerance", "1"], "--tolerance is not for simulation"),
+        ("simulation", "model.xml", ["--quaternion", "1", "0", "0", "0"], "--quaternion is not"),
+        ("simulation", "model.xml", ["--density", "-1"], "--density must be a positive number"),
+        ("simulation", "missing/model.xml", [], "no folder"),
+        ("hull", "hull.stl", ["--density", "1000"], "--density is not for hull"),
+        ("hull", "hull.mjcf", [], "no mesh format 'mjcf'"),
+    ],
+)
+def test_options_and_formats_belong_to_what_is_written(
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    what: str,
+    name: str,
+    options: list[str],
+    words: str,
+) -> None:
+    assert run(["export", what, "--out", str(tmp_path / name), *options]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.count("\n") == 1
+    assert words in captured.err
+    assert list(tmp_path.iterdir()) == []

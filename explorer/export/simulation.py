@@ -1,0 +1,300 @@
+"""The mechanism for physics engines: an MJCF model, in metres, kilograms and radians.
+
+Every leg is a chain of three joints from the base; the platform is free, and each ball
+joint a `connect` that closes a loop. The home pose is the reference configuration, joint
+values are those of `explorer.prototype.chains`, lengths in metres. Position servos move
+the six actuators.
+
+A swing limit of a universal joint is a cone, that of its two hinges the box around it.
+Limits of the ball joints and of the pose (box, margins) have no counterpart and are left out.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import numpy as np
+
+from explorer import __version__
+from explorer.arrays import FloatArray
+from explorer.design import JOINTS, Design
+from explorer.errors import InputError
+from explorer.export.files import write_whole
+from explorer.home import home_pose
+from explorer.pose import quaternion_from_rotation
+from explorer.prototype.chains import (
+    ACTUATED,
+    BODIES,
+    CHAIN_JOINTS,
+    LEGS,
+    ON_GUIDE,
+    Chains,
+    Places,
+)
+from explorer.prototype.mass import Mass
+from explorer.prototype.sketch import BALL, ROD, leg_radii, platform_points, sketch_masses
+
+DENSITY = 1240.0
+"""Of what the bodies are made unless told otherwise, in kg/m³: that of printed PLA."""
+
+TIMESTEP = 5e-4
+# How fast the servos follow, in rad/s; a load of their own weight puts them off by g/ω².
+SERVO = 300.0
+# MuJoCo takes moving bodies for massless below this, in kg and kg m².
+LEAST_MASS = LEAST_INERTIA = 1e-14
+
+X, Y, Z = (1, 0, 0), (0, 1, 0), (0, 0, 1)
+
+
+def simulation_joints(design: Design, position: FloatArray, rotation: FloatArray) -> FloatArray:
+    """Return the joint values of the model in a pose (MuJoCo's `qpos`), shape (..., 19).
+
+    They are the joints of the four chains, lengths in metres, then the position of the
+    platform and its quaternion (w, x, y, z).
+
+    Args:
+        design: The manipulator.
+        position: b4 in the base frame, shape (..., 3), in design units.
+        rotation: Platform to base, shape (..., 3, 3).
+
+    Raises:
+        InputError: a pose that is not finite or not a rotation.
+    """
+    metres = 1e-3 * design.unit_mm
+    found = Chains.of(design).joints(position, rotation)
+    found = np.where(np.isin(CHAIN_JOINTS, JOINTS), found * metres, found)
+    place = np.broadcast_to(position * metres, (*found.shape[:-1], 3))
+    turn = np.broadcast_to(quaternion_from_rotation(rotation), (*found.shape[:-1], 4))
+    return np.concatenate([found, place, turn], axis=-1)
+
+
+def simulation_mjcf(
+    design: Design, density: float = DENSITY, masses: Mapping[str, Mass] | None = None
+) -> str:
+    """Return the model as XML.
+
+    Args:
+        design: The manipulator.
+        density: Of the bodies, in kg/m³.
+        masses: Of the bodies in their own frames, in metres and kilograms; those of bars
+            with the legs' radii if None.
+
+    Raises:
+        InputError: a density that is not positive, a home pose in which a leg has no
+            length, or bodies so light that MuJoCo takes them for massless.
+    """
+    if not (math.isfinite(density) and density > 0.0):
+        raise InputError(f"the density must be positive; got {density:g}")
+    return _Model(design, density, masses).text()
+
+
+def write_simulation(design: Design, path: Path, density: float = DENSITY) -> None:
+    """Write the model into a file, whole or not at all.
+
+    Raises:
+        InputError: as of `simulation_mjcf`, or a file that cannot be written.
+    """
+    write_whole(path, simulation_mjcf(design, density).encode())
+
+
+class _Model:
+    """What the elements of the model are made from."""
+
+    def __init__(self, design: Design, density: float, masses: Mapping[str, Mass] | None) -> None:
+        self.design = design
+        self.metres = 1e-3 * design.unit_mm
+        self.home = home_pose(design)
+        self.chains = Chains.of(design)
+        position, rotation = np.array(self.home.position), self.home.rotation
+        joints = self.chains.joints(position, rotation)
+        for leg in LEGS:
+            if not joints[3 * leg - 1] > 0.0:
+                raise InputError(
+                    f"leg {leg} has no length in the home pose, so that a model that starts "
+                    "there has no direction for it; choose another home"
+                )
+        self.places: Places = self.chains.places(joints, position, rotation)
+        self.values = simulation_joints(design, position, rotation).tolist()
+        self.masses = masses or {
+            name: mass.scaled(self.metres, density * self.metres**3)
+            for name, mass in sketch_masses(self.chains, joints, 1.0).items()
+        }
+        self._check_masses()
+        self.radii = [radius * self.metres for radius in leg_radii(design)]
+
+    def _check_masses(self) -> None:
+        def inertia(mass: Mass) -> float:
+            return float(np.linalg.eigvalsh(mass.inertia)[0])
+
+        name, lightest = min(self.masses.items(), key=lambda item: inertia(item[1]))
+        least = inertia(lightest)
+        if least < LEAST_INERTIA or lightest.mass < LEAST_MASS:
+            # Inertia grows with the fifth power of the size.
+            factor = 1.02 * (LEAST_INERTIA / least) ** 0.2 if least > 0.0 else math.inf
+            raise InputError(
+                f"{name} has a mass of {lightest.mass:.3g} kg and an inertia of {least:.3g} kg m², "
+                "which physics engines take for none; unit_mm must be at least "
+                f"{factor * self.design.unit_mm:.3g}, or the legs thicker"
+            )
+
+    def text(self) -> str:
+        root = ET.Element("mujoco", model=self.design.name)
+        root.append(
+            ET.Comment(
+                f" flagged-explorer {__version__}; metres, kilograms, radians; "
+                f"one design unit is {self.design.unit_mm:g} mm "
+            )
+        )
+        ET.SubElement(root, "compiler", angle="radian", autolimits="true")
+        ET.SubElement(
+            root,
+            "option",
+            timestep=repr(TIMESTEP),
+            integrator="implicitfast",
+            solver="Newton",
+            iterations="100",
+            tolerance="1e-12",
+        )
+        default = ET.SubElement(root, "default")
+        # Bodies overlap in their joints; what may touch is for the explorer to say.
+        ET.SubElement(default, "geom", contype="0", conaffinity="0")
+        stiff = {"solref": f"{2 * TIMESTEP!r} 1", "solimp": "0.9999 0.99999 1e-5"}
+        ET.SubElement(default, "equality", stiff)
+        self._bodies(ET.SubElement(root, "worldbody"))
+        equality = ET.SubElement(root, "equality")
+        for leg in LEGS:
+            ends = {"site1": f"rod {leg} b{leg}", "site2": f"platform b{leg}"}
+            ET.SubElement(equality, "connect", {"name": f"ball {leg}", **ends})
+        self._gap(root)
+        self._actuators(ET.SubElement(root, "actuator"))
+        key = ET.SubElement(ET.SubElement(root, "keyframe"), "key", name="home")
+        key.set("qpos", _row(self.values))
+        key.set("ctrl", _row(self.values[index] for index in ACTUATED))
+        ET.indent(root)
+        return ET.tostring(root, encoding="unicode") + "\n"
+
+    def _bodies(self, world: ET.Element) -> None:
+        design, metres = self.design, self.metres
+        low, high = design.limits.guide or (0.0, design.a2x)
+        thin = min(self.radii[1:3])
+        guide = _row([low * metres, 0.0, 0.0, high * metres, 0.0, 0.0])
+        if high > low:
+            _geom(world, "capsule", thin, "guide", fromto=guide)
+        for name, (x, y) in (("a1", (0.0, 0.0)), ("a3", design.a3)):
+            _geom(world, "sphere", thin, name, pos=_row([x * metres, y * metres, 0.0]))
+        for leg in LEGS:
+            radius = self.radii[leg - 1]
+            names = BODIES[3 * leg - 2 : 3 * leg + 1]
+            length = self.values[3 * leg - 1]
+            first = self._body(world, names[0], "base")
+            _geom(first, "sphere", BALL * radius)
+            cylinder = self._body(first, names[1], names[0])
+            # Through all of its length, whatever the stroke, so that nothing gapes.
+            _geom(cylinder, "capsule", radius, fromto=_row([0, 0, 0, 0, 0, 0.5 * length]))
+            rod = self._body(cylinder, names[2], names[1])
+            _geom(rod, "capsule", ROD * radius, fromto=_row([0, 0, -length, 0, 0, 0]))
+            ET.SubElement(rod, "site", name=f"rod {leg} b{leg}", size=repr(radius))
+        platform = self._body(world, "platform", "base")
+        points = platform_points(design) * metres
+        hub = points.mean(axis=0)
+        for leg, radius, point in zip(LEGS, self.radii, points, strict=True):
+            size, where = repr(radius), _row(point)
+            ET.SubElement(platform, "site", name=f"platform b{leg}", size=size, pos=where)
+            _geom(platform, "sphere", BALL * radius, pos=where)
+            if (point != hub).any():
+                _geom(platform, "capsule", radius, fromto=_row([*hub, *point]))
+
+    def _body(self, parent: ET.Element, name: str, within: str) -> ET.Element:
+        """Add a body with its joint and its mass, placed as in the home pose."""
+        index, outer = BODIES.index(name), BODIES.index(within)
+        origin, turn = self.places.origin, self.places.rotation
+        offset = turn[outer].T @ (origin[index] - origin[outer]) * self.metres
+        quaternion = quaternion_from_rotation(turn[outer].T @ turn[index])
+        body = ET.SubElement(parent, "body", name=name, pos=_row(offset), quat=_row(quaternion))
+        if name == "platform":
+            ET.SubElement(body, "freejoint", name="platform")
+        else:
+            self._joint(body, index - 1)
+        mass = self.masses[name]
+        i = mass.inertia
+        ET.SubElement(
+            body,
+            "inertial",
+            pos=_row(mass.centre),
+            mass=repr(mass.mass),
+            fullinertia=_row([i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]]),
+        )
+        return body
+
+    def _joint(self, body: ET.Element, index: int) -> None:
+        name = CHAIN_JOINTS[index]
+        leg, place = divmod(index, 3)
+        on_guide = leg + 1 in ON_GUIDE
+        slides = place == 2 or (place == 0 and on_guide)
+        axis = Z if place == 2 else Y if place == 1 and not on_guide else X
+        joint = ET.SubElement(
+            body,
+            "joint",
+            name=name,
+            type="slide" if slides else "hinge",
+            axis=_row(axis),
+            ref=repr(self.values[index]),
+        )
+        limits = self._range(name, self.values[index])
+        if limits is not None:
+            joint.set("range", _row(limits))
+
+    def _range(self, name: str, at_home: float) -> tuple[float, float] | None:
+        limits = self.design.limits
+        if name in ("d1", "d3"):
+            low, high = limits.guide or (0.0, 0.0)
+        elif name in JOINTS:
+            low, high = self.design.length_range(name)
+        else:
+            degrees = {"a1": limits.swing.a1, "a3": limits.swing.a3}.get(name[:2])
+            # A wider cone holds every first angle.
+            if degrees is None or degrees >= 90.0:
+                return None
+            swing = math.radians(degrees)
+            return at_home - swing, at_home + swing
+        # A range of no width would be one that MuJoCo refuses.
+        return (low * self.metres, high * self.metres) if high > low else None
+
+    def _gap(self, root: ET.Element) -> None:
+        """Keep the carriages apart, on the sides that they have at home."""
+        gap = self.design.limits.gap
+        if gap <= 0.0:
+            return
+        d1, d3 = (self.values[CHAIN_JOINTS.index(name)] for name in ("d1", "d3"))
+        order = 1 if d1 > d3 else -1
+        limits = _row([gap * self.metres, 1e3 * self.design.reach * self.metres])
+        tendon = ET.SubElement(ET.SubElement(root, "tendon"), "fixed", name="gap", range=limits)
+        for joint, sign in (("d1", order), ("d3", -order)):
+            ET.SubElement(tendon, "joint", joint=joint, coef=str(sign))
+
+    def _actuators(self, parent: ET.Element) -> None:
+        moving = sum(mass.mass for mass in self.masses.values())
+        for name in JOINTS:
+            limits = self._range(name, 0.0)
+            servo = ET.SubElement(
+                parent,
+                "position",
+                name=name,
+                joint=name,
+                kp=repr(moving * SERVO**2),
+                kv=repr(2.0 * moving * SERVO),
+            )
+            if limits is not None:
+                servo.set("ctrlrange", _row(limits))
+
+
+def _geom(parent: ET.Element, kind: str, radius: float, name: str = "", **where: str) -> None:
+    named = {"name": name} if name else {}
+    ET.SubElement(parent, "geom", {**named, "type": kind, "size": repr(radius), **where})
+
+
+def _row(values: Iterator[float] | FloatArray | list[float] | tuple[float, ...]) -> str:
+    return " ".join(repr(float(value)) for value in values)

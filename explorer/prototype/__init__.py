@@ -1,0 +1,1 @@
+"""The mechanism as things: the bodies of each leg, their sizes, their shapes and where they are."""

@@ -1,0 +1,57 @@
+"""The bodies as bars and balls: enough to simulate a design that is too tight for its parts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from explorer.arrays import FloatArray
+from explorer.design import Design
+from explorer.prototype.chains import ON_GUIDE, Chains
+from explorer.prototype.mass import Mass, ball, bar, together
+
+DEFAULT_RADIUS = 0.01
+"""Radius of legs that have none in the design, over the reach."""
+
+# Of the length at home that cylinder and rod each have, so that they overlap.
+SHARE = 0.55
+# Over the radius of the leg.
+ROD, JOINT, BALL = 0.6, 2.0, 1.2
+
+
+def leg_radii(design: Design) -> tuple[float, ...]:
+    """Return the radii of the four legs in design units, of each more than zero."""
+    return tuple(radius or DEFAULT_RADIUS * design.reach for radius in design.limits.leg_radii)
+
+
+def platform_points(design: Design) -> FloatArray:
+    """Return b1 to b4 in the platform frame, shape (4, 3)."""
+    return np.array(
+        [(*design.b1, 0.0), (design.b2, 0.0, 0.0), (design.b3, 0.0, 0.0), (0.0, 0.0, 0.0)]
+    )
+
+
+def sketch_masses(chains: Chains, home_joints: FloatArray, density: float) -> Mapping[str, Mass]:
+    """Return the masses of all bodies but the base, in their own frames and design units.
+
+    Args:
+        chains: Of the design.
+        home_joints: Of the chains, shape (12,).
+        density: Mass for each cubed design unit.
+    """
+    radii = leg_radii(chains.design)
+    found: dict[str, Mass] = {}
+    for leg, radius in enumerate(radii, 1):
+        length = SHARE * max(float(home_joints[3 * leg - 1]), radius)
+        joint = "carriage" if leg in ON_GUIDE else "cross"
+        along = np.array([0.0, 0.0, length])
+        found[f"{joint} {leg}"] = ball(JOINT * radius, np.zeros(3), density)
+        found[f"cylinder {leg}"] = bar(radius, np.zeros(3), along, density)
+        found[f"rod {leg}"] = bar(ROD * radius, -along, np.zeros(3), density)
+    points = platform_points(chains.design)
+    hub = points.mean(axis=0)
+    balls = (ball(BALL * r, point, density) for r, point in zip(radii, points, strict=True))
+    bars = (bar(r, hub, point, density) for r, point in zip(radii, points, strict=True))
+    found["platform"] = together([*balls, *bars])
+    return found
