@@ -79,12 +79,15 @@ def home_rotation(design: Design) -> FloatArray:
     return home_pose(design).rotation
 
 
-def workspace_volume(design: Design, rotation: ArrayLike | None = None) -> Volume:
+def workspace_volume(
+    design: Design, rotation: ArrayLike | None = None, *, explain: bool = True
+) -> Volume:
     """Return the exact volume of the constant-orientation workspace, and its gradient.
 
     Args:
         design: The manipulator.
         rotation: Platform to base, shape (3, 3); that of the home pose if None.
+        explain: Whether to find out what empties an empty workspace, which takes longer.
 
     Raises:
         InputError: not a rotation.
@@ -97,7 +100,7 @@ def workspace_volume(design: Design, rotation: ArrayLike | None = None) -> Volum
     else:
         volume, gradient = _volume_of_slices(region)
         error = 1e-12 * volume
-    because = what_empties(limits) if volume <= 0.0 else ()
+    because = what_empties(limits) if explain and volume <= 0.0 else ()
     return Volume(max(0.0, volume), error, gradient, because)
 
 

@@ -298,7 +298,13 @@ def test_an_empty_workspace_is_opened_first() -> None:
     start = with_limits(PRESETS["paper-initial"], box=box)
     assert workspace_volume(start).volume == 0.0
     problem = make_problem(start, "match-volume", volume=100.0)
-    u = opened(problem, np.array(problem.start_values) / scales(problem), see=lambda _: None)
+    model = Model(problem, problem.start_values)
+
+    def see(_: State, worst: str) -> None:
+        assert worst in model.names or worst in {limit.name for limit in limits}
+
+    limits = State(problem, model.start).limits
+    u = opened(problem, model.start, see=see)
     assert u is not None
     radius = room(problem)
     assert State(problem, u).volume >= 4.0 / 3.0 * math.pi * radius**3 * (1.0 - 1e-6)

@@ -35,14 +35,14 @@ def room(problem: Problem) -> float:
 
 
 def opened(
-    problem: Problem, start: FloatArray, *, see: Callable[[State], None]
+    problem: Problem, start: FloatArray, *, see: Callable[[State, str], None]
 ) -> FloatArray | None:
     """Return scaled variables at which a ball fits into the workspace; None if none is found.
 
     Args:
         problem: The problem.
         start: Scaled variables, shape (n,).
-        see: Called with each iterate; may raise.
+        see: Called with each iterate and the limit that it breaks most; may raise.
     """
     here, size, n = State(problem, start), problem.size, len(start)
     radius = room(problem)
@@ -52,7 +52,8 @@ def opened(
     if here.design.limits.gap > 0.0:
         sides.append(GapDemand(here))
     names = [each.name for each in here.limits if isinstance(each, Round | HalfSpace)]
-    count = len(names) + sum(len(side.names) for side in sides)
+    labels = [*names, *(name for side in sides for name in side.names)]
+    count = len(labels)
     place = _least_broken(here) / size
     first = np.concatenate([start, place])
     last: list[tuple[FloatArray, FloatArray, FloatArray]] = []
@@ -88,7 +89,7 @@ def opened(
     costs = np.concatenate([np.ones(n), np.full(3, COST_OF_PLACE)])
 
     def slope(x: FloatArray) -> FloatArray:
-        see(State(problem, x[:n]))
+        see(State(problem, x[:n]), labels[int(measured(x)[0].argmin())])
         return costs * (x - first)
 
     bounds = [

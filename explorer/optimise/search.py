@@ -28,6 +28,7 @@ from explorer.optimise.problem import Problem
 from explorer.optimise.sqp import Stop, solve
 from explorer.optimise.state import State, scales
 from explorer.optimise.trail import MET, Trail
+from explorer.workspace import what_empties
 
 # F = |1 − V/V′| from which on a volume is matched.
 MATCHED = 1e-10
@@ -123,7 +124,7 @@ class Search:
             if self._is_closed(u):
                 found = opened(problem, u, see=self._see_opening)
                 if found is None:
-                    because = State(problem, u).measured.empty_because
+                    because = what_empties(State(problem, u).limits)
                     words = (
                         f"the workspace is empty because of {', '.join(because)}, and no "
                         "design nearby opens it"
@@ -133,7 +134,7 @@ class Search:
             return self._solved(Model(problem, values, trail.before_each))
         except Stop:
             if not trail.history:
-                trail.see_opening(State(problem, np.array(values) / scales(problem)))
+                trail.see_opening(State(problem, np.array(values) / scales(problem)), "")
             return Attempt("cancelled", "", "", trail.best)
 
     def _is_closed(self, u: FloatArray) -> bool:
@@ -143,12 +144,12 @@ class Search:
         wanted = self.problem.demands.volume or self.problem.size**3
         return State(self.problem, u).volume < OPEN * wanted
 
-    def _see_opening(self, state: State) -> None:
+    def _see_opening(self, state: State, worst: str) -> None:
         self.trail.before_each()
         self.steps += 1
         self.evaluations += 1
         self.left -= 1
-        self.trail.see_opening(state)
+        self.trail.see_opening(state, worst)
 
     def _solved(self, model: Model) -> Attempt:
         at, missed, has_grown = model.at(model.start), np.zeros((0, 3)), False

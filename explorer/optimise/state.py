@@ -64,8 +64,8 @@ class State:
 
     @cached_property
     def measured(self) -> Volume:
-        """The workspace."""
-        return workspace_volume(self.design, self.rotation)
+        """The workspace, without what empties it."""
+        return workspace_volume(self.design, self.rotation, explain=False)
 
     @property
     def volume(self) -> float:

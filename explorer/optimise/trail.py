@@ -60,10 +60,9 @@ class Trail:
         spare, worst = model.worst(at)
         self._add(at.state, phase, worst, spare)
 
-    def see_opening(self, state: State) -> None:
+    def see_opening(self, state: State, worst: str) -> None:
         """Record an iterate on the way to a workspace that is not empty."""
-        because = state.measured.empty_because
-        self._add(state, "opening", because[0] if because else "", -1.0 if because else 0.0)
+        self._add(state, "opening", worst, 0.0 if state.volume > 0.0 else -1.0)
 
     def _add(self, state: State, phase: Phase, worst: str, spare: float) -> None:
         iterate = Iterate(
