@@ -43,7 +43,7 @@ from explorer.optimise.record import (
     record_of,
 )
 from explorer.optimise.starts import more_starts
-from explorer.optimise.state import State, scales
+from explorer.optimise.state import State
 
 OPTIMAL = PRESETS["paper-optimal"]
 
