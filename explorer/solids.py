@@ -18,6 +18,7 @@ from explorer.constraints import Constraint, HalfSpace, constraints
 from explorer.design import Design
 from explorer.errors import ExplorerError, InputError
 from explorer.facets import Facets
+from explorer.isosurface import surface_below_zero
 from explorer.pose import checked_rotation
 from explorer.primitives import MOST_FACES, Frame, Piece, frame_of, pieces_of
 from explorer.solid import Solid
@@ -95,13 +96,15 @@ def carved_solid(
         InputError: a tolerance that is not positive or too small.
         ExplorerError: a boolean fails.
     """
+    from manifold3d import Manifold
+
     frame, names = frame_of([limits], design.reach, tolerance), _names([limits])
     bodies, origins = _bodies([limits], frame, names)
     body = bodies[0]
     if surface is not None:
-        blocked = _below_zero(surface, frame)
-        origins[blocked.original_id()] = len(names)
-        body = body - blocked
+        own = Manifold.reserve_ids(1)
+        origins[own] = len(names)
+        body = body - _below_zero(surface, frame, own)
     parts = [_solid(part, origins, frame, names) for part in body.decompose()]
     if not parts:
         return _solid(body, origins, frame, names)
@@ -121,8 +124,8 @@ def carved_solid(
     return replace(solid, limit_of_face=of_face, limits=(*names, *surface.names))
 
 
-def _below_zero(surface: Surface, frame: Frame) -> Manifold:
-    """Return what a surface cuts out, as a closed mesh in a frame."""
+def _below_zero(surface: Surface, frame: Frame, own: int) -> Manifold:
+    """Return what a surface cuts out, as a body in a frame with an id of its own."""
     from manifold3d import Manifold
 
     below = np.argwhere(surface.values < 0.0)
@@ -132,33 +135,13 @@ def _below_zero(surface: Surface, frame: Frame) -> Manifold:
     beyond = np.minimum(below.max(axis=0) + 2, surface.values.shape)
     x, y, z = (slice(int(a), int(b)) for a, b in zip(first, beyond, strict=True))
     values, lows = surface.values[x, y, z], surface.lows + first * surface.step
-    # manifold3d asks at the nodes and at the middles of cells, also half a cell beyond.
-    padded = np.pad(values, 1, mode="edge")
-    middles = np.zeros([count + 1 for count in values.shape])
-    for corner in CORNERS:
-        x, y, z = (
-            slice(int(a), int(a) + many) for a, many in zip(corner, middles.shape, strict=True)
-        )
-        middles += padded[x, y, z] / len(CORNERS)
-    table = np.zeros([2 * count + 1 for count in values.shape])
-    table[1::2, 1::2, 1::2], table[::2, ::2, ::2] = -values, -middles
-    rows: list[list[list[float]]] = table.tolist()
-
-    def value(x: float, y: float, z: float) -> float:
-        return rows[int(2.0 * x + 1.5)][int(2.0 * y + 1.5)][int(2.0 * z + 1.5)]
-
-    def settled(places: FloatArray) -> FloatArray:
-        where = np.array(places)
-        most = np.array(values.shape) - 2
-        corners = np.clip(np.floor(where), 0, most).astype(np.int64)[:, None, :] + CORNERS
-        kept = values[corners[..., 0], corners[..., 1], corners[..., 2]].argmax(axis=1)
-        beside = corners[np.arange(len(where)), kept]
-        points = surface.settle(lows + where * surface.step, lows + beside * surface.step)
-        return frame.to(points)
-
-    last = [count - 1.0 for count in values.shape]
-    shapes: Any = Manifold
-    return shapes.level_set(value, [0.0, 0.0, 0.0, *last], 1.0).warp_batch(settled).as_original()
+    where, faces = surface_below_zero(values)
+    most = np.array(values.shape) - 2
+    corners = np.clip(np.floor(where), 0, most).astype(np.int64)[:, None, :] + CORNERS
+    kept = values[corners[..., 0], corners[..., 1], corners[..., 2]].argmax(axis=1)
+    beside = corners[np.arange(len(where)), kept]
+    points = surface.settle(lows + where * surface.step, lows + beside * surface.step)
+    return _manifold_of((frame.to(points), faces), (own,), (len(faces),))
 
 
 def reachable_solid(design: Design, rotations: ArrayLike, tolerance: float | None = None) -> Solid:

@@ -68,6 +68,7 @@ LAYERS = (
         "trajectory",
         "least_clearance",
         "reachable_nodes",
+        "isosurface",
         "start",
         "collision_surface",
         "reachable",
