@@ -127,7 +127,9 @@ def nearest_in_stratum(design: Design, pose: Pose, asked: Stratum) -> NearestInS
         distance = float(
             displacement(design, pose.position, pose.rotation, found.position, found.rotation)
         )
-    return NearestInStratum(w, seen_stratum(design, found), distance, found)
+    seen = seen_stratum(design, found)
+    # Just at the tolerance of incidences, those that imply others need not agree.
+    return NearestInStratum(w, seen if is_below(seen, w) else w, distance, found)
 
 
 def nearest_in_strata(design: Design, pose: Pose) -> Mapping[Stratum, NearestInStratum]:

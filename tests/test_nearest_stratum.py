@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 from multistart import searched_least
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
-from strategies import Case, designs, ordinary_cases, positions, rotations
+from strategies import QUARTER_TURNS, Case, designs, ordinary_cases, positions, rotations
 from test_strata import REPRESENTATIVES
 
-from explorer import PRESETS, InputError, Pose, home_pose, nearest_singularities
+from explorer import PRESETS, Design, InputError, Pose, home_pose, nearest_singularities
 from explorer.arrays import FloatArray
 from explorer.bruhat import COVERED, OF_INCIDENCES, Stratum, conditions, is_below
 from explorer.displacement import displacement
@@ -101,6 +101,16 @@ def test_a_distance_changes_no_more_than_the_platform_moves(
     here, there = (nearest_in_strata(case.design, each) for each in (pose, other))
     for w in STRATA:
         assert abs(here[w].distance - there[w].distance) <= moved + 1e-8 * case.size
+
+
+def test_a_pose_at_the_tolerance_of_incidences_is_in_the_stratum_asked_for() -> None:
+    # b4 comes so near to a1, and b2b3 to the guide, that a1 counts as on the line, too.
+    design = Design(a3=(10.0, 10.0), b1=(0.0, 10.0), b2=0.0, b3=2.5)
+    pose = Pose.of([0.0, 0.15625, 0.0], QUARTER_TURNS[4])
+    found = nearest_in_stratum(design, pose, (3, 1, 4, 2))
+    assert is_below(found.seen, (3, 1, 4, 2))
+    p, n = np.array(found.pose.position), found.pose.rotation[:, 2]
+    assert_allclose([p[1], p[2], n[0], n @ p], 0.0, atol=1e-14)
 
 
 @given(designs(), positions(), rotations())
