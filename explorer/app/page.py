@@ -14,6 +14,7 @@ from explorer.app.actions import SetPose
 from explorer.app.assigning import Assigner
 from explorer.app.jobs import Worker
 from explorer.app.panels.design import DesignPanel
+from explorer.app.panels.jog import JogPanel
 from explorer.app.panels.legs import LegsPanel
 from explorer.app.panels.move import MovePanel
 from explorer.app.panels.singularity import SingularityPanel
@@ -25,6 +26,7 @@ from explorer.app.scene.camera import Cameras, ViewName, framing
 from explorer.app.scene.placing import Placed, scene_scale
 from explorer.app.session import Session, Who
 from explorer.app.state import Frame, State
+from explorer.app.strata_feed import StrataFeed
 from explorer.app.tasks import exported_name
 from explorer.app.workspace_feed import (
     RadiusFeed,
@@ -59,6 +61,7 @@ class Page:
         self.worker = Worker(lambda message: self._complain(message, None))
         self.feed = WorkspaceFeed(self.worker, self.session.redraw)
         self.radius_feed = RadiusFeed(self.worker, self.session.redraw)
+        self.strata_feed = StrataFeed(self.worker, self.session.redraw)
         gui = server.gui
         gui.configure_theme(
             show_logo=False, show_share_button=False, control_width="large", brand_color=BRAND
@@ -70,6 +73,7 @@ class Page:
         tabs = gui.add_tab_group()
         with tabs.add_tab("Move", viser.Icon.ARROWS_MOVE):
             move = MovePanel(gui, self.session)
+            jog = JogPanel(gui, self.session)
         with tabs.add_tab("Design", viser.Icon.RULER_2):
             design = DesignPanel(gui, self.session)
         with tabs.add_tab("Workspace", viser.Icon.CUBE):
@@ -78,17 +82,17 @@ class Page:
             view = ViewPanel(gui, self.session)
         side = gui.add_panel()
         with side.add_tab("Singularity"):
-            singularity = SingularityPanel(gui, self.session)
+            self._singularity = SingularityPanel(gui, self.session)
         with side.add_tab("Workspace"):
             self._numbers = WorkspaceNumbers(gui)
         with side.add_tab("Legs"):
             self._legs = LegsPanel(gui, self.session)
-        self._panels = (move, design, view, singularity)
+        self._panels = (move, jog, design, view)
         if docked:
             gui.main_panel.dock_right()
             gui.main_panel.set_width(350)
             side.dock_left()
-            side.set_width(270)
+            side.set_width(300)
 
         self._scene.drag_handle.handle.on_update(self._dragged)
         self._aim_initial_camera()
@@ -129,7 +133,7 @@ class Page:
     def _draw(self, frame: Frame) -> None:
         self._frame = frame
         # First, so that what is asked for is called out of date until it arrives.
-        for feed in (self.feed, self.radius_feed):
+        for feed in (self.feed, self.radius_feed, self.strata_feed):
             feed.follow(frame)
         updates = self._scene.updates(self._placed())
         for panel in self._panels:
@@ -137,6 +141,7 @@ class Page:
         for panel in (self._workspace, self._numbers):
             updates.extend(panel.updates(frame, self.feed))
         updates.extend(self._legs.updates(frame, self.radius_feed))
+        updates.extend(self._singularity.updates(frame, self.strata_feed))
         self._assigner.assign(updates)
 
     def _placed(self) -> Placed:

@@ -20,9 +20,16 @@ from explorer.errors import InputError
 from explorer.home import home_pose
 from explorer.kinematics import inverse
 from explorer.moves import MoveClearance, move_clearance
+from explorer.performance import (
+    Performance,
+    SingularityFreeBall,
+    performance,
+    singularity_free_ball,
+)
 from explorer.pose import Pose, Triple, yaw_pitch_roll_from_rotation
 from explorer.singularity import TETRAHEDRA, margins, mode_of
 from explorer.snapshot import Snapshot, evaluate
+from explorer.uncoupled import UNCOUPLED, Travel
 
 Joints = tuple[float, float, float, float, float, float]
 Hold = Literal["pose", "legs"]
@@ -228,6 +235,21 @@ class Frame:
     def snapshot(self) -> Snapshot:
         """The design in its pose."""
         return evaluate(self.state.design, self.state.pose)
+
+    @cached_property
+    def performance(self) -> Performance:
+        """How fast and how strong the platform is in its pose."""
+        return performance(self.state.design, self.state.pose)
+
+    @cached_property
+    def travels(self) -> tuple[Travel, ...]:
+        """How far each of the six uncoupled motions may go from here to the singularity."""
+        return tuple(motion.travel(self.state.pose) for motion in UNCOUPLED)
+
+    @cached_property
+    def free_ball(self) -> SingularityFreeBall:
+        """The largest ball of positions about the pose without a singular one."""
+        return singularity_free_ball(self.state.pose)
 
     @cached_property
     def last_move(self) -> MoveClearance | None:

@@ -12,11 +12,13 @@ import numpy as np
 from explorer.app.bands import PLAIN, Colouring, Measure, Shell
 from explorer.app.slice_map import AXES, CUT, Axis, SliceMap, slice_map
 from explorer.arrays import FloatArray
+from explorer.bruhat import Stratum
 from explorer.constraints import HalfSpace
 from explorer.design import Design
 from explorer.errors import ExplorerError, InputError
 from explorer.least_clearance import LeastClearances, least_clearances
-from explorer.pose import Triple
+from explorer.nearest_stratum import nearest_in_strata
+from explorer.pose import Pose, Triple
 from explorer.radii import RadiusCurve, radius_curve
 from explorer.reachable import PairCost, ReachableWorkspace, reachable_workspace
 from explorer.solid import Solid
@@ -157,6 +159,27 @@ class RadiusDrawing:
     trouble: Trouble | None
 
 
+@dataclass(frozen=True)
+class StrataRequest:
+    """From which pose to measure the way to each stratum."""
+
+    design: Design
+    pose: Pose
+
+
+@dataclass(frozen=True)
+class StrataDistances:
+    """The root-mean-square way of b1 to b4 to the nearest pose in each of the 24 strata.
+
+    Attributes:
+        request: What was asked for.
+        distances: In design units, by stratum.
+    """
+
+    request: StrataRequest
+    distances: dict[Stratum, float]
+
+
 def ready() -> None:
     """Do nothing: the process that was asked has started."""
 
@@ -214,6 +237,12 @@ def draw_radius_curve(request: RadiusRequest) -> RadiusDrawing:
     except ExplorerError as error:
         return RadiusDrawing(request, None, least, _trouble(error))
     return RadiusDrawing(request, curve, least, None)
+
+
+def strata_distances(request: StrataRequest) -> StrataDistances:
+    """Return how far the pose is from each stratum."""
+    found = nearest_in_strata(request.design, request.pose)
+    return StrataDistances(request, {w: nearest.distance for w, nearest in found.items()})
 
 
 def export_mesh(

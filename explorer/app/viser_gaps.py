@@ -51,3 +51,9 @@ def refuse_tunnels(server: viser.ViserServer) -> None:
 
     internals: Any = server
     internals._websock_server.unregister_handler(_messages.ShareUrlRequest)
+
+
+def element_id(button: viser.GuiButtonHandle) -> str:
+    """Return the id that a button has in the page, by which a label of HTML can be for it."""
+    internals: Any = button
+    return str(internals._impl.uuid)

@@ -1,4 +1,4 @@
-"""How near a singularity is, and why: the legend of the colours and the numbers."""
+"""How near a singularity is, and why: the numbers, and folders for what there is beyond them."""
 
 from __future__ import annotations
 
@@ -12,16 +12,21 @@ from explorer.app.actions import SetView
 from explorer.app.assigning import Update
 from explorer.app.colours import CLEAR, FAR, FAR_WARNINGS, SINGULAR, WARNED, css, proximity_colour
 from explorer.app.controls import Controls
+from explorer.app.panels.distance import DistancePanel
 from explorer.app.panels.html import BEYOND, DIM, WITHIN, scientific, signed
+from explorer.app.panels.performance import PerformancePanel
+from explorer.app.panels.strata import StrataPanel
 from explorer.app.session import Session
 from explorer.app.state import Frame
+from explorer.app.strata_feed import StrataFeed
+from explorer.bruhat import incidences
 from explorer.singularity import INCIDENCES, mode_name
 from explorer.snapshot import Snapshot
 from explorer.strata import GENERIC
 
 
 class SingularityPanel:
-    """Legend, margins, conditioning, mode and stratum."""
+    """Legend, margins, conditioning, mode; then distances, strata and performance."""
 
     def __init__(self, gui: viser.GuiApi, session: Session) -> None:
         self._controls = Controls(gui, session)
@@ -34,11 +39,20 @@ class SingularityPanel:
             least=0.0,
             step=0.01,
         )
+        with gui.add_folder("Nearest singular poses"):
+            self._distances = DistancePanel(gui, session)
+        with gui.add_folder("Stratum of the two flags"):
+            self._strata = StrataPanel(gui, session)
+        with gui.add_folder("Performance"):
+            self._performance = PerformancePanel(gui, session)
 
-    def updates(self, frame: Frame) -> Iterator[Update]:
+    def updates(self, frame: Frame, feed: StrataFeed) -> Iterator[Update]:
         """Yield what makes the panel show the frame."""
         yield self._numbers, "content", summary(frame)
         yield from self._controls.updates(frame)
+        yield from self._distances.updates(frame)
+        yield from self._strata.updates(frame, feed)
+        yield from self._performance.updates(frame)
 
 
 def summary(frame: Frame) -> str:
@@ -58,10 +72,16 @@ def _status(frame: Frame) -> str:
     snapshot = frame.snapshot
     near = snapshot.proximity * snapshot.design.reach < frame.state.warn_below
     word, colour = ("Near a singularity", BEYOND) if near else ("Clear of singularities", WITHIN)
+    which = ""
     if snapshot.stratum != GENERIC:
         word, colour = "Singular", BEYOND
+        which = "; ".join(
+            f"κ{index} = 0: {INCIDENCES[index - 1]}" for index in incidences(snapshot.stratum)
+        )
+    note = f'<div style="color:{colour};margin-bottom:6px">{escape(which)}</div>' if which else ""
     return (
-        f'<div style="font-size:15px;font-weight:600;color:{colour};margin-bottom:6px">{word}</div>'
+        f'<div style="font-size:15px;font-weight:600;color:{colour};'
+        f'margin-bottom:{2 if which else 6}px">{word}</div>{note}'
     )
 
 

@@ -15,9 +15,11 @@ from explorer.app.assigning import Update
 from explorer.app.scene.bodies import Bodies
 from explorer.app.scene.clearance import ClearanceScene
 from explorer.app.scene.flags import Flags
+from explorer.app.scene.jog import JogScene
 from explorer.app.scene.legs import Legs, TwinLegs
 from explorer.app.scene.marks import DragHandle, Ghosts, Labels
 from explorer.app.scene.placing import Placed
+from explorer.app.scene.singular import BallScene, EllipsoidScene, NearestGhost
 from explorer.app.scene.swept import SweptTetrahedra
 from explorer.app.scene.tetrahedra import Tetrahedra
 from explorer.app.scene.workspace import WorkspaceScene
@@ -51,6 +53,10 @@ class Scene:
             ClearanceScene(scene),
             SweptTetrahedra(scene),
             WorkspaceScene(scene, feed),
+            NearestGhost(scene),
+            EllipsoidScene(scene),
+            BallScene(scene),
+            JogScene(scene),
             self.drag_handle,
         )
 

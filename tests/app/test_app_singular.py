@@ -1,0 +1,500 @@
+"""Singularities on the page: strata, uncoupled motions, distances, performance; no browser."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Generator, Iterable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+import viser
+from desk import Desk, number, rows_of
+
+from explorer.app.actions import GoHome, Open, SetPose, SetPosition
+from explorer.app.assigning import Update
+from explorer.app.jobs import Worker
+from explorer.app.panels.distance import DistancePanel, distance_table
+from explorer.app.panels.jog import (
+    JogPanel,
+    in_shown_units,
+    jog_amount,
+    jog_label,
+    travel_marks,
+    travel_table,
+)
+from explorer.app.panels.performance import performance_table
+from explorer.app.panels.ranges import coordinate_span
+from explorer.app.panels.singularity import SingularityPanel, summary
+from explorer.app.panels.strata import StrataPanel, distances_of, neighbours
+from explorer.app.scene.jog import JogScene, drawn_motion, shown_motions
+from explorer.app.scene.placing import Placed
+from explorer.app.scene.singular import LONGEST, BallScene, EllipsoidScene, NearestGhost
+from explorer.app.singular_actions import (
+    GoToSingularity,
+    GoToStratum,
+    Jog,
+    SetSingularView,
+    name_of,
+)
+from explorer.app.singular_view import SingularView
+from explorer.app.state import Frame, State, opened
+from explorer.app.strata_feed import StrataFeed
+from explorer.app.tasks import StrataRequest, strata_distances
+from explorer.app.viser_gaps import element_id, start_viser, stop_viser
+from explorer.bruhat import COVERED, OF_INCIDENCES, WORDS, conditions, incidences
+from explorer.design_file import PRESETS
+from explorer.displacement import displacement
+from explorer.errors import InputError
+from explorer.kinematics import attachment_points
+from explorer.nearest_singular import nearest_singularities
+from explorer.nearest_stratum import nearest_in_stratum
+from explorer.pose import Pose
+from explorer.singularity import INCIDENCES, jacobian, margins
+from explorer.strata import GENERIC, STRATA
+from explorer.uncoupled import UNCOUPLED
+
+OPTIMAL = PRESETS["paper-optimal"]
+# Started when it is first needed, and so never.
+UNUSED = Worker(lambda _: None)
+MOTIONS = range(len(UNCOUPLED))
+
+
+@pytest.fixture(scope="module")
+def server() -> Generator[viser.ViserServer]:
+    made = start_viser("127.0.0.1", 0)
+    yield made
+    stop_viser(made)
+
+
+@pytest.fixture
+def desk() -> Generator[Desk]:
+    made = Desk(opened(OPTIMAL))
+    yield made
+    made.session.stop()
+
+
+def random_states(count: int, seed: int = 3) -> list[State]:
+    """Return the optimum in poses all about its home."""
+    rng = np.random.default_rng(seed)
+    return [
+        opened(
+            OPTIMAL,
+            Pose.of_yaw_pitch_roll(rng.uniform(-8.0, 15.0, 3), rng.uniform(-80, 80, 3)),
+        )
+        for _ in range(count)
+    ]
+
+
+def singular_states() -> list[State]:
+    """Return the home pose brought to each singular stratum."""
+    return [GoToStratum(w).apply(opened(OPTIMAL)) for w in STRATA if w != GENERIC]
+
+
+def viewed(state: State, **changes: Any) -> State:
+    return SetSingularView(replace(SingularView(), **changes)).apply(state)
+
+
+def kappas(pose: Pose) -> np.ndarray[Any, np.dtype[np.float64]]:
+    return margins(pose.position, pose.rotation)
+
+
+def by_name(updates: Iterable[Update]) -> dict[str, dict[str, Any]]:
+    """Return the values that are assigned, by the name of the node and the property."""
+    found: dict[str, dict[str, Any]] = {}
+    for handle, name, value in updates:
+        found.setdefault(handle.name, {})[name] = value
+    return found
+
+
+def plain(html: str) -> str:
+    """Return the words of HTML."""
+    return re.sub(r"\s+", " ", re.sub("<.*?>", " ", html)).strip()
+
+
+# Strata
+
+
+@pytest.mark.parametrize("stratum", [w for w in STRATA if w != GENERIC])
+def test_a_stratum_is_gone_to_by_the_shortest_way(stratum: tuple[int, ...]) -> None:
+    for state in random_states(2):
+        after = GoToStratum(stratum).apply(state)
+        expected = nearest_in_stratum(OPTIMAL, state.pose, stratum)
+        assert Frame(after).snapshot.stratum == expected.seen == stratum
+        way = displacement(
+            OPTIMAL,
+            state.pose.position,
+            state.pose.rotation,
+            after.pose.position,
+            after.pose.rotation,
+        )
+        assert float(way) == pytest.approx(expected.distance, rel=1e-9)
+
+
+@pytest.mark.parametrize("lower", [(2, 4, 3, 1), (1, 2, 3, 4)])
+def test_what_has_no_nearest_pose_is_refused_in_words(lower: tuple[int, ...]) -> None:
+    state = GoToStratum(lower).apply(opened(OPTIMAL))
+    with pytest.raises(InputError, match="as near as one likes to any pose"):
+        GoToStratum(GENERIC).apply(state)
+    with pytest.raises(InputError, match=rf"lies in {re.escape(name_of(lower))} already"):
+        GoToStratum(lower).apply(state)
+    with pytest.raises(InputError, match=r"\(3, 4, 2, 1\) borders on"):
+        GoToStratum((3, 4, 2, 1)).apply(state)
+    with pytest.raises(InputError, match="permutation"):
+        GoToStratum((1, 1, 2, 3)).apply(state)
+
+
+def test_each_node_of_the_diagram_pushes_the_button_of_its_stratum(
+    server: viser.ViserServer, desk: Desk
+) -> None:
+    panel, feed = StrataPanel(server.gui, desk.session), StrataFeed(UNUSED, lambda: None)
+    assert set(panel.buttons) == set(STRATA) - {GENERIC}
+    desk.session.do(SetSingularView(SingularView(strata=True)))
+    contents = [
+        str(value)
+        for _, name, value in panel.updates(Frame(desk.state), feed)
+        if name == "content" and "label" in str(value)
+    ]
+    (html,) = contents
+    nodes = re.findall(r'<(span|label)(?: for="([^"]*)")? title="(\([\d, ]+\))[^"]*"', html)
+    assert len(nodes) == len(STRATA)
+    ids = {name: button for _, button, name in nodes}
+    assert ids.pop(name_of(GENERIC)) == ""
+    assert ids == {name_of(w): element_id(b) for w, b in panel.buttons.items()}
+    desk.click(panel.buttons[3, 4, 1, 2])
+    assert Frame(desk.state).snapshot.stratum == (3, 4, 1, 2)
+    desk.click(panel.buttons[3, 4, 2, 1])
+    desk.state  # noqa: B018 - waits until it is done
+    assert "borders on" in desk.complaints[-1]
+
+
+def test_no_diagram_is_made_until_it_is_asked_for(server: viser.ViserServer, desk: Desk) -> None:
+    panel, feed = StrataPanel(server.gui, desk.session), StrataFeed(UNUSED, lambda: None)
+    feed.follow(Frame(desk.state))
+    assert UNUSED.process_id is None
+    contents = [v for _, n, v in panel.updates(Frame(desk.state), feed) if n == "content"]
+    assert len(contents) == 1
+
+
+@pytest.mark.parametrize("state", [opened(OPTIMAL), *singular_states()])
+def test_the_panel_says_where_one_more_incidence_leads(state: State) -> None:
+    frame = Frame(state)
+    here = frame.snapshot.stratum
+    words = plain(neighbours(frame, strata_distances(_request(state)).distances))
+    assert name_of(here) in words
+    for lower in COVERED[here]:
+        zero = ", ".join(f"κ{i}" for i in incidences(lower))
+        assert f"{zero} = 0: {', '.join(WORDS[c] for c in conditions(lower))}" in words
+    assert ("Both flags coincide" in words) is (here == (1, 2, 3, 4))
+
+
+def test_the_three_incidences_stand_beside_the_generic_stratum() -> None:
+    state = opened(OPTIMAL)
+    words = plain(neighbours(Frame(state), strata_distances(_request(state)).distances))
+    for index, nearest in enumerate(nearest_singularities(OPTIMAL, state.pose)):
+        assert f"κ{index + 1} = 0: {INCIDENCES[index]} {nearest.distance:.4g}" in words
+
+
+def test_distances_come_from_the_worker_but_those_of_one_incidence_at_once() -> None:
+    state = viewed(random_states(1)[0], strata=True)
+    feed = StrataFeed(UNUSED, lambda: None)
+    known = distances_of(Frame(state), feed)
+    assert set(known) == {GENERIC, *OF_INCIDENCES}
+    every = strata_distances(_request(state)).distances
+    assert set(every) == set(STRATA)
+    for stratum, distance in known.items():
+        assert distance == pytest.approx(every[stratum], rel=1e-9, abs=1e-12)
+
+
+def _request(state: State) -> StrataRequest:
+    return StrataRequest(state.design, state.pose)
+
+
+# Uncoupled motions
+
+
+@pytest.mark.parametrize("motion", MOTIONS)
+def test_a_jog_moves_one_margin_and_no_other(motion: int) -> None:
+    rng = np.random.default_rng(motion)
+    moved = UNCOUPLED[motion].incidence - 1
+    others = [i for i in range(3) if i != moved]
+    for state in (*random_states(10), *singular_states()):
+        after = Jog(motion, float(rng.uniform(-60.0, 60.0))).apply(state)
+        before, now = kappas(state.pose), kappas(after.pose)
+        size = float(np.linalg.norm(after.pose.position)) + 1.0
+        np.testing.assert_allclose(now[others], before[others], atol=1e-13 * size)
+
+
+@pytest.mark.parametrize("motion", MOTIONS)
+def test_a_jog_counts_from_where_it_began_and_leads_back_there(motion: int) -> None:
+    start = random_states(1)[0]
+    state = start
+    for amount in (3.0, -7.5, 20.0):
+        state = Jog(motion, amount).apply(state)
+        assert jog_amount(state, motion) == amount
+        assert [jog_amount(state, other) for other in MOTIONS if other != motion] == [0.0] * 5
+    direct = Jog(motion, 20.0).apply(start)
+    assert state.pose == direct.pose
+    assert Jog(motion, 0.0).apply(state).pose == start.pose
+
+
+def test_anything_else_that_moves_the_platform_ends_a_jog() -> None:
+    state = Jog(2, 4.0).apply(random_states(1)[0])
+    for action in (SetPosition(0, 3.0), GoHome(), Open(OPTIMAL), Jog(5, 2.0)):
+        after = action.apply(state)
+        assert jog_amount(after, 2) == 0.0
+    # The next one begins where the platform is then.
+    after = Jog(2, 1.0).apply(SetPosition(0, 3.0).apply(state))
+    assert after.jog is not None
+    assert after.jog.start.position[0] == 3.0
+
+
+@pytest.mark.parametrize("state", random_states(6))
+def test_the_travel_in_the_table_ends_where_the_margin_vanishes(state: State) -> None:
+    frame = Frame(state)
+    for name in ("platform", "base"):
+        own = [i for i, motion in enumerate(UNCOUPLED) if motion.frame == name]
+        for index, row in zip(own, rows_of(travel_table(frame, name)), strict=True):
+            motion = UNCOUPLED[index]
+            travel = in_shown_units(motion, motion.travel(state.pose))
+            assert row[0].startswith(f"κ{motion.incidence}: ")
+            for shown, end in zip(row[1:], (travel.low, travel.high), strict=True):
+                if math.isinf(end):
+                    assert shown == "never"
+                    continue
+                assert number(shown.rstrip("°")) == pytest.approx(end, rel=1e-2)
+                after = Jog(index, end).apply(state)
+                size = float(np.linalg.norm(after.pose.position)) + 1.0
+                assert abs(kappas(after.pose)[motion.incidence - 1]) < 1e-12 * size
+
+
+@pytest.mark.parametrize("state", random_states(4))
+def test_the_marks_of_a_motion_stay_where_it_is_singular_while_it_goes(
+    server: viser.ViserServer, desk: Desk, state: State
+) -> None:
+    desk.session.do(SetPose(state.pose))
+    panel = JogPanel(server.gui, desk.session)
+    index = 1
+    marks: list[list[tuple[float, str]]] = []
+    for amount in (0.0, 10.0, 25.0):
+        desk.session.do(Jog(index, amount))
+        found: list[Any] = [v for _, n, v in panel.updates(Frame(desk.state)) if n == "marks"]
+        marks.append(list(found[index]))
+    assert marks[0] == marks[1] == marks[2]
+    travel = in_shown_units(UNCOUPLED[index], UNCOUPLED[index].travel(state.pose))
+    assert [value for value, _ in marks[0]] == pytest.approx([travel.low, travel.high])
+
+
+def test_a_slider_jogs(server: viser.ViserServer, desk: Desk) -> None:
+    panel = JogPanel(server.gui, desk.session)
+    sliders: dict[str, Any] = {
+        handle.label: handle
+        for handle, _, _ in panel.updates(Frame(desk.state))
+        if isinstance(handle, viser.GuiSliderHandle)
+    }
+    label = jog_label(UNCOUPLED[0])
+    before = desk.state
+    desk.use(sliders[label], 12.0)
+    assert desk.state.pose == Jog(0, 12.0).apply(before).pose
+    assert len(sliders) == 6
+
+
+def test_at_a_singular_pose_motions_say_so_and_lead_away() -> None:
+    for index, motion in enumerate(UNCOUPLED):
+        home = opened(OPTIMAL)
+        state = GoToSingularity(motion.incidence).apply(home)
+        # A margin that is zero but for rounding is zero.
+        travel = motion.travel(state.pose)
+        assert min(abs(travel.low), abs(travel.high)) < 1e-9
+        own = [i for i, each in enumerate(UNCOUPLED) if each.frame == motion.frame]
+        row = rows_of(travel_table(Frame(state), motion.frame))[own.index(index)]
+        assert row[1:] == ["singular", "here"]
+        assert f"κ{motion.incidence} = 0: {INCIDENCES[motion.incidence - 1]}" in plain(
+            summary(Frame(state))
+        )
+        after = Jog(index, 5.0).apply(state)
+        rate = motion.rate(state.pose)
+        if abs(rate) > 1e-3:
+            assert Frame(after).snapshot.stratum == GENERIC
+
+
+def test_marks_are_only_where_the_slider_goes() -> None:
+    state = random_states(1)[0]
+    span = coordinate_span(state)
+    for motion in UNCOUPLED:
+        if motion.kind == "translation":
+            marks = travel_marks(motion.travel(state.pose), span)
+            assert all(span.low <= value <= span.high for value, _ in marks)
+            assert len(marks) <= 1
+
+
+@pytest.mark.parametrize("state", random_states(5))
+def test_a_motion_is_drawn_from_singularity_to_singularity(state: State) -> None:
+    placed = Placed(Frame(state))
+    for index, motion in enumerate(UNCOUPLED):
+        drawn = drawn_motion(placed, motion, placed.frame.travels[index])
+        for end, is_singular, amount in zip(
+            (0, -1),
+            drawn.singular,
+            (placed.frame.travels[index].low, placed.frame.travels[index].high),
+            strict=True,
+        ):
+            if is_singular and motion.frame == "base":
+                there = motion.moved(state.pose, amount)
+                np.testing.assert_allclose(
+                    drawn.points[end], placed.scale * np.array(there.position), atol=1e-9
+                )
+            if not is_singular:
+                assert motion.kind == "translation"
+        assert np.isfinite(drawn.points).all()
+
+
+def test_the_motion_in_use_is_drawn_or_all_six_or_none(server: viser.ViserServer) -> None:
+    scene = JogScene(server.scene)
+    state = random_states(1)[0]
+    for arrows, at_rest, in_use in (
+        ("one in use", (), (4,)),
+        ("all six", tuple(MOTIONS), tuple(MOTIONS)),
+        ("none", (), ()),
+    ):
+        rest = viewed(state, arrows=arrows)
+        for each, expected in ((rest, at_rest), (Jog(4, 5.0).apply(rest), in_use)):
+            placed = Placed(Frame(each))
+            assert shown_motions(placed) == expected
+            drawn = by_name(scene.updates(placed))
+            lines = [drawn[f"/motion/{i}/line"]["visible"] for i in MOTIONS]
+            assert lines == [i in expected for i in MOTIONS]
+
+
+@pytest.mark.parametrize("state", singular_states())
+def test_motions_are_drawn_at_singular_poses_too(server: viser.ViserServer, state: State) -> None:
+    drawn = by_name(JogScene(server.scene).updates(Placed(Frame(viewed(state, arrows="all six")))))
+    for properties in drawn.values():
+        for name in ("points", "batched_positions", "batched_scales"):
+            if name in properties:
+                assert np.isfinite(properties[name]).all()
+
+
+# Distances
+
+
+@pytest.mark.parametrize("state", random_states(4))
+def test_the_distances_and_their_ghosts(server: viser.ViserServer, state: State) -> None:
+    nearest = nearest_singularities(OPTIMAL, state.pose)
+    rows = rows_of(distance_table(Frame(state)))
+    assert [row[0] for row in rows] == ["κ1 = 0", "κ2 = 0", "κ3 = 0"]
+    distances = [each.distance for each in nearest]
+    assert [number(row[1]) for row in rows] == pytest.approx(distances, rel=1e-3)
+    assert [number(row[2]) for row in rows] == pytest.approx(
+        [OPTIMAL.unit_mm * d for d in distances], rel=1e-2
+    )
+    scene = NearestGhost(server.scene)
+    least = int(np.argmin(distances))
+    for ghost, index in (("κ1 = 0", 0), ("κ2 = 0", 1), ("κ3 = 0", 2), ("nearest", least)):
+        placed = Placed(Frame(viewed(state, ghost=ghost)))
+        drawn = by_name(scene.updates(placed))
+        plate, ways = drawn["/nearest/platform"], drawn["/nearest/ways"]["points"]
+        assert plate["visible"] is True
+        assert plate["wxyz"] == nearest[index].pose.quaternion
+        lengths = np.linalg.norm(ways[:, 1] - ways[:, 0], axis=1) / placed.scale
+        assert float(np.sqrt((lengths**2).mean())) == pytest.approx(distances[index], rel=1e-4)
+        assert f"κ{index + 1} = 0" in drawn["/nearest/label"]["text"]
+        there = attachment_points(
+            OPTIMAL, nearest[index].pose.position, nearest[index].pose.rotation
+        )
+        ends = placed.scale * np.array([there.b1, there.b2, there.b3, there.b4])
+        np.testing.assert_allclose(ways[:, 1], ends, rtol=1e-4, atol=1e-4)
+
+
+def test_the_buttons_go_to_the_nearest_pose_and_say_where_it_is_reached(
+    server: viser.ViserServer, desk: Desk
+) -> None:
+    panel = DistancePanel(server.gui, desk.session)
+    expected = nearest_singularities(OPTIMAL, desk.state.pose)[1].pose
+    desk.use(panel.go, "κ2 = 0")
+    assert desk.state.pose == expected
+    assert Frame(desk.state).snapshot.stratum == (4, 2, 3, 1)
+    drawn = by_name(
+        NearestGhost(server.scene).updates(Placed(Frame(viewed(desk.state, ghost="κ2 = 0"))))
+    )
+    assert not any(each["visible"] for each in drawn.values())
+    with pytest.raises(InputError, match="κ2 = 0 already: lines a1a2 and b2b3 meeting"):
+        GoToSingularity(2).apply(viewed(GoToStratum((2, 1, 4, 3)).apply(desk.state)))
+
+
+# Performance
+
+
+@pytest.mark.parametrize("state", random_states(4))
+def test_the_ellipsoids_hold_what_unit_actuators_do(
+    server: viser.ViserServer, state: State
+) -> None:
+    rates = jacobian(OPTIMAL, state.pose.position, state.pose.rotation)
+    rng = np.random.default_rng(1)
+    joints = rng.normal(size=(4000, 6))
+    joints /= np.linalg.norm(joints, axis=1, keepdims=True)
+    speeds = np.linalg.norm((joints @ np.linalg.inv(rates).T)[:, :3], axis=1)
+    rows = {row[0]: row[1:] for row in rows_of(performance_table(Frame(state)))}
+    most = number(rows["speed of b4"][1])
+    assert speeds.max() <= most * (1.0 + 5e-3)
+    assert speeds.max() > 0.7 * most
+    assert number(rows["force at b4"][0]) == pytest.approx(1.0 / most, rel=1e-2)
+    scene = EllipsoidScene(server.scene)
+    for kind in ("speed", "force"):
+        placed = Placed(Frame(viewed(state, ellipsoid=kind)))
+        drawn = by_name(scene.updates(placed))
+        body, axes = drawn[f"/ellipsoid/{kind}"], drawn["/ellipsoid/axes"]["points"]
+        assert body["visible"] is True
+        assert max(body["scale"]) <= LONGEST
+        np.testing.assert_allclose(
+            np.linalg.norm(axes[:, 1] - axes[:, 0], axis=1), 2 * np.array(body["scale"]), rtol=1e-3
+        )
+        np.testing.assert_allclose(
+            axes.mean(axis=1), np.tile(placed.points["b4"], (3, 1)), atol=1e-4
+        )
+
+
+@pytest.mark.parametrize("state", random_states(5))
+def test_the_ball_touches_the_nearest_singular_plane(
+    server: viser.ViserServer, state: State
+) -> None:
+    placed = Placed(Frame(viewed(state, ball=True)))
+    drawn = by_name(BallScene(server.scene).updates(placed))
+    radius = drawn["/ball/ball"]["scale"] / placed.scale
+    touch = np.array(drawn["/ball/touch"]["position"]) / placed.scale
+    p = np.array(state.pose.position)
+    assert np.linalg.norm(touch - p) == pytest.approx(radius)
+    assert np.abs(margins(touch, state.pose.rotation)).min() < 1e-9
+    rng = np.random.default_rng(0)
+    away = rng.normal(size=(500, 3))
+    inside = p + 0.999 * radius * away / np.linalg.norm(away, axis=1, keepdims=True)
+    assert (np.sign(margins(inside, state.pose.rotation)) == np.sign(kappas(state.pose))).all()
+
+
+@pytest.mark.parametrize("state", singular_states())
+@pytest.mark.filterwarnings("error")
+def test_everything_is_told_and_drawn_at_singular_poses(
+    server: viser.ViserServer, desk: Desk, state: State
+) -> None:
+    shown = viewed(
+        state, ghost="nearest", strata=True, arrows="all six", ellipsoid="speed", ball=True
+    )
+    frame = Frame(shown)
+    words = plain(summary(frame))
+    for index in incidences(frame.snapshot.stratum):
+        assert f"κ{index} = 0: {INCIDENCES[index - 1]}" in words
+    panel, feed = SingularityPanel(server.gui, desk.session), StrataFeed(UNUSED, lambda: None)
+    texts = [str(v) for _, n, v in panel.updates(frame, feed) if n == "content"]
+    assert not any(re.search(r"\b(nan|inf)\b", plain(text)) for text in texts)
+    assert "none: κ" in plain(performance_table(frame))
+    placed = Placed(frame)
+    for scene in (
+        EllipsoidScene(server.scene),
+        BallScene(server.scene),
+        NearestGhost(server.scene),
+    ):
+        for _, name, value in scene.updates(placed):
+            if name in ("points", "scale", "position", "wxyz"):
+                assert np.isfinite(np.asarray(value, dtype=np.float64)).all()
