@@ -13,10 +13,12 @@ import viser
 from explorer.app.actions import SetPose
 from explorer.app.assigning import Assigner
 from explorer.app.jobs import Worker
+from explorer.app.optimiser import Optimiser
 from explorer.app.panels.design import DesignPanel
 from explorer.app.panels.jog import JogPanel
 from explorer.app.panels.legs import LegsPanel
 from explorer.app.panels.move import MovePanel
+from explorer.app.panels.optimise import OptimisePanel
 from explorer.app.panels.singularity import SingularityPanel
 from explorer.app.panels.view import ViewPanel
 from explorer.app.panels.workspace import WorkspacePanel, tolerance_of
@@ -27,14 +29,16 @@ from explorer.app.scene.placing import Placed, scene_scale
 from explorer.app.session import Session, Who
 from explorer.app.state import Frame, State
 from explorer.app.strata_feed import StrataFeed
-from explorer.app.tasks import exported_name
+from explorer.app.tasks import Region, Rows, exported_name
 from explorer.app.workspace_feed import (
     RadiusFeed,
     WorkspaceFeed,
     workspace_rows,
     workspace_start,
 )
-from explorer.pose import Pose
+from explorer.design_file import encode_design
+from explorer.home import home_pose
+from explorer.pose import Pose, Triple
 
 TITLE = "Flagged 4-4 explorer"
 BRAND = (24, 74, 150)
@@ -67,18 +71,25 @@ class Page:
             show_logo=False, show_share_button=False, control_width="large", brand_color=BRAND
         )
         gui.set_panel_label(TITLE)
+        self.optimiser = Optimiser(
+            self.session,
+            lambda message: self._complain(message, None),
+            lambda: self.feed.is_settled,
+        )
         self._scene = Scene(server, self.feed)
         self._cameras = Cameras(self._placed)
         self._add_view_buttons(gui)
         tabs = gui.add_tab_group()
-        with tabs.add_tab("Move", viser.Icon.ARROWS_MOVE):
+        with tabs.add_tab("Move"):
             move = MovePanel(gui, self.session)
             jog = JogPanel(gui, self.session)
-        with tabs.add_tab("Design", viser.Icon.RULER_2):
+        with tabs.add_tab("Design"):
             design = DesignPanel(gui, self.session)
-        with tabs.add_tab("Workspace", viser.Icon.CUBE):
+        with tabs.add_tab("Workspace"):
             self._workspace = WorkspacePanel(gui, self.session, self._export)
-        with tabs.add_tab("View", viser.Icon.EYE):
+        with tabs.add_tab("Optimise"):
+            self._optimise = OptimisePanel(gui, self.session, self._export_hull, self._save_design)
+        with tabs.add_tab("View"):
             view = ViewPanel(gui, self.session)
         side = gui.add_panel()
         with side.add_tab("Singularity"):
@@ -104,6 +115,7 @@ class Page:
         """End the session and the worker."""
         self.session.stop()
         self.worker.stop()
+        self.optimiser.stop()
 
     def wait_until_drawn(self, timeout: float = 30.0) -> bool:
         """Wait until the newest state and its workspace are drawn; say whether they are."""
@@ -136,6 +148,7 @@ class Page:
         for feed in (self.feed, self.radius_feed, self.strata_feed):
             feed.follow(frame)
         updates = self._scene.updates(self._placed())
+        updates.extend(self._optimise.updates(frame))
         for panel in self._panels:
             updates.extend(panel.updates(frame))
         for panel in (self._workspace, self._numbers):
@@ -143,6 +156,7 @@ class Page:
         updates.extend(self._legs.updates(frame, self.radius_feed))
         updates.extend(self._singularity.updates(frame, self.strata_feed))
         self._assigner.assign(updates)
+        self.optimiser.follow(frame)
 
     def _placed(self) -> Placed:
         drawing = self.feed.drawing
@@ -162,7 +176,27 @@ class Page:
         self.session.post("drag", change, stamp=handle.update_timestamp, who=event.client_id)
 
     def _export(self, what: str, file_format: str, client_id: int | None) -> None:
-        client = self._server.get_clients().get(-1 if client_id is None else client_id)
+        state = self.session.state
+        frame, region = Frame(state), state.view.workspace.region
+        start = workspace_start(frame)
+        self._send_mesh(client_id, what, file_format, workspace_rows(frame), region, start)
+
+    def _export_hull(self, client_id: int | None) -> None:
+        """Send the hull of the workspace that is optimised: at the orientation of home."""
+        rotation = home_pose(self.session.state.design).rotation
+        rows = tuple(tuple(row) for row in rotation.tolist())
+        self._send_mesh(client_id, "hull", self._workspace.file_format, rows, "limits", None)
+
+    def _send_mesh(
+        self,
+        client_id: int | None,
+        what: str,
+        file_format: str,
+        rotation: Rows,
+        region: Region,
+        start: Triple | None,
+    ) -> None:
+        client = self._client(client_id)
         if client is None:
             return
         state = self.session.state
@@ -177,6 +211,16 @@ class Page:
                 tolerance_of(state),
                 region,
                 workspace_start(frame),
+    def _save_design(self, client_id: int | None) -> None:
+        client = self._client(client_id)
+        if client is not None:
+            design = self.session.state.design
+            data = encode_design(design)
+            client.send_file_download(f"{design.name}.json", data, save_immediately=True)
+
+    def _client(self, client_id: int | None) -> viser.ClientHandle | None:
+        return self._server.get_clients().get(-1 if client_id is None else client_id)
+
                 what,
                 file_format,
             ),

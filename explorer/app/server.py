@@ -105,7 +105,8 @@ def serve(
         gc.collect()
         gc.freeze()
         warm_in_background()
-        running.page.worker.start()
+        # One after the other, and what the page needs first.
+        running.page.worker.start(then=running.page.optimiser.worker.start)
         if open_browser:
             threading.Thread(target=webbrowser.open, args=(running.url,), daemon=True).start()
         threading.Event().wait()

@@ -74,6 +74,11 @@ class Feed(Generic[Request, Drawing]):
         """Whether the drawing is what was last asked for."""
         return self._drawing is not None and self._drawing.request == self._asked
 
+    @property
+    def is_settled(self) -> bool:
+        """Whether nothing newer is on its way."""
+        return self._asked is None or self.is_current or self._problem is not None
+
     def follow(self, frame: Frame) -> None:
         """Ask for the drawing that a frame wants, unless it is asked for already."""
         wanted = self._wanted(frame)

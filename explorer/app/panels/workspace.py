@@ -131,6 +131,11 @@ class WorkspacePanel:
             for what in ("workspace", "hull"):
                 self._add_export(gui, what, export)
 
+    @property
+    def file_format(self) -> str:
+        """The format chosen for files."""
+        return self._format.value
+
     def updates(self, frame: Frame, feed: WorkspaceFeed) -> Iterator[Update]:
         """Yield what makes the panel show the frame."""
         yield from self._controls.updates(frame)

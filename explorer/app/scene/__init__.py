@@ -19,6 +19,7 @@ from explorer.app.scene.jog import JogScene
 from explorer.app.scene.legs import Legs, TwinLegs
 from explorer.app.scene.marks import DragHandle, Ghosts, Labels
 from explorer.app.scene.placing import Placed
+from explorer.app.scene.required_box import RequiredBox
 from explorer.app.scene.singular import BallScene, EllipsoidScene, NearestGhost
 from explorer.app.scene.swept import SweptTetrahedra
 from explorer.app.scene.tetrahedra import Tetrahedra
@@ -53,6 +54,11 @@ class Scene:
             ClearanceScene(scene),
             SweptTetrahedra(scene),
             WorkspaceScene(scene, feed),
+            NearestGhost(scene),
+            EllipsoidScene(scene),
+            BallScene(scene),
+            JogScene(scene),
+            RequiredBox(scene),
             NearestGhost(scene),
             EllipsoidScene(scene),
             BallScene(scene),

@@ -1,0 +1,588 @@
+"""Optimising on the page, with a real session and a real process: runs, ends, and what stays."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from collections.abc import Callable, Generator, Iterator
+from dataclasses import replace
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+import viser
+from desk import number, rows_of
+
+from explorer.app import optimiser
+from explorer.app.actions import (
+    Action,
+    Open,
+    Reset,
+    SetAngle,
+    SetLimits,
+    SetPosition,
+    SetUnit,
+    SetVariable,
+    SetView,
+)
+from explorer.app.assigning import Assigner
+from explorer.app.optimisation import (
+    PLACE,
+    Run,
+    Wish,
+    box_within,
+    problem_of,
+    wished_box,
+    wished_reach,
+    wished_volume,
+)
+from explorer.app.optimise_tasks import compare, optimise
+from explorer.app.optimiser import Optimiser
+from explorer.app.optimising import (
+    Accept,
+    Advance,
+    CancelRun,
+    EndRun,
+    Revert,
+    SetWish,
+    StartRun,
+)
+from explorer.app.panels.optimise import OptimisePanel
+from explorer.app.panels.optimise_plots import curves_of, data_of
+from explorer.app.panels.optimise_words import comparison_table, verdict_words
+from explorer.app.scene.required_box import box_shown, edges_of
+from explorer.app.session import Session
+from explorer.app.state import Frame, State, opened
+from explorer.app.viser_gaps import start_viser, stop_viser
+from explorer.app.worker import Line
+from explorer.compiled import warm
+from explorer.constraints import constraints, slacks
+from explorer.design import VARIABLES, Swing
+from explorer.design_file import PRESETS
+from explorer.errors import InputError
+from explorer.home import home_pose
+from explorer.optimise.demands import corners_of
+from explorer.optimise.findings import paper_start
+from explorer.optimise.outcome import Iterate
+from explorer.optimise.problem import YAW
+from explorer.optimise.trail import Trail
+from explorer.pose import Pose
+from explorer.workspace import workspace_volume
+
+OPTIMAL = PRESETS["paper-optimal"]
+PATIENCE = 240.0
+SMALL = Wish(volume=8000.0)
+# With so many starts a search goes on until it is ended.
+ENDLESS = Wish(objective="smallest-reach", volume=7053.0, starts=10_000)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _warm_kernels() -> None:  # pyright: ignore[reportUnusedFunction]
+    warm()
+
+
+@pytest.fixture(scope="module")
+def server() -> Generator[viser.ViserServer]:
+    made = start_viser("127.0.0.1", 0)
+    yield made
+    stop_viser(made)
+
+
+class Bench:
+    """A session with an optimiser and the panel, as the page has them, and what was drawn."""
+
+    def __init__(self, server: viser.ViserServer, state: State) -> None:
+        self.complaints: list[str] = []
+        self.reports: list[str] = []
+        self.sent: list[str] = []
+        self.states: list[State] = []
+        self._assigner = Assigner(server)
+        self.session = Session(
+            state, self._draw, lambda message, _: self.complaints.append(message), self._fail
+        )
+        self.optimiser = Optimiser(self.session, self.reports.append, lambda: True)
+        self.panel: Any = OptimisePanel(
+            server.gui,
+            self.session,
+            lambda _: self.sent.append("hull"),
+            lambda _: self.sent.append("design"),
+        )
+
+    @property
+    def state(self) -> State:
+        assert self.session.wait_until_idle()
+        return self.session.state
+
+    @property
+    def run(self) -> Run:
+        run = self.state.optimisation.run
+        assert run is not None
+        return run
+
+    def do(self, *actions: Action) -> State:
+        for action in actions:
+            self.session.do(action)
+        return self.state
+
+    def wait(self, condition: Callable[[State], bool]) -> State:
+        deadline = time.monotonic() + PATIENCE
+        while not condition(self.state):
+            assert time.monotonic() < deadline
+            time.sleep(0.002)
+        return self.state
+
+    def wait_for_end(self) -> Run:
+        self.wait(lambda state: not state.optimisation.is_on)
+        return self.run
+
+    def wait_for_comparison(self) -> Run:
+        self.wait_for_end()
+        self.wait(lambda _: self.run.comparison is not None)
+        return self.run
+
+    def wait_for_iterates(self, count: int) -> Run:
+        self.wait(lambda _: len(self.run.iterates) >= count)
+        return self.run
+
+    def find(self, wish: Wish = SMALL) -> Run:
+        self.do(SetWish(wish), StartRun())
+        return self.wait_for_end()
+
+    def stop(self) -> None:
+        self.session.stop()
+        self.optimiser.stop()
+
+    def _draw(self, frame: Frame) -> None:
+        self.states.append(frame.state)
+        self._assigner.assign(list(self.panel.updates(frame)))
+        self.optimiser.follow(frame)
+
+    def _fail(self, error: Exception) -> None:
+        raise error
+
+
+@pytest.fixture
+def bench(server: viser.ViserServer, monkeypatch: pytest.MonkeyPatch) -> Iterator[Bench]:
+    monkeypatch.setattr(optimiser, "PACE", 0.005)
+    made = Bench(server, own())
+    yield made
+    process = made.optimiser.worker.process_id
+    made.stop()
+    if process is not None:
+        # Neither alive nor a zombie.
+        with pytest.raises(ProcessLookupError):
+            os.kill(process, 0)
+
+
+def own() -> State:
+    """The paper's start in a pose of its own, held by its legs."""
+    moved = SetAngle(1, 3.0).apply(SetPosition(0, 4.5).apply(opened(paper_start())))
+    return replace(moved, hold="legs")
+
+
+def stripped(state: State) -> State:
+    """Return all of a state that belongs to the mechanism."""
+    fresh = opened(PRESETS["paper-optimal"])
+    return replace(
+        state, view=fresh.view, hold=fresh.hold, optimisation=fresh.optimisation, gesture=None
+    )
+
+
+def started(wish: Wish = SMALL, state: State | None = None) -> State:
+    """Return a state with a run, without a process."""
+    return StartRun().apply(SetWish(wish).apply(state or own()))
+
+
+def told_by(problem: Any, starts: int = 1) -> tuple[Iterate, ...]:
+    told: list[Iterate] = []
+    optimise(problem, starts, Line(told.append, lambda: False))
+    return tuple(told)
+
+
+def test_it_finds_the_design_and_the_page_goes_through_all_iterates(bench: Bench) -> None:
+    run = bench.find()
+    assert run.verdict is not None
+    assert run.verdict.status == "converged"
+    assert run.best is not None
+    assert run.best.objective <= 1e-6
+    assert abs(workspace_volume(run.best.design).volume / 8000.0 - 1.0) <= 1e-6
+    # A short search is shown iterate by iterate.
+    drawn = [state.design.variables for state in bench.states if state.optimisation.is_on]
+    shown = list(dict.fromkeys(drawn))
+    assert shown[-len(run.iterates) :] == [each.design.variables for each in run.iterates]
+    assert [each.number for each in run.iterates] == list(range(len(run.iterates)))
+    state = bench.state
+    assert state.design.variables == run.best.design.variables
+    assert state.design.name == "paper-initial-optimised"
+    assert state.pose == Pose(own().pose.position, home_pose(paper_start()).quaternion)
+    assert state.view.workspace.solid
+    assert not bench.complaints
+    assert not bench.reports
+
+
+def test_the_search_ends_before_the_next_evaluation_once_it_is_cut() -> None:
+    problem = problem_of(SetWish(ENDLESS).apply(own()))
+    told: list[Iterate] = []
+    outcome = optimise(problem, 10_000, Line(told.append, lambda: len(told) >= 40))
+    assert len(told) == 40
+    assert told[-1].run == len(outcome.runs) - 1
+    assert outcome.best in told
+    # What comes first of all is an iterate too: there is always a best so far.
+    outcome = optimise(problem, 1, Line(told.append, lambda: True))
+    assert outcome.status == "cancelled"
+    assert outcome.design.variables == problem.start.variables
+
+
+def test_cancel_ends_the_search_by_a_word_and_keeps_the_best_so_far(bench: Bench) -> None:
+    bench.do(SetWish(ENDLESS), StartRun())
+    bench.wait_for_iterates(60)
+    process = bench.optimiser.worker.process_id
+    bench.do(CancelRun())
+    run = bench.wait_for_end()
+    assert run.best is not None
+    assert run.verdict is not None
+    assert run.verdict.starts < 10_000
+    rank = Trail(run.problem, None, None).rank
+    assert rank(run.best)[0] == 0.0
+    assert run.best.objective <= run.iterates[0].objective * 10.0
+    assert run.best in run.iterates
+    assert bench.state.design.variables == run.best.design.variables
+    phases = [s.optimisation.run.phase for s in bench.states if s.optimisation.run is not None]
+    assert list(dict.fromkeys(phases)) == ["running", "cancelling", "ended"]
+    # The process heard the word, and so serves again.
+    assert bench.find(SMALL).verdict is not None
+    assert bench.optimiser.worker.process_id == process
+    assert not bench.reports
+
+
+def test_cancel_ends_a_search_that_hears_nothing_by_force(bench: Bench) -> None:
+    # The word and the force together answer within a fifth of a second.
+    assert optimiser.PATIENCE < 0.2
+    bench.do(SetWish(ENDLESS), StartRun())
+    bench.wait_for_iterates(30)
+    process = bench.optimiser.worker.process_id
+    assert process is not None
+    os.kill(process, signal.SIGSTOP)
+    bench.do(CancelRun())
+    run = bench.wait_for_end()
+    assert run.verdict is not None
+    assert run.verdict.status == "cancelled"
+    rank = Trail(run.problem, None, None).rank
+    assert run.best == min(run.iterates, key=rank)
+    assert run.best is not None
+    assert bench.state.design.variables == run.best.design.variables
+    assert not bench.reports
+    assert bench.find(SMALL).verdict is not None
+    assert bench.optimiser.worker.process_id != process
+
+
+def test_a_process_killed_in_mid_run_leaves_the_design_and_the_panel_says_so(
+    bench: Bench,
+) -> None:
+    before = stripped(bench.state)
+    bench.do(SetWish(ENDLESS), StartRun())
+    bench.wait_for_iterates(10)
+    assert bench.state.design.variables != before.design.variables
+    process = bench.optimiser.worker.process_id
+    assert process is not None
+    os.kill(process, signal.SIGKILL)
+    run = bench.wait_for_end()
+    assert stripped(bench.state) == before
+    assert run.verdict is not None
+    assert run.verdict.status == "failed"
+    assert "died" in bench.panel._words.content
+    assert bench.panel._words.visible
+    assert not bench.panel._decision.visible
+    assert len(bench.reports) == 1
+    assert bench.find(SMALL).best is not None
+
+
+def test_revert_brings_the_own_design_and_pose_back_exactly(bench: Bench) -> None:
+    before = bench.state
+    bench.find()
+    view = replace(bench.state.view, labels=False)
+    bench.do(SetView(view), SetPosition(2, 8.0), SetVariable("b2", 3.3))
+    assert bench.state.design != before.design
+    after = bench.do(Revert())
+    assert stripped(after) == stripped(before)
+    assert (after.hold, after.view) == (before.hold, view)
+    assert after.optimisation.run is None
+    assert after.optimisation.wish == SMALL
+    # There is nothing to return from any more.
+    assert bench.do(Revert()).design == before.design
+
+
+def test_accept_keeps_the_result_and_reset_still_returns_to_the_design_opened(
+    bench: Bench,
+) -> None:
+    best = bench.find().best
+    assert best is not None
+    assert bench.panel._decision.visible
+    after = bench.do(Accept())
+    assert after.design.variables == best.design.variables
+    assert not bench.panel._decision.visible
+    assert bench.panel._files.visible
+    assert "accepted" in bench.panel._words.content
+    assert bench.do(Revert()).design == after.design
+    assert bench.do(Reset()).design == paper_start()
+
+
+def test_a_run_from_an_undecided_result_still_reverts_to_the_own_design() -> None:
+    state = started()
+    first = told_by(state.optimisation.run and state.optimisation.run.problem)
+    ended = ended_with(state, first)
+    again = StartRun().apply(ended)
+    assert again.optimisation.run is not None
+    assert again.optimisation.run.number == 2
+    assert again.optimisation.run.problem.start.variables == first[-1].design.variables
+    assert stripped(Revert().apply(ended_with(again, first))) == stripped(own())
+    accepted = StartRun().apply(Accept().apply(ended))
+    assert accepted.optimisation.run is not None
+    assert accepted.optimisation.run.own.design == ended.design
+
+
+def ended_with(state: State, iterates: tuple[Iterate, ...]) -> State:
+    run = state.optimisation.run
+    assert run is not None
+    verdict = optimiser.cut_short(run.problem, iterates)
+    return EndRun(run.number, verdict, iterates).apply(state)
+
+
+@pytest.mark.parametrize(
+    "action",
+    [
+        SetVariable("b2", 3.1),
+        SetUnit(5.0),
+        SetLimits(OPTIMAL.limits),
+        Open(OPTIMAL),
+        Reset(),
+    ],
+)
+def test_the_design_belongs_to_the_run_while_it_goes_on(action: Action) -> None:
+    state = started()
+    for each in (state, CancelRun().apply(state)):
+        with pytest.raises(InputError, match=r"being optimised: wait .* or cancel"):
+            action.apply(each)
+    first = told_by(state.optimisation.run and state.optimisation.run.problem)
+    action.apply(ended_with(state, first))
+
+
+def test_the_platform_moves_freely_meanwhile_and_iterates_keep_its_position() -> None:
+    state = started(replace(SMALL, free=(*VARIABLES, YAW)))
+    run = state.optimisation.run
+    assert run is not None
+    moved = SetPosition(0, 6.0).apply(state)
+    last = told_by(run.problem)[-1]
+    after = Advance(run.number, (last,)).apply(moved)
+    assert after.pose.position[0] == 6.0
+    assert after.pose.quaternion == home_pose(last.design).quaternion
+    assert after.pose.quaternion != home_pose(run.own.design).quaternion
+    assert after.joints == opened(last.design, after.pose).joints
+    # Of another run nothing is shown.
+    assert Advance(run.number + 1, (last,)).apply(moved) == moved
+
+
+def test_opening_another_design_forgets_the_run_but_not_the_wish() -> None:
+    state = started()
+    first = told_by(state.optimisation.run and state.optimisation.run.problem)
+    after = Open(OPTIMAL).apply(ended_with(state, first))
+    assert after.optimisation.run is None
+    assert after.optimisation.wish == SMALL
+    again = StartRun().apply(after).optimisation.run
+    assert again is not None
+    assert again.number == 2
+
+
+SWINGING = msgspec.structs.replace(
+    OPTIMAL, limits=msgspec.structs.replace(OPTIMAL.limits, swing=Swing(a1=30.0))
+)
+
+
+@pytest.mark.parametrize(
+    ("wish", "words"),
+    [
+        (Wish(volume=float("nan")), "volume demanded must be"),
+        (Wish(volume=-1.0), "volume demanded must be"),
+        (Wish(objective="largest-volume", reach=0.0), "reach demanded must be"),
+        (Wish(clearance=-0.1), "clearance demanded must be"),
+        (Wish(free=()), "nothing may change"),
+        (
+            Wish(with_box=True, box=((1.0, 1.0, 1.0), (2.0, 0.0, 2.0))),
+            "required box",
+        ),
+    ],
+)
+def test_what_cannot_be_asked_is_told_in_one_line_and_nothing_is_lost(
+    bench: Bench, wish: Wish, words: str
+) -> None:
+    before = bench.state
+    after = bench.do(SetWish(wish), StartRun())
+    assert after.optimisation.run is None
+    assert after.optimisation.refusal is not None
+    assert words in after.optimisation.refusal
+    assert "\n" not in after.optimisation.refusal
+    assert words in bench.panel._words.content
+    assert bench.panel._words.visible
+    assert stripped(after) == stripped(before)
+    # A new wish is a new beginning.
+    assert bench.do(SetWish(SMALL)).optimisation.refusal is None
+    assert not bench.panel._words.visible
+    assert not bench.complaints
+
+
+def test_a_design_whose_volume_has_no_gradient_is_told_of() -> None:
+    refusal = StartRun().apply(opened(SWINGING)).optimisation.refusal
+    assert refusal is not None
+    assert "swing" in refusal
+
+
+def test_what_the_process_refuses_leaves_the_design(bench: Bench) -> None:
+    before = stripped(bench.state)
+    run = bench.find(replace(SMALL, starts=0))
+    assert run.verdict is not None
+    assert run.verdict.status == "failed"
+    assert "number of starts" in run.verdict.message
+    assert stripped(bench.state) == before
+    assert not bench.reports
+
+
+def test_margins_ask_for_what_has_an_influence_on_them() -> None:
+    state = SetWish(Wish(objective="largest-margin")).apply(own())
+    assert {YAW, PLACE} <= {*state.optimisation.wish.free}
+    run = started(Wish(objective="largest-margin")).optimisation.run
+    assert run is not None
+    assert {"shift-x", "shift-y", "shift-z", YAW} <= {*run.problem.names}
+
+
+def test_only_what_is_chosen_may_change(bench: Bench) -> None:
+    run = bench.find(replace(SMALL, free=("a3x", "b1y")))
+    assert run.problem.names == ("a3x", "b1y")
+    assert run.best is not None
+    changed = [
+        name
+        for name, old, new in zip(
+            VARIABLES, paper_start().variables, run.best.design.variables, strict=True
+        )
+        if old != new
+    ]
+    assert changed == ["a3x", "b1y"]
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_what_is_suggested_suits_the_design(name: str) -> None:
+    state = opened(PRESETS[name])
+    design, home = state.design, home_pose(state.design)
+    volume = workspace_volume(design).volume
+    assert 1.05 * volume < wished_volume(state) < 2.3 * volume
+    same = SetWish(Wish(objective="smallest-reach")).apply(state)
+    assert wished_volume(same) == pytest.approx(volume, rel=1e-5)
+    assert wished_reach(state) == design.reach
+    box = wished_box(state)
+    assert box == box_within(design)
+    lows, highs = np.array(box)
+    assert (lows < home.position).all()
+    assert (home.position < highs).all()
+    for corner in corners_of(box):
+        assert slacks(constraints(design, home.rotation), corner).min() >= 0.0
+
+
+def test_the_required_box_is_drawn_where_it_is(bench: Bench) -> None:
+    wish = Wish(objective="largest-margin", free=(PLACE,))
+    assert box_shown(bench.state) is None
+    state = bench.do(SetWish(wish))
+    box = wished_box(state)
+    assert box_shown(state) == box
+    edges = edges_of(box)
+    sides = np.ptp(np.array(box), axis=0)
+    assert np.sort(np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)) == pytest.approx(
+        np.sort(np.repeat(sides, 4))
+    )
+    run = bench.find(wish)
+    assert run.best is not None
+    shown = box_shown(bench.state)
+    assert shown is not None
+    assert np.ptp(np.array(shown), axis=0) == pytest.approx(sides)
+    assert shown == run.problem.required_box_at(run.best.values)
+    assert shown != box
+
+
+def test_the_table_shows_old_and_new_and_their_difference(bench: Bench) -> None:
+    bench.find(replace(SMALL, clearance=0.2))
+    run = bench.wait_for_comparison()
+    found = run.comparison
+    assert found is not None
+    assert run.best is not None
+    margin = run.problem.demands.clearance_margin
+    assert found == compare(paper_start(), run.best.design, margin, (None, None))
+    rows = {row[0].partition(" ")[0]: row[1:] for row in rows_of(comparison_table(run))}
+    assert [number(cell) for cell in rows["volume"]] == pytest.approx(
+        [found.before.volume, 8000.0, 8000.0 - found.before.volume], abs=0.005
+    )
+    for index, name in enumerate(VARIABLES):
+        old, new = found.before.design.variables[index], found.after.design.variables[index]
+        assert [number(cell) for cell in rows[name]] == pytest.approx([old, new, new - old], 1e-3)
+        assert rows[name][2][0] == ("+" if new > old else "−")
+    assert [number(cell) for cell in rows["nodes"]] == [
+        found.before.node_count,
+        found.after.node_count,
+        found.after.node_count - found.before.node_count,
+    ]
+    assert number(rows["clearance"][1]) >= 0.198
+    assert number(rows["reach"][1]) == pytest.approx(run.best.design.reach, abs=1e-4)
+    assert bench.panel._table.content == comparison_table(run)
+
+
+def test_the_charts_are_of_one_start_and_of_what_was_asked() -> None:
+    state = started(ENDLESS)
+    run = state.optimisation.run
+    assert run is not None
+    assert curves_of(run) == []
+    iterates = told_by(run.problem, 3)
+    assert {each.run for each in iterates} == {0, 1, 2}
+    shown = Advance(run.number, iterates).apply(state).optimisation.run
+    assert shown is not None
+    reach, volume, spare = curves_of(shown)
+    last = [each for each in iterates if each.run == 2]
+    assert reach.values.tolist() == [each.objective for each in last]
+    assert volume.values.tolist() == [each.volume for each in last]
+    assert (volume.level, spare.level) == (7053.0, 0.0)
+    best = ended_with(state, iterates).optimisation.run
+    assert best is not None
+    assert best.best is not None
+    assert len(curves_of(best)[0].values) == sum(each.run == best.best.run for each in iterates)
+    x, y, level = data_of(volume)
+    assert x.tolist() == list(range(len(last)))
+    assert len(y) == len(level) == len(x)
+    small = started()
+    ran = small.optimisation.run
+    assert ran is not None
+    matched = ended_with(small, told_by(ran.problem)).optimisation.run
+    assert matched is not None
+    powers = curves_of(matched)[0].values
+    # Down to rounding, where exactly zero is drawn as the least power.
+    assert powers[0] == pytest.approx(np.log10(matched.iterates[0].objective))
+    assert -16.0 <= powers[-1] <= -10.0
+
+
+def test_a_design_changed_since_is_told_of() -> None:
+    state = started()
+    run = state.optimisation.run
+    assert run is not None
+    ended = ended_with(state, told_by(run.problem))
+    now = ended.optimisation.run
+    assert now is not None
+    assert now.verdict is not None
+    assert "by hand" not in verdict_words(ended, now, now.verdict)
+    changed = SetVariable("b2", 3.3).apply(replace(ended, hold="pose"))
+    assert "by hand" in verdict_words(changed, now, now.verdict)
+
+
+def test_an_unreachable_volume_is_told_with_the_largest_found(bench: Bench) -> None:
+    run = bench.find(replace(SMALL, volume=1e6, free=("b2", "b3")))
+    assert run.verdict is not None
+    assert run.verdict.status == "infeasible"
+    assert "largest found" in bench.panel._words.content
+    assert "No design keeps all demands" in bench.panel._words.content
+    assert bench.panel._decision.visible
