@@ -200,17 +200,17 @@ class Page:
         if client is None:
             return
         state = self.session.state
-        frame, region = Frame(state), state.view.workspace.region
         name = f"{state.design.name}-{exported_name(region, what).replace(' ', '-')}"
         self.worker.submit(
             ("export", client_id, what),
             "export_mesh",
-            (
-                state.design,
-                workspace_rows(frame),
-                tolerance_of(state),
-                region,
-                workspace_start(frame),
+            (state.design, rotation, tolerance_of(state), region, start, what, file_format),
+            lambda data: client.send_file_download(
+                f"{name}.{file_format}", data, save_immediately=True
+            ),
+            lambda problem: self._complain(problem, client_id),
+        )
+
     def _save_design(self, client_id: int | None) -> None:
         client = self._client(client_id)
         if client is not None:
@@ -220,15 +220,6 @@ class Page:
 
     def _client(self, client_id: int | None) -> viser.ClientHandle | None:
         return self._server.get_clients().get(-1 if client_id is None else client_id)
-
-                what,
-                file_format,
-            ),
-            lambda data: client.send_file_download(
-                f"{name}.{file_format}", data, save_immediately=True
-            ),
-            lambda problem: self._complain(problem, client_id),
-        )
 
     def _aim_initial_camera(self) -> None:
         eye, target = framing(Placed(self._frame), "isometric", aspect=1.2)
