@@ -13,8 +13,8 @@ from typing import Literal
 import numpy as np
 
 from explorer.app.jog import Jog
-from explorer.app.singular_view import SingularView
 from explorer.app.optimisation import Optimisation
+from explorer.app.singular_view import SingularView
 from explorer.design import JOINTS, Design
 from explorer.errors import InputError
 from explorer.home import home_pose
@@ -164,6 +164,7 @@ class State:
         gesture: What brought the platform to its pose; None where nothing moved it there,
             as after a change of the design.
         jog: The uncoupled motion that was last used.
+        optimisation: What is to be optimised, and how far that has got.
     """
 
     design: Design
@@ -171,13 +172,13 @@ class State:
     pose: Pose
     yaw_pitch_roll: Triple
     joints: Joints
-        optimisation: What is to be optimised, and how far that has got.
     mode: int
     hold: Hold = "pose"
     unclosed: Unclosed | None = None
     view: View = field(default_factory=View)
     gesture: Gesture | None = None
     jog: Jog | None = None
+    optimisation: Optimisation = field(default_factory=Optimisation)
 
     @property
     def jog_in_use(self) -> Jog | None:
@@ -185,7 +186,6 @@ class State:
         return self.jog if self.jog is not None and self.jog.pose == self.pose else None
 
     @property
-    optimisation: Optimisation = field(default_factory=Optimisation)
     def warn_below(self) -> float:
         """The length below which margins are warned of, in design units."""
         given = self.view.warn_below
