@@ -1,6 +1,7 @@
 """Workspaces as watertight meshes: the limits' primitive solids, combined by booleans.
 
-The only module that uses manifold3d. Each face remembers the limit that it comes from.
+The only module that uses manifold3d, but for `explorer.prototype.shapes`. Each face remembers
+the limit that it comes from.
 """
 
 from __future__ import annotations

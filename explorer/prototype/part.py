@@ -1,0 +1,62 @@
+"""A part of the prototype: a closed body of one piece, in the frame of what it moves with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from explorer.arrays import FloatArray
+from explorer.prototype.chains import BODIES
+from explorer.prototype.mass import Mass, mesh_mass
+from explorer.solid import Solid
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part, in design units.
+
+    Attributes:
+        name: Such as "cylinder 2"; each is there once.
+        body: What it moves with, one of `explorer.prototype.chains.BODIES`.
+        vertices: In the frame of the body, shape (n, 3).
+        faces: Indices of vertices, counter-clockwise from outside, shape (m, 3).
+    """
+
+    name: str
+    body: str
+    vertices: FloatArray
+    faces: NDArray[np.int32]
+
+    @property
+    def kind(self) -> str:
+        """Its name without a number, which tells its colour."""
+        return self.name.partition(" ")[0]
+
+    @property
+    def body_index(self) -> int:
+        """The index of its body."""
+        return BODIES.index(self.body)
+
+    @cached_property
+    def solid(self) -> Solid:
+        """The part as a closed mesh in its own frame."""
+        none = np.zeros(len(self.faces), dtype=np.int64)
+        return Solid(self.vertices, self.faces, none, (self.name,), 0.0)
+
+    @cached_property
+    def unit_mass(self) -> Mass:
+        """Its volume, centre and inertia at a density of 1, in design units."""
+        return mesh_mass(self.vertices, self.faces, 1.0)
+
+    def mass(self, density: float, unit_mm: float) -> Mass:
+        """Return its mass in kilograms and metres.
+
+        Args:
+            density: In kg/m³.
+            unit_mm: Millimetres in a design unit.
+        """
+        metres = 1e-3 * unit_mm
+        return self.unit_mass.scaled(metres, density * metres**3)
