@@ -11,13 +11,16 @@ from pathlib import Path
 
 from playwright.sync_api import Browser
 
-from explorer.app.actions import Action, SetJoint, SetLimits, SetView
+from explorer.app.actions import Action, Open, SetJoint, SetLimits, SetView
+from explorer.app.optimisation import Wish
+from explorer.app.optimising import SetWish, StartRun
 from explorer.app.scene.camera import ViewName
 from explorer.app.screenshot import headless_browser, picture
 from explorer.app.server import Running
 from explorer.app.state import View, WorkspaceView
 from explorer.design import JOINTS
 from explorer.design_file import PRESETS
+from explorer.optimise.findings import CLEARANCE, PAPER_VOLUME, paper_start
 from explorer.pose import Pose
 from explorer.radii import with_radius
 
@@ -37,6 +40,7 @@ class Scene:
         actions: Done before the picture is taken.
         view: From where to look.
         panels: Whether the panels are in the picture.
+        tab: To which they are turned; the first one if None.
         size: Width and height in pixels.
     """
 
@@ -44,6 +48,7 @@ class Scene:
     actions: tuple[Action, ...] = ()
     view: ViewName = "isometric"
     panels: bool = False
+    tab: str | None = None
     size: tuple[int, int] = (1280, 800)
 
 
@@ -94,6 +99,18 @@ SCENES = {
             SetView(replace(BARE, workspace=WorkspaceView(solid=True, region="reachable"))),
         ),
     ),
+    # The paper's problem; a search is the same each time, so that its end can be shown.
+    "optimise": Scene(
+        actions=(
+            Open(paper_start()),
+            SetView(BARE),
+            SetWish(Wish(volume=PAPER_VOLUME, clearance=CLEARANCE)),
+            StartRun(),
+        ),
+        panels=True,
+        tab="Optimise",
+        size=(1280, 1190),
+    ),
 }
 
 
@@ -111,6 +128,7 @@ def draw(browser: Browser, scene: Scene) -> bytes:
         view=scene.view,
         size=scene.size,
         panels=scene.panels,
+        tab=scene.tab,
         prepare=prepare,
     )
 

@@ -44,6 +44,8 @@ TITLE = "Flagged 4-4 explorer"
 BRAND = (24, 74, 150)
 # One complaint is shown this long, and not again within it.
 COMPLAINT_SECONDS = 6.0
+# Between two looks at a run that is waited for.
+WAIT_SECONDS = 0.02
 VIEW_LABELS: dict[str, ViewName] = {name.capitalize(): name for name in get_args(ViewName)}
 
 
@@ -118,9 +120,15 @@ class Page:
         self.optimiser.stop()
 
     def wait_until_drawn(self, timeout: float = 30.0) -> bool:
-        """Wait until the newest state and its workspace are drawn; say whether they are."""
+        """Wait until the newest state and its workspace are drawn; say whether they are.
+
+        A run of the optimiser is waited for too.
+        """
         deadline = time.monotonic() + timeout
-        idle = True
+        idle = self.session.wait_until_idle(timeout)
+        while self.session.state.optimisation.is_on and time.monotonic() < deadline:
+            time.sleep(WAIT_SECONDS)
+        idle = idle and self.optimiser.worker.wait_until_idle(deadline - time.monotonic())
         # Drawing may ask the worker, whose answer is drawn again.
         for _ in range(2):
             idle = idle and self.session.wait_until_idle(deadline - time.monotonic())

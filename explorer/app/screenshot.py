@@ -84,9 +84,12 @@ def picture(
     view: ViewName,
     size: tuple[int, int],
     panels: bool = False,
+    tab: str | None = None,
     prepare: Callable[[Running], None] | None = None,
 ) -> bytes:
     """Return a picture as `take` writes it, from a browser that serves for many.
+
+    The panels may be turned to a tab by its name.
 
     Raises:
         PictureError: the browser did not draw in time.
@@ -100,6 +103,8 @@ def picture(
         try:
             if not panels:
                 page.add_style_tag(content=SCENE_ALONE)
+            if tab is not None:
+                page.get_by_role("tab", name=tab, exact=True).first.click()
             # The size of the canvas, and with it the framing, is known only then.
             settle(page, client)
             running.page.point_cameras(view)

@@ -130,7 +130,8 @@ def _series() -> tuple[uplot.Series, ...]:
         "label": "value",
         "stroke": css(FAR),
         "width": 2.0,
-        "points": {"show": True, "size": 5, "fill": css(FAR)},
+        # Shown where they are apart.
+        "points": {"size": 5, "fill": css(FAR)},
     }
     level: uplot.Series = {
         "label": "level",
@@ -158,5 +159,5 @@ def _scales(curve: Curve) -> dict[str, uplot.Scale]:
 def _axes() -> tuple[uplot.Axis, uplot.Axis]:
     return (
         {"gap": 3, "ticks": {"size": 4}, "font": FONT, "size": 20, "space": 40},
-        {"gap": 3, "ticks": {"size": 4}, "font": FONT, "size": 50, "space": 22},
+        {"gap": 3, "ticks": {"size": 4}, "font": FONT, "size": 50, "space": 16},
     )

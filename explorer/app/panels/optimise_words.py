@@ -78,7 +78,7 @@ def verdict_words(state: State, run: Run, verdict: Verdict) -> str:
     return (
         f'{BOX}<div style="font-size:15px;font-weight:600;color:{colour};margin-bottom:2px">'
         f"{title}</div><div>{escape(message)}</div>"
-        f'<div style="{DIM};font-size:11.5px">{" · ".join(facts)}</div></div>'
+        f'<div style="{DIM};font-size:11.5px;margin-bottom:6px">{" · ".join(facts)}</div></div>'
     )
 
 

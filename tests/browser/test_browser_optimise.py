@@ -1,0 +1,50 @@
+"""Optimising in a real page: one press, live charts, the verdict in every tab, and its files."""
+
+from __future__ import annotations
+
+from conftest import OpenTab
+from playwright.sync_api import expect
+
+from explorer.design_file import PRESETS, decode_design
+from explorer.workspace import workspace_volume
+
+OPTIMAL = PRESETS["paper-optimal"]
+
+
+def test_one_press_finds_a_design_that_is_seen_in_every_tab_and_accepted(
+    open_tab: OpenTab,
+) -> None:
+    tab, other = open_tab(), open_tab()
+    for each in (tab, other):
+        each.turn_to("Optimise")
+    expect(tab.page.get_by_role("button", name="Accept", exact=True)).to_be_hidden()
+    tab.choose("Objective", "smallest reach for a volume")
+    expect(tab.field("Volume")).to_have_value("7053.04")
+    tab.push("Optimise")
+    # The process starts first, so that there is time to change one's mind in any tab.
+    other.page.get_by_role("button", name="Cancel", exact=True).wait_for()
+    tab.page.get_by_text("Found", exact=True).wait_for()
+    found = tab.state.design
+    assert workspace_volume(found).volume >= 7053.04 * (1.0 - 1e-6)
+    assert found.reach < 17.9
+    reaches = (OPTIMAL.reach, found.reach, found.reach - OPTIMAL.reach)
+    for each in (tab, other):
+        expect(each.page.get_by_text(f"Reach = {found.reach:.6g}")).to_be_visible()
+        expect(each.page.locator(".uplot canvas:visible")).to_have_count(3)
+        for value in reaches:
+            text = f"{value:.4f}".replace("-", "−")
+            expect(each.page.get_by_role("cell", name=text, exact=True)).to_be_visible()
+
+    with tab.page.expect_download() as hull:
+        tab.push("Export hull")
+    assert hull.value.suggested_filename == "paper-optimal-optimised-hull.3mf"
+    with tab.page.expect_download() as saved:
+        tab.push("Save design")
+    assert decode_design(saved.value.path().read_bytes(), "saved") == found
+
+    other.push("Accept")
+    for each in (tab, other):
+        expect(each.page.get_by_role("button", name="Revert", exact=True)).to_be_hidden()
+        expect(each.page.get_by_text("accepted")).to_be_visible()
+    assert tab.state.design == found
+    assert tab.state.base == OPTIMAL
