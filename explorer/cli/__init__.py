@@ -26,7 +26,7 @@ COMMANDS: Mapping[str, str] = {
     "interference": "Tell how far the legs keep from each other, in a pose or over a move.",
     "path": "Plan a path between two poses that keeps limits, margins and clearances.",
     "workspace": "Measure the workspace: exact volume and gradient, the paper's nodes, a mesh.",
-    "optimise": "Look for the best design: a volume to match, the smallest reach, …",
+    "optimise": "Look for the best design by SQP: a volume to match, the smallest reach or others.",
     "export": "Write the workspace as a mesh, or the mechanism for simulation.",
     "screenshot": "Draw a pose into a PNG file.",
 }

@@ -60,7 +60,9 @@ def _words(option: str, metavar: str) -> PrimitiveConstructorSpec[Any]:
 
 @dataclass(frozen=True, kw_only=True)
 class Optimise(JsonOptions, DesignOptions):
-    """Look for the best design from a given one, by SQP with exact gradients.
+    """Look for the best design by SQP: a volume to match, the smallest reach or others.
+
+    The gradients are exact, and the search begins at a given design.
 
     The limits of the design hold throughout. A design is called found only if all demands hold
     and it cannot get better nearby; otherwise the exit status is 1, and the best so far is told.
