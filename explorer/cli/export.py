@@ -21,13 +21,14 @@ _OF_BODIES = "(simulation; default: 1240, printed PLA)"
 
 @dataclass(frozen=True, kw_only=True)
 class Export(JsonOptions, OrientationOptions, DesignOptions):
-    """Write the workspace as a mesh, or the mechanism for simulation.
+    """Write the workspace as a mesh, or the mechanism as parts or for simulation.
 
     Meshes have the coordinates of the base frame in millimetres; GLB is in metres, as it must
-    be. The simulation is an MJCF model in metres: every joint, closed loops, six servos.
+    be. The mechanism is its parts, assembled in the home pose; as `stl-zip` each in a file of
+    its own. The simulation is an MJCF model in metres: every joint, closed loops, six servos.
     """
 
-    what: Annotated[Literal["workspace", "hull", "simulation"], tyro.conf.Positional]
+    what: Annotated[Literal["workspace", "hull", "mechanism", "simulation"], tyro.conf.Positional]
     """What to write."""
 
     out: Path
@@ -36,7 +37,7 @@ class Export(JsonOptions, OrientationOptions, DesignOptions):
     format: Annotated[
         str | None,
         tyro.conf.arg(
-            metavar="3mf|stl|glb|obj|ply|mjcf",
+            metavar="3mf|stl|glb|obj|ply|stl-zip|mjcf",
             help_behavior_hint="(default: the suffix of the file)",
         ),
     ] = None
@@ -103,6 +104,29 @@ def _mesh(command: Export, file_format: str, check: Callable[[], None]) -> Facts
     return {"format": file_format, "volume": solid.volume, "triangles": len(solid.faces)}
 
 
+def _mechanism(command: Export, file_format: str, check: Callable[[], None]) -> Facts:
+    from explorer.export.assembly import check_format, write_assembly
+    from explorer.prototype.assembly import make_prototype
+
+    command.refuse("tolerance", "density", "quaternion", "yaw_pitch_roll")
+    file_format = "stl-zip" if file_format == "zip" else file_format
+    check_format(file_format)
+    check()
+    prototype = make_prototype(command.load())
+    write_assembly(prototype, command.out, file_format)
+    unit = prototype.design.unit_mm
+    parts = [
+        {
+            "name": part.name,
+            "volume_mm3": part.unit_mass.mass * unit**3,
+            "triangles": len(part.faces),
+        }
+        for part in prototype.parts
+    ]
+    strokes = [list(stroke) for stroke in prototype.sizes.strokes]
+    return {"format": file_format, "parts": parts, "strokes_mm": strokes}
+
+
 def _simulation(command: Export, file_format: str, check: Callable[[], None]) -> Facts:
     from explorer.export.simulation import DENSITY, write_simulation
     from explorer.prototype.chains import BODIES, CHAIN_JOINTS
@@ -116,5 +140,5 @@ def _simulation(command: Export, file_format: str, check: Callable[[], None]) ->
 
 
 _WRITERS: Mapping[str, Callable[[Export, str, Callable[[], None]], Facts]] = MappingProxyType(
-    {"workspace": _mesh, "hull": _mesh, "simulation": _simulation}
+    {"workspace": _mesh, "hull": _mesh, "mechanism": _mechanism, "simulation": _simulation}
 )

@@ -109,7 +109,7 @@ def colour_of(limit: str) -> Rgb:
     return COLOURS.get(limit.partition(" ")[0], HULL_COLOUR)
 
 
-def _design_json(design: Design) -> str:
+def design_json(design: Design) -> str:
     """Return the design as JSON on one line, in ASCII."""
     return json.dumps(json.loads(msgspec.json.encode(design)))
 
@@ -172,7 +172,7 @@ def _ply(solid: Solid, design: Design, name: str) -> bytes:
         f"comment name {json.dumps(name)[1:-1]}",
         "comment unit millimetre",
         *(f"comment colour {_spaced(colour_of(limit))} {_ascii(limit)}" for limit in solid.limits),
-        f"comment design {_design_json(design)}",
+        f"comment design {design_json(design)}",
         f"element vertex {len(solid.vertices)}",
         *(f"property double {axis}" for axis in "xyz"),
         f"element face {len(solid.faces)}",
@@ -192,7 +192,7 @@ def _obj(solid: Solid, design: Design, name: str) -> bytes:
     lines = [
         f"# {APPLICATION}",
         "# unit millimetre",
-        f"# design {_design_json(design)}",
+        f"# design {design_json(design)}",
         f"o {_ascii(name).replace(' ', '_')}",
         *(f"v {_spaced(point)}" for point in _millimetres(solid, design).tolist()),
     ]
@@ -208,7 +208,7 @@ def _glb(solid: Solid, design: Design, name: str) -> bytes:
     points = _single(_millimetres(solid, design) * 1e-3, solid, "glb")
     positions = points.astype("<f4").tobytes()
     indices = solid.faces.astype("<u4").tobytes()
-    red, green, blue = (_linear(channel) for channel in HULL_COLOUR)
+    red, green, blue = (linear(channel) for channel in HULL_COLOUR)
     quarter = math.sqrt(0.5)
     scene: dict[str, Any] = {
         "asset": {
@@ -218,7 +218,7 @@ def _glb(solid: Solid, design: Design, name: str) -> bytes:
                 "unit": "metre; millimetres of the base frame times 0.001",
                 "up": "the node turns the base frame, whose z is up, to y up",
                 "unit_mm": design.unit_mm,
-                "design": json.loads(_design_json(design)),
+                "design": json.loads(design_json(design)),
             },
         },
         "scene": 0,
@@ -267,9 +267,13 @@ def _glb(solid: Solid, design: Design, name: str) -> bytes:
         ],
         "buffers": [{"byteLength": len(positions) + len(indices)}],
     }
+    return pack_glb(scene, positions + indices)
+
+
+def pack_glb(scene: Mapping[str, Any], binary: bytes) -> bytes:
+    """Return a GLB file of a glTF scene and its one buffer, a multiple of four bytes."""
     text = json.dumps(scene).encode()
     text += b" " * (-len(text) % 4)
-    binary = positions + indices
     length = 12 + 8 + len(text) + 8 + len(binary)
     return b"".join(
         [
@@ -300,14 +304,7 @@ def _3mf(solid: Solid, design: Design, name: str) -> bytes:
         wrapper = library.get_wrapper()
         model = wrapper.CreateModel()
         model.SetUnit(library.ModelUnit.MilliMeter)
-        about = model.GetMetaDataGroup()
-        for key, value in (
-            ("Title", name),
-            ("Application", APPLICATION),
-            ("Description", f"{name}; one design unit is {design.unit_mm:g} mm"),
-        ):
-            about.AddMetaData("", key, value, "xs:string", True)
-        about.AddMetaData(NAMESPACE, "design", _design_json(design), "xs:string", True)
+        describe(model, name, design)
         mesh = model.AddMeshObject()
         mesh.SetName(name)
         corners = np.ascontiguousarray(points, dtype="<f4")
@@ -339,6 +336,18 @@ def _3mf(solid: Solid, design: Design, name: str) -> bytes:
         raise ExplorerError(f"lib3mf refuses the mesh: {error}") from None
 
 
+def describe(model: Any, name: str, design: Design) -> None:
+    """Add what a model of lib3mf is of: its name, the application and the design."""
+    about = model.GetMetaDataGroup()
+    for key, value in (
+        ("Title", name),
+        ("Application", APPLICATION),
+        ("Description", f"{name}; one design unit is {design.unit_mm:g} mm"),
+    ):
+        about.AddMetaData("", key, value, "xs:string", True)
+    about.AddMetaData(NAMESPACE, "design", design_json(design), "xs:string", True)
+
+
 def _ascii(text: str) -> str:
     return text.encode("ascii", "replace").decode()
 
@@ -348,7 +357,7 @@ def _spaced(values: Iterable[float]) -> str:
     return " ".join(map(repr, values))
 
 
-def _linear(channel: int) -> float:
+def linear(channel: int) -> float:
     """Return a channel of sRGB, 0 to 255, as linear light."""
     share = channel / 255.0
     return share / 12.92 if share <= 0.04045 else ((share + 0.055) / 1.055) ** 2.4

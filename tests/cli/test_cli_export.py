@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 import trimesh
 
@@ -98,8 +99,8 @@ def test_an_existing_file_survives_a_refusal(
 def test_what_to_write_and_where_must_be_given(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["export", "workspace"]) == 2
     assert "missing --out" in capsys.readouterr().err
-    assert run(["export", "mechanism", "--out", "x.stl"]) == 2
-    assert "workspace" in capsys.readouterr().err
+    assert run(["export", "manual", "--out", "x.stl"]) == 2
+    assert "mechanism" in capsys.readouterr().err
 
 
 def test_the_simulation_is_an_mjcf_model(
@@ -127,6 +128,10 @@ def test_the_simulation_is_an_mjcf_model(
         ("simulation", "model.xml", ["--quaternion", "1", "0", "0", "0"], "--quaternion is not"),
         ("simulation", "model.xml", ["--density", "-1"], "--density must be a positive number"),
         ("simulation", "missing/model.xml", [], "no folder"),
+        ("mechanism", "parts.stl", [], "there are 3mf, glb, stl-zip"),
+        ("mechanism", "parts.3mf", ["--density", "1000"], "--density is not for mechanism"),
+        ("mechanism", "parts.3mf", ["--yaw-pitch-roll", "1", "2", "3"], "--yaw-pitch-roll is not"),
+        ("mechanism", "missing/parts.3mf", [], "no folder"),
         ("hull", "hull.stl", ["--density", "1000"], "--density is not for hull"),
         ("hull", "hull.mjcf", [], "no mesh format 'mjcf'"),
     ],
@@ -145,3 +150,32 @@ def test_options_and_formats_belong_to_what_is_written(
     assert captured.err.count("\n") == 1
     assert words in captured.err
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(("name", "expected"), [("a.3mf", "3mf"), ("a.zip", "stl-zip")])
+def test_the_mechanism_is_written_as_parts(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, name: str, expected: str
+) -> None:
+    out = tmp_path / name
+    assert run(["export", "mechanism", "--out", str(out), "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert (answer["file"], answer["format"]) == (str(out), expected)
+    assert len(answer["parts"]) == 18
+    assert min(part["volume_mm3"] for part in answer["parts"]) > 1.0
+    assert all(low < high for low, high in answer["strokes_mm"])
+    assert 10_000 < out.stat().st_size < 2_000_000
+
+
+def test_a_design_too_tight_for_its_parts_has_no_file(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    design = tmp_path / "thick.json"
+    limits = explorer.Limits(leg_radii=(0.5, 0.5, 0.5, 0.5))
+    design.write_bytes(explorer.encode_design(msgspec.structs.replace(OPTIMAL, limits=limits)))
+    out = tmp_path / "parts.glb"
+    assert run(["export", "mechanism", "--out", str(out), "--design", str(design)]) == 2
+    captured = capsys.readouterr()
+    assert "carriages 2 and 3 at home are 6.69 mm apart and need 10.2 mm" in captured.err
+    assert "radius at most" in captured.err
+    assert captured.err.count("\n") == 1
+    assert not out.exists()
