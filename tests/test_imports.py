@@ -80,7 +80,7 @@ LAYERS = (
 )
 """Top-level modules and packages, from the ground up."""
 
-WITHOUT_VISER = ("app.state", "app.jobs")
+WITHOUT_VISER = ("app.state", "app.jobs", "app.optimiser")
 """The parts of the app whose logic runs without a browser."""
 
 SLOW = ("numba", "trimesh", "manifold3d", "playwright")

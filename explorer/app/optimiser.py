@@ -20,11 +20,11 @@ from explorer.app.state import Frame, State
 from explorer.optimise.outcome import Iterate, Outcome
 
 # Seconds between two iterates that are shown, and that one waits to be drawn at the most.
-PACE, LONGEST = 0.07, 0.5
+PACE, LONGEST = 0.07, 0.25
 # However many iterates wait, about so many steps show them.
 STEPS = 25
 # Seconds after which a search that was cancelled ends with its process.
-PATIENCE = 0.15
+PATIENCE = 0.1
 
 DIED = "the optimiser's process died; the design is as it was, and Optimise starts it again"
 
