@@ -21,6 +21,7 @@ from explorer.app.actions import (
     Open,
     Reset,
     SetAngle,
+    SetJoint,
     SetLimits,
     SetPosition,
     SetUnit,
@@ -327,6 +328,15 @@ def test_accept_keeps_the_result_and_reset_still_returns_to_the_design_opened(
     assert "accepted" in bench.panel._words.content
     assert bench.do(Revert()).design == after.design
     assert bench.do(Reset()).design == paper_start()
+
+
+def test_revert_brings_back_lengths_that_cannot_close_too() -> None:
+    asked = SetJoint(0, 25.0).apply(own())
+    assert asked.unclosed is not None
+    state = started(state=asked)
+    ended = ended_with(state, told_by(state.optimisation.run and state.optimisation.run.problem))
+    assert ended.unclosed is None
+    assert stripped(Revert().apply(ended)) == stripped(asked)
 
 
 def test_a_run_from_an_undecided_result_still_reverts_to_the_own_design() -> None:
