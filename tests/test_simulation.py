@@ -29,6 +29,7 @@ from explorer import (
 from explorer.arrays import FloatArray
 from explorer.design import Swing
 from explorer.export.simulation import simulation_joints, simulation_mjcf
+from explorer.prototype.assembly import make_prototype
 from explorer.prototype.chains import ACTUATED, BODIES, CHAIN_JOINTS, Chains
 from explorer.prototype.mass import ball, bar, mesh_mass, together
 from explorer.singularity import mode_of
@@ -317,6 +318,24 @@ def test_masses_grow_with_density_and_the_unit() -> None:
     np.testing.assert_allclose(twice.body_inertia, 32.0 * one.body_inertia, rtol=1e-9)
     dense = engine.MjModel.from_xml_string(simulation_mjcf(OPTIMAL, 2480.0))
     np.testing.assert_allclose(dense.body_mass, 2.0 * one.body_mass, rtol=1e-9)
+
+
+def test_masses_can_be_those_of_the_parts() -> None:
+    prototype = make_prototype(OPTIMAL)
+    masses = prototype.masses(2700.0)
+    model = engine.MjModel.from_xml_string(simulation_mjcf(OPTIMAL, masses=masses))
+    for name, mass in masses.items():
+        body = model.body(name)
+        assert body.mass[0] == pytest.approx(mass.mass, rel=1e-9)
+        np.testing.assert_allclose(body.ipos, mass.centre, atol=1e-12)
+        turn = np.empty(9)
+        engine.mju_quat2Mat(turn, body.iquat)
+        axes = turn.reshape(3, 3)
+        inertia = axes @ np.diag(body.inertia) @ axes.T
+        np.testing.assert_allclose(inertia, mass.inertia, atol=1e-6 * mass.inertia.max())
+    # All but the base: what moves weighs what its parts weigh.
+    volume = sum(part.solid.volume for part in prototype.parts[1:]) * 1e-6
+    assert float(model.body_mass.sum()) == pytest.approx(2700.0 * volume, rel=1e-9)
 
 
 def test_what_cannot_be_simulated_is_refused_with_what_would_work() -> None:

@@ -53,6 +53,12 @@ class Export(JsonOptions, OrientationOptions, DesignOptions):
     ] = None
     """Density of the bodies, in kg/m³."""
 
+    masses: Annotated[
+        Literal["bars", "parts"] | None,
+        tyro.conf.arg(help_behavior_hint="(simulation; default: bars)"),
+    ] = None
+    """What bodies weigh: bars as thick as the legs, or the parts of `export mechanism`."""
+
     def run(self) -> None:
         """Write the file, and what is in it.
 
@@ -90,7 +96,7 @@ Facts = dict[str, object]
 def _mesh(command: Export, file_format: str, check: Callable[[], None]) -> Facts:
     from explorer.export.mesh import check_format, write_mesh
 
-    command.refuse("density")
+    command.refuse("density", "masses")
     check_format(file_format)
     check()
     design = command.load()
@@ -108,7 +114,7 @@ def _mechanism(command: Export, file_format: str, check: Callable[[], None]) -> 
     from explorer.export.assembly import check_format, write_assembly
     from explorer.prototype.assembly import make_prototype
 
-    command.refuse("tolerance", "density", "quaternion", "yaw_pitch_roll")
+    command.refuse("tolerance", "density", "masses", "quaternion", "yaw_pitch_roll")
     file_format = "stl-zip" if file_format == "zip" else file_format
     check_format(file_format)
     check()
@@ -135,7 +141,13 @@ def _simulation(command: Export, file_format: str, check: Callable[[], None]) ->
     if file_format not in ("mjcf", "xml"):
         raise InputError(f"no simulation format {file_format!r}; there is mjcf")
     check()
-    write_simulation(command.load(), command.out, command.density or DENSITY)
+    design, density = command.load(), command.density or DENSITY
+    masses = None
+    if command.masses == "parts":
+        from explorer.prototype.assembly import make_prototype
+
+        masses = make_prototype(design).masses(density)
+    write_simulation(design, command.out, density, masses)
     return {"format": "mjcf", "bodies": list(BODIES[1:]), "joints": [*CHAIN_JOINTS, "platform"]}
 
 

@@ -79,8 +79,9 @@ def simulation_mjcf(
     Args:
         design: The manipulator.
         density: Of the bodies, in kg/m³.
-        masses: Of the bodies in their own frames, in metres and kilograms; those of bars
-            with the legs' radii if None.
+        masses: Of the bodies in their own frames, in metres and kilograms, such as those of
+            the parts, see `explorer.prototype.assembly.Prototype.masses`; those of bars with
+            the legs' radii if None.
 
     Raises:
         InputError: a density that is not positive, a home pose in which a leg has no
@@ -91,13 +92,18 @@ def simulation_mjcf(
     return _Model(design, density, masses).text()
 
 
-def write_simulation(design: Design, path: Path, density: float = DENSITY) -> None:
+def write_simulation(
+    design: Design,
+    path: Path,
+    density: float = DENSITY,
+    masses: Mapping[str, Mass] | None = None,
+) -> None:
     """Write the model into a file, whole or not at all.
 
     Raises:
         InputError: as of `simulation_mjcf`, or a file that cannot be written.
     """
-    write_whole(path, simulation_mjcf(design, density).encode())
+    write_whole(path, simulation_mjcf(design, density, masses).encode())
 
 
 class _Model:

@@ -107,6 +107,7 @@ def test_the_simulation_is_an_mjcf_model(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     from explorer.export.simulation import simulation_mjcf
+    from explorer.prototype.assembly import make_prototype
 
     out = tmp_path / "model.xml"
     assert run(["export", "simulation", "--out", str(out), "--json"]) == 0
@@ -118,6 +119,9 @@ def test_the_simulation_is_an_mjcf_model(
     assert run(["export", "simulation", "--out", str(out), *words]) == 0
     assert out.read_text(encoding="utf-8") == simulation_mjcf(OPTIMAL, 2700.0)
     assert capsys.readouterr().out == f"{out}\n"
+    assert run(["export", "simulation", "--out", str(out), "--masses", "parts"]) == 0
+    masses = make_prototype(OPTIMAL).masses(1240.0)
+    assert out.read_text(encoding="utf-8") == simulation_mjcf(OPTIMAL, masses=masses)
 
 
 @pytest.mark.parametrize(
@@ -131,6 +135,7 @@ def test_the_simulation_is_an_mjcf_model(
         ("mechanism", "parts.stl", [], "there are 3mf, glb, stl-zip"),
         ("mechanism", "parts.3mf", ["--density", "1000"], "--density is not for mechanism"),
         ("mechanism", "parts.3mf", ["--yaw-pitch-roll", "1", "2", "3"], "--yaw-pitch-roll is not"),
+        ("mechanism", "parts.3mf", ["--masses", "parts"], "--masses is not for mechanism"),
         ("mechanism", "missing/parts.3mf", [], "no folder"),
         ("hull", "hull.stl", ["--density", "1000"], "--density is not for hull"),
         ("hull", "hull.mjcf", [], "no mesh format 'mjcf'"),
