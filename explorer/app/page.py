@@ -19,10 +19,12 @@ from explorer.app.panels.jog import JogPanel
 from explorer.app.panels.legs import LegsPanel
 from explorer.app.panels.move import MovePanel
 from explorer.app.panels.optimise import OptimisePanel
+from explorer.app.panels.paths import PathsPanel
 from explorer.app.panels.singularity import SingularityPanel
 from explorer.app.panels.view import ViewPanel
 from explorer.app.panels.workspace import WorkspacePanel, tolerance_of
 from explorer.app.panels.workspace_numbers import WorkspaceNumbers
+from explorer.app.path_runner import PathRunner
 from explorer.app.scene import Scene
 from explorer.app.scene.camera import Cameras, ViewName, framing
 from explorer.app.scene.placing import Placed, scene_scale
@@ -37,6 +39,7 @@ from explorer.app.workspace_feed import (
     workspace_start,
 )
 from explorer.design_file import encode_design
+from explorer.export.trajectory import trajectory_csv
 from explorer.home import home_pose
 from explorer.pose import Pose, Triple
 
@@ -68,6 +71,7 @@ class Page:
         self.feed = WorkspaceFeed(self.worker, self.session.redraw)
         self.radius_feed = RadiusFeed(self.worker, self.session.redraw)
         self.strata_feed = StrataFeed(self.worker, self.session.redraw)
+        self.path_runner = PathRunner(self.session, lambda message: self._complain(message, None))
         gui = server.gui
         gui.configure_theme(
             show_logo=False, show_share_button=False, control_width="large", brand_color=BRAND
@@ -100,7 +104,9 @@ class Page:
             self._numbers = WorkspaceNumbers(gui)
         with side.add_tab("Legs"):
             self._legs = LegsPanel(gui, self.session)
-        self._panels = (move, jog, design, view)
+        with side.add_tab("Paths"):
+            paths = PathsPanel(gui, self.session, self._save_path)
+        self._panels = (move, jog, design, view, paths)
         if docked:
             gui.main_panel.dock_right()
             gui.main_panel.set_width(350)
@@ -116,6 +122,7 @@ class Page:
     def stop(self) -> None:
         """End the session and the worker."""
         self.session.stop()
+        self.path_runner.stop()
         self.worker.stop()
         self.optimiser.stop()
 
@@ -165,6 +172,7 @@ class Page:
         updates.extend(self._singularity.updates(frame, self.strata_feed))
         self._assigner.assign(updates)
         self.optimiser.follow(frame)
+        self.path_runner.follow(frame)
 
     def _placed(self) -> Placed:
         drawing = self.feed.drawing
@@ -225,6 +233,13 @@ class Page:
             design = self.session.state.design
             data = encode_design(design)
             client.send_file_download(f"{design.name}.json", data, save_immediately=True)
+
+    def _save_path(self, client_id: int | None) -> None:
+        client, journey = self._client(client_id), self.session.state.journey
+        if client is not None and journey is not None:
+            data = trajectory_csv(journey.trajectory).encode()
+            name = f"{journey.design.name}-path.csv"
+            client.send_file_download(name, data, save_immediately=True)
 
     def _client(self, client_id: int | None) -> viser.ClientHandle | None:
         return self._server.get_clients().get(-1 if client_id is None else client_id)

@@ -14,6 +14,7 @@ import numpy as np
 
 from explorer.app.jog import Jog
 from explorer.app.optimisation import Optimisation
+from explorer.app.paths import Journey, Paths
 from explorer.app.singular_view import SingularView
 from explorer.design import JOINTS, Design
 from explorer.errors import InputError
@@ -164,6 +165,7 @@ class State:
         gesture: What brought the platform to its pose; None where nothing moved it there,
             as after a change of the design.
         jog: The uncoupled motion that was last used.
+        paths: The path that is played, and what is stored to plan one.
         optimisation: What is to be optimised, and how far that has got.
     """
 
@@ -178,12 +180,19 @@ class State:
     view: View = field(default_factory=View)
     gesture: Gesture | None = None
     jog: Jog | None = None
+    paths: Paths = field(default_factory=Paths)
     optimisation: Optimisation = field(default_factory=Optimisation)
 
     @property
     def jog_in_use(self) -> Jog | None:
         """The uncoupled motion that brought the platform here; None once it is elsewhere."""
         return self.jog if self.jog is not None and self.jog.pose == self.pose else None
+
+    @property
+    def journey(self) -> Journey | None:
+        """The path at hand; None where it was made for another design."""
+        journey = self.paths.journey
+        return journey if journey is not None and journey.design == self.design else None
 
     @property
     def warn_below(self) -> float:

@@ -18,6 +18,7 @@ from explorer.app.scene.flags import Flags
 from explorer.app.scene.jog import JogScene
 from explorer.app.scene.legs import Legs, TwinLegs
 from explorer.app.scene.marks import DragHandle, Ghosts, Labels
+from explorer.app.scene.path import PathScene
 from explorer.app.scene.placing import Placed
 from explorer.app.scene.required_box import RequiredBox
 from explorer.app.scene.singular import BallScene, EllipsoidScene, NearestGhost
@@ -59,6 +60,7 @@ class Scene:
             EllipsoidScene(scene),
             BallScene(scene),
             JogScene(scene),
+            PathScene(scene),
             self.drag_handle,
         )
 

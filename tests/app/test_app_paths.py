@@ -1,0 +1,388 @@
+"""Paths on the page: between modes, planned, played, plotted and exported; no browser."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import signal
+import time
+from collections.abc import Callable, Generator
+from typing import Any
+
+import numpy as np
+import pytest
+import viser
+from desk import Desk
+
+from explorer.app.actions import SetLimits, SetPose, SetPosition, SetVariable
+from explorer.app.panels.margin_plot import columns_of, crossing_time, path_words
+from explorer.app.panels.paths import PathsPanel, ends_table, plan_words
+from explorer.app.path_actions import (
+    Advance,
+    CancelPlan,
+    ChooseModes,
+    Plan,
+    Play,
+    SetPathTime,
+    SetPlanSeconds,
+    StoreEnd,
+    TakePlan,
+    WatchModes,
+    chosen_modes,
+)
+from explorer.app.path_runner import DIED, PathRunner
+from explorer.app.path_tasks import plan
+from explorer.app.paths import MODES_SECONDS, Journey
+from explorer.app.scene.path import PathScene
+from explorer.app.scene.placing import Placed
+from explorer.app.session import Session
+from explorer.app.state import Frame, State, joints_of, opened
+from explorer.app.viser_gaps import start_viser, stop_viser
+from explorer.design_file import PRESETS
+from explorer.errors import ExplorerError, InputError
+from explorer.kinematics import forward
+from explorer.pose import Pose
+from explorer.radii import with_radius
+from explorer.singularity import margins, mode_of
+from explorer.validity import poses_are_valid
+
+OPTIMAL = PRESETS["paper-optimal"]
+TILTED = Pose.of_yaw_pitch_roll((10.0, 5.0, 9.0), (-73.1, 12.0, 9.0))
+GOAL = Pose.of_yaw_pitch_roll((14.0, -2.0, 6.0), (-73.0, 10.0, 0.0))
+
+
+@pytest.fixture(scope="module")
+def server() -> Generator[viser.ViserServer]:
+    made = start_viser("127.0.0.1", 0)
+    yield made
+    stop_viser(made)
+
+
+@pytest.fixture
+def desk() -> Generator[Desk]:
+    made = Desk(opened(OPTIMAL))
+    yield made
+    made.session.stop()
+
+
+class Bench:
+    """A session whose frames a path runner follows."""
+
+    def __init__(self, state: State) -> None:
+        self.problems: list[str] = []
+        self.times: list[float] = []
+        self._runner: PathRunner | None = None
+        self.session = Session(state, self._draw, lambda m, _: self.problems.append(m), self._fail)
+        self._runner = self.runner = PathRunner(self.session, self.problems.append)
+
+    def _draw(self, frame: Frame) -> None:
+        if frame.state.journey is not None:
+            self.times.append(frame.state.journey.at)
+        if self._runner is not None:
+            self._runner.follow(frame)
+
+    def _fail(self, error: Exception) -> None:
+        raise error
+
+    def wait(self, condition: Callable[[State], bool]) -> State:
+        deadline = time.monotonic() + 60.0
+        while not condition(self.session.state):
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+        return self.session.state
+
+
+@pytest.fixture
+def bench() -> Generator[Bench]:
+    made = Bench(opened(OPTIMAL))
+    yield made
+    made.session.stop()
+    made.runner.stop()
+
+
+def watched(first: int, last: int, pose: Pose = TILTED) -> State:
+    state = ChooseModes(first, last).apply(opened(OPTIMAL, pose))
+    return WatchModes().apply(state)
+
+
+def journey_of(state: State) -> Journey:
+    assert state.journey is not None
+    return state.journey
+
+
+def with_ends(goal: Pose = GOAL) -> State:
+    state = StoreEnd("start").apply(opened(OPTIMAL))
+    return StoreEnd("goal").apply(SetPose(goal).apply(state))
+
+
+# Between modes
+
+
+@pytest.mark.parametrize(("first", "last"), list(itertools.permutations(range(0, 8, 3), 2)))
+def test_a_path_between_modes_leads_from_one_to_the_other_with_the_same_joints(
+    first: int, last: int
+) -> None:
+    state = watched(first, last)
+    journey = journey_of(state)
+    joints = joints_of(OPTIMAL, TILTED)
+    modes = forward(OPTIMAL, joints)
+    for pose, mode in zip(journey.poses, (first, last), strict=True):
+        np.testing.assert_allclose(pose.position, modes.position[mode], atol=1e-12)
+        assert int(mode_of(margins(pose.position, pose.rotation))) == mode
+    assert state.pose == journey.poses[0]
+    assert state.mode == first
+    assert journey.is_playing
+    end = SetPathTime(journey.trajectory.duration).apply(state)
+    assert end.pose == journey.poses[-1]
+    assert end.mode == last
+    assert end.joints == pytest.approx(joints, abs=1e-9)
+    # Every margin whose sign differs is crossed, and told.
+    crossed = {c.incidence for c in journey.margins.crossings if c.changes_sign}
+    assert {i for i, bit in enumerate((4, 2, 1), 1) if (first ^ last) & bit} <= crossed
+    words = path_words(journey)
+    for incidence in crossed:
+        assert f"κ{incidence} = 0" in words
+
+
+def test_the_modes_are_the_present_one_and_its_neighbour_until_they_are_chosen() -> None:
+    state = opened(OPTIMAL)
+    assert chosen_modes(state) == (1, 5)
+    assert chosen_modes(ChooseModes(3, 2).apply(state)) == (3, 2)
+    with pytest.raises(InputError, match=r"both are mode 4 \(\+ − −\)"):
+        WatchModes().apply(ChooseModes(4, 4).apply(state))
+
+
+def test_to_watch_again_on_the_way_takes_the_joints_of_its_ends() -> None:
+    state = SetPathTime(0.3 * MODES_SECONDS).apply(watched(1, 4))
+    again = WatchModes().apply(ChooseModes(1, 4).apply(state))
+    for pose, before in zip(journey_of(again).poses, journey_of(state).poses, strict=True):
+        np.testing.assert_allclose(pose.position, before.position, atol=1e-9)
+    # But elsewhere those of the present pose.
+    elsewhere = WatchModes().apply(SetPosition(0, 9.0).apply(state))
+    assert journey_of(elsewhere).poses[0] != journey_of(state).poses[0]
+
+
+def test_a_path_is_of_its_design() -> None:
+    state = watched(1, 5)
+    other = SetVariable("b2", 2.7).apply(state)
+    assert other.journey is None
+    for action in (SetPathTime(1.0), Play(True)):
+        with pytest.raises(InputError, match="no path for this design"):
+            action.apply(other)
+    assert Advance(1.0).apply(other) is other
+    assert SetVariable("b2", OPTIMAL.b2).apply(other).journey == state.journey
+
+
+# Playing
+
+
+def test_time_goes_on_while_a_path_is_played_and_stops_at_its_end() -> None:
+    state = watched(1, 5)
+    duration = journey_of(state).trajectory.duration
+    assert duration == pytest.approx(MODES_SECONDS)
+    for _ in range(4):
+        state = Advance(0.3 * duration).apply(state)
+        assert state.pose == journey_of(state).pose
+    assert (journey_of(state).at, journey_of(state).is_playing) == (duration, False)
+    assert Advance(1.0).apply(state) is state
+    again = Play(True).apply(state)
+    assert (journey_of(again).at, journey_of(again).is_playing) == (0.0, True)
+    paused = Play(False).apply(Advance(1.0).apply(again))
+    assert (journey_of(paused).at, journey_of(paused).is_playing) == (1.0, False)
+    assert journey_of(SetPathTime(1e9).apply(paused)).at == duration
+    assert journey_of(SetPathTime(-1.0).apply(paused)).at == 0.0
+    with pytest.raises(InputError, match="finite"):
+        SetPathTime(float("nan")).apply(paused)
+
+
+def test_a_runner_plays_in_real_time_and_rests_when_it_is_paused(bench: Bench) -> None:
+    bench.session.do(ChooseModes(1, 5))
+    bench.session.do(WatchModes())
+    began = time.monotonic()
+    state = bench.wait(lambda state: state.journey is not None and state.journey.at > 0.3)
+    passed = time.monotonic() - began
+    assert journey_of(state).at <= passed + 0.1
+    bench.session.do(Play(False))
+    bench.wait(lambda state: not journey_of(state).is_playing)
+    assert bench.session.wait_until_idle()
+    at = journey_of(bench.session.state).at
+    time.sleep(0.2)
+    assert journey_of(bench.session.state).at == at
+    assert bench.times == sorted(bench.times)
+
+
+# The chart
+
+
+@pytest.mark.parametrize(("first", "last", "at"), [(1, 5, 0.0), (0, 7, 3.0), (2, 4, 8.0)])
+def test_the_chart_shows_the_margins_over_time(first: int, last: int, at: float) -> None:
+    state = SetPathTime(at).apply(watched(first, last))
+    journey = journey_of(state)
+    x, k1, k2, k3, zero, crossed, now = columns_of(journey)
+    assert (np.diff(x) >= 0.0).all()
+    assert not zero.any()
+    shown = np.stack([k1, k2, k3], axis=1)
+    poses = [journey.pose_at(float(t)) for t in x]
+    exact = np.array([margins(pose.position, pose.rotation) for pose in poses])
+    np.testing.assert_allclose(shown, exact, atol=2e-2 * np.abs(exact).max())
+    times = [crossing_time(journey, i) for i in range(len(journey.margins.crossings))]
+    assert x[np.isfinite(crossed)].tolist() == pytest.approx(sorted(times))
+    for crossing, t in zip(journey.margins.crossings, times, strict=True):
+        pose = journey.pose_at(t)
+        assert abs(margins(pose.position, pose.rotation)[crossing.incidence - 1]) < 1e-2
+    assert x[np.isfinite(now)].tolist() == [journey.at, journey.at]
+
+
+def test_the_path_and_its_crossings_are_drawn(server: viser.ViserServer) -> None:
+    scene = PathScene(server.scene)
+    state = watched(1, 7)
+    drawn = {(h.name, n): v for h, n, v in scene.updates(Placed(Frame(state)))}
+    scale = Placed(Frame(state)).scale
+    line: Any = drawn["/path/line", "points"]
+    ends = [journey_of(state).poses[i].position for i in (0, -1)]
+    np.testing.assert_allclose([line[0, 0], line[-1, 1]], scale * np.array(ends), atol=1e-4)
+    crossings = journey_of(state).margins.crossings
+    balls: Any = drawn["/path/crossings", "batched_positions"]
+    expected = scale * np.array([c.pose.position for c in crossings])
+    np.testing.assert_allclose(balls[: len(crossings)], expected, atol=1e-4)
+    hidden = [v for _, n, v in scene.updates(Placed(Frame(opened(OPTIMAL)))) if n == "visible"]
+    assert hidden == [False, False]
+
+
+# Planning
+
+
+def test_planning_needs_both_ends_and_some_time() -> None:
+    with pytest.raises(InputError, match="store a start and a goal first"):
+        Plan().apply(opened(OPTIMAL))
+    with pytest.raises(InputError, match="store a goal first"):
+        Plan().apply(StoreEnd("start").apply(opened(OPTIMAL)))
+    for seconds in (0.0, -1.0, float("nan")):
+        with pytest.raises(InputError, match="above zero"):
+            SetPlanSeconds(seconds).apply(opened(OPTIMAL))
+    assert "14.0, −2.0, 6.0" in ends_table(with_ends())
+
+
+def test_a_plan_is_made_in_a_process_of_its_own_and_keeps_everything(bench: Bench) -> None:
+    bench.session.do(SetLimits(with_radius(OPTIMAL, 0.2).limits))
+    for action in (StoreEnd("start"), SetPose(GOAL), StoreEnd("goal"), Plan()):
+        bench.session.do(action)
+    state = bench.wait(lambda state: state.paths.request == 1 and not state.paths.is_planning)
+    assert state.paths.problem is None
+    journey = journey_of(state)
+    assert journey.kind == "plan"
+    assert state.pose == journey.poses[0] == state.paths.start
+    assert journey.poses[-1] == GOAL
+    assert not journey.margins.crossings
+    assert "No singularity on the way" in path_words(journey)
+    inner = [journey.pose_at(float(t)) for t in np.linspace(0, journey.trajectory.duration, 50)]
+    positions, rotations = ([p.position for p in inner], [p.rotation for p in inner])
+    assert poses_are_valid(state.design, np.array(positions), np.array(rotations)).all()
+    assert bench.runner.worker.process_id not in (None, os.getpid())
+
+
+def test_why_there_is_no_path_is_told(bench: Bench) -> None:
+    below = Pose((14.0, -2.0, -6.0), opened(OPTIMAL).pose.quaternion)
+    for action in (StoreEnd("start"), SetPose(below), StoreEnd("goal"), Plan()):
+        bench.session.do(action)
+    state = bench.wait(lambda state: state.paths.request == 1 and not state.paths.is_planning)
+    with pytest.raises(ExplorerError) as expected:
+        plan(OPTIMAL, opened(OPTIMAL).pose, below, 2.0)
+    assert state.paths.problem == str(expected.value)
+    words = plan_words(state)
+    assert words is not None
+    assert "The start is in mode 1" in words
+    assert state.journey is None
+
+
+def test_planning_is_cancelled_at_once_and_begun_again(bench: Bench) -> None:
+    for action in (StoreEnd("start"), SetPose(GOAL), StoreEnd("goal"), Plan()):
+        bench.session.do(action)
+    bench.wait(lambda state: state.paths.request == 1 and not state.paths.is_planning)
+    process = bench.runner.worker.process_id
+    assert process is not None
+    # One that would never be done.
+    os.kill(process, signal.SIGSTOP)
+    bench.session.do(Plan())
+    state = bench.wait(lambda state: state.paths.request == 2)
+    words = plan_words(state)
+    assert words is not None
+    assert "Planning, for 2 s at most" in words
+    bench.session.do(CancelPlan())
+    state = bench.wait(lambda state: not state.paths.is_planning)
+    assert bench.runner.worker.wait_until_idle(10.0)
+    assert bench.session.wait_until_idle()
+    state = bench.session.state
+    assert (state.paths.problem, state.journey) == (None, None)
+    bench.session.do(Plan())
+    state = bench.wait(lambda state: state.paths.request == 3 and not state.paths.is_planning)
+    assert journey_of(state).poses[-1] == GOAL
+    assert bench.runner.worker.process_id != process
+    assert bench.problems == []
+
+
+def test_an_answer_that_comes_late_or_for_another_design_is_not_taken() -> None:
+    state = Plan().apply(with_ends())
+    journey = Journey("plan", "", OPTIMAL, (opened(OPTIMAL).pose, GOAL))
+    for late in (CancelPlan().apply(state), Plan().apply(state)):
+        assert TakePlan(1, journey, None).apply(late) == late
+    assert TakePlan(1, journey, None).apply(state).pose == journey.poses[0]
+    changed = SetVariable("b2", 2.7).apply(state)
+    after = TakePlan(1, journey, None).apply(changed)
+    assert after.pose == changed.pose
+    assert after.paths.problem is not None
+    assert "design has changed" in after.paths.problem
+    failed = TakePlan(1, None, DIED).apply(state)
+    assert failed.paths.problem == DIED
+
+
+# The panel
+
+
+def test_the_panel_stores_plans_plays_and_exports(server: viser.ViserServer, desk: Desk) -> None:
+    saved: list[int | None] = []
+    panel = PathsPanel(server.gui, desk.session, saved.append)
+
+    def shown() -> dict[str, bool]:
+        visible = {
+            id(handle): value
+            for handle, name, value in panel.updates(Frame(desk.state))
+            if name == "visible"
+        }
+        names = ("plan", "cancel", "play", "pause", "export")
+        return {name: bool(visible[id(getattr(panel, name))]) for name in names}
+
+    def only(*names: str) -> dict[str, bool]:
+        return {name: name in names for name in ("plan", "cancel", "play", "pause", "export")}
+
+    assert shown() == only("plan")
+    desk.use(panel.store, "start")
+    desk.session.do(SetPose(GOAL))
+    desk.use(panel.store, "goal")
+    assert (desk.state.paths.start, desk.state.paths.goal) == (opened(OPTIMAL).pose, GOAL)
+    desk.click(panel.plan)
+    assert shown() == only("cancel")
+    desk.click(panel.cancel)
+    assert shown() == only("plan")
+    desk.session.do(ChooseModes(1, 5))
+    desk.session.do(WatchModes())
+    assert shown() == only("plan", "pause", "export")
+    desk.click(panel.pause)
+    assert shown() == only("plan", "play", "export")
+    for handle, name, value in panel.updates(Frame(desk.state)):
+        if handle is panel.time.handle:
+            setattr(handle, name, value)
+    desk.use(panel.time.handle, 2.5)
+    assert journey_of(desk.state).at == 2.5
+    assert desk.state.pose == journey_of(desk.state).pose
+    desk.click(panel.export)
+    assert saved == [1]
+
+
+def test_the_time_slider_ends_where_the_path_does(server: viser.ViserServer, desk: Desk) -> None:
+    panel = PathsPanel(server.gui, desk.session, lambda _: None)
+    disabled = {n: v for h, n, v in panel.updates(Frame(desk.state)) if h is panel.time.handle}
+    assert disabled["disabled"] is True
+    updates = {n: v for h, n, v in panel.updates(Frame(watched(1, 5))) if h is panel.time.handle}
+    assert updates["disabled"] is False
+    assert updates["max"] == pytest.approx(MODES_SECONDS, abs=0.011)
