@@ -37,11 +37,12 @@ class Export(JsonOptions, OrientationOptions, DesignOptions):
     format: Annotated[
         str | None,
         tyro.conf.arg(
-            metavar="3mf|stl|glb|obj|ply|stl-zip|mjcf",
+            metavar="3mf|stl|glb|obj|ply|step|stl-zip|mjcf",
             help_behavior_hint="(default: the suffix of the file)",
         ),
     ] = None
-    """The format: 3mf holds unit, names and colours, ply and obj double precision."""
+    """The format: 3mf holds unit, names and colours, ply and obj double precision, step (of
+    the workspace) its exact faces. STEP needs the extra `cad`."""
 
     tolerance: Annotated[
         float | None, positive("--tolerance"), tyro.conf.arg(help_behavior_hint=_OF_MESHES)
@@ -65,6 +66,7 @@ class Export(JsonOptions, OrientationOptions, DesignOptions):
         Raises:
             InputError: a design, option, format or file that cannot be used.
             NoAnswerError: the workspace is empty.
+            MissingExtraError: STEP without OpenCASCADE.
         """
         from explorer.export.files import check_writable
 
@@ -96,6 +98,8 @@ Facts = dict[str, object]
 def _mesh(command: Export, file_format: str, check: Callable[[], None]) -> Facts:
     from explorer.export.mesh import check_format, write_mesh
 
+    if command.what == "workspace" and file_format in ("step", "stp"):
+        return _step(command, check)
     command.refuse("density", "masses")
     check_format(file_format)
     check()
@@ -108,6 +112,18 @@ def _mesh(command: Export, file_format: str, check: Callable[[], None]) -> Facts
         solid = convex_hull(solid)
     write_mesh(solid, command.out, file_format, design, f"{command.what} of {design.name}")
     return {"format": file_format, "volume": solid.volume, "triangles": len(solid.faces)}
+
+
+def _step(command: Export, check: Callable[[], None]) -> Facts:
+    from explorer.export.step import check_extra, write_workspace_step
+
+    command.refuse("tolerance", "density", "masses")
+    check_extra()
+    check()
+    design = command.load()
+    solid = write_workspace_step(design, command.out, command.oriented(design).rotation)
+    volume = solid.volume / design.unit_mm**3
+    return {"format": "step", "volume": volume, "faces": len(solid.limit_of_face)}
 
 
 def _mechanism(command: Export, file_format: str, check: Callable[[], None]) -> Facts:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -65,7 +66,9 @@ def test_an_empty_workspace_has_no_file(capsys: pytest.CaptureFixture[str], tmp_
 @pytest.mark.parametrize(
     ("name", "options", "words"),
     [
-        ("file.step", [], "no mesh format 'step'; there are 3mf, stl, glb, obj, ply"),
+        ("file.dwg", [], "no mesh format 'dwg'; there are 3mf, stl, glb, obj, ply"),
+        ("file.step", ["--tolerance", "1"], "--tolerance is not for workspace"),
+        ("missing/file.step", [], "no folder"),
         ("file.stl", ["--format", "iges"], "no mesh format 'iges'"),
         ("file", [], "give --format"),
         ("missing/file.stl", [], "no folder"),
@@ -138,6 +141,7 @@ def test_the_simulation_is_an_mjcf_model(
         ("mechanism", "parts.3mf", ["--masses", "parts"], "--masses is not for mechanism"),
         ("mechanism", "missing/parts.3mf", [], "no folder"),
         ("hull", "hull.stl", ["--density", "1000"], "--density is not for hull"),
+        ("hull", "hull.step", [], "no mesh format 'step'"),
         ("hull", "hull.mjcf", [], "no mesh format 'mjcf'"),
     ],
 )
@@ -184,3 +188,31 @@ def test_a_design_too_tight_for_its_parts_has_no_file(
     assert "radius at most" in captured.err
     assert captured.err.count("\n") == 1
     assert not out.exists()
+
+
+def test_the_workspace_as_step(capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    out = tmp_path / "workspace.stp"
+    words = ["--yaw-pitch-roll", "-60", "5", "0", "--json"]
+    assert run(["export", "workspace", "--out", str(out), *words]) == 0
+    # OpenCASCADE has a tongue of its own, on the same standard output.
+    captured = capfd.readouterr()
+    answer = json.loads(captured.out)
+    assert captured.err == ""
+    rotation = explorer.rotation_from_yaw_pitch_roll([-60.0, 5.0, 0.0])
+    exact = explorer.workspace_volume(OPTIMAL, rotation).volume
+    assert answer["format"] == "step"
+    assert answer["volume"] == pytest.approx(exact, rel=1e-6)
+    assert answer["faces"] >= 6
+    assert out.read_bytes().startswith(b"ISO-10303-21;")
+
+
+def test_without_its_extra_step_is_refused_with_one_line(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "OCP.gp", None)
+    out = tmp_path / "workspace.step"
+    assert run(["export", "workspace", "--out", str(out)]) == 2
+    captured = capsys.readouterr()
+    assert 'pip install "flagged-explorer[cad]"' in captured.err
+    assert captured.err.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,376 @@
+"""The constant-orientation workspace as STEP: true spheres, cylinders, cones and planes.
+
+Each limit is an exact primitive of OpenCASCADE, which the booleans keep, so that the file is
+small and its volume that of `explorer.workspace`. AP242, in millimetres of the base frame;
+each face has the name and the colour of the limit that it comes from.
+
+Needs the extra `cad`, which is imported only when asked for.
+"""
+
+from __future__ import annotations
+
+import importlib
+import math
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from explorer.arrays import FloatArray
+from explorer.constraints import Cone, Constraint, HalfSpace, Round, constraints
+from explorer.design import Design
+from explorer.errors import ExplorerError, InputError, MissingExtraError, NoAnswerError
+from explorer.export.files import write_whole
+from explorer.export.mesh import colour_of, linear
+from explorer.pose import checked_rotation
+from explorer.region import Region, region_of
+from explorer.workspace import bounds, home_rotation, workspace_volume
+
+SCHEMA = "AP242DIS"
+
+# OpenCASCADE takes points that are nearer than 1e-7 for one, whatever the unit.
+SMALLEST_MM, LARGEST_MM = 1e-1, 1e7
+GOOD_ERROR, LARGEST_ERROR = 1e-6, 1e-4
+"""Of the volume: at the first no other order of the booleans is tried, the last is refused."""
+
+# Of the largest extent: how far the first box reaches beyond the workspace.
+_BEYOND = 0.1
+# Of the largest extent: planes and cones are cut off so far away.
+_FAR = 4.0
+
+
+@dataclass(frozen=True)
+class ExactSolid:
+    """The workspace as a boundary representation of OpenCASCADE, in millimetres.
+
+    Attributes:
+        shape: A `TopoDS_Shape` of solids.
+        limit_of_face: Of each face, in the order of OpenCASCADE's explorer.
+    """
+
+    shape: Any
+    limit_of_face: tuple[str, ...]
+
+    @property
+    def volume(self) -> float:
+        """The volume in cubic millimetres, integrated over the exact faces."""
+        found: Any = _occ("GProp_GProps")()
+        tool: Any = _occ("BRepGProp")
+        # Asked for this precision, quadrature over curved faces does not stop at 1e-4.
+        tool.VolumeProperties_s(self.shape, found, 1e-9)
+        return float(found.Mass())
+
+
+def exact_workspace(design: Design, rotation: ArrayLike | None = None) -> ExactSolid:
+    """Return the constant-orientation workspace with its exact faces.
+
+    Args:
+        design: The manipulator.
+        rotation: Platform to base, shape (3, 3); that of the home pose if None.
+
+    Raises:
+        MissingExtraError: OpenCASCADE is not installed.
+        InputError: not a rotation, or a workspace too small or large for OpenCASCADE.
+        NoAnswerError: the workspace is empty.
+        ExplorerError: a boolean fails.
+    """
+    check_extra()
+    r = home_rotation(design) if rotation is None else checked_rotation(rotation)
+    exact = workspace_volume(design, r)
+    if exact.volume <= 0.0:
+        reason = ", ".join(exact.empty_because)
+        raise NoAnswerError(f"there is nothing to export, the workspace is empty: {reason}")
+    limits, unit = constraints(design, r), design.unit_mm
+    region = region_of(limits)
+    lows, highs = (end * unit for end in bounds(region))
+    size = float((highs - lows).max())
+    if not SMALLEST_MM <= size <= LARGEST_MM:
+        raise InputError(
+            f"OpenCASCADE takes solids of {SMALLEST_MM:g} to {LARGEST_MM:g} mm; this one is "
+            f"{size:.3g} mm: choose another unit_mm"
+        )
+    best: ExactSolid | None = None
+    off = math.inf
+    for shape in _Maker(lows, highs, unit).attempts(limits, region):
+        found = ExactSolid(shape, tuple(_limit_of(face, limits, unit) for face in _faces(shape)))
+        error = abs(found.volume / unit**3 - exact.volume) / exact.volume
+        if error < off:
+            best, off = found, error
+        if off <= GOOD_ERROR + exact.error / exact.volume:
+            break
+    if best is None or off > LARGEST_ERROR + exact.error / exact.volume:
+        raise ExplorerError(
+            f"OpenCASCADE is off by {off:.1g} of the volume of this workspace, which may be too "
+            "thin for it; as 3mf, ply or stl it can be exported"
+        )
+    return best
+
+
+def workspace_step(design: Design, rotation: ArrayLike | None = None) -> bytes:
+    """Return a STEP file of the constant-orientation workspace.
+
+    Raises:
+        MissingExtraError, InputError, NoAnswerError, ExplorerError: as of `exact_workspace`.
+    """
+    return step_bytes(exact_workspace(design, rotation), f"workspace of {design.name}")
+
+
+def write_workspace_step(
+    design: Design, path: Path, rotation: ArrayLike | None = None
+) -> ExactSolid:
+    """Write a STEP file of the workspace, whole or not at all, and return what is in it.
+
+    Raises:
+        MissingExtraError, NoAnswerError, ExplorerError: as of `exact_workspace`.
+        InputError: as of it, or a file that cannot be written.
+    """
+    solid = exact_workspace(design, rotation)
+    write_whole(path, step_bytes(solid, f"workspace of {design.name}"))
+    return solid
+
+
+def check_extra() -> None:
+    """Find out whether OpenCASCADE is installed.
+
+    Raises:
+        MissingExtraError: it is not; the message says how to get it.
+    """
+    _occ("gp_Pnt")
+
+
+def _occ(name: str) -> Any:
+    """Return a class of OpenCASCADE, which has no types; its package is its first word."""
+    try:
+        package = importlib.import_module(f"OCP.{name.partition('_')[0]}")
+    except ImportError:
+        raise MissingExtraError(
+            'STEP needs OpenCASCADE, which is not installed: pip install "flagged-explorer[cad]"'
+        ) from None
+    return getattr(package, name)
+
+
+class _Maker:
+    """Makes the primitives, in millimetres, as far as a box of positions needs them."""
+
+    def __init__(self, lows: FloatArray, highs: FloatArray, unit: float) -> None:
+        self.unit = unit
+        self.size = float((highs - lows).max())
+        self.lows = lows - _BEYOND * self.size
+        self.highs = highs + _BEYOND * self.size
+
+    def attempts(self, limits: tuple[Constraint, ...], region: Region) -> Iterator[Any]:
+        """Yield what keeps all limits of a region, the limits in one order and another.
+
+        Where surfaces nearly touch, some orders fail and others do not.
+        """
+        steps = list(self._steps(limits, region))
+        half = len(steps) // 2
+        for order in (steps, steps[::-1], steps[half:] + steps[:half]):
+            shape = _occ("BRepPrimAPI_MakeBox")(_point(self.lows), _point(self.highs))
+            shape = shape.Shape()
+            for primitive, inside in order:
+                shape = _combined(shape, primitive, inside)
+            yield shape
+
+    def _steps(self, limits: tuple[Constraint, ...], region: Region) -> Iterator[tuple[Any, bool]]:
+        """Yield the primitives that bound the region, and whether they keep p inside."""
+        planes = [end for end in (region.of_low, region.of_high, *region.of_planes) if end]
+        for plane in planes:
+            if self._heights(plane).max() > plane.offset * self.unit:
+                yield self._half_space(plane.normal, plane.offset), True
+        for each in region.of_rounds:
+            near, far = self._distances(each)
+            if (each.radius * self.unit < far) if each.inside else (each.radius * self.unit > near):
+                yield self._round(each), each.inside
+        for each in limits:
+            if isinstance(each, Cone):
+                yield from self._cone(each)
+
+    def _heights(self, plane: HalfSpace) -> FloatArray:
+        corners = np.array(np.meshgrid(*zip(self.lows, self.highs, strict=True)))
+        return corners.reshape(3, -1).T @ plane.normal
+
+    def _distances(self, each: Round) -> tuple[float, float]:
+        start = 0 if each.is_ball else 1
+        centre = each.centre[start:] * self.unit
+        lows, highs = self.lows[start:] - centre, self.highs[start:] - centre
+        near = np.maximum(0.0, np.maximum(lows, -highs))
+        far = np.maximum(np.abs(lows), np.abs(highs))
+        return float(np.linalg.norm(near)), float(np.linalg.norm(far))
+
+    def _half_space(self, normal: FloatArray, offset: float) -> Any:
+        """Return the block of the positions with normal · p <= offset."""
+        length = float(np.linalg.norm(normal))
+        unit_normal = normal / length
+        middle = 0.5 * (self.lows + self.highs)
+        foot = middle + (offset * self.unit / length - middle @ unit_normal) * unit_normal
+        frame: Any = _occ("gp_Ax2")(_point(foot), _direction(-unit_normal))
+        far = _FAR * self.size
+        x, y = (_array(frame.XDirection()), _array(frame.YDirection()))
+        corner: Any = _occ("gp_Ax2")(
+            _point(foot - far * (x + y)), _direction(-unit_normal), frame.XDirection()
+        )
+        return _occ("BRepPrimAPI_MakeBox")(corner, 2.0 * far, 2.0 * far, 2.0 * far).Shape()
+
+    def _round(self, each: Round) -> Any:
+
+        radius, centre = each.radius * self.unit, each.centre * self.unit
+        if each.is_ball:
+            away = self._away(centre)
+            aside = _cross(away, np.eye(3)[np.abs(away).argmin()])
+            return _occ("BRepPrimAPI_MakeSphere")(self._frame(centre, aside), radius).Shape()
+        start = np.array([self.lows[0] - self.size, centre[1], centre[2]])
+        frame = self._frame(start, np.array([1.0, 0.0, 0.0]))
+        length = float(self.highs[0] - self.lows[0]) + 2.0 * self.size
+        return _occ("BRepPrimAPI_MakeCylinder")(frame, radius, length).Shape()
+
+    def _away(self, point: FloatArray) -> FloatArray:
+        """Return a vector from the middle of the workspace to a point, never zero."""
+        away = point - 0.5 * (self.lows + self.highs)
+        return away if np.linalg.norm(away) > 1e-9 * self.size else np.array([0.0, 0.0, 1.0])
+
+    def _frame(self, origin: FloatArray, axis: FloatArray) -> Any:
+        """Return a frame whose seam is away from the workspace: it would spoil booleans."""
+        away = self._away(origin)
+        across = _cross(_cross(axis, away), axis)
+        if np.linalg.norm(across) <= 1e-9 * np.linalg.norm(away) * (axis @ axis):
+            return _occ("gp_Ax2")(_point(origin), _direction(axis))
+        return _occ("gp_Ax2")(_point(origin), _direction(axis), _direction(across))
+
+    def _cone(self, each: Cone) -> Iterator[tuple[Any, bool]]:
+        """Yield primitives and whether they keep p inside; a section of a cone is a wedge."""
+        apex, axis, angle = each.apex, each.axis, each.half_angle
+        if each.flat:
+            across = math.hypot(axis[1], axis[2])
+            if abs(math.cos(angle)) >= across:
+                return
+            axis, angle = np.array([0.0, *axis[1:]]) / across, math.acos(math.cos(angle) / across)
+        outside = angle > 0.5 * math.pi
+        if outside:
+            axis, angle = -axis, math.pi - angle
+        if abs(math.cos(angle)) < 1e-9:
+            yield self._half_space(-axis, -float(axis @ apex)), True
+        elif each.flat:
+            # The planes of a wedge meet in a line along x through the apex.
+            sides = [
+                self._half_space(side, float(side @ apex))
+                for side in (_turned(axis, sign * (angle + 0.5 * math.pi)) for sign in (1, -1))
+            ]
+            if outside:
+                yield _combined(sides[0], sides[1], True), False
+            else:
+                yield from ((side, True) for side in sides)
+        else:
+            yield self._round_cone(apex, axis, angle), not outside
+
+    def _round_cone(self, apex: FloatArray, axis: FloatArray, angle: float) -> Any:
+
+        apex = apex * self.unit
+        far = np.maximum(np.abs(self.lows - apex), np.abs(self.highs - apex))
+        height = 1.1 * float(np.linalg.norm(far))
+        frame = self._frame(apex, axis)
+        return _occ("BRepPrimAPI_MakeCone")(frame, 0.0, height * math.tan(angle), height).Shape()
+
+
+def _turned(vector: FloatArray, angle: float) -> FloatArray:
+    """Return a vector of the yz-plane turned about x."""
+    c, s = math.cos(angle), math.sin(angle)
+    return np.array([0.0, c * vector[1] - s * vector[2], s * vector[1] + c * vector[2]])
+
+
+def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    return np.asarray(np.cross(a, b), dtype=np.float64)
+
+
+def _point(where: FloatArray) -> Any:
+    return _occ("gp_Pnt")(*map(float, where))
+
+
+def _direction(vector: FloatArray) -> Any:
+    return _occ("gp_Dir")(*map(float, vector))
+
+
+def _array(point: Any) -> FloatArray:
+    return np.array([point.X(), point.Y(), point.Z()])
+
+
+def _combined(shape: Any, other: Any, inside: bool) -> Any:
+    work: Any = (_occ("BRepAlgoAPI_Common") if inside else _occ("BRepAlgoAPI_Cut"))(shape, other)
+    if not work.IsDone():
+        raise ExplorerError("OpenCASCADE cannot combine the limits of the workspace")
+    return work.Shape()
+
+
+def _faces(shape: Any) -> Iterator[Any]:
+    walk: Any = _occ("TopExp_Explorer")(shape, _occ("TopAbs_ShapeEnum").TopAbs_FACE)
+    while walk.More():
+        yield to_face(walk.Current())
+        walk.Next()
+
+
+def to_face(shape: Any) -> Any:
+    """Return a `TopoDS_Shape` that is a face as a `TopoDS_Face`."""
+    namespace = _occ("TopoDS")
+    # The name of static functions had an ending before OpenCASCADE 8.
+    return (getattr(namespace, "Face", None) or namespace.Face_s)(shape)
+
+
+def _limit_of(face: Any, limits: tuple[Constraint, ...], unit: float) -> str:
+    """Return the limit on whose surface a face lies."""
+    surface: Any = _occ("BRepAdaptor_Surface")(face)
+    shares = (1.0 / 3.0, 2.0 / 3.0)
+    u0, v0 = float(surface.FirstUParameter()), float(surface.FirstVParameter())
+    du, dv = float(surface.LastUParameter()) - u0, float(surface.LastVParameter()) - v0
+    where = [surface.Value(u0 + a * du, v0 + b * dv) for a in shares for b in shares]
+    points = np.array([_array(point) for point in where]) / unit
+    return min(limits, key=lambda limit: float(limit.distance(points).max())).name
+
+
+def step_bytes(solid: ExactSolid, name: str) -> bytes:
+    """Return a STEP file of a solid.
+
+    Raises:
+        ExplorerError: OpenCASCADE cannot write it.
+    """
+    tools: Any = _occ("XCAFDoc_DocumentTool")
+    document: Any = _occ("TDocStd_Document")(_occ("TCollection_ExtendedString")("XmlOcaf"))
+    shapes: Any = tools.ShapeTool_s(document.Main())
+    colours: Any = tools.ColorTool_s(document.Main())
+    names: Any = _occ("TDataStd_Name")
+    top = shapes.AddShape(solid.shape, False)
+    names.Set_s(top, _occ("TCollection_ExtendedString")(name, True))
+    for face, limit in zip(_faces(solid.shape), solid.limit_of_face, strict=True):
+        label = shapes.AddSubShape(top, face)
+        names.Set_s(label, _occ("TCollection_ExtendedString")(limit, True))
+        red, green, blue = (linear(channel) for channel in colour_of(limit))
+        colour = _occ("Quantity_Color")(
+            red, green, blue, _occ("Quantity_TypeOfColor").Quantity_TOC_RGB
+        )
+        colours.SetColor(label, colour, _occ("XCAFDoc_ColorType").XCAFDoc_ColorSurf)
+    _hush()
+    controller: Any = _occ("STEPCAFControl_Controller")
+    controller.Init_s()
+    static: Any = _occ("Interface_Static")
+    static.SetCVal_s("write.step.schema", SCHEMA)
+    static.SetCVal_s("write.step.unit", "MM")
+    static.SetIVal_s("write.stepcaf.subshapes.name", 1)
+    writer: Any = _occ("STEPCAFControl_Writer")()
+    writer.SetNameMode(True)
+    writer.SetColorMode(True)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "workspace.step"
+        mode = _occ("STEPControl_StepModelType").STEPControl_AsIs
+        if not writer.Transfer(document, mode) or int(writer.Write(str(path))) != 1:
+            raise ExplorerError("OpenCASCADE cannot write the workspace as STEP")
+        return path.read_bytes()
+
+
+def _hush() -> None:
+    """Keep OpenCASCADE from telling on standard output what it writes."""
+    messages: Any = _occ("Message")
+    for printer in messages.DefaultMessenger_s().Printers():
+        printer.SetTraceLevel(_occ("Message_Gravity").Message_Alarm)
