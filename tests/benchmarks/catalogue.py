@@ -21,7 +21,7 @@ BENCHMARKS: Mapping[str, str] = {
     "validity": "whether poses and moves keep limits, margins and clearances",
     "optimise": "optimal designs: iterations, precision, time, random starts",
     "planning": "paths between random poses that keep everything",
-    "prototype": "parts of the prototype, their places, files of the assembly, STEP, the simulation",
+    "prototype": "parts of the prototype, their places, their files, STEP, the simulation",
     "capability": "share of all orientations that a position allows",
     "drag_sockets": "lag of two long drags at once, seen by bare websocket clients",
     "drag_browser": "lag of two long drags at once, seen in two tabs of a real browser",
