@@ -52,6 +52,7 @@ if TYPE_CHECKING:
         rotation_from_yaw_pitch_roll,
         yaw_pitch_roll_from_rotation,
     )
+    from explorer.prototype.assembly import Prototype, make_prototype
     from explorer.radii import RadiusCurve, radius_curve
     from explorer.reachable import PairCost, ReachableWorkspace, reachable_workspace
     from explorer.singularity import jacobian, margins
@@ -108,6 +109,7 @@ _HOMES = {
         "rotation_from_yaw_pitch_roll",
         "yaw_pitch_roll_from_rotation",
     ),
+    "prototype.assembly": ("Prototype", "make_prototype"),
     "radii": ("RadiusCurve", "radius_curve"),
     "reachable": ("PairCost", "ReachableWorkspace", "reachable_workspace"),
     "singularity": ("jacobian", "margins"),
@@ -150,6 +152,7 @@ __all__ = [
     "PlannedPath",
     "Pose",
     "Problem",
+    "Prototype",
     "RadiusCurve",
     "ReachableWorkspace",
     "Run",
@@ -171,6 +174,7 @@ __all__ = [
     "leg_clearances",
     "load_design",
     "make_problem",
+    "make_prototype",
     "margins",
     "move_clearance",
     "move_clearances",

@@ -18,6 +18,7 @@ from scipy.spatial.transform import Rotation
 from explorer import PRESETS, Design, InputError, Pose, home_pose, leg_clearances
 from explorer.arrays import FloatArray
 from explorer.prototype.assembly import Prototype, make_prototype
+from explorer.prototype.bill import bill_of_materials
 from explorer.prototype.chains import BODIES, LEGS, ON_GUIDE, Places
 from explorer.prototype.dimensions import (
     CLEARANCE,
@@ -384,8 +385,32 @@ def test_homes_that_legs_cannot_have_are_refused() -> None:
     leaning = msgspec.structs.replace(
         OPTIMAL, home=Pose((12.0, 5.0, 4.0), home_pose(OPTIMAL).quaternion)
     )
-    with pytest.raises(InputError, match=r"leg \d leans .* choose another home"):
+    with pytest.raises(
+        InputError, match=r"at home the universal joint at a\d leans .* choose another"
+    ):
         make_prototype(leaning)
     parallel = msgspec.structs.replace(OPTIMAL, home=Pose.of_yaw_pitch_roll((10, 5, 9), (90, 0, 0)))
     with pytest.raises(InputError, match="no unit_mm makes that fit"):
         make_prototype(parallel)
+
+
+@pytest.mark.parametrize("name", [OPTIMAL.name, LARGE.name])
+def test_the_bill_has_every_part_and_every_actuator(name: str) -> None:
+    prototype = PROTOTYPES[name]
+    bill = bill_of_materials(prototype, 2700.0)
+    assert [item.name for item in bill.items] == [part.name for part in prototype.parts]
+    for item in bill.items:
+        # Grams of aluminium, 2.7 to the cubic centimetre.
+        assert item.mass * 1e3 == pytest.approx(2.7e-3 * item.volume, rel=1e-9)
+        assert 0.0 < item.volume < math.prod(item.size)
+    assert bill.mass == pytest.approx(sum(item.mass for item in bill.items), rel=1e-12)
+    by_name = {item.name: item for item in bill.items}
+    for actuator in bill.actuators:
+        low, high = actuator.stroke
+        cylinder, rod = (by_name[f"{kind} {actuator.leg}"] for kind in ("cylinder", "rod"))
+        assert actuator.mass == pytest.approx(cylinder.mass + rod.mass, rel=1e-12)
+        # Together they span the longest length, and neither exceeds the shortest.
+        assert rod.size[2] < low < high < cylinder.size[2] + rod.size[2]
+        assert actuator.asked.shortest <= low
+        assert high <= actuator.asked.longest
+        assert actuator.diameter == pytest.approx(2.0 * prototype.sizes.radii[actuator.leg - 1])

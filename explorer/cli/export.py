@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import tyro
 
@@ -16,7 +16,7 @@ from explorer.cli.values import positive
 from explorer.errors import InputError
 
 _OF_MESHES = "(workspace and hull; default: a 500th of the reach)"
-_OF_BODIES = "(simulation; default: 1240, printed PLA)"
+_OF_BODIES = "(mechanism, simulation; default: 1240, printed PLA)"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,7 +79,7 @@ class Export(JsonOptions, OrientationOptions, DesignOptions):
         if self.json:
             write_json({"file": str(self.out), **facts})
         else:
-            write_lines(str(self.out))
+            write_lines(str(self.out), *_as_lines(facts))
 
     def refuse(self, *options: str) -> None:
         """Refuse options that say nothing about what is to be written.
@@ -92,7 +92,20 @@ class Export(JsonOptions, OrientationOptions, DesignOptions):
                 raise InputError(f"--{option.replace('_', '-')} is not for {self.what}")
 
 
-Facts = dict[str, object]
+Facts = dict[str, Any]
+
+
+def _as_lines(facts: Facts) -> list[str]:
+    """Return what people are to know of the file: strokes may be less than the limits."""
+    return [
+        f"leg {each['leg']}: stroke {_range(each['stroke_mm'])} mm"
+        f" (the limits ask for {_range(each['asked_mm'])} mm)"
+        for each in facts.get("actuators", [])
+    ]
+
+
+def _range(ends: tuple[float, float]) -> str:
+    return f"{ends[0]:.1f} to {ends[1]:.1f}"
 
 
 def _mesh(command: Export, file_format: str, check: Callable[[], None]) -> Facts:
@@ -128,25 +141,32 @@ def _step(command: Export, check: Callable[[], None]) -> Facts:
 
 def _mechanism(command: Export, file_format: str, check: Callable[[], None]) -> Facts:
     from explorer.export.assembly import check_format, write_assembly
+    from explorer.export.simulation import DENSITY
     from explorer.prototype.assembly import make_prototype
+    from explorer.prototype.bill import bill_of_materials
 
-    command.refuse("tolerance", "density", "masses", "quaternion", "yaw_pitch_roll")
+    command.refuse("tolerance", "masses", "quaternion", "yaw_pitch_roll")
     file_format = "stl-zip" if file_format == "zip" else file_format
     check_format(file_format)
     check()
     prototype = make_prototype(command.load())
     write_assembly(prototype, command.out, file_format)
-    unit = prototype.design.unit_mm
+    bill = bill_of_materials(prototype, command.density or DENSITY)
     parts = [
-        {
-            "name": part.name,
-            "volume_mm3": part.unit_mass.mass * unit**3,
-            "triangles": len(part.faces),
-        }
-        for part in prototype.parts
+        {"name": item.name, "size_mm": item.size, "volume_mm3": item.volume, "mass_kg": item.mass}
+        for item in bill.items
     ]
-    strokes = [list(stroke) for stroke in prototype.sizes.strokes]
-    return {"format": file_format, "parts": parts, "strokes_mm": strokes}
+    actuators = [
+        {
+            "leg": each.leg,
+            "stroke_mm": each.stroke,
+            "asked_mm": each.asked,
+            "diameter_mm": each.diameter,
+            "mass_kg": each.mass,
+        }
+        for each in bill.actuators
+    ]
+    return {"format": file_format, "parts": parts, "actuators": actuators, "mass_kg": bill.mass}
 
 
 def _simulation(command: Export, file_format: str, check: Callable[[], None]) -> Facts:

@@ -16,7 +16,7 @@ from explorer.design import Design
 from explorer.errors import InputError
 from explorer.home import home_pose
 from explorer.prototype.chains import LEGS
-from explorer.prototype.dimensions import FIRST_SWING
+from explorer.prototype.motion import hindrances
 from explorer.prototype.sizes import Sizes
 
 THICKEST_SHARE = 0.012
@@ -48,13 +48,9 @@ def sizes_of(design: Design) -> Sizes:
                 f"leg {leg} is {found.at_home(leg):.4g} mm long at home, but its limits are "
                 f"{low:.4g} to {high:.4g} mm; choose another home"
             )
-    for leg, joint in ((1, "a1"), (4, "a3")):
-        lean = abs(found.home_joints[3 * leg - 3])
-        if lean > FIRST_SWING:
-            raise InputError(
-                f"leg {leg} leans {math.degrees(lean):.1f}° at home, and the universal joint at "
-                f"{joint} takes {math.degrees(FIRST_SWING):.0f}° at the most; choose another home"
-            )
+    home = home_pose(design)
+    for hindrance in hindrances(found, home.position, home.rotation):
+        raise InputError(f"at home {hindrance}; choose another home")
     return found
 
 

@@ -136,7 +136,7 @@ def test_the_simulation_is_an_mjcf_model(
         ("simulation", "model.xml", ["--density", "-1"], "--density must be a positive number"),
         ("simulation", "missing/model.xml", [], "no folder"),
         ("mechanism", "parts.stl", [], "there are 3mf, glb, stl-zip"),
-        ("mechanism", "parts.3mf", ["--density", "1000"], "--density is not for mechanism"),
+        ("mechanism", "parts.3mf", ["--tolerance", "1"], "--tolerance is not for mechanism"),
         ("mechanism", "parts.3mf", ["--yaw-pitch-roll", "1", "2", "3"], "--yaw-pitch-roll is not"),
         ("mechanism", "parts.3mf", ["--masses", "parts"], "--masses is not for mechanism"),
         ("mechanism", "missing/parts.3mf", [], "no folder"),
@@ -171,8 +171,16 @@ def test_the_mechanism_is_written_as_parts(
     assert (answer["file"], answer["format"]) == (str(out), expected)
     assert len(answer["parts"]) == 18
     assert min(part["volume_mm3"] for part in answer["parts"]) > 1.0
-    assert all(low < high for low, high in answer["strokes_mm"])
+    assert answer["mass_kg"] == pytest.approx(sum(part["mass_kg"] for part in answer["parts"]))
+    for actuator in answer["actuators"]:
+        low, high = actuator["stroke_mm"]
+        assert 0.0 < low < high
     assert 10_000 < out.stat().st_size < 2_000_000
+    assert run(["export", "mechanism", "--out", str(out)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == str(out)
+    assert len(lines) == 5
+    assert all("the limits ask for 0.0 to 204.2 mm" in line for line in lines[1:])
 
 
 def test_a_design_too_tight_for_its_parts_has_no_file(
