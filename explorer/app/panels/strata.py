@@ -115,10 +115,11 @@ def diagram(frame: Frame, distances: Mapping[Stratum, float], ids: Mapping[Strat
 def neighbours(frame: Frame, distances: Mapping[Stratum, float]) -> str:
     """Return where the pose lies and where one more incidence leads, in words, as HTML."""
     here = frame.snapshot.stratum
-    unit = frame.state.design.unit_mm
-    rows = "".join(_neighbour(w, distances.get(w), unit) for w in COVERED[here])
+    rows = "".join(_neighbour(w, distances.get(w)) for w in COVERED[here])
     rest = (
-        f'<div style="{DIM};margin:7px 0 3px">One incidence from here</div>{rows}'
+        f'<div style="{DIM};margin:7px 0 3px;display:flex;'
+        f'justify-content:space-between"><span>One incidence from here</span><span>units</span>'
+        f"</div>{rows}"
         if rows
         else f'<div style="{DIM};margin-top:7px">Both flags coincide: nothing is more singular.'
         "</div>"
@@ -139,18 +140,11 @@ def _sentence(stratum: Stratum) -> str:
     return f"{zero} = 0: {words(stratum)}"
 
 
-def _neighbour(stratum: Stratum, distance: float | None, unit_mm: float) -> str:
-    if distance is None:
-        value = f'<span style="{DIM}">…</span>'
-    else:
-        value = (
-            f"{scientific(distance, 4)} "
-            f'<span style="{DIM};font-size:11.5px">{scientific(distance * unit_mm, 3)} mm</span>'
-        )
+def _neighbour(stratum: Stratum, distance: float | None) -> str:
+    value = "…" if distance is None else scientific(distance, 4)
     return (
         '<div style="display:flex;justify-content:space-between;gap:8px;padding:2px 0">'
-        f"<span>{escape(_sentence(stratum))}</span>"
-        f'<span style="white-space:nowrap;text-align:right">{value}</span></div>'
+        f"<span>{escape(_sentence(stratum))}</span><span>{value}</span></div>"
     )
 
 
@@ -175,7 +169,7 @@ def _node(
     tag, does = ("span", "") if button is None else ("label", f' for="{button}"')
     pointer = "" if button is None else "cursor:pointer;"
     return (
-        f'<{tag}{does} title="{hint}" style="position:absolute;left:calc({left:.4g}% - '
+        f'<{tag}{does} title="{hint}" aria-label="Go to {hint}" style="position:absolute;left:calc({left:.4g}% - '
         f"{NODE_WIDTH // 2}px);top:{_top(inversions(stratum))}px;width:{NODE_WIDTH}px;"
         f"height:{NODE_HEIGHT}px;box-sizing:border-box;border-radius:5px;text-align:center;"
         f'user-select:none;{pointer}{edge}{look}"><span style="display:block;font-size:11px;'

@@ -51,8 +51,9 @@ class Bodies:
         yield self._frame, "wxyz", state.pose.quaternion
         for body in (self._base, self._platform):
             yield body, "visible", state.view.bodies
-        # Within the translucent workspace the browser would leave a translucent body out.
-        within = state.view.workspace.solid
+        # Within what is translucent the browser would leave a translucent body out.
+        singular = state.view.singular
+        within = state.view.workspace.solid or singular.ball or singular.ellipsoid != "none"
         yield self._platform, "opacity", None if within else PLATFORM_OPACITY
         yield self._grid, "visible", state.view.grid
         for handle, (vertices, faces) in (

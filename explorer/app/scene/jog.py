@@ -68,6 +68,8 @@ class JogScene:
         count = 2 * len(UNCOUPLED)
         self._heads = Instances(scene, "/motion/heads", _cone(), [SINGULAR] * count)
         self._stops = Instances(scene, "/motion/stops", cylinder(), [SINGULAR] * count)
+        for part in (self._heads, self._stops):
+            part.handle.cast_shadow = False
 
     def updates(self, placed: Placed) -> Iterator[Update]:
         """Yield what draws the motions of this frame."""

@@ -141,7 +141,7 @@ class EllipsoidScene:
         )
         longest = int(gain.argmax())
         value = "∞" if np.isinf(gain[longest]) else f"{gain[longest]:.3g}"
-        yield self._label, "text", f"{kind} ≤ {value}"
+        yield self._label, "text", f"{kind} ≤ {value} per unit"
         way = ways[longest] * (1.0 if ways[longest, 2] >= 0.0 else -1.0)
         yield self._label, "position", tuple((centre + way).tolist())
 
