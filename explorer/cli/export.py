@@ -41,8 +41,7 @@ class Export(JsonOptions, OrientationOptions, DesignOptions):
             help_behavior_hint="(default: the suffix of the file)",
         ),
     ] = None
-    """The format: 3mf holds unit, names and colours, ply and obj double precision, step (of
-    the workspace) its exact faces. STEP needs the extra `cad`."""
+    """3mf holds unit, names, colours, ply and obj doubles, step (extra `cad`) exact faces."""
 
     tolerance: Annotated[
         float | None, positive("--tolerance"), tyro.conf.arg(help_behavior_hint=_OF_MESHES)
@@ -55,9 +54,9 @@ class Export(JsonOptions, OrientationOptions, DesignOptions):
     """Density of the bodies, in kg/m³."""
 
     masses: Annotated[
-        Literal["bars", "parts"] | None,
+        Literal["bars", "parts"],
         tyro.conf.arg(help_behavior_hint="(simulation; default: bars)"),
-    ] = None
+    ] = "bars"
     """What bodies weigh: bars as thick as the legs, or the parts of `export mechanism`."""
 
     def run(self) -> None:
@@ -88,7 +87,7 @@ class Export(JsonOptions, OrientationOptions, DesignOptions):
             InputError: one of them was given.
         """
         for option in options:
-            if getattr(self, option) is not None:
+            if getattr(self, option) != getattr(type(self), option):
                 raise InputError(f"--{option.replace('_', '-')} is not for {self.what}")
 
 
