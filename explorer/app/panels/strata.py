@@ -167,9 +167,11 @@ def _node(
         below = "any"
     hint = escape(f"{name_of(stratum)}  {_sentence(stratum)}")
     tag, does = ("span", "") if button is None else ("label", f' for="{button}"')
+    # The button takes its name from its label.
+    named = "" if button is None else f' aria-label="Go to {hint}"'
     pointer = "" if button is None else "cursor:pointer;"
     return (
-        f'<{tag}{does} title="{hint}" aria-label="Go to {hint}" style="position:absolute;left:calc({left:.4g}% - '
+        f'<{tag}{does} title="{hint}"{named} style="position:absolute;left:calc({left:.4g}% - '
         f"{NODE_WIDTH // 2}px);top:{_top(inversions(stratum))}px;width:{NODE_WIDTH}px;"
         f"height:{NODE_HEIGHT}px;box-sizing:border-box;border-radius:5px;text-align:center;"
         f'user-select:none;{pointer}{edge}{look}"><span style="display:block;font-size:11px;'

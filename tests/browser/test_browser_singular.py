@@ -1,0 +1,87 @@
+"""Singularities in a real page: the diagram to click on, one margin alone, paths to watch."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+from playwright.sync_api import expect
+from tab import Tab
+
+from explorer.app.path_actions import StoreEnd
+from explorer.app.state import Frame
+from explorer.arrays import FloatArray
+from explorer.pose import Pose
+from explorer.singularity import margins
+
+
+def kappas(tab: Tab) -> FloatArray:
+    pose = tab.state.pose
+    return margins(pose.position, pose.rotation)
+
+
+def test_a_click_on_the_diagram_moves_to_the_stratum(tab: Tab) -> None:
+    nodes = tab.page.locator("label[title^='(']")
+    expect(nodes).to_have_count(0)
+    tab.switch("Diagram", on=True)
+    expect(nodes).to_have_count(23)
+    # The buttons behind the nodes are there for keyboards, and take no room.
+    button = tab.page.get_by_role("button", name="Go to (3, 4, 2, 1)")
+    box = button.locator("..").bounding_box()
+    assert box is not None
+    assert box["width"] <= 1.0
+    tab.page.locator("label[title^='(3, 4, 1, 2)']").click()
+    tab.wait_for(lambda: Frame(tab.state).snapshot.stratum == (3, 4, 1, 2), "the stratum")
+    expect(tab.page.get_by_text("κ3 = 0: b4 on the base plane", exact=False).first).to_be_visible()
+    assert np.abs(kappas(tab)[[0, 2]]).max() < 1e-9
+
+
+def test_a_jog_moves_one_margin_by_mouse_and_by_keyboard(tab: Tab) -> None:
+    before = kappas(tab)
+    tab.drag("κ2: about z (°)", 0.6)
+    tab.wait_for(lambda: tab.state.jog_in_use is not None, "a jog")
+    tab.type("κ2: about z (°)", "-30\n")
+    tab.wait_for(
+        lambda: tab.state.jog_in_use is not None and tab.state.jog_in_use.amount == -30.0, "-30°"
+    )
+    after = kappas(tab)
+    np.testing.assert_allclose(after[[0, 2]], before[[0, 2]], atol=1e-12)
+    assert abs(after[1] - before[1]) > 0.1
+    tab.push("Home pose")
+    tab.wait_until_shown("κ2: about z (°)", 0.0)
+
+
+def test_a_path_is_watched_planned_and_saved(tab: Tab) -> None:
+    tab.turn_to("Paths")
+    chart = tab.page.locator(".uplot canvas")
+    expect(chart).to_be_hidden()
+    tab.push("Watch")
+    tab.wait_for(lambda: tab.state.journey is not None and tab.state.journey.at > 0.5, "playing")
+    tab.push("Pause")
+    chart.wait_for()
+    expect(tab.page.get_by_text("Singular once on the way")).to_be_visible()
+    session = tab.running.page.session
+    tab.push("start")
+    tab.wait_for(lambda: tab.state.paths.start is not None, "a start")
+    x, y, z = tab.state.pose.position
+    session.do(StoreEnd("goal"))
+    tab.push("Home pose")
+    tab.push("start")
+    expect(tab.page.get_by_text(f"{x:.1f}, {y:.1f}, {z:.1f}").first).to_be_visible()
+    home: Pose = tab.state.pose
+    tab.wait_for(lambda: tab.state.paths.start == home, "the home pose as start")
+    # A little way off in the same mode.
+    tab.drag("z", 0.7)
+    tab.wait_for(lambda: tab.state.pose != home, "another pose")
+    tab.push("goal")
+    tab.wait_for(lambda: tab.state.paths.goal == tab.state.pose, "a goal")
+    tab.push("Plan")
+    tab.page.get_by_text("Planned path of").wait_for()
+    expect(tab.page.get_by_text("No singularity on the way.")).to_be_visible()
+    with tab.page.expect_download() as download:
+        tab.push("Export CSV")
+    assert download.value.suggested_filename == "paper-optimal-path.csv"
+    rows = list(csv.reader(Path(download.value.path()).read_text().splitlines()))
+    assert rows[0][:7] == ["time_s", "l1", "d1", "d2", "d3", "d4", "l4"]
+    assert [float(v) for v in rows[1][7:10]] == list(home.position)
