@@ -1,7 +1,6 @@
-"""The bodies of the parts, by booleans of plain shapes, and whether parts overlap.
+"""The parts as closed meshes by manifold3d, and whether they overlap.
 
-The only module of the prototype that uses manifold3d. Shapes are in millimetres, each in
-the frame of the body that it moves with (`explorer.prototype.chains`).
+The only module of the prototype that uses manifold3d.
 """
 
 from __future__ import annotations
@@ -15,20 +14,18 @@ import numpy as np
 
 from explorer.arrays import FloatArray
 from explorer.errors import ExplorerError
-from explorer.prototype.chains import LEGS, ON_GUIDE, Places
-from explorer.prototype.dimensions import CLEARANCE, LegSizes
+from explorer.pose import Triple
+from explorer.prototype.chains import Places
+from explorer.prototype.forms import forms_of
+from explorer.prototype.kernel import Circle
 from explorer.prototype.part import Part
 from explorer.prototype.sizes import Sizes
-from explorer.prototype.sketch import platform_points
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
 
 SEGMENTS = 48
 """Edges of a circle."""
-
-# Of eyes over which lugs and arms are wide.
-_SLIM = 0.55
 
 
 def parts_of(sizes: Sizes) -> tuple[Part, ...]:
@@ -37,17 +34,67 @@ def parts_of(sizes: Sizes) -> tuple[Part, ...]:
     Raises:
         ExplorerError: a boolean fails.
     """
-    made: list[tuple[str, str, Manifold]] = [("base", "base", _base(sizes))]
-    for leg, own in zip(LEGS, sizes.legs, strict=True):
-        if leg in ON_GUIDE:
-            made.append((f"carriage {leg}", f"carriage {leg}", _carriage(sizes, own)))
-        else:
-            made.append((f"cross {leg}", f"cross {leg}", _cross(own)))
-        made.append((f"cylinder {leg}", f"cylinder {leg}", _cylinder(sizes, leg)))
-        made.append((f"rod {leg}", f"rod {leg}", _rod(sizes, leg)))
-    made.append(("platform", "platform", _platform(sizes)))
-    made += [(f"ball {leg}", "platform", _ball(sizes, leg)) for leg in LEGS]
-    return tuple(_part(name, body, shape, sizes.design.unit_mm) for name, body, shape in made)
+    unit = sizes.design.unit_mm
+    return tuple(
+        _part(name, body, shape, unit) for name, body, shape in forms_of(sizes, MeshKernel())
+    )
+
+
+class MeshKernel:
+    """Makes bodies of plane faces: chords of circles, within them but for holes."""
+
+    def disc(self, circle: Circle, low: float, high: float) -> Manifold:
+        """Return a cylinder along z between two heights."""
+        from manifold3d import Manifold
+
+        made = Manifold.cylinder(high - low, circle.radius, circle.radius, SEGMENTS)
+        return made.translate((circle.x, circle.y, low))
+
+    def hole(self, circle: Circle, low: float, high: float) -> Manifold:
+        """Return what to cut out for a round hole, whose chords lie outside the circle."""
+        return self.disc(
+            circle._replace(radius=circle.radius / math.cos(math.pi / SEGMENTS)), low, high
+        )
+
+    def ball(self, radius: float) -> Manifold:
+        """Return a ball about the origin."""
+        from manifold3d import Manifold
+
+        return Manifold.sphere(radius, SEGMENTS)
+
+    def cavity(self, radius: float) -> Manifold:
+        """Return what to cut out for a ball about the origin."""
+        return self.ball(radius / _inscribed())
+
+    def box(self, low: Triple, high: Triple) -> Manifold:
+        """Return a box between two corners."""
+        from manifold3d import Manifold
+
+        x, y, z = (b - a for a, b in zip(low, high, strict=True))
+        return Manifold.cube((x, y, z)).translate(low)
+
+    def union(self, shapes: Sequence[Manifold]) -> Manifold:
+        """Return the union of some shapes."""
+        from manifold3d import Manifold, OpType
+
+        return Manifold.batch_boolean(list(shapes), OpType.Add)
+
+    def hull(self, circles: Sequence[Circle], low: float, high: float) -> Manifold:
+        """Return a plate between two heights, whose outline is the convex hull of circles."""
+        from manifold3d import Manifold
+
+        return Manifold.batch_hull([self.disc(each, low, high) for each in circles])
+
+
+@functools.cache
+def _inscribed() -> float:
+    """Return how near the faces of a ball of radius 1 come to its centre."""
+    mesh: Any = MeshKernel().ball(1.0).to_mesh64()
+    corners = np.array(mesh.vert_properties)[:, :3][np.array(mesh.tri_verts)]
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    normals = np.cross(b - a, c - a)
+    distances = np.einsum("ij,ij->i", normals, a) / np.linalg.norm(normals, axis=1)
+    return float(distances.min())
 
 
 def overlaps(parts: Sequence[Part], places: Places) -> Iterator[tuple[str, str, float]]:
@@ -107,182 +154,6 @@ def _placed(
 
 def _touching(one: tuple[FloatArray, FloatArray], other: tuple[FloatArray, FloatArray]) -> bool:
     return bool((one[0] <= other[1]).all() and (other[0] <= one[1]).all())
-
-
-def _base(sizes: Sizes) -> Manifold:
-    """Return the plate, the lugs of both universal joints, the rails on their pillars."""
-    side, unit = sizes.chains.side, sizes.design.unit_mm
-    low, high = -sizes.depth - sizes.base_plate, -sizes.depth
-    a3 = (sizes.design.a3[0] * unit, sizes.design.a3[1] * unit * side)
-    guide = sizes.guide
-    ends = [x for rail in sizes.rails for x in rail]
-    feet = [
-        (0.0, 0.0, sizes.legs[0].swing),
-        (*a3, sizes.legs[3].swing),
-        *((x, 0.0, 2.0 * guide.radius) for x in ends),
-    ]
-    pieces = [_hull([_disc(radius, low, high, x, y) for x, y, radius in feet])]
-    for index, (x, y) in ((0, (0.0, 0.0)), (3, a3)):
-        mount = np.diag([1.0, side, side]) @ sizes.chains.mounts[index]
-        lugs = _lugs(sizes.legs[index], low)
-        pieces.append(lugs.transform(np.column_stack([mount, [x, y, 0.0]])))
-    for start, end in sizes.rails:
-        pieces.append(_box((start, -guide.shaft, -guide.shaft), (end, guide.shaft, guide.shaft)))
-        pieces.extend(
-            _box((foot, -guide.shaft, low), (foot + guide.pillar, guide.shaft, guide.shaft))
-            for foot in (start, end - guide.pillar)
-        )
-    # Made with the platform above it.
-    return _union(pieces).rotate((180.0 * (side < 0), 0.0, 0.0))
-
-
-def _lugs(own: LegSizes, low: float) -> Manifold:
-    """Return the two eyes that hold the first axis, on stems down to the base plate."""
-    eye = _disc(own.eye, own.inner, own.outer).rotate((0.0, 90.0, 0.0))
-    # As narrow as the fork's arms, which pass beside it when the leg leans both ways.
-    half = _SLIM * own.eye
-    lug = eye + _box((own.inner, -half, low + 0.5 * own.plate), (own.outer, half, 0.0))
-    hole = _hole(own.pin + CLEARANCE, -own.outer - 1.0, own.outer + 1.0).rotate((0.0, 90.0, 0.0))
-    return _union([lug, lug.mirror((1.0, 0.0, 0.0))]) - hole
-
-
-def _cross(own: LegSizes) -> Manifold:
-    """Return the cross of a universal joint: two shafts, their ends thinner."""
-    half = own.inner - CLEARANCE
-    shaft = _disc(0.8 * own.radius, -half, half) + _disc(own.pin, -own.outer, own.outer)
-    return shaft.rotate((0.0, 90.0, 0.0)) + shaft.rotate((90.0, 0.0, 0.0))
-
-
-def _carriage(sizes: Sizes, own: LegSizes) -> Manifold:
-    """Return a sleeve on the square shaft, with a flange at both ends."""
-    guide, half = sizes.guide, own.radius
-    flange = _flange(own)
-    pieces = [
-        _disc(guide.sleeve, -half, half),
-        _disc(guide.flange, -half, flange - half),
-        _disc(guide.flange, half - flange, half),
-    ]
-    hole = guide.shaft + CLEARANCE
-    sleeve = _union(pieces).rotate((0.0, 90.0, 0.0))
-    return sleeve - _box((-half - 1.0, -hole, -hole), (half + 1.0, hole, hole))
-
-
-def _flange(own: LegSizes) -> float:
-    return max(0.2 * own.radius, 0.25)
-
-
-def _cylinder(sizes: Sizes, leg: int) -> Manifold:
-    """Return a cylinder, open at its end, with what joins it to the base."""
-    own, stroke = sizes.legs[leg - 1], sizes.strokes[leg - 1]
-    top = stroke.shortest - own.end - CLEARANCE
-    bottom = own.floor - own.plate
-    tube = _disc(own.radius, bottom, top) - _hole(own.bore, own.floor, top + 1.0)
-    return tube + (_ring(sizes, own) if leg in ON_GUIDE else _fork(own))
-
-
-def _ring(sizes: Sizes, own: LegSizes) -> Manifold:
-    """Return the eye of a leg about the guide."""
-    guide = sizes.guide
-    half = own.radius - _flange(own) - CLEARANCE
-    around = _disc(guide.eye, -half, half).rotate((0.0, 90.0, 0.0))
-    # The neck fills what is left between the eye and the round bottom.
-    neck = _box((-half, -0.6 * guide.eye, 0.0), (half, 0.6 * guide.eye, guide.eye + own.plate))
-    neck ^= _disc(own.radius, 0.0, guide.eye + own.plate)
-    hole = _hole(guide.sleeve + CLEARANCE, -half - 1.0, half + 1.0).rotate((0.0, 90.0, 0.0))
-    return (around + neck) - hole
-
-
-def _fork(own: LegSizes) -> Manifold:
-    """Return the two eyes that hold the second axis, and the bridge between them."""
-    eye = _disc(own.eye, own.inner, own.outer).rotate((-90.0, 0.0, 0.0))
-    half = _SLIM * own.eye
-    arm = _box((-half, own.inner, 0.0), (half, own.outer, own.floor))
-    hole = _hole(own.pin + CLEARANCE, -own.outer - 1.0, own.outer + 1.0).rotate((90.0, 0.0, 0.0))
-    bridge = _box((-own.eye, -own.outer, own.bottom), (own.eye, own.outer, own.floor))
-    arms = _union([eye, arm]) - hole
-    return _union([arms, arms.mirror((0.0, 1.0, 0.0)), bridge])
-
-
-def _rod(sizes: Sizes, leg: int) -> Manifold:
-    """Return a rod with the cup of the ball joint, whose centre is the origin."""
-    own, stroke = sizes.legs[leg - 1], sizes.strokes[leg - 1]
-    length = stroke.shortest - own.floor - CLEARANCE
-    cup = _disc(own.cup, -own.end, -own.rim) - _sphere((own.ball + CLEARANCE) / _inscribed())
-    return cup + _disc(own.rod, -length, -own.end + 0.5 * own.wall)
-
-
-def _platform(sizes: Sizes) -> Manifold:
-    """Return the plate, on the far side of the platform plane, with a hole for each ball."""
-    points = platform_points(sizes.design) * sizes.design.unit_mm
-    low, high = sizes.standoff, sizes.standoff + sizes.platform_plate
-    discs: list[Manifold] = []
-    holes: list[Manifold] = []
-    for own, (x, y, _) in zip(sizes.legs, points.tolist(), strict=True):
-        discs.append(_disc(1.5 * own.radius, low, high, x, y))
-        holes.append(_hole(own.neck + CLEARANCE, low - 1.0, high + 1.0, x, y))
-    return _facing(_hull(discs) - _union(holes), sizes)
-
-
-def _ball(sizes: Sizes, leg: int) -> Manifold:
-    """Return a ball on its neck, which reaches through the platform plate."""
-    own = sizes.legs[leg - 1]
-    x, y, _ = (platform_points(sizes.design)[leg - 1] * sizes.design.unit_mm).tolist()
-    neck = _disc(own.neck, 0.0, sizes.standoff + sizes.platform_plate)
-    return _facing((_sphere(own.ball) + neck).translate((x, y, 0.0)), sizes)
-
-
-def _facing(shape: Manifold, sizes: Sizes) -> Manifold:
-    """Return a shape that was made for a1 below the platform, facing a1 where it is."""
-    return shape.mirror((0.0, 0.0, 1.0)) if sizes.chains.platform_side > 0 else shape
-
-
-def _disc(radius: float, low: float, high: float, x: float = 0.0, y: float = 0.0) -> Manifold:
-    """Return a cylinder along z."""
-    from manifold3d import Manifold
-
-    made = Manifold.cylinder(high - low, radius, radius, SEGMENTS)
-    return made.translate((x, y, low))
-
-
-def _hole(radius: float, low: float, high: float, x: float = 0.0, y: float = 0.0) -> Manifold:
-    """Return what to cut out for a round hole: its chords lie outside the circle."""
-    return _disc(radius / math.cos(math.pi / SEGMENTS), low, high, x, y)
-
-
-def _sphere(radius: float) -> Manifold:
-    from manifold3d import Manifold
-
-    return Manifold.sphere(radius, SEGMENTS)
-
-
-@functools.cache
-def _inscribed() -> float:
-    """Return how near the faces of a sphere of radius 1 come to its centre."""
-    mesh: Any = _sphere(1.0).to_mesh64()
-    corners = np.array(mesh.vert_properties)[:, :3][np.array(mesh.tri_verts)]
-    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
-    normals = np.cross(b - a, c - a)
-    distances = np.einsum("ij,ij->i", normals, a) / np.linalg.norm(normals, axis=1)
-    return float(distances.min())
-
-
-def _box(low: tuple[float, float, float], high: tuple[float, float, float]) -> Manifold:
-    from manifold3d import Manifold
-
-    x, y, z = (b - a for a, b in zip(low, high, strict=True))
-    return Manifold.cube((x, y, z)).translate(low)
-
-
-def _union(shapes: Sequence[Manifold]) -> Manifold:
-    from manifold3d import Manifold, OpType
-
-    return Manifold.batch_boolean(list(shapes), OpType.Add)
-
-
-def _hull(shapes: Sequence[Manifold]) -> Manifold:
-    from manifold3d import Manifold
-
-    return Manifold.batch_hull(list(shapes))
 
 
 def _sound(shape: Manifold) -> Manifold:
