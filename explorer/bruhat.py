@@ -9,6 +9,7 @@ is what the stratum is in words.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
 from types import MappingProxyType
 from typing import TypeAlias
 
@@ -68,6 +69,7 @@ def words(stratum: Stratum) -> str:
     return ", ".join(WORDS[each] for each in conditions(stratum)) or "generic"
 
 
+@cache
 def incidences(stratum: Stratum) -> tuple[int, ...]:
     """Return which of κ1, κ2 and κ3 vanish in a stratum, as 1, 2 and 3."""
     return tuple(

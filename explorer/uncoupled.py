@@ -79,20 +79,23 @@ class UncoupledMotion:
         """
         if not math.isfinite(amount):
             raise InputError(f"a motion {self.name} needs a finite amount; got {amount}")
-        point, direction = self.line(pose)
-        position = np.array(pose.position)
         if self.kind == "translation":
-            x, y, z = (position + amount * direction).tolist()
+            direction = self.line(pose)[1]
+            x, y, z = (np.array(pose.position) + amount * direction).tolist()
             return Pose((x, y, z), pose.quaternion)
-        turn = Rotation.from_rotvec(amount * direction).as_matrix()
-        return Pose.of(point + turn @ (position - point), turn @ pose.rotation)
+        return Pose.of(*self._turned(pose, amount))
+
+    def _turned(self, pose: Pose, angle: float) -> tuple[FloatArray, FloatArray]:
+        """Return position and rotation after a turn about the axis."""
+        point, direction = self.line(pose)
+        turn = Rotation.from_rotvec(angle * direction).as_matrix()
+        return point + turn @ (np.array(pose.position) - point), turn @ pose.rotation
 
     def rate(self, pose: Pose) -> float:
         """Return how fast the margin changes with the amount, in units per unit or radian."""
         # Along the axis all changes are linear; about it a quarter turn later κ is κ'.
         if self.kind == "rotation":
-            later = self.moved(pose, 0.5 * math.pi)
-            return float(margins(later.position, later.rotation)[self.incidence - 1])
+            return float(margins(*self._turned(pose, 0.5 * math.pi))[self.incidence - 1])
         along = self.line(pose)[1]
         return float(margins(along, pose.rotation)[self.incidence - 1])
 
