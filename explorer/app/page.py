@@ -20,10 +20,12 @@ from explorer.app.panels.legs import LegsPanel
 from explorer.app.panels.move import MovePanel
 from explorer.app.panels.optimise import OptimisePanel
 from explorer.app.panels.paths import PathsPanel
+from explorer.app.panels.prototype import PrototypePanel, assembly_name
 from explorer.app.panels.singularity import SingularityPanel
 from explorer.app.panels.view import ViewPanel
 from explorer.app.panels.workspace import WorkspacePanel, tolerance_of
 from explorer.app.panels.workspace_numbers import WorkspaceNumbers
+from explorer.app.parts_feed import PartsFeed
 from explorer.app.path_runner import PathRunner
 from explorer.app.scene import Scene
 from explorer.app.scene.camera import Cameras, ViewName, framing
@@ -71,6 +73,7 @@ class Page:
         self.feed = WorkspaceFeed(self.worker, self.session.redraw)
         self.radius_feed = RadiusFeed(self.worker, self.session.redraw)
         self.strata_feed = StrataFeed(self.worker, self.session.redraw)
+        self.parts_feed = PartsFeed(self.worker, self.session.redraw)
         self.path_runner = PathRunner(self.session, lambda message: self._complain(message, None))
         gui = server.gui
         gui.configure_theme(
@@ -96,6 +99,7 @@ class Page:
         with tabs.add_tab("Optimise"):
             self._optimise = OptimisePanel(gui, self.session, self._export_hull, self._save_design)
         with tabs.add_tab("View"):
+            self._prototype = PrototypePanel(gui, self.session, self._export_assembly)
             view = ViewPanel(gui, self.session)
         side = gui.add_panel()
         with side.add_tab("Singularity"):
@@ -160,7 +164,7 @@ class Page:
     def _draw(self, frame: Frame) -> None:
         self._frame = frame
         # First, so that what is asked for is called out of date until it arrives.
-        for feed in (self.feed, self.radius_feed, self.strata_feed):
+        for feed in (self.feed, self.radius_feed, self.strata_feed, self.parts_feed):
             feed.follow(frame)
         updates = self._scene.updates(self._placed())
         updates.extend(self._optimise.updates(frame))
@@ -170,6 +174,7 @@ class Page:
             updates.extend(panel.updates(frame, self.feed))
         updates.extend(self._legs.updates(frame, self.radius_feed))
         updates.extend(self._singularity.updates(frame, self.strata_feed))
+        updates.extend(self._prototype.updates(frame, self.parts_feed))
         self._assigner.assign(updates)
         self.optimiser.follow(frame)
         self.path_runner.follow(frame)
@@ -177,7 +182,8 @@ class Page:
     def _placed(self) -> Placed:
         drawing = self.feed.drawing
         extent = None if drawing is None else drawing.extent
-        return Placed(self._frame, None if extent is None else np.array(extent))
+        box = None if extent is None else np.array(extent)
+        return Placed(self._frame, box, self.parts_feed.parts)
 
     def _dragged(self, event: viser.TransformControlsEvent) -> None:
         if event.client_id is None:
@@ -224,6 +230,20 @@ class Page:
             lambda data: client.send_file_download(
                 f"{name}.{file_format}", data, save_immediately=True
             ),
+            lambda problem: self._complain(problem, client_id),
+        )
+
+    def _export_assembly(self, file_format: str, client_id: int | None) -> None:
+        client = self._client(client_id)
+        if client is None:
+            return
+        design = self.session.state.design
+        name = f"{design.name}-{assembly_name(file_format)}"
+        self.worker.submit(
+            ("export", client_id, "assembly"),
+            "export_assembly",
+            (design, file_format),
+            lambda data: client.send_file_download(name, data, save_immediately=True),
             lambda problem: self._complain(problem, client_id),
         )
 

@@ -15,6 +15,7 @@ import numpy as np
 from explorer.app.jog import Jog
 from explorer.app.optimisation import Optimisation
 from explorer.app.paths import Journey, Paths
+from explorer.app.prototype_view import PrototypeView
 from explorer.app.singular_view import SingularView
 from explorer.design import JOINTS, Design
 from explorer.errors import InputError
@@ -84,6 +85,7 @@ class View:
         twin: Whether the 6-4 twin's six legs replace the four.
         warn_below: Margins below this length are warned of, in design units; None for a
             share of the reach.
+        prototype: How the prototype is shown.
         workspace: How the workspace is shown.
         singular: How singularities are shown.
     """
@@ -101,6 +103,7 @@ class View:
     ghosts: bool = False
     twin: bool = False
     warn_below: float | None = None
+    prototype: PrototypeView = field(default_factory=PrototypeView)
     workspace: WorkspaceView = field(default_factory=WorkspaceView)
     singular: SingularView = field(default_factory=SingularView)
 

@@ -10,6 +10,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from explorer.app.bands import PLAIN, Colouring, Measure, Shell
+from explorer.app.parts import PartsDrawing, PartsRequest, parts_drawing
 from explorer.app.slice_map import AXES, CUT, Axis, SliceMap, slice_map
 from explorer.arrays import FloatArray
 from explorer.bruhat import Stratum
@@ -243,6 +244,27 @@ def strata_distances(request: StrataRequest) -> StrataDistances:
     """Return how far the pose is from each stratum."""
     found = nearest_in_strata(request.design, request.pose)
     return StrataDistances(request, {w: nearest.distance for w, nearest in found.items()})
+
+
+def draw_parts(request: PartsRequest) -> PartsDrawing:
+    """Return the parts of the prototype, or why there are none."""
+    return parts_drawing(request)
+
+
+def export_assembly(design: Design, file_format: str) -> bytes:
+    """Return a file of the prototype, assembled in the home pose.
+
+    Args:
+        design: The manipulator.
+        file_format: As of `explorer.export.assembly`.
+
+    Raises:
+        ExplorerError: a design too tight for the parts, or a library that is missing.
+    """
+    from explorer.export.assembly import assembly_bytes
+    from explorer.prototype.assembly import make_prototype
+
+    return assembly_bytes(make_prototype(design), file_format)
 
 
 def export_mesh(

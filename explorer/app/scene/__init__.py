@@ -20,6 +20,7 @@ from explorer.app.scene.legs import Legs, TwinLegs
 from explorer.app.scene.marks import DragHandle, Ghosts, Labels
 from explorer.app.scene.path import PathScene
 from explorer.app.scene.placing import Placed
+from explorer.app.scene.prototype import PrototypeScene
 from explorer.app.scene.required_box import RequiredBox
 from explorer.app.scene.singular import BallScene, EllipsoidScene, NearestGhost
 from explorer.app.scene.swept import SweptTetrahedra
@@ -49,6 +50,7 @@ class Scene:
             Flags(scene),
             Legs(scene),
             TwinLegs(scene),
+            PrototypeScene(scene),
             Tetrahedra(scene),
             Labels(scene),
             Ghosts(scene),

@@ -16,6 +16,7 @@ from explorer.app.scene.shapes import Mesh, plate
 PLATE_THICKNESS = 0.22
 PLATFORM_THICKNESS = 0.2
 PLATFORM_OPACITY = 0.82
+GRID_BELOW = 0.01
 
 
 class Bodies:
@@ -41,7 +42,6 @@ class Bodies:
             fade_distance=46.0,
             fade_from="origin",
             shadow_opacity=0.1,
-            position=(0.0, 0.0, PLATE_TOP - PLATE_THICKNESS - 0.01),
         )
 
     def updates(self, placed: Placed) -> Iterator[Update]:
@@ -50,18 +50,27 @@ class Bodies:
         yield self._frame, "position", tuple(placed.points["b4"].tolist())
         yield self._frame, "wxyz", state.pose.quaternion
         for body in (self._base, self._platform):
-            yield body, "visible", state.view.bodies
+            yield body, "visible", state.view.bodies and placed.parts is None
         # Within what is translucent the browser would leave a translucent body out.
         singular = state.view.singular
         within = state.view.workspace.solid or singular.ball or singular.ellipsoid != "none"
         yield self._platform, "opacity", None if within else PLATFORM_OPACITY
         yield self._grid, "visible", state.view.grid
+        yield self._grid, "position", (0.0, 0.0, _lowest(placed) - GRID_BELOW)
         for handle, (vertices, faces) in (
             (self._base, _base_plate(placed)),
             (self._platform, platform_plate(placed)),
         ):
             yield handle, "vertices", vertices.astype(np.float32)
             yield handle, "faces", faces.astype(np.uint32)
+
+
+def _lowest(placed: Placed) -> float:
+    """Return the height at which the base stands."""
+    if placed.parts is None:
+        return PLATE_TOP - PLATE_THICKNESS
+    vertices, _ = placed.parts.meshes[0]
+    return placed.scale * float(vertices[:, 2].min())
 
 
 def _base_plate(placed: Placed) -> Mesh:

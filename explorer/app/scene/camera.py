@@ -14,6 +14,7 @@ from explorer.app.scene.flags import flag_corners
 from explorer.app.scene.legs import guide_span
 from explorer.app.scene.marks import ghost_points, handle_tips
 from explorer.app.scene.placing import Placed
+from explorer.app.scene.prototype import part_corners
 from explorer.arrays import FloatArray
 
 ViewName = Literal["isometric", "front", "side", "top"]
@@ -73,6 +74,8 @@ def outermost_points(placed: Placed) -> FloatArray:
         seen.append(flag_corners(placed))
     if view.handle:
         seen.append(handle_tips(placed))
+    if placed.parts is not None:
+        seen.append(part_corners(placed, placed.parts))
     if placed.extent is not None:
         ends = placed.scale * placed.extent
         seen.append(np.array(np.meshgrid(*ends.T)).reshape(3, -1).T)

@@ -78,7 +78,7 @@ class Legs:
     def updates(self, placed: Placed) -> Iterator[Update]:
         """Yield what draws the legs of this frame."""
         view = placed.frame.state.view
-        visible = view.legs and not view.twin
+        visible = view.legs and not view.twin and placed.parts is None
         for part in (self._actuators, self._joints, self._balls, self._guide):
             yield from part.shown(visible)
         if not visible:

@@ -12,6 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
+from explorer.app.parts import Parts
 from explorer.app.state import Frame, State
 from explorer.arrays import FloatArray
 
@@ -40,10 +41,12 @@ class Placed:
     Attributes:
         frame: What is drawn.
         extent: (lows, highs) of a workspace that is drawn too, in design units, or None.
+        parts: Of the prototype, where they replace the schematic legs and bodies.
     """
 
     frame: Frame
     extent: FloatArray | None = None
+    parts: Parts | None = None
 
     @cached_property
     def scale(self) -> float:

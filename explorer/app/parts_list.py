@@ -1,0 +1,136 @@
+"""The list of parts as a workshop reads it: what is alike in one line, and the stock to cut.
+
+Stock is the bar or the block that a part is cut from.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from explorer.prototype.assembly import Prototype
+from explorer.prototype.bill import Actuator, bill_of_materials
+from explorer.prototype.part import Part
+
+# What is cut from a round bar, and the bar's axis in the frame of the part.
+_ROUND = {"cylinder": 2, "rod": 2, "ball": 2, "carriage": 0}
+# As they are put together.
+_ORDER = ("base", "carriage", "cross", "cylinder", "rod", "ball", "platform")
+# Parts are alike whose measures agree to so many digits.
+_DIGITS = 6
+
+
+@dataclass(frozen=True)
+class Bar:
+    """A round bar, in millimetres."""
+
+    diameter: float
+    length: float
+
+    def __str__(self) -> str:
+        return f"Ø {self.diameter:.1f} × {self.length:.1f}"
+
+
+@dataclass(frozen=True)
+class Block:
+    """A block along the axes of the part's frame, its sides in millimetres."""
+
+    x: float
+    y: float
+    z: float
+
+    def __str__(self) -> str:
+        return f"{self.x:.1f} × {self.y:.1f} × {self.z:.1f}"
+
+
+Stock = Bar | Block
+
+
+@dataclass(frozen=True)
+class Line:
+    """Parts that are alike.
+
+    Attributes:
+        kind: Of part, such as "rod".
+        legs: To which they belong, () for base and platform.
+        stock: From which each is cut.
+        volume: Of each, in mm³.
+    """
+
+    kind: str
+    legs: tuple[int, ...]
+    stock: Stock
+    volume: float
+
+    @property
+    def count(self) -> int:
+        """How many there are."""
+        return max(len(self.legs), 1)
+
+    @property
+    def name(self) -> str:
+        """The kind, and the legs."""
+        return " ".join([self.kind, ", ".join(map(str, self.legs))]).strip()
+
+    def mass(self, density: float) -> float:
+        """Return the mass of all of them in grams.
+
+        Args:
+            density: In kg/m³.
+        """
+        return self.count * density * self.volume * 1e-6
+
+
+@dataclass(frozen=True)
+class PartsList:
+    """All that a prototype consists of."""
+
+    lines: tuple[Line, ...]
+    actuators: tuple[Actuator, ...]
+
+    def mass(self, density: float) -> float:
+        """Return the mass of everything in grams, at a density in kg/m³."""
+        return sum(line.mass(density) for line in self.lines)
+
+    def moving_mass(self, density: float) -> float:
+        """Return the mass of all but the base in grams, at a density in kg/m³."""
+        return sum(line.mass(density) for line in self.lines if line.kind != "base")
+
+
+def parts_list(prototype: Prototype) -> PartsList:
+    """Return the list of a prototype's parts."""
+    bill = bill_of_materials(prototype, 1.0)
+    found: dict[object, Line] = {}
+    for part, item in zip(prototype.parts, bill.items, strict=True):
+        stock = stock_of(part, prototype.design.unit_mm)
+        key = (part.kind, _rounded((item.volume, *vars(stock).values())))
+        known = found.get(key)
+        _, _, leg = part.name.partition(" ")
+        legs = (*(() if known is None else known.legs), *((int(leg),) if leg else ()))
+        found[key] = Line(part.kind, legs, stock, item.volume)
+    lines = sorted(found.values(), key=lambda line: _ORDER.index(line.kind))
+    return PartsList(tuple(lines), bill.actuators)
+
+
+def stock_of(part: Part, unit_mm: float) -> Stock:
+    """Return what a part is cut from.
+
+    Args:
+        part: Any.
+        unit_mm: Millimetres in a design unit.
+    """
+    points = part.vertices * unit_mm
+    lows, highs = points.min(axis=0), points.max(axis=0)
+    x, y, z = (highs - lows).tolist()
+    axis = _ROUND.get(part.kind)
+    if axis is None:
+        return Block(x, y, z)
+    off = np.delete(points - 0.5 * (lows + highs), axis, axis=1)
+    return Bar(2.0 * float(np.hypot(off[:, 0], off[:, 1]).max()), (x, y, z)[axis])
+
+
+def _rounded(values: Sequence[float]) -> tuple[float, ...]:
+    return tuple(round(value, _DIGITS - 1 - math.floor(math.log10(value))) for value in values)

@@ -1,0 +1,450 @@
+"""The prototype on the page: its parts at their places, made once for a design; what they are."""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Callable, Generator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+import viser
+from desk import Desk, number, rows_of, thick
+from test_app_drawing import closed_volume
+
+from explorer.app import tasks
+from explorer.app.actions import SetPose, SetPosition, SetUnit, SetVariable, SetView
+from explorer.app.assigning import Assigner, Update
+from explorer.app.colours import OUTLINE
+from explorer.app.creases import creased
+from explorer.app.jobs import Worker
+from explorer.app.panels.prototype import (
+    PROTOTYPE,
+    SCHEMATIC,
+    PrototypePanel,
+    assembly_name,
+    parts_table,
+    trouble_of,
+)
+from explorer.app.parts import Parts, PartsRequest, parts_drawing
+from explorer.app.parts_feed import PartsFeed
+from explorer.app.parts_list import Bar, stock_of
+from explorer.app.prototype_view import ALUMINIUM, PrototypeView
+from explorer.app.scene.bodies import Bodies
+from explorer.app.scene.camera import outermost_points
+from explorer.app.scene.legs import Legs
+from explorer.app.scene.placing import Placed
+from explorer.app.scene.prototype import PrototypeScene, part_corners, shown_places
+from explorer.app.scene.shapes import cylinder
+from explorer.app.state import Frame, State, opened
+from explorer.app.viser_gaps import start_viser, stop_viser
+from explorer.design_file import PRESETS
+from explorer.errors import InputError
+from explorer.export.assembly import FORMATS, assembly_bytes
+from explorer.pose import Pose
+from explorer.prototype.assembly import make_prototype
+from explorer.prototype.bill import bill_of_materials
+from explorer.prototype.chains import LEGS, ON_GUIDE, Places
+from explorer.prototype.shapes import least_gap
+
+OPTIMAL = PRESETS["paper-optimal"]
+PARTS = 18
+
+
+class AtOnce(Worker):
+    """A worker that does what it is asked at once and in this process, and counts it."""
+
+    def __init__(self) -> None:
+        super().__init__(lambda _: None)
+        self.done: list[str] = []
+
+    def submit(
+        self,
+        key: object,
+        task: str,
+        arguments: tuple[Any, ...],
+        done: Callable[[Any], None],
+        failed: Callable[[str], None],
+        told: Callable[[Any], None] | None = None,
+    ) -> int:
+        del key, failed, told
+        self.done.append(task)
+        # As they go to another process and come back.
+        answer = getattr(tasks, task)(*pickle.loads(pickle.dumps(arguments)))
+        done(pickle.loads(pickle.dumps(answer)))
+        return len(self.done)
+
+
+@pytest.fixture
+def worker() -> Generator[AtOnce]:
+    made = AtOnce()
+    yield made
+    made.stop()
+
+
+@pytest.fixture
+def feed(worker: AtOnce) -> PartsFeed:
+    return PartsFeed(worker, lambda: None)
+
+
+@pytest.fixture(scope="module")
+def server() -> Generator[viser.ViserServer]:
+    made = start_viser("127.0.0.1", 0)
+    yield made
+    stop_viser(made)
+
+
+@pytest.fixture(scope="module")
+def parts() -> Parts:
+    made = parts_drawing(PartsRequest(OPTIMAL)).parts
+    assert made is not None
+    return made
+
+
+@pytest.fixture
+def desk() -> Generator[Desk]:
+    made = Desk(opened(OPTIMAL))
+    yield made
+    made.session.stop()
+
+
+def shown(state: State | None = None, **changes: Any) -> State:
+    """Return the state with the prototype drawn."""
+    begin = opened(OPTIMAL) if state is None else state
+    view = replace(begin.view, prototype=PrototypeView(shown=True, **changes))
+    return SetView(view).apply(begin)
+
+
+def states(count: int, **changes: Any) -> list[State]:
+    """Return the prototype in poses about home."""
+    rng = np.random.default_rng(11)
+    return [
+        SetPose(
+            Pose.of_yaw_pitch_roll(
+                [10, 5, 9] + rng.uniform(-3, 3, 3), [-73, 0, 0] + rng.uniform(-15, 15, 3)
+            )
+        ).apply(shown(**changes))
+        for _ in range(count)
+    ]
+
+
+def nodes_of(updates: list[Update]) -> dict[str, dict[str, Any]]:
+    """Return the values that are assigned, by the name of the node and the property."""
+    found: dict[str, dict[str, Any]] = {}
+    for handle, name, value in updates:
+        found.setdefault(handle.name, {})[name] = value
+    return found
+
+
+def in_scene(nodes: dict[str, dict[str, Any]], path: str) -> np.ndarray[Any, Any]:
+    """Return the vertices of a node as a browser places them, with those it hangs on."""
+    points = np.asarray(nodes[path]["vertices"], dtype=np.float64)
+    while path in nodes:
+        node = nodes[path]
+        if "wxyz" in node:
+            points = points @ Pose((0.0, 0.0, 0.0), node["wxyz"]).rotation.T
+        points = points + node["position"]
+        path = path.rpartition("/")[0]
+    return points
+
+
+# The scene
+
+
+@pytest.mark.parametrize("state", states(6))
+def test_parts_are_drawn_where_the_library_places_them(
+    state: State, server: viser.ViserServer, parts: Parts
+) -> None:
+    placed = Placed(Frame(state), None, parts)
+    nodes = nodes_of(list(PrototypeScene(server.scene).updates(placed)))
+    assert len(nodes) == PARTS
+    whole = parts.prototype.at(state.pose.position, state.pose.rotation)
+    for part, (_, faces), corners in zip(parts.prototype.parts, parts.meshes, whole, strict=True):
+        path = next(path for path in nodes if path.endswith(f"/{part.name}"))
+        seen = in_scene(nodes, path)[faces]
+        assert np.allclose(seen, placed.scale * corners[part.faces], atol=1e-5)
+        assert nodes[path]["visible"]
+
+
+def test_meshes_are_assigned_only_when_the_design_has_changed(
+    server: viser.ViserServer, feed: PartsFeed
+) -> None:
+    scene, assigner = PrototypeScene(server.scene), Assigner(server)
+
+    def meshes_assigned(state: State) -> int:
+        feed.follow(Frame(state))
+        updates = scene.updates(Placed(Frame(state), None, feed.parts))
+        return assigner.assign(u for u in updates if u[1] in ("vertices", "faces"))
+
+    assert meshes_assigned(shown()) == 2 * PARTS
+    for state in (*states(3), shown(exploded=0.5), shown(density=7850.0)):
+        assert meshes_assigned(state) == 0
+    changed = SetVariable("b2", 2.7).apply(shown())
+    assert meshes_assigned(changed) > 0
+    assert meshes_assigned(SetPosition(0, 11.0).apply(changed)) == 0
+
+
+def test_parts_replace_bodies_and_legs_and_follow_their_switches(
+    server: viser.ViserServer, parts: Parts
+) -> None:
+    drawn = (Bodies(server.scene), Legs(server.scene), PrototypeScene(server.scene))
+
+    def visible(state: State, made: Parts | None) -> dict[str, bool]:
+        placed = Placed(Frame(state), None, made)
+        nodes = nodes_of([update for part in drawn for update in part.updates(placed)])
+        return {path: node["visible"] for path, node in nodes.items() if "visible" in node}
+
+    for made in (None, parts):
+        for path, is_shown in visible(shown(), made).items():
+            if path != "/grid":
+                assert is_shown == (path.startswith("/prototype") == (made is not None)), path
+    view = shown().view
+    for switch, kinds in (
+        ("legs", {"cross", "carriage", "cylinder", "rod"}),
+        ("bodies", {"base", "platform", "ball"}),
+    ):
+        without = SetView(replace(view, **{switch: False})).apply(shown())
+        hidden = {
+            path.rpartition("/")[2].partition(" ")[0]
+            for path, is_shown in visible(without, parts).items()
+            if path.startswith("/prototype") and not is_shown
+        }
+        assert hidden == kinds
+
+
+def test_legs_that_collide_are_coloured(server: viser.ViserServer, parts: Parts) -> None:
+    state = thick(shown(), 0.3, 0.5, 0.5, 0.3)
+    nodes = nodes_of(list(PrototypeScene(server.scene).updates(Placed(Frame(state), None, parts))))
+    red = {path for path, node in nodes.items() if node.get("color") == OUTLINE}
+    assert red == {f"/prototype/{kind} {leg}" for kind in ("cylinder", "rod") for leg in (2, 3)}
+
+
+@pytest.mark.parametrize("state", states(3, exploded=1.0))
+def test_drawn_apart_the_parts_of_a_leg_are_free_of_each_other(state: State, parts: Parts) -> None:
+    frame = Frame(state)
+    places = shown_places(Placed(frame, None, parts), parts)
+    moved = {
+        part.name: replace(part, body="base", vertices=part.vertices @ turn.T + origin)
+        for part, origin, turn in zip(
+            parts.prototype.parts, places.origin, places.rotation, strict=True
+        )
+    }
+    rest = Places(np.zeros((1, 3)), np.eye(3)[None])
+    least = 0.02 * OPTIMAL.reach
+    for leg in LEGS:
+        joint = "carriage" if leg in ON_GUIDE else "cross"
+        names = [f"{kind} {leg}" for kind in (joint, "cylinder", "rod", "ball")]
+        chain = [moved[name] for name in ("base", *names, "platform")]
+        gap, *which = least_gap(chain, rest, least)
+        assert gap == least, which
+
+
+def test_the_way_apart_is_straight_and_begins_at_the_assembly(parts: Parts) -> None:
+    together, half, apart = (
+        shown_places(Placed(Frame(shown(exploded=share)), None, parts), parts)
+        for share in (0.0, 0.5, 1.0)
+    )
+    home = opened(OPTIMAL).pose
+    expected = parts.prototype.places(home.position, home.rotation)
+    assert np.array_equal(together.origin, expected.origin)
+    assert np.allclose(half.origin, 0.5 * (together.origin + apart.origin))
+    assert np.array_equal(apart.rotation, expected.rotation)
+    assert not apart.origin[0].any()
+
+
+@pytest.mark.parametrize("share", [0.0, 1.0])
+def test_what_must_be_in_the_picture_holds_all_parts(share: float, parts: Parts) -> None:
+    placed = Placed(Frame(shown(exploded=share)), None, parts)
+    corners = part_corners(placed, parts)
+    places = shown_places(placed, parts)
+    for (vertices, _), origin, turn in zip(
+        parts.meshes, places.origin, places.rotation, strict=True
+    ):
+        seen = placed.scale * (vertices @ turn.T + origin)
+        assert (seen >= corners.min(axis=0) - 1e-9).all()
+        assert (seen <= corners.max(axis=0) + 1e-9).all()
+    outermost = outermost_points(placed)
+    assert (outermost.max(axis=0) >= corners.max(axis=0)).all()
+
+
+# The meshes
+
+
+def test_edges_are_split_and_round_faces_are_not(parts: Parts) -> None:
+    corners, faces = cylinder()
+    whole, indices = np.unique(corners.round(9), axis=0, return_inverse=True)
+    joined = indices[faces].astype(np.int32)
+    vertices, split = creased(whole, joined)
+    # A cylinder has two rims, each once in the mantle and once in a cap.
+    assert len(vertices) == 2 * len(whole)
+    assert closed_volume(vertices.astype(float), split.astype(np.int64)) == pytest.approx(
+        closed_volume(whole, joined.astype(np.int64)), rel=1e-6
+    )
+    for part, (drawn, sides) in zip(parts.prototype.parts, parts.meshes, strict=True):
+        assert np.allclose(drawn[sides], part.vertices[part.faces], atol=1e-5)
+
+
+# The feed
+
+
+def test_parts_are_made_anew_when_the_design_changes_and_not_else(
+    worker: AtOnce, feed: PartsFeed
+) -> None:
+    feed.follow(Frame(opened(OPTIMAL)))
+    assert worker.done == []
+    for state in (shown(), *states(3), shown(exploded=0.3), shown(density=1.0)):
+        feed.follow(Frame(state))
+    assert worker.done == ["draw_parts"]
+    for count, state in enumerate(
+        (
+            SetVariable("a3x", 19.0).apply(shown()),
+            thick(shown(), 0.2),
+            SetUnit(20.0).apply(shown()),
+        ),
+        2,
+    ):
+        feed.follow(Frame(state))
+        assert len(worker.done) == count
+        made, expected = feed.parts, make_prototype(state.design)
+        assert made is not None
+        assert made.prototype.sizes.radii == expected.sizes.radii
+        assert np.array_equal(made.prototype.parts[0].vertices, expected.parts[0].vertices)
+    feed.follow(Frame(SetView(replace(shown().view, twin=True)).apply(shown())))
+    assert feed.parts is None
+
+
+def test_a_design_too_tight_is_told_in_the_words_of_the_library(feed: PartsFeed) -> None:
+    state = thick(shown(), 0.4)
+    with pytest.raises(InputError) as refusal:
+        make_prototype(state.design)
+    frame = Frame(state)
+    assert "Making the parts" in (trouble_of(frame, feed) or "")
+    feed.follow(frame)
+    assert feed.parts is None
+    told = trouble_of(frame, feed) or ""
+    assert str(refusal.value)[1:] in told
+    assert "carriages 2 and 3" in told
+    feed.follow(Frame(shown()))
+    assert feed.parts is not None
+    assert trouble_of(Frame(shown()), feed) is None
+    assert trouble_of(Frame(opened(OPTIMAL)), feed) is None
+
+
+def test_a_pose_that_the_parts_do_not_take_is_told(feed: PartsFeed) -> None:
+    state = SetPosition(2, 17.0).apply(shown())
+    feed.follow(Frame(state))
+    assert feed.parts is not None
+    hindrances = feed.parts.prototype.hindrances(state.pose.position, state.pose.rotation)
+    assert hindrances
+    told = trouble_of(Frame(state), feed) or ""
+    assert "do not take this pose" in told
+    assert all(each[1:] in told for each in hindrances)
+
+
+# The list of parts
+
+
+@pytest.mark.parametrize("density", [ALUMINIUM, 1.0, 7850.0])
+def test_masses_and_counts_are_those_of_the_library(density: float, parts: Parts) -> None:
+    bill = bill_of_materials(parts.prototype, density)
+    lines = parts.listed.lines
+    assert sum(line.count for line in lines) == len(bill.items) == PARTS
+    assert parts.listed.mass(density) == pytest.approx(1e3 * bill.mass, rel=1e-9)
+    for line in lines:
+        same = [i.mass for i in bill.items if i.name.partition(" ")[0] == line.kind]
+        masses = [m for m in same if m == pytest.approx(1e-3 * line.mass(density) / line.count)]
+        assert len(masses) >= line.count
+
+
+def test_legs_of_equal_parts_share_a_line_and_others_do_not(parts: Parts) -> None:
+    assert [line.name for line in parts.listed.lines if line.count > 1] == [
+        "carriage 2, 3",
+        "cross 1, 4",
+        "ball 1, 2, 3, 4",
+    ]
+    mixed = parts_drawing(PartsRequest(thick(shown(), 0.2, 0.25, 0.2, 0.15).design)).parts
+    assert mixed is not None
+    names = [line.name for line in mixed.listed.lines]
+    assert {"carriage 2", "carriage 3", "cross 1", "cross 4", "ball 1, 3"} <= set(names)
+
+
+def test_stock_holds_the_part(parts: Parts) -> None:
+    unit = OPTIMAL.unit_mm
+    for part in parts.prototype.parts:
+        stock = stock_of(part, unit)
+        size = np.ptp(part.vertices, axis=0) * unit
+        if not isinstance(stock, Bar):
+            assert [stock.x, stock.y, stock.z] == pytest.approx(size.tolist())
+            continue
+        axis = 0 if part.kind == "carriage" else 2
+        assert stock.length == pytest.approx(size[axis])
+        across = np.delete(size, axis)
+        assert across.max() * (1.0 - 1e-9) <= stock.diameter <= np.hypot(*across)
+
+
+def test_the_table_shows_masses_and_strokes(parts: Parts) -> None:
+    html = parts_table(parts.listed, 7850.0)
+    rows = rows_of(html)
+    lines, actuators = rows[: len(parts.listed.lines)], rows[-4:]
+    for row, line in zip(lines, parts.listed.lines, strict=True):
+        assert row[:3] == [line.name, str(line.count), str(line.stock)]
+        assert number(row[3]) == pytest.approx(line.mass(7850.0), abs=0.05)
+    strokes = parts.prototype.sizes.strokes
+    for leg, (row, (low, high)) in enumerate(zip(actuators, strokes, strict=True), 1):
+        assert row[0].endswith(f"leg {leg}")
+        assert [number(each) for each in row[1:]] == pytest.approx(
+            [low, high, high - low], abs=0.06
+        )
+    assert f"{parts.listed.mass(7850.0):.1f} g" in html
+    assert "0.0 to 204.2 mm" in html
+
+
+# The panel and the files
+
+
+def test_the_panel_shows_and_changes_how_the_prototype_is_drawn(
+    desk: Desk, server: viser.ViserServer, feed: PartsFeed
+) -> None:
+    with server.gui.add_folder("test"):
+        panel = PrototypePanel(server.gui, desk.session, lambda _format, _client: None)
+    begin = list(panel.updates(Frame(desk.state), feed))
+    drawn, apart, density = (handle for handle, name, _ in begin if name == "value")
+    assert not any(value for _, name, value in begin if name == "visible")
+    desk.use(drawn, PROTOTYPE)
+    desk.use(apart, 0.25)
+    desk.use(density, 7850.0)
+    assert desk.state.view.prototype == PrototypeView(True, 0.25, 7850.0)
+    desk.use(density, -1.0)
+    assert desk.state.view.prototype.density == 7850.0
+    assert len(desk.complaints) == 1
+    assert "positive" in desk.complaints[0]
+    feed.follow(Frame(desk.state))
+    updates = list(panel.updates(Frame(desk.state), feed))
+    assert feed.parts is not None
+    table = parts_table(feed.parts.listed, 7850.0)
+    assert table in [value for _, name, value in updates if name == "content"]
+    assert [value for _, name, value in updates if name == "visible"] == [False, True]
+    desk.use(drawn, SCHEMATIC)
+    assert not desk.state.view.prototype.shown
+
+
+def test_files_of_the_assembly_are_those_of_the_library() -> None:
+    # In 3MF there are random identities.
+    for file_format in set(FORMATS) & {"glb", "stl-zip"}:
+        expected = assembly_bytes(make_prototype(OPTIMAL), file_format)
+        assert tasks.export_assembly(OPTIMAL, file_format) == expected
+    with pytest.raises(InputError, match="too tight"):
+        tasks.export_assembly(thick(opened(OPTIMAL), 0.4).design, "glb")
+    assert assembly_name("3mf") == "mechanism.3mf"
+    assert assembly_name("stl-zip") == "parts-stl.zip"
+
+
+def test_shares_and_densities_out_of_range_are_refused() -> None:
+    assert PrototypeView().density == ALUMINIUM
+    for share in (-0.1, 1.1, np.nan):
+        with pytest.raises(InputError, match="apart"):
+            PrototypeView(exploded=share)
+    for density in (0.0, -1.0, np.inf, np.nan):
+        with pytest.raises(InputError, match="density"):
+            PrototypeView(density=density)
