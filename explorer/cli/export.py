@@ -145,11 +145,22 @@ def _mechanism(command: Export, file_format: str, check: Callable[[], None]) -> 
     from explorer.prototype.bill import bill_of_materials
 
     command.refuse("tolerance", "masses", "quaternion", "yaw_pitch_roll")
-    file_format = "stl-zip" if file_format == "zip" else file_format
-    check_format(file_format)
+    file_format = {"zip": "stl-zip", "stp": "step"}.get(file_format, file_format)
+    if file_format == "step":
+        from explorer.export.opencascade import occ
+
+        # Without OpenCASCADE nothing else needs to be looked at.
+        occ("gp_Pnt")
+    else:
+        check_format(file_format)
     check()
     prototype = make_prototype(command.load())
-    write_assembly(prototype, command.out, file_format)
+    if file_format == "step":
+        from explorer.export.step_assembly import write_assembly_step
+
+        write_assembly_step(prototype.sizes, command.out)
+    else:
+        write_assembly(prototype, command.out, file_format)
     bill = bill_of_materials(prototype, command.density or DENSITY)
     parts = [
         {"name": item.name, "size_mm": item.size, "volume_mm3": item.volume, "mass_kg": item.mass}

@@ -86,7 +86,9 @@ def check_format(file_format: str) -> None:
         InputError: no such format.
     """
     if file_format not in FORMATS:
-        raise InputError(f"no format {file_format!r} of assemblies; there are {', '.join(FORMATS)}")
+        raise InputError(
+            f"no format {file_format!r} of assemblies; there are {', '.join(FORMATS)}, step"
+        )
 
 
 def _at_home(prototype: Prototype) -> Places:
@@ -95,13 +97,11 @@ def _at_home(prototype: Prototype) -> Places:
     return prototype.chains.places_at(home.position, home.rotation)
 
 
-def _groups(prototype: Prototype) -> Sequence[tuple[str, list[int]]]:
-    """Return the groups that people take apart, with the indices of their parts."""
-    names = [part.name for part in prototype.parts]
+def groups_of() -> Sequence[tuple[str, Sequence[str]]]:
+    """Return the groups that people take apart, with the names of their parts."""
     legs = [(f"leg {leg}", [f"{kind} {leg}" for kind in _chain(leg)]) for leg in LEGS]
     top = ["platform", *(f"ball {leg}" for leg in LEGS)]
-    groups = [("base", ["base"]), *legs, ("platform with balls", top)]
-    return [(group, [names.index(name) for name in members]) for group, members in groups]
+    return [("base", ["base"]), *legs, ("platform with balls", top)]
 
 
 def _chain(leg: int) -> tuple[str, str, str]:
@@ -131,11 +131,12 @@ def _3mf(prototype: Prototype) -> bytes:
         }
         whole = model.AddComponentsObject()
         whole.SetName("mechanism")
-        for name, members in _groups(prototype):
+        by_name = {part.name: part for part in prototype.parts}
+        for name, members in groups_of():
             group = model.AddComponentsObject()
             group.SetName(name)
-            for index in members:
-                part = prototype.parts[index]
+            for member in members:
+                part = by_name[member]
                 mesh = model.AddMeshObject()
                 mesh.SetName(part.name)
                 corners = np.ascontiguousarray(part.vertices * unit, dtype="<f4")

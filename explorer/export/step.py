@@ -9,9 +9,7 @@ Needs the extra `cad`, which is imported only when asked for.
 
 from __future__ import annotations
 
-import importlib
 import math
-import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,14 +21,21 @@ from numpy.typing import ArrayLike
 from explorer.arrays import FloatArray
 from explorer.constraints import Cone, Constraint, HalfSpace, Round, constraints
 from explorer.design import Design
-from explorer.errors import ExplorerError, InputError, MissingExtraError, NoAnswerError
+from explorer.errors import ExplorerError, InputError, NoAnswerError
 from explorer.export.files import write_whole
-from explorer.export.mesh import colour_of, linear
+from explorer.export.mesh import colour_of
+from explorer.export.opencascade import (
+    Document,
+    coordinates,
+    direction,
+    faces_of,
+    occ,
+    point,
+    volume_of,
+)
 from explorer.pose import checked_rotation
 from explorer.region import Region, region_of
 from explorer.workspace import bounds, home_rotation, workspace_volume
-
-SCHEMA = "AP242DIS"
 
 # OpenCASCADE takes points that are nearer than 1e-7 for one, whatever the unit.
 SMALLEST_MM, LARGEST_MM = 1e-1, 1e7
@@ -58,11 +63,7 @@ class ExactSolid:
     @property
     def volume(self) -> float:
         """The volume in cubic millimetres, integrated over the exact faces."""
-        found: Any = _occ("GProp_GProps")()
-        tool: Any = _occ("BRepGProp")
-        # Asked for this precision, quadrature over curved faces does not stop at 1e-4.
-        tool.VolumeProperties_s(self.shape, found, 1e-9)
-        return float(found.Mass())
+        return volume_of(self.shape)
 
 
 def exact_workspace(design: Design, rotation: ArrayLike | None = None) -> ExactSolid:
@@ -96,7 +97,7 @@ def exact_workspace(design: Design, rotation: ArrayLike | None = None) -> ExactS
     best: ExactSolid | None = None
     off = math.inf
     for shape in _Maker(lows, highs, unit).attempts(limits, region):
-        found = ExactSolid(shape, tuple(_limit_of(face, limits, unit) for face in _faces(shape)))
+        found = ExactSolid(shape, tuple(_limit_of(face, limits, unit) for face in faces_of(shape)))
         error = abs(found.volume / unit**3 - exact.volume) / exact.volume
         if error < off:
             best, off = found, error
@@ -139,18 +140,7 @@ def check_extra() -> None:
     Raises:
         MissingExtraError: it is not; the message says how to get it.
     """
-    _occ("gp_Pnt")
-
-
-def _occ(name: str) -> Any:
-    """Return a class of OpenCASCADE, which has no types; its package is its first word."""
-    try:
-        package = importlib.import_module(f"OCP.{name.partition('_')[0]}")
-    except ImportError:
-        raise MissingExtraError(
-            'STEP needs OpenCASCADE, which is not installed: pip install "flagged-explorer[cad]"'
-        ) from None
-    return getattr(package, name)
+    occ("gp_Pnt")
 
 
 class _Maker:
@@ -170,7 +160,7 @@ class _Maker:
         steps = list(self._steps(limits, region))
         half = len(steps) // 2
         for order in (steps, steps[::-1], steps[half:] + steps[:half]):
-            shape = _occ("BRepPrimAPI_MakeBox")(_point(self.lows), _point(self.highs))
+            shape = occ("BRepPrimAPI_MakeBox")(point(self.lows), point(self.highs))
             shape = shape.Shape()
             for primitive, inside in order:
                 shape = _combined(shape, primitive, inside)
@@ -208,13 +198,13 @@ class _Maker:
         unit_normal = normal / length
         middle = 0.5 * (self.lows + self.highs)
         foot = middle + (offset * self.unit / length - middle @ unit_normal) * unit_normal
-        frame: Any = _occ("gp_Ax2")(_point(foot), _direction(-unit_normal))
+        frame: Any = occ("gp_Ax2")(point(foot), direction(-unit_normal))
         far = _FAR * self.size
-        x, y = (_array(frame.XDirection()), _array(frame.YDirection()))
-        corner: Any = _occ("gp_Ax2")(
-            _point(foot - far * (x + y)), _direction(-unit_normal), frame.XDirection()
+        x, y = (coordinates(frame.XDirection()), coordinates(frame.YDirection()))
+        corner: Any = occ("gp_Ax2")(
+            point(foot - far * (x + y)), direction(-unit_normal), frame.XDirection()
         )
-        return _occ("BRepPrimAPI_MakeBox")(corner, 2.0 * far, 2.0 * far, 2.0 * far).Shape()
+        return occ("BRepPrimAPI_MakeBox")(corner, 2.0 * far, 2.0 * far, 2.0 * far).Shape()
 
     def _round(self, each: Round) -> Any:
 
@@ -222,11 +212,11 @@ class _Maker:
         if each.is_ball:
             away = self._away(centre)
             aside = _cross(away, np.eye(3)[np.abs(away).argmin()])
-            return _occ("BRepPrimAPI_MakeSphere")(self._frame(centre, aside), radius).Shape()
+            return occ("BRepPrimAPI_MakeSphere")(self._frame(centre, aside), radius).Shape()
         start = np.array([self.lows[0] - self.size, centre[1], centre[2]])
         frame = self._frame(start, np.array([1.0, 0.0, 0.0]))
         length = float(self.highs[0] - self.lows[0]) + 2.0 * self.size
-        return _occ("BRepPrimAPI_MakeCylinder")(frame, radius, length).Shape()
+        return occ("BRepPrimAPI_MakeCylinder")(frame, radius, length).Shape()
 
     def _away(self, point: FloatArray) -> FloatArray:
         """Return a vector from the middle of the workspace to a point, never zero."""
@@ -238,8 +228,8 @@ class _Maker:
         away = self._away(origin)
         across = _cross(_cross(axis, away), axis)
         if np.linalg.norm(across) <= 1e-9 * np.linalg.norm(away) * (axis @ axis):
-            return _occ("gp_Ax2")(_point(origin), _direction(axis))
-        return _occ("gp_Ax2")(_point(origin), _direction(axis), _direction(across))
+            return occ("gp_Ax2")(point(origin), direction(axis))
+        return occ("gp_Ax2")(point(origin), direction(axis), direction(across))
 
     def _cone(self, each: Cone) -> Iterator[tuple[Any, bool]]:
         """Yield primitives and whether they keep p inside; a section of a cone is a wedge."""
@@ -273,7 +263,7 @@ class _Maker:
         far = np.maximum(np.abs(self.lows - apex), np.abs(self.highs - apex))
         height = 1.1 * float(np.linalg.norm(far))
         frame = self._frame(apex, axis)
-        return _occ("BRepPrimAPI_MakeCone")(frame, 0.0, height * math.tan(angle), height).Shape()
+        return occ("BRepPrimAPI_MakeCone")(frame, 0.0, height * math.tan(angle), height).Shape()
 
 
 def _turned(vector: FloatArray, angle: float) -> FloatArray:
@@ -286,47 +276,21 @@ def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
     return np.asarray(np.cross(a, b), dtype=np.float64)
 
 
-def _point(where: FloatArray) -> Any:
-    return _occ("gp_Pnt")(*map(float, where))
-
-
-def _direction(vector: FloatArray) -> Any:
-    return _occ("gp_Dir")(*map(float, vector))
-
-
-def _array(point: Any) -> FloatArray:
-    return np.array([point.X(), point.Y(), point.Z()])
-
-
 def _combined(shape: Any, other: Any, inside: bool) -> Any:
-    work: Any = (_occ("BRepAlgoAPI_Common") if inside else _occ("BRepAlgoAPI_Cut"))(shape, other)
+    work: Any = (occ("BRepAlgoAPI_Common") if inside else occ("BRepAlgoAPI_Cut"))(shape, other)
     if not work.IsDone():
         raise ExplorerError("OpenCASCADE cannot combine the limits of the workspace")
     return work.Shape()
 
 
-def _faces(shape: Any) -> Iterator[Any]:
-    walk: Any = _occ("TopExp_Explorer")(shape, _occ("TopAbs_ShapeEnum").TopAbs_FACE)
-    while walk.More():
-        yield to_face(walk.Current())
-        walk.Next()
-
-
-def to_face(shape: Any) -> Any:
-    """Return a `TopoDS_Shape` that is a face as a `TopoDS_Face`."""
-    namespace = _occ("TopoDS")
-    # The name of static functions had an ending before OpenCASCADE 8.
-    return (getattr(namespace, "Face", None) or namespace.Face_s)(shape)
-
-
 def _limit_of(face: Any, limits: tuple[Constraint, ...], unit: float) -> str:
     """Return the limit on whose surface a face lies."""
-    surface: Any = _occ("BRepAdaptor_Surface")(face)
+    surface: Any = occ("BRepAdaptor_Surface")(face)
     shares = (1.0 / 3.0, 2.0 / 3.0)
     u0, v0 = float(surface.FirstUParameter()), float(surface.FirstVParameter())
     du, dv = float(surface.LastUParameter()) - u0, float(surface.LastVParameter()) - v0
     where = [surface.Value(u0 + a * du, v0 + b * dv) for a in shares for b in shares]
-    points = np.array([_array(point) for point in where]) / unit
+    points = np.array([coordinates(point) for point in where]) / unit
     return min(limits, key=lambda limit: float(limit.distance(points).max())).name
 
 
@@ -336,41 +300,11 @@ def step_bytes(solid: ExactSolid, name: str) -> bytes:
     Raises:
         ExplorerError: OpenCASCADE cannot write it.
     """
-    tools: Any = _occ("XCAFDoc_DocumentTool")
-    document: Any = _occ("TDocStd_Document")(_occ("TCollection_ExtendedString")("XmlOcaf"))
-    shapes: Any = tools.ShapeTool_s(document.Main())
-    colours: Any = tools.ColorTool_s(document.Main())
-    names: Any = _occ("TDataStd_Name")
-    top = shapes.AddShape(solid.shape, False)
-    names.Set_s(top, _occ("TCollection_ExtendedString")(name, True))
-    for face, limit in zip(_faces(solid.shape), solid.limit_of_face, strict=True):
-        label = shapes.AddSubShape(top, face)
-        names.Set_s(label, _occ("TCollection_ExtendedString")(limit, True))
-        red, green, blue = (linear(channel) for channel in colour_of(limit))
-        colour = _occ("Quantity_Color")(
-            red, green, blue, _occ("Quantity_TypeOfColor").Quantity_TOC_RGB
-        )
-        colours.SetColor(label, colour, _occ("XCAFDoc_ColorType").XCAFDoc_ColorSurf)
-    _hush()
-    controller: Any = _occ("STEPCAFControl_Controller")
-    controller.Init_s()
-    static: Any = _occ("Interface_Static")
-    static.SetCVal_s("write.step.schema", SCHEMA)
-    static.SetCVal_s("write.step.unit", "MM")
-    static.SetIVal_s("write.stepcaf.subshapes.name", 1)
-    writer: Any = _occ("STEPCAFControl_Writer")()
-    writer.SetNameMode(True)
-    writer.SetColorMode(True)
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "workspace.step"
-        mode = _occ("STEPControl_StepModelType").STEPControl_AsIs
-        if not writer.Transfer(document, mode) or int(writer.Write(str(path))) != 1:
-            raise ExplorerError("OpenCASCADE cannot write the workspace as STEP")
-        return path.read_bytes()
-
-
-def _hush() -> None:
-    """Keep OpenCASCADE from telling on standard output what it writes."""
-    messages: Any = _occ("Message")
-    for printer in messages.DefaultMessenger_s().Printers():
-        printer.SetTraceLevel(_occ("Message_Gravity").Message_Alarm)
+    document = Document()
+    top = document.shapes.AddShape(solid.shape, False)
+    document.name(top, name)
+    for face, limit in zip(faces_of(solid.shape), solid.limit_of_face, strict=True):
+        label = document.shapes.AddSubShape(top, face)
+        document.name(label, limit)
+        document.colour(label, colour_of(limit))
+    return document.step()

@@ -135,7 +135,7 @@ def test_the_simulation_is_an_mjcf_model(
         ("simulation", "model.xml", ["--quaternion", "1", "0", "0", "0"], "--quaternion is not"),
         ("simulation", "model.xml", ["--density", "-1"], "--density must be a positive number"),
         ("simulation", "missing/model.xml", [], "no folder"),
-        ("mechanism", "parts.stl", [], "there are 3mf, glb, stl-zip"),
+        ("mechanism", "parts.stl", [], "there are 3mf, glb, stl-zip, step"),
         ("mechanism", "parts.3mf", ["--tolerance", "1"], "--tolerance is not for mechanism"),
         ("mechanism", "parts.3mf", ["--yaw-pitch-roll", "1", "2", "3"], "--yaw-pitch-roll is not"),
         ("mechanism", "parts.3mf", ["--masses", "parts"], "--masses is not for mechanism"),
@@ -161,7 +161,9 @@ def test_options_and_formats_belong_to_what_is_written(
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize(("name", "expected"), [("a.3mf", "3mf"), ("a.zip", "stl-zip")])
+@pytest.mark.parametrize(
+    ("name", "expected"), [("a.3mf", "3mf"), ("a.zip", "stl-zip"), ("a.step", "step")]
+)
 def test_the_mechanism_is_written_as_parts(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, name: str, expected: str
 ) -> None:
@@ -218,9 +220,9 @@ def test_without_its_extra_step_is_refused_with_one_line(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "OCP.gp", None)
-    out = tmp_path / "workspace.step"
-    assert run(["export", "workspace", "--out", str(out)]) == 2
-    captured = capsys.readouterr()
-    assert 'pip install "flagged-explorer[cad]"' in captured.err
-    assert captured.err.count("\n") == 1
+    for what in ("workspace", "mechanism"):
+        assert run(["export", what, "--out", str(tmp_path / "file.step")]) == 2
+        captured = capsys.readouterr()
+        assert 'pip install "flagged-explorer[cad]"' in captured.err
+        assert captured.err.count("\n") == 1
     assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,255 @@
+"""OpenCASCADE: its classes when they are asked for, exact shapes, and STEP files of documents.
+
+It comes with the extra `cad`, and has no types.
+"""
+
+from __future__ import annotations
+
+import importlib
+import math
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from explorer.arrays import FloatArray
+from explorer.errors import ExplorerError, MissingExtraError
+from explorer.export.mesh import Rgb, linear
+from explorer.pose import Triple
+from explorer.prototype.kernel import Circle
+
+SCHEMA = "AP242DIS"
+
+# Directions in which the outline of a hull is looked for; only neighbours are taken from it.
+_DIRECTIONS = 3600
+
+
+def occ(name: str) -> Any:
+    """Return a class of OpenCASCADE; its package is the first word of its name.
+
+    Raises:
+        MissingExtraError: it is not installed; the message says how to get it.
+    """
+    try:
+        package = importlib.import_module(f"OCP.{name.partition('_')[0]}")
+    except ImportError:
+        raise MissingExtraError(
+            'STEP needs OpenCASCADE, which is not installed: pip install "flagged-explorer[cad]"'
+        ) from None
+    return getattr(package, name)
+
+
+def point(where: FloatArray) -> Any:
+    """Return a `gp_Pnt`."""
+    return occ("gp_Pnt")(*map(float, where))
+
+
+def direction(vector: FloatArray) -> Any:
+    """Return a `gp_Dir`, of unit length whatever the vector has."""
+    return occ("gp_Dir")(*map(float, vector))
+
+
+def coordinates(of: Any) -> FloatArray:
+    """Return the coordinates of a point or direction, shape (3,)."""
+    return np.array([of.X(), of.Y(), of.Z()])
+
+
+def placed(rotation: FloatArray, origin: FloatArray) -> Any:
+    """Return a `gp_Trsf` that turns and then moves."""
+    found = occ("gp_Trsf")()
+    rows = np.column_stack([rotation, origin])
+    found.SetValues(*map(float, rows.ravel()))
+    return found
+
+
+def faces_of(shape: Any) -> Iterator[Any]:
+    """Yield the faces of a shape."""
+    walk = occ("TopExp_Explorer")(shape, occ("TopAbs_ShapeEnum").TopAbs_FACE)
+    namespace = occ("TopoDS")
+    # The name of static functions had an ending before OpenCASCADE 8.
+    to_face = getattr(namespace, "Face", None) or namespace.Face_s
+    while walk.More():
+        yield to_face(walk.Current())
+        walk.Next()
+
+
+def volume_of(shape: Any) -> float:
+    """Return the volume of a shape, integrated over its exact faces."""
+    found = occ("GProp_GProps")()
+    # Asked for this precision, quadrature over curved faces does not stop at 1e-4.
+    occ("BRepGProp").VolumeProperties_s(shape, found, 1e-9)
+    return float(found.Mass())
+
+
+@dataclass(frozen=True)
+class ExactShape:
+    """A body with exact faces, as `explorer.prototype.kernel.Shape` has it."""
+
+    shape: Any
+
+    def __add__(self, other: ExactShape) -> ExactShape:
+        return self._with(other, "BRepAlgoAPI_Fuse")
+
+    def __sub__(self, other: ExactShape) -> ExactShape:
+        return self._with(other, "BRepAlgoAPI_Cut")
+
+    def __xor__(self, other: ExactShape) -> ExactShape:
+        return self._with(other, "BRepAlgoAPI_Common")
+
+    def translate(self, offset: Triple) -> ExactShape:
+        """Return it moved."""
+        return self._moved(placed(np.eye(3), np.array(offset)))
+
+    def rotate(self, degrees: Triple) -> ExactShape:
+        """Return it turned about x, y and z in turn."""
+        turn = Rotation.from_euler("xyz", degrees, degrees=True).as_matrix()
+        return self._moved(placed(turn, np.zeros(3)))
+
+    def transform(self, matrix: FloatArray) -> ExactShape:
+        """Return it turned and moved by a matrix of three rows and four columns."""
+        return self._moved(placed(matrix[:, :3], matrix[:, 3]))
+
+    def mirror(self, normal: Triple) -> ExactShape:
+        """Return its mirror image at a plane through the origin."""
+        found = occ("gp_Trsf")()
+        found.SetMirror(occ("gp_Ax2")(point(np.zeros(3)), direction(np.array(normal))))
+        return self._moved(found)
+
+    def _moved(self, how: Any) -> ExactShape:
+        return ExactShape(occ("BRepBuilderAPI_Transform")(self.shape, how, True).Shape())
+
+    def _with(self, other: ExactShape, operation: str) -> ExactShape:
+        work = occ(operation)(self.shape, other.shape)
+        if not work.IsDone():
+            raise ExplorerError(f"OpenCASCADE cannot combine two shapes ({operation})")
+        return ExactShape(work.Shape())
+
+
+class ExactKernel:
+    """Makes bodies of exact faces: what to cut out for a hole is the hole itself."""
+
+    def disc(self, circle: Circle, low: float, high: float) -> ExactShape:
+        """Return a cylinder along z between two heights."""
+        frame = occ("gp_Ax2")(point(np.array([circle.x, circle.y, low])), direction(np.eye(3)[2]))
+        return ExactShape(occ("BRepPrimAPI_MakeCylinder")(frame, circle.radius, high - low).Shape())
+
+    def hole(self, circle: Circle, low: float, high: float) -> ExactShape:
+        """Return what to cut out for a round hole."""
+        return self.disc(circle, low, high)
+
+    def ball(self, radius: float) -> ExactShape:
+        """Return a ball about the origin."""
+        return ExactShape(occ("BRepPrimAPI_MakeSphere")(radius).Shape())
+
+    def cavity(self, radius: float) -> ExactShape:
+        """Return what to cut out for a ball about the origin."""
+        return self.ball(radius)
+
+    def box(self, low: Triple, high: Triple) -> ExactShape:
+        """Return a box between two corners."""
+        corners = point(np.array(low)), point(np.array(high))
+        return ExactShape(occ("BRepPrimAPI_MakeBox")(*corners).Shape())
+
+    def union(self, shapes: Sequence[ExactShape]) -> ExactShape:
+        """Return the union of some shapes."""
+        whole, *others = shapes
+        for each in others:
+            whole = whole + each
+        return whole
+
+    def hull(self, circles: Sequence[Circle], low: float, high: float) -> ExactShape:
+        """Return a plate between two heights, whose outline is the convex hull of circles."""
+        around = [circles[index] for index in _outline(circles)]
+        if len(around) < 2:
+            return self.disc(around[0], low, high)
+        # Of each tangent the angle of its outward normal, from one circle to the next.
+        normals = [
+            math.atan2(b.y - a.y, b.x - a.x)
+            - math.acos((a.radius - b.radius) / math.hypot(b.x - a.x, b.y - a.y))
+            for a, b in zip(around, [*around[1:], around[0]], strict=True)
+        ]
+
+        def on(circle: Circle, angle: float) -> Any:
+            x = circle.x + circle.radius * math.cos(angle)
+            y = circle.y + circle.radius * math.sin(angle)
+            return point(np.array([x, y, low]))
+
+        wire, edge = occ("BRepBuilderAPI_MakeWire")(), occ("BRepBuilderAPI_MakeEdge")
+        for index, circle in enumerate(around):
+            start, end = normals[index - 1], normals[index]
+            end += 2.0 * math.pi * math.ceil((start - end) / (2.0 * math.pi))
+            middle = on(circle, 0.5 * (start + end))
+            arc = occ("GC_MakeArcOfCircle")(on(circle, start), middle, on(circle, end)).Value()
+            wire.Add(edge(arc).Edge())
+            following = around[(index + 1) % len(around)]
+            wire.Add(edge(on(circle, end), on(following, end)).Edge())
+        face = occ("BRepBuilderAPI_MakeFace")(wire.Wire()).Face()
+        up = occ("gp_Vec")(0.0, 0.0, high - low)
+        return ExactShape(occ("BRepPrimAPI_MakePrism")(face, up).Shape())
+
+
+def _outline(circles: Sequence[Circle]) -> list[int]:
+    """Return the circles on the convex hull, counter-clockwise; one may come twice."""
+    angles = np.linspace(0.0, 2.0 * math.pi, _DIRECTIONS, endpoint=False)
+    reach = np.array([c.x * np.cos(angles) + c.y * np.sin(angles) + c.radius for c in circles])
+    farthest = reach.argmax(axis=0).tolist()
+    found = [b for a, b in zip([farthest[-1], *farthest[:-1]], farthest, strict=True) if a != b]
+    return found or farthest[:1]
+
+
+class Document:
+    """A document of shapes with names and colours, to be written as STEP."""
+
+    def __init__(self) -> None:
+        self._document = occ("TDocStd_Document")(_text("XmlOcaf"))
+        tools = occ("XCAFDoc_DocumentTool")
+        self.shapes = tools.ShapeTool_s(self._document.Main())
+        self.colours = tools.ColorTool_s(self._document.Main())
+
+    def name(self, label: Any, name: str) -> None:
+        """Give a label a name."""
+        occ("TDataStd_Name").Set_s(label, _text(name))
+
+    def colour(self, label: Any, rgb: Rgb) -> None:
+        """Give the surface of a label a colour."""
+        red, green, blue = (linear(channel) for channel in rgb)
+        colour = occ("Quantity_Color")(
+            red, green, blue, occ("Quantity_TypeOfColor").Quantity_TOC_RGB
+        )
+        self.colours.SetColor(label, colour, occ("XCAFDoc_ColorType").XCAFDoc_ColorSurf)
+
+    def step(self) -> bytes:
+        """Return the document as a STEP file, in millimetres.
+
+        Raises:
+            ExplorerError: OpenCASCADE cannot write it.
+        """
+        _hush()
+        occ("STEPCAFControl_Controller").Init_s()
+        static = occ("Interface_Static")
+        static.SetCVal_s("write.step.schema", SCHEMA)
+        static.SetCVal_s("write.step.unit", "MM")
+        static.SetIVal_s("write.stepcaf.subshapes.name", 1)
+        writer = occ("STEPCAFControl_Writer")()
+        writer.SetNameMode(True)
+        writer.SetColorMode(True)
+        mode = occ("STEPControl_StepModelType").STEPControl_AsIs
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "document.step"
+            if not writer.Transfer(self._document, mode) or int(writer.Write(str(path))) != 1:
+                raise ExplorerError("OpenCASCADE cannot write the STEP file")
+            return path.read_bytes()
+
+
+def _text(text: str) -> Any:
+    return occ("TCollection_ExtendedString")(text, True)
+
+
+def _hush() -> None:
+    """Keep OpenCASCADE from telling on standard output what it writes."""
+    for printer in occ("Message").DefaultMessenger_s().Printers():
+        printer.SetTraceLevel(occ("Message_Gravity").Message_Alarm)

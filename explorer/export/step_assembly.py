@@ -1,0 +1,75 @@
+"""The prototype as STEP: parts of exact faces, in the groups that people take apart.
+
+AP242, millimetres of the base frame, in the home pose; names and colours as in 3MF. Needs
+the extra `cad`, which is imported only when asked for.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from explorer.export.assembly import COLOURS, groups_of
+from explorer.export.files import write_whole
+from explorer.export.opencascade import Document, ExactKernel, ExactShape, occ, placed
+from explorer.home import home_pose
+from explorer.prototype.chains import BODIES, Chains
+from explorer.prototype.forms import forms_of
+from explorer.prototype.sizes import Sizes
+
+
+def exact_parts(sizes: Sizes) -> dict[str, ExactShape]:
+    """Return the parts by name, each in the frame of its body, in millimetres.
+
+    Raises:
+        MissingExtraError: OpenCASCADE is not installed.
+        ExplorerError: a boolean fails.
+    """
+    return {name: shape for name, _, shape in forms_of(sizes, ExactKernel())}
+
+
+def assembly_step(sizes: Sizes) -> bytes:
+    """Return a STEP file of the parts, assembled in the home pose.
+
+    Raises:
+        MissingExtraError: OpenCASCADE is not installed.
+        ExplorerError: a boolean fails, or the file cannot be made.
+    """
+    design = sizes.design
+    home = home_pose(design)
+    places = Chains.of(design).places_at(home.position, home.rotation)
+    parts = exact_parts(sizes)
+    document = Document()
+    whole = _group(document, f"mechanism of {design.name}")
+    for name, members in groups_of():
+        group = _group(document, name)
+        for member in members:
+            label = document.shapes.AddShape(parts[member].shape, False)
+            document.name(label, member)
+            document.colour(label, COLOURS[member.partition(" ")[0]])
+            body = BODIES.index(member if member in BODIES else "platform")
+            where = placed(places.rotation[body], places.origin[body] * design.unit_mm)
+            _add(document, group, label, where, member)
+        _add(document, whole, group, occ("gp_Trsf")(), name)
+    document.shapes.UpdateAssemblies()
+    return document.step()
+
+
+def write_assembly_step(sizes: Sizes, path: Path) -> None:
+    """Write a STEP file of the parts, whole or not at all.
+
+    Raises:
+        MissingExtraError, ExplorerError: as of `assembly_step`.
+        InputError: the file cannot be written.
+    """
+    write_whole(path, assembly_step(sizes))
+
+
+def _group(document: Document, name: str) -> Any:
+    label = document.shapes.NewShape()
+    document.name(label, name)
+    return label
+
+
+def _add(document: Document, group: Any, label: Any, where: Any, name: str) -> None:
+    document.name(document.shapes.AddComponent(group, label, occ("TopLoc_Location")(where)), name)
