@@ -17,6 +17,8 @@ from explorer.app.optimising import SetWish, StartRun
 from explorer.app.scene.camera import ViewName
 from explorer.app.screenshot import headless_browser, picture
 from explorer.app.server import Running
+from explorer.app.singular_actions import Jog
+from explorer.app.singular_view import SingularView
 from explorer.app.state import View, WorkspaceView
 from explorer.design import JOINTS
 from explorer.design_file import PRESETS
@@ -78,6 +80,16 @@ SCENES = {
         size=(900, 800),
     ),
     "unclosed": Scene(actions=(SetJoint(JOINTS.index("l1"), 20.0),), panels=True),
+    # Tall, so that the whole diagram is in it.
+    "strata": Scene(
+        pose=Pose.of_yaw_pitch_roll((10, 5, 9), (-73.1, 12, 0)),
+        actions=(
+            SetView(View(handle=False, singular=SingularView(strata=True, ghost="nearest"))),
+            Jog(0, 20.0),
+        ),
+        panels=True,
+        size=(1280, 1300),
+    ),
     "twin": Scene(actions=(SetView(View(handle=False, twin=True)),)),
     "workspace": Scene(
         actions=(SetView(replace(BARE, workspace=WorkspaceView(solid=True))),),
