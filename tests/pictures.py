@@ -14,6 +14,7 @@ from playwright.sync_api import Browser
 from explorer.app.actions import Action, Open, SetJoint, SetLimits, SetView
 from explorer.app.optimisation import Wish
 from explorer.app.optimising import SetWish, StartRun
+from explorer.app.prototype_view import PrototypeView
 from explorer.app.scene.camera import ViewName
 from explorer.app.screenshot import headless_browser, picture
 from explorer.app.server import Running
@@ -110,6 +111,22 @@ SCENES = {
             SetLimits(with_radius(DESIGN, 0.2).limits),
             SetView(replace(BARE, workspace=WorkspaceView(solid=True, region="reachable"))),
         ),
+    ),
+    # Half apart, so that each part is seen and where it belongs too.
+    "prototype": Scene(
+        actions=(
+            SetView(
+                replace(
+                    BARE,
+                    flags=False,
+                    labels=False,
+                    prototype=PrototypeView(shown=True, exploded=0.5),
+                )
+            ),
+        ),
+        panels=True,
+        tab="View",
+        size=(1280, 1000),
     ),
     # The paper's problem; a search is the same each time, so that its end can be shown.
     "optimise": Scene(
