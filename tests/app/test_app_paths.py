@@ -274,7 +274,9 @@ def test_a_plan_is_made_in_a_process_of_its_own_and_keeps_everything(bench: Benc
     assert state.pose == journey.poses[0] == state.paths.start
     assert journey.poses[-1] == GOAL
     assert not journey.margins.crossings
-    assert "No singularity on the way" in path_words(journey)
+    least = np.abs(journey.margins.margins).min(axis=0)
+    closest = int(least.argmin())
+    assert f"|κ{closest + 1}| = {least[closest]:.3g}" in path_words(journey)
     inner = [journey.pose_at(float(t)) for t in np.linspace(0, journey.trajectory.duration, 50)]
     positions, rotations = ([p.position for p in inner], [p.rotation for p in inner])
     assert poses_are_valid(state.design, np.array(positions), np.array(rotations)).all()

@@ -78,7 +78,7 @@ def test_a_path_is_watched_planned_and_saved(tab: Tab) -> None:
     tab.wait_for(lambda: tab.state.paths.goal == tab.state.pose, "a goal")
     tab.push("Plan")
     tab.page.get_by_text("Planned path of").wait_for()
-    expect(tab.page.get_by_text("No singularity on the way.")).to_be_visible()
+    expect(tab.page.get_by_text("No singularity on the way;")).to_be_visible()
     with tab.page.expect_download() as download:
         tab.push("Export CSV")
     assert download.value.suggested_filename == "paper-optimal-path.csv"

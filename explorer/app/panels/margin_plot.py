@@ -12,7 +12,7 @@ from viser import uplot
 
 from explorer.app.assigning import Update
 from explorer.app.colours import GHOST, JOINT, SINGULAR, Rgb, css
-from explorer.app.panels.html import DIM, signed
+from explorer.app.panels.html import DIM, scientific, signed
 from explorer.app.paths import Journey
 from explorer.app.state import Frame
 from explorer.arrays import FloatArray
@@ -93,7 +93,8 @@ def _margins_at(journey: Journey, at: FloatArray) -> FloatArray:
 
 def path_words(journey: Journey) -> str:
     """Return the legend with the margins here, and the crossings, as HTML."""
-    here = margins(journey.pose.position, journey.pose.rotation).tolist()
+    pose = journey.pose
+    here = margins(pose.position, pose.rotation).tolist()
     legend = "".join(
         f'<tr><td style="padding:1px 0">{_swatch(index)}κ{index + 1}</td>'
         f'<td style="{DIM}">{INCIDENCES[index]}</td>'
@@ -116,7 +117,12 @@ def _crossings(journey: Journey) -> str:
     ]
     lines += [f"all along a move: κ{each} = 0" for each in found.lies_in]
     if not lines:
-        return f'<span style="{DIM}">No singularity on the way.</span>'
+        least = np.abs(found.margins).min(axis=0)
+        index = int(least.argmin())
+        return (
+            f'<span style="{DIM}">No singularity on the way; the closest is κ{index + 1} = 0, '
+            f"with |κ{index + 1}| = {scientific(float(least[index]), 3)}.</span>"
+        )
     dot = (
         '<span style="display:inline-block;width:9px;height:9px;border-radius:5px;'
         f'background:{css(SINGULAR)};margin-right:6px"></span>'
