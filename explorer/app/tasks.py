@@ -256,7 +256,7 @@ def export_assembly(design: Design, file_format: str) -> bytes:
 
     Args:
         design: The manipulator.
-        file_format: As of `explorer.export.assembly`.
+        file_format: As of `explorer.export.assembly`, or "step".
 
     Raises:
         ExplorerError: a design too tight for the parts, or a library that is missing.
@@ -264,6 +264,11 @@ def export_assembly(design: Design, file_format: str) -> bytes:
     from explorer.export.assembly import assembly_bytes
     from explorer.prototype.assembly import make_prototype
 
+    if file_format == "step":
+        from explorer.export.step_assembly import assembly_step
+        from explorer.prototype.fitting import sizes_of
+
+        return assembly_step(sizes_of(design))
     return assembly_bytes(make_prototype(design), file_format)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import sys
 from collections.abc import Callable, Generator
 from dataclasses import replace
 from typing import Any
@@ -22,6 +23,7 @@ from explorer.app.jobs import Worker
 from explorer.app.panels.prototype import (
     PROTOTYPE,
     SCHEMATIC,
+    STEP,
     PrototypePanel,
     assembly_name,
     parts_table,
@@ -40,13 +42,14 @@ from explorer.app.scene.shapes import cylinder
 from explorer.app.state import Frame, State, opened
 from explorer.app.viser_gaps import start_viser, stop_viser
 from explorer.design_file import PRESETS
-from explorer.errors import InputError
+from explorer.errors import InputError, MissingExtraError
 from explorer.export.assembly import FORMATS, assembly_bytes
 from explorer.pose import Pose
 from explorer.prototype.assembly import make_prototype
 from explorer.prototype.bill import bill_of_materials
 from explorer.prototype.chains import LEGS, ON_GUIDE, Places
 from explorer.prototype.shapes import least_gap
+from explorer.prototype.sizes import Sizes
 
 OPTIMAL = PRESETS["paper-optimal"]
 PARTS = 18
@@ -434,10 +437,30 @@ def test_files_of_the_assembly_are_those_of_the_library() -> None:
     for file_format in set(FORMATS) & {"glb", "stl-zip"}:
         expected = assembly_bytes(make_prototype(OPTIMAL), file_format)
         assert tasks.export_assembly(OPTIMAL, file_format) == expected
-    with pytest.raises(InputError, match="too tight"):
-        tasks.export_assembly(thick(opened(OPTIMAL), 0.4).design, "glb")
+    for file_format in ("glb", STEP):
+        with pytest.raises(InputError, match="too tight"):
+            tasks.export_assembly(thick(opened(OPTIMAL), 0.4).design, file_format)
     assert assembly_name("3mf") == "mechanism.3mf"
     assert assembly_name("stl-zip") == "parts-stl.zip"
+
+
+def test_step_is_exact_faces_or_a_word_on_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    sizes = make_prototype(OPTIMAL).sizes
+    written: list[Sizes] = []
+
+    def write(of: Sizes) -> bytes:
+        written.append(of)
+        return b"ISO-10303-21"
+
+    monkeypatch.setattr("explorer.export.step_assembly.assembly_step", write)
+    assert tasks.export_assembly(OPTIMAL, STEP) == b"ISO-10303-21"
+    assert written == [sizes]
+    monkeypatch.undo()
+    monkeypatch.setitem(sys.modules, "OCP", None)
+    for name in [name for name in sys.modules if name.startswith("OCP.")]:
+        monkeypatch.delitem(sys.modules, name)
+    with pytest.raises(MissingExtraError, match=r"flagged-explorer\[cad\]"):
+        tasks.export_assembly(OPTIMAL, STEP)
 
 
 def test_shares_and_densities_out_of_range_are_refused() -> None:

@@ -23,6 +23,7 @@ from explorer.export.assembly import FORMATS
 from explorer.prototype.bill import Actuator
 
 SCHEMATIC, PROTOTYPE = "schematic", "prototype"
+STEP = "step"
 RIGHT = '<td style="text-align:right;white-space:nowrap">'
 # Zipped STL files are the one format whose name is no suffix.
 SUFFIXES = {"stl-zip": "parts-stl.zip"}
@@ -67,9 +68,10 @@ class PrototypePanel:
             self._bill = gui.add_html("")
             self._format = gui.add_dropdown(
                 "Format",
-                tuple(FORMATS),
+                (*FORMATS, STEP),
                 hint="Of the assembly in the home pose: 3MF in millimetres, with names and "
-                "colours; GLB with the tree of joints; a zip with an STL for each part.",
+                "colours; GLB with the tree of joints; a zip with an STL for each part; STEP "
+                "with exact faces, which needs the extra cad.",
             )
             button = gui.add_button(
                 "Export assembly",
