@@ -6,7 +6,7 @@ Everything here is in millimetres, but for the design.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -114,6 +114,13 @@ class Sizes:
         That is what the guide's limits allow, or the workspace asks for, on the side of a1
         that it has at home.
         """
+        return self._carriage_ranges[leg]
+
+    @cached_property
+    def _carriage_ranges(self) -> Mapping[int, Stroke]:
+        return {leg: self._carriage_range(leg) for leg in ON_GUIDE}
+
+    def _carriage_range(self, leg: int) -> Stroke:
         home, nearest = self.carriage_at_home(leg), self.nearest_to_a1(leg)
         low, high = self._asked_of_guide(leg)
         low, high = min(low, home), max(high, home)
