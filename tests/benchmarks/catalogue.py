@@ -22,6 +22,7 @@ BENCHMARKS: Mapping[str, str] = {
     "optimise": "optimal designs: iterations, precision, time, random starts",
     "planning": "paths between random poses that keep everything",
     "prototype": "parts of the prototype, their places, their files, STEP, the simulation",
+    "prototype_page": "from a design slider to the new parts, and their moves with a pose",
     "capability": "share of all orientations that a position allows",
     "drag_sockets": "lag of two long drags at once, seen by bare websocket clients",
     "drag_browser": "lag of two long drags at once, seen in two tabs of a real browser",

@@ -1,0 +1,72 @@
+"""The prototype on the page: new parts after a design slider, and their moves with a pose."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from benchmarks.samples import DESIGN
+from benchmarks.table import Row, seconds
+from benchmarks.timing import Spread
+from explorer.app.actions import SetPosition, SetVariable, SetView
+from explorer.app.assigning import Assigner
+from explorer.app.prototype_view import PrototypeView
+from explorer.app.scene.placing import Placed
+from explorer.app.scene.prototype import PrototypeScene
+from explorer.app.server import Running, start
+from explorer.app.state import Frame, State
+from explorer.compiled import warm
+
+CHANGES, MOVES, WARM_UP = 60, 300, 10
+
+
+def run() -> Iterator[Row]:
+    """Yield the rows."""
+    warm()
+    running = start(DESIGN, port=0)
+    try:
+        session = running.page.session
+        view = replace(session.state.view, prototype=PrototypeView(shown=True))
+        session.do(SetView(view))
+        running.page.wait_until_drawn()
+        rebuilt, moved = Spread.of(_rebuilt(running)), Spread.of(_moved(running))
+    finally:
+        running.stop()
+    yield Row("design slider to the new parts of the prototype", _words(rebuilt), "300 ms")
+    yield Row("move of all parts, computed and assigned", _words(moved), "1 ms")
+
+
+def _rebuilt(running: Running) -> list[float]:
+    durations: list[float] = []
+    for value in (19.0 + 0.5 * np.sin(np.arange(CHANGES + WARM_UP) / 9.0)).tolist():
+
+        def change(_: State, value: float = value) -> SetVariable:
+            return SetVariable("a3x", value)
+
+        began = time.perf_counter()
+        running.page.session.post("a3x", change)
+        running.page.wait_until_drawn()
+        durations.append(time.perf_counter() - began)
+    return durations[WARM_UP:]
+
+
+def _moved(running: Running) -> list[float]:
+    parts, state = running.page.parts_feed.parts, running.page.session.state
+    scene, assigner = PrototypeScene(running.viser.scene), Assigner(running.viser)
+    durations: list[float] = []
+    for z in (9.0 + np.sin(np.arange(MOVES + WARM_UP) / 9.0)).tolist():
+        state = SetPosition(2, z).apply(state)
+        frame = Frame(state)
+        # What other parts of the scene need too is not counted.
+        _ = frame.snapshot
+        began = time.perf_counter()
+        assigner.assign(list(scene.updates(Placed(frame, None, parts))))
+        durations.append(time.perf_counter() - began)
+    return durations[WARM_UP:]
+
+
+def _words(spread: Spread) -> str:
+    return f"{seconds(spread.p95)} p95 (p50 {seconds(spread.p50)})"
