@@ -37,9 +37,15 @@ CHROMIUM_FLAGS = (
 )
 # A software renderer on a busy machine takes seconds for a large picture.
 PATIENCE_SECONDS = 60.0
+# Charts have canvases too; three.js marks its own.
+SCENE_CANVAS = "canvas[data-engine]"
 NUDGE_SECONDS = 2.0
+# A panel that docks changes the shape of the canvas by far more.
+SAME_SHAPE = 0.01
 # Whatever neither holds the canvas nor is it.
-SCENE_ALONE = "body *:not(:has(canvas)):not(canvas) { visibility: hidden !important; }"
+SCENE_ALONE = (
+    f"body *:not(:has({SCENE_CANVAS})):not({SCENE_CANVAS}) {{ visibility: hidden !important; }}"
+)
 
 
 class PictureError(ExplorerError):
@@ -197,9 +203,14 @@ def settle(page: Page, client: ClientHandle) -> None:
 
 
 def _knows_its_size(page: Page, client: ClientHandle) -> bool:
-    """Whether the server knows the size of the canvas, which docked panels narrow."""
-    box = page.locator("canvas").first.bounding_box()
-    return box is not None and abs(client.camera.aspect - box["width"] / box["height"]) < 1e-3
+    """Whether the server knows the size of the canvas, which docked panels narrow.
+
+    To a pixel of those that are drawn: a busy browser draws fewer than it shows.
+    """
+    box = page.locator(SCENE_CANVAS).bounding_box()
+    if box is None:
+        return False
+    return abs(client.camera.aspect * box["height"] / box["width"] - 1.0) < SAME_SHAPE
 
 
 def stable_picture(page: Page) -> bytes:

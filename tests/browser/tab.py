@@ -13,7 +13,7 @@ from playwright.sync_api import Browser, ConsoleMessage, Locator
 
 from explorer.app.scene.camera import ViewName, framing
 from explorer.app.scene.placing import Placed
-from explorer.app.screenshot import PATIENCE_SECONDS, settle
+from explorer.app.screenshot import PATIENCE_SECONDS, SCENE_CANVAS, settle
 from explorer.app.server import Running
 from explorer.app.state import Frame, State
 from explorer.arrays import FloatArray
@@ -184,7 +184,7 @@ class Tab:
         """Return a picture of the scene, drawn after all that has been asked for."""
         assert self.running.page.session.wait_until_idle()
         settle(self.page, self.client)
-        return self.page.locator("canvas").first.screenshot()
+        return self.page.locator(SCENE_CANVAS).screenshot()
 
     def on_screen(self, point: FloatArray) -> tuple[float, float]:
         """Return where a point of the scene (3,) is in the page."""
@@ -195,7 +195,7 @@ class Tab:
         right /= np.linalg.norm(right)
         up = np.cross(right, forward)
         depth = (point - eye) @ forward * math.tan(0.5 * camera.fov)
-        box = self.page.locator("canvas").first.bounding_box()
+        box = self.page.locator(SCENE_CANVAS).bounding_box()
         assert box is not None
         across = float((point - eye) @ right / depth) * box["height"] / 2
         upward = float((point - eye) @ up / depth) * box["height"] / 2
