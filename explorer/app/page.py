@@ -115,7 +115,7 @@ class Page:
             gui.main_panel.dock_right()
             gui.main_panel.set_width(350)
             side.dock_left()
-            side.set_width(300)
+            side.set_width(286)
 
         self._scene.drag_handle.handle.on_update(self._dragged)
         self._aim_initial_camera()
