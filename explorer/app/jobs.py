@@ -64,6 +64,12 @@ class LatestWins(Generic[Item]):
         with self._condition:
             return key in self._waiting
 
+    @property
+    def has_more(self) -> bool:
+        """Whether anything waits."""
+        with self._condition:
+            return bool(self._waiting)
+
     def wait_until_idle(self, timeout: float) -> bool:
         """Wait until nothing waits and nothing runs; say whether that came about."""
         with self._condition:

@@ -49,6 +49,8 @@ TITLE = "Flagged 4-4 explorer"
 BRAND = (24, 74, 150)
 # One complaint is shown this long, and not again within it.
 COMPLAINT_SECONDS = 6.0
+# While events come faster than frames, the figures are told this often.
+FIGURES_SECONDS = 0.1
 # Between two looks at a run that is waited for.
 WAIT_SECONDS = 0.02
 VIEW_LABELS: dict[str, ViewName] = {name.capitalize(): name for name in get_args(ViewName)}
@@ -66,6 +68,7 @@ class Page:
     def __init__(self, server: viser.ViserServer, state: State, *, docked: bool = True) -> None:
         self._server = server
         self._complained: dict[str, float] = {}
+        self._told = 0.0
         self._frame = Frame(state)
         self._assigner = Assigner(server)
         self.session = Session(state, self._draw, self._complain, self._report)
@@ -166,8 +169,15 @@ class Page:
         # First, so that what is asked for is called out of date until it arrives.
         for feed in (self.feed, self.radius_feed, self.strata_feed, self.parts_feed):
             feed.follow(frame)
-        updates = self._scene.updates(self._placed())
-        updates.extend(self._optimise.updates(frame))
+        # The mechanism follows the hand before the figures do, which nobody reads meanwhile.
+        self._assigner.assign(self._scene.updates(self._placed()))
+        self.optimiser.follow(frame)
+        self.path_runner.follow(frame)
+        now = time.monotonic()
+        if self.session.has_more and now - self._told < FIGURES_SECONDS:
+            return
+        self._told = now
+        updates = list(self._optimise.updates(frame))
         for panel in self._panels:
             updates.extend(panel.updates(frame))
         for panel in (self._workspace, self._numbers):
@@ -176,8 +186,6 @@ class Page:
         updates.extend(self._singularity.updates(frame, self.strata_feed))
         updates.extend(self._prototype.updates(frame, self.parts_feed))
         self._assigner.assign(updates)
-        self.optimiser.follow(frame)
-        self.path_runner.follow(frame)
 
     def _placed(self) -> Placed:
         drawing = self.feed.drawing

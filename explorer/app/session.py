@@ -77,6 +77,11 @@ class Session:
         """Whether a change of this key waits."""
         return self._jobs.is_waiting(key)
 
+    @property
+    def has_more(self) -> bool:
+        """Whether any change waits, so that another frame follows at once."""
+        return self._jobs.has_more
+
     def wait_until_idle(self, timeout: float = 10.0) -> bool:
         """Wait until all that was posted is done and drawn; say whether it is."""
         return self._jobs.wait_until_idle(timeout)

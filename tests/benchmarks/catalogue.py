@@ -11,7 +11,7 @@ BENCHMARKS: Mapping[str, str] = {
     "forward_batch": "joint vectors per second of the forward kinematics, one core",
     "forward_once": "one call of the forward kinematics",
     "forward_error": "error of the forward kinematics over the reference cases",
-    "slider": "from the arrival of a slider's event to the last message of its frame",
+    "slider": "from the arrival of a slider's event to the last message of the scene",
     "volume": "exact volume and gradient of the workspace",
     "solid": "the solid of the workspace",
     "solid_page": "from a design slider to the updated solid",
