@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import gc
+import signal
 import socket
 import sys
 import threading
@@ -19,6 +21,8 @@ from explorer.design import Design
 from explorer.errors import ServerError
 from explorer.pose import Pose
 
+# How soon an interruption is heard where it does not end a wait.
+WAKE_SECONDS = 1.0
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
 
@@ -94,26 +98,53 @@ def serve(
     """
     running = start(design, host=host, port=port)
     try:
-        sys.stderr.write(f"{TITLE}: {running.url}   (Ctrl-C stops it)\n")
-        if host not in LOOPBACK:
-            sys.stderr.write(
-                f"Listening on {host}: whoever reaches this machine over the network can see and "
-                "change what you do here, without a password.\n"
-            )
-        sys.stderr.flush()
-        # What is there now stays; the collector need not look at it again in mid-drag.
-        gc.collect()
-        gc.freeze()
-        warm_in_background()
-        # One after the other, and what the page needs first.
-        running.page.worker.start(then=running.page.optimiser.worker.start)
-        if open_browser:
-            threading.Thread(target=webbrowser.open, args=(running.url,), daemon=True).start()
-        threading.Event().wait()
-    except KeyboardInterrupt:
+        with contextlib.suppress(KeyboardInterrupt):
+            _attend(running, host, open_browser)
         sys.stderr.write("Stopped.\n")
     finally:
         running.stop()
+
+
+def _attend(running: Running, host: str, open_browser: bool) -> None:
+    """Say where the page is, make ready what it needs, and wait for an interruption."""
+    interrupted = _interruption()
+    sys.stderr.write(f"{TITLE}: {running.url}   (Ctrl-C stops it)\n")
+    if host not in LOOPBACK:
+        sys.stderr.write(
+            f"Listening on {host}: whoever reaches this machine over the network can see and "
+            "change what you do here, without a password.\n"
+        )
+    sys.stderr.flush()
+    # What is there now stays; the collector need not look at it again in mid-drag.
+    gc.collect()
+    gc.freeze()
+    warm_in_background()
+    # One after the other, and what the page needs first.
+    running.page.worker.start(then=running.page.optimiser.worker.start)
+    if open_browser:
+        threading.Thread(target=webbrowser.open, args=(running.url,), daemon=True).start()
+    # Some systems hear of signals only between two waits.
+    while not interrupted.wait(WAKE_SECONDS):
+        pass
+
+
+def _interruption() -> threading.Event:
+    """Return what the first Ctrl-C sets; the next one interrupts as ever.
+
+    Python would raise wherever it is, and what is raised while the collector or a finaliser
+    runs is lost. Where nothing is to be interrupted, as in a background job, nothing changes.
+    """
+    asked = threading.Event()
+    usual = signal.getsignal(signal.SIGINT)
+    in_main = threading.current_thread() is threading.main_thread()
+    if in_main and usual is signal.default_int_handler:
+
+        def ask(*_: object) -> None:
+            signal.signal(signal.SIGINT, usual)
+            asked.set()
+
+        signal.signal(signal.SIGINT, ask)
+    return asked
 
 
 def _check_free(host: str, port: int) -> None:

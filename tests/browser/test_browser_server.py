@@ -8,6 +8,7 @@ import socket
 import subprocess
 import sys
 import threading
+import time
 import urllib.request
 from collections.abc import Iterator
 
@@ -171,3 +172,16 @@ def test_serve_says_where_it_is_and_stops_quietly_when_interrupted(host: str | N
     assert process.returncode in (0, 130)
     assert rest == "Stopped.\n"
     assert out == ""
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.03, 0.1, 0.3])
+def test_an_interruption_is_heard_whenever_it_comes(delay: float) -> None:
+    with serve() as process:
+        assert process.stderr is not None
+        process.stderr.readline()
+        # The collector runs about now, and what is raised within it is lost.
+        time.sleep(delay)
+        process.send_signal(signal.SIGINT)
+        _, rest = process.communicate(timeout=60)
+    assert process.returncode in (0, 130)
+    assert rest == "Stopped.\n"
