@@ -20,6 +20,7 @@ from strategies import (
 from explorer import PRESETS, InputError, Pose, forward, home_pose, inverse, margins, poses_between
 from explorer.arrays import FloatArray
 from explorer.crossings import modes_differ, path_between_modes, path_margins
+from explorer.singularity import mode_of
 
 OPTIMAL = PRESETS["paper-optimal"]
 HOME = home_pose(OPTIMAL)
@@ -68,7 +69,11 @@ def test_any_path_between_two_modes_crosses_each_margin_that_they_differ_in(
     """The claim: modes are the sign triples, so a path to another crosses what differs."""
     modes = forward(case.design, inverse(case.design, case.position, case.rotation))
     assume(bool(modes.feasible))
-    assume(bool(np.abs(margins(case.position, case.rotation)).min() > 1e-6 * case.size))
+    # All eight have the same |κ| but for the rounding of the joints, which a platform of a
+    # millionth of the size blows up until an end may lie on the singular set.
+    found_margins = margins(modes.position, modes.rotation)
+    assume(bool(np.abs(found_margins).min() > 1e-6 * case.size))
+    assume(bool((mode_of(found_margins) == np.arange(8)).all()))
     rng = np.random.default_rng(seed)
     first, last = rng.choice(8, 2, replace=False).tolist()
     ends = [Pose.of(modes.position[k], modes.rotation[k]) for k in (first, last)]
