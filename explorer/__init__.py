@@ -40,8 +40,9 @@ if TYPE_CHECKING:
         nearest_singularities,
     )
     from explorer.nearest_stratum import nearest_in_stratum
+    from explorer.optimise.defaults import make_problem
     from explorer.optimise.outcome import Iterate, Outcome, Run
-    from explorer.optimise.problem import Demands, Problem, Variable, make_problem
+    from explorer.optimise.problem import Demands, Problem, Variable
     from explorer.optimise.solver import optimise_design
     from explorer.performance import singularity_free_ball
     from explorer.planning import NoPathError, PlannedPath, plan_path
@@ -97,7 +98,8 @@ _HOMES = {
         "nearest_singularities",
     ),
     "optimise.outcome": ("Iterate", "Outcome", "Run"),
-    "optimise.problem": ("Demands", "Problem", "Variable", "make_problem"),
+    "optimise.defaults": ("make_problem",),
+    "optimise.problem": ("Demands", "Problem", "Variable"),
     "optimise.solver": ("optimise_design",),
     "nearest_stratum": ("nearest_in_stratum",),
     "performance": ("singularity_free_ball",),

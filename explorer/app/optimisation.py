@@ -17,6 +17,7 @@ import numpy as np
 from explorer.constraints import Never, constraints
 from explorer.design import VARIABLES, Design
 from explorer.home import home_pose
+from explorer.optimise.defaults import make_problem
 from explorer.optimise.facts import Facts
 from explorer.optimise.outcome import Iterate, Outcome, Status
 from explorer.optimise.problem import (
@@ -26,7 +27,6 @@ from explorer.optimise.problem import (
     ObjectiveName,
     Problem,
     longest_length,
-    make_problem,
 )
 from explorer.optimise.trail import Trail
 from explorer.workspace import workspace_volume

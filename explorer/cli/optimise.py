@@ -173,7 +173,7 @@ class Optimise(JsonOptions, DesignOptions):
 
     def _asked(self) -> tuple[Problem, Settings]:
         """Return what the options ask for."""
-        from explorer.optimise.problem import make_problem
+        from explorer.optimise.defaults import make_problem
         from explorer.optimise.record import Settings, load_record
 
         if self.repeat is not None:

@@ -11,8 +11,9 @@ from explorer.clearance import PAIRS
 from explorer.design import Design
 from explorer.home import home_pose
 from explorer.least_clearance import least_clearances
+from explorer.optimise.defaults import MARGIN_OF_CLEARANCE
 from explorer.optimise.demands import corners_of
-from explorer.optimise.problem import MARGIN_OF_CLEARANCE, Box, longest_length
+from explorer.optimise.problem import Box, longest_length
 from explorer.pose import yaw_pitch_roll_from_rotation
 from explorer.singularity import margins
 from explorer.workspace import workspace_nodes, workspace_volume

@@ -12,8 +12,9 @@ import msgspec
 
 from explorer.design import Design
 from explorer.design_file import PRESETS
+from explorer.optimise.defaults import make_problem
 from explorer.optimise.facts import Facts, facts_of
-from explorer.optimise.problem import Box, Problem, Variable, make_problem
+from explorer.optimise.problem import Box, Problem, Variable
 from explorer.optimise.solver import optimise_design
 from explorer.workspace import workspace_volume
 

@@ -33,14 +33,6 @@ for all four lengths, and how far the required box is shifted along each axis.""
 
 Box = tuple[Triple, Triple]
 
-# Default bounds, as multiples of the start's largest variable.
-A3_WITHIN, B_WITHIN = 3.0, 1.0
-# How near a design may come to a degenerate one by default, as such a share.
-LEAST = 0.05
-# Where clearances are demanded by default: from this margin on, as a share of the reach.
-MARGIN_OF_CLEARANCE = 0.05
-# Degrees of yaw that may change, and that stay between the two lines.
-YAW_WITHIN, LINES_APART = 45.0, 5.0
 # How small a reach of its own may become, as a share of the start's.
 LEAST_REACH = 1e-3
 
@@ -225,90 +217,6 @@ class Problem(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         return (ax + x, ay + y, az + z), (bx + x, by + y, bz + z)
 
 
-def make_problem(
-    start: Design,
-    objective: ObjectiveName,
-    *,
-    volume: float | None = None,
-    reach: float | None = None,
-    clearance: float | None = None,
-    clearance_margin: float | None = None,
-    least: float | None = None,
-    stroke_ratio: float | None = None,
-    required_box: Box | None = None,
-    free: Iterable[str] = (),
-    bounds: Iterable[Variable] = (),
-) -> Problem:
-    """Return a problem with sensible bounds and margins where none are given.
-
-    Args:
-        start: Where to begin.
-        objective: One of `OBJECTIVES`.
-        volume: See `Demands`; the start's own for the smallest reach if None.
-        reach: See `Demands`; the start's own for the largest volume if None.
-        clearance: See `Demands`.
-        clearance_margin: See `Demands`; a 20th of the start's reach if None.
-        least: See `Demands`; if None a 20th of the start's largest variable, or less where
-            the start itself is half as far from degenerate.
-        stroke_ratio: See `Demands`.
-        required_box: See `Demands`.
-        free: What of `OPTIONAL` may change besides the six design variables.
-        bounds: Variables with bounds in the place of the default ones.
-
-    Raises:
-        InputError: see `Problem`.
-    """
-    given = {each.name: each for each in bounds}
-    names = [*VARIABLES, *free, *(name for name in given if name not in VARIABLES)]
-    variables = [given.get(name) or default_variable(start, name) for name in dict.fromkeys(names)]
-    size = max(map(abs, start.variables))
-    if volume is None and objective == "smallest-reach":
-        volume = _own_volume(start)
-    if reach is None and objective == "largest-volume":
-        reach = longest_length(start)
-    if least is None:
-        least = min(LEAST * size, 0.5 * min(abs(distance_of(start, name)) for name in DISTANCES))
-    if clearance_margin is None:
-        clearance_margin = MARGIN_OF_CLEARANCE * start.reach
-    return Problem(
-        start=start,
-        objective=objective,
-        variables=tuple(variables),
-        demands=Demands(
-            volume=volume,
-            reach=reach,
-            clearance=clearance,
-            clearance_margin=clearance_margin,
-            least=least,
-            stroke_ratio=stroke_ratio,
-            required_box=required_box,
-        ),
-    )
-
-
-def default_variable(start: Design, name: str) -> Variable:
-    """Return a variable with bounds that leave room around a start.
-
-    Raises:
-        InputError: no such variable.
-    """
-    size = max(map(abs, start.variables))
-    value = start_value(start, name)
-    if name in ("a3x", "a3y"):
-        return Variable(name, -A3_WITHIN * size, A3_WITHIN * size)
-    if name in VARIABLES:
-        return Variable(name, -B_WITHIN * size, B_WITHIN * size)
-    if name == REACH:
-        return Variable(name, max(value / A3_WITHIN, _longest_minimum(start)), A3_WITHIN * value)
-    if name in SHIFTS:
-        return Variable(name, -size, size)
-    # Between the two yaws at which the lines are parallel, if the start is.
-    below = 180.0 * math.floor(value / 180.0)
-    low = max(value - YAW_WITHIN, min(value, below + LINES_APART))
-    high = min(value + YAW_WITHIN, max(value, below + 180.0 - LINES_APART))
-    return Variable(name, low, high)
-
-
 DISTANCES = ("a3y", "b1y", "b3 − b2")
 """What makes a design degenerate at zero."""
 
@@ -340,18 +248,9 @@ def longest_length(design: Design) -> float:
     return max(design.length_range(name)[1] for name in LENGTHS)
 
 
-def _longest_minimum(design: Design) -> float:
+def longest_minimum(design: Design) -> float:
     """Return the largest of the four minimum lengths."""
     return max(design.length_range(name)[0] for name in LENGTHS)
-
-
-def _own_volume(start: Design) -> float:
-    from explorer.workspace import workspace_volume
-
-    volume = workspace_volume(start).volume
-    if volume <= 0.0:
-        raise InputError("the start has an empty workspace: say which volume is wanted")
-    return volume
 
 
 def _with_lengths(limits: Limits, ranges: Mapping[str, tuple[float, float | None]]) -> Limits:
@@ -375,10 +274,10 @@ def _check_variables(problem: Problem) -> None:
                 f"the start has {each.name} = {value:g}{unit}, outside its bounds "
                 f"{each.low:g}{unit} to {each.high:g}{unit}: widen them or start elsewhere"
             )
-        if each.name == REACH and not each.low >= max(LEAST_REACH * value, _longest_minimum(start)):
+        if each.name == REACH and not each.low >= max(LEAST_REACH * value, longest_minimum(start)):
             raise InputError(
                 f"the reach must stay above every minimum length, so its low bound above "
-                f"{max(LEAST_REACH * value, _longest_minimum(start)):g}; got {each.low:g}"
+                f"{max(LEAST_REACH * value, longest_minimum(start)):g}; got {each.low:g}"
             )
         if each.name in SHIFTS and problem.demands.required_box is None:
             raise InputError(f"{each.name} shifts the required box, and none is given")

@@ -17,6 +17,7 @@ from benchmarks.table import Row, seconds, times
 from explorer.arrays import BoolArray, FloatArray
 from explorer.compiled import warm
 from explorer.errors import DesignError
+from explorer.optimise.defaults import make_problem
 from explorer.optimise.findings import (
     CLEARANCE,
     PAPER_VOLUME,
@@ -25,7 +26,7 @@ from explorer.optimise.findings import (
     reach_problem,
 )
 from explorer.optimise.model import Evaluation, Model
-from explorer.optimise.problem import Problem, make_problem
+from explorer.optimise.problem import Problem
 from explorer.optimise.solver import optimise_design
 from explorer.optimise.starts import more_starts
 

@@ -1,0 +1,125 @@
+"""Problems with sensible bounds and margins where none are given."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+from explorer.design import VARIABLES, Design
+from explorer.errors import InputError
+from explorer.optimise.problem import (
+    DISTANCES,
+    REACH,
+    SHIFTS,
+    Box,
+    Demands,
+    ObjectiveName,
+    Problem,
+    Variable,
+    distance_of,
+    longest_length,
+    longest_minimum,
+    start_value,
+)
+
+# Default bounds, as multiples of the start's largest variable.
+A3_WITHIN, B_WITHIN = 3.0, 1.0
+# How near a design may come to a degenerate one by default, as such a share.
+LEAST = 0.05
+# Where clearances are demanded by default: from this margin on, as a share of the reach.
+MARGIN_OF_CLEARANCE = 0.05
+# Degrees of yaw that may change, and that stay between the two lines.
+YAW_WITHIN, LINES_APART = 45.0, 5.0
+
+
+def make_problem(
+    start: Design,
+    objective: ObjectiveName,
+    *,
+    volume: float | None = None,
+    reach: float | None = None,
+    clearance: float | None = None,
+    clearance_margin: float | None = None,
+    least: float | None = None,
+    stroke_ratio: float | None = None,
+    required_box: Box | None = None,
+    free: Iterable[str] = (),
+    bounds: Iterable[Variable] = (),
+) -> Problem:
+    """Return a problem with sensible bounds and margins where none are given.
+
+    Args:
+        start: Where to begin.
+        objective: One of `OBJECTIVES`.
+        volume: See `Demands`; the start's own for the smallest reach if None.
+        reach: See `Demands`; the start's own for the largest volume if None.
+        clearance: See `Demands`.
+        clearance_margin: See `Demands`; a 20th of the start's reach if None.
+        least: See `Demands`; if None a 20th of the start's largest variable, or less where
+            the start itself is half as far from degenerate.
+        stroke_ratio: See `Demands`.
+        required_box: See `Demands`.
+        free: What of `OPTIONAL` may change besides the six design variables.
+        bounds: Variables with bounds in the place of the default ones.
+
+    Raises:
+        InputError: see `Problem`.
+    """
+    given = {each.name: each for each in bounds}
+    names = [*VARIABLES, *free, *(name for name in given if name not in VARIABLES)]
+    variables = [given.get(name) or default_variable(start, name) for name in dict.fromkeys(names)]
+    size = max(map(abs, start.variables))
+    if volume is None and objective == "smallest-reach":
+        volume = _own_volume(start)
+    if reach is None and objective == "largest-volume":
+        reach = longest_length(start)
+    if least is None:
+        least = min(LEAST * size, 0.5 * min(abs(distance_of(start, name)) for name in DISTANCES))
+    if clearance_margin is None:
+        clearance_margin = MARGIN_OF_CLEARANCE * start.reach
+    return Problem(
+        start=start,
+        objective=objective,
+        variables=tuple(variables),
+        demands=Demands(
+            volume=volume,
+            reach=reach,
+            clearance=clearance,
+            clearance_margin=clearance_margin,
+            least=least,
+            stroke_ratio=stroke_ratio,
+            required_box=required_box,
+        ),
+    )
+
+
+def default_variable(start: Design, name: str) -> Variable:
+    """Return a variable with bounds that leave room around a start.
+
+    Raises:
+        InputError: no such variable.
+    """
+    size = max(map(abs, start.variables))
+    value = start_value(start, name)
+    if name in ("a3x", "a3y"):
+        return Variable(name, -A3_WITHIN * size, A3_WITHIN * size)
+    if name in VARIABLES:
+        return Variable(name, -B_WITHIN * size, B_WITHIN * size)
+    if name == REACH:
+        return Variable(name, max(value / A3_WITHIN, longest_minimum(start)), A3_WITHIN * value)
+    if name in SHIFTS:
+        return Variable(name, -size, size)
+    # Between the two yaws at which the lines are parallel, if the start is.
+    below = 180.0 * math.floor(value / 180.0)
+    low = max(value - YAW_WITHIN, min(value, below + LINES_APART))
+    high = min(value + YAW_WITHIN, max(value, below + 180.0 - LINES_APART))
+    return Variable(name, low, high)
+
+
+def _own_volume(start: Design) -> float:
+    from explorer.workspace import workspace_volume
+
+    volume = workspace_volume(start).volume
+    if volume <= 0.0:
+        raise InputError("the start has an empty workspace: say which volume is wanted")
+    return volume
