@@ -17,7 +17,7 @@ from explorer.arrays import FloatArray, IntArray
 from explorer.clearance import PAIRS, leg_clearances
 from explorer.design import Design
 from explorer.home import home_pose
-from explorer.least_clearance import least_clearances
+from explorer.least_clearance import LeastClearances, least_clearances
 from explorer.moves import move_clearances
 from explorer.pose import checked_rotation
 from explorer.reachable_nodes import Survey, middles_over, survey
@@ -42,19 +42,36 @@ class RadiusCurve:
             (n,).
         volumes: Reachable with them, shape (n,), in cubed design units; counted in cells
             of a grid as shares of the exact volume within the limits.
-        harmless: The largest radius with which no two legs collide anywhere within the
-            limits; 0 if some touch without a radius.
-        harmless_bound: Certified not to exceed it.
-        closest_legs: The pair that comes closest, None if none has a clearance.
-        closest_position: Where it does, shape (3,).
+        least: How close legs without radii come within the limits.
     """
 
     radii: FloatArray
     volumes: FloatArray
-    harmless: float
-    harmless_bound: float
-    closest_legs: tuple[int, int] | None
-    closest_position: FloatArray
+    least: LeastClearances
+
+    @property
+    def harmless(self) -> float:
+        """The largest radius with which no two legs collide anywhere within the limits.
+
+        0 if some touch without a radius, or if there is nothing within the limits.
+        """
+        return 0.0 if self.closest_legs is None else 0.5 * float(self.least.clearance.min())
+
+    @property
+    def harmless_bound(self) -> float:
+        """Certified not to exceed `harmless`."""
+        return 0.0 if self.closest_legs is None else 0.5 * max(0.0, float(self.least.bound.min()))
+
+    @property
+    def closest_legs(self) -> tuple[int, int] | None:
+        """The pair that comes closest, None if there is nothing within the limits."""
+        closest = self.least.clearance.argmin()
+        return PAIRS[closest] if np.isfinite(self.least.clearance[closest]) else None
+
+    @property
+    def closest_position(self) -> FloatArray:
+        """Where that pair comes closest, shape (3,); NaN if there is none."""
+        return self.least.position[self.least.clearance.argmin()]
 
     def radius_at(self, share: float) -> float:
         """Return the radius at which this share of the first volume is left."""
@@ -85,7 +102,7 @@ def radius_curve(
     thin = with_radius(design, 0.0)
     whole = workspace_solid(thin, r)
     if whole.is_empty:
-        return RadiusCurve(np.zeros(1), np.zeros(1), 0.0, 0.0, None, np.full(3, np.nan))
+        return RadiusCurve(np.zeros(1), np.zeros(1), least_clearances(thin, r))
     check_start(thin, r, p)
     least = least_clearances(thin, r)
     lows, highs = whole.vertices.min(axis=0), whole.vertices.max(axis=0)
@@ -95,15 +112,8 @@ def radius_curve(
     # A cell is reached with radii up to its own, to rounding.
     left = len(widest) - np.searchsorted(np.sort(widest), (1.0 - SAME) * radii)
     shares = np.append(left / max(1, len(widest)), 0.0)
-    closest = int(least.clearance.argmin())
-    return RadiusCurve(
-        np.append(radii, radii[-1]),
-        shares * workspace_volume(thin, r).volume,
-        0.5 * max(0.0, float(least.clearance.min())),
-        0.5 * max(0.0, float(least.bound.min())),
-        PAIRS[closest] if np.isfinite(least.clearance[closest]) else None,
-        least.position[closest],
-    )
+    volume = workspace_volume(thin, r).volume
+    return RadiusCurve(np.append(radii, radii[-1]), shares * volume, least)
 
 
 def with_radius(design: Design, radius: float) -> Design:

@@ -17,7 +17,6 @@ from explorer.bruhat import Stratum
 from explorer.constraints import HalfSpace
 from explorer.design import Design
 from explorer.errors import ExplorerError, InputError
-from explorer.least_clearance import LeastClearances, least_clearances
 from explorer.nearest_stratum import nearest_in_strata
 from explorer.pose import Pose, Triple
 from explorer.radii import RadiusCurve, radius_curve
@@ -145,18 +144,16 @@ class RadiusRequest:
 
 @dataclass(frozen=True)
 class RadiusDrawing:
-    """The reachable volume against the radius, and where legs come the closest.
+    """The reachable volume against the radius.
 
     Attributes:
         request: What was asked for.
         curve: None if there is trouble.
-        least: Of legs without radii, anywhere within the limits.
         trouble: Why there is no curve.
     """
 
     request: RadiusRequest
     curve: RadiusCurve | None
-    least: LeastClearances
     trouble: Trouble | None
 
 
@@ -232,12 +229,11 @@ def draw_workspace(request: WorkspaceRequest) -> WorkspaceDrawing:
 def draw_radius_curve(request: RadiusRequest) -> RadiusDrawing:
     """Return the reachable volume against the radius of all legs."""
     design, rotation = request.design, np.array(request.rotation)
-    least = least_clearances(design, rotation)
     try:
         curve = radius_curve(design, rotation, start=request.start)
     except ExplorerError as error:
-        return RadiusDrawing(request, None, least, _trouble(error))
-    return RadiusDrawing(request, curve, least, None)
+        return RadiusDrawing(request, None, _trouble(error))
+    return RadiusDrawing(request, curve, None)
 
 
 def strata_distances(request: StrataRequest) -> StrataDistances:

@@ -4,7 +4,7 @@ At each of many fixed positions the pair must keep its clearance, or the positio
 outside the workspace or nearer to a singular plane than where clearance is demanded. That
 "or" is a smooth maximum, "at each" a smooth minimum, both by Kreisselmeier and Steinhauser
 (1979) and both from below: where the bound is not negative, every position keeps to it.
-Between the positions `explorer.optimise.least_clearance` looks afterwards.
+Between the positions `explorer.optimise.crossings` looks afterwards.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Generator, Iterable
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
@@ -25,7 +25,6 @@ from explorer.app.scene.legs import Legs
 from explorer.app.scene.placing import Placed
 from explorer.app.scene.swept import SweptTetrahedra
 from explorer.app.state import Frame, State, opened
-from explorer.app.viser_gaps import start_viser, stop_viser
 from explorer.app.workspace_feed import RadiusFeed
 from explorer.clearance import PAIRS, leg_axes, leg_clearances
 from explorer.design import Design
@@ -39,20 +38,6 @@ OPTIMAL = PRESETS["paper-optimal"]
 UNUSED = Worker(lambda _: None)
 JOINED = Design(a3=(10, 4), b1=(4, -1), b2=0.0, b3=2.0)
 END = Pose.of_yaw_pitch_roll((14.0, -2.0, 6.0), (-20.0, 0.0, 15.0))
-
-
-@pytest.fixture(scope="module")
-def server() -> Generator[viser.ViserServer]:
-    made = start_viser("127.0.0.1", 0)
-    yield made
-    stop_viser(made)
-
-
-@pytest.fixture
-def desk() -> Generator[Desk]:
-    made = Desk(opened(OPTIMAL))
-    yield made
-    made.session.stop()
 
 
 def swept(end: Pose = END, start: State | None = None) -> State:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import time
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -56,7 +56,6 @@ from explorer.app.panels.optimise_words import comparison_table, verdict_words
 from explorer.app.scene.required_box import box_shown, edges_of
 from explorer.app.session import Session
 from explorer.app.state import Frame, State, opened
-from explorer.app.viser_gaps import start_viser, stop_viser
 from explorer.app.worker import Line
 from explorer.compiled import warm
 from explorer.constraints import constraints, slacks
@@ -82,13 +81,6 @@ ENDLESS = Wish(objective="smallest-reach", volume=7053.0, starts=10_000)
 @pytest.fixture(autouse=True, scope="module")
 def _warm_kernels() -> None:  # pyright: ignore[reportUnusedFunction]
     warm()
-
-
-@pytest.fixture(scope="module")
-def server() -> Generator[viser.ViserServer]:
-    made = start_viser("127.0.0.1", 0)
-    yield made
-    stop_viser(made)
 
 
 class Bench:

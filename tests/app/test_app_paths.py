@@ -37,7 +37,6 @@ from explorer.app.scene.path import PathScene
 from explorer.app.scene.placing import Placed
 from explorer.app.session import Session
 from explorer.app.state import Frame, State, joints_of, opened
-from explorer.app.viser_gaps import start_viser, stop_viser
 from explorer.design_file import PRESETS
 from explorer.errors import ExplorerError, InputError
 from explorer.kinematics import forward
@@ -49,20 +48,6 @@ from explorer.validity import poses_are_valid
 OPTIMAL = PRESETS["paper-optimal"]
 TILTED = Pose.of_yaw_pitch_roll((10.0, 5.0, 9.0), (-73.1, 12.0, 9.0))
 GOAL = Pose.of_yaw_pitch_roll((14.0, -2.0, 6.0), (-73.0, 10.0, 0.0))
-
-
-@pytest.fixture(scope="module")
-def server() -> Generator[viser.ViserServer]:
-    made = start_viser("127.0.0.1", 0)
-    yield made
-    stop_viser(made)
-
-
-@pytest.fixture
-def desk() -> Generator[Desk]:
-    made = Desk(opened(OPTIMAL))
-    yield made
-    made.session.stop()
 
 
 class Bench:

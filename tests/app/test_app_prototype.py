@@ -40,7 +40,6 @@ from explorer.app.scene.placing import Placed
 from explorer.app.scene.prototype import PrototypeScene, part_corners, shown_places
 from explorer.app.scene.shapes import cylinder
 from explorer.app.state import Frame, State, opened
-from explorer.app.viser_gaps import start_viser, stop_viser
 from explorer.design_file import PRESETS
 from explorer.errors import InputError, MissingExtraError
 from explorer.export.assembly import FORMATS, assembly_bytes
@@ -92,24 +91,10 @@ def feed(worker: AtOnce) -> PartsFeed:
 
 
 @pytest.fixture(scope="module")
-def server() -> Generator[viser.ViserServer]:
-    made = start_viser("127.0.0.1", 0)
-    yield made
-    stop_viser(made)
-
-
-@pytest.fixture(scope="module")
 def parts() -> Parts:
     made = parts_drawing(PartsRequest(OPTIMAL)).parts
     assert made is not None
     return made
-
-
-@pytest.fixture
-def desk() -> Generator[Desk]:
-    made = Desk(opened(OPTIMAL))
-    yield made
-    made.session.stop()
 
 
 def shown(state: State | None = None, **changes: Any) -> State:

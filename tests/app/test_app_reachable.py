@@ -31,7 +31,6 @@ from explorer.app.tasks import (
     export_mesh,
     exported_name,
 )
-from explorer.app.viser_gaps import start_viser, stop_viser
 from explorer.app.workspace_feed import RadiusFeed, WorkspaceFeed
 from explorer.arrays import FloatArray
 from explorer.clearance import PAIRS, leg_clearances
@@ -51,13 +50,6 @@ RADIUS = 0.2
 @pytest.fixture(autouse=True, scope="module")
 def _warm_kernels() -> None:  # pyright: ignore[reportUnusedFunction]
     warm()
-
-
-@pytest.fixture(scope="module")
-def server() -> Generator[viser.ViserServer]:
-    made = start_viser("127.0.0.1", 0)
-    yield made
-    stop_viser(made)
 
 
 @pytest.fixture
@@ -472,7 +464,9 @@ CURVE = radius_curve(OPTIMAL)
 
 def curve(*volumes: float) -> RadiusCurve:
     radii = np.append(np.linspace(0.0, 0.5, len(volumes)), 0.5)
-    return replace(CURVE, radii=radii, volumes=np.array([*volumes, 0.0]), harmless=0.05)
+    # Two legs that come as near as 0.1 bear radii of 0.05.
+    least = CURVE.least._replace(clearance=np.full(len(PAIRS), 0.1))
+    return replace(CURVE, radii=radii, volumes=np.array([*volumes, 0.0]), least=least)
 
 
 @given(st.lists(st.floats(1.0, 1e3), min_size=2, max_size=30), st.none() | st.floats(0.0, 2.0))

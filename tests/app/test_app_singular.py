@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Generator, Iterable
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
@@ -43,7 +43,7 @@ from explorer.app.singular_view import SingularView
 from explorer.app.state import Frame, State, opened
 from explorer.app.strata_feed import StrataFeed
 from explorer.app.tasks import StrataRequest, strata_distances
-from explorer.app.viser_gaps import element_id, start_viser, stop_viser
+from explorer.app.viser_gaps import element_id
 from explorer.bruhat import COVERED, OF_INCIDENCES, WORDS, conditions, incidences
 from explorer.design_file import PRESETS
 from explorer.displacement import displacement
@@ -60,20 +60,6 @@ OPTIMAL = PRESETS["paper-optimal"]
 # Started when it is first needed, and so never.
 UNUSED = Worker(lambda _: None)
 MOTIONS = range(len(UNCOUPLED))
-
-
-@pytest.fixture(scope="module")
-def server() -> Generator[viser.ViserServer]:
-    made = start_viser("127.0.0.1", 0)
-    yield made
-    stop_viser(made)
-
-
-@pytest.fixture
-def desk() -> Generator[Desk]:
-    made = Desk(opened(OPTIMAL))
-    yield made
-    made.session.stop()
 
 
 def random_states(count: int, seed: int = 3) -> list[State]:

@@ -12,6 +12,7 @@ from viser import uplot
 
 from explorer.app.assigning import Update
 from explorer.app.colours import GHOST, JOINT, SINGULAR, Rgb, css
+from explorer.app.panels.charts import axis
 from explorer.app.panels.html import DIM, scientific, signed
 from explorer.app.paths import Journey
 from explorer.app.state import Frame
@@ -37,7 +38,10 @@ class MarginPlot:
             (BLANK,) * COLUMNS,
             _series(),
             scales=_scales(1.0, 1.0),
-            axes=_axes(),
+            axes=(
+                axis("time (s)", label_size=20, size=28),
+                axis("κ (units)", label_size=18, size=40, space=26),
+            ),
             legend={"show": False},
             cursor={"drag": {"x": False, "y": False}},
             height=HEIGHT,
@@ -179,29 +183,3 @@ def _scales(duration: float, top: float) -> dict[str, uplot.Scale]:
         "x": {"time": False, "range": (0.0, max(duration, 1e-9))},
         "y": {"range": (-max(top, 1e-9), max(top, 1e-9))},
     }
-
-
-def _axes() -> tuple[uplot.Axis, uplot.Axis]:
-    font = "11px system-ui, sans-serif"
-    return (
-        {
-            "label": "time (s)",
-            "labelSize": 20,
-            "size": 28,
-            "gap": 3,
-            "ticks": {"size": 5},
-            "font": font,
-            "labelFont": font,
-            "space": 30,
-        },
-        {
-            "label": "κ (units)",
-            "labelSize": 18,
-            "size": 40,
-            "gap": 3,
-            "ticks": {"size": 5},
-            "font": font,
-            "labelFont": font,
-            "space": 26,
-        },
-    )

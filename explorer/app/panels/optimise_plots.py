@@ -15,6 +15,7 @@ from viser import uplot
 from explorer.app.assigning import Update
 from explorer.app.colours import FAR, SINGULAR, css
 from explorer.app.optimisation import Run
+from explorer.app.panels.charts import FONT
 from explorer.app.panels.html import DIM, scientific
 from explorer.app.panels.optimise_words import NAMES
 from explorer.optimise.outcome import Iterate
@@ -25,7 +26,6 @@ BLANK = np.zeros(2)
 LEAST = 1e-16
 # Of the span of the values: how far an axis goes beyond them.
 BEYOND = 0.12
-FONT = "11px system-ui, sans-serif"
 
 
 class Curve(NamedTuple):

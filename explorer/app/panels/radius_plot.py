@@ -12,9 +12,9 @@ from viser import uplot
 
 from explorer.app.assigning import Update
 from explorer.app.colours import CLEAR, FAR, SINGULAR, Rgb, css
+from explorer.app.panels.charts import axis
 from explorer.app.panels.html import DIM, alert, scientific
 from explorer.app.state import Frame
-from explorer.app.tasks import RadiusDrawing
 from explorer.app.workspace_feed import RadiusFeed
 from explorer.arrays import FloatArray
 from explorer.clearance import PAIRS
@@ -57,7 +57,10 @@ class RadiusPlot:
             (BLANK,) * 5,
             _series(marks_of(None, None)),
             scales=_scales(1.0, 1.0),
-            axes=_axes(),
+            axes=(
+                axis("radius of all four legs (units)", label_size=20, size=28),
+                axis("reachable volume (units³)", label_size=18, size=46),
+            ),
             legend={"show": False},
             cursor={"drag": {"x": False, "y": False}},
             height=HEIGHT,
@@ -159,13 +162,13 @@ def radius_words(frame: Frame, feed: RadiusFeed) -> str:
         f'{BOX}<div style="display:flex;justify-content:space-between;margin-bottom:2px">'
         f"<b>Reachable volume</b>{note}</div>"
         f'<table style="width:100%;border-collapse:collapse">{rows}</table>'
-        f'<div style="{DIM};margin-top:4px">{where_legs_meet(drawing)}</div></div>'
+        f'<div style="{DIM};margin-top:4px">{where_legs_meet(curve, design.reach)}</div></div>'
     )
 
 
-def where_legs_meet(drawing: RadiusDrawing) -> str:
+def where_legs_meet(curve: RadiusCurve, reach: float) -> str:
     """Return in words which legs are the first to meet as they grow, and where."""
-    least = drawing.least
+    least = curve.least
     closest = float(least.clearance.min())
     if not np.isfinite(closest):
         return "No two legs can meet."
@@ -176,7 +179,7 @@ def where_legs_meet(drawing: RadiusDrawing) -> str:
     ]
     if closest > 0.0:
         return f"The first to collide within the limits: {'; '.join(meetings)}."
-    on_base = np.abs(least.position[first, 2]).max() <= 1e-6 * drawing.request.design.reach
+    on_base = np.abs(least.position[first, 2]).max() <= 1e-6 * reach
     where = ", where z = 0" if on_base else ""
     return f"Even without radii these touch within the limits{where}: {'; '.join(meetings)}."
 
@@ -232,29 +235,3 @@ def _scales(last: float, volume: float) -> dict[str, uplot.Scale]:
         "x": {"time": False, "range": (0.0, last)},
         "y": {"range": (0.0, 1.08 * volume)},
     }
-
-
-def _axes() -> tuple[uplot.Axis, uplot.Axis]:
-    font = "11px system-ui, sans-serif"
-    return (
-        {
-            "label": "radius of all four legs (units)",
-            "labelSize": 20,
-            "size": 28,
-            "gap": 3,
-            "ticks": {"size": 5},
-            "font": font,
-            "labelFont": font,
-            "space": 30,
-        },
-        {
-            "label": "reachable volume (units³)",
-            "labelSize": 18,
-            "size": 46,
-            "gap": 3,
-            "ticks": {"size": 5},
-            "font": font,
-            "labelFont": font,
-            "space": 30,
-        },
-    )
