@@ -10,6 +10,7 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from explorer.app.notebook import Shown, show
     from explorer.clearance import PAIRS, LegClearances, leg_clearances
     from explorer.crossings import path_margins
     from explorer.design import JOINTS, VARIABLES, Design, Limits
@@ -62,12 +63,18 @@ if TYPE_CHECKING:
     from explorer.solid import Solid
     from explorer.solids import convex_hull, workspace_solid
     from explorer.strata import stratum
+    from explorer.sweep.cluster import DaskWorkers
+    from explorer.sweep.results import Results, load_results
+    from explorer.sweep.run import run_study
+    from explorer.sweep.study import Study, load_study
+    from explorer.sweep.workers import LocalWorkers
     from explorer.tetrahedra import tetrahedra_overlap
     from explorer.uncoupled import UNCOUPLED
     from explorer.validity import poses_are_valid
     from explorer.workspace import NodeCount, Volume, workspace_nodes, workspace_volume
 
 _HOMES = {
+    "app.notebook": ("Shown", "show"),
     "clearance": ("PAIRS", "LegClearances", "leg_clearances"),
     "crossings": ("path_margins",),
     "design": ("JOINTS", "VARIABLES", "Design", "Limits"),
@@ -120,6 +127,11 @@ _HOMES = {
     "solid": ("Solid",),
     "solids": ("convex_hull", "workspace_solid"),
     "strata": ("stratum",),
+    "sweep.cluster": ("DaskWorkers",),
+    "sweep.results": ("Results", "load_results"),
+    "sweep.run": ("run_study",),
+    "sweep.study": ("Study", "load_study"),
+    "sweep.workers": ("LocalWorkers",),
     "tetrahedra": ("tetrahedra_overlap",),
     "uncoupled": ("UNCOUPLED",),
     "validity": ("poses_are_valid",),
@@ -133,6 +145,7 @@ __all__ = [
     "PRESETS",
     "UNCOUPLED",
     "VARIABLES",
+    "DaskWorkers",
     "Demands",
     "Design",
     "DesignError",
@@ -142,6 +155,7 @@ __all__ = [
     "LeastClearances",
     "LegClearances",
     "Limits",
+    "LocalWorkers",
     "MissingExtraError",
     "MoveClearance",
     "MoveClearances",
@@ -157,9 +171,12 @@ __all__ = [
     "Prototype",
     "RadiusCurve",
     "ReachableWorkspace",
+    "Results",
     "Run",
+    "Shown",
     "Snapshot",
     "Solid",
+    "Study",
     "Variable",
     "Volume",
     "attachment_points",
@@ -175,6 +192,8 @@ __all__ = [
     "least_clearances",
     "leg_clearances",
     "load_design",
+    "load_results",
+    "load_study",
     "make_problem",
     "make_prototype",
     "margins",
@@ -195,6 +214,8 @@ __all__ = [
     "reachable_workspace",
     "rotation_from_quaternion",
     "rotation_from_yaw_pitch_roll",
+    "run_study",
+    "show",
     "singularity_free_ball",
     "slice_field",
     "step_is_free",

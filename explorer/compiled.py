@@ -125,11 +125,16 @@ def _with_compiled_helpers(function: Callable[..., Any]) -> Callable[..., Any]:
     return copy
 
 
-def warm() -> None:
-    """Make every kernel that has been imported compiled, so that small calls are fast too."""
+def fill_cache() -> None:
+    """Have every kernel that has been imported compiled by another process, for all to load."""
     missing = sorted({each.module for each in _kernels if not (each.ready or each.is_cached)})
     if missing:
         _compile_in_child(missing)
+
+
+def warm() -> None:
+    """Make every kernel that has been imported compiled, so that small calls are fast too."""
+    fill_cache()
     for each in _kernels:
         each.compile()
 
@@ -140,9 +145,19 @@ def compile_here() -> None:
         each.compile(here=True)
 
 
-def warm_in_background() -> threading.Thread:
-    """Warm in a thread; calls run interpreted meanwhile."""
-    thread = threading.Thread(target=warm, name="warm kernels", daemon=True)
+def warm_in_background(then: Callable[[], None] | None = None) -> threading.Thread:
+    """Warm in a thread; calls run interpreted meanwhile.
+
+    Args:
+        then: Called there once all is warm.
+    """
+
+    def run() -> None:
+        warm()
+        if then is not None:
+            then()
+
+    thread = threading.Thread(target=run, name="warm kernels", daemon=True)
     thread.start()
     return thread
 

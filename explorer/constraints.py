@@ -30,6 +30,8 @@ Rates: TypeAlias = Mapping[str, FloatArray]
 """By parameter: the rates of a primitive's own parameters, centre or normal first."""
 
 X, Y, Z = np.eye(3)
+# The sine of the angle between two lines that only rounding keeps from being parallel.
+PARALLEL = 1e-15
 
 
 @dataclass(frozen=True)
@@ -257,7 +259,8 @@ def _margins(design: Design, r: FloatArray) -> Iterator[Constraint]:
         ("margin κ3", Z, np.zeros(3)),
     )
     for (name, k, turning), sign in zip(gradients, home_signs(design), strict=True):
-        if not np.any(k):
+        # The lines are parallel, and the margin is nothing wherever b4 is.
+        if float(np.linalg.norm(k)) <= PARALLEL:
             yield Never(name)
             continue
         rates = {YAW: _four(-sign * turning), "margin": _four(np.zeros(3), -1.0)}

@@ -1,15 +1,18 @@
 """Design files: JSON, read strictly, and the designs that come along.
 
-Unknown fields are refused, so that a misspelt limit is never silently ignored. The
-presets are both rows of the paper's Table 1.
+Unknown fields are refused, so that a misspelt limit is never silently ignored, and so are
+fields given twice. A file of an older schema is brought up to date first, one of a newer
+schema is refused. The presets are both rows of the paper's Table 1.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import json
+from collections.abc import Callable, Mapping
 from importlib import resources
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 import msgspec
 
@@ -18,6 +21,18 @@ from explorer.errors import DesignError
 
 # No honest design file comes near this size, in bytes.
 LARGEST_FILE = 1_000_000
+# Of what a message quotes, in characters.
+LONGEST_LINE = 300
+SCHEMA = 1
+
+MIGRATIONS: dict[int, Callable[[dict[str, Any]], dict[str, Any]]] = {}
+"""By schema: what turns the fields of a file into those of the next schema."""
+
+
+class _Dated(msgspec.Struct):
+    """What every schema has; a file that does not tell is of the first one."""
+
+    schema: int = 1
 
 
 def decode_design(data: bytes, source: str) -> Design:
@@ -28,16 +43,52 @@ def decode_design(data: bytes, source: str) -> Design:
         source: What to call it in an error message.
 
     Raises:
-        DesignError: not JSON, of another schema, with unknown fields or unusable values.
+        DesignError: not JSON, of a newer schema, with unknown fields, fields given twice or
+            unusable values.
     """
     if len(data) > LARGEST_FILE:
         raise DesignError(
             f"{source}: {len(data)} bytes is no design file; they stay below {LARGEST_FILE}"
         )
     try:
-        return msgspec.json.decode(data, type=Design)
-    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
-        raise DesignError(" ".join(f"{source}: {error}".split())) from None
+        schema = msgspec.json.decode(data, type=_Dated).schema
+        if schema > SCHEMA:
+            raise DesignError(  # noqa: TRY301 - it is told of its source below
+                f"schema {schema} was made by a newer explorer; this one reads up to {SCHEMA}"
+            )
+        if schema in MIGRATIONS:
+            fields = msgspec.json.decode(data, type=dict[str, Any])
+            design = msgspec.convert(up_to_date(fields), Design)
+        else:
+            design = msgspec.json.decode(data, type=Design)
+        # By now it is known to be shallow and its numbers to be short.
+        json.loads(data, object_pairs_hook=_each_once)
+    except (msgspec.MsgspecError, DesignError, UnicodeDecodeError, RecursionError) as error:
+        raise DesignError(_one_line(f"{source}: {error}")) from None
+    return design
+
+
+def _one_line(message: str) -> str:
+    """Return a message that quotes a file as one short line that can be shown."""
+    words = " ".join(message.split())
+    shown = "".join(letter if letter.isprintable() else "\ufffd" for letter in words[:LONGEST_LINE])
+    return shown if len(words) <= LONGEST_LINE else f"{shown}…"
+
+
+def up_to_date(fields: dict[str, Any]) -> dict[str, Any]:
+    """Return the fields of a design, of this schema or an older one, as those of this one."""
+    for older in range(fields.get("schema", 1), SCHEMA):
+        fields = MIGRATIONS[older](fields)
+    return fields | {"schema": SCHEMA}
+
+
+def _each_once(fields: list[tuple[str, object]]) -> dict[str, object]:
+    seen = dict(fields)
+    if len(seen) < len(fields):
+        names = [name for name, _ in fields]
+        twice = next(name for name in names if names.count(name) > 1)
+        raise DesignError(f"the field {twice!r} is given twice; leave one of them out")
+    return seen
 
 
 def encode_design(design: Design) -> bytes:

@@ -23,6 +23,10 @@ class DesignError(InputError):
     """A design, or a design file, that describes no usable manipulator."""
 
 
+class StorageError(InputError):
+    """A file or folder that cannot be read or written, such as one on a full disk."""
+
+
 class NoAnswerError(ExplorerError):
     """A well-posed question that has no answer, such as lengths that cannot close."""
 

@@ -60,7 +60,11 @@ class LeastClearances(NamedTuple):
 
 
 def least_clearances(
-    design: Design, rotation: ArrayLike | None = None, tolerance: float | None = None
+    design: Design,
+    rotation: ArrayLike | None = None,
+    tolerance: float | None = None,
+    *,
+    only_least: bool = False,
 ) -> LeastClearances:
     """Return the least clearances over the constant-orientation workspace.
 
@@ -69,6 +73,8 @@ def least_clearances(
         rotation: Platform to base, shape (3, 3); that of the home pose if None.
         tolerance: To which they are to be certain, in design units; a 10,000th of the
             reach if None. Where too many positions come as close, the bound is lower.
+        only_least: Whether only the least of all six is wanted, which takes far less time;
+            the others are then attained, and their bounds hold, but may lie far apart.
 
     Raises:
         InputError: not a rotation.
@@ -104,16 +110,27 @@ def least_clearances(
             found = distance[least, np.arange(len(PAIRS))]
             better = ~joined & (found < best)
             best[better], places[better] = found[better], middles[least[better]]
+            if only_least:
+                # What is least already spares all cells that cannot undercut it.
+                pair = int((best - radii).argmin())
+                if better[pair] and best[pair] > floor[pair]:
+                    best[pair], places[pair] = _polished(
+                        design, r, limits, pair, best[pair], places[pair]
+                    )
+                    if best[pair] <= CROSSING * design.reach:
+                        best[pair] = 0.0
         low = np.maximum(distance - half, floor)
-        goes_on = asked & (low < best - finest)
+        top = (best - radii).min() + radii if only_least else best
+        goes_on = asked & (low < top - finest)
         asked = asked & (goes_on.sum(axis=0) <= MOST_CELLS)
         goes_on = goes_on & asked
         settled = np.minimum(settled, np.where(goes_on, math.inf, low).min(axis=0, initial=np.inf))
         size = 0.5 * size
         again = goes_on.any(axis=-1)
         middles = (middles[again][:, None, :] + size * CORNERS).reshape(-1, 3)
-    for pair in np.flatnonzero(np.isfinite(best) & (best > floor)):
-        best[pair], places[pair] = _polished(design, r, limits, int(pair), best[pair], places[pair])
+    if not only_least:
+        for pair in np.flatnonzero(np.isfinite(best) & (best > floor)).tolist():
+            best[pair], places[pair] = _polished(design, r, limits, pair, best[pair], places[pair])
     best[best <= CROSSING * design.reach] = 0.0
     places[np.abs(places) <= CROSSING * design.reach] = 0.0
     bound = np.where(joined, math.inf, np.minimum(settled, best))

@@ -229,13 +229,19 @@ class _Problem:
         return float(value[best]), angles[best]
 
     def _starts(self, count: int) -> FloatArray:
-        """Return the angles (n, d) of the local leasts on a grid over all turns."""
+        """Return the angles (n, d) of the local leasts on a grid over all turns.
+
+        Of two angles, those that are least along either alone: far from a1, the value has
+        valleys so narrow that a grid does not tell where their floor is lowest. Of three,
+        these would be too many.
+        """
         grid = _grid(count)
         value = self.value(grid)
-        low = np.ones(value.shape, dtype=np.bool_)
-        for axis in range(count):
-            for side in (1, -1):
-                low &= value <= np.roll(value, side, axis=axis)
+        along = [
+            (value <= np.roll(value, 1, axis=axis)) & (value <= np.roll(value, -1, axis=axis))
+            for axis in range(count)
+        ]
+        low = np.any(along, axis=0) if count == 2 else np.all(along, axis=0)
         found = grid[low]
         return found[np.argsort(value[low], kind="stable")]
 

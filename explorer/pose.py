@@ -113,15 +113,36 @@ def checked_rotation(rotation: ArrayLike) -> FloatArray:
         InputError: not orthonormal to 1e-6, or a reflection.
     """
     matrix = finite_array("rotation", rotation, (3, 3))
-    residual = np.abs(matrix @ np.swapaxes(matrix, -1, -2) - np.eye(3))
-    if residual.size and float(residual.max()) > ORTHONORMAL_TOLERANCE:
+    off, is_reflection = _flaws_of_one(matrix) if matrix.ndim == 2 else _flaws(matrix)
+    if off > ORTHONORMAL_TOLERANCE:
         raise InputError(
             f"rotation must be orthonormal to {ORTHONORMAL_TOLERANCE:g}; "
-            f"R Rᵀ is off the identity by {float(residual.max()):.3g}"
+            f"R Rᵀ is off the identity by {off:.3g}"
         )
-    if (np.linalg.det(matrix) < 0.0).any():
+    if is_reflection:
         raise InputError("rotation must have determinant +1; this one is a reflection")
     return matrix
+
+
+def _flaws(matrices: FloatArray) -> tuple[float, bool]:
+    """Return how far R Rᵀ is off the identity at the most, and whether any is a reflection."""
+    residual = np.abs(matrices @ np.swapaxes(matrices, -1, -2) - np.eye(3))
+    return float(residual.max(initial=0.0)), bool((np.linalg.det(matrices) < 0.0).any())
+
+
+def _flaws_of_one(matrix: FloatArray) -> tuple[float, bool]:
+    """Return the same of one matrix, in plain numbers: a tenth of the time."""
+    (ax, ay, az), (bx, by, bz), (cx, cy, cz) = matrix.tolist()
+    off = max(
+        abs(ax * ax + ay * ay + az * az - 1.0),
+        abs(bx * bx + by * by + bz * bz - 1.0),
+        abs(cx * cx + cy * cy + cz * cz - 1.0),
+        abs(ax * bx + ay * by + az * bz),
+        abs(ax * cx + ay * cy + az * cz),
+        abs(bx * cx + by * cy + bz * cz),
+    )
+    det = ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)
+    return off, det < 0.0
 
 
 @functools.lru_cache(64)

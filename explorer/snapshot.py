@@ -1,4 +1,4 @@
-"""Everything there is to know about one design in one pose, computed once.
+"""Everything there is to know about one design in one pose, computed once, when it is needed.
 
 The page, the command line, reports and tests all read this; none computes its own.
 """
@@ -39,44 +39,91 @@ from explorer.strata import inversions, stratum
 
 @dataclass(frozen=True)
 class Snapshot:
-    """A design in a pose, and all that follows; lengths in design units.
+    """A design in a pose; what follows is computed when it is first asked for.
+
+    Lengths are in design units.
 
     Attributes:
         design: The manipulator.
         pose: Of the platform.
-        rotation: That of the pose, shape (3, 3).
-        points: The attachment points in the base frame, each (3,).
-        joints: (l1, d1, d2, d3, d4, l4), shape (6,).
-        margins: (κ1, κ2, κ3), shape (3,).
-        volumes: Of the three tetrahedra, shape (3,), in cubed design units.
-        determinant: det J.
-        inverse_condition: Of J made homogeneous with the reach, 0 (singular) to 1.
-        stratum: The relative position of the two flags.
-        stratum_dimension: 6 generic to 0 coinciding.
-        mode: The assembly mode, 0 to 7.
-        proximity: The smallest |margin| over the reach.
-        violations: The limits that the pose breaks.
     """
 
     design: Design
     pose: Pose
-    rotation: FloatArray
-    points: AttachmentPoints
-    joints: FloatArray
-    margins: FloatArray
-    volumes: FloatArray
-    determinant: float
-    inverse_condition: float
-    stratum: tuple[int, ...]
-    stratum_dimension: int
-    mode: int
-    proximity: float
-    violations: tuple[Violation, ...]
+
+    @cached_property
+    def rotation(self) -> FloatArray:
+        """The rotation of the pose, shape (3, 3)."""
+        return self.pose.rotation
+
+    @cached_property
+    def points(self) -> AttachmentPoints:
+        """The attachment points in the base frame, each (3,)."""
+        return attachment_points(self.design, self.pose.position, self.rotation)
+
+    @cached_property
+    def joints(self) -> FloatArray:
+        """(l1, d1, d2, d3, d4, l4), shape (6,)."""
+        return inverse(self.design, self.pose.position, self.rotation)
+
+    @cached_property
+    def margins(self) -> FloatArray:
+        """(κ1, κ2, κ3), shape (3,)."""
+        return margins(self.pose.position, self.rotation)
+
+    @cached_property
+    def volumes(self) -> FloatArray:
+        """Of the three tetrahedra, shape (3,), in cubed design units."""
+        return tetrahedron_volumes(self.design, self.margins)
+
+    @cached_property
+    def determinant(self) -> float:
+        """The determinant of J."""
+        return float(determinant(self.design, self.joints, self.margins))
+
+    @cached_property
+    def inverse_condition(self) -> float:
+        """Of J made homogeneous with the reach, 0 (singular) to 1."""
+        matrix = jacobian(self.design, self.pose.position, self.rotation)
+        return float(inverse_condition(matrix, self.design.reach))
+
+    @cached_property
+    def stratum(self) -> tuple[int, ...]:
+        """The relative position of the two flags."""
+        found = stratum(self.pose.position, self.rotation, self.design.reach)
+        return tuple(found.tolist())
+
+    @property
+    def stratum_dimension(self) -> int:
+        """6 generic to 0 coinciding."""
+        return inversions(self.stratum)
+
+    @property
+    def mode(self) -> int:
+        """The assembly mode, 0 to 7."""
+        return int(mode_of(self.margins))
 
     @property
     def signs(self) -> tuple[int, int, int]:
         """The sign triple of the mode."""
         return signs_of(self.mode)
+
+    @property
+    def proximity(self) -> float:
+        """The smallest |margin| over the reach."""
+        return float(np.abs(self.margins).min()) / self.design.reach
+
+    @cached_property
+    def violations(self) -> tuple[Violation, ...]:
+        """The limits that the pose breaks."""
+        return violations(
+            self.design,
+            np.array(self.pose.position),
+            self.rotation,
+            self.joints,
+            self.margins,
+            _home_signs(home_pose(self.design)),
+        )
 
     @cached_property
     def clearances(self) -> LegClearances:
@@ -106,30 +153,7 @@ def evaluate(design: Design, pose: Pose) -> Snapshot:
         design: The manipulator.
         pose: Of its platform, in design units.
     """
-    rotation = pose.rotation
-    position = np.array(pose.position)
-    joints = inverse(design, position, rotation)
-    margin = margins(position, rotation)
-    home = home_pose(design)
-    flags = tuple(stratum(position, rotation, design.reach).tolist())
-    return Snapshot(
-        design=design,
-        pose=pose,
-        rotation=rotation,
-        points=attachment_points(design, position, rotation),
-        joints=joints,
-        margins=margin,
-        volumes=tetrahedron_volumes(design, margin),
-        determinant=float(determinant(design, joints, margin)),
-        inverse_condition=float(
-            inverse_condition(jacobian(design, position, rotation), design.reach)
-        ),
-        stratum=flags,
-        stratum_dimension=inversions(flags),
-        mode=int(mode_of(margin)),
-        proximity=float(np.abs(margin).min()) / design.reach,
-        violations=violations(design, position, rotation, joints, margin, _home_signs(home)),
-    )
+    return Snapshot(design, pose)
 
 
 @lru_cache(64)

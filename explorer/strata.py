@@ -72,13 +72,15 @@ def _incidences(
 ) -> dict[tuple[int, int], IntArray]:
     """Return r_ij by (i - 1, j - 1), from distances and angles rather than from ranks."""
     u, n = r[..., 0], r[..., 2]
-    distance = np.sqrt(dot(p, p))
+    across = np.hypot(p[..., 1], p[..., 2])
+    # Not from squares, which vanish or overflow in some units.
+    distance = np.hypot(p[..., 0], across)
     near = TOLERANCE * (distance if length is None else length)
 
     point_on_point = distance <= near
     a1_on_line = _cross_norm(u, p) <= near
     a1_on_plane = np.abs(dot(n, p)) <= near
-    b4_on_line = np.hypot(p[..., 1], p[..., 2]) <= near
+    b4_on_line = across <= near
     b4_on_plane = np.abs(p[..., 2]) <= near
     lines_parallel = np.hypot(u[..., 1], u[..., 2]) <= TOLERANCE
     lines_meet = np.abs(u[..., 1] * p[..., 2] - u[..., 2] * p[..., 1]) <= near

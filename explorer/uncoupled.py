@@ -83,38 +83,19 @@ class UncoupledMotion:
             direction = self.line(pose)[1]
             x, y, z = (np.array(pose.position) + amount * direction).tolist()
             return Pose((x, y, z), pose.quaternion)
-        return Pose.of(*self._turned(pose, amount))
-
-    def _turned(self, pose: Pose, angle: float) -> tuple[FloatArray, FloatArray]:
-        """Return position and rotation after a turn about the axis."""
-        point, direction = self.line(pose)
-        turn = Rotation.from_rotvec(angle * direction).as_matrix()
-        return point + turn @ (np.array(pose.position) - point), turn @ pose.rotation
+        return Pose.of(*_turned(self, pose, amount))
 
     def rate(self, pose: Pose) -> float:
         """Return how fast the margin changes with the amount, in units per unit or radian."""
-        # Along the axis all changes are linear; about it a quarter turn later κ is κ'.
-        if self.kind == "rotation":
-            return float(margins(*self._turned(pose, 0.5 * math.pi))[self.incidence - 1])
-        along = self.line(pose)[1]
-        return float(margins(along, pose.rotation)[self.incidence - 1])
+        ((_, rate),) = _margins_and_rates(pose, (self,))
+        return rate
 
     def travel(self, pose: Pose) -> Travel:
         """Return how far the motion goes until the margin is zero, forwards and backwards.
 
         On the singular set both are zero. A rotation's are half a turn apart.
         """
-        margin = float(margins(pose.position, pose.rotation)[self.incidence - 1])
-        rate = self.rate(pose)
-        if margin == 0.0:
-            return Travel(0.0, 0.0)
-        if self.kind == "rotation":
-            high = math.atan2(-margin, rate) % math.pi
-            return Travel(high - math.pi, high)
-        if abs(rate) <= NO_RATE:
-            return Travel(-math.inf, math.inf)
-        way = -margin / rate
-        return Travel(way, math.inf) if way < 0.0 else Travel(-math.inf, way)
+        return _travels(pose, (self,))[0]
 
 
 UNCOUPLED = (
@@ -126,3 +107,57 @@ UNCOUPLED = (
     UncoupledMotion("base", "rotation", "x", 3),
 )
 """The six motions: three of each frame, in the order of the margins that they move."""
+
+
+def travels(pose: Pose) -> tuple[Travel, ...]:
+    """Return the travel of each of the six motions from a pose, in the order of `UNCOUPLED`."""
+    return _travels(pose, UNCOUPLED)
+
+
+def _travels(pose: Pose, motions: tuple[UncoupledMotion, ...]) -> tuple[Travel, ...]:
+    found = _margins_and_rates(pose, motions)
+    return tuple(
+        _travel(motion.kind, margin, rate)
+        for motion, (margin, rate) in zip(motions, found, strict=True)
+    )
+
+
+def _travel(kind: Literal["translation", "rotation"], margin: float, rate: float) -> Travel:
+    if margin == 0.0:
+        return Travel(0.0, 0.0)
+    if kind == "rotation":
+        high = math.atan2(-margin, rate) % math.pi
+        return Travel(high - math.pi, high)
+    if abs(rate) <= NO_RATE:
+        return Travel(-math.inf, math.inf)
+    way = -margin / rate
+    return Travel(way, math.inf) if way < 0.0 else Travel(-math.inf, way)
+
+
+def _margins_and_rates(
+    pose: Pose, motions: tuple[UncoupledMotion, ...]
+) -> list[tuple[float, float]]:
+    """Return of each motion the margin that it moves and how fast; all of them in one go."""
+    placed = [_place_of_rate(motion, pose) for motion in motions]
+    positions = [np.array(pose.position), *(position for position, _ in placed)]
+    rotations = [pose.rotation, *(rotation for _, rotation in placed)]
+    here, *rates = margins(np.stack(positions), np.stack(rotations)).tolist()
+    return [
+        (here[motion.incidence - 1], rate[motion.incidence - 1])
+        for motion, rate in zip(motions, rates, strict=True)
+    ]
+
+
+def _place_of_rate(motion: UncoupledMotion, pose: Pose) -> tuple[FloatArray, FloatArray]:
+    """Return the position and rotation whose margin is the rate at a pose."""
+    # Along the axis all changes are linear; about it a quarter turn later κ is κ'.
+    if motion.kind == "rotation":
+        return _turned(motion, pose, 0.5 * math.pi)
+    return motion.line(pose)[1], pose.rotation
+
+
+def _turned(motion: UncoupledMotion, pose: Pose, angle: float) -> tuple[FloatArray, FloatArray]:
+    """Return position and rotation after a turn about the axis."""
+    point, direction = motion.line(pose)
+    turn = Rotation.from_rotvec(angle * direction).as_matrix()
+    return point + turn @ (np.array(pose.position) - point), turn @ pose.rotation

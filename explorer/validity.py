@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from explorer.arrays import BoolArray, FloatArray, batch_shape, finite_array
+from explorer.arrays import BoolArray, FloatArray, batch_shape, finite_array, for_kernel
 from explorer.clearance import joined_pairs, radii_of_pairs
 from explorer.compiled import helper, kernel
 from explorer.constraints import home_signs, joint_cones
@@ -127,8 +127,8 @@ def poses_are_valid(
         len(p_rows),
         demanded.row,
         demanded.cones,
-        np.array(p_rows),
-        np.array(r_rows),
+        for_kernel(p_rows),
+        for_kernel(r_rows),
         valid,
     )
     return valid.reshape(batch)

@@ -170,13 +170,18 @@ def node_range(region: Region, step: float) -> tuple[FloatArray, FloatArray]:
     """Return the first index and the number of the nodes around a region, each (3,)."""
     lows, highs = bounds(region)
     # Nodes on a boundary count, so the grid may not lose one to rounding.
-    first = np.ceil(lows / step - 1e-9)
-    return first, np.maximum(0.0, np.floor(highs / step + 1e-9) - first + 1.0)
+    # A tiny step leads beyond all numbers; such a count is refused.
+    with np.errstate(over="ignore", invalid="ignore"):
+        first = np.ceil(lows / step - 1e-9)
+        return first, np.maximum(0.0, np.floor(highs / step + 1e-9) - first + 1.0)
 
 
 def check_node_count(many: FloatArray, step: float, most: int) -> None:
     """Raise an `InputError` if a grid with so many nodes an axis has too many."""
-    count = float(np.prod(many))
+    with np.errstate(over="ignore"):
+        count = float(np.prod(many))
+    if not math.isfinite(count):
+        raise InputError(f"a node step of {step:g} is too small for any grid; leave it out")
     if count > most:
         coarsest = step * (count / most) ** (1.0 / 3.0)
         raise InputError(

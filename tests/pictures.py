@@ -5,30 +5,54 @@ From the checkout, all of them or only some: python tests/pictures.py [names]
 
 from __future__ import annotations
 
+import base64
+import datetime as dt
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
-from playwright.sync_api import Browser
+import msgspec
+import numpy as np
+from playwright.sync_api import Browser, FloatRect
 
-from explorer.app.actions import Action, Open, SetJoint, SetLimits, SetView
+from explorer.app.actions import Action, Open, SetJoint, SetLimits, SetVariable, SetView
+from explorer.app.compared import Look
+from explorer.app.comparing import Pin, SetLook
 from explorer.app.optimisation import Wish
 from explorer.app.optimising import SetWish, StartRun
 from explorer.app.prototype_view import PrototypeView
+from explorer.app.reporting import make_report
 from explorer.app.scene.camera import ViewName
-from explorer.app.screenshot import headless_browser, picture
-from explorer.app.server import Running
+from explorer.app.screenshot import headless_browser, open_page, picture, settle, stable_picture
+from explorer.app.server import Running, start
 from explorer.app.singular_actions import Jog
 from explorer.app.singular_view import SingularView
 from explorer.app.state import View, WorkspaceView
+from explorer.app.studies import Brush, within
+from explorer.app.study_actions import BrushAxis, OpenStudy, PickDesign
+from explorer.app.study_folders import StudyFolders
 from explorer.design import JOINTS
 from explorer.design_file import PRESETS
 from explorer.optimise.findings import CLEARANCE, PAPER_VOLUME, paper_start
 from explorer.pose import Pose
 from explorer.radii import with_radius
+from explorer.sweep.results import load_results
+from explorer.sweep.run import run_study
+from explorer.sweep.study import STUDIES, Sampling
+from explorer.sweep.workers import LocalWorkers
 
 FOLDER = Path(__file__).resolve().parents[1] / "assets" / "pictures"
 DESIGN = PRESETS["paper-optimal"]
+
+REPORT_DATE = dt.date(2026, 1, 1)
+REPORT_SHEETS = ("header", "section:nth-of-type(2)", "section:nth-of-type(3)")
+REPORT_STYLE = (
+    "body{margin:0;padding:20px;display:flex;gap:20px;background:#dfe3e8}"
+    "img{width:400px;box-shadow:0 1px 6px rgb(28 37 48/.25)}"
+)
 
 # The mechanism without what would hide the workspace, or hide in it.
 BARE = View(handle=False, tetrahedra=(False, False, False))
@@ -89,7 +113,7 @@ SCENES = {
             Jog(0, 20.0),
         ),
         panels=True,
-        size=(1280, 1300),
+        size=(1280, 1330),
     ),
     "twin": Scene(actions=(SetView(View(handle=False, twin=True)),)),
     "workspace": Scene(
@@ -128,6 +152,19 @@ SCENES = {
         tab="View",
         size=(1280, 1000),
     ),
+    # What is left of the paper's optimum when a3 comes nearer, beside both rows of Table 1.
+    "compare": Scene(
+        actions=(
+            SetView(BARE),
+            Pin(DESIGN),
+            Pin(PRESETS["paper-initial"]),
+            SetVariable("a3x", 17.0),
+            SetLook(Look(overlay=True)),
+        ),
+        panels=True,
+        tab="Compare",
+        size=(1280, 800),
+    ),
     # The paper's problem; a search is the same each time, so that its end can be shown.
     "optimise": Scene(
         actions=(
@@ -138,7 +175,7 @@ SCENES = {
         ),
         panels=True,
         tab="Optimise",
-        size=(1280, 1190),
+        size=(1280, 1230),
     ),
 }
 
@@ -162,16 +199,81 @@ def draw(browser: Browser, scene: Scene) -> bytes:
     )
 
 
+def draw_report(browser: Browser) -> bytes:
+    """Return a picture of three sheets of the report."""
+    html = make_report(DESIGN, date=REPORT_DATE).decode()
+    # A sheet of A4 on the screen, beside which the page's ground is seen.
+    width, height = 794, 1123
+    page = browser.new_page(viewport={"width": 900, "height": height}, device_scale_factor=1.5)
+    page.set_content(html)
+    sheets: list[str] = []
+    for selector in REPORT_SHEETS:
+        top = page.locator(selector).evaluate("each => each.getBoundingClientRect().top + scrollY")
+        clip = {"x": 53.0, "y": float(top) - 40.0, "width": width, "height": height}
+        shot = page.screenshot(clip=FloatRect(**clip), full_page=True)
+        sheets.append(base64.b64encode(shot).decode())
+    images = "".join(f'<img src="data:image/png;base64,{each}">' for each in sheets)
+    page.set_content(f"<style>{REPORT_STYLE}</style>{images}")
+    page.set_viewport_size({"width": 1280, "height": 608})
+    data = page.screenshot()
+    page.close()
+    return data
+
+
+def draw_studies(browser: Browser) -> bytes:
+    """Return a picture of a study: a brush, and a design of the front that was picked."""
+    study = STUDIES["trade-off"]
+    study = msgspec.structs.replace(study, sampling=Sampling(count=512, seed=1))
+    with TemporaryDirectory() as home:
+        folder = Path(home) / study.name
+        with LocalWorkers() as workers:
+            run_study(study, folder, workers)
+        results = load_results(folder)
+        # The largest clearance among the designs within the brush.
+        brush = BrushAxis("volume", ((4000.0, 7000.0),))
+        inside = results.front() & within(results.columns, (Brush(brush.axis, brush.ranges),))
+        rows = np.flatnonzero(inside)
+        row = int(rows[results.columns["clearance"][rows].argmax()])
+        index = int(results.columns["index"][row])
+        running = start(DESIGN, port=0, studies=StudyFolders(Path(home)))
+        try:
+            session, panel = running.page.session, running.page.studies
+            session.do(SetView(BARE))
+            session.do(OpenStudy(study.name))
+            session.do(PickDesign(results.design_of_row(row), index=index, study=study.name))
+            session.do(brush)
+            session.wait_until_idle()
+            assert panel is not None
+            assert panel.feed.wait_until_idle(60.0)
+            page, client = open_page(browser, running, (1280, 1000))
+            page.get_by_role("tab", name="Studies", exact=True).click()
+            page.locator(".js-plotly-plot").nth(1).wait_for()
+            page.get_by_title("Make the drawer taller, or lower again").click()
+            settle(page, client)
+            running.page.point_cameras("isometric")
+            settle(page, client)
+            return stable_picture(page)
+        finally:
+            running.stop()
+
+
+PICTURES: dict[str, Callable[[Browser], bytes]] = {
+    **{name: partial(draw, scene=scene) for name, scene in SCENES.items()},
+    "report": draw_report,
+    "studies": draw_studies,
+}
+
+
 def main(names: list[str]) -> None:
     """Make the pictures with these names, or all."""
-    unknown = sorted(set(names) - set(SCENES))
+    unknown = sorted(set(names) - set(PICTURES))
     if unknown:
-        sys.exit(f"no scene {', '.join(unknown)}; there are {', '.join(SCENES)}")
+        sys.exit(f"no picture {', '.join(unknown)}; there are {', '.join(PICTURES)}")
     FOLDER.mkdir(exist_ok=True)
     with headless_browser() as browser:
-        for name in names or SCENES:
+        for name in names or PICTURES:
             out = FOLDER / f"{name}.png"
-            out.write_bytes(draw(browser, SCENES[name]))
+            out.write_bytes(PICTURES[name](browser))
             print(out)
 
 

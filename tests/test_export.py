@@ -16,8 +16,8 @@ import pytest
 import trimesh
 
 from explorer import PRESETS, Design, ExplorerError, InputError, NoAnswerError, decode_design
-from explorer.export.files import check_writable, write_whole
 from explorer.export.mesh import FORMATS, colour_of, mesh_bytes, write_mesh
+from explorer.files import check_writable
 from explorer.solid import Solid
 from explorer.solids import HULL, convex_hull, workspace_solid
 
@@ -223,31 +223,6 @@ def test_files_hold_what_the_bytes_hold(tmp_path: Path, file_format: str) -> Non
     if file_format != "3mf":
         assert path.read_bytes() == mesh_bytes(SOLID, file_format, OPTIMAL, NAME)
     assert [each.name for each in tmp_path.iterdir()] == [path.name]
-
-
-def test_a_file_is_written_whole_or_not_at_all(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    path = tmp_path / "file"
-    path.write_bytes(b"old")
-
-    def full(descriptor: int) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr("os.fsync", full)
-    with pytest.raises(InputError, match="No space left"):
-        write_whole(path, b"new")
-    assert path.read_bytes() == b"old"
-    assert [each.name for each in tmp_path.iterdir()] == ["file"]
-
-
-def test_a_link_stays_a_link(tmp_path: Path) -> None:
-    target, link = tmp_path / "target", tmp_path / "link"
-    target.write_bytes(b"old")
-    link.symlink_to(target)
-    write_whole(link, b"new")
-    assert link.is_symlink()
-    assert target.read_bytes() == b"new"
 
 
 def test_what_cannot_be_written_is_refused_before_and_after(tmp_path: Path) -> None:

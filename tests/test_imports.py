@@ -18,7 +18,7 @@ import explorer
 PACKAGE = Path(explorer.__file__).parent
 
 LAYERS = (
-    ("errors", "arrays", "checks", "compiled", "descent"),
+    ("errors", "arrays", "checks", "colours", "compiled", "descent", "files", "versions"),
     ("pose", "design", "design_file"),
     (
         "trilateration",
@@ -60,13 +60,16 @@ LAYERS = (
         "solids",
         "orientations",
         "nodes",
+        "node_measures",
         "workspace",
         "slice_fields",
+        "slice_outline",
         "smoothing",
         "tree_search",
         "planning",
         "trajectory",
         "least_clearance",
+        "extremes",
         "reachable_nodes",
         "isosurface",
         "start",
@@ -74,13 +77,28 @@ LAYERS = (
         "reachable",
         "radii",
     ),
-    ("optimise", "sweep", "prototype"),
+    ("optimise", "figures", "sweep", "prototype"),
     ("export",),
     ("app", "cli", "__main__"),
 )
 """Top-level modules and packages, from the ground up."""
 
-WITHOUT_VISER = ("app.state", "app.jobs", "app.optimiser")
+WITHOUT_VISER = (
+    "app.state",
+    "app.jobs",
+    "app.optimiser",
+    "app.reporting",
+    "app.access",
+    "app.client_messages",
+    "app.storage",
+    "app.storage.autosave",
+    "app.storage.library",
+    "app.studies",
+    "app.study_actions",
+    "app.study_feed",
+    "app.study_runner",
+    "app.plot_events",
+)
 """The parts of the app whose logic runs without a browser."""
 
 SLOW = ("numba", "trimesh", "manifold3d", "playwright")

@@ -591,3 +591,20 @@ def test_default_bounds_hold_every_start_and_keep_lines_apart() -> None:
         problem = make_problem(design, "match-volume", volume=9.0, free=["yaw", "reach"])
         yaw = problem.variables[problem.names.index("yaw")]
         assert math.sin(math.radians(yaw.low)) * math.sin(math.radians(yaw.high)) > 0.0
+
+
+def test_a_problem_that_demands_nothing_is_solved_within_its_bounds() -> None:
+    problem = Problem(
+        start=OPTIMAL,
+        objective="largest-volume",
+        variables=(Variable("b1y", -5.0, -2.0), Variable("b2", 1.0, 4.0)),
+    )
+    outcome = optimise_design(problem, iterations=60)
+    assert outcome.converged
+    assert outcome.best.volume > workspace_volume(OPTIMAL).volume
+    grid = [
+        workspace_volume(problem.design_at((b1y, b2))).volume
+        for b1y in np.linspace(-5.0, -2.0, 13).tolist()
+        for b2 in np.linspace(1.0, 4.0, 13).tolist()
+    ]
+    assert outcome.best.volume >= max(grid) - 1e-6

@@ -14,7 +14,7 @@ from strategies import Case, all_cases, ordinary_cases
 
 from explorer import PRESETS, InputError, Pose, home_pose, inverse, margins
 from explorer.arrays import FloatArray
-from explorer.uncoupled import UNCOUPLED, Travel, UncoupledMotion
+from explorer.uncoupled import UNCOUPLED, Travel, UncoupledMotion, travels
 
 HOME = home_pose(PRESETS["paper-optimal"])
 each_motion = pytest.mark.parametrize("motion", UNCOUPLED, ids=lambda motion: motion.name)
@@ -119,11 +119,17 @@ def test_rotations_reach_the_singular_set_within_half_a_turn(case: Case) -> None
             assert travel.high - travel.low == pytest.approx(math.pi, abs=1e-15)
 
 
+@given(all_cases())
+def test_all_travels_at_once_are_the_travels_of_each(case: Case) -> None:
+    pose = pose_of(case)
+    assert travels(pose) == tuple(motion.travel(pose) for motion in UNCOUPLED)
+
+
 def test_a_level_platform_never_reaches_the_base_along_its_line() -> None:
-    travels = {motion.name: motion.travel(HOME) for motion in UNCOUPLED}
-    assert travels["along the platform's x"] == Travel(-math.inf, math.inf)
-    assert travels["along the base's x"] == Travel(-math.inf, math.inf)
-    assert math.isfinite(travels["about the platform's z"].high)
+    found = {motion.name: motion.travel(HOME) for motion in UNCOUPLED}
+    assert found["along the platform's x"] == Travel(-math.inf, math.inf)
+    assert found["along the base's x"] == Travel(-math.inf, math.inf)
+    assert math.isfinite(found["about the platform's z"].high)
 
 
 def test_on_the_singular_set_there_is_no_travel_left() -> None:

@@ -210,6 +210,20 @@ def test_few_and_many_poses_and_moves_have_the_same_answers() -> None:
         assert poses_are_valid(THICK, moves[0][index], moves[1][index])
 
 
+@pytest.mark.parametrize("count", [3, MANY_ROWS])
+def test_many_positions_may_share_a_rotation_and_many_rotations_a_position(count: int) -> None:
+    poses = poses_about(THICK, 5, count)
+    p, r = (np.array([pose.position for pose in poses]), np.array([q.rotation for q in poses]))
+    one = np.broadcast_to(r[0], r.shape).copy()
+    assert np.array_equal(poses_are_valid(THICK, p, r[0]), poses_are_valid(THICK, p, one))
+    same = np.broadcast_to(p[0], p.shape).copy()
+    assert np.array_equal(poses_are_valid(THICK, p[0], r), poses_are_valid(THICK, same, r))
+    # Nor need they be rows of one block.
+    assert np.array_equal(
+        poses_are_valid(THICK, p.T.copy().T, r[::-1]), poses_are_valid(THICK, p, r[::-1].copy())
+    )
+
+
 def test_poses_that_are_none_are_refused() -> None:
     with pytest.raises(InputError, match="position"):
         poses_are_valid(OPTIMAL, [0.0, math.nan, 1.0], np.eye(3))

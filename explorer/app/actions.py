@@ -12,7 +12,6 @@ import msgspec
 import numpy as np
 
 from explorer.app.state import (
-    Gesture,
     Hold,
     Joints,
     State,
@@ -29,9 +28,6 @@ from explorer.feasibility import feasible_intervals, nearest_feasible
 from explorer.kinematics import discriminants, forward
 from explorer.pose import Pose, Triple
 
-# A hand that has not moved a control for longer, in seconds, begins a new gesture with it.
-PAUSE_SECONDS = 1.0
-
 
 class Action(Protocol):
     """A change of the state."""
@@ -47,7 +43,7 @@ class Action(Protocol):
 
 @dataclass(frozen=True)
 class Open:
-    """Open a design in its home pose; the view stays."""
+    """Open a design in its home pose; the view, comparisons and studies stay."""
 
     design: Design
 
@@ -60,7 +56,13 @@ class Open:
         _check_free(state)
         optimisation = replace(state.optimisation, run=None, refusal=None)
         after = opened(self.design, view=state.view)
-        return replace(after, hold=state.hold, optimisation=optimisation)
+        return replace(
+            after,
+            hold=state.hold,
+            optimisation=optimisation,
+            compared=state.compared,
+            studies=state.studies,
+        )
 
 
 @dataclass(frozen=True)
@@ -224,6 +226,41 @@ class SetVariable:
 
 
 @dataclass(frozen=True)
+class SetName:
+    """Give the design another name."""
+
+    name: str
+
+    def apply(self, state: State) -> State:
+        """Return the next state.
+
+        Raises:
+            DesignError: not one printable line.
+            InputError: no name at all, or the design is being optimised.
+        """
+        _check_free(state)
+        name = self.name.strip()
+        if not name:
+            raise InputError(f"a design needs a name; it stays {state.design.name!r}")
+        return replace(state, design=msgspec.structs.replace(state.design, name=name))
+
+
+@dataclass(frozen=True)
+class MarkSaved:
+    """Take a design that has been saved as the one to which reset returns."""
+
+    design: Design
+
+    def apply(self, state: State) -> State:
+        """Return the next state; the design has the name under which it was saved."""
+        renamed = msgspec.structs.replace(state.design, name=self.design.name)
+        if renamed != self.design:
+            # It went on meanwhile.
+            return replace(state, base=self.design)
+        return replace(state, design=renamed, base=self.design)
+
+
+@dataclass(frozen=True)
 class SetUnit:
     """Set the millimetres in one design unit."""
 
@@ -282,42 +319,6 @@ class SetView:
         if warn is not None and not (np.isfinite(warn) and warn > 0.0):
             raise InputError(f"the warning length must be positive; got {warn:g}")
         return replace(state, view=self.view)
-
-
-@dataclass(frozen=True)
-class ByHand:
-    """An action with its origin, by which the many events of one drag become one gesture.
-
-    Attributes:
-        action: What is done.
-        source: The control that it came from; one of its own for what is no drag.
-        time: When it happened, in seconds.
-    """
-
-    action: Action
-    source: object
-    time: float
-
-    def apply(self, state: State) -> State:
-        """Return the next state, with the gesture that led to its pose."""
-        after = self.action.apply(state)
-        return replace(after, gesture=self._gesture(state, after))
-
-    def _gesture(self, before: State, after: State) -> Gesture | None:
-        is_jump = isinstance(self.action, Open | Reset | SetMode)
-        if is_jump or after.design.variables != before.design.variables:
-            # The legs did not go from one to the other.
-            return None
-        gesture = before.gesture
-        if (
-            gesture is not None
-            and gesture.source == self.source
-            and self.time - gesture.last <= PAUSE_SECONDS
-        ):
-            return replace(gesture, last=max(gesture.last, self.time))
-        if after.pose == before.pose:
-            return gesture
-        return Gesture(before.pose, self.source, self.time)
 
 
 def moved(state: State, pose: Pose, yaw_pitch_roll: Triple | None = None) -> State:

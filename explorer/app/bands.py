@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from explorer.app.colours import FAR_WARNINGS, OUTLINE, Rgb, proximity_colour
 from explorer.arrays import FloatArray
+from explorer.colours import BAND_EDGES, OUTLINE, Rgb, band_colours
 from explorer.design import Design
 from explorer.reachable import PAIR_NAMES
 from explorer.singularity import inverse_condition, jacobian, margins
@@ -20,8 +19,6 @@ Measure = Literal["plain", "margin", "condition"]
 
 # An inverse condition number below this is coloured as a warning.
 WARN_CONDITION = 0.01
-# Colours come in bands, so that a surface tells how much and not only where less.
-BAND_EDGES = (0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 2.5, 3.0, FAR_WARNINGS)
 PLAIN: Rgb = (110, 150, 196)
 # Where legs begin to collide: what collides has this colour all over the page.
 COLLIDING: Rgb = OUTLINE
@@ -89,12 +86,6 @@ def _by_cause(solid: Solid) -> tuple[Shell, ...]:
     collide = np.isin(solid.limit_of_face, pairs)
     parts = ((PLAIN, solid.faces[~collide]), (COLLIDING, solid.faces[collide]))
     return tuple(Shell(colour, solid.vertices, faces) for colour, faces in parts if len(faces))
-
-
-def band_colours() -> tuple[Rgb, ...]:
-    """Return the colour of each band, of values as multiples of the warning value."""
-    edges = (*BAND_EDGES, 1.5 * BAND_EDGES[-1])
-    return tuple(proximity_colour(0.5 * (a + b), 1.0) for a, b in itertools.pairwise(edges))
 
 
 def split_at(

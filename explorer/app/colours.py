@@ -1,25 +1,41 @@
-"""The colours, and the one scale that tells how near a singularity is.
-
-Orange below the warning length, blue above it: a pair that every common colour-vision
-deficiency keeps apart, with the step where it matters. Both ends darken, so that the
-scale also reads in grey: dark orange is singular, dark blue is far away.
-"""
+"""The colours of the scene, beside the scale of `explorer.colours` that it shares with reports."""
 
 from __future__ import annotations
 
-from typing import TypeAlias
+from explorer.colours import (
+    CLEAR,
+    FAR,
+    FAR_WARNINGS,
+    OUTLINE,
+    SINGULAR,
+    WARNED,
+    Rgb,
+    css,
+    proximity_colour,
+)
 
-import numpy as np
-
-Rgb: TypeAlias = tuple[int, int, int]
-
-SINGULAR: Rgb = (196, 52, 8)
-WARNED: Rgb = (246, 178, 76)
-CLEAR: Rgb = (112, 172, 220)
-FAR: Rgb = (24, 74, 150)
-
-# The scale ends at this many warning lengths; everything beyond is simply far.
-FAR_WARNINGS = 4.0
+__all__ = [
+    "BALL",
+    "BASE_BODY",
+    "CARRIAGE",
+    "CLEAR",
+    "COMPARED",
+    "FAR",
+    "FAR_WARNINGS",
+    "GHOST",
+    "JOINT",
+    "OUTLINE",
+    "PLATFORM_BODY",
+    "RAIL",
+    "ROD",
+    "SINGULAR",
+    "SWEPT",
+    "TUBE",
+    "WARNED",
+    "Rgb",
+    "css",
+    "proximity_colour",
+]
 
 TUBE: Rgb = (84, 96, 114)
 ROD: Rgb = (188, 197, 209)
@@ -30,28 +46,10 @@ PLATFORM_BODY: Rgb = (150, 160, 176)
 RAIL: Rgb = (128, 138, 152)
 CARRIAGE: Rgb = (104, 115, 132)
 GHOST: Rgb = (120, 134, 156)
-OUTLINE: Rgb = (190, 24, 60)
 SWEPT: Rgb = (92, 60, 156)
+COMPARED: tuple[Rgb, ...] = ((0, 158, 115), (120, 70, 200), (225, 110, 190), (170, 150, 20))
+"""Of the live design and of the pinned ones.
 
-
-def proximity_colour(margin: float, warn_below: float) -> Rgb:
-    """Return the colour of a margin.
-
-    Args:
-        margin: Signed or not, in design units.
-        warn_below: The length below which to warn, in design units.
-    """
-    share = abs(margin) / warn_below
-    if share < 1.0:
-        return _mix(SINGULAR, WARNED, share)
-    return _mix(CLEAR, FAR, min(1.0, (share - 1.0) / (FAR_WARNINGS - 1.0)))
-
-
-def css(colour: Rgb) -> str:
-    """Return the colour as hexadecimal CSS."""
-    return "#{:02x}{:02x}{:02x}".format(*colour)
-
-
-def _mix(a: Rgb, b: Rgb, share: float) -> Rgb:
-    red, green, blue = np.rint(np.array(a) + share * (np.array(b) - np.array(a))).tolist()
-    return int(red), int(green), int(blue)
+Apart from each other for every common colour-vision deficiency, from the scale of proximity,
+and from light and dark pages. A letter stands beside each.
+"""

@@ -124,6 +124,31 @@ class Slider(Control[float]):
         yield from super().updates(frame)
 
 
+class Number(Control[float]):
+    """A number field, whose step follows the state."""
+
+    def __init__(
+        self,
+        session: Session,
+        handle: viser.GuiNumberHandle[float],
+        read: Callable[[Frame], float],
+        write: Callable[[State, float], Action],
+        step: Callable[[State], float],
+        *,
+        visible: Callable[[State], bool] | None = None,
+    ) -> None:
+        super().__init__(session, handle, read, write, visible=visible)
+        self._number = handle
+        self._step = step
+
+    def updates(self, frame: Frame) -> Iterator[Update]:
+        """Yield what makes the field show the frame, its step first."""
+        step = self._step(frame.state)
+        yield self._number, "step", step
+        yield self._number, "precision", decimals(step)
+        yield from super().updates(frame)
+
+
 class Controls:
     """Makes controls and keeps them in step with the state.
 
@@ -170,12 +195,17 @@ class Controls:
         write: Callable[[State, float], Action],
         *,
         least: float,
-        step: float,
+        step: float | Callable[[State], float],
         visible: Callable[[State], bool] | None = None,
     ) -> None:
-        """Add a number field."""
-        handle = self._gui.add_number(label, least, min=least, step=step, hint=hint)
-        self._controls.append(Control(self._session, handle, read, write, visible=visible))
+        """Add a number field, of which the step may follow the state."""
+        if callable(step):
+            handle = self._gui.add_number(label, least, min=least, hint=hint)
+            control = Number(self._session, handle, read, write, step, visible=visible)
+        else:
+            handle = self._gui.add_number(label, least, min=least, step=step, hint=hint)
+            control = Control(self._session, handle, read, write, visible=visible)
+        self._controls.append(control)
 
     def triple(
         self,
@@ -216,6 +246,19 @@ class Controls:
     ) -> None:
         """Add a list to choose from."""
         handle = self._gui.add_dropdown(label, options, hint=hint)
+        self._controls.append(Control[str](self._session, handle, read, write, disabled))
+
+    def text(
+        self,
+        label: str,
+        hint: str,
+        read: Callable[[Frame], str],
+        write: Callable[[State, str], Action],
+        *,
+        disabled: Callable[[State], bool] | None = None,
+    ) -> None:
+        """Add a line of text."""
+        handle = self._gui.add_text(label, "", hint=hint)
         self._controls.append(Control[str](self._session, handle, read, write, disabled))
 
     def button(

@@ -23,6 +23,8 @@ from explorer.app.worker import Cancel, Order, Reply, Told, read_frame, write_fr
 
 Item = TypeVar("Item")
 
+RESTARTED = "The worker process died and was started again."
+
 # What can go wrong with a pipe to a process that has ended.
 GONE = (OSError, ValueError, EOFError, pickle.UnpicklingError)
 
@@ -65,10 +67,10 @@ class LatestWins(Generic[Item]):
             return key in self._waiting
 
     @property
-    def has_more(self) -> bool:
-        """Whether anything waits."""
+    def waiting(self) -> int:
+        """How many items wait."""
         with self._condition:
-            return bool(self._waiting)
+            return len(self._waiting)
 
     def wait_until_idle(self, timeout: float) -> bool:
         """Wait until nothing waits and nothing runs; say whether that came about."""
@@ -112,8 +114,8 @@ class _Request:
 class Worker:
     """A child process for heavy work; of each kind of request only the newest waits.
 
-    It is started when it is first needed, and again should it die. Results come on a
-    thread of their own.
+    It is started when it is first needed, and again should it die: then what it was doing
+    is done once more, unless it tells. Results come on a thread of their own.
 
     Args:
         report: Called with a message when the process died or failed unexpectedly.
@@ -126,7 +128,7 @@ class Worker:
         report: Callable[[str], None],
         *,
         tasks: str = "explorer.app.tasks",
-        died: str = "The worker process died; the next change starts it again.",
+        died: str = "The worker process died over this twice; the next change starts it again.",
     ) -> None:
         self._report = report
         self._tasks = tasks
@@ -136,8 +138,8 @@ class Worker:
         self._stopped = False
         # Of the process: it must not be started after it was told to stop.
         self._lock = threading.Lock()
-        # Of what is written to it, and of these three: the order that it does, the newest
-        # that was cancelled, and when the process is ended for not heeding that.
+        # Of what is written to it, of ending it by force, and of these three: the order that
+        # it does, the newest that was cancelled, and when it is ended for not heeding that.
         self._writing = threading.Lock()
         self._doing: int | None = None
         self._cancelled = -1
@@ -173,7 +175,9 @@ class Worker:
         return number
 
     def cancel(self, number: int, patience: float) -> None:
-        """Ask a task that tells, and all before it, to end early.
+        """Ask a task, and all before it, to end early.
+
+        One that tells hears of it; any other is not begun, or ends with its process.
 
         Args:
             number: Of the task, as `submit` returned it.
@@ -219,45 +223,69 @@ class Worker:
                 self._serve(request)
 
     def _serve(self, request: _Request) -> None:
-        process = self._alive()
-        if process is None:
-            return
-        try:
-            self._hand_over(request.order, process)
-            reply = _replied(request, process)
-        except GONE:
-            with self._lock:
-                _end(process)
-                if self._stopped:
-                    return
+        reply = self._tried(request)
+        # What has told something cannot be begun anew without a word.
+        if reply is None and request.told is None and not self._is_over(request):
+            self._report(RESTARTED)
+            reply = self._tried(request)
+        if reply is None:
+            if self._stopped:
+                return
             if self._cancelled < request.order.number:
                 self._report(self._died)
             request.failed(self._died)
-            return
-        finally:
-            with self._writing:
-                self._doing = None
-                # One that waits for its turn yet keeps its deadline.
-                if self._deadline is not None and self._cancelled <= request.order.number:
-                    self._deadline.cancel()
-        if reply.problem is None:
+        elif reply.problem is None:
             request.done(reply.value)
         else:
             if not reply.expected:
                 self._report(f"Something went wrong in the worker: {reply.problem}")
             request.failed(reply.problem)
 
-    def _hand_over(self, order: Order, process: subprocess.Popen[bytes]) -> None:
+    def _is_over(self, request: _Request) -> bool:
+        return self._stopped or self._cancelled >= request.order.number
+
+    def _tried(self, request: _Request) -> Reply | None:
+        """Return the reply to a request.
+
+        None if the process died or is to stop, or if the task was not begun any more.
+        """
+        process = self._alive()
+        if process is None:
+            return None
+        try:
+            if not self._hand_over(request.order, process):
+                return None
+            return _replied(request, process)
+        except GONE:
+            with self._lock:
+                _end(process)
+                self._process = None
+            return None
+        finally:
+            with self._writing:
+                self._doing = None
+                # One that waits for its turn yet keeps its deadline.
+                if self._deadline is not None and self._cancelled <= request.order.number:
+                    self._deadline.cancel()
+
+    def _hand_over(self, order: Order, process: subprocess.Popen[bytes]) -> bool:
+        """Write an order to the process; return whether it is to be done at all."""
         with self._writing:
+            is_cancelled = self._cancelled >= order.number
+            # It would not hear of it, and the time to end it by force may have passed.
+            if is_cancelled and not order.tells:
+                return False
             # Both are pipes, as they were asked for.
             stream = cast("IO[bytes]", process.stdin)
             write_frame(stream, order)
             self._doing = order.number
-            if order.tells and self._cancelled >= order.number:
+            if is_cancelled:
                 write_frame(stream, Cancel(order.number))
+            return True
 
     def _kill(self, number: int) -> None:
-        with self._lock:
+        # Nothing else is handed over meanwhile, so that it cannot hit what comes next.
+        with self._writing:
             if self._doing == number and self._process is not None:
                 self._process.kill()
 
@@ -266,7 +294,12 @@ class Worker:
         with self._lock:
             if self._stopped:
                 return None
-            if self._process is None or self._process.poll() is not None:
+            if self._process is not None and self._process.poll() is not None:
+                # Killed while it had nothing to do.
+                _end(self._process)
+                self._process = None
+                self._report(RESTARTED)
+            if self._process is None:
                 paths = {"PYTHONPATH": str(Path(__file__).parents[2])}
                 code = "import sys; from explorer.app.worker import main; main(sys.argv[1])"
                 self._process = subprocess.Popen(  # noqa: S603 - our own interpreter and words

@@ -28,6 +28,7 @@ from explorer.optimise.problem import (
     Problem,
     longest_length,
 )
+from explorer.optimise.record import Record, Settings, record_of
 from explorer.optimise.trail import Trail
 from explorer.workspace import workspace_volume
 
@@ -97,6 +98,7 @@ class Verdict:
         converged: How many of them converged.
         iterations: Of the best.
         seconds: It took.
+        record: By which it can be repeated; None if it had to be ended or failed.
     """
 
     status: Status | Literal["failed"]
@@ -106,6 +108,7 @@ class Verdict:
     converged: int = 0
     iterations: int = 0
     seconds: float | None = None
+    record: Record | None = None
 
 
 @dataclass(frozen=True)
@@ -174,6 +177,12 @@ class Optimisation:
         """Whether a run goes on."""
         return self.run is not None and self.run.phase != "ended"
 
+    @property
+    def record(self) -> Record | None:
+        """Of the search that ended last; None where there is none to repeat."""
+        verdict = None if self.run is None else self.run.verdict
+        return None if verdict is None else verdict.record
+
 
 def wished_volume(state: State) -> float:
     """Return the volume that is asked for."""
@@ -217,8 +226,8 @@ def problem_of(state: State) -> Problem:
     return msgspec.structs.replace(problem, variables=variables)
 
 
-def verdict_of(outcome: Outcome) -> Verdict:
-    """Return how an outcome ended."""
+def verdict_of(outcome: Outcome, starts: int) -> Verdict:
+    """Return how a search from so many starts ended."""
     run = outcome.run
     return Verdict(
         status=run.status,
@@ -228,6 +237,7 @@ def verdict_of(outcome: Outcome) -> Verdict:
         converged=sum(each.status == "converged" for each in outcome.runs),
         iterations=run.iterations,
         seconds=outcome.seconds,
+        record=record_of(outcome, Settings(starts=starts)),
     )
 
 

@@ -152,7 +152,7 @@ def _verdict(
     run: Run, iterates: tuple[Iterate, ...], ending: Outcome | str, is_cancelled: bool
 ) -> Verdict:
     if isinstance(ending, Outcome):
-        return verdict_of(ending)
+        return verdict_of(ending, run.starts)
     if is_cancelled:
         return cut_short(run.problem, iterates)
     return Verdict("failed", ending)

@@ -176,7 +176,14 @@ def _with_run(state: State, change: Callable[[Run], Run]) -> State:
 
 def _back(state: State, own: State) -> State:
     """Return the user's own state, with what is looked at as it is now."""
-    return replace(own, view=state.view, hold=state.hold, optimisation=state.optimisation)
+    return replace(
+        own,
+        view=state.view,
+        hold=state.hold,
+        optimisation=state.optimisation,
+        compared=state.compared,
+        studies=state.studies,
+    )
 
 
 def _showing(state: State, design: Design) -> State:

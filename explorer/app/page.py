@@ -3,56 +3,69 @@
 from __future__ import annotations
 
 import sys
+import threading
 import time
 import traceback
+from collections.abc import Iterable, Iterator
 from typing import get_args
 
 import numpy as np
 import viser
 
 from explorer.app.actions import SetPose
-from explorer.app.assigning import Assigner
+from explorer.app.assigning import QUIET_SECONDS, Assigner, Update
+from explorer.app.compare_feed import CompareFeed
+from explorer.app.downloads import Downloads
+from explorer.app.hands import Hands
+from explorer.app.history import History
 from explorer.app.jobs import Worker
+from explorer.app.keeping import Keep, Keeper
 from explorer.app.optimiser import Optimiser
+from explorer.app.panels.compare import ComparePanel
 from explorer.app.panels.design import DesignPanel
+from explorer.app.panels.designs import DesignsPanel
+from explorer.app.panels.history import HistoryPanel
 from explorer.app.panels.jog import JogPanel
 from explorer.app.panels.legs import LegsPanel
 from explorer.app.panels.move import MovePanel
 from explorer.app.panels.optimise import OptimisePanel
 from explorer.app.panels.paths import PathsPanel
-from explorer.app.panels.prototype import PrototypePanel, assembly_name
+from explorer.app.panels.prototype import PrototypePanel
+from explorer.app.panels.share import SharePanel
 from explorer.app.panels.singularity import SingularityPanel
+from explorer.app.panels.studies import StudiesPanel
 from explorer.app.panels.view import ViewPanel
-from explorer.app.panels.workspace import WorkspacePanel, tolerance_of
+from explorer.app.panels.workspace import WorkspacePanel
 from explorer.app.panels.workspace_numbers import WorkspaceNumbers
 from explorer.app.parts_feed import PartsFeed
 from explorer.app.path_runner import PathRunner
+from explorer.app.preferences import PreferenceFile
 from explorer.app.scene import Scene
-from explorer.app.scene.camera import Cameras, ViewName, framing
+from explorer.app.scene.camera import Cameras, ViewName
 from explorer.app.scene.placing import Placed, scene_scale
-from explorer.app.session import Session, Who
+from explorer.app.session import REDO, UNDO, Session, Who
+from explorer.app.shelf import Shelf
 from explorer.app.state import Frame, State
 from explorer.app.strata_feed import StrataFeed
-from explorer.app.tasks import Region, Rows, exported_name
-from explorer.app.workspace_feed import (
-    RadiusFeed,
-    WorkspaceFeed,
-    workspace_rows,
-    workspace_start,
-)
-from explorer.design_file import encode_design
-from explorer.export.trajectory import trajectory_csv
-from explorer.home import home_pose
-from explorer.pose import Pose, Triple
+from explorer.app.study_folders import StudyFolders
+from explorer.app.workspace_feed import RadiusFeed, WorkspaceFeed
+from explorer.design import Design
+from explorer.pose import Pose
 
 TITLE = "Flagged 4-4 explorer"
-BRAND = (24, 74, 150)
-# One complaint is shown this long, and not again within it.
-COMPLAINT_SECONDS = 6.0
-# While events come faster than frames, the figures are told this often.
+# What a notice is called that answers something asked for.
+REFUSAL = "That is not possible"
+# One notice is shown this long, and not again within it.
+NOTICE_SECONDS = 6.0
+# While events come faster than frames, all figures are told this often.
 FIGURES_SECONDS = 0.1
+# To send a frame to one browser takes about so long; up to so many at once are not felt.
+REST_SECONDS, FEW_BROWSERS, LONGEST_REST_SECONDS = 0.002, 4, 0.04
+# Properties that decide whether a control can be used.
+IN_USE = ("disabled", "visible")
 # Between two looks at a run that is waited for.
 WAIT_SECONDS = 0.02
+TRAVELS = {"Undo": UNDO, "Redo": REDO}
 VIEW_LABELS: dict[str, ViewName] = {name.capitalize(): name for name in get_args(ViewName)}
 
 
@@ -63,33 +76,58 @@ class Page:
         server: On which everything is drawn.
         state: The first state.
         docked: Whether the panels lie beside the scene, rather than over it.
+        keep: The user's designs and where the session is kept; None to keep nothing.
+        history: That led to the state; None where it begins with it.
+        preferences: Where theme and tour are remembered; None to be light and to begin no
+            tour by itself.
+        studies: Where design studies lie; None to offer none.
     """
 
-    def __init__(self, server: viser.ViserServer, state: State, *, docked: bool = True) -> None:
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        state: State,
+        *,
+        docked: bool = True,
+        keep: Keep | None = None,
+        history: History | None = None,
+        preferences: PreferenceFile | None = None,
+        studies: StudyFolders | None = None,
+    ) -> None:
         self._server = server
-        self._complained: dict[str, float] = {}
+        self._notified: dict[str, float] = {}
         self._told = 0.0
+        self._again: threading.Timer | None = None
+        # What is read on other threads may be there before the last panel is.
+        self._is_complete = False
         self._frame = Frame(state)
         self._assigner = Assigner(server)
-        self.session = Session(state, self._draw, self._complain, self._report)
-        self.worker = Worker(lambda message: self._complain(message, None))
+        self.session = Session(state, self._draw, self._complain, self._report, history)
+        self.worker = Worker(self._tell)
         self.feed = WorkspaceFeed(self.worker, self.session.redraw)
         self.radius_feed = RadiusFeed(self.worker, self.session.redraw)
         self.strata_feed = StrataFeed(self.worker, self.session.redraw)
         self.parts_feed = PartsFeed(self.worker, self.session.redraw)
-        self.path_runner = PathRunner(self.session, lambda message: self._complain(message, None))
+        self.compare_feed = CompareFeed(self.worker, self.session.redraw)
+        self.path_runner = PathRunner(self.session, self._tell)
         gui = server.gui
-        gui.configure_theme(
-            show_logo=False, show_share_button=False, control_width="large", brand_color=BRAND
-        )
         gui.set_panel_label(TITLE)
+        self.hands = Hands(server, self.session, preferences, self._complain)
         self.optimiser = Optimiser(
             self.session,
-            lambda message: self._complain(message, None),
+            self._tell,
             lambda: self.feed.is_settled,
         )
-        self._scene = Scene(server, self.feed)
-        self._cameras = Cameras(self._placed)
+        self._scene = Scene(server, self.feed, self.compare_feed)
+        self._cameras = Cameras(server.initial_camera, self._placed)
+        self.downloads = downloads = Downloads(
+            server,
+            self.session,
+            self.worker,
+            self._complain,
+            lambda: self.hands.theme.is_dark,
+        )
+        self._add_edit_buttons(gui)
         self._add_view_buttons(gui)
         tabs = gui.add_tab_group()
         with tabs.add_tab("Move"):
@@ -98,11 +136,17 @@ class Page:
         with tabs.add_tab("Design"):
             design = DesignPanel(gui, self.session)
         with tabs.add_tab("Workspace"):
-            self._workspace = WorkspacePanel(gui, self.session, self._export)
+            self._workspace = WorkspacePanel(gui, self.session, downloads.workspace)
         with tabs.add_tab("Optimise"):
-            self._optimise = OptimisePanel(gui, self.session, self._export_hull, self._save_design)
+            self._optimise = OptimisePanel(
+                gui,
+                self.session,
+                lambda who: downloads.hull(self._workspace.file_format, who),
+                downloads.design,
+                downloads.search,
+            )
         with tabs.add_tab("View"):
-            self._prototype = PrototypePanel(gui, self.session, self._export_assembly)
+            self._prototype = PrototypePanel(gui, self.session, downloads.assembly)
             view = ViewPanel(gui, self.session)
         side = gui.add_panel()
         with side.add_tab("Singularity"):
@@ -112,23 +156,29 @@ class Page:
         with side.add_tab("Legs"):
             self._legs = LegsPanel(gui, self.session)
         with side.add_tab("Paths"):
-            paths = PathsPanel(gui, self.session, self._save_path)
+            paths = PathsPanel(gui, self.session, downloads.path)
         self._panels = (move, jog, design, view, paths)
-        if docked:
-            gui.main_panel.dock_right()
-            gui.main_panel.set_width(350)
-            side.dock_left()
-            side.set_width(286)
-
+        drawer = self._add_drawer(gui, keep, studies)
+        self.hands.complete(self._cameras, side, drawer, docked=docked)
         self._scene.drag_handle.handle.on_update(self._dragged)
-        self._aim_initial_camera()
         server.on_client_connect(self._cameras.connected)
         server.on_client_disconnect(self._cameras.disconnected)
-        self._draw(self._frame)
+        self._is_complete = True
+        self.session.redraw()
+        self.session.wait_until_idle()
 
     def stop(self) -> None:
         """End the session and the worker."""
+        if self._again is not None:
+            self._again.cancel()
         self.session.stop()
+        if self.shelf is not None:
+            self.shelf.stop()
+        if self.keeper is not None:
+            self.keeper.stop()
+        if self.studies is not None:
+            self.studies.stop()
+        self.downloads.stop()
         self.path_runner.stop()
         self.worker.stop()
         self.optimiser.stop()
@@ -154,6 +204,38 @@ class Page:
         for client in self._server.get_clients().values():
             self._cameras.point(client, view)
 
+    def _add_drawer(
+        self, gui: viser.GuiApi, keep: Keep | None, studies: StudyFolders | None
+    ) -> viser.PanelHandle:
+        # A drawer over the foot of the scene: what is wide, and what is not needed all the time.
+        drawer = gui.add_panel()
+        self.shelf: Shelf | None = None
+        self.keeper: Keeper | None = None
+        self._designs: DesignsPanel | None = None
+        if keep is not None:
+            self.keeper = Keeper(keep.store, self._tell)
+            self.shelf = Shelf(keep.library, self.session, self._complain)
+            with drawer.add_tab("Designs"):
+                self._designs = DesignsPanel(gui, self.session, self.shelf, self.downloads.design)
+        with drawer.add_tab("Compare"):
+            self._compare = ComparePanel(gui, self.session, self._saved_designs)
+        self.studies: StudiesPanel | None = None
+        if studies is not None:
+            with drawer.add_tab("Studies") as tab:
+                self.studies = StudiesPanel(
+                    self._server,
+                    tab,
+                    self.session,
+                    studies,
+                    self._complain,
+                    lambda client, tall: self.hands.set_drawer(client, drawer, tall=tall),
+                )
+        with drawer.add_tab("History"):
+            self._history = HistoryPanel(gui, self.session)
+        with drawer.add_tab("Share"):
+            self._share = SharePanel(gui, self.downloads)
+        return drawer
+
     def _add_view_buttons(self, gui: viser.GuiApi) -> None:
         buttons = gui.add_button_group(
             "View", tuple(VIEW_LABELS), hint="Frame the mechanism from one of four sides."
@@ -164,34 +246,107 @@ class Page:
             if event.client is not None:
                 self._cameras.point(event.client, VIEW_LABELS[buttons.value])
 
+    def _add_edit_buttons(self, gui: viser.GuiApi) -> None:
+        buttons = gui.add_button_group(
+            "Edit",
+            tuple(TRAVELS),
+            hint="Undo the last step, or redo it; the drawer lists them all.",
+        )
+        buttons.on_click(
+            lambda event: self.session.travel(TRAVELS[buttons.value], who=event.client_id)
+        )
+
     def _draw(self, frame: Frame) -> None:
-        self._frame = frame
+        if not self._is_complete:
+            return
+        self._draw_all(frame)
+        self._rest()
+
+    def _draw_all(self, frame: Frame) -> None:
+        self._frame, began = frame, time.time()
+        step = self.session.history.step
+        self.downloads.log.record(frame.state, step.number, step.words)
+        if self.keeper is not None:
+            self.keeper.follow(frame.state, self.session.history)
         # First, so that what is asked for is called out of date until it arrives.
         for feed in (self.feed, self.radius_feed, self.strata_feed, self.parts_feed):
             feed.follow(frame)
+        self.compare_feed.follow(frame)
         # The mechanism follows the hand before the figures do, which nobody reads meanwhile.
-        self._assigner.assign(self._scene.updates(self._placed()))
+        self._assigner.assign(self._scene.updates(self._placed()), since=began)
         self.optimiser.follow(frame)
         self.path_runner.follow(frame)
-        now = time.monotonic()
-        if self.session.has_more and now - self._told < FIGURES_SECONDS:
-            return
-        self._told = now
-        updates = list(self._optimise.updates(frame))
-        for panel in self._panels:
-            updates.extend(panel.updates(frame))
+        changed = self._assigner.assign(self._told_now(frame), since=began)
+        # What a control allows, its command does; controls have been told of it by now.
+        controls = any(name in IN_USE for _, name, _ in changed)
+        self._assigner.assign(self.hands.updates(controls=controls))
+        if self.shelf is not None:
+            self.hands.offer_saved(self.shelf)
+        self.hands.follow(frame)
+        if self._assigner.settle():
+            self._look_again()
+
+    def _look_again(self) -> None:
+        """Draw once more when hands rest, unless that is to come already."""
+        if self._again is None:
+            self._again = threading.Timer(QUIET_SECONDS, self._draw_again)
+            self._again.daemon = True
+            self._again.start()
+
+    def _draw_again(self) -> None:
+        self._again = None
+        self.session.redraw()
+
+    def _told_now(self, frame: Frame) -> list[Update]:
+        """Return what makes the panels show a frame, or the first of them if another waits.
+
+        What is left out is told with the next frame.
+        """
+        is_due = time.monotonic() - self._told >= FIGURES_SECONDS
+        updates: list[Update] = []
+        for panel in self._figures(frame):
+            if self.session.has_more and not is_due:
+                return updates
+            updates.extend(panel)
+        self._told = time.monotonic()
+        return updates
+
+    def _figures(self, frame: Frame) -> Iterator[Iterable[Update]]:
+        """Yield the updates of panel after panel; each is computed when it is gone through."""
+        for panel in (self._optimise, *self._panels):
+            yield panel.updates(frame)
         for panel in (self._workspace, self._numbers):
-            updates.extend(panel.updates(frame, self.feed))
-        updates.extend(self._legs.updates(frame, self.radius_feed))
-        updates.extend(self._singularity.updates(frame, self.strata_feed))
-        updates.extend(self._prototype.updates(frame, self.parts_feed))
-        self._assigner.assign(updates)
+            yield panel.updates(frame, self.feed)
+        yield self._legs.updates(frame, self.radius_feed)
+        yield self._singularity.updates(frame, self.strata_feed)
+        yield self._prototype.updates(frame, self.parts_feed)
+        yield self._history.updates(self.session.history)
+        if self._designs is not None:
+            yield self._designs.updates(frame)
+        if self.studies is not None:
+            yield self.studies.updates(frame, dark=self.hands.theme.is_dark)
+        yield self._compare.updates(frame, self.compare_feed)
+        yield self._share.updates()
+
+    def _rest(self) -> None:
+        """Leave the processor to the many browsers that a frame has to be sent to."""
+        many = len(self._server.get_clients()) - FEW_BROWSERS
+        if many > 0:
+            time.sleep(min(REST_SECONDS * many, LONGEST_REST_SECONDS))
+
+    def _saved_designs(self) -> tuple[Design, ...]:
+        entries = () if self.shelf is None else self.shelf.entries
+        return tuple(entry.design for entry in entries if entry.design is not None)
 
     def _placed(self) -> Placed:
         drawing = self.feed.drawing
-        extent = None if drawing is None else drawing.extent
-        box = None if extent is None else np.array(extent)
-        return Placed(self._frame, box, self.parts_feed.parts)
+        boxes = self.compare_feed.extents(self._frame.state)
+        if drawing is not None and drawing.extent is not None:
+            boxes.append(np.array(drawing.extent))
+        box = None
+        if boxes:
+            box = np.array([np.min(boxes, axis=0)[0], np.max(boxes, axis=0)[1]])
+        return Placed(self._frame, box, self.parts_feed.parts, self.hands.theme.is_dark)
 
     def _dragged(self, event: viser.TransformControlsEvent) -> None:
         if event.client_id is None:
@@ -205,96 +360,25 @@ class Page:
 
         self.session.post("drag", change, stamp=handle.update_timestamp, who=event.client_id)
 
-    def _export(self, what: str, file_format: str, client_id: int | None) -> None:
-        state = self.session.state
-        frame, region = Frame(state), state.view.workspace.region
-        start = workspace_start(frame)
-        self._send_mesh(client_id, what, file_format, workspace_rows(frame), region, start)
-
-    def _export_hull(self, client_id: int | None) -> None:
-        """Send the hull of the workspace that is optimised: at the orientation of home."""
-        rotation = home_pose(self.session.state.design).rotation
-        rows = tuple(tuple(row) for row in rotation.tolist())
-        self._send_mesh(client_id, "hull", self._workspace.file_format, rows, "limits", None)
-
-    def _send_mesh(
-        self,
-        client_id: int | None,
-        what: str,
-        file_format: str,
-        rotation: Rows,
-        region: Region,
-        start: Triple | None,
-    ) -> None:
-        client = self._client(client_id)
-        if client is None:
-            return
-        state = self.session.state
-        name = f"{state.design.name}-{exported_name(region, what).replace(' ', '-')}"
-        self.worker.submit(
-            ("export", client_id, what),
-            "export_mesh",
-            (state.design, rotation, tolerance_of(state), region, start, what, file_format),
-            lambda data: client.send_file_download(
-                f"{name}.{file_format}", data, save_immediately=True
-            ),
-            lambda problem: self._complain(problem, client_id),
-        )
-
-    def _export_assembly(self, file_format: str, client_id: int | None) -> None:
-        client = self._client(client_id)
-        if client is None:
-            return
-        design = self.session.state.design
-        name = f"{design.name}-{assembly_name(file_format)}"
-        self.worker.submit(
-            ("export", client_id, "assembly"),
-            "export_assembly",
-            (design, file_format),
-            lambda data: client.send_file_download(name, data, save_immediately=True),
-            lambda problem: self._complain(problem, client_id),
-        )
-
-    def _save_design(self, client_id: int | None) -> None:
-        client = self._client(client_id)
-        if client is not None:
-            design = self.session.state.design
-            data = encode_design(design)
-            client.send_file_download(f"{design.name}.json", data, save_immediately=True)
-
-    def _save_path(self, client_id: int | None) -> None:
-        client, journey = self._client(client_id), self.session.state.journey
-        if client is not None and journey is not None:
-            data = trajectory_csv(journey.trajectory).encode()
-            name = f"{journey.design.name}-path.csv"
-            client.send_file_download(name, data, save_immediately=True)
-
-    def _client(self, client_id: int | None) -> viser.ClientHandle | None:
-        return self._server.get_clients().get(-1 if client_id is None else client_id)
-
-    def _aim_initial_camera(self) -> None:
-        eye, target = framing(Placed(self._frame), "isometric", aspect=1.2)
-        camera = self._server.initial_camera
-        camera.position, camera.look_at = eye, target
-
     def _complain(self, message: str, who: Who) -> None:
-        now = time.monotonic()
-        if now - self._complained.get(message, -COMPLAINT_SECONDS) < COMPLAINT_SECONDS:
-            return
-        self._complained = {
-            m: t for m, t in self._complained.items() if now - t < COMPLAINT_SECONDS
-        }
-        self._complained[message] = now
-        clients = self._server.get_clients()
-        for client_id, client in clients.items():
-            if who is None or client_id == who:
-                client.add_notification(
-                    "That is not possible",
-                    message,
-                    auto_close_seconds=COMPLAINT_SECONDS,
-                    color="orange",
-                )
+        self._notify(REFUSAL, message, who)
+
+    def _tell(self, message: str) -> None:
+        """Tell all of what nobody asked for."""
+        self._notify("Please note", message, None)
 
     def _report(self, error: Exception) -> None:
         traceback.print_exception(error, file=sys.stderr)
-        self._complain(f"Something went wrong in the explorer itself: {error}", None)
+        self._notify("Something went wrong", f"In the explorer itself: {error}", None)
+
+    def _notify(self, title: str, message: str, who: Who) -> None:
+        now = time.monotonic()
+        if now - self._notified.get(message, -NOTICE_SECONDS) < NOTICE_SECONDS:
+            return
+        self._notified = {m: t for m, t in self._notified.items() if now - t < NOTICE_SECONDS}
+        self._notified[message] = now
+        for client_id, client in self._server.get_clients().items():
+            if who is None or client_id == who:
+                client.add_notification(
+                    title, message, auto_close_seconds=NOTICE_SECONDS, color="orange"
+                )

@@ -6,8 +6,9 @@ no graphics card, and the README's can be made again by anyone.
 
 from __future__ import annotations
 
+import os
 import time
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,16 +18,17 @@ from explorer.app.scene.camera import ViewName
 from explorer.app.server import Running, start
 from explorer.design import Design
 from explorer.errors import ExplorerError, MissingExtraError
+from explorer.files import write_whole
 from explorer.pose import Pose
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
     from viser import ClientHandle
 
+# The renderer that every Chromium brings along.
+SWIFTSHADER = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 CHROMIUM_FLAGS = (
     "--no-sandbox",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
     "--disable-background-networking",
     "--disable-component-update",
     "--disable-sync",
@@ -76,10 +78,11 @@ def take(
     Raises:
         MissingExtraError: Playwright or a Chromium is missing.
         PictureError: the browser did not start or did not draw in time.
+        StorageError: the file cannot be written.
     """
     with headless_browser() as browser:
         data = picture(browser, design, pose, view=view, size=size, panels=panels, prepare=prepare)
-    _write(out, data)
+    write_whole(out, data)
 
 
 def picture(
@@ -104,7 +107,8 @@ def picture(
     try:
         if prepare is not None:
             prepare(running)
-            running.page.wait_until_drawn()
+            if not running.page.wait_until_drawn(PATIENCE_SECONDS):
+                raise PictureError("the explorer did not finish what it draws in time")
         page, client = open_page(browser, running, size)
         try:
             if not panels:
@@ -123,12 +127,18 @@ def picture(
 
 
 @contextmanager
-def headless_browser() -> Generator[Browser]:
+def headless_browser(
+    graphics: Sequence[str] = SWIFTSHADER, environment: Mapping[str, str] | None = None
+) -> Generator[Browser]:
     """Start a headless Chromium and close it in the end.
+
+    Args:
+        graphics: Its flags that choose what draws.
+        environment: Variables that it is to have beside those of this process.
 
     Raises:
         MissingExtraError: Playwright or a Chromium is missing.
-        PictureError: the browser did not start.
+        PictureError: the browser did not start, or failed at what it was then told to do.
     """
     try:
         from playwright.sync_api import Error, sync_playwright
@@ -145,13 +155,18 @@ def headless_browser() -> Generator[Browser]:
     with sync_playwright() as playwright:
         try:
             browser = playwright.chromium.launch(
-                executable_path=chromium, args=list(CHROMIUM_FLAGS)
+                executable_path=chromium,
+                args=[*CHROMIUM_FLAGS, *graphics],
+                env={**os.environ, **(environment or {})},
             )
         except Error as error:
             reason = str(error).splitlines()[0]
             raise PictureError(f"the browser {chromium} did not start: {reason}") from None
         try:
             yield browser
+        except Error as error:
+            reason = str(error).splitlines()[0]
+            raise PictureError(f"the browser {chromium} failed: {reason}") from None
         finally:
             browser.close()
 
@@ -166,7 +181,8 @@ def open_page(
     """
     known = set(running.viser.get_clients())
     page = browser.new_page(viewport={"width": size[0], "height": size[1]})
-    page.goto(running.url)
+    page.set_default_timeout(1000.0 * PATIENCE_SECONDS)
+    page.goto(evenly_drawn(running))
     # viser tells of software rendering; a picture is not the place for it.
     page.add_style_tag(content=".mantine-Notifications-root { display: none !important; }")
     deadline = time.monotonic() + PATIENCE_SECONDS
@@ -176,6 +192,11 @@ def open_page(
                 return page, client
         page.wait_for_timeout(50)
     raise PictureError("the page did not connect to the explorer in time")
+
+
+def evenly_drawn(running: Running) -> str:
+    """Return the address of a page that never draws coarser for being slow, as viser's do."""
+    return f"{running.url}/?fixedDpr=1"
 
 
 def settle(page: Page, client: ClientHandle) -> None:
@@ -229,13 +250,3 @@ def stable_picture(page: Page) -> bytes:
             return data
         last = data
     raise PictureError("the page did not come to rest in time")
-
-
-def _write(out: Path, data: bytes) -> None:
-    partial = out.with_name(f".{out.name}.part")
-    try:
-        partial.write_bytes(data)
-        partial.replace(out)
-    except OSError as error:
-        partial.unlink(missing_ok=True)
-        raise PictureError(f"cannot write {str(out)!r}: {error.strerror}") from None

@@ -10,7 +10,9 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from explorer.app.actions import Action, ByHand
+from explorer.app.actions import Action
+from explorer.app.gestures import ByHand
+from explorer.app.history import History, begun, restored
 from explorer.app.jobs import LatestWins
 from explorer.app.state import Frame, State
 from explorer.errors import ExplorerError
@@ -20,8 +22,28 @@ Who = int | None
 
 
 @dataclass(frozen=True)
+class Travel:
+    """A way through the history.
+
+    Attributes:
+        go: From the history as it is to the one at another step.
+    """
+
+    go: Callable[[History], History]
+
+
+UNDO = Travel(lambda history: history.moved(-1))
+REDO = Travel(lambda history: history.moved(1))
+
+
+def to_step(number: int) -> Travel:
+    """Return the way to the step with a number."""
+    return Travel(lambda history: history.moved_to(number))
+
+
+@dataclass(frozen=True)
 class _Posted:
-    change: Change
+    change: Change | Travel
     key: object
     stamp: float
     who: Who
@@ -35,6 +57,7 @@ class Session:
         draw: Called on the session's thread with each new frame.
         complain: Called with a message for people and the client it is for (None: all).
         report: Called with an unexpected exception; the session goes on.
+        history: That led to the state; None where it begins with it.
     """
 
     def __init__(
@@ -43,8 +66,10 @@ class Session:
         draw: Callable[[Frame], None],
         complain: Callable[[str, Who], None],
         report: Callable[[Exception], None],
+        history: History | None = None,
     ) -> None:
         self._state = state
+        self._history = begun(state) if history is None else history
         self._draw = draw
         self._complain = complain
         self._report = report
@@ -54,6 +79,11 @@ class Session:
     def state(self) -> State:
         """The present state."""
         return self._state
+
+    @property
+    def history(self) -> History:
+        """What was done so far."""
+        return self._history
 
     def post(
         self, key: object, change: Change, *, stamp: float | None = None, who: Who = None
@@ -66,12 +96,19 @@ class Session:
             stamp: When the event happened; now if None.
             who: The client to tell should it not be possible.
         """
-        at = time.time() if stamp is None else stamp
-        self._jobs.post(key, at, _Posted(change, key, at, who))
+        self._post(key, change, stamp, who)
 
     def do(self, action: Action, *, who: Who = None) -> None:
         """Ask for an action that must not be merged with another of its kind."""
         self.post(object(), lambda _: action, who=who)
+
+    def travel(self, travel: Travel, *, who: Who = None) -> None:
+        """Ask to go through the history; no way is left out."""
+        self._post(object(), travel, None, who)
+
+    def travel_to(self, key: object, number: int, *, stamp: float | None, who: Who) -> None:
+        """Ask for the step with a number; of one key only the newest that waits is done."""
+        self._post(key, to_step(number), stamp, who)
 
     def is_waiting(self, key: object) -> bool:
         """Whether a change of this key waits."""
@@ -80,7 +117,12 @@ class Session:
     @property
     def has_more(self) -> bool:
         """Whether any change waits, so that another frame follows at once."""
-        return self._jobs.has_more
+        return self.waiting > 0
+
+    @property
+    def waiting(self) -> int:
+        """How many changes wait."""
+        return self._jobs.waiting
 
     def wait_until_idle(self, timeout: float = 10.0) -> bool:
         """Wait until all that was posted is done and drawn; say whether it is."""
@@ -94,18 +136,31 @@ class Session:
         """End the session's thread."""
         self._jobs.stop()
 
+    def _post(self, key: object, change: Change | Travel, stamp: float | None, who: Who) -> None:
+        at = time.time() if stamp is None else stamp
+        self._jobs.post(key, at, _Posted(change, key, at, who))
+
     def _handle(self, items: Sequence[_Posted]) -> None:
         try:
             for item in items:
                 try:
-                    action = ByHand(item.change(self._state), item.key, item.stamp)
-                    self._state = action.apply(self._state)
+                    self._make(item)
                 except ExplorerError as error:
                     self._complain(str(error), item.who)
             # Drawn also after a refusal: the control that asked for it must go back.
             self._draw(Frame(self._state))
         except Exception as error:  # noqa: BLE001 - one bad frame must not end the session
             self._report(error)
+
+    def _make(self, item: _Posted) -> None:
+        if isinstance(item.change, Travel):
+            history = item.change.go(self._history)
+            self._state = restored(history.step, self._state)
+            self._history = history
+            return
+        action = ByHand(item.change(self._state), item.key, item.stamp)
+        self._state = action.apply(self._state)
+        self._history = self._history.recorded(action, self._state)
 
 
 @dataclass(frozen=True)

@@ -12,11 +12,14 @@ from typing import Literal
 
 import numpy as np
 
+from explorer.app.compared import Compared
 from explorer.app.jog import Jog
 from explorer.app.optimisation import Optimisation
 from explorer.app.paths import Journey, Paths
 from explorer.app.prototype_view import PrototypeView
 from explorer.app.singular_view import SingularView
+from explorer.app.studies import Studies
+from explorer.colours import WARN_SHARE
 from explorer.design import JOINTS, Design
 from explorer.errors import InputError
 from explorer.home import home_pose
@@ -31,13 +34,10 @@ from explorer.performance import (
 from explorer.pose import Pose, Triple, yaw_pitch_roll_from_rotation
 from explorer.singularity import TETRAHEDRA, margins, mode_of
 from explorer.snapshot import Snapshot, evaluate
-from explorer.uncoupled import UNCOUPLED, Travel
+from explorer.uncoupled import Travel, travels
 
 Joints = tuple[float, float, float, float, float, float]
 Hold = Literal["pose", "legs"]
-
-# Unless told otherwise, margins below this share of the reach are warned of.
-WARN_SHARE = 0.05
 
 
 @dataclass(frozen=True)
@@ -170,6 +170,8 @@ class State:
         jog: The uncoupled motion that was last used.
         paths: The path that is played, and what is stored to plan one.
         optimisation: What is to be optimised, and how far that has got.
+        compared: What the design is compared with.
+        studies: Which study of designs is looked at, and how.
     """
 
     design: Design
@@ -185,6 +187,8 @@ class State:
     jog: Jog | None = None
     paths: Paths = field(default_factory=Paths)
     optimisation: Optimisation = field(default_factory=Optimisation)
+    compared: Compared = field(default_factory=Compared)
+    studies: Studies = field(default_factory=Studies)
 
     @property
     def jog_in_use(self) -> Jog | None:
@@ -256,7 +260,7 @@ class Frame:
     @cached_property
     def travels(self) -> tuple[Travel, ...]:
         """How far each of the six uncoupled motions may go from here to the singularity."""
-        return tuple(motion.travel(self.state.pose) for motion in UNCOUPLED)
+        return travels(self.state.pose)
 
     @cached_property
     def free_ball(self) -> SingularityFreeBall:

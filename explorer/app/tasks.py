@@ -10,14 +10,18 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from explorer.app.bands import PLAIN, Colouring, Measure, Shell
+from explorer.app.compared_drawing import ComparedDrawing, ComparedRequest, compared_drawing
 from explorer.app.parts import PartsDrawing, PartsRequest, parts_drawing
+from explorer.app.reporting import ReportFormat, make_report
 from explorer.app.slice_map import AXES, CUT, Axis, SliceMap, slice_map
 from explorer.arrays import FloatArray
 from explorer.bruhat import Stratum
 from explorer.constraints import HalfSpace
 from explorer.design import Design
 from explorer.errors import ExplorerError, InputError
+from explorer.export.session_log import SessionTable, session_csv
 from explorer.nearest_stratum import nearest_in_strata
+from explorer.optimise.record import Record
 from explorer.pose import Pose, Triple
 from explorer.radii import RadiusCurve, radius_curve
 from explorer.reachable import PairCost, ReachableWorkspace, reachable_workspace
@@ -247,6 +251,11 @@ def draw_parts(request: PartsRequest) -> PartsDrawing:
     return parts_drawing(request)
 
 
+def draw_compared(request: ComparedRequest) -> ComparedDrawing:
+    """Return the figures of a design that is compared, and its workspace if asked for."""
+    return compared_drawing(request)
+
+
 def export_assembly(design: Design, file_format: str) -> bytes:
     """Return a file of the prototype, assembled in the home pose.
 
@@ -266,6 +275,22 @@ def export_assembly(design: Design, file_format: str) -> bytes:
 
         return assembly_step(sizes_of(design))
     return assembly_bytes(make_prototype(design), file_format)
+
+
+def export_session(table: SessionTable) -> bytes:
+    """Return the poses of a session as comma-separated values."""
+    return session_csv(table).encode()
+
+
+def export_report(
+    design: Design, pose: Pose, record: Record | None, file_format: ReportFormat
+) -> bytes:
+    """Return the report of a design in a pose, with the search that found it, if one did.
+
+    Raises:
+        ExplorerError: PDF without what prints it.
+    """
+    return make_report(design, pose, record=record, file_format=file_format)
 
 
 def export_mesh(

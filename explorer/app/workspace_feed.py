@@ -42,6 +42,7 @@ class Feed(Generic[Request, Drawing]):
         task: The name of a function in `explorer.app.tasks`, from requests to drawings.
         wanted: The request of a frame, None if nothing is to be drawn.
         redraw: Called when a new one is there.
+        key: Of the requests, of which the newest counts; the task if None.
     """
 
     def __init__(
@@ -50,9 +51,11 @@ class Feed(Generic[Request, Drawing]):
         task: str,
         wanted: Callable[[Frame], Request | None],
         redraw: Callable[[], None],
+        key: object = None,
     ) -> None:
         self._worker = worker
         self._task = task
+        self._key = task if key is None else key
         self._wanted = wanted
         self._redraw = redraw
         self._asked: Request | None = None
@@ -63,6 +66,11 @@ class Feed(Generic[Request, Drawing]):
     def drawing(self) -> Drawing | None:
         """The newest drawing, None if there is none or none is wanted."""
         return self._drawing if self._asked is not None else None
+
+    @property
+    def asked(self) -> Request | None:
+        """What was asked for last, None if nothing is to be drawn."""
+        return self._asked
 
     @property
     def problem(self) -> str | None:
@@ -86,7 +94,7 @@ class Feed(Generic[Request, Drawing]):
             return
         self._asked, self._problem = wanted, None
         if wanted is not None:
-            self._worker.submit(self._task, self._task, (wanted,), self._arrived, self._failed)
+            self._worker.submit(self._key, self._task, (wanted,), self._arrived, self._failed)
 
     def _arrived(self, drawing: Drawing) -> None:
         # Of requests that failed meanwhile none is the newest.

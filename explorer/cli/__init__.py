@@ -27,7 +27,9 @@ COMMANDS: Mapping[str, str] = {
     "path": "Plan a path between two poses that keeps limits, margins and clearances.",
     "workspace": "Measure the workspace: exact volume and gradient, the paper's nodes, a mesh.",
     "optimise": "Look for the best design by SQP: a volume to match, the smallest reach or others.",
-    "export": "Write the workspace as a mesh, or the mechanism as parts or for simulation.",
+    "sweep": "Measure many designs as a study says, on every core or a cluster; tell the front.",
+    "export": "Write the workspace as a mesh, the mechanism as parts or simulation, or the scene.",
+    "report": "Write a report of a design: drawings, slices, tables, and how to make it again.",
     "screenshot": "Draw a pose into a PNG file.",
 }
 """Each command's name, which is that of its module, and what it does."""

@@ -1,4 +1,4 @@
-"""`explorer export`: the workspace as a mesh, the mechanism for other programs."""
+"""`explorer export`: the workspace as a mesh, the mechanism for other programs and people."""
 
 from __future__ import annotations
 
@@ -10,25 +10,32 @@ from typing import Annotated, Any, Literal
 
 import tyro
 
-from explorer.cli.options import DesignOptions, JsonOptions, OrientationOptions
+from explorer.cli.options import DesignOptions, JsonOptions, PoseOptions
 from explorer.cli.output import write_json, write_lines
 from explorer.cli.values import positive
 from explorer.errors import InputError
 
+What = Literal["workspace", "hull", "mechanism", "simulation", "scene"]
+
 _OF_MESHES = "(workspace and hull; default: a 500th of the reach)"
+# Width over height of the windows in which scenes are opened, about.
+ASPECT = 1.6
 _OF_BODIES = "(mechanism, simulation; default: 1240, printed PLA)"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Export(JsonOptions, OrientationOptions, DesignOptions):
-    """Write the workspace as a mesh, or the mechanism as parts or for simulation.
+class Export(JsonOptions, PoseOptions, DesignOptions):
+    """Write the workspace as a mesh, the mechanism as parts or simulation, or the scene.
 
     Meshes have the coordinates of the base frame in millimetres; GLB is in metres, as it must
     be. The mechanism is its parts, assembled in the home pose; as `stl-zip` each in a file of
     its own. The simulation is an MJCF model in metres: every joint, closed loops, six servos.
+    The scene is one HTML file, to be turned in any browser, in the home pose or that given.
     """
 
-    what: Annotated[Literal["workspace", "hull", "mechanism", "simulation"], tyro.conf.Positional]
+    what: Annotated[
+        Literal["workspace", "hull", "mechanism", "simulation", "scene"], tyro.conf.Positional
+    ]
     """What to write."""
 
     out: Path
@@ -37,7 +44,7 @@ class Export(JsonOptions, OrientationOptions, DesignOptions):
     format: Annotated[
         str | None,
         tyro.conf.arg(
-            metavar="3mf|stl|glb|obj|ply|step|stl-zip|mjcf",
+            metavar="3mf|stl|glb|obj|ply|step|stl-zip|mjcf|html",
             help_behavior_hint="(default: the suffix of the file)",
         ),
     ] = None
@@ -67,7 +74,7 @@ class Export(JsonOptions, OrientationOptions, DesignOptions):
             NoAnswerError: the workspace is empty.
             MissingExtraError: STEP without OpenCASCADE.
         """
-        from explorer.export.files import check_writable
+        from explorer.files import check_writable
 
         file_format = self.format or self.out.suffix.lower().removeprefix(".")
         if not file_format:
@@ -112,7 +119,7 @@ def _mesh(command: Export, file_format: str, check: Callable[[], None]) -> Facts
 
     if command.what == "workspace" and file_format in ("step", "stp"):
         return _step(command, check)
-    command.refuse("density", "masses")
+    command.refuse("density", "masses", "position")
     check_format(file_format)
     check()
     design = command.load()
@@ -129,7 +136,7 @@ def _mesh(command: Export, file_format: str, check: Callable[[], None]) -> Facts
 def _step(command: Export, check: Callable[[], None]) -> Facts:
     from explorer.export.step import check_extra, write_workspace_step
 
-    command.refuse("tolerance", "density", "masses")
+    command.refuse("tolerance", "density", "masses", "position")
     check_extra()
     check()
     design = command.load()
@@ -144,7 +151,7 @@ def _mechanism(command: Export, file_format: str, check: Callable[[], None]) -> 
     from explorer.prototype.assembly import make_prototype
     from explorer.prototype.bill import bill_of_materials
 
-    command.refuse("tolerance", "masses", "quaternion", "yaw_pitch_roll")
+    command.refuse("tolerance", "masses", "position", "quaternion", "yaw_pitch_roll")
     file_format = {"zip": "stl-zip", "stp": "step"}.get(file_format, file_format)
     if file_format == "step":
         from explorer.export.opencascade import occ
@@ -183,7 +190,7 @@ def _simulation(command: Export, file_format: str, check: Callable[[], None]) ->
     from explorer.export.simulation import DENSITY, write_simulation
     from explorer.prototype.chains import BODIES, CHAIN_JOINTS
 
-    command.refuse("tolerance", "quaternion", "yaw_pitch_roll")
+    command.refuse("tolerance", "position", "quaternion", "yaw_pitch_roll")
     if file_format not in ("mjcf", "xml"):
         raise InputError(f"no simulation format {file_format!r}; there is mjcf")
     check()
@@ -197,6 +204,40 @@ def _simulation(command: Export, file_format: str, check: Callable[[], None]) ->
     return {"format": "mjcf", "bodies": list(BODIES[1:]), "joints": [*CHAIN_JOINTS, "platform"]}
 
 
+def _scene(command: Export, file_format: str, check: Callable[[], None]) -> Facts:
+    command.refuse("tolerance", "density", "masses")
+    if file_format not in ("html", "htm"):
+        raise InputError(f"no format {file_format!r} of the scene; there is html")
+    check()
+    design = command.load()
+    pose = command.pose(design)
+    import datetime as dt
+
+    from explorer.app.scene.camera import FIELD_OF_VIEW, framing
+    from explorer.app.scene.placing import Placed
+    from explorer.app.scene_html import Eye, scene_html
+    from explorer.app.server import start
+    from explorer.app.state import Frame
+    from explorer.files import write_whole
+
+    running = start(design, pose, port=0)
+    try:
+        state = running.page.session.state
+        eye = Eye(*framing(Placed(Frame(state)), "isometric", ASPECT), FIELD_OF_VIEW)
+        date = dt.datetime.now().astimezone().date()
+        data = scene_html(running.viser, state, eye, date=date)
+    finally:
+        running.stop()
+    write_whole(command.out, data)
+    return {"format": "html", "bytes": len(data)}
+
+
 _WRITERS: Mapping[str, Callable[[Export, str, Callable[[], None]], Facts]] = MappingProxyType(
-    {"workspace": _mesh, "hull": _mesh, "mechanism": _mechanism, "simulation": _simulation}
+    {
+        "workspace": _mesh,
+        "hull": _mesh,
+        "mechanism": _mechanism,
+        "simulation": _simulation,
+        "scene": _scene,
+    }
 )

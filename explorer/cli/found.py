@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import msgspec
@@ -18,16 +17,6 @@ if TYPE_CHECKING:
     from explorer.optimise.facts import Facts
     from explorer.optimise.findings import Finding
     from explorer.optimise.outcome import Outcome
-
-CALLED: Mapping[str, str] = MappingProxyType(
-    {
-        "match-volume": "F",
-        "smallest-reach": "reach",
-        "largest-volume": "volume",
-        "largest-margin": "worst margin",
-    }
-)
-"""What people call the value of each objective."""
 
 
 def found_design(outcome: Outcome) -> Design:

@@ -12,7 +12,6 @@ import tyro
 from tyro.constructors import PrimitiveConstructorSpec
 
 from explorer.cli.found import (
-    CALLED,
     finding_json,
     findings_table,
     found_design,
@@ -29,6 +28,7 @@ from explorer.design import Design
 from explorer.design_file import encode_design
 from explorer.errors import InputError, NoAnswerError
 from explorer.home import home_pose
+from explorer.optimise.curves import CALLED
 
 if TYPE_CHECKING:
     from explorer.optimise.outcome import Outcome
@@ -153,7 +153,7 @@ class Optimise(JsonOptions, DesignOptions):
         if self.findings:
             self._write_findings()
             return
-        from explorer.export.files import check_writable
+        from explorer.files import check_writable
 
         record = self.record
         if record is None and self.out is not None:
@@ -206,7 +206,7 @@ class Optimise(JsonOptions, DesignOptions):
 
     def _files(self, outcome: Outcome, settings: Settings, record: Path | None) -> list[Path]:
         """Write the files that were asked for, and return which."""
-        from explorer.export.files import write_whole
+        from explorer.files import write_whole
         from explorer.optimise.record import encode_record, record_of
 
         written: list[Path] = []

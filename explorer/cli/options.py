@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Annotated
 
 import msgspec
@@ -11,7 +13,7 @@ import tyro
 from explorer.cli.values import numbers
 from explorer.design import Design
 from explorer.design_file import load_design
-from explorer.errors import InputError
+from explorer.errors import DesignError, ExplorerError, InputError
 from explorer.home import home_pose
 from explorer.pose import Pose, Quadruple, Triple
 
@@ -21,15 +23,35 @@ class DesignOptions:
     """Which design a command is about."""
 
     design: Annotated[str, tyro.conf.arg(metavar="PRESET_OR_FILE")] = "paper-optimal"
-    """A preset (paper-initial, paper-optimal) or a design file (JSON)."""
+    """A preset (paper-initial, paper-optimal), a design file (JSON), or a design that was saved
+    on the page, by its name."""
 
     def load(self) -> Design:
         """Return the design.
 
         Raises:
-            DesignError: no such preset or file, or a file that holds no design.
+            DesignError: no such preset, file or saved design, or a file that holds none.
         """
-        return load_design(self.design)
+        return load(self.design)
+
+
+def load(name: str) -> Design:
+    """Return a preset, the design in a file, or one that was saved on the page.
+
+    Raises:
+        DesignError: there is none of that name, or the file holds no design.
+    """
+    try:
+        return load_design(name)
+    except DesignError:
+        # A file that is there and of no use is what was meant.
+        if Path(name).exists():
+            raise
+        from explorer.app.storage.library import Library
+
+        with contextlib.suppress(ExplorerError):
+            return Library().open(name)
+        raise
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -91,8 +91,8 @@ class Path(JsonOptions, RadiiOptions, DesignOptions):
             NoPathError: there is no path, or none was found in time.
             MissingExtraError: OMPL is not installed.
         """
-        from explorer.export.files import check_writable
         from explorer.export.trajectory import write_trajectory
+        from explorer.files import check_writable
         from explorer.planning import EndError, NoPathError, plan_path
         from explorer.trajectory import trajectory
 

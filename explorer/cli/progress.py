@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from types import TracebackType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 if TYPE_CHECKING:
     from explorer.optimise.outcome import Iterate
@@ -15,26 +15,15 @@ WIDTH = 20
 IN_TERMINAL, ELSEWHERE = 0.05, 1.0
 
 
-class Progress:
-    """A bar that shows the iterates of an optimisation.
+class Meter:
+    """A bar with a line of text beside it."""
 
-    Args:
-        starts: How many starts there are.
-        iterations: The most steps of each.
-        objective: What people call the objective, such as "F".
-    """
-
-    def __init__(self, starts: int, iterations: int, objective: str) -> None:
-        self.starts = starts
-        self.iterations = iterations
-        self.objective = objective
+    def __init__(self) -> None:
         self.is_terminal = sys.stderr.isatty()
-        self._steps = 0
-        self._run: int = 0
         self._shown = 0.0
         self._last = 0
 
-    def __enter__(self) -> Progress:
+    def __enter__(self) -> Self:
         """Begin."""
         return self
 
@@ -45,31 +34,71 @@ class Progress:
         trace: TracebackType | None,
     ) -> None:
         """Leave the line to whatever comes next."""
+        self.clear()
+
+    def clear(self) -> None:
+        """Leave the line to whatever comes next."""
         if self._last and self.is_terminal:
             sys.stderr.write("\r" + " " * self._last + "\r")
             sys.stderr.flush()
+        self._last = 0
 
-    def see(self, iterate: Iterate) -> None:
-        """Show an iterate, unless the last one was shown a moment ago."""
-        if iterate.run != self._run:
-            self._run, self._steps = iterate.run, 0
-        self._steps += 1
-        now = time.monotonic()
-        if now - self._shown < (IN_TERMINAL if self.is_terminal else ELSEWHERE):
+    @property
+    def is_due(self) -> bool:
+        """Whether the last line was shown more than a moment ago."""
+        pause = IN_TERMINAL if self.is_terminal else ELSEWHERE
+        return time.monotonic() - self._shown >= pause
+
+    def show(self, text: str, share: float) -> None:
+        """Show a line, unless the last one was shown a moment ago.
+
+        Args:
+            text: What to say.
+            share: How much is done, from 0 to 1.
+        """
+        if not self.is_due:
             return
-        self._shown = now
-        share = (iterate.run + min(1.0, self._steps / self.iterations)) / self.starts
+        self._shown = time.monotonic()
         full = round(WIDTH * share)
-        text = (
-            f"[{'#' * full}{'.' * (WIDTH - full)}] start {iterate.run + 1} of {self.starts}, "
-            f"{iterate.phase} {self._steps}: {self.objective} {iterate.objective:.6g}, "
-            f"volume {iterate.volume:.6g}"
-        )
-        if iterate.spare < -1e-8:
-            text += f", missed: {iterate.worst}"
+        text = f"[{'#' * full}{'.' * (WIDTH - full)}] {text}"
         if self.is_terminal:
             sys.stderr.write("\r" + text.ljust(self._last)[:200])
             self._last = len(text)
         else:
             sys.stderr.write(text + "\n")
         sys.stderr.flush()
+
+
+class Progress(Meter):
+    """A bar that shows the iterates of an optimisation.
+
+    Args:
+        starts: How many starts there are.
+        iterations: The most steps of each.
+        objective: What people call the objective, such as "F".
+    """
+
+    def __init__(self, starts: int, iterations: int, objective: str) -> None:
+        super().__init__()
+        self.starts = starts
+        self.iterations = iterations
+        self.objective = objective
+        self._steps = 0
+        self._run: int = 0
+
+    def see(self, iterate: Iterate) -> None:
+        """Show an iterate, unless the last one was shown a moment ago."""
+        if iterate.run != self._run:
+            self._run, self._steps = iterate.run, 0
+        self._steps += 1
+        if not self.is_due:
+            return
+        share = (iterate.run + min(1.0, self._steps / self.iterations)) / self.starts
+        text = (
+            f"start {iterate.run + 1} of {self.starts}, "
+            f"{iterate.phase} {self._steps}: {self.objective} {iterate.objective:.6g}, "
+            f"volume {iterate.volume:.6g}"
+        )
+        if iterate.spare < -1e-8:
+            text += f", missed: {iterate.worst}"
+        self.show(text, share)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import io
-import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -42,6 +41,10 @@ class Screenshot(JsonOptions, PoseOptions, DesignOptions):
             InputError: a design, pose or file that cannot be used.
             MissingExtraError: what draws the picture is not installed.
         """
+        from explorer.files import check_writable
+
+        if self.out.suffix.lower() != ".png":
+            raise InputError(f"--out must end in .png; got {str(self.out)!r}")
         check_writable(self.out)
         design = self.load()
         pose = self.pose(design)
@@ -54,24 +57,3 @@ class Screenshot(JsonOptions, PoseOptions, DesignOptions):
             write_json({"file": str(self.out), "size": list(self.size)})
         else:
             write_lines(str(self.out))
-
-
-def check_writable(path: Path) -> None:
-    """Find out before the work whether the picture can be written.
-
-    Raises:
-        InputError: another suffix than .png, no such folder, or one that takes no file.
-    """
-    if path.suffix.lower() != ".png":
-        raise InputError(f"--out must end in .png; got {str(path)!r}")
-    if path.is_dir():
-        raise InputError(f"--out must be a file; {str(path)!r} is a folder")
-    folder = path.parent
-    if not folder.is_dir():
-        raise InputError(f"--out: there is no folder {str(folder)!r}; make it first")
-    try:
-        # Permission bits tell less than trying: superusers and read-only disks.
-        with path.open("r+b") if path.exists() else tempfile.TemporaryFile(dir=folder):
-            pass
-    except OSError as error:
-        raise InputError(f"--out: cannot write {str(path)!r}: {error.strerror}") from None

@@ -21,7 +21,6 @@ import numpy as np
 
 from explorer.arrays import FloatArray
 from explorer.errors import ExplorerError, InputError
-from explorer.export.files import write_whole
 from explorer.export.mesh import (
     APPLICATION,
     LARGEST_3MF,
@@ -32,6 +31,7 @@ from explorer.export.mesh import (
     mesh_bytes,
     pack_glb,
 )
+from explorer.files import write_whole
 from explorer.home import home_pose
 from explorer.pose import quaternion_from_rotation
 from explorer.prototype.assembly import Prototype

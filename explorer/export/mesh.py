@@ -23,7 +23,7 @@ from explorer import __version__
 from explorer.arrays import FloatArray
 from explorer.design import Design
 from explorer.errors import ExplorerError, InputError, NoAnswerError
-from explorer.export.files import write_whole
+from explorer.files import write_whole
 from explorer.solid import Solid
 
 Rgb: TypeAlias = tuple[int, int, int]

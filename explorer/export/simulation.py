@@ -22,7 +22,7 @@ from explorer import __version__
 from explorer.arrays import FloatArray
 from explorer.design import JOINTS, Design
 from explorer.errors import InputError
-from explorer.export.files import write_whole
+from explorer.files import write_whole
 from explorer.home import home_pose
 from explorer.pose import quaternion_from_rotation
 from explorer.prototype.chains import (

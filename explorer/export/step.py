@@ -22,7 +22,6 @@ from explorer.arrays import FloatArray
 from explorer.constraints import Cone, Constraint, HalfSpace, Round, constraints
 from explorer.design import Design
 from explorer.errors import ExplorerError, InputError, NoAnswerError
-from explorer.export.files import write_whole
 from explorer.export.mesh import colour_of
 from explorer.export.opencascade import (
     Document,
@@ -33,6 +32,7 @@ from explorer.export.opencascade import (
     point,
     volume_of,
 )
+from explorer.files import write_whole
 from explorer.pose import checked_rotation
 from explorer.region import Region, region_of
 from explorer.workspace import bounds, home_rotation, workspace_volume

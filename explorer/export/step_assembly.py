@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from explorer.export.assembly import COLOURS, groups_of
-from explorer.export.files import write_whole
 from explorer.export.opencascade import Document, ExactKernel, ExactShape, occ, placed
+from explorer.files import write_whole
 from explorer.home import home_pose
 from explorer.prototype.chains import BODIES, Chains
 from explorer.prototype.forms import forms_of

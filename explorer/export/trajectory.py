@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from explorer.design import JOINTS
-from explorer.export.files import write_whole
+from explorer.files import write_whole
 from explorer.trajectory import Trajectory
 
 COLUMNS = ("time_s", *JOINTS, "x", "y", "z", "qw", "qx", "qy", "qz")

@@ -18,6 +18,9 @@ from explorer.pose import yaw_pitch_roll_from_rotation
 from explorer.singularity import margins
 from explorer.workspace import workspace_nodes, workspace_volume
 
+# To which the least clearance is certain, as a share of the reach.
+CERTAIN = 1e-3
+
 
 @dataclass(frozen=True)
 class Facts:
@@ -65,26 +68,54 @@ def facts_of(
         step: Of the paper's nodes; that of the design if None.
     """
     rotation = home_pose(design).rotation
-    least = MARGIN_OF_CLEARANCE * design.reach if clearance_margin is None else clearance_margin
+    least = clearance_margin_of(design) if clearance_margin is None else clearance_margin
     nodes = workspace_nodes(design, rotation, step)
-    own = design.limits.margin or 0.0
-    limits = msgspec.structs.replace(design.limits, margin=max(own, least))
-    clear = least_clearances(
-        msgspec.structs.replace(design, limits=limits), rotation, 1e-3 * design.reach
-    )
-    pair = int(clear.clearance.argmin())
-    is_known = bool(np.isfinite(clear.clearance[pair]))
+    clearance, nearest = clearance_beyond(design, least)
     return Facts(
         design=design,
         yaw=float(yaw_pitch_roll_from_rotation(rotation)[0]),
-        reach=max(design.reach, longest_length(design)),
+        reach=reach_of(design),
         volume=workspace_volume(design, rotation).volume,
         node_count=nodes.count,
         node_volume=nodes.volume,
         worst_margin=None
         if box is None
         else float(np.abs(margins(corners_of(box), rotation)).min()),
-        clearance=float(clear.clearance[pair]) if is_known else None,
+        clearance=clearance,
         clearance_margin=least,
-        nearest=PAIRS[pair] if is_known else None,
+        nearest=nearest,
     )
+
+
+def reach_of(design: Design) -> float:
+    """Return |a3|, or the largest maximum length where that is larger, in design units."""
+    return max(design.reach, longest_length(design))
+
+
+def clearance_margin_of(design: Design) -> float:
+    """Return from which margin on clearances count by default, in design units."""
+    return MARGIN_OF_CLEARANCE * design.reach
+
+
+def clearance_beyond(
+    design: Design, margin: float
+) -> tuple[float, tuple[int, int]] | tuple[None, None]:
+    """Return the least clearance where every margin is at least some length, and its legs.
+
+    Over the workspace at the home's orientation, certain to a thousandth of the reach; None
+    if it has no such position.
+
+    Args:
+        design: The design; nearer to a singularity its legs may have to meet.
+        margin: In design units.
+    """
+    own = design.limits.margin or 0.0
+    limits = msgspec.structs.replace(design.limits, margin=max(own, margin))
+    found = least_clearances(
+        msgspec.structs.replace(design, limits=limits),
+        home_pose(design).rotation,
+        CERTAIN * design.reach,
+        only_least=True,
+    ).clearance
+    pair = int(found.argmin())
+    return (float(found[pair]), PAIRS[pair]) if np.isfinite(found[pair]) else (None, None)

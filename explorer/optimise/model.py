@@ -135,8 +135,8 @@ class Model:
         state = State(self.problem, u[: self.count])
         if not np.isfinite(u).all():
             raise DesignError("the solver asked for a design that is not finite")
-        values: list[FloatArray] = []
-        gradients: list[FloatArray] = []
+        # A problem may demand nothing.
+        values, gradients = [np.zeros(0)], [np.zeros((0, len(u)))]
         for demand in self.demands:
             value, gradient = demand.measure(state)
             if self.raises_worst:

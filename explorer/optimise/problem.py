@@ -166,31 +166,8 @@ class Problem(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         Raises:
             DesignError: the values make a degenerate design.
         """
-        given = dict(zip(self.names, values, strict=True))
-        start = self.start
-        own = zip(VARIABLES, start.variables, strict=True)
-        design = start.with_variables([given.get(name, value) for name, value in own])
-        if YAW in given:
-            home = home_pose(start)
-            _, pitch, roll = yaw_pitch_roll_from_rotation(home.rotation).tolist()
-            home = Pose.of_yaw_pitch_roll(home.position, (given[YAW], pitch, roll))
-            design = msgspec.structs.replace(design, home=home)
-        limits = design.limits
-        if REACH in given:
-            ranges = {name: (getattr(limits, name)[0], given[REACH]) for name in LENGTHS}
-            limits = _with_lengths(limits, ranges)
-            design = msgspec.structs.replace(design, limits=limits)
-        ratio = self.demands.stroke_ratio
-        if ratio is not None:
-            ranges = {
-                name: (
-                    max(getattr(limits, name)[0], design.length_range(name)[1] / ratio),
-                    getattr(limits, name)[1],
-                )
-                for name in LENGTHS
-            }
-            design = msgspec.structs.replace(design, limits=_with_lengths(limits, ranges))
-        return design
+        design = varied(self.start, dict(zip(self.names, values, strict=True)))
+        return with_strokes(design, self.demands.stroke_ratio)
 
     @property
     def wanted_volume(self) -> float:
@@ -215,6 +192,49 @@ class Problem(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         x, y, z = (given.get(name, 0.0) for name in SHIFTS)
         (ax, ay, az), (bx, by, bz) = self.demands.required_box
         return (ax + x, ay + y, az + z), (bx + x, by + y, bz + z)
+
+
+def varied(design: Design, values: Mapping[str, float]) -> Design:
+    """Return a design with other values of some variables, see `start_value`.
+
+    Args:
+        design: The design.
+        values: By name, of `VARIABLES`, `YAW` and `REACH`; other names change nothing.
+
+    Raises:
+        DesignError: the values make a degenerate design.
+    """
+    own = zip(VARIABLES, design.variables, strict=True)
+    found = design.with_variables([values.get(name, value) for name, value in own])
+    if YAW in values:
+        home = home_pose(design)
+        _, pitch, roll = yaw_pitch_roll_from_rotation(home.rotation).tolist()
+        home = Pose.of_yaw_pitch_roll(home.position, (values[YAW], pitch, roll))
+        found = msgspec.structs.replace(found, home=home)
+    if REACH in values:
+        ranges = {name: (getattr(found.limits, name)[0], values[REACH]) for name in LENGTHS}
+        found = msgspec.structs.replace(found, limits=_with_lengths(found.limits, ranges))
+    return found
+
+
+def with_strokes(design: Design, ratio: float | None) -> Design:
+    """Return a design whose minimum lengths allow no more than a ratio of strokes.
+
+    Args:
+        design: The design.
+        ratio: Longest over shortest length of each actuator; None for no demand.
+    """
+    if ratio is None:
+        return design
+    limits = design.limits
+    ranges = {
+        name: (
+            max(getattr(limits, name)[0], design.length_range(name)[1] / ratio),
+            getattr(limits, name)[1],
+        )
+        for name in LENGTHS
+    }
+    return msgspec.structs.replace(design, limits=_with_lengths(limits, ranges))
 
 
 DISTANCES = ("a3y", "b1y", "b3 − b2")

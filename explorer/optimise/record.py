@@ -6,8 +6,6 @@ the libraries that found it.
 
 from __future__ import annotations
 
-import platform
-from importlib import metadata
 from pathlib import Path
 from typing import Literal
 
@@ -17,11 +15,10 @@ from explorer.design import Design
 from explorer.errors import InputError
 from explorer.optimise.outcome import Iterate, Outcome, Phase, Status
 from explorer.optimise.problem import Problem
+from explorer.versions import versions
 
 # No honest record comes near this size, in bytes.
 LARGEST_FILE = 200_000_000
-
-LIBRARIES = ("flagged-explorer", "numpy", "scipy", "numba")
 
 
 class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -104,9 +101,9 @@ def record_of(outcome: Outcome, settings: Settings) -> Record:
             )
             for run in outcome.runs
         ),
-        history=tuple(_step(each) for each in outcome.history),
+        history=tuple(step_of(each) for each in outcome.history),
         seconds=outcome.seconds,
-        versions={"python": platform.python_version(), **_versions()},
+        versions=versions(),
     )
 
 
@@ -150,18 +147,20 @@ def load_record(path: Path) -> Record:
     return decode_record(data, str(path))
 
 
-def _step(iterate: Iterate) -> Step:
+def step_of(iterate: Iterate) -> Step:
+    """Return an iterate without its design."""
     return Step(**{name: getattr(iterate, name) for name in Step.__struct_fields__})
 
 
-def _versions() -> dict[str, str]:
-    found: dict[str, str] = {}
-    for name in LIBRARIES:
-        try:
-            found[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            # A checkout that was never installed has no metadata of its own.
-            from explorer import __version__
+def iterate_of(problem: Problem, step: Step) -> Iterate:
+    """Return an iterate of a problem, with its design.
 
-            found[name] = __version__
-    return found
+    Raises:
+        InputError: its values are not those of a design.
+    """
+    if len(step.values) != len(problem.variables):
+        raise InputError(
+            f"iterate {step.number} must have {len(problem.variables)} values; "
+            f"got {len(step.values)}"
+        )
+    return Iterate(design=problem.design_at(step.values), **msgspec.structs.asdict(step))

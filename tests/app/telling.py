@@ -51,3 +51,8 @@ def die(line: Line) -> None:
     """Tell one number, then die."""
     line.tell(0)
     os._exit(9)
+
+
+def fall() -> None:
+    """Die, telling nothing."""
+    os._exit(9)

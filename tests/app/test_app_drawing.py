@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import itertools
+import re
 
+import msgspec
 import numpy as np
 import pytest
 from hypothesis import given
@@ -12,6 +14,7 @@ from hypothesis import strategies as st
 from explorer.app.bands import COLLIDING, PLAIN
 from explorer.app.colours import FAR, FAR_WARNINGS, SINGULAR, Rgb, proximity_colour
 from explorer.app.controls import Span, decimals
+from explorer.app.panels.html import share
 from explorer.app.panels.move import interval_marks
 from explorer.app.panels.ranges import coordinate_span, length_span, round_up, variable_span
 from explorer.app.panels.singularity import summary
@@ -20,7 +23,7 @@ from explorer.app.scene.placing import Placed, round_step
 from explorer.app.scene.shapes import cylinder, plate, sphere, turned_to
 from explorer.app.state import Frame, opened
 from explorer.arrays import FloatArray, IntArray
-from explorer.design import Design
+from explorer.design import Design, Limits
 from explorer.design_file import PRESETS
 from explorer.pose import Pose
 
@@ -174,3 +177,40 @@ def test_the_summary_names_what_the_pose_breaks_and_how_near_it_is() -> None:
     assert "Singular<" in flat
     outside = summary(Frame(opened(OPTIMAL, Pose.of_yaw_pitch_roll((10, 5, 19), (-73.1, 0, 0)))))
     assert "box z = 19 is above its maximum 18" in outside
+
+
+def of_size(factor: float) -> Design:
+    """Return the optimal design so many times as large, without limits."""
+    a3, b1 = (tuple(factor * x for x in pair) for pair in (OPTIMAL.a3, OPTIMAL.b1))
+    return msgspec.structs.replace(
+        OPTIMAL, a3=a3, b1=b1, b2=factor * OPTIMAL.b2, b3=factor * OPTIMAL.b3, limits=Limits()
+    )
+
+
+@pytest.mark.parametrize(
+    ("factor", "margin"),
+    [
+        (1e-4, ("−0.0009000", "−0.00900 mm")),
+        (1.0, ("−9.000", "−90.0 mm")),
+        (1e4, ("−90000", "−900000 mm")),
+        (1e9, ("−9e+09", "−9e+10 mm")),
+    ],
+)
+def test_margins_are_told_to_the_same_share_of_every_size(
+    factor: float, margin: tuple[str, str]
+) -> None:
+    pose = Pose.of_yaw_pitch_roll((10 * factor, 5 * factor, 9 * factor), (-73.1, 0, 0))
+    text = summary(Frame(opened(of_size(factor), pose)))
+    for words in margin:
+        assert f">{words}<" in text
+    assert "units³" in text
+
+
+def test_what_is_small_is_not_told_as_nothing() -> None:
+    assert share(0.0308) == "0.0308"
+    assert share(1.651e-9) == "1.65e−09"
+    assert share(0.0) == "0.0000"
+    thin = msgspec.structs.replace(OPTIMAL, b3=OPTIMAL.b2 + 1e-6)
+    conditioning = re.search(r"1/cond J</td><td[^>]*>([^<]*)<", summary(Frame(opened(thin))))
+    assert conditioning is not None
+    assert 0.0 < float(conditioning[1].replace("−", "-")) < 1e-6

@@ -11,9 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from explorer.app.actions import (
-    PAUSE_SECONDS,
     Action,
-    ByHand,
     GoHome,
     Open,
     Reset,
@@ -26,6 +24,7 @@ from explorer.app.actions import (
     SetVariable,
     SetView,
 )
+from explorer.app.gestures import PAUSE_SECONDS, ByHand
 from explorer.app.session import Session
 from explorer.app.state import Frame, State, opened
 from explorer.design import JOINTS, Limits

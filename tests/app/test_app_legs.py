@@ -12,9 +12,10 @@ import pytest
 import viser
 from desk import Desk, number, rows_of, thick
 
-from explorer.app.actions import ByHand, SetPose, SetPosition, SetView
+from explorer.app.actions import SetPose, SetPosition, SetView
 from explorer.app.assigning import Update
 from explorer.app.colours import OUTLINE, SWEPT, TUBE
+from explorer.app.gestures import ByHand
 from explorer.app.jobs import Worker
 from explorer.app.panels.design import DesignPanel
 from explorer.app.panels.html import BEYOND, WITHIN

@@ -182,8 +182,8 @@ def test_time_goes_on_while_a_path_is_played_and_stops_at_its_end() -> None:
 
 def test_a_runner_plays_in_real_time_and_rests_when_it_is_paused(bench: Bench) -> None:
     bench.session.do(ChooseModes(1, 5))
-    bench.session.do(WatchModes())
     began = time.monotonic()
+    bench.session.do(WatchModes())
     state = bench.wait(lambda state: state.journey is not None and state.journey.at > 0.3)
     passed = time.monotonic() - began
     assert journey_of(state).at <= passed + 0.1
@@ -295,6 +295,9 @@ def test_planning_is_cancelled_at_once_and_begun_again(bench: Bench) -> None:
     words = plan_words(state)
     assert words is not None
     assert "Planning, for 2 s at most" in words
+    # Else it would not be begun at all, and the process need not end.
+    worker: Any = bench.runner.worker
+    bench.wait(lambda _: worker._doing is not None)
     bench.session.do(CancelPlan())
     state = bench.wait(lambda state: not state.paths.is_planning)
     assert bench.runner.worker.wait_until_idle(10.0)

@@ -163,7 +163,7 @@ def test_meshes_are_assigned_only_when_the_design_has_changed(
     def meshes_assigned(state: State) -> int:
         feed.follow(Frame(state))
         updates = scene.updates(Placed(Frame(state), None, feed.parts))
-        return assigner.assign(u for u in updates if u[1] in ("vertices", "faces"))
+        return len(assigner.assign(u for u in updates if u[1] in ("vertices", "faces")))
 
     assert meshes_assigned(shown()) == 2 * PARTS
     for state in (*states(3), shown(exploded=0.5), shown(density=7850.0)):

@@ -14,6 +14,7 @@ import viser
 from desk import Desk, number, rows_of, thick
 from hypothesis import given
 from hypothesis import strategies as st
+from PIL import Image
 
 from explorer.app import tasks
 from explorer.app.actions import GoHome, SetLimits, SetPosition, SetView
@@ -228,6 +229,25 @@ def test_a_cut_takes_one_side_and_maps_what_is_reached(axis: int) -> None:
     assert clearance[kept].mean() > 0.0 > clearance[blocked].mean()
 
 
+def test_the_map_lets_the_page_through_where_nothing_is(
+    server: viser.ViserServer, desk: Desk
+) -> None:
+    state = shown(THICK, cut="z", level=0.3)
+    panel = WorkspacePanel(server.gui, desk.session, _no_export)
+    feed, _ = feed_of(state)
+    assert feed.drawing is not None
+    drawn = feed.drawing.slice_map
+    assert drawn is not None
+    for handle, name, value in panel.updates(Frame(state), feed):
+        setattr(handle, name, value)
+    assert panel._map.visible  # pyright: ignore[reportPrivateUsage]
+    data = panel._map._data  # pyright: ignore[reportPrivateUsage]
+    assert data is not None
+    sent = np.asarray(Image.open(io.BytesIO(data)))
+    np.testing.assert_array_equal(sent[::3, ::3], drawn.pixels)
+    assert sent[..., 3].min() == 0
+
+
 def test_cutting_and_colouring_reach_for_nothing_anew(monkeypatch: pytest.MonkeyPatch) -> None:
     calls: list[float] = []
 
@@ -297,8 +317,8 @@ def test_the_columns_of_a_chart_are_sent_once(server: viser.ViserServer) -> None
     assigner = Assigner(server)
     for y, differing in ((1.0, 1), (1.0, 0), (2.0, 1)):
         columns = (np.arange(3.0), np.full(3, y))
-        assert assigner.assign([(chart, "data", columns)]) == differing
-    assert assigner.assign([(chart, "data", (np.arange(3.0),))]) == 1
+        assert len(assigner.assign([(chart, "data", columns)])) == differing
+    assert len(assigner.assign([(chart, "data", (np.arange(3.0),))])) == 1
 
 
 # The numbers

@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from explorer.app.jobs import Worker
+from explorer.app.jobs import RESTARTED, Worker
 
 ROOT = Path(__file__).resolve().parents[2]
 TASKS = "tests.app.telling"
@@ -121,17 +121,36 @@ def test_who_does_not_heed_the_word_is_ended_by_force_and_nobody_complains(
     assert worker.process_id != process
 
 
+def test_what_does_not_tell_is_not_begun_once_it_is_cancelled(
+    ear: Ear, worker: Worker, reports: list[str]
+) -> None:
+    ear.ask("count_until_cut")
+    assert ear.next() == ("told", 0)
+    first, process = ear.number, worker.process_id
+    ear.ask("say", "nobody asks any more", tells=False)
+    # Its turn comes when the first one is done.
+    worker.cancel(ear.number, NEVER)
+    worker.cancel(first, NEVER)
+    assert ear.all()[1][0] == "done"
+    assert ear.next() == ("failed", "it died")
+    ear.ask("say", "again", tells=False)
+    assert ear.next() == ("done", "again")
+    assert worker.process_id == process
+    assert not reports
+
+
 def test_force_does_not_hit_the_next_task(ear: Ear, worker: Worker) -> None:
     ear.ask("count_until_cut")
     ear.next()
-    worker.cancel(ear.number, 0.2)
+    worker.cancel(ear.number, NEVER)
+    held: Any = worker
+    deadline: threading.Timer = held._deadline
     assert ear.all()[1][0] == "done"
     process = worker.process_id
     ear.ask("count_until_cut")
-    # Until the deadline of the first one has passed.
-    for each in threading.enumerate():
-        if isinstance(each, threading.Timer):
-            each.join()
+    ear.next()
+    # As if the deadline of the first one passed only now.
+    deadline.function(*deadline.args)
     worker.cancel(ear.number, NEVER)
     assert ear.all()[1][0] == "done"
     assert worker.process_id == process
@@ -150,10 +169,21 @@ def test_a_refusal_and_a_death_after_some_words(
     assert ear.all() == ([0, 1, 2], ("done", 3))
 
 
+def test_work_that_kills_its_process_is_tried_twice(
+    ear: Ear, worker: Worker, reports: list[str]
+) -> None:
+    ear.ask("fall", tells=False)
+    assert ear.next() == ("failed", "it died")
+    assert reports == [RESTARTED, "it died"]
+    ear.ask("say", "again", tells=False)
+    assert ear.next() == ("done", "again")
+    assert len(reports) == 2
+
+
 def test_no_process_is_left_when_the_parent_is_gone() -> None:
     code = f"""
 import os, sys
-from explorer.app.jobs import Worker
+from explorer.app.jobs import RESTARTED, Worker
 worker = Worker(print, tasks={TASKS!r})
 def told(value):
     if value == 5:

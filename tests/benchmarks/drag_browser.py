@@ -14,14 +14,13 @@ from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from benchmarks.ready_page import ready_page
 from benchmarks.socket_client import EVENTS_PER_SECOND
 from benchmarks.sweeps import sweep
 from benchmarks.table import Row, seconds
-from explorer import PRESETS
 from explorer.app.chromium import find_chromium
-from explorer.app.screenshot import CHROMIUM_FLAGS
-from explorer.app.server import Running, start
-from explorer.compiled import warm
+from explorer.app.screenshot import CHROMIUM_FLAGS, SWIFTSHADER
+from explorer.app.server import Running
 
 if TYPE_CHECKING:
     from playwright.async_api import Browser, Page
@@ -94,8 +93,7 @@ def run() -> Iterator[Row]:
     if chromium is None:
         yield Row(TITLE, "not measured: no Chromium", "150 ms")
         return
-    running = start(PRESETS["paper-optimal"], port=0)
-    warm()
+    running = ready_page()
     try:
         drags = asyncio.run(_drags(running, chromium))
     finally:
@@ -132,7 +130,7 @@ async def _browser(chromium: str) -> AsyncGenerator[Browser]:
 
     async with async_playwright() as playwright:
         browser = await playwright.chromium.launch(
-            executable_path=chromium, args=list(CHROMIUM_FLAGS)
+            executable_path=chromium, args=[*CHROMIUM_FLAGS, *SWIFTSHADER]
         )
         try:
             yield browser

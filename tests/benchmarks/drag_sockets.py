@@ -8,13 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from benchmarks.ready_page import ready_page
 from benchmarks.socket_client import EVENTS_PER_SECOND, SliderDrag, dragging_process
 from benchmarks.sweeps import sweep
 from benchmarks.table import Row, seconds
-from explorer import PRESETS
 from explorer.app.scene.placing import scene_scale
-from explorer.app.server import start
-from explorer.compiled import warm
 
 SECONDS = 20.0
 
@@ -25,8 +23,7 @@ def run() -> Iterator[Row]:
     Raises:
         RuntimeError: a client does not see the last value of the other.
     """
-    running = start(PRESETS["paper-optimal"], port=0)
-    warm()
+    running = ready_page()
     state = running.page.session.state
     scale = scene_scale(state)
     count = int(SECONDS * EVENTS_PER_SECOND)

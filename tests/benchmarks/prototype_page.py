@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from benchmarks.ready_page import ready_page
 from benchmarks.samples import DESIGN
 from benchmarks.table import Row, seconds
 from benchmarks.timing import Spread
@@ -16,17 +17,15 @@ from explorer.app.assigning import Assigner
 from explorer.app.prototype_view import PrototypeView
 from explorer.app.scene.placing import Placed
 from explorer.app.scene.prototype import PrototypeScene
-from explorer.app.server import Running, start
+from explorer.app.server import Running
 from explorer.app.state import Frame, State
-from explorer.compiled import warm
 
 CHANGES, MOVES, WARM_UP = 60, 300, 10
 
 
 def run() -> Iterator[Row]:
     """Yield the rows."""
-    warm()
-    running = start(DESIGN, port=0)
+    running = ready_page(DESIGN)
     try:
         session = running.page.session
         view = replace(session.state.view, prototype=PrototypeView(shown=True))

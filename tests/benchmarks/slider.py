@@ -15,18 +15,18 @@ from dataclasses import dataclass
 from itertools import chain
 from typing import Any
 
+from benchmarks.ready_page import ready_page
 from benchmarks.socket_client import Drag, HandleDrag, SliderDrag, dragging_process
 from benchmarks.sweeps import sweep
 from benchmarks.table import Row, seconds
 from benchmarks.timing import Spread
-from explorer import PRESETS, Pose
+from explorer import Pose
 from explorer.app.actions import Reset
 from explorer.app.assigning import Assigner, Update
 from explorer.app.panels.move import JOINT_LABELS
 from explorer.app.scene.placing import scene_scale
-from explorer.app.server import Running, start
+from explorer.app.server import Running
 from explorer.app.state import State
-from explorer.compiled import warm
 
 ROUNDS, EVENTS, WARM_UP_EVENTS = 3, 100, 20
 
@@ -131,10 +131,12 @@ def timed(running: Running, stopwatch: Stopwatch) -> Generator[None]:
         stopwatch.arrive(message)
         return handle(client_id, message)
 
-    def assigning(self: Assigner, updates: Iterable[Update]) -> int:
-        count = assign(self, updates)
+    def assigning(
+        self: Assigner, updates: Iterable[Update], *, since: float | None = None
+    ) -> list[Update]:
+        assigned = assign(self, updates, since=since)
         stopwatch.drawn(running.page.session.state)
-        return count
+        return assigned
 
     server._handle_incoming_message = arriving
     Assigner.assign = assigning
@@ -174,8 +176,7 @@ def run() -> Iterator[Row]:
 
 def measure() -> dict[str, list[Stopwatch]]:
     """Return the stopwatch of every round, by kind."""
-    running = start(PRESETS["paper-optimal"], port=0)
-    warm()
+    running = ready_page()
     found: dict[str, list[Stopwatch]] = {kind.name: [] for kind in KINDS}
     session = running.page.session
     try:

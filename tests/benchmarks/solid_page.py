@@ -8,21 +8,19 @@ from dataclasses import replace
 
 import numpy as np
 
+from benchmarks.ready_page import ready_page
 from benchmarks.samples import DESIGN
 from benchmarks.table import Row, seconds
 from benchmarks.timing import Spread
 from explorer.app.actions import SetVariable, SetView
-from explorer.app.server import start
 from explorer.app.state import State
-from explorer.compiled import warm
 
 CHANGES, WARM_UP = 120, 15
 
 
 def run() -> Iterator[Row]:
     """Yield the rows."""
-    warm()
-    running = start(DESIGN, port=0)
+    running = ready_page(DESIGN)
     page = running.page
     try:
         session = page.session

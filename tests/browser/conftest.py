@@ -5,20 +5,23 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 import pytest
-from playwright.sync_api import Browser
+from graphics import quick_browser
+from playwright.sync_api import Browser, expect
 from tab import Tab
 
-from explorer.app.screenshot import headless_browser
+from explorer.app.screenshot import PATIENCE_SECONDS
 from explorer.app.server import Running, start
 from explorer.design_file import PRESETS
 
 OpenTab = Callable[[], Tab]
 
+expect.set_options(timeout=1000 * PATIENCE_SECONDS)
+
 
 @pytest.fixture(scope="session")
 def browser() -> Iterator[Browser]:
     """A Chromium; without one every test that needs it fails and says how to get one."""
-    with headless_browser() as browser:
+    with quick_browser() as browser:
         yield browser
 
 

@@ -78,11 +78,12 @@ def blocks(picture: FloatArray, side: int) -> FloatArray:
     return cut.reshape(rows, side, columns, side, n).mean(axis=(1, 3))
 
 
-EVERYWHERE = slice(None)
+Part = tuple[slice, slice]
+EVERYWHERE = (slice(None), slice(None))
 
 
 def assert_alike(
-    name: str, expected: bytes, got: bytes, limit: Likeness, columns: slice = EVERYWHERE
+    name: str, expected: bytes, got: bytes, limit: Likeness, part: Part = EVERYWHERE
 ) -> None:
     """Fail if the pictures differ by more than the limit, and keep both and the difference.
 
@@ -91,11 +92,11 @@ def assert_alike(
         expected: A PNG.
         got: Another.
         limit: How far they may be apart.
-        columns: Those that count.
+        part: The rows and columns that count.
     """
     a, b = decoded(expected), decoded(got)
     assert a.shape == b.shape, f"{name}: expected {a.shape[1::-1]} pixels, got {b.shape[1::-1]}"
-    measured = likeness(a[:, columns], b[:, columns])
+    measured = likeness(a[part], b[part])
     if measured.is_within(limit):
         return
     FAILED.mkdir(exist_ok=True)

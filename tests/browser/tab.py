@@ -13,7 +13,7 @@ from playwright.sync_api import Browser, ConsoleMessage, Locator
 
 from explorer.app.scene.camera import ViewName, framing
 from explorer.app.scene.placing import Placed
-from explorer.app.screenshot import PATIENCE_SECONDS, SCENE_CANVAS, settle
+from explorer.app.screenshot import PATIENCE_SECONDS, SCENE_CANVAS, evenly_drawn, settle
 from explorer.app.server import Running
 from explorer.app.state import Frame, State
 from explorer.arrays import FloatArray
@@ -39,13 +39,25 @@ class Tab:
     Args:
         browser: In which it is opened.
         running: The explorer.
+        size: Of its window, in pixels.
+        dark: Whether its user prefers dark pages.
     """
 
-    def __init__(self, browser: Browser, running: Running) -> None:
+    def __init__(
+        self,
+        browser: Browser,
+        running: Running,
+        *,
+        size: tuple[int, int] = SIZE,
+        dark: bool = False,
+    ) -> None:
         self.running = running
         self.requests: list[str] = []
         self._complaints: list[str] = []
-        self._context = browser.new_context(viewport={"width": SIZE[0], "height": SIZE[1]})
+        self._context = browser.new_context(
+            viewport={"width": size[0], "height": size[1]},
+            color_scheme="dark" if dark else "light",
+        )
         self._context.set_default_timeout(1000 * PATIENCE_SECONDS)
         self._context.on("console", self._said)
         self._context.on("weberror", lambda error: self._complaints.append(str(error.error)))
@@ -53,7 +65,7 @@ class Tab:
         self._context.on("requestfailed", lambda request: self._complaints.append(request.url))
         self.page = self._context.new_page()
         known = set(running.viser.get_clients())
-        self.page.goto(running.url)
+        self.page.goto(evenly_drawn(running))
         self._arrive(known)
 
     def close(self) -> None:
@@ -156,16 +168,16 @@ class Tab:
 
     def wait_until_shown(self, words: str, value: float, tolerance: float = 1e-9) -> None:
         """Wait until a slider and its field stand at a value."""
+        self.wait_for(lambda: self.stands(words, value, tolerance), f"{words} at {value}")
 
-        def stands() -> bool:
-            text = self.field(words).input_value()
-            digits = len(text.partition(".")[2])
-            return (
-                abs(self.shown(words) - value) <= tolerance
-                and abs(float(text) - value) <= tolerance + 0.5001 * 10.0**-digits
-            )
-
-        self.wait_for(stands, f"{words} at {value}")
+    def stands(self, words: str, value: float, tolerance: float = 1e-9) -> bool:
+        """Whether a slider and its field stand at a value."""
+        text = self.field(words).input_value()
+        digits = len(text.partition(".")[2])
+        return (
+            abs(self.shown(words) - value) <= tolerance
+            and abs(float(text) - value) <= tolerance + 0.5001 * 10.0**-digits
+        )
 
     def look_from(self, view: ViewName) -> None:
         """Push the button of a view and wait until the camera stands where it should."""

@@ -6,6 +6,7 @@ from conftest import OpenTab
 from playwright.sync_api import expect
 
 from explorer.design_file import PRESETS, decode_design
+from explorer.optimise.record import decode_record
 from explorer.workspace import workspace_volume
 
 OPTIMAL = PRESETS["paper-optimal"]
@@ -36,11 +37,17 @@ def test_one_press_finds_a_design_that_is_seen_in_every_tab_and_accepted(
             expect(each.page.get_by_role("cell", name=text, exact=True)).to_be_visible()
 
     with tab.page.expect_download() as hull:
-        tab.push("Export hull")
+        tab.push("Hull")
     assert hull.value.suggested_filename == "paper-optimal-optimised-hull.3mf"
     with tab.page.expect_download() as saved:
-        tab.push("Save design")
+        tab.push("Design")
     assert decode_design(saved.value.path().read_bytes(), "saved") == found
+
+    with tab.page.expect_download() as search:
+        tab.push("Search")
+    assert search.value.suggested_filename == "paper-optimal-optimised.record.json"
+    record = decode_record(search.value.path().read_bytes(), "search")
+    assert record.design.variables == found.variables
 
     other.push("Accept")
     for each in (tab, other):

@@ -10,21 +10,23 @@ import sys
 import threading
 import time
 import urllib.request
-from collections.abc import Iterator
+from collections.abc import Callable, Generator, Iterator
+from contextlib import closing, contextmanager
+from typing import NoReturn
 
 import msgspec
 import pytest
 import viser
-from websockets.sync.client import connect
-from websockets.typing import Subprotocol
+from client import PROTOCOL, opened
 
 from explorer.app import server as server_module
 from explorer.app.server import Running, start
-from explorer.app.viser_gaps import start_viser
+from explorer.app.viser_gaps import Serve, start_viser
 from explorer.design_file import PRESETS
 from explorer.errors import ServerError
 
 DESIGN = PRESETS["paper-optimal"]
+DESIGNED = ("--design", DESIGN.name)
 
 
 @pytest.fixture
@@ -62,8 +64,10 @@ def test_a_port_that_is_taken_in_between_leaves_no_server(
 ) -> None:
     made: list[viser.ViserServer] = []
 
-    def recorded(host: str, port: int) -> viser.ViserServer:
-        made.append(start_viser(host, port))
+    def recorded(
+        host: str, port: int, guarded: Callable[[Serve], Serve] | None
+    ) -> viser.ViserServer:
+        made.append(start_viser(host, port, guarded))
         return made[-1]
 
     def found_free(host: str, port: int) -> None:
@@ -110,11 +114,10 @@ def test_told_to_listen_to_all_it_does() -> None:
         running.stop()
 
 
-def ask_for_tunnel(port: int) -> None:
+def ask_for_tunnel(url: str) -> None:
     """Send what viser's page sends when somebody pushes its share button."""
-    protocol = Subprotocol(f"viser-v{viser.__version__}")
-    with connect(f"ws://127.0.0.1:{port}", subprotocols=[protocol], max_size=None) as connection:
-        assert connection.subprotocol == protocol
+    with closing(opened(url)) as connection:
+        assert connection.subprotocol == PROTOCOL
         connection.send(msgspec.msgpack.encode({"type": "ShareUrlRequest"}))
 
 
@@ -124,31 +127,39 @@ def test_a_request_for_a_public_tunnel_opens_none(
 ) -> None:
     asked = threading.Event()
 
-    def request(self: viser.ViserServer) -> None:
+    def tunnel(*_: object) -> NoReturn:
         asked.set()
+        raise OSError("no network")
 
-    monkeypatch.setattr(viser.ViserServer, "request_share_url", request)
+    monkeypatch.setattr("viser._viser.ViserTunnel", tunnel)
     if is_ours:
         running = start(DESIGN, port=0)
-        port, stop = running.viser.get_port(), running.stop
+        url, stop = running.url, running.stop
     else:
         # That the request is one: a bare viser server does what it says.
         bare = start_viser("127.0.0.1", 0)
-        port, stop = bare.get_port(), bare.stop
+        url, stop = f"http://127.0.0.1:{bare.get_port()}", bare.stop
     try:
-        ask_for_tunnel(port)
+        ask_for_tunnel(url)
         assert asked.wait(1.0 if is_ours else 30.0) is not is_ours
     finally:
         stop()
 
 
-def serve(*argv: str) -> subprocess.Popen[str]:
-    return subprocess.Popen(
-        [sys.executable, "-m", "explorer", "serve", "--no-open", "--port", "0", *argv],
+@contextmanager
+def serve(*argv: str) -> Generator[subprocess.Popen[str]]:
+    """Run the command, and in the end make sure that it is gone."""
+    with subprocess.Popen(
+        # A design, since the session of another test would be told to go on.
+        [sys.executable, "-m", "explorer", "serve", "--no-open", "--port", "0", *DESIGNED, *argv],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         encoding="utf-8",
-    )
+    ) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
 
 
 @pytest.mark.parametrize("host", [None, "0.0.0.0"])
@@ -157,15 +168,18 @@ def test_serve_says_where_it_is_and_stops_quietly_when_interrupted(host: str | N
         assert process.stderr is not None
         said = process.stderr.readline()
         try:
-            address = re.search(r"http://127\.0\.0\.1:\d+", said)
+            address = re.search(r"http://127\.0\.0\.1:\d+(/\?token=(?P<token>[\w-]+))?", said)
             assert address is not None, said
             with urllib.request.urlopen(address[0], timeout=30) as page:
                 assert page.status == 200
                 assert b"<html" in page.read()
+            assert (host is None) == (address["token"] is None)
             if host is not None:
-                warning = process.stderr.readline()
-                assert warning.startswith(f"Listening on {host}: whoever reaches this machine")
-                assert "without a password" in warning
+                token = address["token"]
+                assert len(token) >= 32
+                more = process.stderr.readline()
+                assert more.startswith(f"Listening on {host}: other machines open http://")
+                assert f"?token={token}; who has no token is refused." in more
         finally:
             process.send_signal(signal.SIGINT)
         out, rest = process.communicate(timeout=60)

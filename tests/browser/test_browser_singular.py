@@ -6,12 +6,14 @@ import csv
 from pathlib import Path
 
 import numpy as np
+import pytest
 from playwright.sync_api import expect
 from tab import Tab
 
 from explorer.app.path_actions import StoreEnd
 from explorer.app.state import Frame
 from explorer.arrays import FloatArray
+from explorer.home import home_pose
 from explorer.pose import Pose
 from explorer.singularity import margins
 
@@ -52,7 +54,9 @@ def test_a_jog_moves_one_margin_by_mouse_and_by_keyboard(tab: Tab) -> None:
     tab.wait_until_shown("κ2: about z (°)", 0.0)
 
 
-def test_a_path_is_watched_planned_and_saved(tab: Tab) -> None:
+def test_a_path_is_watched_planned_and_saved(tab: Tab, monkeypatch: pytest.MonkeyPatch) -> None:
+    # So long that even a slow browser can stop it on the way.
+    monkeypatch.setattr("explorer.app.paths.MODES_SECONDS", 60.0)
     tab.turn_to("Paths")
     chart = tab.page.locator(".uplot canvas")
     expect(chart).to_be_hidden()
@@ -67,6 +71,7 @@ def test_a_path_is_watched_planned_and_saved(tab: Tab) -> None:
     x, y, z = tab.state.pose.position
     session.do(StoreEnd("goal"))
     tab.push("Home pose")
+    tab.wait_for(lambda: tab.state.pose == home_pose(tab.state.design), "the home pose")
     tab.push("start")
     expect(tab.page.get_by_text(f"{x:.1f}, {y:.1f}, {z:.1f}").first).to_be_visible()
     home: Pose = tab.state.pose

@@ -226,3 +226,44 @@ def test_without_its_extra_step_is_refused_with_one_line(
         assert 'pip install "flagged-explorer[cad]"' in captured.err
         assert captured.err.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_scene_is_one_page_that_says_what_it_shows(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    out = tmp_path / "scene.html"
+    words = ["--position", "9", "5", "8", "--yaw-pitch-roll", "-60", "10", "0", "--json"]
+    assert run(["export", "scene", "--out", str(out), *words]) == 0
+    captured = capsys.readouterr()
+    assert captured.err == ""
+    page = out.read_bytes()
+    assert json.loads(captured.out) == {
+        "file": str(out),
+        "format": "html",
+        "bytes": len(page),
+    }
+    text = page.decode()
+    assert text.startswith("<!doctype html>")
+    assert "b4 at (9.000, 5.000, 8.000) · yaw −60.00° · pitch 10.00° · roll 0.00°" in text
+    assert "1 unit = 10 mm" in text
+    # Only what is asked for from within the page itself.
+    assert "default-src 'none'" in text
+    assert [each.name for each in tmp_path.iterdir()] == [out.name]
+
+
+@pytest.mark.parametrize(
+    ("argv", "reason"),
+    [
+        (["scene", "--format", "png"], "no format 'png' of the scene; there is html"),
+        (["scene", "--density", "3"], "--density is not for scene"),
+        (["hull", "--format", "stl", "--position", "1", "2", "3"], "--position is not for hull"),
+        (["simulation", "--format", "mjcf", "--position", "1", "2", "3"], "--position is not for"),
+    ],
+)
+def test_what_does_not_belong_to_a_kind_of_file_is_refused(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, argv: list[str], reason: str
+) -> None:
+    out = tmp_path / "out.html"
+    assert run(["export", *argv, "--out", str(out)]) == 2
+    assert reason in capsys.readouterr().err
+    assert not out.exists()

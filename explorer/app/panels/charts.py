@@ -4,7 +4,17 @@ from __future__ import annotations
 
 from viser import uplot
 
+from explorer.app.colours import GHOST, Rgb
+
 FONT = "11px system-ui, sans-serif"
+
+# Of lines and points: seen on white and on dark panels alike, since a chart cannot follow the
+# theme as words do.
+BLUE: Rgb = (46, 116, 208)
+TEAL: Rgb = (30, 150, 135)
+VIOLET: Rgb = (150, 120, 190)
+ORANGE: Rgb = (214, 74, 24)
+NEUTRAL: Rgb = GHOST
 
 
 def axis(label: str, *, label_size: int, size: int, space: int = 30) -> uplot.Axis:

@@ -2,14 +2,26 @@
 
 from __future__ import annotations
 
+import math
 from html import escape
 
 from explorer.app.colours import OUTLINE, css
 
+
+def by_theme(light: str, dark: str) -> str:
+    """Return the colour of CSS that is one on light pages and another on dark ones."""
+    return f"light-dark({light},{dark})"
+
+
+# On light panels and on dark ones, each legible there.
+GREY = ("#5f666e", "#a3a9b1")
+GREEN = ("#1f7a4a", "#5fca90")
+RED = ("#c43408", "#ff8f66")
+
 DIM = "color:var(--mantine-color-dimmed)"
 # What keeps its bounds, and what does not.
-WITHIN = "#2b8a57"
-BEYOND = "#c43408"
+WITHIN = by_theme(*GREEN)
+BEYOND = by_theme(*RED)
 
 
 def alert(title: str, body: str) -> str:
@@ -25,6 +37,33 @@ def alert(title: str, body: str) -> str:
 def signed(value: float, digits: int = 3) -> str:
     """Return a number with a true minus sign."""
     return f"{value:.{digits}f}".replace("-", "−")
+
+
+# Beyond these sizes numbers are told with a power of ten.
+LEAST, MOST = 1e-3, 1e7
+
+
+def decimals_for(size: float, digits: int) -> int:
+    """Return how many decimals give a number of a size so many digits."""
+    return max(0, digits - 1 - math.floor(math.log10(size))) if size > 0.0 else digits - 1
+
+
+def fitted(value: float, size: float, digits: int) -> str:
+    """Return a number with as many decimals as others of a size have, so that it holds still.
+
+    Args:
+        value: The number.
+        size: Of the largest that is to be expected.
+        digits: That one of this size has.
+    """
+    if size != 0.0 and not LEAST <= size < MOST:
+        return scientific(value, digits)
+    return signed(value, decimals_for(size, digits))
+
+
+def share(value: float) -> str:
+    """Return a number from 0 to 1 with four decimals, or more where it would look like 0."""
+    return scientific(value, 3) if 0.0 < value < LEAST else f"{value:.4f}"
 
 
 def scientific(value: float, digits: int = 4) -> str:

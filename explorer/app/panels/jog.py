@@ -28,6 +28,7 @@ FOLDERS = {
     "base": "One margin: on the base's x and z",
 }
 THROUGH = {"platform": "b4", "base": "a1"}
+UNITS = {"translation": "design units", "rotation": "degrees"}
 ARROWS: tuple[Arrows, ...] = get_args(Arrows)
 TURN = Span(-180.0, 180.0, 0.1)
 
@@ -68,8 +69,8 @@ class JogPanel:
             jog_label(motion),
             f"Moves κ{motion.incidence} and no other margin: "
             f"{'moves' if motion.kind == 'translation' else 'turns'} the platform {motion.name} "
-            f"through {THROUGH[motion.frame]}, counted from where this began. The marks are "
-            "singular.",
+            f"through {THROUGH[motion.frame]}, in {UNITS[motion.kind]} from where this began. The "
+            "marks are singular.",
             lambda frame: jog_amount(frame.state, index),
             lambda _, value: Jog(index, value),
             span,
@@ -122,7 +123,7 @@ def travel_table(frame: Frame, frame_name: str) -> str:
     return (
         '<div style="padding:2px 12px 6px;font-size:12px;line-height:1.45;'
         'font-variant-numeric:tabular-nums"><table style="width:100%;border-collapse:collapse">'
-        f'<tr style="{DIM}"><td>from here to singular</td><td style="text-align:right">back</td>'
+        f'<tr style="{DIM}"><td>to singular, units or °</td><td style="text-align:right">back</td>'
         f'<td style="text-align:right">ahead</td></tr>{rows}</table></div>'
     )
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from viser import uplot
 
 from explorer.app.assigning import Update
-from explorer.app.colours import GHOST, JOINT, SINGULAR, Rgb, css
-from explorer.app.panels.charts import axis
+from explorer.app.colours import Rgb, css
+from explorer.app.panels.charts import BLUE, NEUTRAL, ORANGE, TEAL, VIOLET, axis
 from explorer.app.panels.html import DIM, scientific, signed
 from explorer.app.paths import Journey
 from explorer.app.state import Frame
@@ -20,7 +20,7 @@ from explorer.arrays import FloatArray
 from explorer.singularity import INCIDENCES, margins
 
 # Told apart by every common deficiency of colour vision, and in grey; none is one that warns.
-COLOURS: tuple[Rgb, Rgb, Rgb] = ((24, 74, 150), (60, 160, 145), (150, 120, 190))
+COLOURS: tuple[Rgb, Rgb, Rgb] = (BLUE, TEAL, VIOLET)
 DASHES: tuple[tuple[float, ...], ...] = ((), (7.0, 3.0), (2.0, 3.0))
 HEIGHT = 200
 # Time, the three margins, zero, crossings, and now.
@@ -129,7 +129,7 @@ def _crossings(journey: Journey) -> str:
         )
     dot = (
         '<span style="display:inline-block;width:9px;height:9px;border-radius:5px;'
-        f'background:{css(SINGULAR)};margin-right:6px"></span>'
+        f'background:{css(ORANGE)};margin-right:6px"></span>'
     )
     told = "".join(f"<div>{dot}{line}</div>" for line in lines[:MOST_TOLD])
     more = len(lines) - MOST_TOLD
@@ -159,19 +159,19 @@ def _series() -> tuple[uplot.Series, ...]:
     ]
     zero: uplot.Series = {
         "label": "zero",
-        "stroke": css(GHOST),
+        "stroke": css(NEUTRAL),
         "width": 1.0,
         "points": {"show": False},
     }
     crossings: uplot.Series = {
         "label": "singular",
-        "stroke": css(SINGULAR),
+        "stroke": css(ORANGE),
         "width": 0.0,
-        "points": {"show": True, "size": 9, "fill": css(SINGULAR)},
+        "points": {"show": True, "size": 9, "fill": css(ORANGE)},
     }
     now: uplot.Series = {
         "label": "now",
-        "stroke": css(JOINT),
+        "stroke": css(NEUTRAL),
         "width": 1.5,
         "points": {"show": False},
     }

@@ -35,7 +35,7 @@ FREE = {
 }
 FREE_LABELS = {YAW: "yaw of home", PLACE: "place of the box"}
 ACCEPT, REVERT = "Accept", "Revert"
-EXPORT_HULL, SAVE_DESIGN = "Export hull", "Save design"
+HULL_FILE, DESIGN_FILE, SEARCH_FILE = "Hull", "Design", "Search"
 CANCEL_COLOUR = "red"
 STEP = 0.001
 
@@ -51,10 +51,16 @@ class OptimisePanel:
         session: To which it posts.
         export_hull: Sends the hull of the present design's workspace.
         save_design: Sends the present design.
+        save_search: Sends the record of the last search.
     """
 
     def __init__(
-        self, gui: viser.GuiApi, session: Session, export_hull: Send, save_design: Send
+        self,
+        gui: viser.GuiApi,
+        session: Session,
+        export_hull: Send,
+        save_design: Send,
+        save_search: Send,
     ) -> None:
         self._session = session
         self._controls = controls = Controls(gui, session)
@@ -83,13 +89,17 @@ class OptimisePanel:
         )
         self._decision.on_click(self._decided)
         self._files = gui.add_button_group(
-            "Files",
-            (EXPORT_HULL, SAVE_DESIGN),
+            "Download",
+            (HULL_FILE, DESIGN_FILE, SEARCH_FILE),
             hint="The convex hull of the workspace, in the format chosen in the tab Workspace; "
-            "the design as a file to open again.",
+            "the design as a file to open again; the record by which the search can be repeated.",
             visible=False,
         )
-        self._sends = {EXPORT_HULL: export_hull, SAVE_DESIGN: save_design}
+        self._sends = {
+            HULL_FILE: export_hull,
+            DESIGN_FILE: save_design,
+            SEARCH_FILE: save_search,
+        }
         self._files.on_click(self._asked_for)
         self._table = gui.add_html("", visible=False)
         self._plots = OptimisePlots(gui)

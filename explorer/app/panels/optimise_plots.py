@@ -13,17 +13,16 @@ from numpy.typing import NDArray
 from viser import uplot
 
 from explorer.app.assigning import Update
-from explorer.app.colours import FAR, SINGULAR, css
+from explorer.app.colours import css
 from explorer.app.optimisation import Run
-from explorer.app.panels.charts import FONT
+from explorer.app.panels.charts import BLUE, FONT, ORANGE
 from explorer.app.panels.html import DIM, scientific
-from explorer.app.panels.optimise_words import NAMES
+from explorer.optimise import curves
 from explorer.optimise.outcome import Iterate
+from explorer.optimise.problem import Problem
 
 HEIGHT = 96
 BLANK = np.zeros(2)
-# What is drawn of an objective that is met exactly, since zero is no power of ten.
-LEAST = 1e-16
 # Of the span of the values: how far an axis goes beyond them.
 BEYOND = 0.12
 
@@ -67,9 +66,9 @@ class OptimisePlots:
 
     def updates(self, run: Run | None) -> Iterator[Update]:
         """Yield what makes them show a run."""
-        curves = [] if run is None else curves_of(run)
+        shown = [] if run is None else curves_of(run)
         for index, (caption, chart) in enumerate(self._charts):
-            curve = curves[index] if index < len(curves) else None
+            curve = shown[index] if index < len(shown) else None
             yield caption, "visible", curve is not None
             yield chart, "visible", curve is not None
             if curve is not None:
@@ -86,24 +85,23 @@ def curves_of(run: Run) -> list[Curve]:
     iterates = [each for each in run.iterates if each.run == which]
     if not iterates:
         return []
-    problem, last = run.problem, iterates[-1]
-    wanted, objective = problem.demands.volume, _values(iterates, "objective")
-    curves: list[Curve] = []
-    if problem.objective == "match-volume":
-        powers = np.log10(np.maximum(objective, LEAST))
-        text = f"log10 of F = |1 − V / V′|; F = {last.objective:.2g}".replace("e-", "e−")
-        curves.append(Curve(text, powers, None, powers=True))
-    elif problem.objective != "largest-volume":
-        name = NAMES[problem.objective].capitalize()
-        text = f"{name} (units): {scientific(last.objective, 6)}"
-        curves.append(Curve(text, objective, None))
-    target = "" if wanted is None else f", wanted {wanted:.6g}"
-    text = f"Volume (units³): {last.volume:.6g}{target}"
-    curves.append(Curve(text, _values(iterates, "volume"), wanted))
-    if any(each.worst for each in iterates):
-        text = f"Worst constraint, missed below 0: {last.worst or 'none'}"
-        curves.append(Curve(text, _values(iterates, "spare"), 0.0))
-    return curves
+    return [
+        Curve(_words(run.problem, iterates[-1], curve), curve.values, curve.level, curve.powers)
+        for curve in curves.curves_of(run.problem, iterates)
+    ]
+
+
+def _words(problem: Problem, last: Iterate, curve: curves.Curve) -> str:
+    """Return what a curve is, with its last value."""
+    if curve.kind == "spare":
+        return f"Worst constraint, missed below 0: {last.worst or 'none'}"
+    if curve.kind == "volume":
+        target = "" if curve.level is None else f", wanted {curve.level:.6g}"
+        return f"Volume (units³): {last.volume:.6g}{target}"
+    if curve.powers:
+        return f"log10 of F = |1 − V / V′|; F = {last.objective:.2g}".replace("e-", "e−")
+    name = curves.CALLED[problem.objective].capitalize()
+    return f"{name} (units): {scientific(last.objective, 6)}"
 
 
 def data_of(curve: Curve) -> tuple[NDArray[np.float64], ...]:
@@ -111,10 +109,6 @@ def data_of(curve: Curve) -> tuple[NDArray[np.float64], ...]:
     x = np.arange(len(curve.values), dtype=np.float64)
     level = np.full(len(x), np.nan if curve.level is None else curve.level)
     return x, curve.values, level
-
-
-def _values(iterates: list[Iterate], name: str) -> NDArray[np.float64]:
-    return np.array([getattr(each, name) for each in iterates], dtype=np.float64)
 
 
 def _caption(text: str) -> str:
@@ -128,14 +122,14 @@ def _caption(text: str) -> str:
 def _series() -> tuple[uplot.Series, ...]:
     values: uplot.Series = {
         "label": "value",
-        "stroke": css(FAR),
+        "stroke": css(BLUE),
         "width": 2.0,
         # Shown where they are apart.
-        "points": {"size": 5, "fill": css(FAR)},
+        "points": {"size": 5, "fill": css(BLUE)},
     }
     level: uplot.Series = {
         "label": "level",
-        "stroke": css(SINGULAR),
+        "stroke": css(ORANGE),
         "width": 1.0,
         "dash": (4, 4),
         "points": {"show": False},

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from html import escape
 
 from explorer.app.optimisation import Run, Verdict
-from explorer.app.panels.html import BEYOND, DIM, WITHIN, alert, scientific
+from explorer.app.panels.html import BEYOND, DIM, WITHIN, alert, decimals_for, scientific
 from explorer.app.state import State
 from explorer.design import VARIABLES
+from explorer.optimise.curves import CALLED
 from explorer.optimise.facts import Facts
 from explorer.optimise.problem import YAW, Problem
 from explorer.optimise.trail import MET
@@ -19,14 +19,6 @@ BOX = (
     '<div style="padding:6px 12px 4px;font-size:12.5px;line-height:1.45;'
     'font-variant-numeric:tabular-nums">'
 )
-NAMES = {
-    "match-volume": "F",
-    "smallest-reach": "reach",
-    "largest-volume": "volume",
-    "largest-margin": "worst margin",
-}
-"""What people call the value of each objective."""
-
 TITLES = {
     "converged": ("Found", WITHIN),
     "not converged": ("Not converged", BEYOND),
@@ -50,7 +42,7 @@ def progress_line(run: Run) -> str:
     inside = sum(each.run == last.run for each in run.iterates) - 1
     start = f"start {last.run + 1} of {run.starts}, " if run.starts > 1 else ""
     missed = f", missed: {last.worst}" if last.spare < -MET else ""
-    name = NAMES[run.problem.objective]
+    name = CALLED[run.problem.objective]
     return _running(
         f"{start}{last.phase} {inside}".capitalize(),
         f"{name} {scientific(last.objective, 5)}{missed}",
@@ -206,9 +198,7 @@ def _row(row: Row, *, is_first: bool = False) -> str:
 
 def decimals_of(size: float) -> int:
     """Return how many decimals give a number of this size `DIGITS` digits, 4 at the most."""
-    if size <= 0.0:
-        return 1
-    return min(4, max(0, DIGITS - 1 - math.floor(math.log10(size))))
+    return min(4, decimals_for(size, DIGITS)) if size > 0.0 else 1
 
 
 def _number(value: float | None, digits: int) -> str:

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from viser import uplot
 
 from explorer.app.assigning import Update
-from explorer.app.colours import CLEAR, FAR, SINGULAR, Rgb, css
-from explorer.app.panels.charts import axis
+from explorer.app.colours import Rgb, css
+from explorer.app.panels.charts import BLUE, ORANGE, TEAL, VIOLET, axis
 from explorer.app.panels.html import DIM, alert, scientific
 from explorer.app.state import Frame
 from explorer.app.workspace_feed import RadiusFeed
@@ -100,9 +100,9 @@ def common_radius(design: Design) -> float | None:
 def marks_of(curve: RadiusCurve | None, radius: float | None) -> tuple[Mark, Mark, Mark]:
     """Return the marks of a curve, in the order in which they are told."""
     return (
-        Mark("present radius", SINGULAR, 10, radius),
-        Mark("99 % left up to", CLEAR, 8, None if curve is None else curve.radius_at(SHARE)),
-        Mark("harmless up to", FAR, 8, None if curve is None else curve.harmless),
+        Mark("present radius", ORANGE, 10, radius),
+        Mark("99 % left up to", TEAL, 8, None if curve is None else curve.radius_at(SHARE)),
+        Mark("harmless up to", VIOLET, 8, None if curve is None else curve.harmless),
     )
 
 
@@ -214,7 +214,7 @@ def _shown(position: FloatArray) -> str:
 def _series(marks: tuple[Mark, ...]) -> tuple[uplot.Series, ...]:
     line: uplot.Series = {
         "label": "volume",
-        "stroke": css(FAR),
+        "stroke": css(BLUE),
         "width": 2.0,
         "points": {"show": False},
     }

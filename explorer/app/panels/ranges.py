@@ -45,14 +45,14 @@ def _coordinate_span(reach: float) -> Span:
 
 
 def variable_span(state: State) -> Span:
-    """Return the range of a design variable, in steps that its number field can show."""
+    """Return the range of a design variable, in steps as fine as designs are published with."""
     return _variable_span(max(map(abs, state.base.variables)))
 
 
 @functools.lru_cache(64)
 def _variable_span(size: float) -> Span:
     edge = round_up(REACHES * size)
-    return Span(-edge, edge, fine_step(size, 1e4))
+    return Span(-edge, edge, fine_step(size, 1e5))
 
 
 def round_up(value: float) -> float:

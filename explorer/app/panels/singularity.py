@@ -13,8 +13,9 @@ from explorer.app.assigning import Update
 from explorer.app.colours import CLEAR, FAR, FAR_WARNINGS, SINGULAR, WARNED, css, proximity_colour
 from explorer.app.controls import Controls
 from explorer.app.panels.distance import DistancePanel
-from explorer.app.panels.html import BEYOND, DIM, WITHIN, scientific, signed
+from explorer.app.panels.html import BEYOND, DIM, WITHIN, fitted, scientific, share
 from explorer.app.panels.performance import PerformancePanel
+from explorer.app.panels.ranges import length_span
 from explorer.app.panels.strata import StrataPanel
 from explorer.app.session import Session
 from explorer.app.state import Frame
@@ -37,7 +38,7 @@ class SingularityPanel:
             lambda frame: frame.state.warn_below,
             lambda state, value: SetView(replace(state.view, warn_below=value)),
             least=0.0,
-            step=0.01,
+            step=lambda state: length_span(state).step,
         )
         with gui.add_folder("Nearest singular poses"):
             self._distances = DistancePanel(gui, session)
@@ -105,17 +106,18 @@ def _legend(warn: float) -> str:
 
 
 def _margin(snapshot: Snapshot, index: int, warn: float, unit_mm: float) -> str:
-    value = float(snapshot.margins[index])
+    value, reach = float(snapshot.margins[index]), snapshot.design.reach
     colour = css(proximity_colour(value, warn))
     filled = min(100.0, 100.0 * abs(value) / (FAR_WARNINGS * warn))
     return (
         '<div style="margin:7px 0 0"><div style="display:flex;align-items:baseline;gap:7px">'
         f'<span style="width:11px;height:11px;border-radius:2px;background:{colour};'
         'flex:none;align-self:center"></span>'
-        f"<b>κ{index + 1}</b><span>{signed(value)}</span>"
-        f'<span style="{DIM};font-size:11.5px">{signed(value * unit_mm, 1)} mm</span>'
-        f'<span style="{DIM};margin-left:auto;font-size:11.5px">'
-        f"V {scientific(float(snapshot.volumes[index]))}</span></div>"
+        f"<b>κ{index + 1}</b><span>{fitted(value, reach, 5)}</span>"
+        f'<span style="{DIM};font-size:11.5px">{fitted(value * unit_mm, reach * unit_mm, 4)} mm'
+        f'</span><span style="{DIM};margin-left:auto;font-size:11.5px" '
+        'title="Volume of its tetrahedron, signed">'
+        f"V {scientific(float(snapshot.volumes[index]))} units³</span></div>"
         '<div style="height:3px;border-radius:2px;margin:3px 0 2px;'
         'background:color-mix(in srgb,currentColor 12%,transparent)">'
         f'<div style="height:3px;border-radius:2px;width:{filled:.1f}%;background:{colour}">'
@@ -127,13 +129,17 @@ def _table(frame: Frame) -> str:
     snapshot = frame.snapshot
     generic = "generic" if snapshot.stratum == GENERIC else "singular"
     rows = (
-        ("det J", scientific(snapshot.determinant), "Determinant of the actuator Jacobian"),
+        (
+            "det J",
+            f"{scientific(snapshot.determinant)} units³",
+            "Determinant of the actuator Jacobian",
+        ),
         (
             "1/cond J",
-            f"{snapshot.inverse_condition:.4f}",
+            share(snapshot.inverse_condition),
             "Inverse condition number of J made homogeneous with the reach; 0 is singular",
         ),
-        ("min |κ| / reach", f"{snapshot.proximity:.4f}", "Smallest margin over the reach |a3|"),
+        ("min |κ| / reach", share(snapshot.proximity), "Smallest margin over the reach |a3|"),
         (
             "Mode",
             f"{mode_name(frame.state.mode)} &nbsp;({frame.state.mode})",

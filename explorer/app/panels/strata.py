@@ -1,9 +1,4 @@
-"""The order of the 24 strata as a diagram to click on, today's lit, each with its distance.
-
-viser's HTML takes no clicks of its own. But a label of HTML, clicked, pushes the button that
-it is for; so each stratum has a button of viser's, unseen but for keyboards and screen
-readers, and the diagram is made of labels.
-"""
+"""The order of the 24 strata as a diagram to click on, today's lit, each with its distance."""
 
 from __future__ import annotations
 
@@ -18,6 +13,7 @@ from explorer.app.assigning import Update
 from explorer.app.colours import css, proximity_colour
 from explorer.app.controls import Controls
 from explorer.app.panels.html import DIM, scientific
+from explorer.app.panels.labels import out_of_sight
 from explorer.app.session import Session
 from explorer.app.singular_actions import GoToStratum, SetSingularView, name_of
 from explorer.app.state import Frame
@@ -51,10 +47,10 @@ class StrataPanel:
             if stratum != GENERIC:
                 label = f"Go to {name_of(stratum)}: {words(stratum)}"
                 self.buttons[stratum] = self._controls.button(
-                    label, label, lambda w=stratum: GoToStratum(w)
+                    label, f"{label}.", lambda w=stratum: GoToStratum(w)
                 )
         self._ids = {w: element_id(button) for w, button in self.buttons.items()}
-        gui.add_html(_out_of_sight(tuple(self._ids.values())))
+        gui.add_html(out_of_sight(tuple(self._ids.values())))
 
     def updates(self, frame: Frame, feed: StrataFeed) -> Iterator[Update]:
         """Yield what makes the panel show the frame."""
@@ -212,13 +208,4 @@ def _edges(here: Stratum) -> str:
         'height:100%;overflow:visible" stroke="currentColor">'
         f'<g stroke-opacity="0.16">{"".join(plain)}</g>'
         f'<g stroke-opacity="0.75" stroke-width="1.5">{"".join(lit)}</g></svg>'
-    )
-
-
-def _out_of_sight(ids: tuple[str, ...]) -> str:
-    """Return the style that leaves buttons to keyboards and screen readers alone."""
-    boxes = ",".join(f'div:has(> [id="{each}"])' for each in ids)
-    return (
-        f"<style>{boxes}{{position:absolute;width:1px;height:1px;margin:0;padding:0;"
-        "overflow:hidden;clip-path:inset(50%);white-space:nowrap}</style>"
     )

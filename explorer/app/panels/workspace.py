@@ -27,7 +27,7 @@ STARTS = {"the home position": "home", "the present position": "pose"}
 COLOURINGS = {"one colour": "plain", "smallest margin": "margin", "1 / cond J": "condition"}
 ORIENTATIONS = {"of the present pose": "pose", "of the home pose": "home"}
 CUTS = {"no cut": None, "across x": "x", "across y": "y", "across z": "z"}
-BLANK = np.full((8, 8, 3), 255, dtype=np.uint8)
+BLANK = np.zeros((8, 8, 4), dtype=np.uint8)
 
 Export = Callable[[str, str, int | None], None]
 """Sends a file to one browser: of "workspace" or "hull", in a format, to a client."""
@@ -158,7 +158,7 @@ class WorkspacePanel:
                 "content",
                 f'<div style="{DIM};font-size:12px;padding:2px 10px">{text}</div>',
             )
-            yield self._map, "image", _picture(slice_map.pixels)
+            yield self._map, "image", _enlarged(slice_map.pixels)
 
     def _show_trouble(self, drawing: WorkspaceDrawing | None) -> Iterator[Update]:
         """Yield why nothing can be reached, and where it could be started from."""
@@ -193,11 +193,9 @@ def tolerance_of(state: State) -> float:
     return state.view.workspace.tolerance or LIVE_TOLERANCE * state.base.reach
 
 
-def _picture(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return the map on white, enlarged so that its pixels stay sharp."""
-    alpha = pixels[..., 3:].astype(np.float64) / 255.0
-    flat = pixels[..., :3] * alpha + 255.0 * (1.0 - alpha)
-    return np.repeat(np.repeat(flat.astype(np.uint8), 3, axis=0), 3, axis=1)
+def _enlarged(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return the map so large that its pixels stay sharp."""
+    return np.repeat(np.repeat(pixels, 3, axis=0), 3, axis=1)
 
 
 def _tolerance_span(state: State) -> Span:

@@ -9,12 +9,13 @@ from html import escape
 import viser
 
 from explorer.app.assigning import Update
-from explorer.app.bands import BAND_EDGES, COLLIDING, PLAIN, WARN_CONDITION, band_colours
+from explorer.app.bands import COLLIDING, PLAIN, WARN_CONDITION
 from explorer.app.colours import css
 from explorer.app.panels.html import BEYOND, DIM, WITHIN, alert, scientific
 from explorer.app.state import Frame
 from explorer.app.tasks import Reached, WorkspaceDrawing
 from explorer.app.workspace_feed import WorkspaceFeed
+from explorer.colours import BAND_EDGES, band_colours
 from explorer.reachable import PairCost
 
 RIGHT = '<td style="text-align:right">'

@@ -12,8 +12,10 @@ from typing import Protocol
 import viser
 
 from explorer.app.assigning import Update
+from explorer.app.compare_feed import CompareFeed
 from explorer.app.scene.bodies import Bodies
 from explorer.app.scene.clearance import ClearanceScene
+from explorer.app.scene.compared import ComparedScene
 from explorer.app.scene.flags import Flags
 from explorer.app.scene.jog import JogScene
 from explorer.app.scene.legs import Legs, TwinLegs
@@ -40,7 +42,9 @@ class Part(Protocol):
 class Scene:
     """All that is drawn in three dimensions."""
 
-    def __init__(self, server: viser.ViserServer, feed: WorkspaceFeed) -> None:
+    def __init__(
+        self, server: viser.ViserServer, feed: WorkspaceFeed, compare_feed: CompareFeed
+    ) -> None:
         scene = server.scene
         scene.set_up_direction("+z")
         self.drag_handle = DragHandle(scene)
@@ -57,6 +61,7 @@ class Scene:
             ClearanceScene(scene),
             SweptTetrahedra(scene),
             WorkspaceScene(scene, feed),
+            ComparedScene(scene, compare_feed),
             RequiredBox(scene),
             NearestGhost(scene),
             EllipsoidScene(scene),

@@ -8,7 +8,7 @@ import numpy as np
 import viser
 
 from explorer.app.assigning import Update
-from explorer.app.colours import BASE_BODY, PLATFORM_BODY
+from explorer.app.colours import BASE_BODY, PLATFORM_BODY, Rgb
 from explorer.app.scene.legs import PLATE_TOP
 from explorer.app.scene.placing import Placed
 from explorer.app.scene.shapes import Mesh, plate
@@ -17,6 +17,11 @@ PLATE_THICKNESS = 0.22
 PLATFORM_THICKNESS = 0.2
 PLATFORM_OPACITY = 0.82
 GRID_BELOW = 0.01
+# Of the grid, cells and sections, by whether the page is dark.
+GRID: dict[bool, tuple[Rgb, Rgb]] = {
+    False: ((226, 230, 236), (203, 209, 218)),
+    True: ((38, 41, 46), (56, 61, 69)),
+}
 
 
 class Bodies:
@@ -37,8 +42,8 @@ class Bodies:
             height=60.0,
             cell_size=1.0,
             section_size=5.0,
-            cell_color=(226, 230, 236),
-            section_color=(203, 209, 218),
+            cell_color=GRID[False][0],
+            section_color=GRID[False][1],
             fade_distance=46.0,
             fade_from="origin",
             shadow_opacity=0.1,
@@ -56,6 +61,9 @@ class Bodies:
         within = state.view.workspace.solid or singular.ball or singular.ellipsoid != "none"
         yield self._platform, "opacity", None if within else PLATFORM_OPACITY
         yield self._grid, "visible", state.view.grid
+        cell, section = GRID[placed.dark]
+        yield self._grid, "cell_color", cell
+        yield self._grid, "section_color", section
         yield self._grid, "position", (0.0, 0.0, _lowest(placed) - GRID_BELOW)
         for handle, (vertices, faces) in (
             (self._base, _base_plate(placed)),

@@ -32,19 +32,24 @@ DIRECTIONS: dict[ViewName, tuple[float, float, float]] = {
 
 # How many earlier places of a camera count as not moved by hand.
 REMEMBERED = 4
+# Width over height of the scene of a new browser, as far as anybody can guess.
+FIRST_ASPECT = 1.2
 
 
-def framing(placed: Placed, view: ViewName, aspect: float) -> tuple[FloatArray, FloatArray]:
+def framing(
+    placed: Placed, view: ViewName | FloatArray, aspect: float
+) -> tuple[FloatArray, FloatArray]:
     """Return the eye and the target, in scene units, that show the whole mechanism.
 
     Args:
         placed: What to show.
-        view: From where.
+        view: From where, or from the target towards the eye (3,), not along z.
         aspect: Width over height of the picture.
     """
     points = outermost_points(placed)
     centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
-    forward = -np.array(DIRECTIONS[view]) / np.linalg.norm(DIRECTIONS[view])
+    towards = np.array(DIRECTIONS[view]) if isinstance(view, str) else view
+    forward = -towards / np.linalg.norm(towards)
     right = np.cross(forward, [0.0, 0.0, 1.0])
     right /= np.linalg.norm(right)
     up = np.cross(right, forward)
@@ -84,10 +89,23 @@ def outermost_points(placed: Placed) -> FloatArray:
 
 @dataclass(frozen=True)
 class _Aimed:
-    view: ViewName
+    view: ViewName | FloatArray
     aspect: float
+    # Where it may have begun: a slow browser tells of that for long.
+    first: tuple[FloatArray, ...]
     # Where the camera was put, the last time last. A browser may still tell of one before.
     eyes: tuple[FloatArray, ...]
+    # At what it looks from the last of them.
+    target: FloatArray
+
+    def has(self, client: viser.ClientHandle) -> bool:
+        """Whether a browser's camera is where it was ever put."""
+        return any(self.is_at(client, eye) for eye in (*self.first, *self.eyes))
+
+    def is_at(self, client: viser.ClientHandle, eye: FloatArray) -> bool:
+        """Whether it is at one of these places."""
+        distance = float(np.linalg.norm(self.eyes[-1] - client.camera.look_at))
+        return float(np.abs(client.camera.position - eye).max()) <= 1e-3 * distance
 
 
 class Cameras:
@@ -97,26 +115,26 @@ class Cameras:
     camera that still stands where it was put is therefore put again when the size changes.
 
     Args:
+        first: Where the camera of a new browser begins; put to show what there is now.
         placed: Gives what to frame at the time.
     """
 
-    def __init__(self, placed: Callable[[], Placed]) -> None:
+    def __init__(self, first: viser.InitialCameraConfig, placed: Callable[[], Placed]) -> None:
+        self._first = first
         self._placed = placed
         self._aimed: dict[int, _Aimed] = {}
+        first.position, first.look_at = framing(placed(), "isometric", FIRST_ASPECT)
 
     def point(self, client: viser.ClientHandle, view: ViewName) -> None:
         """Point one browser's camera."""
-        given = client.camera.aspect
-        aspect = given if math.isfinite(given) and given > 0.0 else 1.0
-        eye, target = framing(self._placed(), view, aspect)
-        aimed = self._aimed.get(client.client_id)
-        before = (client.camera.position,) if aimed is None else aimed.eyes[-REMEMBERED:]
-        self._aimed[client.client_id] = _Aimed(view, given, (*before, eye))
-        with client.atomic():
-            client.camera.fov = FIELD_OF_VIEW
-            client.camera.up_direction = (0.0, 0.0, 1.0)
-            client.camera.position = eye
-            client.camera.look_at = target
+        self._put(client, view)
+
+    def fit(self, client: viser.ClientHandle) -> None:
+        """Show the whole mechanism from where one browser's camera looks."""
+        towards = np.asarray(client.camera.position) - np.asarray(client.camera.look_at)
+        # The browser turns no camera upright, but a script may have.
+        if np.linalg.norm(towards[:2]) > 1e-6 * np.linalg.norm(towards):
+            self._put(client, towards)
 
     def connected(self, client: viser.ClientHandle) -> None:
         """Point a new browser's camera and keep it framed while nobody moves it."""
@@ -127,11 +145,47 @@ class Cameras:
         """Forget a browser."""
         self._aimed.pop(client.client_id, None)
 
+    def look_again(self, client: viser.ClientHandle) -> None:
+        """Put a browser's camera where it was put last, unless somebody moved it."""
+        aimed = self._aimed.get(client.client_id)
+        if aimed is None or not aimed.has(client):
+            return
+        if client.camera.aspect == aimed.aspect:
+            _tell(client, aimed.eyes[-1], aimed.target)
+        else:
+            self._put(client, aimed.view)
+
+    def stands(self, client: viser.ClientHandle) -> bool:
+        """Whether a browser's camera is where it was put last, or where somebody moved it.
+
+        A browser that is still loading may miss where it is put, and tell of its first place.
+        """
+        aimed = self._aimed.get(client.client_id)
+        if aimed is None:
+            return True
+        return aimed.is_at(client, aimed.eyes[-1]) or not aimed.has(client)
+
     def _resized(self, client: viser.ClientHandle) -> None:
         aimed = self._aimed.get(client.client_id)
-        if aimed is None or client.camera.aspect == aimed.aspect:
-            return
-        distance = float(np.linalg.norm(aimed.eyes[-1] - client.camera.look_at))
-        moved = min(float(np.abs(client.camera.position - eye).max()) for eye in aimed.eyes)
-        if moved <= 1e-3 * distance:
-            self.point(client, aimed.view)
+        if aimed is not None and client.camera.aspect != aimed.aspect and aimed.has(client):
+            self._put(client, aimed.view)
+
+    def _put(self, client: viser.ClientHandle, view: ViewName | FloatArray) -> None:
+        given = client.camera.aspect
+        aspect = given if math.isfinite(given) and given > 0.0 else 1.0
+        eye, target = framing(self._placed(), view, aspect)
+        aimed = self._aimed.get(client.client_id)
+        if aimed is None:
+            first, before = (self._first.position, np.array(client.camera.position)), ()
+        else:
+            first, before = aimed.first, aimed.eyes[-REMEMBERED:]
+        self._aimed[client.client_id] = _Aimed(view, given, first, (*before, eye), target)
+        _tell(client, eye, target)
+
+
+def _tell(client: viser.ClientHandle, eye: FloatArray, target: FloatArray) -> None:
+    with client.atomic():
+        client.camera.fov = FIELD_OF_VIEW
+        client.camera.up_direction = (0.0, 0.0, 1.0)
+        client.camera.position = eye
+        client.camera.look_at = target

@@ -16,7 +16,7 @@ import viser
 from explorer.app.assigning import Update
 from explorer.app.colours import SINGULAR, Rgb, proximity_colour
 from explorer.app.scene.placing import Placed
-from explorer.app.scene.shapes import Instances, Mesh, cylinder, turned_to
+from explorer.app.scene.shapes import Instances, Mesh, cylinder, of_one_colour, turned_to
 from explorer.arrays import FloatArray
 from explorer.uncoupled import UNCOUPLED, Travel, UncoupledMotion
 
@@ -93,8 +93,7 @@ class JogScene:
             segments = np.stack([drawn.points[:-1], drawn.points[1:]], axis=1)
             segments = np.concatenate([segments, drawn.spoke[None]])
             yield self._lines[index], "points", segments.astype(np.float32)
-            rgb = np.tile(np.array(colour, dtype=np.uint8), (POINTS, 2, 1))
-            yield self._lines[index], "colors", rgb
+            yield self._lines[index], "colors", of_one_colour(colour, POINTS)
             for side, (end, before) in enumerate(((0, 1), (-1, -2))):
                 row = 2 * index + side
                 at[row] = drawn.points[end]

@@ -18,6 +18,7 @@ from explorer.singularity import mode_name
 BASE_LABELS = ("a1", "a2", "a3")
 PLATFORM_LABELS = ("b1", "b2", "b3", "b4")
 
+HANDLE_NAME = "/handle"
 HANDLE_SCALE = 1.9
 # From the gizmo's origin to the tip of an arrow, as viser draws it.
 HANDLE_REACH = 1.25 * HANDLE_SCALE
@@ -132,7 +133,7 @@ class DragHandle:
 
     def __init__(self, scene: viser.SceneApi) -> None:
         self.handle = scene.add_transform_controls(
-            "/handle", scale=HANDLE_SCALE, line_width=2.0, depth_test=False, opacity=0.85
+            HANDLE_NAME, scale=HANDLE_SCALE, line_width=2.0, depth_test=False, opacity=0.85
         )
 
     def updates(self, placed: Placed) -> Iterator[Update]:

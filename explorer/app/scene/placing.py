@@ -18,6 +18,8 @@ from explorer.arrays import FloatArray
 
 # What the reach of a design measures in the scene, roughly.
 SCENE_REACH = 10.0
+# Of every two of the platform's points.
+PAIRS = np.triu_indices(4, 1)
 
 
 def round_step(length: float) -> float:
@@ -42,11 +44,13 @@ class Placed:
         frame: What is drawn.
         extent: (lows, highs) of a workspace that is drawn too, in design units, or None.
         parts: Of the prototype, where they replace the schematic legs and bodies.
+        dark: Whether it is drawn on a dark page.
     """
 
     frame: Frame
     extent: FloatArray | None = None
     parts: Parts | None = None
+    dark: bool = False
 
     @cached_property
     def scale(self) -> float:
@@ -79,7 +83,7 @@ class Placed:
     def thickness(self) -> float:
         """How thick parts are drawn: 1, and less where the platform's points are close."""
         points = np.array(list(self.platform_points.values()))
-        gaps = np.linalg.norm(points[:, None] - points, axis=2)[np.triu_indices(4, 1)]
+        gaps = np.linalg.norm(points[PAIRS[0]] - points[PAIRS[1]], axis=1)
         # b4 and b2 or b3 may coincide; the legs then simply share a joint.
         apart = gaps[gaps > 0.05]
         return float(np.clip(apart.min(initial=1.2) / 1.2, 0.3, 1.0))

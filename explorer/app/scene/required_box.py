@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import viser
+from numpy.typing import NDArray
 
 from explorer.app.assigning import Update
 from explorer.app.colours import JOINT
@@ -17,6 +18,10 @@ from explorer.optimise.problem import Box
 
 # The twelve edges of a cube by its corners, whose bits are the axes.
 EDGES = tuple((a, a | 1 << axis) for a in range(8) for axis in range(3) if not a >> axis & 1)
+
+
+# Of a coordinate that is drawn.
+FARTHEST = 1e30
 
 
 class RequiredBox:
@@ -37,7 +42,7 @@ class RequiredBox:
         box = box_shown(placed.frame.state)
         yield self._edges, "visible", box is not None
         if box is not None:
-            yield self._edges, "points", (placed.scale * edges_of(box)).astype(np.float32)
+            yield self._edges, "points", single(edges_of(box), placed.scale)
 
 
 def box_shown(state: State) -> Box | None:
@@ -55,3 +60,10 @@ def edges_of(box: Box) -> FloatArray:
     lows, highs = box
     corners = np.array([[(lows, highs)[c >> a & 1][a] for a in range(3)] for c in range(8)])
     return corners[np.array(EDGES)]
+
+
+def single(points: FloatArray, scale: float) -> NDArray[np.float32]:
+    """Return scaled points in single precision; those beyond it lie at its end, out of sight."""
+    # Bounded first, lest a coordinate that is a number becomes none.
+    farthest = FARTHEST / scale
+    return (scale * np.clip(np.nan_to_num(points), -farthest, farthest)).astype(np.float32)

@@ -12,6 +12,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 import viser
+from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
 from explorer.app.assigning import Update
@@ -21,6 +22,8 @@ from explorer.arrays import FloatArray, IntArray
 Mesh: TypeAlias = tuple[FloatArray, IntArray]
 
 SECTIONS = 28
+# The ends of the four sides of a quadrilateral.
+HEM = np.array([[0, 1], [1, 2], [2, 3], [3, 0]])
 
 
 class Instances:
@@ -153,11 +156,18 @@ class Patch:
 
     def spanned(self, corners: FloatArray, colour: Rgb) -> Iterator[Update]:
         """Yield what spans it between corners (4, 3)."""
-        hem = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
         yield self._plane, "color", colour
         yield self._plane, "vertices", corners.astype(np.float32)
-        yield self._hem, "points", hem.astype(np.float32)
-        yield self._hem, "colors", np.tile(np.array(colour, dtype=np.uint8), (4, 2, 1))
+        yield self._hem, "points", corners[HEM].astype(np.float32)
+        yield self._hem, "colors", of_one_colour(colour, len(HEM))
+
+
+@functools.lru_cache(maxsize=256)
+def of_one_colour(colour: Rgb, count: int) -> NDArray[np.uint8]:
+    """Return the colours of both ends of segments (count, 2, 3), all the same; read only."""
+    colours = np.tile(np.array(colour, dtype=np.uint8), (count, 2, 1))
+    colours.flags.writeable = False
+    return colours
 
 
 def turned_to(directions: FloatArray) -> FloatArray:
@@ -223,12 +233,13 @@ def _plate(
     outline = (np.array(points)[:, None, :] + disc).reshape(-1, 2)
     rim = outline[ConvexHull(outline).vertices]
     count = len(rim)
-    low, high = (np.pad(rim, ((0, 0), (0, 1)), constant_values=z) for z in (bottom, top))
+    corners = np.empty((2 * count, 3))
+    corners[:, :2] = np.concatenate([rim, rim])
+    corners[:count, 2], corners[count:, 2] = bottom, top
     i = np.arange(count)
     j = (i + 1) % count
     wall = np.concatenate([np.stack([i, j, count + j], 1), np.stack([i, count + j, count + i], 1)])
     fan = np.stack([np.zeros(count - 2, int), i[1:-1], i[2:]], axis=1)
-    corners = np.concatenate([low, high])
     faces = np.concatenate([wall, fan[:, ::-1], count + fan])
     return _sharp(corners[faces])
 

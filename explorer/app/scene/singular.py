@@ -172,13 +172,13 @@ class BallScene:
 
     def updates(self, placed: Placed) -> Iterator[Update]:
         """Yield what draws the ball of this frame."""
-        ball = placed.frame.free_ball
-        is_singular = placed.frame.snapshot.stratum != GENERIC
-        shown = placed.frame.state.view.singular.ball and not is_singular
+        asked = placed.frame.state.view.singular.ball
+        shown = asked and placed.frame.snapshot.stratum == GENERIC
         for handle in (self._ball, self._touch, self._line, self._label):
             yield handle, "visible", shown
         if not shown:
             return
+        ball = placed.frame.free_ball
         centre, touch = placed.points["b4"], placed.scale * ball.touches
         colour = proximity_colour(ball.radius, placed.frame.state.warn_below)
         yield self._ball, "position", tuple(centre.tolist())

@@ -11,10 +11,11 @@ import viser
 from explorer.app.assigning import Update
 from explorer.app.colours import OUTLINE, proximity_colour
 from explorer.app.scene.placing import Placed
+from explorer.app.scene.shapes import of_one_colour
 from explorer.singularity import TETRAHEDRA
 
 FACES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
-EDGES = tuple(itertools.combinations(range(4), 2))
+EDGES = np.array(list(itertools.combinations(range(4), 2)))
 OPACITY = 0.1
 
 
@@ -62,6 +63,6 @@ class Tetrahedra:
             yield edges, "visible", shown or fails
             yield mesh, "vertices", corners.astype(np.float32)
             yield mesh, "color", colour
-            yield edges, "points", corners[np.array(EDGES)].astype(np.float32)
-            yield edges, "colors", np.tile(np.array(colour, dtype=np.uint8), (6, 2, 1))
+            yield edges, "points", corners[EDGES].astype(np.float32)
+            yield edges, "colors", of_one_colour(colour, len(EDGES))
             yield edges, "thickness", 5.0 if fails else 1.5

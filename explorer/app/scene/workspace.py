@@ -10,13 +10,14 @@ import viser
 from numpy.typing import NDArray
 
 from explorer.app.assigning import Update
-from explorer.app.bands import COLLIDING, PLAIN, Shell, band_colours
+from explorer.app.bands import COLLIDING, PLAIN, Shell
 from explorer.app.colours import OUTLINE, Rgb, proximity_colour
 from explorer.app.scene.placing import Placed
 from explorer.app.scene.shapes import Patch
 from explorer.app.tasks import WorkspaceDrawing
 from explorer.app.workspace_feed import WorkspaceFeed, workspace_rotation
 from explorer.arrays import FloatArray
+from explorer.colours import band_colours
 from explorer.constraints import Cone, HalfSpace, Never, Round, constraints
 
 ArrayPair: TypeAlias = tuple[NDArray[np.float32], NDArray[np.uint32]]
@@ -144,27 +145,30 @@ class _SingularPlane:
     def updates(self, placed: Placed) -> Iterator[Update]:
         """Yield what draws it in this frame."""
         state, snapshot = placed.frame.state, placed.frame.snapshot
-        r = snapshot.rotation
-        normal = (-r[:, 2], np.cross([1.0, 0.0, 0.0], r[:, 0]), np.array([0.0, 0.0, 1.0]))[
-            self._index
-        ]
-        length = float(np.linalg.norm(normal))
-        # With parallel lines every position is singular, and there is no plane to draw.
-        shown = state.view.workspace.planes and length > 1e-9
-        yield from self._patch.shown(shown)
-        yield self._label, "visible", shown
-        if not shown:
+        normal = self._normal(snapshot.rotation) if state.view.workspace.planes else None
+        yield from self._patch.shown(normal is not None)
+        yield self._label, "visible", normal is not None
+        if normal is None:
             return
         colour = proximity_colour(float(snapshot.margins[self._index]), state.warn_below)
-        along = np.cross(normal / length, [0.0, 1.0, 0.0])
+        along = np.cross(normal, [0.0, 1.0, 0.0])
         if np.linalg.norm(along) < 0.1:
             along = np.array([1.0, 0.0, 0.0])
         along /= np.linalg.norm(along)
-        across = np.cross(normal / length, along)
+        across = np.cross(normal, along)
         half = 1.1 * placed.reach
         corners = half * np.array([a * along + b * across for a, b in CORNERS])
         yield from self._patch.spanned(corners, colour)
         yield self._label, "position", tuple(corners[2].tolist())
+
+    def _normal(self, rotation: FloatArray) -> FloatArray | None:
+        """Return its unit normal; None with parallel lines, where every position is singular."""
+        x = rotation[:, 0]
+        normal = (-rotation[:, 2], np.array([0.0, -x[2], x[1]]), np.array([0.0, 0.0, 1.0]))[
+            self._index
+        ]
+        length = float(np.linalg.norm(normal))
+        return normal / length if length > 1e-9 else None
 
 
 CORNERS = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))

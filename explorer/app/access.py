@@ -1,0 +1,229 @@
+"""Who may load the page and who may open a websocket, decided from a request's head alone.
+
+On loopback every program of this machine may, but no web site: a page from elsewhere that
+the user's browser shows has another `Origin`, and a foreign name that was made to lead here
+(DNS rebinding) is another `Host`. Wherever else the explorer listens, a token is asked for:
+in the address of the page, then in a cookie, since the page itself chooses the address of
+its websocket.
+"""
+
+from __future__ import annotations
+
+import hmac
+import ipaddress
+import re
+import secrets
+import socket
+from collections.abc import Sequence
+from dataclasses import dataclass
+from http import HTTPStatus
+from http.cookies import CookieError, SimpleCookie
+
+from explorer.errors import ServerError
+
+LOOPBACK_NAMES = ("127.0.0.1", "localhost", "[::1]")
+# What stands for every address of this machine, and the loopback address among them.
+EVERYWHERE = {"0.0.0.0": "127.0.0.1", "::": "::1"}  # noqa: S104 - a comparison
+TOKEN_BYTES = 24
+TOKEN = re.compile(r"[A-Za-z0-9_-]{16,128}")
+# Plain words, into which no address of another server fits: viser's page would connect to it.
+PLAIN_QUERY = re.compile(r"[A-Za-z0-9_.~,=&-]*")
+HOST = re.compile(r"(?P<name>\[[0-9a-f:.]+\]|[a-z0-9._-]+)(:(?P<port>[0-9]{1,5}))?")
+HTTP_PORT = 80
+# What the page may do. Its program, its styles and its workers are all inside one file; it
+# connects to nobody but the server that it came from, so that no link can turn it elsewhere.
+# Plots of studies come as text that viser's page runs, and compile their shaders from text.
+POLICY = (
+    "default-src 'none'; "
+    "script-src 'self' 'unsafe-inline' 'unsafe-eval' blob: data:; "
+    "worker-src 'self' blob: data:; "
+    "style-src 'self' 'unsafe-inline'; "
+    "img-src 'self' blob: data:; "
+    "font-src 'self' data:; "
+    "connect-src 'self' ws://{host} wss://{host} blob: data:; "
+    "base-uri 'none'; form-action 'none'; "
+    # Notebooks of this machine show the page in a frame.
+    "frame-ancestors 'self' http://localhost:* http://127.0.0.1:* https://localhost:* "
+    "https://127.0.0.1:* vscode-webview: vscode-file:"
+)
+
+
+@dataclass(frozen=True)
+class Head:
+    """The head of a request, all that is judged.
+
+    Attributes:
+        target: Path and query, as sent.
+        hosts, origins, cookies: Every value of these headers.
+        upgrade: Whether it asks to become a websocket, or anything else but a page.
+    """
+
+    target: str
+    hosts: Sequence[str]
+    origins: Sequence[str]
+    cookies: Sequence[str]
+    upgrade: bool
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """Why a request is not answered."""
+
+    status: HTTPStatus
+    reason: str
+
+
+@dataclass(frozen=True)
+class Access:
+    """The rule of one server.
+
+    Attributes:
+        host: The address that it listens on.
+        token: What has to be known to get in; None for no token, on loopback only.
+
+    Raises:
+        ServerError: a host beyond loopback without a token, or a token that is none.
+    """
+
+    host: str
+    token: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.token is None and not is_loopback(self.host):
+            raise ServerError(f"listening on {self.host!r} takes a token; others could get in")
+        if self.token is not None and TOKEN.fullmatch(self.token) is None:
+            raise ServerError(
+                "a token has 16 to 128 letters, digits, - and _; leave it out to get a random one"
+            )
+
+    @staticmethod
+    def to(host: str, token: str | None = None) -> Access:
+        """Return the rule for a host, with a new random token where one is needed and not given.
+
+        Raises:
+            ServerError: the token cannot be used.
+        """
+        if token is None and not is_loopback(host):
+            token = secrets.token_urlsafe(TOKEN_BYTES)
+        return Access(host, token)
+
+    def url(self, port: int, host: str | None = None) -> str:
+        """Return where the page is found, token included.
+
+        Args:
+            port: On which the server listens.
+            host: As others call this machine; as a browser on it does if None.
+        """
+        name = EVERYWHERE.get(self.host, self.host) if host is None else host
+        address = f"http://{_in_address(name)}:{port}"
+        return address if self.token is None else f"{address}/?token={self.token}"
+
+    def judge(self, head: Head, port: int) -> Refusal | None:
+        """Return why a request is refused, or None if it may pass.
+
+        Args:
+            head: Of the request.
+            port: On which the server listens.
+        """
+        host = head.hosts[0].lower() if len(head.hosts) == 1 else ""
+        if not self._is_ours(host, port):
+            return Refusal(
+                HTTPStatus.FORBIDDEN,
+                f"This address is not one of the explorer's; open {self.url(port).split('?')[0]}",
+            )
+        _, _, query = head.target.partition("?")
+        if PLAIN_QUERY.fullmatch(query) is None:
+            return Refusal(
+                HTTPStatus.FORBIDDEN,
+                "The explorer's page is opened with nothing but its token in the address.",
+            )
+        if head.upgrade and not self._is_own_page(head.origins, host):
+            return Refusal(
+                HTTPStatus.FORBIDDEN,
+                "Only the explorer's own page may connect: the Origin must be that of this Host.",
+            )
+        if self.token is not None and not self._knows(query, head.cookies, port):
+            return Refusal(
+                HTTPStatus.UNAUTHORIZED,
+                "This explorer asks for a token: open the whole address that it told on start, "
+                "with ?token=...",
+            )
+        return None
+
+    def headers(self, head: Head, port: int) -> list[tuple[str, str]]:
+        """Return the headers that go with the page, for a request that may pass."""
+        host = head.hosts[0].lower()
+        headers = [
+            ("Content-Security-Policy", POLICY.format(host=host)),
+            ("X-Content-Type-Options", "nosniff"),
+            ("Referrer-Policy", "no-referrer"),
+            ("Cross-Origin-Resource-Policy", "same-origin"),
+        ]
+        if self.token is not None:
+            cookie = f"{_cookie_name(port)}={self.token}; Path=/; HttpOnly; SameSite=Strict"
+            headers.append(("Set-Cookie", cookie))
+        return headers
+
+    def _is_ours(self, host: str, port: int) -> bool:
+        found = HOST.fullmatch(host)
+        if found is None:
+            return False
+        name = found["name"]
+        if self.token is None:
+            return name in {*LOOPBACK_NAMES, _in_address(self.host).lower()} and port == int(
+                found["port"] or HTTP_PORT
+            )
+        # Rebinding takes a name, so any address will do; and a container's port is mapped to ours.
+        short = name.partition(".")[0]
+        known = (self.host.lower(), "localhost", socket.gethostname().lower())
+        return _is_address(name.strip("[]")) or name in known or short == known[-1]
+
+    def _is_own_page(self, origins: Sequence[str], host: str) -> bool:
+        # A program that is no browser can say what it likes, so it can say this as well.
+        if len(origins) != 1:
+            return False
+        scheme, _, rest = origins[0].lower().partition("://")
+        return scheme in ("http", "https") and rest == host
+
+    def _knows(self, query: str, cookies: Sequence[str], port: int) -> bool:
+        given = [
+            value
+            for name, _, value in (pair.partition("=") for pair in query.split("&"))
+            if name == "token"
+        ]
+        for text in cookies:
+            try:
+                cookie = SimpleCookie(text).get(_cookie_name(port))
+            except CookieError:
+                continue
+            if cookie is not None:
+                given.append(cookie.value)
+        secret = (self.token or "").encode()
+        return any(hmac.compare_digest(v.encode(errors="replace"), secret) for v in given)
+
+
+def is_loopback(host: str) -> bool:
+    """Whether what listens on this host is heard on this machine alone."""
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def _is_address(name: str) -> bool:
+    try:
+        ipaddress.ip_address(name)
+    except ValueError:
+        return False
+    return True
+
+
+def _cookie_name(port: int) -> str:
+    # Browsers keep cookies apart by host, but not by port.
+    return f"explorer-token-{port}"
+
+
+def _in_address(host: str) -> str:
+    return f"[{host}]" if ":" in host else host

@@ -1,0 +1,189 @@
+"""The live page inside a notebook, and the state behind it from Python.
+
+The page is served on this machine and shown in a frame, so the notebook's browser must run on
+this machine too, or reach it as if it did, for instance by `ssh -L`.
+"""
+
+from __future__ import annotations
+
+import atexit
+import threading
+import weakref
+from html import escape
+from types import TracebackType
+from typing import Self
+
+from explorer.app.actions import Action, Open, SetPose
+from explorer.app.server import Running, start
+from explorer.design import Design
+from explorer.design_file import load_design
+from explorer.errors import InputError
+from explorer.pose import Pose
+
+LEAST_HEIGHT = 100
+STYLE = "border:1px solid rgba(128,128,128,0.35);border-radius:4px"
+
+
+class Shown:
+    """A running explorer that a notebook displays; it ends when nothing refers to it any more.
+
+    Args:
+        running: The explorer.
+        height: Of its frame, in pixels.
+    """
+
+    def __init__(self, running: Running, height: int) -> None:
+        self._running = running
+        self._height = height
+        self._end = weakref.finalize(self, _end, running)
+        # viser ends its servers at exit by itself, and says so; this comes before.
+        self._end.atexit = False
+        atexit.register(self._end)
+
+    @property
+    def url(self) -> str:
+        """Where a browser on this machine finds the page."""
+        return self._running.url
+
+    @property
+    def is_running(self) -> bool:
+        """Whether the page is still served."""
+        return self._end.alive
+
+    @property
+    def design(self) -> Design:
+        """The design as it is on the page; assigning one opens it in its home pose.
+
+        Assigned it may be a design, the name of a preset, or a file.
+
+        Raises:
+            DesignError: no such preset or file, or a file that holds no design.
+            InputError: it is stopped, or the design is being optimised.
+        """
+        self._check_running()
+        return self._running.page.session.state.design
+
+    @design.setter
+    def design(self, design: Design | str) -> None:
+        self._do(Open(_as_design(design)))
+
+    @property
+    def pose(self) -> Pose:
+        """The pose as it is on the page; assigning one moves the platform there.
+
+        Raises:
+            InputError: it is stopped.
+        """
+        self._check_running()
+        return self._running.page.session.state.pose
+
+    @pose.setter
+    def pose(self, pose: Pose) -> None:
+        self._do(SetPose(_as_pose(pose)))
+
+    def stop(self) -> None:
+        """End the page; its last picture stays in the notebook until that is loaded again."""
+        if self._end.detach() is not None:
+            atexit.unregister(self._end)
+            self._running.stop()
+
+    def _do(self, action: Action) -> None:
+        """Do what is refused here rather than on the page."""
+        self._check_running()
+        session = self._running.page.session
+        session.wait_until_idle()
+        action.apply(session.state)
+        session.do(action)
+        session.wait_until_idle()
+
+    def _check_running(self) -> None:
+        if not self.is_running:
+            raise InputError("this explorer is stopped; call explorer.show again")
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.stop()
+
+    def __repr__(self) -> str:
+        if not self.is_running:
+            return "Flagged 4-4 explorer, stopped"
+        return f"Flagged 4-4 explorer of {self.design.name!r}: {self.url}"
+
+    def _repr_html_(self) -> str:
+        if not self.is_running:
+            return f"<p>{escape(repr(self))}</p>"
+        return (
+            f'<iframe src="{escape(self.url)}" title="{escape(repr(self))}" width="100%" '
+            f'height="{self._height}" style="{STYLE}"></iframe>'
+        )
+
+    def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> dict[str, str]:
+        """Return what Jupyter displays."""
+        del include, exclude
+        return {"text/html": self._repr_html_(), "text/plain": repr(self)}
+
+
+def show(
+    design: Design | str = "paper-optimal",
+    pose: Pose | None = None,
+    *,
+    height: int = 600,
+    port: int = 0,
+) -> Shown:
+    """Serve the live page and return what displays it inline in a notebook.
+
+    In a plain Python shell nothing opens; what is returned says where the page is.
+
+    Args:
+        design: The manipulator to open: itself, the name of a preset, or a design file.
+        pose: In which to open it; its home pose if None.
+        height: Of the frame in the notebook, in pixels.
+        port: The port to listen on; any free one if 0.
+
+    Raises:
+        InputError: a height that is too small, or a design or pose that cannot be drawn.
+        DesignError: no such preset or file, or a file that holds no design.
+        ServerError: the port cannot be had.
+    """
+    if height < LEAST_HEIGHT:
+        raise InputError(f"the height must be {LEAST_HEIGHT} pixels at least; got {height}")
+    at = None if pose is None else _as_pose(pose)
+    return Shown(start(_as_design(design), at, port=port), height)
+
+
+def _as_design(given: object) -> Design:
+    """Return the design that was given, whichever way.
+
+    Raises:
+        InputError: it is none.
+        DesignError: no such preset or file, or a file that holds no design.
+    """
+    if isinstance(given, str):
+        return load_design(given)
+    if not isinstance(given, Design):
+        raise InputError(
+            f"a design is an explorer.Design, the name of a preset or a file; got {given!r:.50}"
+        )
+    return given
+
+
+def _as_pose(given: object) -> Pose:
+    if not isinstance(given, Pose):
+        raise InputError(f"a pose is an explorer.Pose; got {given!r:.50}")
+    return given
+
+
+def _end(running: Running) -> None:
+    if not threading.main_thread().is_alive():
+        # Python is ending, and starts no more threads.
+        running.stop()
+        return
+    # The collector may run on a thread of this very server, which cannot wait for itself.
+    threading.Thread(target=running.stop, name="explorer stops", daemon=True).start()

@@ -1,0 +1,120 @@
+"""What a report tells of singularities: margins, measures, the nearest poses, performance."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from xml.etree.ElementTree import Element
+
+from explorer.bruhat import incidences, words
+from explorer.export.report.findings import Findings
+from explorer.export.report.markup import Cell, count, element, figure, paragraph, table, written
+from explorer.export.report.mechanism_section import pose_words
+from explorer.performance import Ellipsoid
+from explorer.pose import yaw_pitch_roll_from_rotation
+from explorer.singularity import INCIDENCES, TETRAHEDRA, mode_name
+
+
+def singularity_section(found: Findings) -> Iterator[Element]:
+    """Yield the section on singularities."""
+    snapshot, unit = found.snapshot, found.design.unit_mm
+    yield element("h2", "Singularities")
+    vanishing = incidences(snapshot.stratum)
+    if vanishing:
+        names = " and ".join(INCIDENCES[index - 1] for index in vanishing)
+        yield paragraph(f"The pose is singular: {names}.", class_="note")
+    yield paragraph(
+        "The mechanism is singular exactly where one of three margins is zero; each is the height "
+        "of a tetrahedron. The signs of the three name the assembly mode."
+    )
+    yield table(
+        ("margin", "zero when", "units", "mm", "tetrahedron", "volume, units³"),
+        [
+            (
+                element("b", f"κ{k + 1}"),
+                INCIDENCES[k],
+                float(snapshot.margins[k]),
+                float(snapshot.margins[k]) * unit,
+                " ".join(TETRAHEDRA[k]),
+                float(snapshot.volumes[k]),
+            )
+            for k in range(3)
+        ],
+        align="<<>><>",
+        caption=f"Margins in {pose_words(found)}",
+    )
+    yield table(
+        (),
+        [
+            ("determinant of the Jacobian", snapshot.determinant, ""),
+            (
+                "inverse condition number, with the reach",
+                snapshot.inverse_condition,
+                "0 singular, 1 best",
+            ),
+            ("proximity: smallest |κ| over the reach", snapshot.proximity, ""),
+            ("assembly mode", count(snapshot.mode), mode_name(snapshot.mode)),
+            (
+                "stratum of the two flags",
+                " ".join(map(str, snapshot.stratum)),
+                f"dimension {snapshot.stratum_dimension}: {words(snapshot.stratum)}",
+            ),
+            (
+                "ball of positions without a singular one",
+                found.ball.radius,
+                ("radius in units; ", figure(found.ball.radius * unit), " mm"),
+            ),
+            (
+                "all poses nearer than this are regular",
+                found.certified,
+                ("units, mean way of b1 to b4; ", figure(found.certified * unit), " mm"),
+            ),
+        ],
+        align="<><",
+        caption="Measures",
+    )
+    yield _nearest(found)
+    yield element(
+        "div",
+        _ellipsoid(found.performance.translation, "Speed of b4 per actuator speed"),
+        _ellipsoid(found.performance.rotation, "Turning, times the reach"),
+        class_="pair",
+    )
+    yield paragraph(
+        "Gains are also the actuator force per force, or per moment over the reach, along the same "
+        "direction: where the platform is fast, it is weak.",
+        class_="dim",
+    )
+
+
+def _nearest(found: Findings) -> Element:
+    unit = found.design.unit_mm
+    rows: list[tuple[Cell, ...]] = []
+    for each in found.snapshot.nearest:
+        angles = yaw_pitch_roll_from_rotation(each.pose.rotation).tolist()
+        rows.append(
+            (
+                element("b", f"κ{each.incidence} = 0"),
+                each.distance,
+                each.distance * unit,
+                *(figure(value, 5) for value in each.pose.position),
+                *((figure(value, 5), "°") for value in angles),
+            )
+        )
+    return table(
+        ("nearest with", "units", "mm", "x", "y", "z", "yaw", "pitch", "roll"),
+        rows,
+        align="<>>>>>>>>",
+        caption="Nearest singular poses, by the root-mean-square way of b1 to b4",
+    )
+
+
+def _ellipsoid(ellipsoid: Ellipsoid, caption: str) -> Element:
+    rows: list[tuple[Cell, ...]] = [
+        (
+            written(index, 1),
+            float(gain),
+            ", ".join(f"{x:z.3f}".replace("-", "−") for x in axis.tolist()),
+        )
+        for index, (gain, axis) in enumerate(zip(ellipsoid.gain, ellipsoid.axes.T, strict=True), 1)
+    ]
+    return table(("", "gain", "along (x, y, z)"), rows, align="<>>", caption=caption)

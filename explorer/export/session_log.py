@@ -1,0 +1,90 @@
+"""Where the platform was in a session, as a table of comma-separated values.
+
+Each row holds its design too, so that it can be computed again by itself: the forward kinematics
+of its joints in its mode is its pose.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from dataclasses import dataclass
+
+import numpy as np
+
+from explorer.arrays import FloatArray
+from explorer.design import VARIABLES
+from explorer.design_file import PRESETS
+from explorer.export.trajectory import COLUMNS as OF_TRAJECTORIES
+from explorer.kinematics import inverse
+from explorer.pose import rotation_from_quaternion
+from explorer.singularity import margins
+
+COLUMNS = (
+    *OF_TRAJECTORIES,
+    *("kappa1", "kappa2", "kappa3", "mode", "moved_by", "unit_mm"),
+    *VARIABLES,
+)
+"""The names of the columns; lengths are in design units of `unit_mm` millimetres, and so are
+the margins kappa1 to kappa3. What moved the platform is told in words."""
+
+
+@dataclass(frozen=True)
+class SessionTable:
+    """The poses of a session, in their order.
+
+    Attributes:
+        time: In seconds since the session began, shape (n,).
+        position: b4 in the base frame, in design units, shape (n, 3).
+        quaternion: Platform to base, (w, x, y, z), shape (n, 4).
+        mode: The assembly mode, 0 to 7, shape (n,).
+        moved_by: What brought the platform there.
+        unit_mm: Millimetres in one design unit, shape (n,).
+        variables: Of the design, in the order of `VARIABLES`, shape (n, 6).
+    """
+
+    time: FloatArray
+    position: FloatArray
+    quaternion: FloatArray
+    mode: FloatArray
+    moved_by: tuple[str, ...]
+    unit_mm: FloatArray
+    variables: FloatArray
+
+
+def session_csv(table: SessionTable) -> str:
+    """Return the poses of a session as text: a line of names, then a line for each pose.
+
+    Numbers are written so that they read back to the last bit.
+    """
+    rotation = rotation_from_quaternion(table.quaternion)
+    numbers = np.column_stack(
+        [
+            table.time,
+            _joints(table, rotation),
+            table.position,
+            table.quaternion,
+            margins(table.position, rotation),
+        ]
+    ).tolist()
+    design = np.column_stack([table.unit_mm, table.variables]).tolist()
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    modes = table.mode.astype(int).tolist()
+    for number, mode, moved_by, own in zip(numbers, modes, table.moved_by, design, strict=True):
+        writer.writerow([*map(repr, number), mode, moved_by, *map(repr, own)])
+    return text.getvalue()
+
+
+def _joints(table: SessionTable, rotation: FloatArray) -> FloatArray:
+    """Return the joints (n, 6), each row in the design of its own."""
+    joints = np.empty((len(table.time), 6))
+    if not len(joints):
+        return joints
+    any_design = next(iter(PRESETS.values()))
+    changes = np.flatnonzero((np.diff(table.variables, axis=0) != 0.0).any(axis=1)) + 1
+    for rows in np.split(np.arange(len(joints)), changes):
+        design = any_design.with_variables(table.variables[rows[0]].tolist())
+        joints[rows] = inverse(design, table.position[rows], rotation[rows])
+    return joints

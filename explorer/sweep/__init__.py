@@ -1,0 +1,1 @@
+"""Design studies: many designs measured at once, on one machine or a cluster, kept as Parquet."""

@@ -1,0 +1,243 @@
+"""Results of a study as Parquet: a part for each chunk, written whole or not at all.
+
+The bytes of a part are a function of the study, its chunk and the versions of the
+libraries: it holds no time and no place. Each carries its study, the study's hash, the seed,
+the chunk and the versions in its metadata. Needs the extra `study`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+import io
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from explorer.errors import InputError, MissingExtraError
+from explorer.files import write_whole
+from explorer.sweep.rows import Kind, Rows, columns_of
+from explorer.sweep.study import Study, decode_study, encode_study, study_hash
+
+SUFFIX = ".parquet"
+
+_STUDY, _HASH, _SEED = b"explorer.study", b"explorer.study_hash", b"explorer.seed"
+_CHUNK, _VERSIONS = b"explorer.chunk", b"explorer.versions"
+
+
+class BadPartError(InputError):
+    """A part that is damaged, cut off or not of this study."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """What a part says of itself.
+
+    Attributes:
+        study: The encoded study.
+        study_hash: Of it.
+        chunk: Its number.
+        versions: Of the libraries that computed it.
+    """
+
+    study: bytes
+    study_hash: str
+    chunk: int
+    versions: dict[str, str]
+
+
+def part_path(folder: Path, chunk: int) -> Path:
+    """Return the file of a chunk's part."""
+    return folder / f"part-{chunk:06d}{SUFFIX}"
+
+
+def part_paths(folder: Path) -> list[Path]:
+    """Return the files in a folder that are named as parts are, in the order of their chunks."""
+    return [path for _, path in _numbered(folder)]
+
+
+def stray_paths(folder: Path, study: Study) -> list[Path]:
+    """Return the Parquet files in a folder that are named after no chunk of a study.
+
+    Copies of parts, for instance: what reads all Parquet of a folder reads their rows twice.
+    """
+    own = {path for chunk, path in _numbered(folder) if chunk < study.chunks}
+    return sorted(set(_visible(folder)) - own)
+
+
+def _numbered(folder: Path) -> list[tuple[int, Path]]:
+    """Return chunks and the files that have the very names of their parts, in order."""
+    found: list[tuple[int, Path]] = []
+    for path in _visible(folder):
+        number = path.stem.removeprefix("part-")
+        if number.isascii() and number.isdigit() and path == part_path(folder, int(number)):
+            found.append((int(number), path))
+    return sorted(found)
+
+
+def _visible(folder: Path) -> list[Path]:
+    # Readers of Parquet folders pass over the others.
+    return [path for path in folder.glob(f"*{SUFFIX}") if not path.name.startswith((".", "_"))]
+
+
+def write_part(folder: Path, study: Study, chunk: int, pieces: Sequence[Rows]) -> None:
+    """Write the part of a chunk.
+
+    Args:
+        folder: To write it to.
+        study: The study.
+        chunk: Its number.
+        pieces: Its rows, in order and without gaps.
+
+    Raises:
+        StorageError: it cannot be written; what was there before is unchanged.
+        MissingExtraError: pyarrow is not installed.
+    """
+    arrow, parquet = pyarrow(), _parquet()
+    fields: list[Any] = []
+    columns: list[Any] = []
+    for name, kind in columns_of(study).items():
+        fields.append(arrow.field(name, _type(kind)))
+        values = [value for piece in pieces for value in piece.columns[name]]
+        columns.append(arrow.array(values, type=_type(kind)))
+    metadata = {
+        _STUDY: encode_study(study),
+        _HASH: study_hash(study).encode(),
+        _SEED: str(study.sampling.seed).encode(),
+        _CHUNK: str(chunk).encode(),
+        _VERSIONS: json.dumps(pieces[0].versions, sort_keys=True).encode(),
+    }
+    table = arrow.table(columns, schema=arrow.schema(fields, metadata=metadata))
+    data = io.BytesIO()
+    parquet.write_table(table, data, compression="zstd", write_page_checksum=True)
+    write_whole(part_path(folder, chunk), data.getvalue())
+
+
+def read_part(path: Path, columns: Sequence[str] | None = None) -> tuple[Part, Any]:
+    """Return what a part says of itself, and its table.
+
+    Args:
+        path: Of the part.
+        columns: To read; None for all.
+
+    Raises:
+        BadPartError: it is damaged or cut off, or no part of a study.
+        MissingExtraError: pyarrow is not installed.
+    """
+    arrow, parquet = pyarrow(), _parquet()
+    try:
+        file = parquet.ParquetFile(path, page_checksum_verification=True)
+        with file:
+            part = _told(file.schema_arrow.metadata or {}, file.metadata.metadata or {})
+            return part, file.read(columns=None if columns is None else list(columns))
+    except (arrow.ArrowException, OSError, ValueError, KeyError) as error:
+        raise BadPartError(f"{path} is no part of a study: {_line(error)}") from None
+
+
+def _told(metadata: Mapping[bytes, bytes], again: Mapping[bytes, bytes]) -> Part:
+    """Return what a part says of itself, twice and without a checksum.
+
+    Raises:
+        KeyError: it says nothing.
+        ValueError: it is damaged.
+    """
+    names = (_STUDY, _HASH, _SEED, _CHUNK, _VERSIONS)
+    part = Part(
+        study=metadata[_STUDY],
+        study_hash=metadata[_HASH].decode(),
+        chunk=int(metadata[_CHUNK]),
+        versions=json.loads(metadata[_VERSIONS]),
+    )
+    if (
+        any(metadata[name] != again[name] for name in names)
+        or hashlib.sha256(part.study).hexdigest() != part.study_hash
+    ):
+        raise ValueError("its metadata is damaged")
+    return part
+
+
+def sound_parts(
+    folder: Path, damaged: list[Path], study: Study | None = None
+) -> Iterator[tuple[Study, int, Any]]:
+    """Yield the study, the chunk and the table of each part in a folder that counts.
+
+    It is read whole, since each column has checksums of its own; and it must hold the rows of
+    the chunk that it is named after. Whoever reads results and whoever goes on with them must
+    see the same parts.
+
+    Args:
+        folder: Of the results.
+        damaged: Takes the parts that do not count; a run computes them again.
+        study: That they must be of; that of the first one if None.
+
+    Raises:
+        InputError: a part is of another study.
+        MissingExtraError: pyarrow is not installed.
+    """
+    known = None if study is None else study_hash(study)
+    for chunk, path in _numbered(folder):
+        try:
+            part, table = read_part(path)
+        except BadPartError:
+            if study is None or chunk < study.chunks:
+                damaged.append(path)
+            continue
+        if study is None or known is None:
+            study, known = decode_study(part.study, str(path)), part.study_hash
+        if part.study_hash != known:
+            raise InputError(
+                f"{folder} holds results of several studies: {path.name} is a part of another "
+                "study; move it away"
+            )
+        if chunk >= study.chunks:
+            continue
+        if part.chunk == chunk and _is_whole(table, study, chunk):
+            yield study, chunk, table
+        else:
+            damaged.append(path)
+
+
+def _is_whole(table: Any, study: Study, chunk: int) -> bool:
+    """Return whether a table holds all rows of a chunk."""
+    return table.column_names == [*columns_of(study)] and table.column("index").to_pylist() == [
+        *study.rows_of(chunk)
+    ]
+
+
+def pyarrow() -> Any:
+    """Return the library that reads and writes Parquet.
+
+    Raises:
+        MissingExtraError: it is not installed.
+    """
+    return _imported("pyarrow")
+
+
+def _parquet() -> Any:
+    return _imported("pyarrow.parquet")
+
+
+def _imported(name: str) -> Any:
+    try:
+        return importlib.import_module(name)
+    except ImportError:
+        raise MissingExtraError(
+            "studies are kept as Parquet, which needs the extra study: "
+            'pip install "flagged-explorer[study]"'
+        ) from None
+
+
+def _type(kind: Kind) -> Any:
+    arrow = pyarrow()
+    return {
+        "count": arrow.int64(),
+        "number": arrow.float64(),
+        "flag": arrow.bool_(),
+        "text": arrow.string(),
+    }[kind]
+
+
+def _line(error: Exception) -> str:
+    return " ".join(str(error).split()) or type(error).__name__

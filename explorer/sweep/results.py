@@ -1,0 +1,183 @@
+"""The results of a study: a folder of parts, read whole into columns or part by part."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from explorer.arrays import BoolArray
+from explorer.design import Design
+from explorer.errors import InputError
+from explorer.sweep.front import costs, front, incomparable, undominated
+from explorer.sweep.parts import sound_parts, stray_paths
+from explorer.sweep.rows import Value, columns_of, design_of
+from explorer.sweep.study import Study
+
+Column = NDArray[Any]
+
+
+@dataclass(frozen=True)
+class Results:
+    """What is known of the designs of a study so far.
+
+    Attributes:
+        study: The study.
+        columns: By name, in the order of the files, shape (n,) each: numbers as float64 with
+            NaN where there is none, "index" as int64, "status" and "reason" as str objects.
+    """
+
+    study: Study
+    columns: dict[str, Column]
+
+    @property
+    def count(self) -> int:
+        """How many rows there are."""
+        return len(self.columns["index"])
+
+    def front(self) -> BoolArray:
+        """Return which rows are on the Pareto front of the study's objectives, shape (n,)."""
+        if not self.study.objectives:
+            return np.zeros(self.count, dtype=np.bool_)
+        return front(self.columns, self.study.objectives)
+
+    def design_of_row(self, row: int) -> Design:
+        """Return the design of a row.
+
+        Args:
+            row: From 0; where parts are missing it is not the design's index.
+
+        Raises:
+            InputError: there is no such row.
+            DesignError: the row is one of an invalid design.
+        """
+        if not 0 <= row < self.count:
+            raise InputError(f"the row must lie within 0 to {self.count - 1}; got {row}")
+        values = {name: float(self.columns[name][row]) for name in self.study.varied}
+        return design_of_index(self.study, int(self.columns["index"][row]), values)
+
+
+def design_of_index(study: Study, index: int, values: Mapping[str, float]) -> Design:
+    """Return the design of some values, named after its study and its index.
+
+    Raises:
+        DesignError: the values make a degenerate design.
+    """
+    return design_of(study, values, f"{study.name[:80]} #{index}")
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What a results folder holds, found in one pass that keeps nothing but the front.
+
+    Attributes:
+        study: The study.
+        counts: How many rows have each status.
+        front: The rows on the Pareto front, by the order of their first objective.
+        incomparable: How many rows are done but lack an objective: the front has none of them.
+        damaged: How many parts cannot be read; a run computes them again.
+        strays: Names of Parquet files that are no parts of the study, such as copies.
+    """
+
+    study: Study
+    counts: dict[str, int]
+    front: list[dict[str, Value]]
+    incomparable: int
+    damaged: int
+    strays: list[str]
+
+    @property
+    def count(self) -> int:
+        """How many rows there are."""
+        return sum(self.counts.values())
+
+
+def design_at(folder: str | Path, index: int) -> Design:
+    """Return the design with an index, reading no more parts than there are before its own.
+
+    Raises:
+        InputError: the folder holds no results, or not yet those of this design.
+        DesignError: its variables make no design.
+        MissingExtraError: pyarrow is not installed.
+    """
+    study, damaged = None, list[Path]()
+    for study, _, table in sound_parts(Path(folder), damaged):
+        at = np.flatnonzero(_column(table, "index", "count") == index)
+        if len(at):
+            row = table.slice(int(at[0]), 1).to_pylist()[0]
+            return design_of_index(study, index, {name: row[name] for name in study.varied})
+    if study is None:
+        raise _nothing(folder, damaged)
+    if index >= study.count:
+        raise InputError(f"the index must lie within 0 to {study.count - 1}; got {index}")
+    raise InputError(f"design {index} has not been computed yet")
+
+
+def load_results(folder: str | Path) -> Results:
+    """Return the rows of a results folder, as far as they have been computed.
+
+    Raises:
+        InputError: the folder holds no results, or those of several studies.
+        MissingExtraError: pyarrow is not installed.
+    """
+    damaged: list[Path] = []
+    parts = list(sound_parts(Path(folder), damaged))
+    if not parts:
+        raise _nothing(folder, damaged)
+    study = parts[0][0]
+    columns = {
+        name: np.concatenate([_column(table, name, kind) for *_, table in parts])
+        for name, kind in columns_of(study).items()
+    }
+    return Results(study, columns)
+
+
+def summarise(folder: str | Path) -> Summary:
+    """Return a summary of a results folder, in memory that its number of parts does not raise.
+
+    Raises:
+        InputError: the folder holds no results, or those of several studies.
+        MissingExtraError: pyarrow is not installed.
+    """
+    damaged: list[Path] = []
+    counts: Counter[str] = Counter()
+    study, best, lacking = None, list[dict[str, Value]](), 0
+    for study, _, table in sound_parts(Path(folder), damaged):
+        columns = {name: _column(table, name, kind) for name, kind in columns_of(study).items()}
+        counts.update(columns["status"].tolist())
+        if study.objectives:
+            lacking += int(incomparable(columns, study.objectives).sum())
+            chosen = table.filter(front(columns, study.objectives))
+            best = _merged(best + chosen.to_pylist(), study)
+    if study is None:
+        raise _nothing(folder, damaged)
+    first = study.objectives[0] if study.objectives else None
+    if first is not None:
+        best.sort(key=lambda row: float(row[first.measure] or 0.0), reverse=first.sense == "max")
+    strays = [path.name for path in stray_paths(Path(folder), study)]
+    return Summary(study, dict(counts), best, lacking, len(damaged), strays)
+
+
+def _merged(rows: list[dict[str, Value]], study: Study) -> list[dict[str, Value]]:
+    names = [each.measure for each in study.objectives]
+    columns = {name: np.array([row[name] for row in rows], dtype=np.float64) for name in names}
+    return [rows[index] for index in undominated(costs(columns, study.objectives)).tolist()]
+
+
+def _column(table: Any, name: str, kind: str) -> Column:
+    # What is missing becomes NaN in numbers; the index and texts have nothing missing.
+    dtype = object if kind == "text" else np.int64 if name == "index" else np.float64
+    return np.asarray(table.column(name).to_numpy(), dtype=dtype)
+
+
+def _nothing(folder: str | Path, damaged: Sequence[Path]) -> InputError:
+    told = f"{str(folder)!r} holds no results of a study"
+    if not damaged:
+        return InputError(told)
+    more = f" and {len(damaged) - 1} more" if len(damaged) > 1 else ""
+    return InputError(f"{told} that can be read: {damaged[0].name}{more} cannot be")

@@ -1,0 +1,337 @@
+"""What becomes of each design of a study: one row, whatever happens.
+
+A row is a function of the study and its index alone. What goes wrong with a design is told
+in its row, by a status and a reason; there are no holes.
+"""
+
+from __future__ import annotations
+
+import functools
+import importlib
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+import msgspec
+
+from explorer.compiled import warm
+from explorer.design import Design
+from explorer.errors import DesignError, InputError
+from explorer.optimise.problem import YAW, Problem, Variable, start_value, varied, with_strokes
+from explorer.sweep.measures import Case, measured
+from explorer.sweep.sampling import samples
+from explorer.sweep.study import RADIUS, Study, decode_study
+from explorer.versions import versions
+
+Status = Literal[
+    "done", "not converged", "empty workspace", "invalid design", "failed", "worker died"
+]
+"""Done: all is measured. Not converged: a search met not all demands; its best is measured.
+Empty workspace: there is nothing to measure but the design. Invalid design: the variables
+make none. Failed: an error that is not the design's. Worker died: whoever tried it died."""
+
+Kind = Literal["count", "number", "flag", "text"]
+Value: TypeAlias = float | int | bool | str | None
+"""Of a row; None where there is nothing to tell."""
+
+# Before none of a study's designs can be used, so many are tried.
+MOST_TRIED = 256
+GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
+
+# Of an angle, in turns.
+ROUNDING = 1e-12
+
+SAMPLE = "sample_"
+"""What the columns begin with that hold where a search started."""
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Some rows of a study.
+
+    Attributes:
+        indices: Of the designs, without gaps.
+        columns: By name, as many values as there are indices, see `columns_of`.
+        versions: Of the libraries that computed them.
+    """
+
+    indices: range
+    columns: dict[str, list[Value]]
+    versions: dict[str, str]
+
+
+def columns_of(study: Study) -> dict[str, Kind]:
+    """Return the columns of a study's rows by name, in their order."""
+    found: dict[str, Kind] = {"index": "count"}
+    if study.polish is not None:
+        found.update((f"{SAMPLE}{name}", "number") for name in study.variables)
+    found.update((name, "number") for name in (*study.varied, *study.measures))
+    if study.polish is not None:
+        found.update(objective="number", iterations="count", converged="flag")
+    found.update(status="text", reason="text")
+    return found
+
+
+def evaluate(study: bytes, start: int, stop: int) -> Rows:
+    """Return the rows of some designs.
+
+    Args:
+        study: As encoded by `encode_study`.
+        start: Index of the first design.
+        stop: Index after the last one.
+    """
+    decoded = _decoded(study)
+    indices = range(start, stop)
+    values = samples(decoded, indices)
+    rows = [
+        _row(decoded, index, dict(zip(decoded.variables, row, strict=True)))
+        for index, row in zip(indices, values.tolist(), strict=True)
+    ]
+    return _as_columns(decoded, indices, rows)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a worker says to a task.
+
+    Attributes:
+        pieces: The rows of each piece of the task.
+        seconds: It took to find them.
+    """
+
+    pieces: tuple[Rows, ...]
+    seconds: float
+
+
+def answer(
+    function: Callable[[bytes, int, int], Rows], study: bytes, pieces: Sequence[range]
+) -> Answer:
+    """Return the rows of several pieces of a study, and how long they took.
+
+    Args:
+        function: Finds the rows of one piece, such as `evaluate`.
+        study: As encoded by `encode_study`.
+        pieces: The indices of their designs.
+    """
+    began = time.perf_counter()
+    found = tuple(function(study, piece.start, piece.stop) for piece in pieces)
+    return Answer(found, time.perf_counter() - began)
+
+
+def lost(study: Study, indices: range, reason: str) -> Rows:
+    """Return the rows of designs that nobody could evaluate: their workers died."""
+    rows: list[dict[str, Value]] = []
+    for index, row in zip(indices, samples(study, indices).tolist(), strict=True):
+        sample = dict(zip(study.variables, row, strict=True))
+        rows.append(_begun(study, index, sample) | {"status": "worker died", "reason": reason})
+    return _as_columns(study, indices, rows)
+
+
+def design_of(study: Study, values: Mapping[str, float], name: str | None = None) -> Design:
+    """Return the design with some values of the variables that a study varies.
+
+    Args:
+        study: The study.
+        values: By name; a variable that is left out is as in the study's design.
+        name: Of the design; that of the study's if None.
+
+    Raises:
+        DesignError: the values make a degenerate design.
+    """
+    design = varied(study.base, values)
+    if RADIUS in values:
+        limits = msgspec.structs.replace(design.limits, leg_radii=(values[RADIUS],) * 4)
+        design = msgspec.structs.replace(design, limits=limits)
+    if study.polish is not None:
+        design = with_strokes(design, study.polish.demands.stroke_ratio)
+    return design if name is None else msgspec.structs.replace(design, name=name)
+
+
+def problem_of(study: Study, sample: Mapping[str, float]) -> Problem:
+    """Return the problem that is solved from a sample.
+
+    Raises:
+        InputError: the sample makes no design, or one that the problem does not allow.
+    """
+    if study.polish is None:
+        raise InputError("this study polishes nothing")
+    without = msgspec.structs.replace(study, polish=None)
+    start = design_of(without, sample)
+    variables: list[Variable] = []
+    for name in study.polished:
+        value = start_value(start, name)
+        turns = _turns(study, sample, value) if name == YAW else 0.0
+        low, high = (end - turns for end in _bounds(study, sample, name))
+        # An angle that has been through a quaternion may leave its range by rounding.
+        ends = (low, high, value) if name in study.variables else (low, high)
+        variables.append(Variable(name, min(ends), max(ends)))
+    return Problem(
+        start=start,
+        objective=study.polish.objective,
+        variables=tuple(variables),
+        demands=study.polish.demands,
+    )
+
+
+def _bounds(study: Study, sample: Mapping[str, float], name: str) -> tuple[float, float]:
+    """Return how far a search may change a variable: its range, and the way to it."""
+    low, high = study.polished[name]
+    start = sample.get(name, low)
+    return min(low, start), max(high, start)
+
+
+def _turns(study: Study, sample: Mapping[str, float], yaw: float) -> float:
+    """Return how many degrees a start's yaw, which is within ±180°, is from the study's.
+
+    The study may mean 190° by what a rotation tells as −170°.
+    """
+    if YAW in sample:
+        return 360.0 * round((sample[YAW] - yaw) / 360.0)
+    return 360.0 * math.ceil((study.polished[YAW][0] - yaw) / 360.0 - ROUNDING)
+
+
+def found_values(
+    study: Study, sample: Mapping[str, float], problem: Problem, values: Sequence[float]
+) -> dict[str, float]:
+    """Return what a search found, by name, within the study's ranges and counted as they are.
+
+    Args:
+        study: The study.
+        sample: Where the search began.
+        problem: That it solved, see `problem_of`.
+        values: That it found.
+    """
+    found = dict(zip(problem.names, values, strict=True))
+    if YAW in found:
+        found[YAW] += _turns(study, sample, start_value(problem.start, YAW))
+    for name, value in found.items():
+        low, high = _bounds(study, sample, name)
+        # By rounding alone would it leave them.
+        found[name] = min(max(value, low), high)
+    return found
+
+
+def check_study(study: Study) -> None:
+    """Raise an `InputError` if no design of a study, of some all over it, can be made or polished.
+
+    So that what is wrong with all of them is told at once, rather than in every row.
+    """
+    first: InputError | None = None
+    tried = _all_over(study)
+    for row in tried:
+        sample = dict(zip(study.variables, row, strict=True))
+        try:
+            if study.polish is None:
+                design_of(study, sample)
+            else:
+                problem_of(study, sample)
+        except InputError as error:
+            first = first or error
+        else:
+            return
+    which = "the" if len(tried) == study.count else f"{len(tried)}"
+    raise InputError(f"none of {which} designs all over the study can be used: {first}")
+
+
+def _all_over(study: Study) -> list[list[float]]:
+    """Return the samples of a study, or some that lie all over its ranges."""
+    count = study.count
+    if study.sampling.method != "grid" or count <= MOST_TRIED:
+        # The first points of a sequence or a hypercube are spread like the others.
+        return samples(study, range(min(count, MOST_TRIED))).tolist()
+    # Multiples of the golden section leave no gaps and keep no step with a grid.
+    indices = [int(count * (k * GOLDEN % 1.0)) for k in range(MOST_TRIED)]
+    return [samples(study, range(index, index + 1))[0].tolist() for index in indices]
+
+
+def ready() -> None:
+    """Load what most studies need, so that their first rows come at once."""
+    importlib.import_module("scipy.stats")
+    warm()
+
+
+def load_kernels(study: Study) -> None:
+    """Import all kernels that the rows of a study may need."""
+    if study.polish is not None:
+        importlib.import_module("explorer.optimise.solver")
+    if "reachable_volume" in study.measures:
+        importlib.import_module("explorer.reachable")
+
+
+@functools.lru_cache(4)
+def _decoded(study: bytes) -> Study:
+    decoded = decode_study(study, "the study")
+    load_kernels(decoded)
+    # Compiled kernels repay their second within a few designs, and the last digits must
+    # not hang on when they are compiled.
+    warm()
+    return decoded
+
+
+def _row(study: Study, index: int, sample: dict[str, float]) -> dict[str, Value]:
+    row = _begun(study, index, sample)
+    try:
+        _fill(study, sample, row)
+    except DesignError as error:
+        row |= {"status": "invalid design", "reason": _line(error)}
+    except InputError as error:
+        row |= {"status": "failed", "reason": _line(error)}
+    except Exception as error:  # noqa: BLE001 - one design's trouble is not that of the others
+        row |= {"status": "failed", "reason": f"{type(error).__name__}: {_line(error)}"}
+    return row
+
+
+def _begun(study: Study, index: int, sample: Mapping[str, float]) -> dict[str, Value]:
+    """Return a row that knows only where it starts."""
+    row: dict[str, Value] = {"index": index, **sample}
+    if study.polish is not None:
+        row |= {f"{SAMPLE}{name}": value for name, value in sample.items()}
+        missing = [name for name in study.varied if name not in sample]
+        row |= {name: start_value(study.base, name) for name in missing}
+    return row
+
+
+def _fill(study: Study, sample: dict[str, float], row: dict[str, Value]) -> None:
+    status, reason = "done", ""
+    values = sample
+    if study.polish is not None:
+        from explorer.optimise.solver import optimise_design
+
+        outcome = optimise_design(problem_of(study, sample), iterations=study.polish.iterations)
+        found = found_values(study, sample, outcome.problem, outcome.best.values)
+        values = {**sample, **found}
+        row |= {
+            **found,
+            "objective": outcome.best.objective,
+            "iterations": outcome.iterations,
+            "converged": outcome.converged,
+        }
+        if not outcome.converged:
+            # A message begins with how the search ended, which the status may say already.
+            status, reason = "not converged", outcome.run.message.removeprefix("not converged: ")
+    design = design_of(study, values)
+    case = Case(design, study.nodes, study.clearance_margin)
+    if case.volume.volume <= 0.0 and status == "done":
+        because = ", ".join(case.volume.empty_because)
+        status, reason = "empty workspace", f"emptied by {because}" if because else "no volume"
+    row |= measured(case, study.measures)
+    row |= {
+        "status": status,
+        "reason": "; ".join(each for each in (reason, case.reason) if each),
+    }
+
+
+def _as_columns(study: Study, indices: range, rows: list[dict[str, Value]]) -> Rows:
+    columns = {name: [_plain(row.get(name)) for row in rows] for name in columns_of(study)}
+    return Rows(indices, columns, versions())
+
+
+def _plain(value: Value) -> Value:
+    """Return a value, None for what is no number."""
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _line(error: Exception) -> str:
+    return " ".join(str(error).split())

@@ -1,0 +1,371 @@
+"""A study: which designs to make, what to measure of them, and what is wanted.
+
+One JSON document, read as strictly as a design file. What is decoded is complete: the name of
+a preset has become the design itself, so that a study means the same wherever it is read.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Iterable, Mapping
+from importlib import resources
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Literal, cast
+
+import msgspec
+
+from explorer.checks import instance, number, positive, two
+from explorer.design import VARIABLES, Design, Pair
+from explorer.design_file import PRESETS
+from explorer.errors import InputError
+from explorer.files import read_at_most
+from explorer.home import home_pose
+from explorer.node_measures import DEFAULT_NODES, FEWEST_NODES, MOST_NODES
+from explorer.optimise.problem import (
+    OBJECTIVES,
+    REACH,
+    YAW,
+    Demands,
+    ObjectiveName,
+    longest_minimum,
+)
+from explorer.sweep.measures import MEASURES
+
+Method = Literal["sobol", "latin-hypercube", "grid"]
+Sense = Literal["min", "max"]
+
+RADIUS = "radius"
+
+POLISHED = (*VARIABLES, YAW, REACH)
+"""The variables that the optimiser can change."""
+
+NAMES = (*POLISHED, RADIUS)
+"""The variables of a study: those of X, the yaw of home in degrees, one maximum for all four
+lengths, one radius for all four legs."""
+
+# No honest study comes near this size, in bytes.
+LARGEST_FILE = 1_000_000
+# The longest Sobol sequence has as many points.
+MOST_DESIGNS = 2**30
+MOST_IN_CHUNK = 100_000
+MOST_ITERATIONS = 100_000
+LARGEST_SEED = 2**31 - 1
+LONGEST_NAME = 100
+
+DEFAULT_MEASURES = ("volume", "reach", "worst_margin", "clearance", "inverse_condition")
+
+
+def _set(struct: msgspec.Struct, name: str, value: object) -> None:
+    msgspec.structs.force_setattr(struct, name, value)
+
+
+class Sampling(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """How designs are spread over the ranges of the variables.
+
+    Attributes:
+        method: A scrambled Sobol sequence, a Latin hypercube, or a full grid.
+        count: How many designs; of a grid how many values of each variable, or of all.
+        seed: Of the scrambling or the hypercube; a grid has no use for it.
+
+    Raises:
+        InputError: no designs, too many, or a seed out of range.
+    """
+
+    method: Method = "sobol"
+    count: int | dict[str, int]
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.seed <= LARGEST_SEED:
+            raise InputError(f"sampling.seed must lie within 0 to {LARGEST_SEED}; got {self.seed}")
+        if isinstance(self.count, dict):
+            if self.method != "grid":
+                raise InputError(
+                    f"sampling.count must be one number for {self.method}; only a grid takes "
+                    "one for each variable"
+                )
+            for name, count in self.count.items():
+                _within(f"sampling.count of {name}", count, 1, MOST_DESIGNS)
+        else:
+            _within("sampling.count", self.count, 1, MOST_DESIGNS)
+
+
+class Polish(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A search for the optimum from each sample, see `explorer.optimise`.
+
+    Attributes:
+        objective: What is wanted.
+        demands: What must hold.
+        variables: What the search may change, and the bounds; None for the variables of the
+            study within their ranges, the radius excepted.
+        iterations: The most steps of each search.
+
+    Raises:
+        InputError: an unknown objective or variable, an empty range, no iterations.
+    """
+
+    objective: ObjectiveName
+    demands: Demands = Demands()
+    variables: dict[str, Pair] | None = None
+    iterations: int = 100
+
+    def __post_init__(self) -> None:
+        if self.objective not in OBJECTIVES:
+            raise InputError(
+                f"no objective {self.objective!r} to polish for; there are {', '.join(OBJECTIVES)}"
+            )
+        _within("polish.iterations", self.iterations, 1, MOST_ITERATIONS)
+        if self.variables is not None:
+            ranges = _ranges("polish.variables", self.variables, POLISHED)
+            _set(self, "variables", ranges)
+
+
+class Objective(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A measure or variable that is to be small or large.
+
+    Attributes:
+        measure: The name of its column.
+        sense: "min" or "max".
+    """
+
+    measure: str
+    sense: Sense
+
+
+class Study(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A study of many designs.
+
+    Attributes:
+        schema: Version of the file format.
+        name: What people call it.
+        design: What is the same in all of them: a design, or the name of a preset, which
+            becomes the design. Its home's position is that of all designs.
+        variables: What differs, by name out of `NAMES`, and the range of each.
+        sampling: How the ranges are filled.
+        measures: What is measured, out of `explorer.sweep.measures.MEASURES`.
+        nodes: On each axis of the grid that margins and clearances are measured on.
+        clearance_margin: From which |κ| on clearances count, in design units; None for a
+            20th of the design's reach.
+        polish: A search from each sample, whose result is what is measured; or None.
+        objectives: What the Pareto front is of.
+        chunk: How many designs make one task and one part of the results.
+
+    Raises:
+        InputError: something is unknown, empty, named twice or out of range.
+    """
+
+    schema: Literal[1] = 1
+    name: str = "untitled"
+    design: Design | str
+    variables: dict[str, Pair]
+    sampling: Sampling
+    measures: tuple[str, ...] = DEFAULT_MEASURES
+    nodes: int = DEFAULT_NODES
+    clearance_margin: float | None = None
+    polish: Polish | None = None
+    objectives: tuple[Objective, ...] = ()
+    chunk: int = 64
+
+    def __post_init__(self) -> None:
+        if self.schema != 1:
+            raise InputError(f"schema must be 1; got {self.schema!r}")
+        if not self.name or len(self.name) > LONGEST_NAME or not self.name.isprintable():
+            raise InputError(f"name must be one printable line of 1 to {LONGEST_NAME} characters")
+        _set(self, "design", _complete(self.design))
+        _set(self, "variables", _ranges("variables", self.variables, NAMES))
+        self._check_ranges()
+        self._check_sampling()
+        self._check_measures()
+        _within("nodes", self.nodes, FEWEST_NODES, MOST_NODES)
+        if self.clearance_margin is not None:
+            _set(self, "clearance_margin", positive("clearance_margin", self.clearance_margin))
+        _within("chunk", self.chunk, 1, MOST_IN_CHUNK)
+        for each in self.objectives:
+            if each.measure not in (*self.varied, *self.measures):
+                raise InputError(
+                    f"the objective {each.measure!r} is neither measured nor a variable of the "
+                    f"study; there are {', '.join((*self.varied, *self.measures))}"
+                )
+        named = [each.measure for each in self.objectives]
+        _once("objectives", named)
+
+    @property
+    def base(self) -> Design:
+        """The design that is varied, with its home pose."""
+        return cast("Design", self.design)
+
+    @property
+    def polished(self) -> Mapping[str, Pair]:
+        """What the searches may change, and the bounds; empty without any."""
+        if self.polish is None:
+            return {}
+        if self.polish.variables is not None:
+            return self.polish.variables
+        return {name: ends for name, ends in self.variables.items() if name in POLISHED}
+
+    @property
+    def varied(self) -> tuple[str, ...]:
+        """The variables in which the designs differ, in the order of their columns."""
+        return tuple(dict.fromkeys((*self.variables, *self.polished)))
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Of a grid: how many values each variable takes."""
+        count = self.sampling.count
+        if isinstance(count, dict):
+            return tuple(count[name] for name in self.variables)
+        return (count,) * len(self.variables)
+
+    @property
+    def count(self) -> int:
+        """How many designs there are."""
+        if self.sampling.method == "grid":
+            return math.prod(self.shape)
+        return cast("int", self.sampling.count)
+
+    @property
+    def chunks(self) -> int:
+        """How many chunks they make."""
+        return -(-self.count // self.chunk)
+
+    def rows_of(self, chunk: int) -> range:
+        """Return the indices of the designs of a chunk."""
+        return range(chunk * self.chunk, min((chunk + 1) * self.chunk, self.count))
+
+    def _check_ranges(self) -> None:
+        for name, (low, _) in self.variables.items():
+            if name == RADIUS and low < 0.0:
+                raise InputError(f"the radius of legs must not be negative; it starts at {low:g}")
+            least = longest_minimum(self.base)
+            if name == REACH and not low > least:
+                raise InputError(
+                    f"the reach must stay above every minimum length, so above {least:g}; it "
+                    f"starts at {low:g}"
+                )
+
+    def _check_sampling(self) -> None:
+        count = self.sampling.count
+        if isinstance(count, dict) and set(count) != set(self.variables):
+            raise InputError(
+                f"sampling.count must name the variables {', '.join(self.variables)}; it names "
+                f"{', '.join(count) or 'none'}"
+            )
+        if self.count > MOST_DESIGNS:
+            raise InputError(
+                f"the grid has {self.count:.3g} designs; at most {MOST_DESIGNS:.3g} are made"
+            )
+
+    def _check_measures(self) -> None:
+        if not self.measures:
+            raise InputError(f"measure something; there are {', '.join(MEASURES)}")
+        _once("measures", self.measures)
+        for name in self.measures:
+            if name not in MEASURES:
+                raise InputError(f"no measure {name!r}; there are {', '.join(MEASURES)}")
+            if name in self.varied:
+                raise InputError(f"{name} is a variable of the study: leave it out of the measures")
+
+
+def decode_study(data: bytes, source: str) -> Study:
+    """Return the study in a JSON text.
+
+    Args:
+        data: The text, UTF-8.
+        source: What to call it in an error message.
+
+    Raises:
+        InputError: not JSON, of another schema, with unknown fields or unusable values.
+    """
+    if len(data) > LARGEST_FILE:
+        raise InputError(f"{source}: {len(data)} bytes is no study; they stay below {LARGEST_FILE}")
+    try:
+        return msgspec.json.decode(data, type=Study)
+    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
+        raise InputError(" ".join(f"{source}: {error}".split())) from None
+
+
+def encode_study(study: Study) -> bytes:
+    """Return a study as indented JSON, which `decode_study` reads back unchanged."""
+    return msgspec.json.format(msgspec.json.encode(study), indent=2) + b"\n"
+
+
+def load_study(path: str | Path) -> Study:
+    """Return the study in a file, or one that comes along by its name.
+
+    Raises:
+        InputError: a file that holds no study.
+        StorageError: one that cannot be read.
+    """
+    known = STUDIES.get(str(path))
+    if known is not None:
+        return known
+    file = Path(path)
+    if not file.exists():
+        raise InputError(
+            f"no study and no file named {str(path)!r}; the studies that come along are "
+            f"{', '.join(STUDIES)}"
+        )
+    return decode_study(read_at_most(file, LARGEST_FILE), str(path))
+
+
+def study_hash(study: Study) -> str:
+    """Return what tells studies apart: the SHA-256 of the encoded study, in hexadecimal."""
+    return hashlib.sha256(encode_study(study)).hexdigest()
+
+
+def _complete(design: Any) -> Design:
+    """Return the design itself, with its home pose so that it does not jump about."""
+    if isinstance(design, str):
+        if design not in PRESETS:
+            raise InputError(
+                f"no preset {design!r}; there are {', '.join(PRESETS)}, or give a design"
+            )
+        design = PRESETS[design]
+    instance("design", design, Design)
+    return msgspec.structs.replace(design, home=home_pose(design))
+
+
+def _ranges(
+    field: str, given: Mapping[str, Pair], known: tuple[str, ...]
+) -> dict[str, tuple[float, float]]:
+    if not given:
+        raise InputError(f"{field} must name at least one of {', '.join(known)}")
+    found: dict[str, tuple[float, float]] = {}
+    for name, ends in given.items():
+        if name not in known:
+            raise InputError(f"{field}: no variable {name!r}; there are {', '.join(known)}")
+        first, last = two(f"the range of {name}", ends)
+        low, high = number(f"the low end of {name}", first), number(f"the high end of {name}", last)
+        if not low < high:
+            raise InputError(
+                f"the range of {name} is empty: {low:g} to {high:g}; the low end must lie below "
+                "the high one"
+            )
+        found[name] = (low, high)
+    return found
+
+
+def _within(field: str, value: int, low: int, high: int) -> None:
+    if not low <= value <= high:
+        raise InputError(f"{field} must lie within {low} to {high}; got {value}")
+
+
+def _once(field: str, names: Iterable[str]) -> None:
+    listed = list(names)
+    if len(set(listed)) < len(listed):
+        raise InputError(f"{field} may name each once; got {', '.join(listed)}")
+
+
+def _load_studies() -> Mapping[str, Study]:
+    # In a wheel they lie inside the package, in a checkout beside it.
+    packaged = resources.files("explorer").joinpath("studies")
+    folder = packaged if packaged.is_dir() else Path(__file__).parents[2] / "assets" / "studies"
+    files = sorted((f for f in folder.iterdir() if f.name.endswith(".json")), key=lambda f: f.name)
+    studies = [decode_study(file.read_bytes(), file.name) for file in files]
+    return MappingProxyType({study.name: study for study in studies})
+
+
+STUDIES: Mapping[str, Study] = _load_studies()
+"""The studies that come along, by name."""

@@ -1,0 +1,230 @@
+"""Who gets in: decided from the head of a request, by its host, its origin and a token."""
+
+from __future__ import annotations
+
+import socket
+from http import HTTPStatus
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from explorer.app.access import Access, Head, Refusal, is_loopback
+from explorer.errors import ServerError
+
+PORT = 8080
+TOKEN = "a-token_of-16-or-more"
+OPEN = Access.to("127.0.0.1")
+CLOSED = Access("0.0.0.0", TOKEN)
+COOKIE = f"explorer-token-{PORT}={TOKEN}"
+HERE = f"127.0.0.1:{PORT}"
+
+EVIL_HOSTS = (
+    "evil.example", f"evil.example:{PORT}", f"127.0.0.1.evil.example:{PORT}", "127.0.0.1",
+    "127.0.0.1:80", "127.0.0.1:8081", f"localhost.evil.example:{PORT}", "", ":8080",
+    f"user@127.0.0.1:{PORT}", f"127.0.0.1:{PORT}/", f"127.0.0.1:{PORT} ", f"[::2]:{PORT}",
+    f"0x7f.1:{PORT}", f"2130706433:{PORT}", f"127.0.0.1:{PORT}\r\nX: 1", "[::1", f"127.1:{PORT}",
+)  # fmt: skip
+EVIL_ORIGINS = (
+    "null", "http://evil.example", f"http://evil.example:{PORT}", "http://127.0.0.1:8081",
+    "http://127.0.0.1", f"http://localhost:{PORT}", f"file://127.0.0.1:{PORT}", "file://", "",
+    f"http://127.0.0.1:{PORT}.evil.example", f"http://127.0.0.1:{PORT}/", f"//127.0.0.1:{PORT}",
+    f"chrome-extension://127.0.0.1:{PORT}", f"127.0.0.1:{PORT}", f"http:// 127.0.0.1:{PORT}",
+)  # fmt: skip
+
+
+def page(host: str = HERE, target: str = "/", cookie: str | None = None) -> Head:
+    return Head(target, [host], [], [] if cookie is None else [cookie], upgrade=False)
+
+
+def websocket(
+    host: str = HERE,
+    origin: str | None = f"http://{HERE}",
+    target: str = "/",
+    cookie: str | None = None,
+) -> Head:
+    origins = [] if origin is None else [origin]
+    return Head(target, [host], origins, [] if cookie is None else [cookie], upgrade=True)
+
+
+def status(refusal: Refusal | None) -> HTTPStatus | None:
+    return None if refusal is None else refusal.status
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "localhost", "[::1]", "LOCALHOST"])
+def test_on_loopback_its_three_names_get_in_with_no_token(host: str) -> None:
+    name = f"{host}:{PORT}"
+    assert OPEN.token is None
+    assert OPEN.judge(page(name), PORT) is None
+    assert OPEN.judge(websocket(name, f"http://{name}"), PORT) is None
+    assert OPEN.judge(websocket(name, f"https://{name}"), PORT) is None
+
+
+def test_at_the_port_of_the_web_the_port_may_be_left_out() -> None:
+    assert OPEN.judge(websocket("localhost", "http://localhost"), 80) is None
+
+
+@pytest.mark.parametrize("host", EVIL_HOSTS)
+def test_on_loopback_every_other_host_is_refused(host: str) -> None:
+    for head in (page(host), websocket(host, f"http://{host}")):
+        assert status(OPEN.judge(head, PORT)) == HTTPStatus.FORBIDDEN
+
+
+@pytest.mark.parametrize("hosts", [[], [HERE, HERE], [HERE, "evil.example"]])
+def test_a_request_has_one_host(hosts: list[str]) -> None:
+    for access in (OPEN, CLOSED):
+        head = Head("/", hosts, [], [COOKIE], upgrade=False)
+        assert status(access.judge(head, PORT)) == HTTPStatus.FORBIDDEN
+
+
+@pytest.mark.parametrize("access", [OPEN, CLOSED])
+@pytest.mark.parametrize("origin", [None, *EVIL_ORIGINS])
+def test_a_websocket_from_elsewhere_or_from_nowhere_is_refused(
+    access: Access, origin: str | None
+) -> None:
+    # Even with the cookie, which a browser may send along.
+    refusal = access.judge(websocket(origin=origin, cookie=COOKIE), PORT)
+    assert status(refusal) == HTTPStatus.FORBIDDEN
+
+
+def test_two_origins_are_none() -> None:
+    head = Head("/", [HERE], [f"http://{HERE}", "http://evil.example"], [], upgrade=True)
+    assert status(OPEN.judge(head, PORT)) == HTTPStatus.FORBIDDEN
+
+
+@given(st.text(max_size=30) | st.from_regex(r"https?://[a-z0-9.:\[\]-]{1,30}", fullmatch=True))
+def test_no_origin_gets_in_but_that_of_the_host(origin: str) -> None:
+    refusal = OPEN.judge(websocket(origin=origin), PORT)
+    assert (refusal is None) == (origin.lower() in (f"http://{HERE}", f"https://{HERE}"))
+
+
+@pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.168.1.7", "lab.example", "fe80::1"])
+def test_beyond_loopback_there_is_a_token_and_no_two_are_the_same(host: str) -> None:
+    first, second = Access.to(host), Access.to(host)
+    assert first.token is not None
+    assert len(first.token) >= 32
+    assert first.token != second.token
+    assert f"?token={first.token}" in first.url(PORT)
+    with pytest.raises(ServerError, match=r"^[^\n]*takes a token[^\n]*$"):
+        Access(host)
+
+
+@pytest.mark.parametrize(
+    "token",
+    [
+        "",
+        "short",
+        "x" * 15,
+        "x" * 129,
+        "ein Wort mit Leerzeichen",
+        "ä" * 20,
+        "x" * 16 + "\n",
+        "x" * 16 + ";",
+        "&token=" + "x" * 16,
+    ],
+)
+def test_a_token_that_an_address_cannot_hold_is_refused_on_one_line(token: str) -> None:
+    for host in ("127.0.0.1", "0.0.0.0"):
+        with pytest.raises(ServerError, match=r"^[^\n]*16 to 128[^\n]*$"):
+            Access.to(host, token)
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "0.0.0.0"])
+def test_the_token_opens_in_the_address_and_in_the_cookie(host: str) -> None:
+    access = Access(host, TOKEN)
+    assert access.judge(page(target=f"/?token={TOKEN}"), PORT) is None
+    assert access.judge(page(target=f"/?darkMode&token={TOKEN}"), PORT) is None
+    assert access.judge(page(cookie=COOKIE), PORT) is None
+    assert access.judge(page(cookie=f"a=b; {COOKIE}; c=d"), PORT) is None
+    assert access.judge(websocket(cookie=COOKIE), PORT) is None
+    assert access.judge(websocket(target=f"/?token={TOKEN}"), PORT) is None
+
+
+WRONG = ("", TOKEN[:-1], TOKEN + "x", TOKEN.upper(), "x" * 16)
+
+
+@pytest.mark.parametrize("wrong", WRONG)
+def test_any_other_token_is_refused(wrong: str) -> None:
+    for head in (
+        page(),
+        page(target=f"/?token={wrong}"),
+        page(target=f"/?tokens={TOKEN}"),
+        page(target=f"/{TOKEN}"),
+        page(cookie=f"explorer-token-{PORT}={wrong}"),
+        # Another explorer's, on another port of the same machine.
+        page(cookie=f"explorer-token-{PORT + 1}={TOKEN}"),
+        page(cookie=f"explorer-token={TOKEN}"),
+        page(cookie=f'explorer-token-{PORT}; "{TOKEN}'),
+        page(cookie="\udcff=\udcff"),
+        page(cookie=f"explorer-token-{PORT}=ü\udcff"),
+        websocket(),
+        websocket(cookie=f"explorer-token-{PORT}={wrong}"),
+        websocket(target=f"/?token={wrong}"),
+    ):
+        refusal = CLOSED.judge(head, PORT)
+        assert status(refusal) == HTTPStatus.UNAUTHORIZED
+        assert refusal is not None
+        assert TOKEN not in refusal.reason
+
+
+def test_beyond_loopback_addresses_and_own_names_are_hosts_and_others_are_not() -> None:
+    access = Access("lab.example", TOKEN)
+    name = socket.gethostname()
+    for host in ("lab.example:1", f"{name}:1", f"{name}.local", "10.1.2.3:99", "[fe80::1]:80"):
+        assert access.judge(page(host, cookie=COOKIE), PORT) is None
+    for host in ("evil.example", "evil.lab.example", "lab.example.evil.example:8080"):
+        assert status(access.judge(page(host, cookie=COOKIE), PORT)) == HTTPStatus.FORBIDDEN
+
+
+@pytest.mark.parametrize(
+    "query",
+    [
+        "websocket=ws://evil.example",
+        "playbackPath=//evil.example/x",
+        "websocket=ws%3A%2F%2Fevil.example",
+        "a=b;c",
+        "a=%00",
+        "ü",
+        "a?b",
+    ],
+)
+def test_no_link_can_name_another_server_for_the_page_to_follow(query: str) -> None:
+    assert status(OPEN.judge(page(target=f"/?{query}"), PORT)) == HTTPStatus.FORBIDDEN
+    with_token = page(target=f"/?token={TOKEN}&{query}")
+    assert status(CLOSED.judge(with_token, PORT)) == HTTPStatus.FORBIDDEN
+
+
+def test_the_page_may_connect_only_to_where_it_came_from() -> None:
+    headers = dict(OPEN.headers(page(), PORT))
+    policy = {
+        words[0]: words[1:]
+        for words in map(str.split, headers["Content-Security-Policy"].split(";"))
+    }
+    assert policy["default-src"] == ["'none'"]
+    remote = [s for s in policy["connect-src"] if s not in ("'self'", "blob:", "data:")]
+    assert remote == [f"ws://{HERE}", f"wss://{HERE}"]
+    assert headers["Referrer-Policy"] == "no-referrer"
+    assert headers["X-Content-Type-Options"] == "nosniff"
+    assert "Set-Cookie" not in headers
+
+
+def test_the_cookie_is_for_this_port_and_out_of_reach_of_scripts_and_other_sites() -> None:
+    cookie = dict(CLOSED.headers(page(), PORT))["Set-Cookie"]
+    given_cookie, *flags = cookie.split("; ")
+    assert given_cookie == COOKIE
+    assert set(flags) == {"Path=/", "HttpOnly", "SameSite=Strict"}
+
+
+@pytest.mark.parametrize(
+    ("host", "url"),
+    [("127.0.0.1", "http://127.0.0.1:8080"), ("::1", "http://[::1]:8080"),
+     ("localhost", "http://localhost:8080"), ("0.0.0.0", "http://127.0.0.1:8080/?token=" + TOKEN),
+     ("::", "http://[::1]:8080/?token=" + TOKEN)],
+)  # fmt: skip
+def test_the_address_is_one_that_a_browser_on_this_machine_opens(host: str, url: str) -> None:
+    assert Access(host, None if is_loopback(host) else TOKEN).url(PORT) == url
+
+
+def test_loopback_is_what_this_machine_alone_hears() -> None:
+    assert all(map(is_loopback, ["127.0.0.1", "localhost", "::1", "127.1.2.3"]))
+    assert not any(map(is_loopback, ["0.0.0.0", "::", "10.0.0.1", "lab.example", "", "127.1"]))

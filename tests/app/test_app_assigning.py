@@ -1,0 +1,171 @@
+"""What is assigned arrives to the last bit; figures left out come with the next frame."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+import pytest
+import viser
+from client import client_of
+from monkey import explorer_with_data
+from page_props import shown_by
+
+from explorer.app import assigning
+from explorer.app.actions import SetJoint, SetPosition
+from explorer.app.assigning import CROSSING_SECONDS, QUIET_SECONDS, Assigner
+from explorer.app.panels.move import JOINT_LABELS
+from explorer.app.session import Session
+from explorer.app.viser_gaps import PLACE
+
+
+@pytest.mark.parametrize("size", [1e-12, 1e-6, 1.0, 1e6])
+def test_nodes_follow_steps_that_are_small_beside_where_they_are(
+    server: viser.ViserServer, size: float
+) -> None:
+    node, assigner = server.scene.add_frame(f"/follower{size}"), Assigner(server)
+    rng = np.random.default_rng(1)
+    position, wxyz = size * rng.normal(size=3), np.array([1.0, 0.0, 0.0, 0.0])
+    for _ in range(50):
+        position = position * (1.0 + 1e-7 * rng.normal(size=3))
+        wxyz = wxyz + 1e-9 * rng.normal(size=4)
+        updates = [(node, "position", position), (node, "wxyz", tuple(wxyz))]
+        assert len(assigner.assign(updates)) == 2
+        assert node.position.tolist() == position.tolist()
+        assert node.wxyz.tolist() == wxyz.tolist()
+        assert _sent(server, node.name) == (position.tolist(), wxyz.tolist())
+        assert assigner.assign(updates) == []
+
+
+def test_what_a_hand_sets_while_a_frame_is_computed_stays(server: viser.ViserServer) -> None:
+    slider: Any = server.gui.add_slider("hand", min=0.0, max=10.0, step=0.1, initial_value=1.0)
+    assigner, state = Assigner(server), slider._impl
+    before = time.time()
+    assert assigner.assign([(slider, "value", 2.0)], since=time.time())
+    assert slider.value == 2.0
+    # So long ago that even a coarse clock has gone on since.
+    began = time.time() - 1.0
+    # As viser does when a browser tells it.
+    state.value, state.update_timestamp = 7.0, time.time()
+    assert assigner.assign([(slider, "value", 3.0)], since=began) == []
+    assert slider.value == 7.0
+    # The next frame knows of it, and may say no.
+    assert assigner.assign([(slider, "value", 3.0)], since=time.time())
+    assert slider.value == 3.0
+    # Before the clock was set back, it was later.
+    state.value, state.update_timestamp = 7.0, time.time() + 3600.0
+    assert assigner.assign([(slider, "value", 3.0)], since=before)
+    assert slider.value == 3.0
+
+
+@pytest.mark.parametrize("name", ["value", "position"])
+def test_what_crossed_with_a_hand_is_told_again_when_it_rests(
+    server: viser.ViserServer, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    handle: Any
+    if name == "value":
+        handle = server.gui.add_slider("crossed", min=0.0, max=9.0, step=0.1, initial_value=1.0)
+        values, state = (2.0, 7.0), handle._impl
+    else:
+        handle = server.scene.add_transform_controls("/crossed")
+        values, state = ((2.0, 0.0, 0.0), (7.0, 0.0, 0.0)), handle._impl_aux
+    assigner, told, now = Assigner(server), list[object](), 1000.0
+    monkeypatch.setattr(assigning.time, "time", lambda: now)
+
+    def tell_again(handle: object, name: str) -> None:
+        told.append(getattr(handle, name))
+
+    monkeypatch.setattr(assigning, "tell_again", tell_again)
+
+    def frame(value: object, seconds: float) -> bool:
+        nonlocal now
+        now += seconds
+        assigner.assign([(handle, name, np.array(value) if name in PLACE else value)])
+        return assigner.settle()
+
+    def hand(value: object, seconds: float) -> None:
+        nonlocal now
+        now += seconds
+        if name == "value":
+            state.value, state.update_timestamp = value, now
+        else:
+            state.last_updated, handle.position[:] = now, value
+
+    first, second = values
+    # Nobody has touched it.
+    assert not frame(first, 1.0)
+    # A hand did, before it can have seen that.
+    hand(second, 0.3)
+    assert frame(second, 0.1)
+    assert told == []
+    assert not frame(second, QUIET_SECONDS)
+    np.testing.assert_array_equal(told, [second])
+    # Once is enough, unless that crosses too.
+    assert not frame(second, 0.1)
+    hand(first, 0.1)
+    assert frame(first, 0.1)
+    assert not frame(first, QUIET_SECONDS)
+    assert len(told) == 2
+    # What a hand sets long after is what it shows.
+    assert not frame(second, 1.0)
+    hand(first, CROSSING_SECONDS + 0.1)
+    assert not frame(first, 2.0 * QUIET_SECONDS)
+    assert len(told) == 2
+
+
+def test_a_browser_that_crossed_with_the_explorer_shows_what_its_user_set() -> None:
+    with explorer_with_data() as running, client_of(running) as client:
+        client.read_until_quiet()
+        uuid = client.find(JOINT_LABELS["l1"])
+        # Told of one value, it sends another before it has read that.
+        running.page.session.do(SetJoint(0, 11.5))
+        running.page.wait_until_drawn()
+        time.sleep(0.2)
+        client.update(uuid, 12.5)
+        said = client.read_until_quiet(2.0)
+        values = [
+            m["updates"]["value"]
+            for m in said
+            if m.get("uuid") == uuid and "value" in m.get("updates", {})
+        ]
+        assert values[0] == 11.5
+        assert values[-1] == 12.5
+        assert running.page.session.state.joints[0] == 12.5
+
+
+def test_figures_that_a_hand_leaves_no_time_for_come_with_the_next_frame(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def controls() -> dict[str, object]:
+        return {key: value for key, value in shown_by(running).items() if not key.startswith("/")}
+
+    with explorer_with_data() as running:
+        page = running.page
+        page.wait_until_drawn()
+        before = controls()
+        with monkeypatch.context() as hand:
+            hand.setattr(Session, "has_more", property(lambda _: True))
+            hand.setattr("explorer.app.page.FIGURES_SECONDS", np.inf)
+            page.session.do(SetPosition(0, 1.5))
+            page.wait_until_drawn()
+            assert controls() == before
+        page.session.redraw()
+        page.wait_until_drawn()
+        after = controls()
+        page.session.redraw()
+        page.wait_until_drawn()
+        assert after != before
+        assert controls() == after
+
+
+def _sent(server: viser.ViserServer, name: str) -> tuple[list[float], list[float]]:
+    """Return position and orientation that a browser would get that comes now."""
+    found: dict[str, list[float]] = {}
+    serializer: Any = server.get_scene_serializer()
+    for _, message in serializer._messages:
+        if message.get("name") == name:
+            found.update(
+                {key: list(message[key]) for key in ("position", "wxyz") if key in message}
+            )
+    return found["position"], found["wxyz"]

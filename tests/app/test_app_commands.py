@@ -1,0 +1,376 @@
+"""Commands: all that can be done is offered once, by a key that is nobody else's, and does it."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import inspect
+import itertools
+import pkgutil
+import re
+import threading
+import time
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+import viser
+
+import explorer.app
+from explorer.app.actions import (
+    MarkSaved,
+    SetAngle,
+    SetJoint,
+    SetName,
+    SetPose,
+    SetPosition,
+    SetUnit,
+    SetVariable,
+    StartThere,
+)
+from explorer.app.commands import CAMERA_KEYS, KEYS, OPEN_LISTS, PALETTE_KEY, offers, with_keys
+from explorer.app.gestures import ByHand
+from explorer.app.keeping import take_up
+from explorer.app.optimising import Advance as ShowIterates
+from explorer.app.optimising import Compare, EndRun
+from explorer.app.palette import Command, Palette
+from explorer.app.path_actions import Advance as PlayOn
+from explorer.app.path_actions import ChooseModes, SetPathTime, SetPlanSeconds, TakePlan
+from explorer.app.server import Running, start
+from explorer.app.session import UNDO, Session
+from explorer.app.singular_actions import Jog
+from explorer.app.state import State
+from explorer.app.study_actions import (
+    BrushAxis,
+    BrushBox,
+    PickDesign,
+    SetAxes,
+    SetStudyWish,
+)
+from explorer.app.study_folders import StudyFolders
+from explorer.app.viser_gaps import start_viser, stop_viser
+from explorer.app.widgets import Widget, widgets
+from explorer.design_file import PRESETS
+from explorer.errors import ExplorerError
+
+OF_VALUES = {
+    SetJoint: "sliders of the legs",
+    SetPosition: "sliders of the pose",
+    SetAngle: "sliders of the pose",
+    SetPose: "the handle at b4",
+    Jog: "sliders of one margin",
+    SetVariable: "sliders of the design",
+    SetUnit: "a number of the design",
+    SetName: "the name of a design",
+    ChooseModes: "lists of the path's ends",
+    SetPathTime: "slider of the time",
+    SetPlanSeconds: "a number of the planner",
+    PickDesign: "points of a study's plots",
+    BrushAxis: "brushes of a study's plots",
+    BrushBox: "brushes of a study's plots",
+    SetAxes: "lists of a study's plots",
+    SetStudyWish: "what a small study varies and measures",
+}
+"""Actions that ask for a value, each with the control that gives it."""
+
+OF_NOBODY = (ByHand, MarkSaved, ShowIterates, PlayOn, EndRun, Compare, TakePlan)
+"""Actions that nobody asks for: they tell of what goes on, or stand for another."""
+
+OF_BROWSERS = {f"View › {view}" for view in ("Isometric", "Front", "Side", "Top", "Fit")} | {
+    "Studies › Taller drawer"
+}
+"""Commands that change the camera or a panel of one browser, which there is none of."""
+
+WHERE_IT_IS_SHOWN = {StartThere: "Workspace › Go there"}
+"""Actions of commands that do nothing unless something is shown."""
+
+CHOSEN_IN_THE_PANEL = {
+    "From",
+    "To",
+    "Format",
+    "Size (px)",
+    "Pin another design",
+    "Study",
+    "Across",
+    "Up",
+    "Coloured by",
+}
+"""Lists of which an option alone does nothing, or whose options come and go."""
+
+# What browsers do with keys; undo and redo are theirs too, and meant for pages.
+BROWSER_KEYS = {f"Ctrl+{key}" for key in "ACDEFGHIJLNOPQRSTUVWX0123456789"} | {
+    f"Ctrl+Shift+{key}" for key in "ABCDEIJKMNOPQRTVW"
+}
+
+
+class Browser:
+    """A browser, as far as commands know one."""
+
+    client_id = 7
+
+
+CLIENT: Any = Browser()
+
+
+@pytest.fixture(scope="module")
+def running(tmp_path_factory: pytest.TempPathFactory) -> Generator[Running]:
+    studies = StudyFolders(tmp_path_factory.mktemp("studies"))
+    made = start(PRESETS["paper-optimal"], port=0, keep=take_up(resume=False), studies=studies)
+    yield made
+    made.stop()
+
+
+@pytest.fixture(scope="module")
+def palette(running: Running) -> Palette:
+    return running.page.hands.palette
+
+
+@pytest.fixture
+def bare() -> Generator[viser.ViserServer]:
+    made = start_viser("127.0.0.1", 0)
+    yield made
+    stop_viser(made)
+
+
+def labelled(palette: Palette) -> dict[str, Command]:
+    return {command.label: command for command in palette.commands}
+
+
+def actions() -> set[type]:
+    """Return every action of the app: what its modules define and can be applied."""
+    found: set[type] = set()
+    for module in pkgutil.iter_modules(explorer.app.__path__, "explorer.app."):
+        for name, each in inspect.getmembers(importlib.import_module(module.name), inspect.isclass):
+            is_action = hasattr(each, "apply") and hasattr(each, "__dataclass_fields__")
+            if is_action and each.__module__ == module.name and not name.startswith("_"):
+                found.add(each)
+    return found
+
+
+@contextmanager
+def heard(session: Session) -> Generator[list[object]]:
+    """Keep what this thread asks for; neither that is done, nor what others tell of it later."""
+    asked: list[object] = []
+    asks = threading.current_thread()
+
+    def post(_key: object, change: Any, *_: object) -> None:
+        if threading.current_thread() is not asks:
+            return
+        # What a state refuses is refused to whoever asks.
+        with contextlib.suppress(ExplorerError):
+            asked.append(change(session.state) if callable(change) else change)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(session, "_post", post)
+        yield asked
+    # The controls that were used go back to what is.
+    session.redraw()
+    assert session.wait_until_idle()
+
+
+def test_every_action_is_a_command_or_asks_for_a_value(running: Running, palette: Palette) -> None:
+    with heard(running.page.session) as asked:
+        for label, command in labelled(palette).items():
+            # The others do something to one browser, or send it a file.
+            if label in OF_BROWSERS or label.startswith(("Page › ", "Share › ")):
+                continue
+            command.run(CLIENT)
+        shelf = running.page.shelf
+        assert shelf is not None
+        assert shelf.wait_until_idle()
+        reached = {type(each) for each in asked}
+    shown = {action for action, label in WHERE_IT_IS_SHOWN.items() if label in labelled(palette)}
+    told = set(OF_VALUES) | set(OF_NOBODY)
+    assert actions() - reached - shown - told == set(), "no command, and no word on why"
+    assert reached & told == set(), "a command after all"
+
+
+def test_saved_designs_are_opened_by_name(running: Running) -> None:
+    session, shelf = running.page.session, running.page.shelf
+    assert shelf is not None
+
+    def offered() -> dict[str, Any]:
+        assert shelf.wait_until_idle()
+        assert session.wait_until_idle()
+        gui: Any = running.viser.gui
+        return {each.label: each for each in gui._command_handle_from_uuid.values()}
+
+    saved = msgspec.structs.replace(PRESETS["paper-initial"], name="mine")
+    shelf.save(saved)
+    command = offered()["Designs › Open mine"]
+    for trigger in command._impl.trigger_cb:
+        trigger(viser.CommandEvent(CLIENT, CLIENT.client_id, command))
+    offered()
+    assert session.state.design == saved
+    session.travel(UNDO)
+    shelf.delete("mine")
+    assert "Designs › Open mine" not in offered()
+
+
+def test_names_and_keys_are_told_apart(palette: Palette) -> None:
+    labels = [command.label for command in palette.commands]
+    assert len(labels) > 100
+    assert len(set(labels)) == len(labels)
+    keys = [str(key) for command in palette.commands for key in command.keys]
+    assert len(set(keys)) == len(keys)
+
+
+def test_every_key_belongs_to_a_command(palette: Palette) -> None:
+    assert set(KEYS) <= set(labelled(palette))
+
+
+def test_no_key_is_taken_from_the_browser_the_camera_or_the_palette() -> None:
+    for key in itertools.chain.from_iterable(KEYS.values()):
+        assert str(key) not in BROWSER_KEYS
+        # viser's camera looks at the letter, whatever else is held down.
+        assert key.key not in CAMERA_KEYS
+        assert key != PALETTE_KEY
+
+
+def test_the_readme_tells_every_key_and_no_other() -> None:
+    readme = Path(__file__).resolve().parents[2] / "README.md"
+    section = readme.read_text(encoding="utf-8").partition("## Hands on the keys")[2]
+    rows = re.findall(r"^\|.*\| (.+) \|$", section.partition("\n## ")[0], flags=re.MULTILINE)
+    told = {key for row in rows for key in re.split(r", | or ", row)}
+    card = {str(key) for key in KEYS["Page › Keys"]}
+    assert told | card == {str(key) for key in itertools.chain.from_iterable(KEYS.values())}
+
+
+def test_two_commands_of_one_name_are_refused(palette: Palette) -> None:
+    twin = Command(palette.commands[0].label, "Nothing.", lambda _: None)
+    with pytest.raises(ValueError, match="two commands"):
+        palette.add(twin)
+
+
+def test_every_list_is_offered_or_chosen_in_its_panel(running: Running) -> None:
+    lists = {widget.label for widget in widgets(running.viser) if widget.kind == "list"}
+    assert lists - OPEN_LISTS - CHOSEN_IN_THE_PANEL == set()
+
+
+def test_a_hint_tells_the_keys_that_do_the_same(running: Running) -> None:
+    told = 0
+    for widget in widgets(running.viser):
+        for key in itertools.chain.from_iterable(KEYS.get(label, ()) for label in offers(widget)):
+            assert f" {key}" in widget.hint
+            told += 1
+    assert told > 20
+
+
+def test_keys_are_told_behind_the_hint() -> None:
+    assert with_keys("Go.", ()) == "Go."
+    assert with_keys("Go.", KEYS["Edit › Undo"]) == "Go. Key: Ctrl+Z."
+    assert with_keys("Go.", KEYS["Edit › Redo"]) == "Go. Keys: Ctrl+Shift+Z, Ctrl+Y."
+
+
+def test_only_what_can_be_done_can_be_chosen(running: Running, palette: Palette) -> None:
+    commands = labelled(palette)
+    session = running.page.session
+    assert not commands["Workspace › Reached from › the present position"].is_ready()
+    commands["Workspace › Region › reachable"].run(CLIENT)
+    assert running.page.wait_until_drawn()
+    assert session.state.view.workspace.region == "reachable"
+    assert commands["Workspace › Reached from › the present position"].is_ready()
+    gui: Any = running.viser.gui
+    disabled = {each.label: each.disabled for each in gui._command_handle_from_uuid.values()}
+    assert disabled["Workspace › Reached from › the present position"] is False
+    assert disabled["Optimise › Cancel"] is True
+    # What is hidden from the eye alone can be done.
+    strata = [label for label in commands if label.startswith("Singularity › Go to (")]
+    assert len(strata) == 23
+    assert all(commands[label].is_ready() for label in strata)
+
+
+SWITCHES: dict[str, Callable[[State], bool]] = {
+    "View › Grid": lambda state: state.view.grid,
+    "View › Prototype": lambda state: state.view.prototype.shown,
+    "View › All tetrahedra": lambda state: state.view.tetrahedra == (True, True, True),
+    "Workspace › Convex hull": lambda state: state.view.workspace.hull,
+}
+
+
+@pytest.mark.parametrize("label", SWITCHES)
+def test_a_switch_switches_and_switches_back(
+    running: Running, palette: Palette, label: str
+) -> None:
+    session = running.page.session
+    command, read = labelled(palette)[label], SWITCHES[label]
+    was = read(session.state)
+    for expected in (not was, was):
+        command.run(CLIENT)
+        assert session.wait_until_idle()
+        assert read(session.state) == expected
+
+
+def test_modes_follow_one_another_in_both_ways(running: Running, palette: Palette) -> None:
+    session, commands = running.page.session, labelled(palette)
+    first = session.state.mode
+    seen = [first]
+    for _ in range(8):
+        commands["Move › Next assembly mode"].run(CLIENT)
+        assert session.wait_until_idle()
+        seen.append(session.state.mode)
+    assert sorted(seen[:8]) == list(range(8))
+    assert seen[8] == first
+    commands["Move › Previous assembly mode"].run(CLIENT)
+    assert session.wait_until_idle()
+    assert session.state.mode == seen[7]
+
+
+def test_undo_and_redo_are_the_session_s(running: Running, palette: Palette) -> None:
+    session, commands = running.page.session, labelled(palette)
+    commands["View › Labels"].run(CLIENT)
+    assert session.wait_until_idle()
+    assert not session.state.view.labels
+    for label, expected in (("Edit › Undo", True), ("Edit › Redo", False), ("Edit › Undo", True)):
+        commands[label].run(CLIENT)
+        assert session.wait_until_idle()
+        assert session.state.view.labels is expected
+
+
+def test_a_control_used_from_the_palette_shows_its_new_value_everywhere(
+    bare: viser.ViserServer,
+) -> None:
+    heard_of: list[tuple[object, object]] = []
+    with bare.gui.add_folder("Around"):
+        box = bare.gui.add_checkbox("On", initial_value=False)
+    box.on_update(lambda event: heard_of.append((event.client_id, event.target.value)))
+    (widget,) = widgets(bare)
+    before = time.time()
+    widget.use(CLIENT, True)
+    assert heard_of == [(7, True)]
+    assert box.value is True
+    assert box.update_timestamp >= before
+    # Late browsers get it too.
+    sent = [m for m in _kept(bare) if getattr(m, "updates", None) == {"value": True}]
+    assert len(sent) == 1
+
+
+def _kept(server: viser.ViserServer) -> list[Any]:
+    internals: Any = server
+    return list(internals._websock_server._broadcast_buffer.message_from_id.values())
+
+
+def test_what_lies_hidden_in_a_folder_is_not_in_use(bare: viser.ViserServer) -> None:
+    folder = bare.gui.add_folder("Around")
+    with folder:
+        bare.gui.add_button("Push")
+    (widget,) = widgets(bare)
+    assert widget.path == ("Around",)
+    assert widget.is_in_use
+    folder.visible = False
+    assert not widget.is_in_use
+
+
+def test_nothing_is_offered_of_what_holds_a_value() -> None:
+    server = start_viser("127.0.0.1", 0)
+    try:
+        server.gui.add_slider("Long", 0.0, 1.0, 0.1, 0.5)
+        server.gui.add_upload_button("File")
+        server.gui.add_button("Step 3 of the list")
+        assert [offers(widget) for widget in widgets(server)] == [{}, {}, {}]
+        assert isinstance(next(widgets(server)), Widget)
+    finally:
+        stop_viser(server)

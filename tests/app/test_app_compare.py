@@ -1,0 +1,452 @@
+"""Two to four designs side by side: the laws of pinning, the numbers shown, what is drawn."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Callable, Generator
+from dataclasses import fields, replace
+from html import unescape
+
+import msgspec
+import numpy as np
+import pytest
+import viser
+from desk import Desk
+from hypothesis import given
+from hypothesis import strategies as st
+
+from explorer.app.actions import Open, SetVariable
+from explorer.app.assigning import Assigner
+from explorer.app.colours import COMPARED
+from explorer.app.compare_feed import LIVE, CompareFeed
+from explorer.app.compared import SLOTS, Compared, Look, unnamed
+from explorer.app.compared_drawing import ComparedDrawing, ComparedRequest, compared_drawing
+from explorer.app.comparing import Pin, SetLook, Unpin
+from explorer.app.jobs import Worker
+from explorer.app.panels.compare import NOTHING, ComparePanel
+from explorer.app.panels.compare_bars import DRAWN, bars
+from explorer.app.panels.compare_columns import Column, best_of, columns_of, notes, told
+from explorer.app.panels.compare_table import table
+from explorer.app.scene.compared import APART, ComparedScene
+from explorer.app.scene.placing import Placed
+from explorer.app.session import UNDO
+from explorer.app.state import Frame, State, opened
+from explorer.design import Design
+from explorer.design_file import PRESETS
+from explorer.errors import InputError
+from explorer.figures import FIGURES, figures_of
+from explorer.home import home_pose
+from explorer.pose import Pose
+from explorer.workspace import workspace_nodes, workspace_volume
+
+INITIAL, OPTIMAL = PRESETS.values()
+DEEDS = [(f"open{slot}", f"unpin{slot}") for slot in range(3)]
+BY_NAME = {figure.name: figure for figure in FIGURES}
+
+
+def variant(number: int, **changes: object) -> Design:
+    return msgspec.structs.replace(
+        OPTIMAL, name=f"variant {number}", b2=2.0 + 0.1 * number, **changes
+    )
+
+
+def compared(*pinned: Design, look: Look | None = None, live: Design = OPTIMAL) -> State:
+    state = opened(live)
+    for design in pinned:
+        state = Pin(design).apply(state)
+    return SetLook(look or Look()).apply(state)
+
+
+def columns(state: State) -> tuple[Column, ...]:
+    """Return the columns of a state, all of them found here and now."""
+    unit = 1.0 if state.compared.look.millimetres else state.design.unit_mm
+    return tuple(
+        Column(number, design, figures_of(design), design.unit_mm / unit)
+        for number, design in enumerate((state.design, *state.compared.pinned))
+        if design is not None
+    )
+
+
+def cells(html: str) -> dict[str, list[str]]:
+    """Return the cells of a table by the first words of its rows, changes left out."""
+    found: dict[str, list[str]] = {}
+    for row in re.findall(r"<tr.*?</tr>", html)[1:]:
+        first, *rest = (
+            unescape(re.sub("<.*?>", "", cell)) for cell in re.findall(r"<td.*?</td>", row)
+        )
+        found[first] = rest[::2]
+    return found
+
+
+def number(text: str) -> float:
+    return float(text.replace("−", "-").replace("\N{NARROW NO-BREAK SPACE}", ""))
+
+
+@given(st.lists(st.tuples(st.sampled_from(["pin", "unpin", "live"]), st.integers(0, 4))))
+def test_three_are_pinned_at_most_and_none_twice_whatever_is_done(
+    what: list[tuple[str, int]],
+) -> None:
+    state = opened(OPTIMAL)
+    for kind, index in what:
+        before = state
+        try:
+            if kind == "pin":
+                state = Pin(variant(index)).apply(state)
+            elif kind == "unpin":
+                state = Unpin(index % 3).apply(state)
+            else:
+                state = Open(variant(index)).apply(state)
+        except InputError:
+            pinned = before.compared.pinned
+            assert kind == "pin"
+            assert variant(index) in pinned or None not in pinned
+        kept = [each for each in state.compared.pinned if each is not None]
+        assert len(state.compared.pinned) == 3
+        assert len({unnamed(each) for each in kept}) == len(kept)
+        if kind == "live":
+            assert state.design == variant(index)
+            assert state.compared == before.compared
+        else:
+            assert replace(state, compared=before.compared) == before
+
+
+def test_a_design_keeps_its_place_and_its_colour_when_another_goes() -> None:
+    state = compared(variant(1), variant(2), variant(3))
+    state = Unpin(0).apply(state)
+    assert state.compared.pinned == (None, variant(2), variant(3))
+    assert Pin(variant(4)).apply(state).compared.pinned[0] == variant(4)
+    assert Unpin(0).apply(state) == state
+
+
+def test_what_cannot_be_pinned_is_told_in_one_line() -> None:
+    state = compared(variant(1), variant(2), variant(3))
+    with pytest.raises(InputError, match=r"^variant 4 finds no place: A, B, C are taken; unpin"):
+        Pin(variant(4)).apply(state)
+    renamed = msgspec.structs.replace(variant(2), name="other")
+    with pytest.raises(InputError, match=r"^other is pinned already, as B; change it, or pin"):
+        Pin(renamed).apply(state)
+
+
+def test_pins_are_steps_that_are_undone(desk: Desk) -> None:
+    for action in (Pin(INITIAL), SetLook(Look(overlay=True)), Unpin(0)):
+        desk.session.do(action)
+    assert desk.state.compared == Compared(look=Look(overlay=True))
+    words = [step.words for step in desk.session.history.steps[1:]]
+    assert words == ["Pin paper-initial", "Compare: overlay on", "Unpin A"]
+    for expected in (Look(overlay=True), Look()):
+        desk.session.travel(UNDO)
+        assert desk.state.compared == Compared((INITIAL, None, None), expected)
+    assert desk.state.compared.slot_of(INITIAL) == 0
+    assert desk.state.compared.slot_of(OPTIMAL) is None
+    desk.session.travel(UNDO)
+    assert desk.state.compared.is_empty
+
+
+@pytest.mark.parametrize("millimetres", [False, True])
+def test_the_table_tells_what_the_functions_tell(millimetres: bool) -> None:
+    small = msgspec.structs.replace(INITIAL, unit_mm=12.0)
+    state = compared(small, variant(3), look=Look(millimetres=millimetres))
+    rows = cells(table(columns(state), DEEDS, millimetres=millimetres))
+    assert len(rows) == len(FIGURES)
+    unit = "mm" if millimetres else "units"
+    for place, design in enumerate((OPTIMAL, small, variant(3))):
+        factor = design.unit_mm if millimetres else design.unit_mm / OPTIMAL.unit_mm
+        nodes = workspace_nodes(design)
+        expected = {
+            f"volume {unit}³": workspace_volume(design).volume * factor**3,
+            "nodes": nodes.count,
+            f"node volume {unit}³": nodes.volume * factor**3,
+            f"reach {unit}": design.reach * factor,
+            f"b2 {unit}": design.b2 * factor,
+            f"clearance {unit}": (figures_of(design).clearance or 0.0) * factor,
+        }
+        for name, value in expected.items():
+            assert number(rows[name][place]) == pytest.approx(value, rel=1e-3, abs=1e-4)
+
+
+def test_what_is_small_beside_the_others_is_not_told_as_nothing() -> None:
+    volume = BY_NAME["volume"]
+    assert told(volume, 0.000999998, 8000.0) == "0.001"
+    assert told(volume, -8.574e-9, 8000.0) == "−8.57e−09"
+    assert told(volume, 0.0, 8000.0) == "0"
+    assert told(volume, 7992.0, 8000.0) == "7992.00"
+    # A difference by rounding is none.
+    assert told(BY_NAME["extent x"], -7.1e-15, 20.0, signed=True) == "0"
+
+
+def test_the_best_of_a_row_is_bold_and_only_where_better_means_something() -> None:
+    html = table(columns(compared(INITIAL)), DEEDS, millimetres=False)
+    rows = {re.sub("<.*?>", "", row.partition("</td>")[0]): row for row in html.split("<tr")[2:]}
+    (volume,) = (
+        row for name, row in rows.items() if name.endswith("volume units³") and "node" not in name
+    )
+    assert re.findall(r"font-weight:700[^>]*>([^<]*)", volume) == ["7053.04"]
+    (extent,) = (row for name, row in rows.items() if name.endswith("extent x units"))
+    assert "font-weight:700" not in extent
+
+
+def test_what_is_as_good_is_not_the_best() -> None:
+    volume, reach, nodes = (BY_NAME[name] for name in ("volume", "reach", "nodes"))
+    assert best_of(volume, [1.0, 2.0, None, 2.0]) == {1, 3}
+    assert best_of(reach, [1.0, 2.0]) == {0}
+    assert best_of(volume, [2.0, 2.0 * (1.0 + 1e-12)]) == set()
+    assert best_of(volume, [2.0, None]) == set()
+    assert best_of(nodes, [1.0, 2.0]) == set()
+
+
+def test_names_are_text_whatever_they_hold() -> None:
+    state = compared(msgspec.structs.replace(INITIAL, name="<b onclick=x>&"))
+    found = columns(state)
+    for html in (table(found, DEEDS, millimetres=False), "".join(notes(state, found))):
+        assert "<b onclick" not in html
+
+
+def test_an_empty_workspace_is_told_with_its_reasons() -> None:
+    limits = msgspec.structs.replace(OPTIMAL.limits, l1=(1.0, 2.0), l4=(1.0, 2.0))
+    state = compared(msgspec.structs.replace(OPTIMAL, name="none", limits=limits))
+    found = columns(state)
+    rows = cells(table(found, DEEDS, millimetres=False))
+    assert rows["volume units³"][1] == "empty"
+    assert rows["clearance units"][1] == "–"
+    (note,) = notes(state, found)
+    assert "A (none) has an empty workspace; emptied by: " in note
+    assert "–" in bars(found, millimetres=False)
+
+
+def test_other_units_are_told_and_the_same_manipulator_is_the_same() -> None:
+    # In units of half the size everything has twice the number.
+    double: dict[str, tuple[float, float]] = {
+        "a3": (2.0 * OPTIMAL.a3[0], 2.0 * OPTIMAL.a3[1]),
+        "b1": (2.0 * OPTIMAL.b1[0], 2.0 * OPTIMAL.b1[1]),
+    }
+    box = OPTIMAL.limits.box
+    assert box is not None
+    lows, highs = (tuple(2.0 * value for value in corner) for corner in box)
+    home = home_pose(OPTIMAL)
+    x, y, z = home.position
+    other = msgspec.structs.replace(
+        OPTIMAL,
+        **double,
+        name="half units",
+        b2=2.0 * OPTIMAL.b2,
+        b3=2.0 * OPTIMAL.b3,
+        unit_mm=0.5 * OPTIMAL.unit_mm,
+        node_step=2.0 * (OPTIMAL.node_step or 1.0),
+        limits=msgspec.structs.replace(OPTIMAL.limits, box=(lows, highs)),
+        home=Pose((2.0 * x, 2.0 * y, 2.0 * z), home.quaternion),
+    )
+    state = compared(other)
+    found = columns(state)
+    for figure in FIGURES:
+        live, same = (column.value(figure) for column in found)
+        assert same == pytest.approx(live, rel=1e-6, abs=1e-9), figure.name
+    (note,) = notes(state, found)
+    assert "One unit of the live design is 10 mm; A has 5 mm. Lengths are told in units" in note
+
+
+def test_bars_are_as_long_as_their_values() -> None:
+    found = columns(compared(INITIAL, variant(2)))
+    html = bars(found, millimetres=False)
+    widths = [float(width) for width in re.findall(r'<rect[^>]* width="([\d.]+)"', html)]
+    assert len(widths) == len(DRAWN) * len(found)
+    per_drawing = np.array(widths).reshape(len(DRAWN), len(found))
+    for name, drawn in zip(DRAWN, per_drawing, strict=True):
+        values = np.array([column.value(BY_NAME[name]) for column in found], dtype=np.float64)
+        if values.max() > 0.0:
+            expected = np.maximum(drawn.max() * values / values.max(), 0.8)
+            assert drawn == pytest.approx(expected, abs=0.02), name
+
+
+def test_a_drawing_has_the_workspace_at_the_home_of_the_design_and_its_points() -> None:
+    drawing = compared_drawing(ComparedRequest(INITIAL, drawn=True))
+    assert drawing.problem is None
+    assert drawing.shell is not None
+    assert drawing.figures is not None
+    spans = np.ptp(drawing.shell.vertices, axis=0)
+    assert spans == pytest.approx(np.array(drawing.figures.extent), abs=0.01 * INITIAL.reach)
+    ends = drawing.outline.reshape(-1, 3)
+    for point in ((0.0, 0.0, 0.0), (*INITIAL.a3, 0.0), home_pose(INITIAL).position):
+        assert np.abs(ends - np.array(point)).max(axis=1).min() < 1e-9
+    assert compared_drawing(ComparedRequest(INITIAL)).shell is None
+
+
+def test_a_tolerance_that_is_too_fine_is_told_and_the_figures_stay() -> None:
+    drawing = compared_drawing(ComparedRequest(OPTIMAL, drawn=True, tolerance=1e-9))
+    assert drawing.figures is not None
+    assert drawing.shell is None
+    assert "tolerance" in (drawing.problem or "")
+
+
+class Helper:
+    """A worker that keeps what it is asked until it is told to do it."""
+
+    def __init__(self) -> None:
+        self.asked: list[tuple[object, ComparedRequest, Callable[[ComparedDrawing], None]]] = []
+
+    def submit(
+        self,
+        key: object,
+        task: str,
+        arguments: tuple[ComparedRequest],
+        done: Callable[[ComparedDrawing], None],
+        failed: Callable[[str], None],
+    ) -> None:
+        assert task == "draw_compared"
+        assert callable(failed)
+        self.asked.append((key, arguments[0], done))
+
+    def work(self) -> None:
+        asked, self.asked = self.asked, []
+        for _, request, done in asked:
+            done(compared_drawing(request))
+
+
+@pytest.fixture
+def helper() -> Helper:
+    return Helper()
+
+
+@pytest.fixture
+def feed(helper: Helper) -> CompareFeed:
+    worker: object = helper
+    return CompareFeed(worker, lambda: None)  # pyright: ignore[reportArgumentType]
+
+
+def test_a_slider_asks_for_the_live_design_alone_and_nothing_without_pins(
+    feed: CompareFeed, helper: Helper
+) -> None:
+    feed.follow(Frame(opened(OPTIMAL)))
+    assert helper.asked == []
+    state = compared(INITIAL, variant(2), look=Look(overlay=True))
+    feed.follow(Frame(state))
+    assert [request.design for _, request, _ in helper.asked] == [
+        unnamed(each) for each in (OPTIMAL, INITIAL, variant(2))
+    ]
+    assert len({key for key, _, _ in helper.asked}) == 3
+    helper.work()
+    assert feed.is_settled
+    feed.follow(Frame(SetVariable("b2", 2.3).apply(state)))
+    ((_, request, _),) = helper.asked
+    assert request.design == unnamed(OPTIMAL.with_variable("b2", 2.3))
+    # Until it comes the last one is shown, and said to be old.
+    assert feed.drawing(LIVE) is not None
+    assert not feed.is_current(LIVE)
+    assert feed.is_current(1)
+
+
+def test_a_place_never_shows_the_design_that_was_there_before(
+    feed: CompareFeed, helper: Helper
+) -> None:
+    state = compared(INITIAL)
+    feed.follow(Frame(state))
+    helper.work()
+    assert feed.drawing(1) is not None
+    feed.follow(Frame(Pin(variant(2)).apply(Unpin(0).apply(state))))
+    assert feed.drawing(1) is None
+    helper.work()
+    found = feed.drawing(1)
+    assert found is not None
+    assert found.request.design == unnamed(variant(2))
+
+
+def test_workspaces_are_drawn_to_true_size_in_their_colours(
+    server: viser.ViserServer, feed: CompareFeed, helper: Helper
+) -> None:
+    large = msgspec.structs.replace(INITIAL, unit_mm=25.0)
+    state = compared(large, look=Look(overlay=True, outlines=True))
+    feed.follow(Frame(state))
+    scene = ComparedScene(server.scene, feed)
+    assigner = Assigner(server)
+    helper.work()
+    feed.follow(Frame(state))
+    placed = Placed(Frame(state))
+    updates = scene.updates(placed)
+    assigner.assign(updates)
+    shown = {
+        handle.name: handle
+        for handle, name, value in scene.updates(placed)
+        if name == "visible" and value
+    }
+    assert {"/compared/live/workspace", "/compared/A/workspace", "/compared/A/outline"} <= {*shown}
+    assert "/compared/live/outline" not in shown
+    drawing = feed.drawing(1)
+    assert drawing is not None
+    assert drawing.shell is not None
+    mesh = shown["/compared/A/workspace"]
+    assert isinstance(mesh, viser.MeshHandle)
+    assert tuple(np.asarray(mesh.color).tolist()) == COMPARED[1]
+    expected = drawing.shell.vertices * placed.scale * 2.5
+    # No face lies in the plane of another workspace's, be the designs ever so alike.
+    close = 0.5 * APART * np.ptp(expected, axis=0).max()
+    off = np.abs(np.asarray(mesh.vertices) - expected).max()
+    assert 0.5 * close < off <= 1.001 * close
+    hidden = Frame(compared(large, look=Look()))
+    feed.follow(hidden)
+    assigner.assign(scene.updates(Placed(hidden)))
+    assert not mesh.visible
+
+
+@pytest.fixture
+def panel(server: viser.ViserServer, desk: Desk) -> ComparePanel:
+    return ComparePanel(server.gui, desk.session, lambda: (variant(7),))
+
+
+def test_the_panel_pins_opens_unpins_and_switches(
+    panel: ComparePanel, desk: Desk, feed: CompareFeed
+) -> None:
+    own = desk.state.design
+    desk.click(panel.pin)
+    assert desk.state.compared.pinned == (own, None, None)
+    options = (NOTHING, "variant 7", *PRESETS)
+    given = [
+        value
+        for handle, name, value in panel.updates(Frame(desk.state), feed)
+        if handle is panel.another and name == "options"
+    ]
+    assert given == [options]
+    panel.another.options = options
+    desk.use(panel.another, "variant 7")
+    assert desk.state.compared.pinned == (own, variant(7), None)
+    desk.click(panel.open[1])
+    assert desk.state.design == variant(7)
+    assert desk.state.compared.pinned == (own, variant(7), None)
+    desk.click(panel.pin)
+    desk.click(panel.open[2])
+    assert desk.state.design == variant(7)
+    assert [line.partition(";")[0] for line in desk.complaints] == [
+        "variant 7 is pinned already, as B",
+        "nothing is pinned as C",
+    ]
+    names = [button.label for button in panel.switches]
+    desk.click(panel.switches[names.index("Overlay workspaces")])
+    desk.click(panel.switches[names.index("Bars")])
+    assert desk.state.compared.look == Look(shows="bars", overlay=True)
+    desk.click(panel.unpin[0])
+    assert desk.state.compared.pinned == (None, variant(7), None)
+
+
+@pytest.fixture
+def worker() -> Generator[Worker]:
+    made = Worker(lambda message: None)
+    yield made
+    made.stop()
+
+
+def test_the_worker_finds_the_columns(worker: Worker) -> None:
+    feed = CompareFeed(worker, lambda: None)
+    state = compared(INITIAL)
+    feed.follow(Frame(state))
+    assert worker.wait_until_idle(120.0)
+    deadline = time.monotonic() + 10.0
+    while not feed.is_settled and time.monotonic() < deadline:
+        time.sleep(0.01)
+    live, pinned = columns_of(state, feed)
+    # Compiled or not, the last bit may differ.
+    for column, design in ((live, OPTIMAL), (pinned, INITIAL)):
+        assert column.figures is not None
+        expected = figures_of(unnamed(design))
+        for each in fields(expected):
+            found, known = (getattr(f, each.name) for f in (column.figures, expected))
+            assert found == known or found == pytest.approx(known, rel=1e-9), each.name
+    assert [each.letter for each in (live, pinned)] == ["live", SLOTS[0]]

@@ -1,0 +1,137 @@
+"""Every control tells what it does, and in which unit; both themes are legible."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Generator
+
+import pytest
+
+from explorer.app.colours import OUTLINE, Rgb
+from explorer.app.commands import NEVER
+from explorer.app.keeping import take_up
+from explorer.app.panels import charts
+from explorer.app.panels.html import GREEN, GREY, RED
+from explorer.app.scene.bodies import GRID
+from explorer.app.server import Running, start
+from explorer.app.study_folders import StudyFolders
+from explorer.app.theme import BRAND, BRAND_ON_DARK
+from explorer.app.widgets import Widget, widgets
+from explorer.design_file import PRESETS
+
+# Of panels, of the scene, and of fields within panels, as viser draws them.
+LIGHT = {"panel": "#ffffff", "scene": "#ffffff", "field": "#ffffff"}
+DARK = {"panel": "#242424", "scene": "#141414", "field": "#2e2e2e"}
+
+UNITS = re.compile(
+    r"design units|units³|\bunits\b|\bmm\b|millimetres|pixels|\(px\)|°|degrees|\(s\)|seconds"
+    r"|kg/m³|\bstep\b"
+)
+
+WITHOUT_UNIT = {
+    "Starts": "a count of designs",
+    "Drawn apart": "a share, from 0 to 1",
+    "Go to step": "the number of a step",
+    "Designs": "a count of designs",
+    "Name": "a name",
+}
+"""Controls of values that have no unit, and what they are."""
+
+OUT_OF_SIGHT = {"What is done in plots"}
+"""What the page writes to and nobody reads."""
+
+
+@pytest.fixture(scope="module")
+def running(tmp_path_factory: pytest.TempPathFactory) -> Generator[Running]:
+    studies = StudyFolders(tmp_path_factory.mktemp("studies"))
+    made = start(PRESETS["paper-optimal"], port=0, keep=take_up(resume=False), studies=studies)
+    yield made
+    made.stop()
+
+
+def name(widget: Widget) -> str:
+    return " / ".join((*widget.path, widget.label))
+
+
+def test_every_control_says_in_sentences_what_it_does(running: Running) -> None:
+    # What is pushed by its words in a list or a table is told of there.
+    found = [
+        each
+        for each in widgets(running.viser)
+        if each.label not in OUT_OF_SIGHT and not each.label.startswith(NEVER)
+    ]
+    assert len(found) > 150
+    for widget in found:
+        assert len(widget.hint) > 5, f"{name(widget)} says nothing"
+        assert widget.hint.endswith("."), f"{name(widget)}: {widget.hint!r} is no sentence"
+        assert not widget.hint[0].islower() or widget.hint[0] in "xyab", name(widget)
+
+
+def test_every_value_says_its_unit(running: Running) -> None:
+    without: set[str] = set()
+    for widget in widgets(running.viser):
+        if widget.kind != "value" or widget.label in OUT_OF_SIGHT:
+            continue
+        told = " ".join((*widget.path, widget.label, widget.hint))
+        if UNITS.search(told) is None:
+            without.add(widget.label)
+    assert without <= set(WITHOUT_UNIT), "these tell no unit"
+
+
+def test_hints_are_short_enough_to_be_read_at_a_glance(running: Running) -> None:
+    for widget in widgets(running.viser):
+        assert len(widget.hint) <= 240, f"{name(widget)} says too much"
+
+
+def rgb(colour: str) -> Rgb:
+    red, green, blue = (int(colour[i : i + 2], 16) for i in (1, 3, 5))
+    return red, green, blue
+
+
+def luminance(colour: Rgb) -> float:
+    """Return the relative luminance as WCAG 2 defines it."""
+    shares = [value / 255.0 for value in colour]
+    linear = [s / 12.92 if s <= 0.04045 else ((s + 0.055) / 1.055) ** 2.4 for s in shares]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+def contrast(one: Rgb, other: Rgb) -> float:
+    low, high = sorted((luminance(one), luminance(other)))
+    return (high + 0.05) / (low + 0.05)
+
+
+def test_the_measure_of_contrast_is_that_of_its_definition() -> None:
+    assert contrast((0, 0, 0), (255, 255, 255)) == pytest.approx(21.0)
+    assert contrast((119, 119, 119), (255, 255, 255)) == pytest.approx(4.48, abs=0.005)
+
+
+@pytest.mark.parametrize("pair", [GREY, GREEN, RED], ids=["grey", "green", "red"])
+def test_words_are_legible_in_both_themes(pair: tuple[str, str]) -> None:
+    for colour, backgrounds in zip(pair, (LIGHT, DARK), strict=True):
+        for place, background in backgrounds.items():
+            assert contrast(rgb(colour), rgb(background)) >= 4.5, f"{colour} on a {place}"
+
+
+@pytest.mark.parametrize("chart", ["BLUE", "TEAL", "VIOLET", "ORANGE", "NEUTRAL"])
+def test_lines_of_charts_are_seen_in_both_themes(chart: str) -> None:
+    for backgrounds in (LIGHT, DARK):
+        assert contrast(getattr(charts, chart), rgb(backgrounds["panel"])) >= 3.0
+
+
+def test_the_tab_in_front_and_buttons_are_legible() -> None:
+    assert contrast(BRAND, rgb(LIGHT["panel"])) >= 4.5
+    assert contrast(BRAND_ON_DARK, rgb(DARK["panel"])) >= 4.5
+    # viser writes on buttons in white or black by what is behind.
+    for brand in (BRAND, BRAND_ON_DARK):
+        assert max(contrast(brand, (255, 255, 255)), contrast(brand, (0, 0, 0))) >= 4.5
+
+
+def test_the_edge_of_an_alert_is_seen_on_light_panels() -> None:
+    assert contrast(OUTLINE, rgb(LIGHT["panel"])) >= 3.0
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_the_grid_is_seen_and_does_not_shout(dark: bool) -> None:
+    background = rgb((DARK if dark else LIGHT)["scene"])
+    cell, section = (contrast(each, background) for each in GRID[dark])
+    assert 1.15 < cell < section < 2.2

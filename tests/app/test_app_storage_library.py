@@ -1,0 +1,567 @@
+"""Named designs: as a dictionary behaves, over any names, files and neighbours."""
+
+from __future__ import annotations
+
+import json
+import os
+import threading
+import unicodedata
+from collections.abc import Callable, Generator
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from explorer.app.storage.folder import alone_in
+from explorer.app.storage.library import MOST_DELETED, Entry, Library, copy_name, file_of
+from explorer.design import Design
+from explorer.design_file import PRESETS, decode_design, encode_design
+from explorer.errors import InputError, StorageError
+
+OPTIMAL = PRESETS["paper-optimal"]
+
+HOSTILE = (
+    "../../../etc/passwd",
+    "/etc/passwd",
+    "C:\\Windows\\system32",
+    "..",
+    ".",
+    "~",
+    "con",
+    "NUL.json",
+    ".lock",
+    ".order",
+    "trash",
+    'a/b\\c:d*e?f"g<h>i|j',
+    "$(rm -rf ~)",
+    "%00",
+    "-rf",
+    "name.json",
+    "<b>bold</b>",
+    "é",
+    "κ1 = 0 ✓",
+    "名前",
+    "x" * 100,
+    "é" * 100,
+    "🦾" * 100,
+)
+
+REFUSED = (
+    "",
+    " ",
+    "\t",
+    "two\nlines",
+    "nul\0",
+    "x" * 101,
+    "\ud800",
+    "bell\a",
+    "\u202e",
+    "a\u2028b",
+)
+
+
+def design(number: int) -> Design:
+    return msgspec.structs.replace(OPTIMAL, b2=1.0 + 0.125 * number)
+
+
+def names(library: Library) -> list[str]:
+    """Return the names in a library, none of whose files is of no use."""
+    entries = library.list()
+    assert all(each.problem is None for each in entries)
+    return [each.name for each in entries]
+
+
+def contents(library: Library) -> dict[str, bytes]:
+    """Return the contents of all files of a library, the trash included, by path."""
+    files = [path for path in library.folder.rglob("*") if path.is_file()]
+    return {str(path): path.read_bytes() for path in files}
+
+
+def problems(library: Library) -> list[Entry]:
+    return [each for each in library.list() if each.problem is not None]
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _disk_that_forces_nothing() -> Generator[None]:  # pyright: ignore[reportUnusedFunction]
+    """Save the time that forcing to the disk takes; no power fails here."""
+
+    def at_once(descriptor: int) -> None:
+        pass
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(os, "fsync", at_once)
+        yield
+
+
+@pytest.fixture
+def library(tmp_path: Path) -> Library:
+    return Library(tmp_path / "data" / "designs")
+
+
+def test_what_is_saved_is_opened_and_listed_with_its_facts(library: Library) -> None:
+    assert library.list() == ()
+    saved = library.save(" mine ", OPTIMAL)
+    assert saved == msgspec.structs.replace(OPTIMAL, name="mine")
+    assert library.open("mine") == library.open(" mine") == saved
+    (entry,) = library.list()
+    assert (entry.name, entry.design, entry.problem) == ("mine", saved, None)
+    assert entry.reach == OPTIMAL.reach
+    assert entry.unit_mm == OPTIMAL.unit_mm
+    assert entry.variables == OPTIMAL.variables
+    # Each file is a design file as any other.
+    data = (library.folder / entry.file).read_bytes()
+    assert decode_design(data, "file") == saved
+
+
+def test_the_design_that_was_saved_last_comes_first_whatever_clocks_say(library: Library) -> None:
+    for number, name in enumerate(("c", "a", "d", "b")):
+        library.save(name, design(number))
+        for path in library.folder.iterdir():
+            os.utime(path, (1e9 - 1e6 * number, 1e9 - 1e6 * number))
+    assert names(library) == ["b", "d", "a", "c"]
+    library.save("a", design(9), replace=True)
+    assert names(library) == ["a", "b", "d", "c"]
+    numbers = [each.generation for each in library.list()]
+    assert numbers == sorted({*numbers}, reverse=True)
+
+
+@pytest.mark.parametrize("damage", [b"", b"{", b'{"x": -1}', b'{"x": 1e30}', b"[1]", b"\xff"])
+def test_without_the_order_the_designs_are_there_all_the_same(
+    library: Library, damage: bytes
+) -> None:
+    for name in ("b", "a"):
+        library.save(name, OPTIMAL)
+    (library.folder / ".order").write_bytes(damage)
+    assert names(library) == ["a", "b"]
+    library.save("c", OPTIMAL)
+    assert names(library) == ["c", "a", "b"]
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_a_name_is_never_a_path(library: Library, name: str) -> None:
+    outside = library.folder.parent
+    library.save(name, OPTIMAL)
+    wanted = unicodedata.normalize("NFC", name)
+    assert names(library) == [wanted]
+    assert library.open(name).name == wanted
+    assert [path.name for path in outside.iterdir()] == ["designs"]
+    (file,) = (path for path in library.folder.iterdir() if not path.name.startswith("."))
+    assert file.name == file_of(wanted)
+    gone = library.delete(name)
+    assert library.list() == ()
+    assert library.restore(gone.file).name == wanted
+    assert [path.name for path in outside.iterdir()] == ["designs"]
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_is_no_name_is_refused_in_one_line(library: Library, name: str) -> None:
+    library.save("mine", OPTIMAL)
+    for refused in (
+        lambda: library.save(name, OPTIMAL),
+        lambda: library.rename("mine", name),
+        lambda: library.duplicate("mine", name),
+    ):
+        with pytest.raises(InputError, match="printable line of 1 to 100") as refusal:
+            refused()
+        assert len(str(refusal.value).splitlines()) == 1
+    with pytest.raises(InputError, match="no design is called") as refusal:
+        library.open(name)
+    assert str(refusal.value).isprintable()
+    assert names(library) == ["mine"]
+
+
+@given(st.text(max_size=100), st.text(max_size=100))
+@example("Mine", "mine")
+@example("a b", "a-b")
+@example("é", "e")
+@example("İ", "i")
+@example("ß", "ss")
+@example("x" * 99 + "a", "x" * 99 + "b")
+def test_files_are_called_differently_on_any_system(one: str, other: str) -> None:
+    for name in (one, other):
+        file = file_of(name)
+        assert file.isascii()
+        assert len(file) <= 64
+        assert {*file} <= {*"abcdefghijklmnopqrstuvwxyz0123456789-."}
+        assert file[0].isalnum()
+        assert Path(file).name == file
+        assert file.endswith(".json")
+    # Also where the system does not tell capitals from small letters.
+    assert (file_of(one).casefold() == file_of(other).casefold()) == (one == other)
+
+
+def test_what_looks_the_same_is_the_same_name(library: Library) -> None:
+    library.save("caf\u00e9", OPTIMAL)
+    assert library.open("cafe\u0301").name == "caf\u00e9"
+    with pytest.raises(InputError, match="already"):
+        library.save("cafe\u0301 ", OPTIMAL)
+
+
+def test_a_name_that_is_taken_is_replaced_only_when_that_is_meant(library: Library) -> None:
+    library.save("mine", design(1))
+    library.save("other", design(2))
+    with pytest.raises(InputError, match=r"replace it.*'mine copy'"):
+        library.save("mine", design(3))
+    with pytest.raises(InputError, match="already"):
+        library.rename("other", "mine")
+    with pytest.raises(InputError, match="already"):
+        library.duplicate("other", "mine")
+    assert library.open("mine").b2 == design(1).b2
+    library.save("mine", design(3), replace=True)
+    assert library.open("mine").b2 == design(3).b2
+    assert sorted(names(library)) == ["mine", "other"]
+    assert library.rename("mine", " mine ").name == "mine"
+
+
+def test_what_is_replaced_by_another_goes_to_the_trash(library: Library) -> None:
+    library.save("mine", design(1))
+    for _ in range(3):
+        library.save("mine", design(1), replace=True)
+    assert library.deleted() == ()
+    library.save("mine", design(2), replace=True)
+    (gone,) = library.deleted()
+    assert library.restore(gone.file, "before").b2 == design(1).b2
+    assert library.open("mine").b2 == design(2).b2
+
+
+def test_copies_get_names_of_their_own(library: Library) -> None:
+    library.save("x" * 100, OPTIMAL)
+    made = [library.duplicate("x" * 100).name for _ in range(3)]
+    assert made == ["x" * 95 + " copy", "x" * 93 + " copy 2", "x" * 93 + " copy 3"]
+    assert {*names(library)} == {"x" * 100, *made}
+    taken = {"a b copy", *(f"a b copy {number}" for number in range(2, 1000))}
+    assert copy_name("a b", taken) == "a b copy 1000"
+    assert copy_name("a b copy 7", taken) == "a b copy 1000"
+    assert copy_name("a b copy", set()) == "a b copy"
+    assert copy_name("a" * 94 + " b", set()) == "a" * 94 + " copy"
+
+
+@pytest.mark.parametrize("act", ["open", "rename", "duplicate", "delete"])
+def test_a_name_that_nothing_has_is_refused_with_those_there_are(
+    library: Library, act: str
+) -> None:
+    def attempt() -> None:
+        _ = library.rename("y", "z") if act == "rename" else getattr(library, act)("y")
+
+    with pytest.raises(InputError, match="none has been saved yet"):
+        attempt()
+    for number in range(9):
+        library.save(f"d{number}", OPTIMAL)
+    with pytest.raises(InputError, match=r"'d8', 'd7'.*'d1', …"):
+        attempt()
+    assert len(names(library)) == 9
+
+
+def test_what_was_deleted_is_kept_for_a_while(library: Library) -> None:
+    for number in range(MOST_DELETED + 5):
+        library.save("same", design(number))
+        library.delete("same")
+    gone = library.deleted()
+    assert [each.name for each in gone] == ["same"] * MOST_DELETED
+    assert library.restore(gone[0].file).b2 == design(MOST_DELETED + 4).b2
+    assert [each.file for each in library.deleted()] == [each.file for each in gone[1:]]
+    with pytest.raises(InputError, match="already"):
+        library.restore(gone[1].file)
+    assert library.restore(gone[1].file, "another").name == "another"
+    for file in (gone[0].file, "../" + gone[2].file, "", "..", "\0"):
+        with pytest.raises(InputError, match="not in the trash"):
+            library.restore(file)
+    # The newest are kept, also when numbers go on.
+    library.delete("same")
+    assert library.deleted()[0].name == "same"
+
+
+def test_files_that_were_copied_into_the_folder_appear_by_the_name_inside(
+    library: Library,
+) -> None:
+    library.save("own", design(1))
+    copied = library.folder / "My Design (1).json"
+    copied.write_bytes(encode_design(msgspec.structs.replace(design(2), name="theirs")))
+    assert names(library) == ["own", "theirs"]
+    assert library.open("theirs").b2 == design(2).b2
+    # One that is replaced or renamed gets a file of the library's own.
+    library.save("theirs", design(3), replace=True)
+    assert not copied.exists()
+    assert library.open("theirs").b2 == design(3).b2
+    (library.folder / "x.json").write_bytes(encode_design(design(4)))
+    library.rename(OPTIMAL.name, "mine")
+    assert {path.name for path in library.folder.glob("*.json")} == {
+        file_of("own"),
+        file_of("theirs"),
+        file_of("mine"),
+    }
+
+
+def test_of_two_files_with_one_name_the_own_one_is_meant(library: Library) -> None:
+    library.save("name", design(1))
+    for file in ("0.json", "z.json"):
+        data = encode_design(msgspec.structs.replace(design(2), name="name"))
+        (library.folder / file).write_bytes(data)
+    assert library.open("name").b2 == design(1).b2
+    found = problems(library)
+    assert [each.file for each in found] == ["0.json", "z.json"]
+    assert all("has the name 'name' too" in (each.problem or "") for each in found)
+    library.delete("0.json")
+    assert library.open("name").b2 == design(1).b2
+    assert [each.file for each in problems(library)] == ["z.json"]
+
+
+BROKEN = {
+    "empty.json": b"",
+    "half.json": encode_design(OPTIMAL)[:100],
+    "other.json": b'{"what": 1}',
+    "list.json": b"[]",
+    "bytes.json": bytes(range(256)),
+    "deep.json": b"[" * 200_000,
+    "large.json": b" " * 2_000_000,
+    "degenerate.json": encode_design(OPTIMAL).replace(b"7.0062", b"0.0000"),
+    "nameless.json": encode_design(msgspec.structs.replace(OPTIMAL, name=" ")),
+    "odd \x1b[31m\n.json": b"{}",
+    "x" * 245 + ".json": b"{}",
+}
+
+
+def test_files_of_no_use_are_listed_with_a_reason_and_can_be_deleted(library: Library) -> None:
+    library.save("good", OPTIMAL)
+    for file, data in BROKEN.items():
+        (library.folder / file).write_bytes(data)
+    (library.folder / "folder.json").mkdir()
+    (library.folder / "gone.json").symlink_to(library.folder / "nowhere")
+    count = len(BROKEN) + 2
+    if hasattr(os, "mkfifo"):
+        os.mkfifo(library.folder / "pipe.json")
+        count += 1
+    entries = library.list()
+    assert (entries[0].name, entries[0].problem) == ("good", None)
+    assert len(entries) == 1 + count
+    for entry in entries[1:]:
+        assert entry.problem
+        assert entry.design is entry.reach is entry.unit_mm is entry.variables is None
+        assert entry.name.isprintable()
+        assert entry.problem.isprintable()
+        with pytest.raises(InputError, match="cannot be opened"):
+            library.open(entry.name)
+    for entry in entries[1:]:
+        library.delete(entry.name)
+    assert names(library) == ["good"]
+    for gone in library.deleted():
+        with pytest.raises(InputError):
+            library.restore(gone.file)
+    # What lies in the trash and cannot be brought back stays there.
+    assert len(library.deleted()) == min(count, MOST_DELETED)
+
+
+OPERATIONS = ("save", "replace", "rename", "duplicate", "delete", "restore", "open")
+NAMES = ("a", "A", "á", "b/..", "a copy")
+
+
+@settings(max_examples=40)
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from(OPERATIONS),
+            st.sampled_from(NAMES),
+            st.sampled_from(NAMES),
+            st.integers(0, 1),
+        ),
+        max_size=15,
+    )
+)
+def test_two_explorers_see_one_dictionary(
+    tmp_path_factory: pytest.TempPathFactory, doings: list[tuple[str, str, str, int]]
+) -> None:
+    folder = tmp_path_factory.mktemp("designs")
+    libraries = Library(folder), Library(folder)
+    known: dict[str, float] = {}
+    trash: list[tuple[str, str, float]] = []
+    for number, (act, name, other, who) in enumerate(doings):
+        library, new = libraries[who], design(number)
+        try:
+            match act:
+                case "save":
+                    library.save(name, new)
+                    assert name not in known
+                    known[name] = new.b2
+                case "replace":
+                    library.save(name, new, replace=True)
+                    if name in known:
+                        trash.append((name, library.deleted()[0].file, known[name]))
+                    known[name] = new.b2
+                case "rename":
+                    library.rename(name, other)
+                    assert name == other or other not in known
+                    known[other] = known.pop(name)
+                case "duplicate":
+                    copy = library.duplicate(name)
+                    assert copy.name not in known
+                    known[copy.name] = known[name]
+                case "delete":
+                    trash.append((name, library.delete(name).file, known.pop(name)))
+                case "restore":
+                    if trash:
+                        was, file, value = trash[-1]
+                        assert library.restore(file).name == was
+                        assert was not in known
+                        known[was] = value
+                        trash.pop()
+                case _:
+                    assert library.open(name).b2 == known[name]
+        except InputError:
+            assert act != "replace"
+            expected = {
+                "save": name in known,
+                "rename": name not in known or (other in known and other != name),
+                "restore": bool(trash) and trash[-1][0] in known,
+            }
+            assert expected.get(act, name not in known)
+        for each in libraries:
+            assert {entry.name: entry.design.b2 for entry in each.list() if entry.design} == known
+            assert [gone.file for gone in each.deleted()] == [file for _, file, _ in trash[::-1]]
+
+
+def test_many_at_once_lose_nothing(library: Library, monkeypatch: pytest.MonkeyPatch) -> None:
+    # On a slow disk the last in the row waits long.
+    monkeypatch.setattr("explorer.app.storage.folder.PATIENCE_SECONDS", 60.0)
+    faults: list[BaseException] = []
+
+    def work(worker: int) -> None:
+        own = Library(library.folder)
+        try:
+            for number in range(3):
+                own.save(f"{worker}-{number}", design(number))
+                own.duplicate(f"{worker}-{number}", f"{worker}-{number} twin")
+                own.delete(f"{worker}-{number}")
+        except BaseException as error:  # noqa: BLE001 - told by the test's own thread
+            faults.append(error)
+
+    threads = [threading.Thread(target=work, args=(worker,)) for worker in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert faults == []
+    assert sorted(names(library)) == sorted(f"{w}-{n} twin" for w in range(4) for n in range(3))
+    generations = [each.generation for each in library.list()]
+    assert len({*generations}) == 12
+    order = json.loads((library.folder / ".order").read_bytes())
+    assert {*order} >= {each.file for each in library.list()}
+
+
+def test_a_folder_that_another_explorer_keeps_is_told(
+    library: Library, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    library.save("mine", OPTIMAL)
+    faults: list[str] = []
+
+    def try_it() -> None:
+        with pytest.raises(StorageError, match="another explorer") as refusal:
+            library.save("yours", OPTIMAL)
+        faults.append(str(refusal.value))
+
+    monkeypatch.setattr("explorer.app.storage.folder.PATIENCE_SECONDS", 0.0)
+    with alone_in(library.folder):
+        thread = threading.Thread(target=try_it)
+        thread.start()
+        thread.join()
+        # To look takes no lock.
+        assert names(library) == ["mine"]
+    assert len(faults) == 1
+    library.save("yours", OPTIMAL)
+
+
+def test_a_write_that_fails_changes_nothing(
+    library: Library, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    library.save("mine", design(1))
+    before = contents(library)
+
+    def full(descriptor: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.fsync", full)
+    for attempt in (
+        lambda: library.save("mine", design(2), replace=True),
+        lambda: library.save("yours", design(2)),
+        lambda: library.rename("mine", "yours"),
+        lambda: library.duplicate("mine"),
+    ):
+        with pytest.raises(StorageError, match="make room"):
+            attempt()
+        assert contents(library) == before
+
+
+class Killed(BaseException):
+    """Stands for a kill: nothing that would write or remove works from here on."""
+
+
+DOINGS: dict[str, Callable[[Library], object]] = {
+    "save": lambda library: library.save("new", design(3)),
+    "replace": lambda library: library.save("mine", design(3), replace=True),
+    "rename": lambda library: library.rename("mine", "new"),
+    "duplicate": lambda library: library.duplicate("mine"),
+    "delete": lambda library: library.delete("mine"),
+    "restore": lambda library: library.restore(library.deleted()[0].file),
+}
+
+
+@pytest.mark.parametrize("act", DOINGS)
+def test_a_kill_between_any_two_steps_loses_no_design(
+    library: Library, monkeypatch: pytest.MonkeyPatch, act: str
+) -> None:
+    library.save("gone", design(2))
+    library.delete("gone")
+    library.save("mine", design(1))
+    start = contents(library)
+    most, is_killed = -1, True
+    while is_killed:
+        most += 1
+        left = most
+
+        def step(usual: Callable[..., Any]) -> Callable[..., Any]:
+            def stepped(*arguments: Any, **named: Any) -> Any:
+                nonlocal left
+                left -= 1
+                if left < 0:
+                    raise Killed
+                return usual(*arguments, **named)
+
+            return stepped
+
+        is_killed = False
+        with monkeypatch.context() as patch:
+            patch.setattr(os, "fsync", step(os.fsync))
+            patch.setattr(Path, "replace", step(Path.replace))
+            patch.setattr(Path, "unlink", step(Path.unlink))
+            try:
+                DOINGS[act](library)
+            except Killed:
+                is_killed = True
+        found = Library(library.folder)
+        there = {entry.design.b2 for entry in found.list() if entry.design}
+        trashed = {found.restore(gone.file, f"back {gone.file}").b2 for gone in found.deleted()}
+        assert {design(1).b2, design(2).b2} <= there | trashed
+        assert problems(found) == []
+        # What was left half written is gone after the next write.
+        found.save("next", OPTIMAL)
+        assert not [path for path in contents(library) if path.endswith(".part")]
+        for path in contents(library):
+            Path(path).unlink()
+        for path, data in start.items():
+            Path(path).write_bytes(data)
+    assert most > 0
+
+
+def test_a_file_in_place_of_the_folder_is_told_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / "file").write_bytes(b"")
+    library = Library(tmp_path / "file")
+    assert library.list() == library.deleted() == ()
+    with pytest.raises(StorageError, match="a file lies where") as refusal:
+        library.save("mine", OPTIMAL)
+    assert "\n" not in str(refusal.value)
+
+
+def test_the_library_lies_in_the_folder_of_the_users_data() -> None:
+    assert Library().folder == Path(os.environ["EXPLORER_DATA"]) / "designs"

@@ -1,0 +1,679 @@
+"""Studies on the page: brushes against brute force, picks, fronts, and small studies."""
+
+from __future__ import annotations
+
+import base64
+import itertools
+import json
+import math
+import os
+import signal
+import time
+from collections.abc import Generator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+from desk import Desk
+from hypothesis import given
+from hypothesis import strategies as st
+
+from explorer.app.actions import SetVariable
+from explorer.app.panels.study_words import legend, status
+from explorer.app.plot_events import LONGEST_LINE, Boxed, Brushed, Picked, event_of
+from explorer.app.session import UNDO
+from explorer.app.state import Frame, State, opened
+from explorer.app.studies import Brush, Studies, StudyWish, range_around, study_around, within
+from explorer.app.study_actions import (
+    MOST_RANGES,
+    BrushAxis,
+    BrushBox,
+    ClearBrushes,
+    OpenStudy,
+    PickDesign,
+    SetStudyWish,
+)
+from explorer.app.study_feed import Request, StudyDrawing, StudyFeed, reasons
+from explorer.app.study_figures import PAPER, packed, parallel, scatter
+from explorer.app.study_folders import StudyFolders, check_given, keep_study, study_in
+from explorer.app.study_runner import StudyRunner
+from explorer.app.study_shown import Shown, default_axes, shown, thinned
+from explorer.design import VARIABLES, Design
+from explorer.design_file import PRESETS
+from explorer.errors import InputError
+from explorer.sweep.measures import MEASURES
+from explorer.sweep.parts import part_paths, write_part
+from explorer.sweep.results import Results, load_results
+from explorer.sweep.rows import evaluate
+from explorer.sweep.study import NAMES, Objective, Sampling, Study, encode_study
+
+OPTIMAL = PRESETS["paper-optimal"]
+QUICK = StudyWish(
+    count=16,
+    percent=30.0,
+    variables=("a3x", "b2"),
+    measures=("volume", "reach"),
+    objectives=(("volume", "max"), ("reach", "min")),
+)
+PATIENCE = 120.0
+
+values = st.one_of(st.floats(-2.0, 2.0), st.sampled_from([-1.0, 0.0, 1.0, math.nan]))
+ends = st.one_of(st.floats(-2.0, 2.0), st.sampled_from([-1.0, 0.0, 1.0]))
+ranges = st.lists(
+    st.tuples(ends, ends).map(lambda pair: (min(pair), max(pair))), min_size=1, max_size=3
+).map(tuple)
+brushings = st.dictionaries(st.sampled_from("abcx"), ranges, max_size=3).map(
+    lambda found: tuple(Brush(axis, each) for axis, each in found.items())
+)
+
+
+@given(st.lists(st.tuples(values, values, values), max_size=12), brushings)
+def test_a_row_is_within_the_brushes_if_each_of_them_has_it_in_some_range(
+    rows: list[tuple[float, float, float]], brushes: tuple[Brush, ...]
+) -> None:
+    columns: dict[str, Any] = {"index": np.arange(len(rows))}
+    columns |= {name: np.array([row[k] for row in rows]) for k, name in enumerate("abc")}
+    expected = [
+        all(
+            brush.axis == "x"
+            or any(low <= columns[brush.axis][k] <= high for low, high in brush.ranges)
+            for brush in brushes
+        )
+        for k in range(len(rows))
+    ]
+    assert within(columns, brushes).tolist() == expected
+
+
+@given(st.lists(st.tuples(st.sampled_from("abc"), st.one_of(st.just(()), ranges)), max_size=8))
+def test_an_axis_has_the_ranges_that_it_was_given_last(
+    strokes: list[tuple[str, tuple[tuple[float, float], ...]]],
+) -> None:
+    state = OpenStudy("some").apply(opened(OPTIMAL))
+    for axis, each in strokes:
+        state = BrushAxis(axis, each).apply(state)
+    last = dict(strokes)
+    assert {brush.axis: brush.ranges for brush in state.studies.brushes} == {
+        axis: each for axis, each in last.items() if each
+    }
+    assert all(state.studies.ranges_of(axis) == each for axis, each in last.items())
+    assert ClearBrushes().apply(state).studies.brushes == ()
+
+
+def test_a_box_brushes_both_its_axes_and_frees_them_again() -> None:
+    state = BrushAxis("b2", ((0.0, 1.0),)).apply(opened(OPTIMAL))
+    boxed = BrushBox("volume", "reach", ((1.0, 2.0), (3.0, 4.0))).apply(state).studies
+    assert boxed.ranges_of("volume") == ((1.0, 2.0),)
+    assert boxed.ranges_of("reach") == ((3.0, 4.0),)
+    assert boxed.ranges_of("b2") == ((0.0, 1.0),)
+    freed = BrushBox("volume", "reach", None)
+    assert [each.axis for each in freed.apply(state).studies.brushes] == ["b2"]
+
+
+@pytest.mark.parametrize(
+    "given_ranges",
+    [((2.0, 1.0),), ((math.nan, 1.0),), ((0.0, math.inf),), ((0.0, 1.0),) * (MOST_RANGES + 1)],
+)
+def test_ranges_that_are_none_are_refused(given_ranges: tuple[tuple[float, float], ...]) -> None:
+    with pytest.raises(InputError):
+        BrushAxis("volume", given_ranges).apply(opened(OPTIMAL))
+
+
+def test_another_study_begins_without_brushes_and_the_same_keeps_them() -> None:
+    state = OpenStudy("one").apply(opened(OPTIMAL))
+    state = BrushAxis("volume", ((1.0, 2.0),)).apply(state)
+    state = SetStudyWish(QUICK).apply(state)
+    assert OpenStudy("one").apply(state) is state
+    other = OpenStudy("two").apply(state)
+    assert other.studies == Studies(name="two", wish=QUICK)
+
+
+@given(st.lists(st.booleans(), min_size=1, max_size=80).map(np.array), st.integers(2, 30))
+def test_of_too_many_rows_those_to_keep_stay_first(keep: Any, most: int) -> None:
+    rows = np.arange(len(keep)) * 3
+    found = thinned(rows, keep, most)
+    assert len(found) == min(most, len(rows))
+    assert np.all(np.diff(found) > 0)
+    assert np.isin(found, rows).all()
+    if keep.sum() <= most:
+        assert np.isin(rows[keep], found).all()
+    else:
+        assert keep[found // 3].all()
+
+
+@given(
+    st.sampled_from(NAMES),
+    st.floats(1.0, 95.0),
+    st.lists(st.floats(-20.0, 20.0), min_size=6, max_size=6),
+)
+def test_a_range_lies_around_the_live_design(
+    name: str, percent: float, variables: list[float]
+) -> None:
+    try:
+        design = OPTIMAL.with_variables(variables)
+    except InputError:
+        return
+    low, high = range_around(design, name, percent)
+    values: dict[str, float] = dict(zip(VARIABLES, design.variables, strict=True))
+    value = values.get(name)
+    if name == "radius":
+        assert low == 0.0 < high
+    elif name == "yaw":
+        assert high - low == pytest.approx(2.0 * percent / 100.0 * 90.0)
+    elif value is not None:
+        assert (low + high) / 2.0 == pytest.approx(value, abs=1e-9)
+        span = max(abs(value), 0.05 * design.reach) * percent / 100.0
+        assert high - low == pytest.approx(2.0 * span)
+        # What is well off zero does not come to it.
+        assert abs(value) < 0.05 * design.reach or low * high > 0.0
+    else:
+        assert 0.0 < low < high
+
+
+@given(
+    st.lists(
+        st.one_of(
+            st.sampled_from(NAMES).map(lambda name: ("variable", name)),
+            st.sampled_from([*MEASURES]).map(lambda name: ("measure", name)),
+        ),
+        max_size=30,
+    )
+)
+def test_a_wish_makes_a_study_or_says_what_is_missing(turns: list[tuple[str, str]]) -> None:
+    wish = StudyWish()
+    for what, name in turns:
+        turn = wish.with_variable_turned if what == "variable" else wish.with_measure_turned
+        wish = turn(name)
+        assert {each for each, _ in wish.objectives} <= {*wish.measures}
+    measured = {*wish.measures} - {*wish.variables}
+    if not wish.variables or not measured:
+        with pytest.raises(InputError, match="choose at least one"):
+            study_around(OPTIMAL, wish, "s")
+        return
+    study = study_around(OPTIMAL, wish, "s")
+    assert {*study.variables} == {*wish.variables}
+    assert {*study.measures} == measured
+    assert study.chunks <= 41
+
+
+def test_a_measure_is_measured_then_large_then_small_then_left_out() -> None:
+    wish, name = StudyWish(), "extent_x"
+    senses: list[object] = []
+    for _ in range(4):
+        wish = wish.with_measure_turned(name)
+        senses.append((name in wish.measures, wish.sense_of(name)))
+    assert senses == [(True, None), (True, "max"), (True, "min"), (False, None)]
+    assert wish == StudyWish()
+
+
+@pytest.mark.parametrize(
+    ("line", "event"),
+    [
+        (
+            '{"do":"pick","study":"s","serial":1,"index":7}',
+            Picked(study="s", serial=1, index=7),
+        ),
+        (
+            '{"do":"brush","study":"s","serial":2,"axis":"b2","ranges":[[0,1.5]]}',
+            Brushed(study="s", serial=2, axis="b2", ranges=((0.0, 1.5),)),
+        ),
+        (
+            '{"do":"box","study":"s","serial":3,"axes":["b2","volume"],"box":null}',
+            Boxed(study="s", serial=3, axes=("b2", "volume"), box=None),
+        ),
+    ],
+)
+def test_what_the_script_says_is_understood(line: str, event: object) -> None:
+    assert event_of(line) == event
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "",
+        "{}",
+        "null",
+        "\ud800",
+        '{"do":"pick","study":"s","serial":1,"index":-1}',
+        '{"do":"pick","study":"s","serial":1,"index":1.5}',
+        '{"do":"pick","study":"s","serial":1,"index":"1"}',
+        '{"do":"pick","study":"s","serial":1,"index":1,"path":"/etc"}',
+        '{"do":"open","study":"s","serial":1}',
+        '{"do":"brush","study":"s","serial":1,"axis":"b2","ranges":[[0,NaN]]}',
+        '{"do":"brush","study":"s","serial":1,"axis":"b2","ranges":[[0]]}',
+        '{"do":"box","study":"s","serial":1,"axes":["b2"],"box":null}',
+        '{"do":"pick","study":"%s","serial":1,"index":1}' % ("s" * 300),
+        '{"do":"pick","study":"s","serial":1,"index":1}' + " " * LONGEST_LINE,
+        "[" * 2000,
+    ],
+)
+def test_what_it_does_not_say_is_dropped(line: str) -> None:
+    assert event_of(line) is None
+
+
+@pytest.fixture(scope="module")
+def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder of studies with one of 16 designs, the last four of which are missing."""
+    home = tmp_path_factory.mktemp("studies")
+    study = Study(
+        name="Some",
+        # So high that a short reach leaves nothing of the workspace.
+        design=msgspec.structs.replace(
+            OPTIMAL,
+            limits=msgspec.structs.replace(OPTIMAL.limits, box=((0, -12, 10), (20, 22, 18))),
+        ),
+        variables={"a3x": (0.5, 20.0), "b2": (-4.0, 4.9)},
+        sampling=Sampling(count=16),
+        measures=("volume", "reach", "worst_margin"),
+        objectives=(Objective("volume", "max"), Objective("reach", "min")),
+        chunk=4,
+    )
+    folder = home / "some"
+    folder.mkdir()
+    for chunk in range(3):
+        rows = evaluate(encode_study(study), chunk * 4, chunk * 4 + 4)
+        write_part(folder, study, chunk, [rows])
+    (home / "no study").mkdir()
+    (home / "a file.txt").write_text("nothing")
+    return home
+
+
+@pytest.fixture
+def feed(home: Path) -> Generator[StudyFeed]:
+    made = StudyFeed(StudyFolders(home), lambda: None, lambda: "inbox")
+    yield made
+    made.stop()
+
+
+def drawn(feed: StudyFeed, studies: Studies) -> StudyDrawing:
+    feed.follow(Frame(_with(opened(OPTIMAL), studies)))
+    assert feed.wait_until_idle(PATIENCE)
+    assert feed.problem is None
+    assert feed.drawing is not None
+    return feed.drawing
+
+
+def _with(state: State, studies: Studies) -> State:
+    return replace(state, studies=studies)
+
+
+def unpacked(array: dict[str, str]) -> list[Any]:
+    kind = {"f4": "<f4", "i4": "<i4"}[array["dtype"]]
+    return np.frombuffer(base64.b64decode(array["bdata"]), dtype=kind).tolist()
+
+
+def test_only_folders_of_studies_are_offered_and_no_name_leads_elsewhere(home: Path) -> None:
+    folders = StudyFolders(home, (home / "some", home / "no study"))
+    assert folders.found() == {"some": home / "some", "some (2)": home / "some"}
+    for name in ("no study", "..", "../some", str(home / "some"), "some/", "", "\0"):
+        with pytest.raises(InputError, match="there is no study"):
+            folders.folder(name)
+    assert StudyFolders(home / "nowhere").found() == {}
+
+
+def test_new_folders_have_plain_names_of_their_own(tmp_path: Path) -> None:
+    folders = StudyFolders(tmp_path / "studies")
+    for name, slug in (("é «one»/..", "e-one"), ("", "study"), ("日本", "study")):
+        folder = folders.new(name)
+        assert folder.parent == folders.home
+        assert folder.name.startswith(slug)
+        keep_study(folder, study_around(OPTIMAL, QUICK, folder.name))
+        assert study_in(folder).name == folder.name
+    assert len(folders.found()) == 3
+
+
+def test_what_is_drawn_is_what_was_computed(feed: StudyFeed, home: Path) -> None:
+    results = load_results(home / "some")
+    assert set(results.columns["status"]) == {"done", "empty workspace"}
+    drawing = drawn(feed, Studies(name="some"))
+    assert (drawing.results.count, drawing.is_complete) == (12, False)
+    done = results.columns["status"] == "done"
+    # By hand: better in one respect and worse in none.
+    volume, reach = results.columns["volume"], results.columns["reach"]
+    best = [
+        bool(done[i])
+        and not any(
+            done[j]
+            and volume[j] >= volume[i]
+            and reach[j] <= reach[i]
+            and (volume[j] > volume[i] or reach[j] < reach[i])
+            for j in range(12)
+        )
+        for i in range(12)
+    ]
+    assert sorted(drawing.front.tolist()) == np.flatnonzero(best).tolist()
+    assert np.all(np.diff(volume[drawing.front]) <= 0.0)
+    assert drawing.reasons
+    assert sum(count for *_, count in drawing.reasons) == int((~done).sum())
+    assert drawing.plots is not None
+    lines, points = (json.loads(plot.to_json()) for plot in drawing.plots)
+    for dimension in lines["data"][0]["dimensions"]:
+        column = results.columns[dimension["name"]][done]
+        assert unpacked(dimension["values"]) == column.astype(np.float32).tolist()
+    marked = [trace for trace in points["data"] if trace["mode"] == "markers"]
+    seen = [index for trace in marked for index in unpacked(trace["customdata"])]
+    assert sorted(seen) == results.columns["index"][done].tolist()
+    for trace in marked:
+        rows = unpacked(trace["customdata"])
+        assert unpacked(trace["x"]) == volume[rows].astype(np.float32).tolist()
+        assert unpacked(trace["y"]) == reach[rows].astype(np.float32).tolist()
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_greater_stands_out_more_on_either_page(feed: StudyFeed, dark: bool) -> None:
+    drawing = drawn(feed, Studies(name="some"))
+    assert drawing.shown is not None
+    points: Any = scatter(drawing.shown, "inbox", 1, dark=dark)
+    scale = [colour for _, colour in points["data"][1]["marker"]["colorscale"]]
+    paper = _light(PAPER[dark])
+    apart = [abs(_light(colour) - paper) for colour in scale]
+    assert apart == sorted(apart)
+    assert min(apart) > 0.1
+    # The legend shows the same, by the theme of each browser.
+    assert all(colour in legend(drawing) for colour in scale)
+
+
+def _light(colour: str) -> float:
+    red, green, blue = (int(colour[k : k + 2], 16) / 255.0 for k in (1, 3, 5))
+    return 0.2126 * red + 0.7152 * green + 0.0722 * blue
+
+
+def test_brushes_and_picks_are_drawn_by_the_server(feed: StudyFeed, home: Path) -> None:
+    results = load_results(home / "some")
+    done = results.columns["status"] == "done"
+    low, high = np.quantile(results.columns["volume"][done], [0.25, 0.75]).tolist()
+    picked = int(results.columns["index"][done][0])
+    brushes = (Brush("volume", ((low, high),)),)
+    drawing = drawn(feed, Studies(name="some", brushes=brushes, picked=picked))
+    expected = [bool(low <= each <= high) for each in results.columns["volume"]]
+    assert drawing.inside.tolist() == expected
+    assert drawing.plots is not None
+    lines, points = (json.loads(plot.to_json()) for plot in drawing.plots)
+    constrained = {
+        each["name"]: each.get("constraintrange") for each in lines["data"][0]["dimensions"]
+    }
+    assert constrained.pop("volume") == [[low, high]]
+    assert not any(constrained.values())
+    (box,) = points["layout"]["shapes"]
+    assert (box["x0"], box["x1"], box["yref"]) == (low, high, "y domain")
+    assert unpacked(points["data"][-1]["customdata"]) == [picked]
+    # Of the points, those left out are drawn apart from the others.
+    left_out = [*points["data"][0]["customdata"], *points["data"][2]["customdata"]]
+    assert left_out
+    rows = unpacked(points["data"][0]["customdata"]) + unpacked(points["data"][2]["customdata"])
+    assert sorted(rows) == np.flatnonzero(done & ~np.array(expected)).tolist()
+
+
+def test_along_the_front_every_design_is_passed_once(feed: StudyFeed) -> None:
+    drawing = drawn(feed, Studies(name="some"))
+    indices = drawing.results.columns["index"][drawing.front].tolist()
+    walked = [drawing.beside(None, 1)]
+    while (after := drawing.beside(walked[-1], 1)) is not None:
+        walked.append(after)
+    assert walked == indices
+    back = [walked[-1]]
+    while (before := drawing.beside(back[-1], -1)) is not None:
+        back.append(before)
+    assert back == indices[::-1]
+
+
+def test_a_picked_design_is_live_and_one_step_to_undo(desk: Desk, feed: StudyFeed) -> None:
+    desk.session.do(OpenStudy("some"))
+    drawing = drawn(feed, desk.state.studies)
+    index = int(drawing.results.columns["index"][drawing.front[0]])
+    design = drawing.results.design_of_row(drawing.row_of(index))
+    before = desk.state
+    desk.session.do(PickDesign(design, index=index, study="some"))
+    assert (desk.state.design, desk.state.studies.picked) == (design, index)
+    desk.session.travel(UNDO)
+    assert (desk.state.design, desk.state.studies) == (before.design, before.studies)
+    desk.session.do(OpenStudy(None))
+    desk.session.do(PickDesign(design, index=index, study="some"))
+    assert desk.state.design == before.design
+    assert desk.complaints == ["the study 'some' is not open any more"]
+
+
+def test_nothing_is_drawn_anew_while_a_hand_is_on_a_slider(feed: StudyFeed) -> None:
+    studies = Studies(name="some")
+    drawing = drawn(feed, studies)
+    state = _with(opened(OPTIMAL), studies)
+    for step in range(5):
+        state = SetVariable("b3", 5.0 + 0.1 * step).apply(state)
+        feed.follow(Frame(state))
+    # A change of the wish changes no plot either.
+    feed.follow(Frame(SetStudyWish(QUICK).apply(state)))
+    assert feed.wait_until_idle(PATIENCE)
+    assert feed.drawing is drawing
+
+
+def test_a_study_that_is_gone_is_told(feed: StudyFeed) -> None:
+    feed.follow(Frame(_with(opened(OPTIMAL), Studies(name="gone"))))
+    assert feed.wait_until_idle(PATIENCE)
+    assert feed.problem == "there is no study 'gone'; there are some"
+    assert feed.drawing is None
+    feed.follow(Frame(opened(OPTIMAL)))
+    assert feed.problem is None
+
+
+def results_of(columns: dict[str, list[Any]], **more: Any) -> Results:
+    study = Study(
+        design=OPTIMAL,
+        variables={"b2": (-4.0, 4.0)},
+        sampling=Sampling(count=len(columns["b2"])),
+        measures=("volume", "reach"),
+        **more,
+    )
+    count = len(columns["b2"])
+    found: dict[str, Any] = {name: np.array(each) for name, each in columns.items()}
+    found |= {"index": np.arange(count), "status": np.array(["done"] * count, dtype=object)}
+    return Results(study, found | {"reason": np.array([""] * count, dtype=object)})
+
+
+def test_what_is_the_same_in_all_designs_has_no_axis() -> None:
+    columns = {"b2": [0.0, 1.0, 2.0], "volume": [1.0, 2.0, 3.0], "reach": [5.0, 5.0, 5.0]}
+    results = results_of(columns, objectives=(Objective("reach", "min"),))
+    seen = shown(results, results.front(), Studies(name="s"))
+    assert seen is not None
+    assert seen.axes == ("b2", "volume")
+    assert (seen.across, seen.up) == ("volume", "b2")
+    assert default_axes(results.study, seen.axes) == ("volume", "b2")
+
+
+@pytest.mark.parametrize("volumes", [[1.0], [1.0, 1.0], [1.0, math.nan], [math.nan, math.nan]])
+def test_too_few_designs_are_not_drawn(volumes: list[float]) -> None:
+    columns = {"b2": [0.5, 1.5][: len(volumes)], "volume": volumes, "reach": [2.0] * len(volumes)}
+    results = results_of(columns)
+    assert shown(results, results.front(), Studies(name="s")) is None
+
+
+def test_a_measure_that_some_designs_lack_hides_no_point_that_it_is_no_axis_of() -> None:
+    columns = {"b2": [0.0, 1.0, 2.0, 3.0], "volume": [4.0, 2.0, 3.0, 1.0]}
+    columns["reach"] = [4.0, math.nan, 3.0, math.nan]
+    wanted = (Objective("volume", "max"),)
+    results = results_of(columns, objectives=wanted)
+    studies = Studies(name="s", across="volume", up="b2", colour="reach")
+    seen = shown(results, results.front(), studies)
+    assert seen is not None
+    assert seen.axes == ("b2", "volume", "reach")
+    assert points_of(scatter(seen, "i", 1, dark=False)) == [0, 1, 2, 3]
+    lines = parallel(seen, "i", 1, dark=False)
+    # A line needs a place on each axis; what has none is told of.
+    assert lines["layout"]["meta"]["designs"] == [0, 2]
+    for dimension in lines["data"][0]["dimensions"]:
+        assert unpacked(dimension["values"]) == [columns[dimension["name"]][k] for k in (0, 2)]
+    assert "<b>2</b> without a line, for want of reach" in status_of(results, seen)
+    # As an axis it places no design that lacks it, picked or not.
+    other = shown(results, results.front(), replace(studies, up="reach", picked=1))
+    assert other is not None
+    assert points_of(scatter(other, "i", 1, dark=False)) == [0, 2]
+
+
+def test_a_measure_that_all_designs_lack_is_no_axis_and_hides_nothing() -> None:
+    columns = {"b2": [0.0, 1.0, 2.0], "volume": [4.0, 2.0, 3.0], "reach": [math.nan] * 3}
+    results = results_of(columns)
+    seen = shown(results, results.front(), Studies(name="s"))
+    assert seen is not None
+    assert seen.axes == ("b2", "volume")
+    assert points_of(scatter(seen, "i", 1, dark=False)) == [0, 1, 2]
+    assert parallel(seen, "i", 1, dark=False)["layout"]["meta"]["designs"] == [0, 1, 2]
+    assert "without a line" not in status_of(results, seen)
+
+
+def test_where_no_design_has_all_axes_points_are_drawn_and_no_line() -> None:
+    nan = math.nan
+    columns = {"b2": [0.0, 1.0, 2.0, 3.0], "volume": [4.0, 2.0, nan, nan]}
+    columns["reach"] = [nan, nan, 3.0, 1.0]
+    results = results_of(columns)
+    seen = shown(results, results.front(), Studies(name="s"))
+    assert seen is not None
+    assert points_of(scatter(seen, "i", 1, dark=False)) == []
+    assert parallel(seen, "i", 1, dark=True)["layout"]["meta"]["designs"] == []
+    other = shown(results, results.front(), Studies(name="s", across="b2", up="reach"))
+    assert other is not None
+    assert points_of(scatter(other, "i", 1, dark=False)) == [2, 3]
+    assert "<b>4</b> without a line, for want of volume or reach" in status_of(results, other)
+
+
+def points_of(figure: dict[str, Any]) -> list[int]:
+    """Return the designs that are points of a scatter plot, those picked once."""
+    traces = [each for each in figure["data"] if each["mode"] == "markers"]
+    return sorted({index for each in traces for index in unpacked(each["customdata"])})
+
+
+def status_of(results: Results, seen: Shown) -> str:
+    request = Request(seen.studies, 1, dark=False)
+    return status(
+        StudyDrawing(request, results, np.flatnonzero(seen.front), seen.inside, seen, None, ()),
+        "",
+        "",
+    )
+
+
+def test_the_front_of_the_two_objectives_shown_is_a_line() -> None:
+    columns = {"b2": [0.0, 1.0, 2.0, 3.0], "volume": [4.0, 2.0, 3.0, 1.0]}
+    columns["reach"] = [4.0, 2.0, 3.0, 5.0]
+    wanted = (Objective("volume", "max"), Objective("reach", "min"))
+    results = results_of(columns, objectives=wanted)
+    seen = shown(results, results.front(), Studies(name="s"))
+    assert seen is not None
+    (line,) = [t for t in scatter(seen, "i", 1, dark=False)["data"] if t["mode"] == "lines"]
+    assert unpacked(line["x"]) == [2.0, 3.0, 4.0]
+    other = shown(results, results.front(), Studies(name="s", across="b2"))
+    assert other is not None
+    assert all(t["mode"] == "markers" for t in scatter(other, "i", 1, dark=True)["data"])
+    assert parallel(other, "i", 2, dark=True)["data"][0]["uirevision"] == 2
+
+
+def test_numbers_come_through_packed() -> None:
+    numbers = np.array([0.0, -1.5, 3.25e7])
+    assert unpacked(packed(numbers)) == numbers.tolist()
+    assert unpacked(packed(np.array([1, 2**31 - 1]), "i4")) == [1, 2**31 - 1]
+
+
+def test_reasons_are_counted_the_most_frequent_first() -> None:
+    columns = {"b2": [0.0] * 4, "volume": [1.0] * 4, "reach": [1.0] * 4}
+    results = results_of(columns)
+    results.columns["status"][:3] = ["failed", "empty workspace", "failed"]
+    results.columns["reason"][:3] = ["why", "emptied by l1", "why"]
+    assert reasons(results) == (("failed", "why", 2), ("empty workspace", "emptied by l1", 1))
+
+
+class Studio:
+    """A desk, its studies and who runs them."""
+
+    def __init__(self, desk: Desk, home: Path) -> None:
+        self.desk = desk
+        self.folders = StudyFolders(home)
+        self.feed = StudyFeed(self.folders, lambda: None, lambda: "inbox")
+        self.runner = StudyRunner(
+            desk.session, self.feed, lambda message, _: desk.complaints.append(message)
+        )
+
+
+@pytest.fixture
+def studio(desk: Desk, tmp_path: Path) -> Generator[Studio]:
+    made = Studio(desk, tmp_path / "studies")
+    yield made
+    made.runner.stop()
+    made.feed.stop()
+
+
+def bytes_of(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in part_paths(folder)}
+
+
+def test_a_small_study_is_cancelled_and_gone_on_with(studio: Studio) -> None:
+    runner, desk = studio.runner, studio.desk
+    runner.start(OPTIMAL, QUICK)
+    run = runner.run
+    assert run is not None
+    # Only one at a time.
+    runner.start(OPTIMAL, QUICK)
+    assert "is being computed" in desk.complaints.pop()
+    runner.cancel()
+    assert runner.wait_until_idle(PATIENCE)
+    assert desk.complaints == []
+    assert desk.state.studies.name == run.name
+    folder = studio.folders.folder(run.name)
+    kept = bytes_of(folder)
+    assert len(kept) < run.study.chunks
+    runner.go_on(run.name)
+    assert runner.wait_until_idle(PATIENCE)
+    assert desk.complaints == []
+    after = bytes_of(folder)
+    assert kept.items() <= after.items()
+    results = load_results(folder)
+    assert results.columns["index"].tolist() == [*range(16)]
+    assert results.study == run.study
+    # The rows are those of the study, wherever it is computed.
+    expected = evaluate(encode_study(run.study), 0, 16).columns
+    for name in ("a3x", "b2", "volume", "reach"):
+        assert results.columns[name].tolist() == expected[name]
+    assert_varied_around(results, OPTIMAL)
+    drawing = drawn(studio.feed, desk.state.studies)
+    assert drawing.is_complete
+
+
+def assert_varied_around(results: Results, design: Design) -> None:
+    base = dict(zip(VARIABLES, design.variables, strict=True))
+    for row, name in itertools.product(range(results.count), VARIABLES):
+        found = dict(zip(VARIABLES, results.design_of_row(row).variables, strict=True))[name]
+        if name in QUICK.variables:
+            low, high = results.study.variables[name]
+            assert low <= found <= high
+        else:
+            assert found == base[name]
+
+
+def test_a_study_that_cannot_be_is_refused_and_leaves_nothing(studio: Studio) -> None:
+    studio.runner.start(OPTIMAL, StudyWish(variables=()))
+    assert studio.desk.complaints == ["choose at least one variable that varies"]
+    studio.runner.go_on("nowhere")
+    assert studio.desk.complaints[1:] == ["there is no study 'nowhere'; there are none yet"]
+    assert studio.runner.run is None
+    assert studio.folders.found() == {}
+
+
+def test_a_process_that_dies_is_told_and_what_is_finished_is_kept(studio: Studio) -> None:
+    studio.runner.start(OPTIMAL, StudyWish(count=2000))
+    # Once there is something to keep.
+    while (run := studio.runner.run) is not None and not (run.progress and run.progress.done):
+        time.sleep(0.02)
+    number = studio.runner.worker.process_id
+    assert number is not None
+    os.kill(number, getattr(signal, "SIGKILL", signal.SIGTERM))
+    assert studio.runner.wait_until_idle(PATIENCE)
+    assert any("Go on starts it again" in each for each in studio.desk.complaints)
+    assert studio.runner.run is None
+    name = studio.desk.state.studies.name
+    assert name is not None
+    assert load_results(studio.folders.folder(name)).count > 0
+
+
+def test_a_folder_that_is_named_and_holds_no_study_is_refused(home: Path) -> None:
+    check_given([home / "some"])
+    for folder in (home / "no study", home / "nowhere"):
+        with pytest.raises(InputError, match="holds no results of a study"):
+            check_given([folder])

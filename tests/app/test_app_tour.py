@@ -1,0 +1,268 @@
+"""The tour leads a user on by what is done, and is remembered with the theme, as told."""
+
+from __future__ import annotations
+
+import json
+import threading
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import viser
+from desk import Desk
+
+from explorer.app.browser_facts import BrowserFacts, facts_of
+from explorer.app.hands import is_narrow
+from explorer.app.optimising import StartRun
+from explorer.app.panels.tour import TourGuide, card_words
+from explorer.app.preferences import NAME, PreferenceFile, Preferences
+from explorer.app.state import Frame, State, opened
+from explorer.app.theme import BRAND, BRAND_ON_DARK, Theme
+from explorer.app.tour import STEPS, Tour, begun
+from explorer.design_file import PRESETS
+from explorer.errors import StorageError
+
+IDS = {name: f"id-{name}" for name in ("Skip", "Back", "Show me", "Next")}
+OPENED = opened(PRESETS["paper-optimal"])
+
+
+def after(tour: Tour, state: State) -> State:
+    """Return the state once the tour has shown its step."""
+    return tour.step.show(Frame(state)).apply(state)
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_every_step_is_done_by_what_it_shows_and_not_before(preset: str) -> None:
+    state = opened(PRESETS[preset])
+    tour = begun(Frame(state))
+    for index, step in enumerate(STEPS):
+        assert tour.at == index
+        assert not tour.seen(Frame(state)).is_done
+        state = after(tour, state)
+        tour = tour.seen(Frame(state))
+        assert tour.is_done
+        # Once done it stays so, whatever is done next.
+        assert tour.seen(Frame(opened(PRESETS[preset]))).is_done
+        if step.after is not None:
+            state = step.after.apply(state)
+        assert tour.is_last == (index == len(STEPS) - 1)
+        tour = tour.moved(1, Frame(state))
+    assert state.optimisation.is_on
+
+
+def test_there_are_five_steps_each_in_few_words() -> None:
+    assert len(STEPS) == 5
+    for step in STEPS:
+        assert step.title
+        assert not step.title.endswith(".")
+        assert step.text.endswith(".")
+        assert len(step.text) <= 220
+
+
+def test_the_tour_comes_close_to_a_singularity_without_reaching_it() -> None:
+    tour = begun(Frame(OPENED)).moved(1, Frame(OPENED))
+    found = Frame(after(tour, OPENED))
+    least = float(np.abs(found.snapshot.margins).min())
+    assert 0.0 < least < found.state.warn_below
+    assert found.state.unclosed is None
+    assert found.state.mode == OPENED.mode
+
+
+def test_the_tour_stops_at_both_ends() -> None:
+    tour = begun(Frame(OPENED))
+    assert tour.moved(-1, Frame(OPENED)).at == 0
+    assert tour.moved(9, Frame(OPENED)).at == len(STEPS) - 1
+
+
+def test_a_search_for_the_best_design_ends_the_tour_only_if_it_is_new() -> None:
+    running = StartRun().apply(OPENED)
+    tour = begun(Frame(running)).moved(4, Frame(running))
+    assert not tour.seen(Frame(running)).is_done
+
+
+def test_the_card_offers_what_can_be_pressed() -> None:
+    first = card_words(begun(Frame(OPENED)), IDS)
+    assert "step 1 of 5" in first
+    assert 'for="id-Back"' not in first
+    assert 'for="id-Show me"' in first
+    assert ">Next<" in first
+    assert "Done" not in first
+    last = card_words(Tour(4, Frame(OPENED), is_done=True), IDS)
+    assert 'for="id-Back"' in last
+    assert 'for="id-Show me"' not in last
+    assert ">Finish<" in last
+    assert "Done" in last
+    assert all(">Skip the tour<" in card for card in (first, last))
+
+
+def test_nothing_is_remembered_at_first(tmp_path: Path) -> None:
+    assert PreferenceFile(tmp_path).chosen == Preferences(dark=None, tour_seen=False)
+    # To look at them makes no file.
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_is_chosen_is_remembered_each_by_itself(tmp_path: Path) -> None:
+    folder = tmp_path / "new" / "folder"
+    PreferenceFile(folder).choose(tour_seen=True)
+    PreferenceFile(folder).choose(dark=True)
+    assert PreferenceFile(folder).chosen == Preferences(dark=True, tour_seen=True)
+    PreferenceFile(folder).choose(dark=False)
+    assert PreferenceFile(folder).chosen == Preferences(dark=False, tour_seen=True)
+
+
+def test_two_explorers_do_not_forget_for_each_other(tmp_path: Path) -> None:
+    one, other = PreferenceFile(tmp_path), PreferenceFile(tmp_path)
+    one.choose(dark=True)
+    other.choose(tour_seen=True)
+    assert PreferenceFile(tmp_path).chosen == Preferences(dark=True, tour_seen=True)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        b"",
+        b"{",
+        b"null",
+        b"[1]",
+        b'{"dark": 7}',
+        b"\xff\xfe",
+        b'{"dark":' + b"[" * 9000,
+        b" " * 20_000 + b"{}",
+    ],
+)
+def test_a_broken_file_counts_as_nothing_chosen_and_is_replaced(
+    tmp_path: Path, text: bytes
+) -> None:
+    (tmp_path / NAME).write_bytes(text)
+    file = PreferenceFile(tmp_path)
+    assert file.chosen == Preferences()
+    file.choose(dark=True)
+    assert json.loads((tmp_path / NAME).read_bytes()) == {"dark": True, "tour_seen": False}
+
+
+def test_what_a_later_explorer_remembers_is_no_trouble(tmp_path: Path) -> None:
+    (tmp_path / NAME).write_bytes(b'{"dark": true, "language": "fr"}')
+    assert PreferenceFile(tmp_path).chosen == Preferences(dark=True)
+
+
+def test_a_folder_that_takes_no_file_is_told_in_a_line(tmp_path: Path) -> None:
+    (tmp_path / "taken").write_bytes(b"")
+    file = PreferenceFile(tmp_path / "taken")
+    with pytest.raises(StorageError) as caught:
+        file.choose(dark=True)
+    assert "\n" not in str(caught.value)
+    assert file.chosen.dark is True
+
+
+@pytest.mark.parametrize(
+    "told",
+    [
+        "",
+        "null",
+        "{}",
+        '{"width": -1, "height": 5, "dark": false}',
+        '{"width": 1e9, "height": 5, "dark": false}',
+        '{"width": "1", "height": 5, "dark": false}',
+        '{"width": 1, "height": 5, "dark": 1}',
+        '{"width": 1, "height": 5, "dark": true, "more": 1}',
+        "[" * 100_000,
+    ],
+)
+def test_what_no_browser_says_is_not_believed(told: str) -> None:
+    assert facts_of(told) is None
+
+
+def test_what_a_browser_says_is_read() -> None:
+    told = '{"width": 1024, "height": 768.5, "dark": true}'
+    assert facts_of(told) == BrowserFacts(1024, 768.5, True)
+
+
+@pytest.mark.parametrize(
+    ("width", "height", "narrow"),
+    [
+        (1280, 720, False),
+        (1920, 1080, False),
+        (1024, 768, True),
+        (768, 1024, True),
+        (1099, 700, True),
+        (1100, 700, False),
+        # Two panels one over the other would be too low to be of use.
+        (860, 480, False),
+    ],
+)
+def test_panels_are_stacked_where_the_window_is_narrow_and_high(
+    width: int, height: int, narrow: bool
+) -> None:
+    assert is_narrow(BrowserFacts(width, height, False)) is narrow
+
+
+class Gui:
+    """What a theme needs of viser's."""
+
+    def __init__(self) -> None:
+        self.themes: list[dict[str, Any]] = []
+
+    def configure_theme(self, **theme: Any) -> None:
+        """Keep what it is told."""
+        self.themes.append(theme)
+
+
+def test_a_theme_is_told_once_for_each_change() -> None:
+    gui, changes = Gui(), list[bool]()
+    untyped: Any = gui
+    theme = Theme(untyped, dark=False, changed=lambda: changes.append(theme.is_dark))
+    for dark in (False, True, True, False):
+        theme.choose(dark=dark)
+    assert changes == [True, False]
+    assert [t["dark_mode"] for t in gui.themes] == [False, True, False]
+    assert [t["brand_color"] for t in gui.themes] == [BRAND, BRAND_ON_DARK, BRAND]
+    # No tunnel to anywhere is offered in either.
+    assert not any(t["show_share_button"] for t in gui.themes)
+
+
+def test_the_theme_is_no_step_of_the_history(desk: Desk) -> None:
+    untyped: Any = Gui()
+    theme = Theme(untyped, dark=False, changed=desk.session.redraw)
+    theme.choose(dark=True)
+    assert desk.session.wait_until_idle()
+    assert len(desk.session.history.steps) == 1
+
+
+def test_hands_on_many_threads_leave_one_card_or_none(
+    server: viser.ViserServer, desk: Desk
+) -> None:
+    class Browser:
+        client_id = 3
+        gui = server.gui
+
+    client: Any = Browser()
+    gui: Any = server.gui
+    guide = TourGuide(desk.session, lambda: None)
+    before = set(gui._panel_handle_from_uuid)
+    failed: list[BaseException] = []
+
+    def use(seed: int) -> None:
+        rng = np.random.default_rng(seed)
+        try:
+            for _ in range(30):
+                act = rng.integers(3)
+                if act == 0:
+                    guide.begin(client)
+                elif act == 1:
+                    guide.end(client)
+                else:
+                    guide.follow(Frame(opened(PRESETS["paper-initial"])))
+        except RuntimeError as error:
+            failed.append(error)
+
+    hands = [threading.Thread(target=use, args=(seed,)) for seed in range(4)]
+    for hand in hands:
+        hand.start()
+    for hand in hands:
+        hand.join()
+    assert failed == []
+    guide.begin(client)
+    assert len(set(gui._panel_handle_from_uuid) - before) == 1
+    guide.end(client)
+    assert set(gui._panel_handle_from_uuid) == before

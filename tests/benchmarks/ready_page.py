@@ -1,0 +1,17 @@
+"""An explorer as the command has it once it is ready, for what is measured of its page."""
+
+from __future__ import annotations
+
+from explorer import PRESETS
+from explorer.app.memory import keep_for_good
+from explorer.app.server import Running, start
+from explorer.compiled import warm
+from explorer.design import Design
+
+
+def ready_page(design: Design = PRESETS["paper-optimal"]) -> Running:
+    """Return a running explorer, its kernels compiled and the collector at rest."""
+    running = start(design, port=0)
+    warm()
+    keep_for_good()
+    return running

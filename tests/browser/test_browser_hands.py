@@ -1,0 +1,207 @@
+"""Hands in a real page: the palette and keys, both themes, the tour, and room on small screens."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from contextlib import closing, contextmanager
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, Locator
+from tab import Tab
+
+from explorer.app.hands import NARROW
+from explorer.app.preferences import PreferenceFile, Preferences
+from explorer.app.screenshot import SCENE_CANVAS
+from explorer.app.server import Running, start
+from explorer.app.tour import STEPS
+from explorer.design_file import PRESETS
+
+# A small laptop's screen, and a tablet either way up.
+SIZES = ((1280, 720), (1024, 768), (768, 1024))
+LEAST_SHARE = 0.4
+RIGHT = ("Move", "Design", "Workspace", "Optimise", "View")
+LEFT = ("Singularity", "Workspace", "Legs", "Paths")
+DRAWER = ("Compare", "History", "Share")
+
+# Controls that stick out of what holds them, or of the page, to the left or to the right.
+CUT_OFF = """() => {
+  const found = [];
+  for (const each of document.querySelectorAll('button, input, [role=slider], [role=tab]')) {
+    const box = each.getBoundingClientRect();
+    const isSeen = each.checkVisibility({visibilityProperty: true});
+    if (box.width < 2 || box.height < 2 || !isSeen) continue;
+    let left = 0, right = innerWidth;
+    const frame = each.closest('.mantine-ScrollArea-viewport');
+    if (frame) { const f = frame.getBoundingClientRect(); left = f.left; right = f.right; }
+    if (box.left < left - 1 || box.right > right + 1)
+      found.push(`${each.tagName} ${each.textContent} from ${box.left} to ${box.right}`);
+  }
+  return found;
+}"""
+
+
+@contextmanager
+def page_with(
+    browser: Browser, preferences: PreferenceFile, *, dark: bool = False
+) -> Generator[Tab]:
+    """Open a page that remembers, as `explorer serve` does."""
+    running = start(PRESETS["paper-optimal"], port=0, preferences=preferences)
+    try:
+        with closing(Tab(browser, running, size=SIZES[0], dark=dark)) as tab:
+            yield tab
+            assert tab.complaints() == []
+    finally:
+        running.stop()
+
+
+def press(tab: Tab, key: str) -> None:
+    tab.page.keyboard.press(key)
+
+
+def test_the_palette_finds_a_command_and_does_it(tab: Tab) -> None:
+    tab.page.get_by_role("button", name="Commands Ctrl+K").click()
+    search = tab.page.get_by_placeholder("Search commands")
+    search.fill("convex hull")
+    press(tab, "Enter")
+    tab.wait_for(lambda: tab.state.view.workspace.hull, "the hull")
+    search.wait_for(state="detached")
+    press(tab, "ControlOrMeta+k")
+    search.fill("prototype")
+    tab.page.get_by_text("View › Prototype").first.click()
+    tab.wait_for(lambda: tab.state.view.prototype.shown, "the prototype")
+
+
+def test_keys_act_on_the_page_and_not_while_one_types(tab: Tab) -> None:
+    press(tab, "g")
+    tab.wait_for(lambda: not tab.state.view.grid, "no grid")
+    press(tab, "n")
+    tab.wait_for(lambda: tab.state.mode == 2, "the next mode")
+    press(tab, "ControlOrMeta+z")
+    tab.wait_for(lambda: tab.state.mode == 1, "undone")
+    for key in ("ControlOrMeta+Shift+z", "ControlOrMeta+y"):
+        press(tab, key)
+        tab.wait_for(lambda: tab.state.mode == 2, "redone")
+        press(tab, "ControlOrMeta+z")
+        tab.wait_for(lambda: tab.state.mode == 1, "undone again")
+    before = tab.state.view
+    field = tab.field("l1 leg 1")
+    field.click()
+    field.press_sequentially("glb")
+    # Whatever is done by the next key is done after it would have been by these.
+    tab.switch("Other modes as ghosts", on=True)
+    tab.wait_for(lambda: tab.state.view.ghosts, "the ghosts")
+    assert tab.state.view.grid == before.grid
+    assert tab.state.view.labels == before.labels
+
+
+def test_a_ticked_box_or_a_chosen_option_leaves_the_keys_free(tab: Tab) -> None:
+    # Else the drawer lies over the end of the right panel.
+    tab.page.set_viewport_size({"width": SIZES[0][0], "height": SIZES[0][1]})
+    ghosts = tab.row("Other modes as ghosts").locator("input[type=checkbox]")
+    ghosts.click()
+    tab.wait_for(lambda: tab.state.view.ghosts, "the ghosts")
+    tab.wait_for(lambda: not ghosts.evaluate("e => e === document.activeElement"), "let go")
+    press(tab, "g")
+    tab.wait_for(lambda: not tab.state.view.grid, "no grid")
+    tab.choose("Arrows", "all six")
+    tab.wait_for(lambda: tab.state.view.singular.arrows == "all six", "arrows")
+    tab.wait_for(lambda: _active(tab) != "INPUT", "let go")
+    press(tab, "g")
+    tab.wait_for(lambda: tab.state.view.grid, "the grid")
+
+
+def _active(tab: Tab) -> str:
+    return str(tab.page.evaluate("document.activeElement.tagName"))
+
+
+def test_the_keys_are_told_on_a_card(tab: Tab) -> None:
+    press(tab, "k")
+    card = tab.page.get_by_role("dialog")
+    card.get_by_text("Ctrl+Shift+Z").wait_for()
+    assert card.locator("kbd").count() > 40
+    press(tab, "k")
+    card.wait_for(state="detached")
+
+
+@pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")
+def test_there_is_room_on_a_small_screen(
+    browser: Browser, running: Running, size: tuple[int, int]
+) -> None:
+    with closing(Tab(browser, running, size=size)) as tab:
+
+        def share() -> float:
+            box = tab.page.locator(SCENE_CANVAS).bounding_box()
+            assert box is not None
+            return box["width"] * box["height"] / (size[0] * size[1])
+
+        # In a narrow window the panels are laid out once the browser has told its size.
+        tab.wait_for(lambda: LEAST_SHARE <= share() < 1.0, "room for the scene")
+        if size[0] < NARROW:
+            tab.wait_for(lambda: abs(_left(tab, "Singularity") - _left(tab, "Move")) < 8, "a stack")
+        tabs = tab.page.get_by_role("tab")
+        names = tabs.all_inner_texts()
+        assert set(RIGHT) | set(LEFT) | set(DRAWER) <= {name.strip() for name in names}
+        for index, name in enumerate(names):
+            tabs.nth(index).click()
+            tab.page.wait_for_timeout(100)
+            assert tab.page.evaluate(CUT_OFF) == [], f"in {name}"
+        assert tab.complaints() == []
+
+
+def _left(tab: Tab, name: str) -> float:
+    box = tab.page.get_by_role("tab", name=name, exact=True).bounding_box()
+    assert box is not None
+    return box["x"]
+
+
+def test_the_page_is_as_dark_as_its_user_prefers_until_one_chooses(
+    browser: Browser, tmp_path: Path
+) -> None:
+    preferences = PreferenceFile(tmp_path)
+    preferences.choose(tour_seen=True)
+    with page_with(browser, preferences, dark=True) as tab:
+        tab.wait_for(lambda: _scheme(tab) == "dark", "a dark page")
+        # Nobody chose, so nothing is remembered.
+        assert PreferenceFile(tmp_path).chosen.dark is None
+        tab.page.get_by_text("Theme").first.click()
+        tab.wait_for(lambda: _scheme(tab) == "light", "a light page")
+        tab.wait_for(lambda: PreferenceFile(tmp_path).chosen.dark is False, "what was chosen")
+    with page_with(browser, PreferenceFile(tmp_path), dark=True) as tab:
+        assert _scheme(tab) == "light"
+
+
+def _scheme(tab: Tab) -> str:
+    return str(tab.page.evaluate("document.documentElement.dataset.mantineColorScheme"))
+
+
+def test_the_tour_leads_through_five_steps_once(browser: Browser, tmp_path: Path) -> None:
+    with page_with(browser, PreferenceFile(tmp_path)) as tab:
+        card = tab.page.get_by_text("step 1 of 5")
+        card.wait_for()
+        # What the user does by hand counts as well.
+        tab.push("Home pose")
+        tab.type("y", "6")
+        tab.page.get_by_text("Done", exact=True).wait_for()
+        for number, step in enumerate(STEPS, 1):
+            tab.page.get_by_text(step.title, exact=True).wait_for()
+            tab.page.get_by_text(f"step {number} of 5").wait_for()
+            if number in (2, 4):
+                _words(tab, "Show me").click()
+                tab.page.get_by_text("Done", exact=True).wait_for()
+            _words(tab, "Finish" if number == len(STEPS) else "Next").click()
+        tab.page.get_by_text("step 5 of 5").wait_for(state="detached")
+        assert tab.state.view.workspace.solid
+        tab.wait_for(lambda: PreferenceFile(tmp_path).chosen.tour_seen, "what was seen")
+        tab.reload()
+        assert tab.page.get_by_text("of 5").count() == 0
+        # By command it begins again, and can be skipped at once.
+        tab.page.get_by_text("Tour", exact=True).first.click()
+        tab.page.get_by_text("step 1 of 5").wait_for()
+        _words(tab, "Skip the tour").click()
+        tab.page.get_by_text("step 1 of 5").wait_for(state="detached")
+    assert PreferenceFile(tmp_path).chosen == Preferences(None, True)
+
+
+def _words(tab: Tab, words: str) -> Locator:
+    return tab.page.locator("label").filter(has_text=words).last

@@ -1,0 +1,265 @@
+"""Files out of a real browser, each to the one that asked; and the page in a notebook."""
+
+from __future__ import annotations
+
+import csv
+import http.server
+import io
+import threading
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import imageio.v3
+import numpy as np
+import pytest
+from likeness import blocks, decoded, likeness
+from numpy.testing import assert_allclose
+from numpy.typing import NDArray
+from playwright.sync_api import Browser, Download, Locator, Page, expect
+from tab import Tab
+
+import explorer
+from explorer.app.actions import SetPosition, SetView
+from explorer.app.screenshot import PATIENCE_SECONDS, SCENE_CANVAS, settle
+from explorer.app.state import View
+from explorer.app.view_picture import Pixels
+
+OpenTab = Callable[[], Tab]
+untyped: Any = imageio.v3
+
+# In milliseconds.
+PATIENCE = 1000 * PATIENCE_SECONDS
+
+# A difference of two pictures that the eye cannot miss.
+PLAIN_TO_SEE = 5.0
+# What a page of the scene asks for: itself, and what is inside it.
+INSIDE = ("file:", "blob:", "data:")
+
+
+def as_html(shown: Any) -> str:
+    """Return what a notebook displays."""
+    return shown._repr_mimebundle_()["text/html"]
+
+
+def at_rest(page: Page, canvas: Locator) -> bytes:
+    """Return a picture of a scene once two in a row are the same and something is drawn."""
+    last = b""
+    for _ in range(100):
+        data = canvas.screenshot()
+        if data == last and decoded(data).std() > 0.01:
+            return data
+        last = data
+        page.wait_for_timeout(150)
+    raise AssertionError("the scene did not come to rest")
+
+
+def pixels_of(download: Download) -> Pixels:
+    return untyped.imread(download.path().read_bytes(), extension=".png")
+
+
+def picture(tab: Tab, size: str, *, transparent: bool) -> Pixels:
+    tab.choose("Size (px)", size)
+    tab.switch("Transparent", on=transparent)
+    with tab.page.expect_download() as download:
+        tab.push("Download picture")
+    assert download.value.suggested_filename.startswith("paper-optimal-")
+    return pixels_of(download.value)
+
+
+def test_a_picture_has_the_size_and_the_background_asked_for_and_no_handle(tab: Tab) -> None:
+    tab.turn_to("Share")
+    settle(tab.page, tab.client)
+    tab.choose("Size (px)", "other")
+    tab.type("Width (px)", "320")
+    tab.type("Height (px)", "240")
+    tab.page.keyboard.press("Tab")
+    opaque = picture(tab, "other", transparent=False)
+    assert opaque.shape == (240, 320, 3)
+    assert (opaque[0, 0] > 240).all()
+    clear = picture(tab, "other", transparent=True)
+    assert clear.shape == (240, 320, 4)
+    assert clear[..., 3].min() == 0
+    assert clear[..., 3].max() == 255
+    # On white, the one is the other.
+    share = clear[..., 3:] / 255.0
+    assert np.abs(clear[..., :3] * share + 255.0 * (1.0 - share) - opaque).mean() < 0.5
+    # The handle that is on the page, and red, is in no picture.
+    assert tab.state.view.handle
+    with_handle = tab.client.get_render(240, 320, transport_format="png", timeout=PATIENCE_SECONDS)
+    assert reds(with_handle) > 0
+    assert reds(opaque) == 0
+
+
+def reds(pixels: NDArray[Any]) -> int:
+    """Return how many pixels are as red as nothing but the handle is."""
+    red, green, blue = (pixels[..., i] for i in range(3))
+    return int(((red > 200) & (green < 120) & (blue < 160)).sum())
+
+
+def test_a_picture_twice_as_large_as_shown_shows_the_same(tab: Tab) -> None:
+    tab.running.page.session.do(SetView(View(handle=False)))
+    shown = decoded(tab.picture())
+    tab.turn_to("Share")
+    taken = picture(tab, "twice as shown", transparent=False) / 255.0
+    height, width = shown.shape[:2]
+    assert taken.shape == (2 * height, 2 * width, 3)
+    # The drawer lies over the foot of the scene.
+    found = likeness(shown[: height // 2], blocks(taken, 2)[: height // 2])
+    assert found.spot < PLAIN_TO_SEE
+    assert found.structure < 0.05
+
+
+def test_a_size_out_of_bounds_is_refused_to_the_one_who_asked(open_tab: OpenTab) -> None:
+    asking, other = open_tab(), open_tab()
+    downloads = asking.running.page.downloads
+    downloads.picture((9, 100), transparent=False, client_id=asking.client.client_id)
+    notice = "the width of a picture is 16 to 8192 pixels; got 9"
+    expect(asking.page.get_by_text(notice)).to_be_visible(timeout=PATIENCE)
+    expect(other.page.get_by_text(notice)).to_be_hidden()
+    # Another may be asked for at once.
+    downloads.picture((64, 48), transparent=False, client_id=asking.client.client_id)
+    with asking.page.expect_download():
+        pass
+
+
+def test_the_scene_is_one_page_that_works_without_network(tab: Tab, browser: Browser) -> None:
+    tab.running.page.session.do(SetView(View(handle=False)))
+    tab.look_from("front")
+    tab.turn_to("Share")
+    with tab.page.expect_download() as download:
+        tab.push("Scene (HTML)")
+    assert download.value.suggested_filename == "paper-optimal-scene.html"
+    file = download.value.path().rename(download.value.path().with_suffix(".html"))
+    asked: list[str] = []
+    said: list[str] = []
+    context = browser.new_context(offline=True, viewport={"width": 640, "height": 480})
+    try:
+        page = context.new_page()
+        page.on("request", lambda request: asked.append(request.url))
+        page.on("console", lambda m: said.append(m.text) if m.type == "error" else None)
+        page.on("pageerror", lambda error: said.append(str(error)))
+        page.goto(file.as_uri())
+        expect(page).to_have_title("paper-optimal – flagged 4-4 manipulator", timeout=PATIENCE)
+        expect(page.locator("#caption")).to_contain_text(
+            "b4 at (10.000, 5.000, 9.000)", timeout=PATIENCE
+        )
+        expect(page.locator("#caption")).to_contain_text("1 unit = 10 mm", timeout=PATIENCE)
+        page.locator("#webgl-software-rendering").get_by_role("button").click()
+        canvas = page.locator(SCENE_CANVAS)
+        drawn = at_rest(page, canvas)
+        # As it was looked at: from the front the guide is level, and a3 is behind it.
+        assert decoded(drawn).std() > 0.05
+        page.mouse.move(320, 240)
+        page.mouse.down()
+        page.mouse.move(420, 300, steps=5)
+        page.mouse.up()
+        turned = at_rest(page, canvas)
+        assert likeness(decoded(drawn), decoded(turned)).spot > PLAIN_TO_SEE
+        # No panel and no way to a server.
+        expect(page.get_by_role("slider")).to_have_count(0)
+    finally:
+        context.close()
+    assert asked[0] == file.as_uri()
+    assert all(url.startswith(INSIDE) for url in asked)
+    assert said == []
+
+
+def test_the_session_comes_as_a_table_to_the_one_who_asked(open_tab: OpenTab) -> None:
+    asking, other = open_tab(), open_tab()
+    arrived: list[Download] = []
+
+    def note(download: Download) -> None:
+        arrived.append(download)
+
+    other.page.on("download", note)
+    goal = asking.drag("x", 0.6)
+
+    def has_come() -> bool:
+        x = asking.state.pose.position[0]
+        return asking.stands("x", x) and abs(x - goal) < 0.4
+
+    # A slow browser may still be telling of the drag.
+    asking.wait_for(has_come, "the x dragged to")
+    session = asking.running.page.session
+    assert session.wait_until_idle()
+    session.do(SetPosition(2, 7.0))
+    assert session.wait_until_idle()
+    asking.turn_to("Share")
+    with asking.page.expect_download() as download:
+        asking.push("Session (CSV)")
+    assert download.value.suggested_filename == "paper-optimal-session.csv"
+    rows = list(csv.DictReader(io.StringIO(download.value.path().read_text(encoding="utf-8"))))
+    poses = [[float(row[name]) for name in "xyz"] for row in rows]
+    assert poses[0] == [10.0, 5.0, 9.0]
+    assert poses[-1] == list(asking.state.pose.position)
+    assert poses[-1][2] == 7.0
+    assert rows[0]["moved_by"] == "Open paper-optimal"
+    assert rows[-2]["moved_by"].startswith("x = ")
+    assert rows[-1]["moved_by"] == "z = 7"
+    times = [float(row["time_s"]) for row in rows]
+    assert times == sorted(times)
+    joints = [float(rows[-1][name]) for name in explorer.JOINTS]
+    found = explorer.forward(explorer.PRESETS["paper-optimal"], joints)
+    assert_allclose(found.position[int(rows[-1]["mode"])], poses[-1], atol=1e-9)
+    other.page.wait_for_timeout(500)
+    assert arrived == []
+
+
+@contextmanager
+def notebook(html: str, tmp_path: Path) -> Generator[str]:
+    """Serve a page with some HTML in it from a port of its own; yield its address."""
+    (tmp_path / "index.html").write_text(f"<!doctype html><body>{html}</body>", encoding="utf-8")
+
+    class Quiet(http.server.SimpleHTTPRequestHandler):
+        def __init__(self, *args: Any) -> None:
+            super().__init__(*args, directory=str(tmp_path))
+
+        def log_message(self, format: str, *args: object) -> None:  # noqa: A002 - its name
+            """Say nothing."""
+
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), Quiet) as server:
+        thread = threading.Thread(target=server.serve_forever)
+        thread.start()
+        try:
+            yield f"http://127.0.0.1:{server.server_address[1]}"
+        finally:
+            server.shutdown()
+            thread.join()
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "localhost"])
+def test_in_a_notebook_the_page_is_live_both_ways(
+    browser: Browser, tmp_path: Path, host: str
+) -> None:
+    context = browser.new_context(viewport={"width": 1000, "height": 640})
+    context.set_default_timeout(PATIENCE)
+    try:
+        with explorer.show() as shown, notebook(as_html(shown), tmp_path) as address:
+            page = context.new_page()
+            page.goto(address.replace("127.0.0.1", host))
+            frame = page.frame_locator("iframe")
+            frame.locator("#webgl-software-rendering").get_by_role("button").click()
+            field = frame.locator("label", has_text="l4 leg 4").locator(
+                "xpath=ancestor::*[.//input][1]//input[@inputmode='decimal']"
+            )
+            expect(field).to_have_value("13.01", timeout=PATIENCE)
+            # From Python to the page.
+            shown.pose = explorer.Pose((10.0, 5.0, 8.0), shown.pose.quaternion)
+            joints = explorer.inverse(shown.design, shown.pose.position, shown.pose.rotation)
+            expect(field).to_have_value(f"{joints[5]:.2f}", timeout=PATIENCE)
+            # From the page to Python.
+            field.fill("12.5")
+            field.press("Enter")
+            expect(field).to_have_value("12.5", timeout=PATIENCE)
+            for _ in range(500):
+                if shown.pose.position[2] != 8.0:
+                    break
+                page.wait_for_timeout(20)
+            moved = explorer.inverse(shown.design, shown.pose.position, shown.pose.rotation)
+            assert moved[5] == pytest.approx(12.5, abs=1e-9)
+            canvas = frame.locator(SCENE_CANVAS)
+            assert decoded(at_rest(page, canvas)).std() > 0.05
+    finally:
+        context.close()

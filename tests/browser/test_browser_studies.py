@@ -1,0 +1,257 @@
+"""Studies in a browser: clicks and brushes in the plots, and a study started from the page."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+from tab import Tab
+
+from explorer.app.screenshot import settle
+from explorer.app.server import Running, start
+from explorer.app.session import UNDO
+from explorer.app.studies import MOST, StudyWish
+from explorer.app.study_actions import OpenStudy, SetStudyWish
+from explorer.app.study_feed import NO_WISH, PlotJson
+from explorer.app.study_folders import StudyFolders
+from explorer.design_file import PRESETS
+from explorer.sweep.parts import write_part
+from explorer.sweep.results import Results, load_results
+from explorer.sweep.rows import evaluate
+from explorer.sweep.study import Objective, Sampling, Study, encode_study
+
+OPTIMAL = PRESETS["paper-optimal"]
+# Panels and drawer side by side.
+WINDOW = {"width": 1280, "height": 900}
+COUNT = 24
+
+# Where a point of the scatter plot is in the window, and what each trace of it shows.
+POINT = """([name, x, y]) => {
+  const plot = document.querySelectorAll(".js-plotly-plot")[1], { xaxis, yaxis } = plot._fullLayout;
+  plot.scrollIntoView({ block: "center" });
+  const box = plot.getBoundingClientRect();
+  return [box.x + xaxis._offset + xaxis.l2p(x), box.y + yaxis._offset + yaxis.l2p(y)];
+}"""
+LEFT_OUT = """() => [0, 2].flatMap((k) =>
+  Array.from(document.querySelectorAll(".js-plotly-plot")[1]._fullData[k].customdata || []))"""
+BRUSHES = """() => document.querySelector(".js-plotly-plot").data[0].dimensions.map(
+  (each) => each.constraintrange || null)"""
+# Close to where the line of a row crosses the third axis, that of the volume.
+LINE = """(row) => {
+  const plot = document.querySelector(".js-plotly-plot");
+  const { values, range } = plot._fullData[0].dimensions[2];
+  const box = plot.querySelectorAll(".axis-brush .background")[2].getBoundingClientRect();
+  const share = (values[row] - range[0]) / (range[1] - range[0]);
+  return [box.x + box.width / 2 + 8, box.y + (1 - share) * box.height];
+}"""
+TOP = "() => document.querySelector('.js-plotly-plot').scrollIntoView({ block: 'center' })"
+
+
+@pytest.fixture
+def home(tmp_path: Path) -> Path:
+    """A folder of studies with a whole one, and half of another."""
+    whole = Study(
+        name="Some",
+        design=OPTIMAL,
+        variables={"a3x": (12.0, 20.0), "b2": (-4.0, 4.0)},
+        sampling=Sampling(count=COUNT),
+        measures=("volume", "reach"),
+        objectives=(Objective("volume", "max"), Objective("reach", "min")),
+        chunk=COUNT,
+    )
+    half = msgspec.structs.replace(whole, name="Half", chunk=COUNT // 2)
+    home = tmp_path / "studies"
+    for study in (whole, half):
+        folder = home / study.name.lower()
+        folder.mkdir(parents=True)
+        write_part(folder, study, 0, [evaluate(encode_study(study), 0, study.chunk)])
+    return home
+
+
+@pytest.fixture
+def running(home: Path, capfd: pytest.CaptureFixture[str]) -> Iterator[Running]:
+    running = start(OPTIMAL, port=0, studies=StudyFolders(home))
+    yield running
+    running.stop()
+    assert capfd.readouterr().err == ""
+
+
+def looked_at(tab: Tab) -> None:
+    tab.page.set_viewport_size({"width": WINDOW["width"], "height": WINDOW["height"]})
+    tab.turn_to("Studies")
+    settle(tab.page, tab.client)
+
+
+def settled(tab: Tab) -> None:
+    """Wait until the plots are those of the state, and are listened to."""
+    panel = tab.running.page.studies
+    assert panel is not None
+    feed = panel.feed
+
+    def plots() -> tuple[PlotJson, PlotJson] | None:
+        drawing, studies = feed.drawing, replace(tab.state.studies, wish=NO_WISH)
+        is_new = drawing is not None and drawing.request.studies == studies and feed.is_current
+        return drawing.plots if drawing is not None and is_new else None
+
+    shows = """(revision) => { const all = [...document.querySelectorAll(".js-plotly-plot")];
+      return all.length === 2 && all.every((each) => each.explorerListens)
+        && `"uirevision":${all[0].data[0].uirevision}` === revision; }"""
+
+    def are_shown() -> bool:
+        # A study that has just been computed is drawn again, so which ones they are may change.
+        found = plots()
+        if found is None:
+            return False
+        revision = f'"uirevision":{_revision(found[0].to_json())}'
+        return bool(tab.page.evaluate(shows, revision))
+
+    tab.wait_for(are_shown, "the plots of the state")
+
+
+def _revision(text: str) -> int:
+    return int(text.partition('"uirevision":')[2].partition("}")[0])
+
+
+def studies_of(tab: Tab) -> Any:
+    return tab.state.studies
+
+
+def test_what_hands_do_in_the_plots(tab: Tab, home: Path) -> None:
+    results = load_results(home / "some")
+    volume, reach = results.columns["volume"], results.columns["reach"]
+    looked_at(tab)
+    tab.choose("Study", "some")
+    settled(tab)
+
+    # A click on a point opens that very design.
+    row = _lonely(results)
+    place = tab.page.evaluate(POINT, ["", volume[row], reach[row]])
+    tab.page.mouse.move(*place)
+    tab.page.mouse.click(*place)
+    tab.wait_for(lambda: studies_of(tab).picked is not None, "a pick")
+    assert studies_of(tab).picked == int(results.columns["index"][row])
+    assert tab.state.design == results.design_of_row(row)
+    settled(tab)
+
+    # A box around it brushes both axes, and all else is left out.
+    place = tab.page.evaluate(POINT, ["", volume[row], reach[row]])
+    tab.page.mouse.move(place[0] - 12, place[1] - 12)
+    tab.page.mouse.down()
+    tab.page.mouse.move(place[0] + 12, place[1] + 12, steps=4)
+    tab.page.mouse.up()
+    tab.wait_for(lambda: len(studies_of(tab).brushes) == 2, "a box")
+    assert {each.axis for each in studies_of(tab).brushes} == {"volume", "reach"}
+    settled(tab)
+    _assert_left_out(tab, results)
+    assert row not in tab.page.evaluate(LEFT_OUT)
+
+    # What is undone is gone from the plots too.
+    tab.running.page.session.travel(UNDO)
+    tab.wait_for(lambda: not studies_of(tab).brushes, "no brush")
+    settled(tab)
+    assert tab.page.evaluate(LEFT_OUT) == []
+    assert not any(tab.page.evaluate(BRUSHES))
+
+    # A click on a line opens its design: the top of an axis is met by one line alone.
+    tab.page.evaluate(TOP)
+    other = int(volume.argmax())
+    line = tab.page.evaluate(LINE, other)
+    tab.page.mouse.move(*line, steps=3)
+    tab.page.mouse.click(*line)
+    tab.wait_for(lambda: studies_of(tab).picked == other, "a pick of a line")
+    assert tab.state.design == results.design_of_row(other)
+    settled(tab)
+
+    # A drag along an axis brushes it.
+    tab.page.evaluate(TOP)
+    axis = tab.page.locator(".axis-brush .background").nth(1).bounding_box()
+    assert axis is not None
+    x, y = axis["x"] + axis["width"] / 2.0, axis["y"]
+    tab.page.mouse.move(x, y + 0.3 * axis["height"])
+    tab.page.mouse.down()
+    tab.page.mouse.move(x, y + 0.7 * axis["height"], steps=4)
+    tab.page.mouse.up()
+    tab.wait_for(lambda: len(studies_of(tab).brushes) == 1, "a brush")
+    (brush,) = studies_of(tab).brushes
+    assert brush.axis == "b2"
+    ((low, high),) = brush.ranges
+    assert -4.2 < low < high < 4.2
+    settled(tab)
+    _assert_left_out(tab, results)
+    assert 0 < len(tab.page.evaluate(LEFT_OUT)) < COUNT
+
+    # The links of the list push buttons out of sight.
+    tab.page.get_by_title("Clear all brushes").click()
+    tab.wait_for(lambda: not studies_of(tab).brushes, "no brush")
+    settled(tab)
+    panel = tab.running.page.studies
+    assert panel is not None
+    drawing = panel.feed.drawing
+    assert drawing is not None
+    best = int(results.columns["index"][drawing.front[0]])
+    tab.page.get_by_title(f"Open design {best}", exact=True).click()
+    tab.wait_for(lambda: studies_of(tab).picked == best, "the best")
+    assert tab.state.design == results.design_of_row(int(drawing.front[0]))
+
+
+def test_a_small_study_is_started_and_cancelled(tab: Tab, home: Path) -> None:
+    # So many, of something so slow, that even a slow browser can cancel it on the way.
+    wish = StudyWish(MOST, 20.0, ("a3x", "b2"), ("volume", "reachable_volume"), ())
+    tab.running.page.session.do(SetStudyWish(wish))
+    looked_at(tab)
+    tab.page.get_by_text("New study", exact=True).click()
+    tab.push("Start study")
+    tab.push("Cancel study")
+    panel = tab.running.page.studies
+    assert panel is not None
+    tab.wait_for(lambda: panel.runner.run is None, "the end of a cancelled study")
+    name = studies_of(tab).name
+    assert name is not None
+    assert _count(home / name) < MOST
+
+
+def test_a_study_that_was_cut_off_is_gone_on_with(tab: Tab, home: Path) -> None:
+    session = tab.running.page.session
+    looked_at(tab)
+    session.do(OpenStudy("half"))
+    tab.push("Go on with the study")
+    tab.wait_for(lambda: _count(home / "half") == COUNT, "the whole study")
+    settled(tab)
+    tab.wait_for(lambda: tab.page.locator(".js-plotly-plot").count() == 2, "both plots")
+    # Another one can be looked at, and none.
+    session.do(OpenStudy(None))
+    tab.wait_for(lambda: tab.page.locator(".js-plotly-plot").count() == 0, "no plots")
+
+
+def _count(folder: Path) -> int:
+    try:
+        return load_results(folder).count
+    except ValueError:
+        return 0
+
+
+def _lonely(results: Results) -> int:
+    """Return the row whose point is farthest from all others in the scatter plot."""
+    points = np.column_stack([results.columns["volume"], results.columns["reach"]])
+    points = (points - points.min(axis=0)) / np.ptp(points, axis=0)
+    apart = np.linalg.norm(points[:, None] - points[None], axis=2)
+    np.fill_diagonal(apart, np.inf)
+    return int(apart.min(axis=1).argmax())
+
+
+def _assert_left_out(tab: Tab, results: Results) -> None:
+    """Compare what the plot leaves out with the law, row by row."""
+    expected = [
+        int(index)
+        for row, index in enumerate(results.columns["index"].tolist())
+        if not all(
+            any(low <= results.columns[brush.axis][row] <= high for low, high in brush.ranges)
+            for brush in studies_of(tab).brushes
+        )
+    ]
+    assert sorted(tab.page.evaluate(LEFT_OUT)) == expected

@@ -1,0 +1,160 @@
+"""`explorer report`: a whole file or none, and commands in it that say the same again."""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+import sys
+from pathlib import Path
+
+import msgspec
+import pytest
+from report_page import read, table_of
+
+import explorer
+from explorer.cli import run
+from explorer.design_file import encode_design
+from explorer.optimise.findings import paper_problem
+from explorer.optimise.record import Record, RunRecord, Settings, Step, encode_record
+
+OPTIMAL = explorer.PRESETS["paper-optimal"]
+
+
+def test_the_answer_is_one_object(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    out = tmp_path / "report.HTM"
+    assert run(["report", "--out", str(out), "--json"]) == 0
+    captured = capsys.readouterr()
+    assert captured.err == ""
+    answer = json.loads(captured.out)
+    assert answer.pop("seconds") > 0.0
+    assert answer == {"out": str(out), "format": "html", "bytes": out.stat().st_size}
+    assert [each.name for each in tmp_path.iterdir()] == [out.name]
+    assert next(read(out.read_text(encoding="utf-8")).all("h1")).text == "paper-optimal"
+
+
+def test_its_commands_tell_the_same_again(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    design = msgspec.structs.replace(OPTIMAL, name="my; rm -rf $(own) 'design'", unit_mm=25.0)
+    Path("mine.json").write_bytes(encode_design(design))
+    turned = ["--position", "9", "4.5", "8", "--yaw-pitch-roll", "-70", "3", "2"]
+    assert run(["report", "--design", "mine.json", "--out", "first.html", *turned]) == 0
+    page = read(Path("first.html").read_text(encoding="utf-8"))
+    Path("design.json").write_bytes(page.one(id="design").text.encode())
+    capsys.readouterr()
+    lines = page.one(id="commands").text.splitlines()
+    assert len(lines) == 5
+    told: dict[str, dict[str, object]] = {}
+    for line in lines:
+        program, *argv = shlex.split(line)
+        assert program == "explorer"
+        assert run([*argv, "--json"]) == 0
+        told[argv[0]] = json.loads(capsys.readouterr().out)
+    undated = [
+        re.sub(r"<time.*?</time>", "", Path(name).read_text(encoding="utf-8"))
+        for name in ("first.html", "report.html")
+    ]
+    assert undated[0] == undated[1]
+    volume = table_of(page, "Volumes")["exact volume"].values[0]
+    assert told["workspace"]["volume"] == volume
+    condition = table_of(page, "Measures")["inverse condition number, with the reach"].values
+    assert [told["singularity"]["inverse_condition"]] == condition
+
+
+def test_a_record_brings_its_history(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    problem = paper_problem()
+    step = Step(
+        number=0,
+        run=0,
+        phase="solving",
+        values=problem.start.variables,
+        objective=0.5,
+        volume=4000.0,
+        worst="",
+        spare=0.0,
+    )
+    only = RunRecord(
+        start=step.values,
+        status="cancelled",
+        best=0,
+        iterations=0,
+        evaluations=1,
+        attempts=1,
+        holding="",
+        message="cancelled on request",
+    )
+    record = Record(
+        problem=problem,
+        settings=Settings(),
+        design=problem.start,
+        chosen=0,
+        runs=(only,),
+        history=(step,),
+        seconds=0.1,
+        versions={"python": "3.11"},
+    )
+    file, out = tmp_path / "run.record.json", tmp_path / "report.html"
+    file.write_bytes(encode_record(record))
+    assert run(["report", "--out", str(out), "--record", str(file)]) == 0
+    assert capsys.readouterr().out == f"{out}\n"
+    heads = [each.text for each in read(out.read_text(encoding="utf-8")).all("h2")]
+    assert "Optimisation" in heads
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "words"),
+    [
+        ("report.doc", [], "--out must end in .html or .pdf"),
+        ("report", [], "--out must end in .html or .pdf"),
+        ("missing/report.html", [], "no folder"),
+        ("report.html", ["--design", "no-such"], "no-such"),
+        ("report.html", ["--record", "no-such.json"], "cannot read 'no-such.json'"),
+        ("report.html", ["--record", __file__], "test_cli_report.py"),
+        ("report.html", ["--quaternion", "0", "0", "0", "0"], "quaternion"),
+        ("report.html", ["--view", "top"], "no option --view"),
+    ],
+)
+def test_what_cannot_be_written_is_refused_with_one_line(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, name: str, options: list[str], words: str
+) -> None:
+    assert run(["report", "--out", str(tmp_path / name), *options]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.count("\n") == 1
+    assert words in captured.err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_degenerate_design_is_refused(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    flat = tmp_path / "flat.json"
+    text = encode_design(OPTIMAL).decode().replace("7.0062", "0.0")
+    flat.write_text(text, encoding="utf-8")
+    assert run(["report", "--design", str(flat), "--out", str(tmp_path / "r.html")]) == 2
+    assert "degenerate design: a3y = 0" in capsys.readouterr().err
+    assert [each.name for each in tmp_path.iterdir()] == ["flat.json"]
+
+
+def test_an_empty_workspace_is_no_reason_for_no_report(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    out = tmp_path / "report.html"
+    assert run(["report", "--out", str(out), "--yaw-pitch-roll", "0", "0", "0"]) == 0
+    assert capsys.readouterr().err == ""
+    assert "The workspace is empty" in out.read_text(encoding="utf-8")
+
+
+def test_without_a_browser_pdf_is_refused_with_one_line_and_html_is_not(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "playwright.sync_api", None)
+    out = tmp_path / "report.pdf"
+    out.write_bytes(b"old")
+    assert run(["report", "--out", str(out)]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.count("\n") == 1
+    assert 'pip install "flagged-explorer[screenshot]"' in captured.err
+    assert out.read_bytes() == b"old"
+    assert run(["report", "--out", str(tmp_path / "report.html")]) == 0

@@ -1,0 +1,130 @@
+"""A bare websocket client that says what it is told to, as no page would."""
+
+from __future__ import annotations
+
+import socket
+import time
+from collections.abc import Generator
+from contextlib import closing, contextmanager
+from typing import Any
+
+import msgspec
+import viser
+import zstandard
+from websockets.sync.client import ClientConnection, connect
+from websockets.typing import Origin, Subprotocol
+
+from explorer.app.server import Running
+
+PROTOCOL = Subprotocol(f"viser-v{viser.__version__}")
+CAMERA: dict[str, Any] = {
+    "type": "ViewerCameraMessage",
+    "wxyz": (1.0, 0.0, 0.0, 0.0),
+    "position": (0.0, -30.0, 20.0),
+    "fov": 0.6,
+    "near": 0.1,
+    "far": 1000.0,
+    "image_height": 400,
+    "image_width": 640,
+    "look_at": (0.0, 0.0, 0.0),
+    "up_direction": (0.0, 0.0, 1.0),
+}
+
+
+def opened(
+    url: str, *, origin: str | None = "", host: str | None = None, cookie: str | None = None
+) -> ClientConnection:
+    """Open a websocket as the page at the url does, or with other headers than the page's.
+
+    Raises:
+        InvalidStatus: the server refuses.
+    """
+    address, _, query = url.partition("/?")
+    more = {} if cookie is None else {"Cookie": cookie}
+    target = address.replace("http", "ws", 1) + (f"/?{query}" if query else "")
+    port = address.rpartition(":")[2]
+    named = target if host is None else target.replace(address[7:], f"{host}:{port}")
+    # Whoever is called, it is this machine that is connected to.
+    machine = "::1" if "[::1]" in address else "127.0.0.1"
+    return connect(
+        named,
+        sock=socket.create_connection((machine, int(port))),
+        origin=None if origin is None else Origin(origin or address),
+        subprotocols=[PROTOCOL],
+        additional_headers=more,
+        compression=None,
+        max_size=None,
+        proxy=None,
+    )
+
+
+class Client:
+    """A client of an explorer that counts as a tab.
+
+    Args:
+        connection: To the explorer.
+    """
+
+    def __init__(self, connection: ClientConnection) -> None:
+        self.connection = connection
+        self.controls: dict[str, dict[str, Any]] = {}
+        self._decompressor = zstandard.ZstdDecompressor()
+        # A client counts once it has told of its camera.
+        self.send(CAMERA)
+        while not any(message["type"] == "ReplayDoneMessage" for message in self.read()):
+            pass
+
+    def send(self, message: dict[str, Any]) -> None:
+        """Send a message, given by its fields."""
+        self.connection.send(msgspec.msgpack.encode(message))
+
+    def update(self, uuid: str, value: object) -> None:
+        """Give a control a value."""
+        self.send({"type": "GuiUpdateMessage", "uuid": uuid, "updates": {"value": value}})
+
+    def find(self, label: str) -> str:
+        """Return the id of the control with this label."""
+        (uuid,) = (u for u, props in self.controls.items() if props.get("label") == label)
+        return uuid
+
+    def read(self, timeout: float | None = 60.0) -> list[dict[str, Any]]:
+        """Return the next messages.
+
+        Raises:
+            TimeoutError: none come in time.
+        """
+        window = self.connection.recv(timeout=timeout)
+        assert isinstance(window, bytes)
+        size, compressed = (int.from_bytes(window[i : i + 8], "little") for i in (0, 8))
+        packed = self._decompressor.decompress(window[16 : 16 + compressed], size)
+        messages: list[dict[str, Any]] = msgspec.msgpack.decode(packed)["messages"]
+        for message in messages:
+            if message["type"].startswith("Gui") and "props" in message:
+                self.controls[message["uuid"]] = message | message["props"]
+            elif message["type"] == "GuiUpdateMessage":
+                self.controls[message["uuid"]].update(message["updates"])
+        return messages
+
+    def read_until_quiet(self, seconds: float = 0.7) -> list[dict[str, Any]]:
+        """Return all that comes until nothing comes for so long, two minutes at most."""
+        messages: list[dict[str, Any]] = []
+        deadline = time.monotonic() + 120.0
+        while time.monotonic() < deadline:
+            try:
+                messages += self.read(seconds)
+            except TimeoutError:
+                break
+        return messages
+
+
+@contextmanager
+def client_of(running: Running) -> Generator[Client]:
+    """Connect as a tab does, and wait until the explorer counts it as one."""
+    known = set(running.viser.get_clients())
+    with closing(opened(running.url)) as connection:
+        client = Client(connection)
+        deadline = time.monotonic() + 60.0
+        while set(running.viser.get_clients()) <= known:
+            assert time.monotonic() < deadline, "the client does not count as connected"
+            time.sleep(0.005)
+        yield client

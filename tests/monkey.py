@@ -1,0 +1,393 @@
+"""Random hands on a running explorer: through websockets, as many tabs, with no mercy.
+
+From the checkout, for as long as one likes: python tests/monkey.py [actions] [seed]
+With --memory it looks at memory alone: the pages that it compares with take some too.
+"""
+
+from __future__ import annotations
+
+import argparse
+import gc
+import io
+import math
+import os
+import random
+import signal
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Generator
+from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import psutil
+import viser
+from page_props import differences, shown_by
+from socket_tab import SocketTab
+
+from explorer.app.actions import Open
+from explorer.app.jobs import RESTARTED
+from explorer.app.keeping import Keep
+from explorer.app.memory import given_back, keep_for_good, limit_arenas
+from explorer.app.page import REFUSAL
+from explorer.app.server import Running, start
+from explorer.app.storage.autosave import Autosave
+from explorer.app.storage.library import Library
+from explorer.compiled import warm
+from explorer.design_file import PRESETS, encode_design
+
+TABS = 3
+# Between two looks at whether the page shows its state.
+BETWEEN_LOOKS = 1000
+PATIENCE_SECONDS = 120.0
+# Between two kills of the worker.
+KILL_SECONDS = 5.0
+
+BROKEN = (
+    b"",
+    b"{",
+    b"null",
+    b"[" * 5000,
+    b"\xff\xfe\x00",
+    b'{"a3": [1, 2]}',
+    b'{"schema": 99}',
+    b'{"schema": 1, "a3": [1e999, 0], "b1": [1, 1], "b2": 1, "b3": 2}',
+    b'{"schema": 1, "a3": [4, 0], "b1": [1, 1], "b2": 1, "b3": 2}',
+    b"PK\x03\x04" + bytes(200),
+)
+NUMBERS = (0.0, -1.0, 1e-12, 1e9, math.nan, math.inf, -math.inf, 1e308)
+
+
+@dataclass
+class Report:
+    """What came of it.
+
+    Attributes:
+        actions: That were done.
+        faults: What the page said had gone wrong in the explorer itself.
+        drift: What the page showed beside what a new page of the same state shows.
+        times: Of each look, on the monotonic clock.
+        memory: Of the process, in bytes, at each look.
+        threads, processes: At each look.
+    """
+
+    actions: int = 0
+    faults: list[str] = field(default_factory=list[str])
+    drift: list[str] = field(default_factory=list[str])
+    times: list[float] = field(default_factory=list[float])
+    memory: list[int] = field(default_factory=list[int])
+    threads: list[int] = field(default_factory=list[int])
+    processes: list[int] = field(default_factory=list[int])
+
+
+class Monkey:
+    """Does random things to an explorer.
+
+    Args:
+        running: The explorer.
+        seed: For what it does; how its events fall between frames is not repeatable.
+        compares: Whether it looks at what the page shows, rather than at memory alone.
+    """
+
+    def __init__(self, running: Running, seed: int, *, compares: bool = True) -> None:
+        self.running = running
+        self._compares = compares
+        self.report = Report()
+        self._random = random.Random(seed)
+        self._tabs = [SocketTab(running.url) for _ in range(TABS)]
+        self._does: tuple[tuple[float, Callable[[], None]], ...] = (
+            (50, self._use),
+            (20, self._drag),
+            (12, self._push),
+            (8, self._trigger),
+            (4, self._pull_handle),
+            (2, self._click_scene),
+            (2, self._upload),
+            (2, self._reload),
+            (1, self._vanish),
+            (1, self._preset),
+            (0.3, self._kill),
+        )
+        gui: Any = running.viser.gui
+        self._gui = gui
+        self._killed = 0.0
+        page: Any = running.page
+        page._notify = self._hearing(page._notify)
+        page.session._report = self._fault
+
+    def run(self, actions: int) -> Report:
+        """Do so many things, look now and then, and say what came of it."""
+        said = io.StringIO()
+        with redirect_stderr(said), redirect_stdout(said):
+            self._run(actions)
+        # Nothing is printed where nothing is wrong.
+        if said.getvalue().strip():
+            self.report.faults.append(said.getvalue())
+        return self.report
+
+    def _run(self, actions: int) -> None:
+        weights = [weight for weight, _ in self._does]
+        since = 0
+        while self.report.actions < actions:
+            _, act = self._random.choices(self._does, weights)[0]
+            before = self.report.actions
+            act()
+            since += self.report.actions - before
+            if since >= BETWEEN_LOOKS:
+                since = 0
+                self.look()
+        self.look()
+        for tab in self._tabs:
+            tab.close()
+
+    def look(self) -> None:
+        """Wait for quiet, compare the page with a new one of the same state, and measure."""
+        for tab in self._tabs:
+            tab.flush()
+        self._settle()
+        if self._compares:
+            self._compare()
+        gc.collect()
+        process = psutil.Process()
+        self.report.times.append(time.monotonic())
+        self.report.memory.append(process.memory_info().rss)
+        self.report.threads.append(threading.active_count())
+        self.report.processes.append(len(process.children(recursive=True)))
+
+    def _compare(self) -> None:
+        page = self.running.page
+        state, history = page.session.state, page.session.history
+        with explorer_with_data() as fresh:
+            session: Any = fresh.page.session
+            fresh.page.wait_until_drawn(PATIENCE_SECONDS)
+            session._state, session._history = state, history
+            fresh.page.hands.theme.choose(dark=page.hands.theme.is_dark)
+            if page.shelf is not None and fresh.page.shelf is not None:
+                page.shelf.wait_until_idle()
+                fresh.page.shelf.wait_until_idle()
+                fresh.page.shelf.entries = page.shelf.entries
+                fresh.page.shelf.deleted = page.shelf.deleted
+            session.redraw()
+            assert fresh.page.wait_until_drawn(PATIENCE_SECONDS)
+            self.report.drift += differences(shown_by(self.running), shown_by(fresh))
+
+    def _settle(self) -> None:
+        page = self.running.page
+        deadline = time.monotonic() + PATIENCE_SECONDS
+        while time.monotonic() < deadline:
+            assert page.wait_until_drawn(PATIENCE_SECONDS), "the page does not come to rest"
+            journey = page.session.state.journey
+            is_on = journey is not None and journey.is_playing
+            if not is_on and not page.session.state.paths.is_planning:
+                time.sleep(0.1)
+                if not page.session.has_more:
+                    return
+            time.sleep(0.05)
+        raise AssertionError("the page does not come to rest")
+
+    def _fault(self, error: Exception) -> None:
+        self.report.faults.append(repr(error))
+
+    def _hearing(self, notify: Callable[[str, str, int | None], None]) -> Callable[..., None]:
+        """Return how to notify people, so that what is no fault of theirs is kept."""
+
+        def notify_and_hear(title: str, message: str, who: int | None) -> None:
+            # A worker that was killed is told of, and nothing else comes of it.
+            if title != REFUSAL and message != RESTARTED:
+                self.report.faults.append(message)
+            notify(title, message, who)
+
+        return notify_and_hear
+
+    @property
+    def _tab(self) -> SocketTab:
+        return self._random.choice(self._tabs)
+
+    def _inputs(self, *, buttons: bool) -> list[Any]:
+        handles = list(self._gui._gui_input_handle_from_uuid.values())
+        return [h for h in handles if h._impl.is_button is buttons]
+
+    def _use(self) -> None:
+        """Give a control a value, once in a while an impossible one."""
+        handle = self._random.choice(self._inputs(buttons=False))
+        self._tab.update(handle._impl.uuid, self._value_for(handle))
+        self._did()
+
+    def _drag(self) -> None:
+        """Move a slider in many small steps, sometimes by two hands in two tabs."""
+        sliders = [h for h in self._inputs(buttons=False) if _is(h, viser.GuiSliderHandle)]
+        handle = self._random.choice(sliders)
+        tabs = [self._tab] if self._random.random() < 0.8 else [self._tab, self._tab]
+        low, high = handle.min, handle.max
+        at = self._random.uniform(low, high)
+        for _ in range(self._random.randint(3, 20)):
+            at = min(max(at + self._random.gauss(0.0, 0.03) * (high - low), low), high)
+            self._random.choice(tabs).update(handle._impl.uuid, at)
+            self._did()
+            if self._random.random() < 0.3:
+                time.sleep(self._random.uniform(0.0, 0.01))
+
+    def _push(self) -> None:
+        handle = self._random.choice(self._inputs(buttons=True))
+        value: object = True
+        if _is(handle, viser.GuiButtonGroupHandle):
+            value = self._random.choice(handle.options)
+        elif _is(handle, viser.GuiUploadButtonHandle):
+            return
+        self._tab.update(handle._impl.uuid, value)
+        self._did()
+
+    def _trigger(self) -> None:
+        """Choose a command from the palette."""
+        commands = list(self._gui._command_handle_from_uuid)
+        if commands:
+            self._tab.send({"type": "CommandTriggerMessage", "uuid": self._random.choice(commands)})
+            self._did()
+
+    def _pull_handle(self) -> None:
+        scene: Any = self.running.viser.scene
+        nodes = scene._handle_from_node_name.items()
+        names = [n for n, handle in nodes if _is(handle, viser.TransformControlsHandle)]
+        name = self._random.choice(names)
+        tab = self._tab
+        for _ in range(self._random.randint(1, 12)):
+            quaternion = [self._random.gauss(0.0, 1.0) for _ in range(4)]
+            norm = math.hypot(*quaternion)
+            tab.send(
+                {
+                    "type": "TransformControlsUpdateMessage",
+                    "name": name,
+                    "position": [self._random.uniform(-5.0, 5.0) for _ in range(3)],
+                    "wxyz": [each / norm for each in quaternion],
+                }
+            )
+            self._did()
+
+    def _click_scene(self) -> None:
+        scene: Any = self.running.viser.scene
+        self._tab.send(
+            {
+                "type": "SceneNodeClickMessage",
+                "name": self._random.choice(list(scene._handle_from_node_name)),
+                "instance_index": None,
+                "ray_origin": (0.0, -30.0, 20.0),
+                "ray_direction": (0.0, 0.8, -0.6),
+                "screen_pos": (0.5, 0.5),
+                "modifier": None,
+            }
+        )
+        self._did()
+
+    def _upload(self) -> None:
+        """Upload what is no design, or half of one, or a whole one."""
+        buttons = [h for h in self._inputs(buttons=True) if _is(h, viser.GuiUploadButtonHandle)]
+        if not buttons:
+            return
+        whole = encode_design(self._random.choice(list(PRESETS.values())))
+        content = self._random.choice([*BROKEN, whole, whole[: len(whole) // 2]])
+        self._tab.upload(self._random.choice(buttons)._impl.uuid, "../x.json", content)
+        self._did()
+
+    def _reload(self) -> None:
+        """Close a tab and open it again."""
+        index = self._random.randrange(TABS)
+        self._tabs[index].close()
+        self._tabs[index] = SocketTab(self.running.url)
+        self._did()
+
+    def _vanish(self) -> None:
+        """Lose a tab in mid-drag, without a word."""
+        index = self._random.randrange(TABS)
+        tab = self._tabs[index]
+        sliders = [h for h in self._inputs(buttons=False) if _is(h, viser.GuiSliderHandle)]
+        handle = self._random.choice(sliders)
+        for _ in range(5):
+            tab.update(handle._impl.uuid, self._random.uniform(handle.min, handle.max))
+            self._did()
+        tab.drop()
+        self._tabs[index] = SocketTab(self.running.url)
+
+    def _kill(self) -> None:
+        """Kill the worker that draws the workspace, whatever it is doing."""
+        number = self.running.page.worker.process_id
+        # Twice over the same work it is given up.
+        if number is not None and time.monotonic() - self._killed > KILL_SECONDS:
+            self._killed = time.monotonic()
+            with suppress(ProcessLookupError):
+                os.kill(number, getattr(signal, "SIGKILL", signal.SIGTERM))
+        self._did()
+
+    def _preset(self) -> None:
+        """Return to a sane design, lest all that follows happens to a monster."""
+        page = self.running.page
+        page.session.do(Open(self._random.choice(list(PRESETS.values()))))
+        self._did()
+
+    def _value_for(self, handle: Any) -> Any:
+        value: Any = handle._impl.value
+        if _is(handle, viser.GuiDropdownHandle):
+            return self._random.choice(handle.options)
+        if isinstance(value, bool):
+            return self._random.random() < 0.5
+        if isinstance(value, tuple):
+            return [self._number(float(each)) for each in handle.value]
+        if isinstance(value, str):
+            return self._random.choice(["", "mine", "../../etc", "<b>x</b>", "κ" * 200, "\x00"])
+        if _is(handle, viser.GuiSliderHandle) and self._random.random() < 0.95:
+            return self._random.uniform(handle.min, handle.max)
+        return self._number(float(value))
+
+    def _number(self, present: float) -> float:
+        if self._random.random() < 0.1:
+            return self._random.choice(NUMBERS)
+        return present + self._random.gauss(0.0, 0.2) * max(1.0, abs(present))
+
+    def _did(self) -> None:
+        self.report.actions += 1
+
+
+def _is(handle: Any, kind: type) -> bool:
+    """Whether a handle is of a kind; what it is made of remains viser's affair."""
+    return isinstance(handle, kind)
+
+
+@contextmanager
+def explorer_with_data() -> Generator[Running]:
+    """Start an explorer with a data folder of its own, to be let loose on."""
+    with tempfile.TemporaryDirectory() as folder:
+        keep = Keep(Library(Path(folder) / "designs"), Autosave(Path(folder) / "sessions"))
+        running = start(PRESETS["paper-optimal"], port=0, keep=keep)
+        try:
+            yield running
+        finally:
+            running.stop()
+
+
+def main() -> None:
+    """Let a monkey loose and print what came of it."""
+    parser = argparse.ArgumentParser(description=main.__doc__)
+    parser.add_argument("actions", nargs="?", type=int, default=20000)
+    parser.add_argument("seed", nargs="?", type=int, default=1)
+    parser.add_argument("--memory", action="store_true", help="look at memory alone")
+    asked = parser.parse_args()
+    # As the command does, lest what the kernels need is counted as growth.
+    limit_arenas()
+    warm()
+    with explorer_with_data() as running, given_back():
+        keep_for_good()
+        began = time.monotonic()
+        report = Monkey(running, asked.seed, compares=not asked.memory).run(asked.actions)
+        print(f"{report.actions} actions in {time.monotonic() - began:.0f} s")
+    print("memory, MB:", [round(each / 1e6) for each in report.memory])
+    print("at, s:", [round(each - began) for each in report.times])
+    print("threads:", report.threads)
+    print("processes:", report.processes)
+    print("\n".join(["faults:", *report.faults, "drift:", *report.drift]))
+    sys.exit(bool(report.faults or report.drift))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,56 @@
+"""Workers for tests of studies: in this process, and tasks that kill theirs."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import Any
+
+from explorer.sweep.rows import Rows, evaluate
+from explorer.sweep.workers import Workers
+
+DEADLY = 13
+"""The index of the design that kills whoever evaluates it."""
+
+
+class HereWorkers(Workers):
+    """Does each task at once, in this process, and remembers the pieces of all."""
+
+    def __init__(self) -> None:
+        self.tasks: list[list[range]] = []
+
+    @property
+    def pieces(self) -> list[range]:
+        return [piece for task in self.tasks for piece in task]
+
+    @property
+    def size(self) -> int:
+        return 1
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        self.tasks.append(args[2])
+        future: Future[Any] = Future()
+        try:
+            future.set_result(fn(*args, **kwargs))
+        except Exception as error:  # noqa: BLE001 - the future raises it
+            future.set_exception(error)
+        return future
+
+
+def deadly(study: bytes, start: int, stop: int) -> Rows:
+    """Evaluate designs, but die of one of them."""
+    if start <= DEADLY < stop:
+        os._exit(1)
+    return evaluate(study, start, stop)
+
+
+def foreign(study: bytes, start: int, stop: int) -> Rows:
+    """Evaluate designs as a worker with other libraries does."""
+    rows = evaluate(study, start, stop)
+    return Rows(rows.indices, rows.columns, {**rows.versions, "numpy": "1.0"})
+
+
+def broken(study: bytes, start: int, stop: int) -> Rows:
+    """Fail as a worker does that cannot do its task."""
+    raise ModuleNotFoundError("No module named 'explorer'")

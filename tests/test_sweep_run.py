@@ -1,0 +1,752 @@
+"""Runs of studies: every row once, the same bytes whatever interrupts them, nothing overwritten."""
+
+from __future__ import annotations
+
+import functools
+import importlib
+import os
+import random
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from concurrent.futures import Future
+from contextlib import ExitStack, suppress
+from multiprocessing.context import SpawnProcess
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+from filelock import FileLock
+from sweep_faults import DEADLY, HereWorkers, broken, deadly, foreign
+
+import explorer
+from explorer import InputError, workspace_volume
+from explorer.errors import MissingExtraError
+from explorer.sweep import run as runs
+from explorer.sweep.cluster import DaskWorkers
+from explorer.sweep.folder import LOCK_FILE
+from explorer.sweep.front import front
+from explorer.sweep.parts import part_path, part_paths, read_part, sound_parts
+from explorer.sweep.results import design_at, load_results, summarise
+from explorer.sweep.rows import columns_of
+from explorer.sweep.run import AHEAD, Progress, RunError, run_locally, run_study
+from explorer.sweep.sampling import samples
+from explorer.sweep.study import Objective, Polish, Sampling, Study, encode_study
+from explorer.sweep.workers import LocalWorkers, WorkerDiedError
+
+STUDY = Study(
+    name="small",
+    design="paper-optimal",
+    variables={"a3x": (12.0, 22.0), "a3y": (2.0, 10.0), "b1y": (-6.0, 2.0)},
+    sampling=Sampling(method="latin-hypercube", count=83, seed=4),
+    measures=("volume", "reach", "clearance"),
+    nodes=4,
+    objectives=(Objective("volume", "max"), Objective("reach", "min")),
+    chunk=8,
+)
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    """Return the bytes of every file that a run leaves behind but the lock."""
+    return {
+        path.name: path.read_bytes() for path in sorted(folder.iterdir()) if path.name != LOCK_FILE
+    }
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the results of a run that nothing interrupted."""
+    folder = tmp_path_factory.mktemp("whole")
+    assert run_study(STUDY, folder, HereWorkers()).is_complete
+    return folder
+
+
+@pytest.fixture(scope="module")
+def two() -> Iterator[LocalWorkers]:
+    with LocalWorkers(2) as workers:
+        yield workers
+
+
+def test_every_design_has_one_row_in_order(whole: Path) -> None:
+    results = load_results(whole)
+    assert results.columns["index"].tolist() == list(range(83))
+    assert list(results.columns) == list(columns_of(STUDY))
+    expected = samples(STUDY, range(83))
+    found = np.column_stack([results.columns[name] for name in STUDY.variables])
+    assert np.array_equal(found, expected)
+    assert set(results.columns["status"]) == {"done"}
+
+
+def test_a_row_is_the_design_that_was_measured(whole: Path) -> None:
+    results = load_results(whole)
+    for row in (0, 40, 82):
+        design = results.design_of_row(row)
+        assert design.name == f"small #{row}"
+        assert workspace_volume(design).volume == results.columns["volume"][row]
+        assert design_at(whole, row) == design
+    with pytest.raises(InputError, match="within 0 to 82"):
+        results.design_of_row(83)
+    with pytest.raises(InputError, match="within 0 to 82"):
+        design_at(whole, 83)
+
+
+def test_a_summary_part_by_part_is_that_of_the_whole(whole: Path) -> None:
+    results, summary = load_results(whole), summarise(whole)
+    assert summary.counts == {"done": 83}
+    assert summary.damaged == 0
+    mask = front(results.columns, STUDY.objectives)
+    assert np.array_equal(results.front(), mask)
+    assert sorted(row["index"] for row in summary.front) == np.flatnonzero(mask).tolist()  # pyright: ignore[reportArgumentType]
+    volumes = [row["volume"] for row in summary.front]
+    assert volumes == sorted(volumes, reverse=True)  # pyright: ignore[reportArgumentType]
+
+
+def test_parts_say_what_they_are_of(whole: Path) -> None:
+    for chunk, path in enumerate(part_paths(whole)):
+        part, table = read_part(path)
+        assert part.chunk == chunk
+        assert part.study == encode_study(STUDY)
+        assert part.versions["numpy"] == np.__version__
+        metadata = table.schema.metadata
+        assert metadata[b"explorer.seed"] == b"4"
+        assert {"python", "scipy", "flagged-explorer"} <= set(part.versions)
+
+
+def test_pandas_polars_and_duckdb_read_the_folder_as_it_is(whole: Path) -> None:
+    expected = load_results(whole).columns
+    pandas, polars, duckdb = (
+        importlib.import_module(name) for name in ("pandas", "polars", "duckdb")
+    )
+    by_pandas = pandas.read_parquet(whole)
+    by_polars = polars.read_parquet(whole)
+    by_duckdb = duckdb.sql(f"SELECT * FROM '{whole}/*.parquet' ORDER BY index")
+    assert list(by_pandas.columns) == by_polars.columns == by_duckdb.columns == list(expected)
+    for name, column in expected.items():
+        assert by_pandas[name].tolist() == column.tolist()
+        assert by_polars[name].to_list() == column.tolist()
+        assert [row[0] for row in by_duckdb.select(name).fetchall()] == column.tolist()
+
+
+def test_what_is_missing_is_null_in_files_and_nan_in_columns(tmp_path: Path) -> None:
+    study = msgspec.structs.replace(
+        STUDY,
+        variables={"b1y": (-1.0, 1.0)},
+        sampling=Sampling(method="grid", count=3),
+        polish=Polish(objective="largest-volume", iterations=2),
+    )
+    run_study(study, tmp_path, HereWorkers())
+    results = load_results(tmp_path)
+    assert results.columns["status"][1] == "invalid design"
+    for name in ("volume", "iterations", "converged", "objective"):
+        assert np.isnan(results.columns[name]).tolist() == [False, True, False]
+    polars: Any = importlib.import_module("polars")
+    assert polars.read_parquet(tmp_path)["volume"].null_count() == 1
+    with pytest.raises(InputError, match="degenerate"):
+        results.design_of_row(1)
+
+
+def test_processes_make_the_same_bytes(whole: Path, two: LocalWorkers, tmp_path: Path) -> None:
+    told: list[Progress] = []
+    progress = run_study(STUDY, tmp_path, two, told=told.append)
+    assert contents(tmp_path) == contents(whole)
+    assert progress.counts == {"done": 83}
+    assert [each.done for each in told] == sorted(each.done for each in told)
+    assert told[0].done == 0
+    assert told[0].seconds_left is None
+    assert told[-1].is_complete
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_run_in_pieces_makes_the_same_bytes_and_computes_nothing_twice(
+    seed: int, whole: Path, tmp_path: Path
+) -> None:
+    rng = random.Random(seed)
+    pieces: list[range] = []
+    while True:
+        workers = HereWorkers()
+        # Cut short after some chunks, or ended after some designs.
+        looks = iter([False] * rng.randrange(3))
+        progress = run_study(
+            STUDY,
+            tmp_path,
+            workers,
+            limit=rng.choice([None, 9, 20]),
+            is_cut=functools.partial(next, looks, True),
+        )
+        pieces += workers.pieces
+        kept = {part.name for part in part_paths(tmp_path)}
+        assert len(kept) * 8 >= progress.done > 8 * (len(kept) - 1)
+        if progress.is_complete:
+            break
+    assert contents(tmp_path) == contents(whole)
+    # What was under way when it was cut is begun again, and nothing that had a part.
+    assert {piece.start for piece in pieces} == set(range(0, 83, 8))
+    assert not run_study(STUDY, tmp_path, idle := HereWorkers()).seconds > 60.0
+    assert idle.tasks == []
+
+
+def test_a_limit_counts_whole_chunks(tmp_path: Path) -> None:
+    assert run_study(STUDY, tmp_path, HereWorkers(), limit=9).done == 16
+    assert run_study(STUDY, tmp_path, HereWorkers(), limit=1).done == 24
+
+
+def test_damaged_parts_are_computed_again(whole: Path, tmp_path: Path) -> None:
+    run_study(STUDY, tmp_path, HereWorkers())
+    paths = [part_path(tmp_path, chunk) for chunk in range(STUDY.chunks)]
+    data = [path.read_bytes() for path in paths]
+    paths[0].write_bytes(data[0][: len(data[0]) // 2])
+    paths[1].write_bytes(b"")
+    # One bit within a column, which only its checksum tells.
+    spoilt = bytearray(data[2])
+    spoilt[40] ^= 1
+    paths[2].write_bytes(spoilt)
+    # A part under the name of another.
+    paths[3].write_bytes(data[4])
+    paths[5].unlink()
+    (tmp_path / ".part-000006.0123.part").write_bytes(b"half")
+    # The part under another's name too, whose rows would be told of twice.
+    assert summarise(tmp_path).damaged == 4
+    assert load_results(tmp_path).columns["index"].tolist() == [*range(32, 40), *range(48, 83)]
+    workers = HereWorkers()
+    progress = run_study(STUDY, tmp_path, workers)
+    assert [piece.start for piece in workers.pieces] == [0, 8, 16, 24, 40]
+    assert progress.kept == 83 - 5 * 8
+    assert contents(tmp_path) == contents(whole)
+
+
+def test_copies_of_parts_are_no_parts_and_are_told_of(whole: Path, tmp_path: Path) -> None:
+    run_study(STUDY, tmp_path, HereWorkers(), limit=40)
+    # One of a chunk that is still missing, one beyond the last, and others.
+    strays = [
+        "part-000001 copy.parquet",
+        "part-0000007.parquet",
+        "part-000011.parquet",
+        "part-1.parquet",
+        "mine.parquet",
+    ]
+    for name in strays:
+        (tmp_path / name).write_bytes(part_path(whole, 1).read_bytes())
+    found = summarise(tmp_path)
+    assert (found.count, found.damaged, found.strays) == (40, 0, sorted(strays))
+    assert load_results(tmp_path).columns["index"].tolist() == [*range(40)]
+    assert run_study(STUDY, tmp_path, HereWorkers()).kept == 40
+    assert summarise(tmp_path).counts == {"done": 83}
+    assert summarise(tmp_path).front == summarise(whole).front
+    assert summarise(whole).strays == []
+
+
+@pytest.mark.parametrize("name", columns_of(STUDY))
+def test_a_run_computes_again_what_the_summary_leaves_out(
+    name: str, whole: Path, tmp_path: Path
+) -> None:
+    for path in part_paths(whole):
+        (tmp_path / path.name).write_bytes(path.read_bytes())
+    path = part_path(tmp_path, 4)
+    with importlib.import_module("pyarrow.parquet").ParquetFile(path) as file:
+        group = file.metadata.row_group(0)
+        columns = [group.column(k) for k in range(group.num_columns)]
+    (column,) = [each for each in columns if each.path_in_schema == name]
+    # The last byte of its pages is of their data, and not of what is said of them.
+    start = column.dictionary_page_offset or column.data_page_offset
+    spoilt = bytearray(path.read_bytes())
+    spoilt[start + column.total_compressed_size - 1] ^= 4
+    path.write_bytes(spoilt)
+    summary = summarise(tmp_path)
+    assert (summary.damaged, summary.count) == (1, 83 - 8)
+    assert load_results(tmp_path).count == 83 - 8
+    workers = HereWorkers()
+    assert run_study(STUDY, tmp_path, workers).kept == 83 - 8
+    assert workers.pieces == [range(32, 40)]
+    assert contents(tmp_path) == contents(whole)
+
+
+def test_with_any_bit_flipped_a_part_is_left_out_or_tells_the_same(
+    whole: Path, tmp_path: Path
+) -> None:
+    ((_, _, expected),) = [each for each in sound_parts(whole, []) if each[1] == 1]
+    data = part_path(whole, 1).read_bytes()
+    rng = random.Random(5)
+    left_out = 0
+    for _ in range(300):
+        spoilt = bytearray(data)
+        spoilt[rng.randrange(len(data))] ^= 1 << rng.randrange(8)
+        part_path(tmp_path, 1).write_bytes(spoilt)
+        found, damaged = list[bool](), list[Path]()
+        for *_, table in sound_parts(tmp_path, damaged, STUDY):
+            found.append(table.equals(expected))
+        assert found in ([], [True])
+        assert len(found) + len(damaged) == 1
+        left_out += len(damaged)
+    assert left_out > 200
+
+
+def test_a_part_whose_study_is_damaged_is_damaged(whole: Path, tmp_path: Path) -> None:
+    for path in part_paths(whole):
+        (tmp_path / path.name).write_bytes(path.read_bytes())
+    # The first one is who tells what the study is.
+    path = part_path(tmp_path, 0)
+    data = path.read_bytes()
+    assert data.count(b'"paper-optimal"') == 1
+    path.write_bytes(data.replace(b'"paper-optimal"', b'"paper-0ptimal"'))
+    assert summarise(tmp_path).damaged == 1
+    assert load_results(tmp_path).study == STUDY
+    assert run_study(STUDY, tmp_path, HereWorkers()).kept == 83 - 8
+    assert contents(tmp_path) == contents(whole)
+
+
+def test_another_studys_folder_is_refused_and_left_alone(whole: Path, tmp_path: Path) -> None:
+    before = contents(whole)
+    other = msgspec.structs.replace(STUDY, name="other")
+    # The first part may be damaged: the others tell.
+    for path in part_paths(whole):
+        (tmp_path / path.name).write_bytes(
+            b"" if path.name.endswith("0.parquet") else path.read_bytes()
+        )
+    damaged = contents(tmp_path)
+    for folder in (whole, tmp_path):
+        with pytest.raises(InputError, match="holds the results of another study"):
+            run_study(other, folder, HereWorkers())
+    assert contents(whole) == before
+    assert contents(tmp_path) == damaged
+
+
+def test_a_strange_part_in_a_folder_is_refused(whole: Path, tmp_path: Path) -> None:
+    other = msgspec.structs.replace(STUDY, name="other", sampling=Sampling(count=8))
+    run_study(other, tmp_path, HereWorkers())
+    part_path(tmp_path, 5).write_bytes(part_path(whole, 5).read_bytes())
+    with pytest.raises(InputError, match=r"part-000005.parquet is a part of another study"):
+        run_study(other, tmp_path, HereWorkers())
+    with pytest.raises(InputError, match="several studies"):
+        load_results(tmp_path)
+
+
+@pytest.mark.parametrize("name", ["thesis.txt", "part-000000.parquet", ".profile"])
+def test_a_folder_with_other_things_in_it_is_refused(name: str, tmp_path: Path) -> None:
+    (tmp_path / name).write_text("mine")
+    with pytest.raises(InputError, match="is not empty, and holds no results"):
+        run_study(STUDY, tmp_path, HereWorkers())
+    assert contents(tmp_path) == {name: b"mine"}
+    with pytest.raises(InputError, match="holds no results of a study"):
+        load_results(tmp_path)
+
+
+def test_where_all_parts_are_damaged_they_are_named_and_what_works_is_told(tmp_path: Path) -> None:
+    study = msgspec.structs.replace(STUDY, sampling=Sampling(count=16))
+    run_study(study, tmp_path, HereWorkers())
+    before = contents(tmp_path)
+    for chunk in range(2):
+        part_path(tmp_path, chunk).write_bytes(b"PAR1")
+    for read in (load_results, summarise, functools.partial(design_at, index=0)):
+        with pytest.raises(InputError, match=r"can be read: part-000000.parquet and 1 more"):
+            read(tmp_path)
+    with pytest.raises(InputError, match=r"part-000000.parquet and 1 more cannot be.*move"):
+        run_study(study, tmp_path, HereWorkers())
+    for chunk in range(2):
+        part_path(tmp_path, chunk).unlink()
+    run_study(study, tmp_path, HereWorkers())
+    assert contents(tmp_path) == before
+
+
+def test_a_folder_that_is_in_use_is_refused(tmp_path: Path) -> None:
+    with FileLock(tmp_path / LOCK_FILE), pytest.raises(InputError, match="another process"):
+        run_study(STUDY, tmp_path, HereWorkers())
+    # Another lock object of this process would share the file handle.
+    assert run_study(STUDY, tmp_path, HereWorkers(), limit=1).done == 8
+
+
+def test_a_place_that_takes_no_folder_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "file"
+    file.write_text("")
+    with pytest.raises(explorer.ExplorerError, match="file"):
+        run_study(STUDY, file, HereWorkers())
+
+
+def test_without_pyarrow_the_extra_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    with pytest.raises(MissingExtraError, match=r"flagged-explorer\[study\]"):
+        run_study(STUDY, tmp_path / "new", HereWorkers())
+    assert not (tmp_path / "new").exists()
+
+
+def test_a_design_that_kills_its_workers_is_a_row_and_the_others_are_done(
+    whole: Path, two: LocalWorkers, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(runs, "evaluate", deadly)
+    progress = run_study(STUDY, tmp_path, two)
+    assert progress.counts == {"done": 82, "worker died": 1}
+    lost, intact = load_results(tmp_path).columns, load_results(whole).columns
+    assert lost["index"].tolist() == list(range(83))
+    assert lost["status"][DEADLY] == "worker died"
+    assert "3 workers in a row" in lost["reason"][DEADLY]
+    assert np.isnan(lost["volume"][DEADLY])
+    assert lost["a3x"].tolist() == intact["a3x"].tolist()
+    others = np.arange(83) != DEADLY
+    assert lost["volume"][others].tolist() == intact["volume"][others].tolist()
+    # Only the chunk with that design is another.
+    before, after = contents(whole), contents(tmp_path)
+    assert [name for name in before if before[name] != after[name]] == ["part-000001.parquet"]
+
+
+class LongTasks(HereWorkers):
+    """Asks for tasks as long as they can be, and dies of one design."""
+
+    task_seconds = 1e9
+    deadly: int | None = None
+
+    @property
+    def size(self) -> int:
+        return 2
+
+    def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
+        future = super().submit(fn, *args, **kwargs)
+        if self.deadly is None or not any(self.deadly in piece for piece in self.tasks[-1]):
+            return future
+        dead: Future[Any] = Future()
+        dead.set_exception(WorkerDiedError("it died"))
+        return dead
+
+
+def test_chunks_go_together_where_tasks_are_dear_and_make_the_same_bytes(
+    whole: Path, tmp_path: Path
+) -> None:
+    workers = LongTasks()
+    run_study(STUDY, tmp_path, workers)
+    assert contents(tmp_path) == contents(whole)
+    # At first one a worker, to see how long it takes; then many, and fewer towards the end.
+    assert [len(task) for task in workers.tasks] == [1, 1, 2, 1, 1, 1, 1, 1, 1, 1]
+    assert [piece.start for piece in workers.pieces] == list(range(0, 83, 8))
+
+
+@pytest.mark.parametrize("design", [0, 17, 82])
+def test_of_chunks_that_went_together_only_the_deadly_design_is_lost(
+    whole: Path, tmp_path: Path, design: int
+) -> None:
+    workers = LongTasks()
+    workers.deadly = design
+    progress = run_study(STUDY, tmp_path, workers)
+    assert progress.counts == {"done": 82, "worker died": 1}
+    assert load_results(tmp_path).columns["status"][design] == "worker died"
+    before, after = contents(whole), contents(tmp_path)
+    assert [name for name in before if before[name] != after[name]] == [
+        part_path(tmp_path, design // 8).name
+    ]
+
+
+def test_workers_that_are_killed_now_and_then_lose_no_row(whole: Path, tmp_path: Path) -> None:
+    killed: list[int] = []
+    rng = random.Random(0)
+    study = msgspec.structs.replace(STUDY, nodes=30, chunk=4)
+    with LocalWorkers(2) as workers:
+
+        def kill_one(progress: Progress) -> None:
+            # Every fifth part, somewhere within a task or a start.
+            if progress.done % 20 == 8:
+                time.sleep(rng.uniform(0.0, 0.05))
+                killed.append(rng.choice(workers.process_ids))
+                os.kill(killed[-1], signal.SIGKILL)
+
+        progress = run_study(study, tmp_path / "killed", workers, told=kill_one)
+    assert len(killed) >= 2
+    assert progress.counts == {"done": 83}
+    assert load_results(tmp_path / "killed").columns["index"].tolist() == list(range(83))
+    run_study(study, tmp_path / "whole", HereWorkers())
+    assert contents(tmp_path / "killed") == contents(tmp_path / "whole")
+
+
+def test_a_process_that_is_killed_goes_on_with_the_same_bytes(tmp_path: Path) -> None:
+    # So many designs that they are not done before it is killed, however late that is.
+    study = msgspec.structs.replace(STUDY, nodes=40, sampling=Sampling(count=400, seed=2), chunk=2)
+    file, folder = tmp_path / "study.json", tmp_path / "killed"
+    file.write_bytes(encode_study(study))
+    rng = random.Random(1)
+    command = ["sweep", str(file), "--out", str(folder), "--workers", "1"]
+    for _ in range(2):
+        process = subprocess.Popen(
+            [sys.executable, "-m", "explorer", *command],
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            env={**os.environ, "PYTHONPATH": str(Path(explorer.__file__).parents[1])},
+        )
+        before = len(part_paths(folder))
+        # Killed some moments after it has written something new.
+        while process.poll() is None and len(part_paths(folder)) <= before:
+            time.sleep(0.01)
+        time.sleep(rng.uniform(0.0, 0.1))
+        process.kill()
+        process.wait()
+    kept = load_results(folder).count
+    progress = run_study(study, folder, HereWorkers())
+    assert 4 <= kept == progress.kept < progress.done == 400
+    run_study(study, tmp_path / "whole", HereWorkers())
+    assert contents(folder) == contents(tmp_path / "whole")
+
+
+def test_workers_end_with_the_process_that_started_them(tmp_path: Path) -> None:
+    code = (
+        "import time\n"
+        "from explorer.sweep.workers import LocalWorkers\n"
+        "if __name__ == '__main__':\n"
+        "    workers = LocalWorkers(2)\n"
+        "    tasks = [workers.submit(time.sleep, 600) for _ in range(2)]\n"
+        "    while len(workers.process_ids) < 2: time.sleep(0.01)\n"
+        "    print(*workers.process_ids, flush=True)\n"
+        "    time.sleep(600)\n"
+    )
+    script = tmp_path / "script.py"
+    script.write_text(code)
+    process = subprocess.Popen(
+        [sys.executable, str(script)],
+        stdout=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": str(Path(explorer.__file__).parents[1])},
+    )
+    assert process.stdout is not None
+    ids = [int(word) for word in process.stdout.readline().split()]
+    assert len(ids) == 2
+    # They are at work, and do not look at their pipes.
+    time.sleep(0.5)
+    process.kill()
+    process.wait()
+    process.stdout.close()
+    deadline = time.monotonic() + 30.0
+    while any(_lives(each) for each in ids) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert not any(_lives(each) for each in ids)
+
+
+def test_a_script_that_its_workers_cannot_import_ends_in_one_line_and_no_rows(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "study.json").write_bytes(encode_study(STUDY))
+    script = tmp_path / "script.py"
+    # Each worker imports it, and so comes to where it would start workers itself.
+    script.write_text(
+        "from explorer.sweep.run import run_locally\n"
+        "from explorer.sweep.study import load_study\n"
+        "run_locally(load_study('study.json'), 'results', 2)\n"
+    )
+    ended = subprocess.run(
+        [sys.executable, str(script)],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+        env={**os.environ, "PYTHONPATH": str(Path(explorer.__file__).parents[1])},
+    )
+    assert ended.returncode == 1
+    last = ended.stderr.splitlines()[-1]
+    assert "RunError: no worker process stays alive until it is ready" in last
+    assert "__main__" in last
+    assert part_paths(tmp_path / "results") == []
+
+
+def test_processes_that_are_killed_while_they_start_are_started_again() -> None:
+    with LocalWorkers(1) as workers:
+        found = workers.submit(os.getpid)
+        killed: set[int] = set()
+        while len(killed) < 6:
+            for process_id in set(workers.process_ids) - killed:
+                os.kill(process_id, signal.SIGKILL)
+                killed.add(process_id)
+            time.sleep(0.001)
+        assert found.result(60.0) not in killed
+
+
+def test_a_process_that_cannot_be_started_is_told_and_is_no_death(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(self: object) -> None:
+        raise BlockingIOError("Resource temporarily unavailable")
+
+    monkeypatch.setattr(SpawnProcess, "start", refuse)
+    with (
+        LocalWorkers(2) as workers,
+        pytest.raises(RunError, match="no worker process stays alive"),
+    ):
+        run_study(STUDY, tmp_path, workers)
+    assert part_paths(tmp_path) == []
+
+
+def _lives(process_id: int) -> bool:
+    try:
+        state = Path(f"/proc/{process_id}/stat").read_text().rpartition(")")[2].split()[0]
+    except OSError:
+        return False
+    return state != "Z"
+
+
+def test_a_run_on_this_machine_ends_at_once_when_it_is_cut(tmp_path: Path) -> None:
+    # A chunk of these takes minutes.
+    study = msgspec.structs.replace(STUDY, nodes=200, chunk=83)
+    looks = iter([False, False])
+    progress = run_locally(study, tmp_path, 1, is_cut=functools.partial(next, looks, True))
+    assert progress.done == 0
+    assert not part_paths(tmp_path)
+
+
+def test_workers_of_other_versions_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(runs, "evaluate", foreign)
+    with pytest.raises(RunError, match=r"other versions.*numpy 1\.0"):
+        run_study(STUDY, tmp_path, HereWorkers())
+    assert part_paths(tmp_path) == []
+
+
+def test_workers_that_cannot_do_their_task_end_the_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(runs, "evaluate", broken)
+    with pytest.raises(RunError, match="cannot do the tasks: ModuleNotFoundError"):
+        run_study(STUDY, tmp_path, HereWorkers())
+
+
+def test_tasks_under_way_stay_few(tmp_path: Path) -> None:
+    class Watched(HereWorkers):
+        """Counts the tasks whose rows have not become a part yet."""
+
+        most = under_way = 0
+
+        @property
+        def size(self) -> int:
+            return 2
+
+        def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
+            self.under_way += 1
+            self.most = max(self.most, self.under_way)
+            return super().submit(fn, *args, **kwargs)
+
+        def see(self, progress: Progress) -> None:
+            self.under_way -= progress.done > 0
+
+    workers = Watched()
+    study = msgspec.structs.replace(STUDY, chunk=2)
+    run_study(study, tmp_path, workers, told=workers.see)
+    assert workers.most == 2 * AHEAD < study.chunks
+
+
+def test_local_workers_do_tasks_tell_errors_and_outlive_deaths() -> None:
+    with LocalWorkers(2) as workers:
+        assert [f.result() for f in [workers.submit(pow, k, 2) for k in range(9)]] == [
+            k * k for k in range(9)
+        ]
+        assert isinstance(workers.submit(int, "x").exception(), ValueError)
+        assert isinstance(workers.submit(os._exit, 3).exception(), WorkerDiedError)
+        assert workers.submit(max, 1, 2).result() == 2
+        # What cannot be sent either way is told, and ends nothing.
+        assert workers.submit(lambda: 1).exception() is not None
+        assert "cannot be sent" in str(workers.submit(eval, "lambda: 1").exception())
+        assert workers.submit(os.getenv, "OMP_NUM_THREADS").result() == "1"
+        running = [workers.submit(time.sleep, 600) for _ in range(2)]
+        waiting = [workers.submit(time.sleep, 600) for _ in range(9)]
+        while not all(each.running() for each in running):
+            time.sleep(0.01)
+        workers.shutdown(cancel_futures=True)
+        assert all(isinstance(each.exception(), WorkerDiedError) for each in running)
+        assert all(each.cancelled() for each in waiting)
+        with pytest.raises(RuntimeError, match="shutdown"):
+            workers.submit(max, 1, 2)
+    for size in (0, -1, 10_000):
+        with pytest.raises(InputError, match="workers must be from 1"):
+            LocalWorkers(size)
+
+
+def test_dask_makes_the_same_bytes_and_outlives_a_death(whole: Path, tmp_path: Path) -> None:
+    distributed: Any = importlib.import_module("distributed")
+    with (
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+        ) as farm,
+        distributed.Client(farm) as client,
+    ):
+        ids: list[int] = list(client.run(os.getpid).values())
+        killed: list[int] = []
+
+        def kill_one(progress: Progress) -> None:
+            if progress.done and not killed:
+                killed.append(ids[0])
+                os.kill(ids[0], signal.SIGKILL)
+
+        with DaskWorkers(farm.scheduler_address) as workers:
+            assert workers.size == 2
+            run_study(STUDY, tmp_path, workers, told=kill_one)
+    assert killed
+    assert contents(tmp_path) == contents(whole)
+
+
+@pytest.mark.parametrize(
+    ("address", "words"),
+    [
+        ("tcp://127.0.0.1:9", r"no Dask scheduler answers at tcp://127.0.0.1:9"),
+        ("127.0.0.1:8786", "an address such as tcp://"),
+        ("tcp://", "an address such as tcp://"),
+        ("http://127.0.0.1:8786", "an address such as tcp://"),
+        ("tcp://127.0.0.1:port", "an address such as tcp://"),
+        ("tcp://127.0.0.1", "an address such as tcp://.*got 'tcp://127.0.0.1'"),
+        ("tcp://127.0.0.1:", "an address such as tcp://"),
+        ("tcp://127.0.0.1:99999", "an address such as tcp://"),
+        ("tcp://:8786", "an address such as tcp://"),
+        ("tcp://[::1", "an address such as tcp://"),
+    ],
+)
+def test_a_scheduler_that_is_not_there_is_one_line(address: str, words: str) -> None:
+    with pytest.raises(InputError, match=words) as caught:
+        DaskWorkers(address, patience=0.5)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("greeting", [b"", b"SSH-2.0-OpenSSH_9.2\r\n"], ids=["mute", "another"])
+def test_what_listens_there_but_is_no_scheduler_is_one_line(greeting: bytes) -> None:
+    """Dask's client waited for ever for the answer to its greeting."""
+    with socket.create_server(("127.0.0.1", 0)) as server, ExitStack() as callers:
+
+        def greet() -> None:
+            with suppress(OSError):
+                while True:
+                    caller = callers.enter_context(server.accept()[0])
+                    caller.sendall(greeting)
+
+        thread = threading.Thread(target=greet)
+        thread.start()
+        callers.callback(thread.join)
+        callers.callback(server.shutdown, socket.SHUT_RDWR)
+        port = server.getsockname()[1]
+        with pytest.raises(
+            InputError, match=rf"no Dask scheduler answers at \S+:{port} "
+        ) as caught:
+            DaskWorkers(f"tcp://127.0.0.1:{port}", patience=0.5)
+        assert "\n" not in str(caught.value)
+
+
+def test_what_dask_itself_refuses_is_one_line_too() -> None:
+    code = (
+        "from explorer.sweep import cluster\n"
+        "cluster._check = str\n"
+        "cluster.DaskWorkers('tcp://127.0.0.1', patience=0.1)\n"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+        env={**os.environ, "PYTHONPATH": str(Path(explorer.__file__).parents[1])},
+    )
+    # Nor does what is half made complain when the process ends.
+    last = ended.stderr.splitlines()[-1]
+    assert "InputError: no Dask scheduler answers at tcp://127.0.0.1 within 0.1 s" in last
+
+
+def test_without_dask_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(MissingExtraError, match="cluster"):
+        DaskWorkers("tcp://127.0.0.1:8786")
