@@ -14,7 +14,7 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from explorer.app.viser_gaps import PLACE, place, tell_again
+from explorer.app.viser_gaps import PLACE, is_misled, place, tell_again
 from explorer.arrays import FloatArray
 
 Update: TypeAlias = tuple[Any, str, object]
@@ -73,7 +73,8 @@ class Assigner:
         now = time.time()
         for key, (handle, sent) in tuple(self._sent.items()):
             touched = handle.update_timestamp
-            if not sent < touched <= sent + CROSSING_SECONDS:
+            has_crossed = sent < touched <= sent + CROSSING_SECONDS or is_misled(handle, key[1])
+            if not has_crossed:
                 if not sent <= now <= sent + CROSSING_SECONDS:
                     del self._sent[key]
             elif touched <= now < touched + QUIET_SECONDS:

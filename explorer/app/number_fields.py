@@ -75,8 +75,12 @@ SCRIPT = """
     const value = numberIn(typing.field.value);
     if (value !== null && written(value) === typing.field.value) enter();
   };
+  // A field whose page is not told that it was left takes the focus back with its next number.
+  const leave = (field) => { field.focus = field.setSelectionRange = () => {}; };
+  const comeBack = (field) => { delete field.focus; delete field.setSelectionRange; };
   const begun = (field) => ({ field, first: field.value, before: field.value });
   addEventListener("focusin", ({ target }) => {
+    if (isField(target)) comeBack(target);
     typing = isField(target) ? begun(target) : null;
   }, true);
   addEventListener("input", (event) => {
@@ -111,6 +115,9 @@ SCRIPT = """
   // Before the field is left: once it is told of a number it takes the focus back.
   addEventListener("pointerdown", ({ target }) => {
     if (typing && typing.isPending && typing.field !== target) finish();
+    // The arrows of a field call for its focus.
+    const field = target.closest?.(".mantine-NumberInput-root")?.querySelector("input");
+    if (field) comeBack(field);
   }, true);
   addEventListener("change", (event) => {
     if (!typing || typing.field !== event.target || !typing.isPending) return;
@@ -121,7 +128,10 @@ SCRIPT = """
     if (!typing || typing.field !== event.target) return;
     if (typing.isPending) finish();
     // The page would move the number into the range, which is about to follow the number.
-    if (typing.isEdited) event.stopPropagation();
+    if (typing.isEdited) {
+      event.stopPropagation();
+      leave(typing.field);
+    }
     typing = null;
   }, true);
 })();

@@ -175,6 +175,27 @@ def tell_again(handle: Any, name: str) -> None:
         state.gui_api._websock_interface.queue_message(message)
 
 
+def is_misled(handle: Any, name: str) -> bool:
+    """Whether browsers were told another `value` of a control last than the one it holds.
+
+    viser's setter tells them first and holds it after: what a hand sets in between is told
+    last, and then overwritten.
+    """
+    from viser import _messages
+
+    if name in PLACE:
+        return False
+    state = handle._impl
+    held = getattr(state, name)
+    message = _messages.GuiUpdateMessage(state.uuid, {name: held})
+    buffer = state.gui_api._websock_interface.get_message_buffer()
+    with buffer.buffer_lock:
+        told = buffer.message_from_id.get(
+            buffer.id_from_redundancy_key.get(message.redundancy_key())
+        )
+    return told is not None and told.updates[name] != held
+
+
 def element_id(control: viser.GuiInputHandle[Any] | viser.GuiButtonHandle) -> str:
     """Return the id of a control in the page: a label of HTML can be for the button with it."""
     internals: Any = control

@@ -12,7 +12,7 @@ from client import client_of
 from monkey import explorer_with_data
 from page_props import shown_by
 
-from explorer.app import assigning
+from explorer.app import assigning, viser_gaps
 from explorer.app.actions import SetJoint, SetPosition
 from explorer.app.assigning import CROSSING_SECONDS, QUIET_SECONDS, Assigner
 from explorer.app.panels.move import JOINT_LABELS
@@ -89,6 +89,7 @@ def test_what_crossed_with_a_hand_is_told_again_when_it_rests(
         now += seconds
         if name == "value":
             state.value, state.update_timestamp = value, now
+            viser_gaps.tell_again(handle, name)
         else:
             state.last_updated, handle.position[:] = now, value
 
@@ -112,6 +113,38 @@ def test_what_crossed_with_a_hand_is_told_again_when_it_rests(
     hand(first, CROSSING_SECONDS + 0.1)
     assert not frame(first, 2.0 * QUIET_SECONDS)
     assert len(told) == 2
+
+
+def test_what_a_hand_sets_while_viser_takes_a_value_misleads_no_browser(
+    server: viser.ViserServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    gui: Any = server.gui
+    slider = gui.add_slider("misled", min=0.0, max=9.0, step=0.1, initial_value=1.0)
+    assigner, state, interface = Assigner(server), slider._impl, gui._websock_interface
+    now, told = 1000.0, list[float]()
+    monkeypatch.setattr(assigning.time, "time", lambda: now)
+    tell = interface.queue_message
+
+    def queue_message(message: Any) -> None:
+        tell(message)
+        told.append(message.updates["value"])
+        if told == [2.0]:
+            # viser holds a value after it has told of it: here a hand comes in between.
+            state.value, state.update_timestamp = 7.0, now
+            viser_gaps.tell_again(slider, "value")
+
+    monkeypatch.setattr(interface, "queue_message", queue_message)
+    assigner.assign([(slider, "value", 2.0)])
+    assert slider.value == 2.0
+    assert told == [2.0, 7.0]
+    assert assigner.settle()
+    now += QUIET_SECONDS
+    assert not assigner.settle()
+    assert told == [2.0, 7.0, 2.0]
+    # Once is enough.
+    now += QUIET_SECONDS
+    assert not assigner.settle()
+    assert len(told) == 3
 
 
 def test_a_browser_that_crossed_with_the_explorer_shows_what_its_user_set() -> None:

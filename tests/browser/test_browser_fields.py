@@ -87,8 +87,7 @@ def test_what_is_no_number_or_given_up_brings_back_what_was_there(tab: Tab) -> N
     tab.page.keyboard.press("Escape")
     tab.wait_until_shown("x", before.pose.position[0])
     tab.page.keyboard.press("Tab")
-    assert tab.running.page.session.wait_until_idle()
-    assert tab.state.pose == before.pose
+    tab.wait_for(lambda: tab.state.pose == before.pose, "the pose of before")
 
 
 def test_a_pause_enters_a_number_and_so_do_a_click_elsewhere_and_an_arrow(tab: Tab) -> None:
@@ -107,6 +106,32 @@ def test_a_pause_enters_a_number_and_so_do_a_click_elsewhere_and_an_arrow(tab: T
     tab.type("x", "5")
     tab.page.keyboard.press("ArrowUp")
     tab.wait_for(lambda: tab.state.pose.position[0] == pytest.approx(5.01), "a step up")
+
+
+def test_a_field_that_was_left_takes_no_focus_with_its_next_number(tab: Tab) -> None:
+    """Told of nothing, the page took it for the one that is typed into."""
+    numbers = iter((8.0, 2.5, 3.25, 4.75))
+    for leave in (lambda: tab.page.keyboard.press("Tab"), tab.field("y").click):
+        tab.type("x", f"{next(numbers):g}")
+        leave()
+        settle(tab.page, tab.client)
+        value = next(numbers)
+        tab.running.page.session.do(SetPosition(0, value))
+        tab.wait_until_shown("x", value)
+        settle(tab.page, tab.client)
+        assert not tab.field("x").evaluate("field => field === document.activeElement")
+        expect(tab.field("x")).to_have_value(f"{value:g}")
+    # A hand gives it the focus at once, and so do its arrows.
+    tab.type("x", "5")
+    tab.wait_for(lambda: tab.state.pose.position[0] == 5.0, "x = 5")
+    tab.turn_to("Design")
+    unit = "1 unit (mm)"
+    tab.type(unit, "5")
+    tab.page.keyboard.press("Tab")
+    tab.wait_for(lambda: tab.state.design.unit_mm == 5.0, "5 mm")
+    tab.row(unit).locator("[data-direction=up]").click()
+    tab.wait_for(lambda: tab.state.design.unit_mm == pytest.approx(5.001), "a step up")
+    assert tab.field(unit).evaluate("field => field === document.activeElement")
 
 
 def test_a_refused_number_is_told_once_and_leaves_no_step(tab: Tab) -> None:

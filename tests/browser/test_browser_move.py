@@ -179,8 +179,7 @@ def test_sixty_values_in_a_row_end_with_the_last_in_every_tab(open_tab: OpenTab)
         field.fill(f"{hundredths / 100:g}")
     for tab in (one, other):
         tab.wait_until_shown(LABELS[5], 13.0)
-    assert one.running.page.session.wait_until_idle()
-    assert one.state.joints[5] == 13.0
+    one.wait_for(lambda: one.state.joints[5] == 13.0, "the last length")
     for tab in (one, other):
         assert_page_shows_state(tab)
 
