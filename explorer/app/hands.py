@@ -14,7 +14,7 @@ import viser
 
 from explorer.app.assigning import Update
 from explorer.app.browser_facts import BrowserFacts, ask
-from explorer.app.number_fields import SCRIPT as NUMBER_FIELDS
+from explorer.app.fields import SCRIPT as FIELDS
 from explorer.app.palette import Command, Palette
 from explorer.app.panels.keys import KeysCard, Toolbar
 from explorer.app.panels.tour import TourGuide
@@ -115,7 +115,7 @@ class Hands:
             docked: Whether panels lie beside the scene.
         """
         fit = Command("View › Fit", "Show the whole mechanism from where you look.", cameras.fit)
-        run_script(self._server, NUMBER_FIELDS)
+        run_script(self._server, FIELDS)
         self._palette = Palette(self._server, (fit, *session_commands(self._session)))
         drawer.float(x=FREE // 2, y=-FREE // 2, width=DRAWER_WIDTH, height=DRAWER_HEIGHT)
         drawer.minimize()

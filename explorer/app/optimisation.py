@@ -24,11 +24,13 @@ from explorer.optimise.problem import (
     SHIFTS,
     YAW,
     Box,
+    Demands,
     ObjectiveName,
     Problem,
     longest_length,
 )
 from explorer.optimise.record import Record, Settings, record_of
+from explorer.optimise.starts import check_starts
 from explorer.optimise.trail import Trail
 from explorer.workspace import workspace_volume
 
@@ -69,6 +71,16 @@ class Wish:
     starts: int = 1
     with_box: bool = False
     box: Box | None = None
+
+    def check(self) -> None:
+        """Refuse numbers that nothing can be asked with, whatever the design.
+
+        Raises:
+            InputError: a volume or reach that is not positive, a clearance below zero, or too
+                few or too many starts.
+        """
+        check_starts(self.starts)
+        Demands(volume=self.volume, reach=self.reach, clearance=self.clearance or None)
 
     @property
     def needs_volume(self) -> bool:

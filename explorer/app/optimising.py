@@ -41,8 +41,13 @@ class SetWish:
     wish: Wish
 
     def apply(self, state: State) -> State:
-        """Return the next state."""
+        """Return the next state.
+
+        Raises:
+            InputError: a number that nothing can be asked with, see `Wish.check`.
+        """
         wish = self.wish
+        wish.check()
         if wish.objective == "largest-margin" and not {YAW, PLACE} & {*wish.free}:
             # Nothing else has an influence on margins over a box.
             wish = replace(wish, free=(*wish.free, YAW, PLACE))

@@ -10,11 +10,10 @@ from explorer.errors import InputError
 from explorer.optimise.outcome import Outcome, Run
 from explorer.optimise.problem import Problem
 from explorer.optimise.search import Search
-from explorer.optimise.starts import more_starts
+from explorer.optimise.starts import check_starts, more_starts
 from explorer.optimise.trail import Trail, Watch
 
 MOST_ITERATIONS = 300
-MOST_STARTS = 10_000
 # Objectives that differ by less than this share are the same.
 SAME = 1e-6
 
@@ -43,8 +42,7 @@ def optimise_design(
     Raises:
         InputError: no start, or no iterations.
     """
-    if not 1 <= starts <= MOST_STARTS:
-        raise InputError(f"the number of starts must lie within 1 to {MOST_STARTS}; got {starts}")
+    check_starts(starts)
     if iterations < 1:
         raise InputError(f"the number of iterations must be at least 1; got {iterations}")
     # Thousands of evaluations repay the second that loading compiled kernels takes.

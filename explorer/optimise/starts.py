@@ -8,7 +8,7 @@ import numpy as np
 
 from explorer.arrays import FloatArray
 from explorer.design import Design
-from explorer.errors import DesignError
+from explorer.errors import DesignError, InputError
 from explorer.home import home_pose
 from explorer.optimise.problem import DISTANCES, Problem, distance_of, longest_length
 from explorer.singularity import margins
@@ -19,6 +19,17 @@ IN_SPACE, IN_SURFACE = 7, 21
 STEEP = 1e-3
 # Tries for each start, before the bounds are taken to leave no room.
 TRIES = 64
+MOST_STARTS = 10_000
+
+
+def check_starts(starts: int) -> None:
+    """Refuse a number of starts that no search has.
+
+    Raises:
+        InputError: it is less than one, or more than `MOST_STARTS`.
+    """
+    if not 1 <= starts <= MOST_STARTS:
+        raise InputError(f"the number of starts must lie within 1 to {MOST_STARTS}; got {starts}")
 
 
 def more_starts(problem: Problem, count: int, seed: int) -> Iterator[tuple[float, ...]]:

@@ -6,7 +6,7 @@ import os
 import signal
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import msgspec
@@ -441,10 +441,6 @@ SWINGING = msgspec.structs.replace(
 @pytest.mark.parametrize(
     ("wish", "words"),
     [
-        (Wish(volume=float("nan")), "volume demanded must be"),
-        (Wish(volume=-1.0), "volume demanded must be"),
-        (Wish(objective="largest-volume", reach=0.0), "reach demanded must be"),
-        (Wish(clearance=-0.1), "clearance demanded must be"),
         (Wish(free=()), "nothing may change"),
         (
             Wish(with_box=True, box=((1.0, 1.0, 1.0), (2.0, 0.0, 2.0))),
@@ -470,6 +466,27 @@ def test_what_cannot_be_asked_is_told_in_one_line_and_nothing_is_lost(
     assert not bench.complaints
 
 
+@pytest.mark.parametrize(
+    ("wish", "words"),
+    [
+        (Wish(volume=float("nan")), "volume demanded must be"),
+        (Wish(volume=-1.0), "volume demanded must be"),
+        (Wish(objective="largest-volume", reach=0.0), "reach demanded must be"),
+        (Wish(clearance=-0.1), "clearance demanded must be"),
+        (Wish(clearance=float("inf")), "clearance demanded must be"),
+        (Wish(starts=-3), "number of starts must lie within 1 to 10000; got -3"),
+        (Wish(starts=10_001), "number of starts must lie within"),
+    ],
+)
+def test_a_number_that_nothing_can_be_asked_with_is_refused_at_once(
+    bench: Bench, wish: Wish, words: str
+) -> None:
+    before = bench.state
+    assert bench.do(SetWish(wish)) == before
+    assert len(bench.complaints) == 1
+    assert words in bench.complaints[0]
+
+
 def test_a_design_whose_volume_has_no_gradient_is_told_of() -> None:
     refusal = StartRun().apply(opened(SWINGING)).optimisation.refusal
     assert refusal is not None
@@ -478,7 +495,17 @@ def test_a_design_whose_volume_has_no_gradient_is_told_of() -> None:
 
 def test_what_the_process_refuses_leaves_the_design(bench: Bench) -> None:
     before = stripped(bench.state)
-    run = bench.find(replace(SMALL, starts=0))
+
+    @dataclass(frozen=True)
+    class AskForNoStart:
+        """What no hand can ask for."""
+
+        def apply(self, state: State) -> State:
+            wish = replace(SMALL, starts=0)
+            return replace(state, optimisation=replace(state.optimisation, wish=wish))
+
+    bench.do(AskForNoStart(), StartRun())
+    run = bench.wait_for_end()
     assert run.verdict is not None
     assert run.verdict.status == "failed"
     assert "number of starts" in run.verdict.message

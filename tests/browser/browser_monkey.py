@@ -43,8 +43,12 @@ KEYS = (
 TEXTS = ("0", "12.5", "-3", "1e9", "abc", "", "-", "99999999999999999999", "κ")
 
 # viser's page does the updates of a frame after its removals, and then complains: a card that
-# is put away within a frame of its last change.
-LATE = re.compile(r"error: Tried to update non-existent component '[\w-]+' \{content: ")
+# is put away within a frame of its last change. And it is told of removals that were before its
+# time, if a page that was reloaded has not been given up by then, which viser itself calls OK.
+LATE = re.compile(
+    r"error: Tried to update non-existent component '[\w-]+' \{content: "
+    r"|warning: \(OK\) Tried to remove non-existent component [\w-]+$"
+)
 
 # What can be clicked and lies open, as its middle and its kind; but for viser's own settings,
 # by which the page can be sent to another server.

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pytest
-from playwright.sync_api import expect
+from monkey import explorer_with_data
+from playwright.sync_api import Browser, expect
 from tab import Tab
 
 from explorer.app.actions import SetPosition
@@ -132,6 +134,143 @@ def test_a_field_that_was_left_takes_no_focus_with_its_next_number(tab: Tab) -> 
     tab.row(unit).locator("[data-direction=up]").click()
     tab.wait_for(lambda: tab.state.design.unit_mm == pytest.approx(5.001), "a step up")
     assert tab.field(unit).evaluate("field => field === document.activeElement")
+
+
+def emptied(tab: Tab, words: str) -> None:
+    tab.field(words).click()
+    tab.page.keyboard.press("ControlOrMeta+a")
+    tab.page.keyboard.press("Delete")
+
+
+def test_an_emptied_field_gets_back_what_the_explorer_has_by_then(tab: Tab) -> None:
+    tab.type("x", "5")
+    for key in ("Enter", "ArrowUp", "ArrowUp"):
+        tab.page.keyboard.press(key)
+    tab.wait_for(lambda: tab.state.pose.position[0] == pytest.approx(5.02), "two steps up")
+    stepped = tab.state.pose
+    # It may be another hand's.
+    for meanwhile in (None, 4.0):
+        if meanwhile is not None:
+            tab.running.page.session.do(SetPosition(0, meanwhile))
+        value = stepped.position[0] if meanwhile is None else meanwhile
+        tab.wait_until_shown("x", value)
+        settle(tab.page, tab.client)
+        emptied(tab, "x")
+        tab.page.keyboard.press("Tab")
+        # What is done next is done after it would have been.
+        tab.type("z", f"{8.0 if meanwhile is None else 7.0:g}")
+        tab.page.keyboard.press("Tab")
+        tab.wait_for(lambda: tab.state.pose.position[2] < 9.0, "z")
+        assert tab.state.pose.position[0] == value
+
+
+def test_undo_in_a_field_is_the_explorer_s(tab: Tab) -> None:
+    """The browser's own undid what was written into its fields, of whichever it was."""
+    before = tab.state.pose
+    undo = "ControlOrMeta+z"
+    field = tab.field("y")
+    field.click()
+    for key in ("End", *4 * ("Backspace",)):
+        tab.page.keyboard.press(key)
+    tab.page.keyboard.type("6.5")
+    tab.page.keyboard.press("Enter")
+    tab.wait_for(lambda: tab.state.pose.position[1] == 6.5, "y = 6.5")
+    # What is half typed goes first.
+    tab.page.keyboard.type("7,")
+    tab.page.keyboard.press(undo)
+    expect(field).to_have_value("6.5")
+    assert tab.state.pose.position[1] == 6.5
+    tab.page.keyboard.press(undo)
+    tab.wait_for(lambda: tab.state.pose == before, "undone")
+    tab.wait_until_shown("y", before.position[1])
+    for _ in range(3):
+        tab.page.keyboard.press(undo)
+    tab.page.keyboard.press("ControlOrMeta+y")
+    tab.wait_for(lambda: tab.state.pose.position[1] == 6.5, "redone")
+    assert words_of_steps(tab)[1:] == ["y = 6.5"]
+
+
+@pytest.mark.parametrize(
+    ("text", "value"), [("3,25", 3.25), ("1,234.5", None), ("3,25 mm", None), ("−2", -2.0)]
+)
+def test_what_is_pasted_counts_as_if_it_was_typed(tab: Tab, text: str, value: float | None) -> None:
+    before = tab.state.pose.position[0]
+    tab.page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+    tab.page.evaluate("text => navigator.clipboard.writeText(text)", text)
+    for empties in (True, False):
+        if empties:
+            emptied(tab, "x")
+        else:
+            tab.field("x").click()
+            tab.page.keyboard.press("ControlOrMeta+a")
+        tab.page.keyboard.press("ControlOrMeta+v")
+        expect(tab.field("x")).to_have_value(text)
+        tab.page.keyboard.press("Tab")
+        expected = before if value is None else value
+        tab.wait_until_shown("x", expected)
+        tab.wait_for(lambda expected=expected: tab.state.pose.position[0] == expected, text)
+    assert len(words_of_steps(tab)) == (1 if value is None else 2)
+
+
+def test_an_input_method_is_not_disturbed_and_its_digits_count(tab: Tab) -> None:
+    methods = tab.page.context.new_cdp_session(tab.page)
+    tab.field("x").click()
+    tab.page.keyboard.press("ControlOrMeta+a")
+    for text in ("３", "３２", "３２．５"):
+        ends = {"selectionStart": len(text), "selectionEnd": len(text)}
+        methods.send("Input.imeSetComposition", {"text": text, **ends})
+    tab.page.wait_for_timeout(900)
+    expect(tab.field("x")).to_have_value("３２．５")
+    methods.send("Input.insertText", {"text": "３２．５"})
+    tab.page.keyboard.press("Enter")
+    tab.wait_for(lambda: tab.state.pose.position[0] == 32.5, "x = 32.5")
+
+
+def test_a_name_may_hold_blanks_and_be_typed_anew(browser: Browser) -> None:
+    with explorer_with_data() as running:
+        tab = Tab(browser, running)
+        tab.turn_to("Designs")
+        name = tab.row("Name").locator("input")
+
+        def named(expected: str) -> None:
+            tab.wait_for(lambda: tab.state.design.name == expected, expected)
+            tab.wait_for(lambda: name.input_value() == expected, expected)
+
+        name.click()
+        tab.page.keyboard.press("ControlOrMeta+a")
+        # Slowly enough for what comes back meanwhile.
+        tab.page.keyboard.type("two words ", delay=100)
+        tab.page.keyboard.press("Tab")
+        named("two words")
+        name.click()
+        tab.page.keyboard.press("ControlOrMeta+a")
+        tab.page.keyboard.press("Delete")
+        settle(tab.page, tab.client)
+        tab.page.keyboard.type("fresh", delay=100)
+        named("fresh")
+        # Left empty it has the name that it had when one came to it.
+        for _ in "fresh":
+            tab.page.keyboard.press("Backspace")
+        tab.page.keyboard.press("Tab")
+        named("two words")
+        expect(tab.page.get_by_text("needs a name")).to_have_count(0)
+        assert tab.complaints() == []
+        tab.close()
+
+
+def test_arrows_on_a_slider_leave_the_camera(tab: Tab) -> None:
+    tab.drag("x", 0.5)
+    settle(tab.page, tab.client)
+    eye, x = tab.client.camera.position.copy(), tab.shown("x")
+    for _ in range(4):
+        tab.page.keyboard.press("ArrowRight", delay=90)
+    tab.wait_for(lambda: tab.shown("x") > x, "a step to the right")
+    settle(tab.page, tab.client)
+    np.testing.assert_array_equal(tab.client.camera.position, eye)
+    # Over the scene they turn it.
+    tab.page.mouse.click(430, 240)
+    tab.page.keyboard.press("ArrowRight", delay=300)
+    tab.wait_for(lambda: np.abs(tab.client.camera.position - eye).max() > 1.0, "a turn")
 
 
 def test_a_refused_number_is_told_once_and_leaves_no_step(tab: Tab) -> None:

@@ -4,7 +4,10 @@ viser's tell each key: half a number becomes a step of the history, an exponent 
 a field that holds no number stays so, what lies outside the range of a slider is moved into
 it, and whatever comes from the explorer meanwhile wipes what is half typed. With this script
 in the page a number counts once it is entered: by Enter, by leaving the field, or by a pause
-in typing. What is no number, or Escape, brings back what was there.
+in typing. What is no number, or Escape, brings back what was there; and undo is the explorer's.
+
+A line of text may hold blanks and be emptied and typed anew; left empty, it gets back what it
+held. And the arrows move a slider alone, not the camera too.
 """
 
 SCRIPT = """
@@ -22,7 +25,9 @@ SCRIPT = """
   // The field that is typed into, what it held at first, and what the page last knew of.
   let typing = null;
   const numberIn = (text) => {
-    const plain = text.trim().replace(/^\\u2212/, "-").replace(/^([^.,]*),([^.,]*)$/, "$1.$2");
+    // Full width, as from an input method of East Asia, is as good.
+    const plain = text.normalize("NFKC").trim()
+      .replace(/^\\u2212/, "-").replace(/^([^.,]*),([^.,]*)$/, "$1.$2");
     const value = /^[-+]?(\\d+\\.?\\d*|\\.\\d+)(e[-+]?\\d+)?$/i.test(plain) ? Number(plain) : NaN;
     return Math.abs(value) <= Number.MAX_SAFE_INTEGER ? value : null;
   };
@@ -40,12 +45,12 @@ SCRIPT = """
   };
   const enter = () => {
     const { field, before } = typing, value = numberIn(field.value);
-    clearTimeout(typing.pause);
-    typing.isPending = false;
     if (value === null) {
-      write.call(field, before);
+      giveUp();
       return;
     }
+    clearTimeout(typing.pause);
+    typing.isPending = false;
     typing.before = written(value);
     typing.isTelling = true;
     tell(field, before, typing.before);
@@ -53,12 +58,15 @@ SCRIPT = """
   };
   // The page writes its own number whenever it draws the field anew, in mid-word too.
   const hold = () => {
-    const { field, text, caret } = typing;
+    const { field, text, chosen } = typing;
     if (field.value === text) return;
     if (typing.first === typing.before) typing.first = field.value;
     typing.before = field.value;
     write.call(field, text);
-    field.setSelectionRange(caret, caret);
+    field.setSelectionRange(...chosen);
+  };
+  const choose = () => {
+    typing.chosen = [typing.field.selectionStart, typing.field.selectionEnd];
   };
   const watch = () => {
     if (!typing || !typing.isPending) return;
@@ -75,6 +83,20 @@ SCRIPT = """
     const value = numberIn(typing.field.value);
     if (value !== null && written(value) === typing.field.value) enter();
   };
+  const wait = () => {
+    clearTimeout(typing.pause);
+    typing.pause = setTimeout(rest, PAUSE);
+  };
+  const giveUp = () => {
+    clearTimeout(typing.pause);
+    typing.isPending = false;
+    write.call(typing.field, typing.before);
+  };
+  // viser hears no keys of fields.
+  const tellAll = ({ key, code, ctrlKey, metaKey, shiftKey }) => {
+    const init = { key, code, ctrlKey, metaKey, shiftKey, bubbles: true };
+    document.documentElement.dispatchEvent(new KeyboardEvent("keydown", init));
+  };
   // A field whose page is not told that it was left takes the focus back with its next number.
   const leave = (field) => { field.focus = field.setSelectionRange = () => {}; };
   const comeBack = (field) => { delete field.focus; delete field.setSelectionRange; };
@@ -90,17 +112,43 @@ SCRIPT = """
     }
     if (typing.isTelling) return;
     event.stopPropagation();
-    clearTimeout(typing.pause);
-    typing.pause = setTimeout(rest, PAUSE);
+    wait();
+    // Nothing may be written into what an input method is at.
+    if (event.isComposing) clearTimeout(typing.pause);
     typing.text = typing.field.value;
-    typing.caret = typing.field.selectionStart;
+    choose();
     if (!typing.isPending) requestAnimationFrame(watch);
     typing.isPending = typing.isEdited = true;
   }, true);
+  // The page would take every comma for a point, and tell of it past all this.
+  addEventListener("paste", (event) => {
+    if (isField(event.target)) event.stopPropagation();
+  }, true);
+  addEventListener("beforeinput", (event) => {
+    const { target, inputType } = event;
+    if (!isField(target)) return;
+    // The browser knows nothing of what was written into its fields, and undoes it wrongly.
+    if (inputType.startsWith("history")) event.preventDefault();
+    // The explorer may have written another number since.
+    if (typing && typing.field === target && !typing.isPending) typing.before = target.value;
+  }, true);
+  addEventListener("compositionend", ({ target }) => {
+    if (typing && typing.field === target && typing.isPending) wait();
+  }, true);
+  document.addEventListener("selectionchange", () => {
+    if (typing && typing.isPending && typing.field.value === typing.text) choose();
+  });
   addEventListener("keydown", (event) => {
     const { target, key } = event;
-    if (!typing || typing.field !== target || typing.isTelling) return;
+    if (!typing || typing.field !== target || typing.isTelling || event.isComposing) return;
     if (typing.isPending) hold();
+    if ((event.ctrlKey || event.metaKey) && /^[zy]$/i.test(key)) {
+      event.preventDefault();
+      event.stopPropagation();
+      if (typing.isPending) giveUp();
+      else tellAll(event);
+      return;
+    }
     if (typing.isEdited && key === "Escape") {
       write.call(target, typing.first);
       enter();
@@ -134,6 +182,32 @@ SCRIPT = """
     }
     typing = null;
   }, true);
+
+  // A line of text says nothing new while it is empty or ends with a blank: there a word is begun.
+  let line = null;
+  const isLine = (it) => it instanceof HTMLInputElement && !!it.closest(".mantine-TextInput-root");
+  addEventListener("focusin", ({ target }) => {
+    line = isLine(target) ? { field: target, before: target.value } : null;
+  }, true);
+  addEventListener("input", (event) => {
+    if (line && line.field === event.target && !/\\S$/.test(line.field.value)) {
+      event.stopPropagation();
+    }
+  }, true);
+  addEventListener("focusout", ({ target }) => {
+    if (!line || line.field !== target) return;
+    const text = target.value.trim() || line.before;
+    line = null;
+    if (text === target.value) return;
+    write.call(target, text);
+    target.dispatchEvent(new Event("input", { bubbles: true }));
+  }, true);
+
+  // After the page's own listeners, before viser's, which turns the camera.
+  document.body.addEventListener("keydown", (event) => {
+    const isOnSlider = event.target.closest?.(".mantine-Slider-root");
+    if (isOnSlider && event.key.startsWith("Arrow")) event.stopPropagation();
+  });
 })();
 """
-"""Makes the number fields of a browser behave so."""
+"""Makes the inputs of a browser behave so."""
