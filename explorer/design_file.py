@@ -7,7 +7,6 @@ schema is refused. The presets are both rows of the paper's Table 1.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping
 from importlib import resources
 from pathlib import Path
@@ -18,11 +17,10 @@ import msgspec
 
 from explorer.design import Design
 from explorer.errors import DesignError
+from explorer.json_text import check_each_once, refusing
 
 # No honest design file comes near this size, in bytes.
 LARGEST_FILE = 1_000_000
-# Of what a message quotes, in characters.
-LONGEST_LINE = 300
 SCHEMA = 1
 
 MIGRATIONS: dict[int, Callable[[dict[str, Any]], dict[str, Any]]] = {}
@@ -50,10 +48,10 @@ def decode_design(data: bytes, source: str) -> Design:
         raise DesignError(
             f"{source}: {len(data)} bytes is no design file; they stay below {LARGEST_FILE}"
         )
-    try:
+    with refusing(source, DesignError):
         schema = msgspec.json.decode(data, type=_Dated).schema
         if schema > SCHEMA:
-            raise DesignError(  # noqa: TRY301 - it is told of its source below
+            raise DesignError(
                 f"schema {schema} was made by a newer explorer; this one reads up to {SCHEMA}"
             )
         if schema in MIGRATIONS:
@@ -61,18 +59,8 @@ def decode_design(data: bytes, source: str) -> Design:
             design = msgspec.convert(up_to_date(fields), Design)
         else:
             design = msgspec.json.decode(data, type=Design)
-        # By now it is known to be shallow and its numbers to be short.
-        json.loads(data, object_pairs_hook=_each_once)
-    except (msgspec.MsgspecError, DesignError, UnicodeDecodeError, RecursionError) as error:
-        raise DesignError(_one_line(f"{source}: {error}")) from None
-    return design
-
-
-def _one_line(message: str) -> str:
-    """Return a message that quotes a file as one short line that can be shown."""
-    words = " ".join(message.split())
-    shown = "".join(letter if letter.isprintable() else "\ufffd" for letter in words[:LONGEST_LINE])
-    return shown if len(words) <= LONGEST_LINE else f"{shown}…"
+        check_each_once(data)
+        return design
 
 
 def up_to_date(fields: dict[str, Any]) -> dict[str, Any]:
@@ -80,15 +68,6 @@ def up_to_date(fields: dict[str, Any]) -> dict[str, Any]:
     for older in range(fields.get("schema", 1), SCHEMA):
         fields = MIGRATIONS[older](fields)
     return fields | {"schema": SCHEMA}
-
-
-def _each_once(fields: list[tuple[str, object]]) -> dict[str, object]:
-    seen = dict(fields)
-    if len(seen) < len(fields):
-        names = [name for name, _ in fields]
-        twice = next(name for name in names if names.count(name) > 1)
-        raise DesignError(f"the field {twice!r} is given twice; leave one of them out")
-    return seen
 
 
 def encode_design(design: Design) -> bytes:

@@ -11,8 +11,9 @@ import pytest
 from fuzz import attempt, fuzzed
 
 from explorer import design_file
-from explorer.design_file import LONGEST_LINE, SCHEMA, decode_design, encode_design
+from explorer.design_file import SCHEMA, decode_design, encode_design
 from explorer.errors import DesignError, InputError
+from explorer.json_text import LONGEST_LINE
 from explorer.workspace import workspace_nodes, workspace_volume
 
 PLAIN: dict[str, Any] = {"a3": [8, 5], "b1": [3, -2.5], "b2": 2, "b3": 5}

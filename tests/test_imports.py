@@ -18,7 +18,17 @@ import explorer
 PACKAGE = Path(explorer.__file__).parent
 
 LAYERS = (
-    ("errors", "arrays", "checks", "colours", "compiled", "descent", "files", "versions"),
+    (
+        "errors",
+        "arrays",
+        "checks",
+        "colours",
+        "compiled",
+        "descent",
+        "files",
+        "json_text",
+        "versions",
+    ),
     ("pose", "design", "design_file"),
     (
         "trilateration",

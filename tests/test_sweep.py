@@ -28,6 +28,7 @@ from explorer import (
 )
 from explorer.constraints import home_signs
 from explorer.design import VARIABLES
+from explorer.json_text import LONGEST_LINE
 from explorer.limits import violations
 from explorer.node_measures import node_measures
 from explorer.pose import Pose
@@ -158,6 +159,25 @@ def test_a_study_that_cannot_be_meant_is_one_line(changes: dict[str, Any], words
 def test_what_is_no_study_is_one_line(data: bytes) -> None:
     with pytest.raises(InputError, match=r"^study: [^\n]+$"):
         decode_study(data, "study")
+
+
+@pytest.mark.parametrize(
+    ("inserted", "words"),
+    [
+        ('"name": "again",', "the field 'name' is given twice"),
+        ('"\\u001b]0;owned\\u0007": 1,', "unknown field"),
+        (f'"{900_000 * "a"}": 1,', "unknown field"),
+        (f'"chunk": {5000 * "9"},', "chunk"),
+    ],
+)
+def test_what_a_refusal_quotes_can_be_shown(inserted: str, words: str) -> None:
+    data = b"{" + inserted.encode() + encode_study(STUDIES["trade-off"]).lstrip()[1:]
+    with pytest.raises(InputError) as caught:
+        decode_study(data, "study.json")
+    message = str(caught.value)
+    assert words in message
+    assert message.isprintable()
+    assert len(message) <= LONGEST_LINE + 1
 
 
 def test_a_study_none_of_whose_designs_can_be_made_is_told_at_once() -> None:

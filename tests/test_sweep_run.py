@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import functools
 import importlib
+import logging
+import math
 import os
 import random
 import signal
@@ -17,7 +19,7 @@ from concurrent.futures import Future
 from contextlib import ExitStack, suppress
 from multiprocessing.context import SpawnProcess
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import msgspec
 import numpy as np
@@ -332,6 +334,7 @@ def test_a_folder_with_other_things_in_it_is_refused(name: str, tmp_path: Path) 
     with pytest.raises(InputError, match="is not empty, and holds no results"):
         run_study(STUDY, tmp_path, HereWorkers())
     assert contents(tmp_path) == {name: b"mine"}
+    assert [each.name for each in tmp_path.iterdir()] == [name]
     with pytest.raises(InputError, match="holds no results of a study"):
         load_results(tmp_path)
 
@@ -660,7 +663,9 @@ def test_local_workers_do_tasks_tell_errors_and_outlive_deaths() -> None:
             LocalWorkers(size)
 
 
-def test_dask_makes_the_same_bytes_and_outlives_a_death(whole: Path, tmp_path: Path) -> None:
+def test_dask_makes_the_same_bytes_and_outlives_a_death(
+    whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     distributed: Any = importlib.import_module("distributed")
     with (
         distributed.LocalCluster(
@@ -679,6 +684,19 @@ def test_dask_makes_the_same_bytes_and_outlives_a_death(whole: Path, tmp_path: P
         with DaskWorkers(farm.scheduler_address) as workers:
             assert workers.size == 2
             run_study(STUDY, tmp_path, workers, told=kill_one)
+            # Dask tells of lost connections at any time; we do, in one line.
+            log = logging.getLogger("distributed.batched")
+            assert log.getEffectiveLevel() == logging.CRITICAL
+            # Of a scheduler that is gone its tasks tell, not whoever counts its workers.
+            known, within = workers.size, cast("Any", workers)
+            within._counted = -math.inf
+
+            def lost() -> None:
+                raise distributed.comm.CommClosedError("it is gone")
+
+            monkeypatch.setattr(within._client, "nthreads", lost)
+            assert workers.size == known
+        assert log.getEffectiveLevel() < logging.CRITICAL
     assert killed
     assert contents(tmp_path) == contents(whole)
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import os
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated
 
 import msgspec
@@ -45,7 +45,7 @@ def load(name: str) -> Design:
         return load_design(name)
     except DesignError:
         # A file that is there and of no use is what was meant.
-        if Path(name).exists():
+        if os.path.exists(name):  # noqa: PTH110 - that of a Path raises for names too long
             raise
         from explorer.app.storage.library import Library
 

@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Annotated
 import msgspec
 import tyro
 
-from explorer.cli.options import JsonOptions
+from explorer.cli.options import JsonOptions, load
 from explorer.cli.output import figure, table, write_json, write_lines
 from explorer.cli.progress import Meter
 from explorer.cli.streams import complain, write
 from explorer.cli.usage import UsageError
 from explorer.cli.values import whole_number
-from explorer.design_file import encode_design, load_design
+from explorer.design_file import encode_design
 
 if TYPE_CHECKING:
     from explorer.sweep.results import Summary
@@ -56,7 +56,8 @@ class Sweep(JsonOptions):
         str | None,
         tyro.conf.arg(metavar="PRESET_OR_FILE", help_behavior_hint="(default: the study's)"),
     ] = None
-    """A preset or a design file to vary, instead of the study's own."""
+    """A preset, a design file, or a design that was saved on the page, by its name, to vary
+    instead of the study's own."""
 
     workers: Annotated[
         int | None,
@@ -113,7 +114,7 @@ class Sweep(JsonOptions):
         study = load_study(name)
         if self.design is None:
             return study
-        return msgspec.structs.replace(study, design=load_design(self.design))
+        return msgspec.structs.replace(study, design=load(self.design))
 
     def _compute(self, study: Study, folder: Path) -> None:
         from explorer.sweep.run import run_study

@@ -13,6 +13,7 @@ import msgspec
 
 from explorer.design import Design
 from explorer.errors import InputError
+from explorer.json_text import decode_strictly
 from explorer.optimise.outcome import Iterate, Outcome, Phase, Status
 from explorer.optimise.problem import Problem
 from explorer.versions import versions
@@ -120,12 +121,10 @@ def decode_record(data: bytes, source: str) -> Record:
         source: What to call it in an error message.
 
     Raises:
-        InputError: not JSON, of another schema, with unknown fields or unusable values.
+        InputError: not JSON, of another schema, with unknown fields, fields given twice or
+            unusable values.
     """
-    try:
-        return msgspec.json.decode(data, type=Record)
-    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
-        raise InputError(" ".join(f"{source}: {error}".split())) from None
+    return decode_strictly(data, Record, source)
 
 
 def load_record(path: Path) -> Record:

@@ -50,7 +50,8 @@ class DaskWorkers(Workers):
         distributed = _distributed()
         waits = PATIENCE if patience is None else patience
         _check(address)
-        with _silence():
+        with contextlib.ExitStack() as quiet:
+            quiet.enter_context(_silence())
             try:
                 _greet(distributed, address, waits)
                 self._client: Any = distributed.Client(
@@ -62,6 +63,8 @@ class DaskWorkers(Workers):
                     f"({type(error).__name__}): start one with dask scheduler, and workers with "
                     f"dask worker {address}"
                 ) from None
+            # A scheduler may be lost at any time.
+            self._quiet = quiet.pop_all()
         # A task is a function of what it is given, but one whose worker died is tried again.
         self._executor: Executor = self._client.get_executor(pure=False)
         self._size, self._counted = 1, -math.inf
@@ -72,8 +75,10 @@ class DaskWorkers(Workers):
         """How many threads the workers have; at least one, and known anew every second or so."""
         now = time.monotonic()
         if now - self._counted > COUNT_SECONDS:
-            # It asks the scheduler, and whoever hands out tasks asks often.
-            self._size = max(1, self.threads)
+            # It asks the scheduler, and whoever hands out tasks asks often. That it is gone, the
+            # tasks tell.
+            with contextlib.suppress(OSError, TimeoutError):
+                self._size = max(1, self.threads)
             self._counted = now
         return self._size
 
@@ -95,7 +100,7 @@ class DaskWorkers(Workers):
             wait: Until tasks have ended.
             cancel_futures: Drop all tasks.
         """
-        with _silence():
+        with self._quiet:
             self._executor.shutdown(wait=wait and not cancel_futures)
             # A scheduler that is gone needs no farewell.
             with contextlib.suppress(OSError, TimeoutError):

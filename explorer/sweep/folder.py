@@ -9,7 +9,7 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 
 from explorer.errors import InputError
-from explorer.files import make_folder
+from explorer.files import make_folder, refusal
 from explorer.sweep.parts import BadPartError, part_paths, read_part
 from explorer.sweep.study import Study, study_hash
 
@@ -23,9 +23,11 @@ def claimed(folder: Path, study: Study) -> Generator[None]:
 
     Raises:
         InputError: it belongs to another study, or is in use.
-        StorageError: it cannot be made.
+        StorageError: it cannot be made, or not be read.
     """
     make_folder(folder)
+    # Nothing is left, not even a lock, in a folder of somebody else's.
+    _check(folder, study)
     with _locked(folder):
         _check(folder, study)
         _clear(folder)
@@ -69,7 +71,11 @@ def _check(folder: Path, study: Study) -> None:
                 f"{parts[0].name}{more} cannot be, and may be of any study; move what cannot be "
                 "read away, and the same command computes it again"
             )
-        if any(not _is_scratch(each) for each in folder.iterdir()):
+        try:
+            is_used = any(not _is_scratch(each) for each in folder.iterdir())
+        except OSError as error:
+            raise refusal("read", folder, error) from None
+        if is_used:
             raise InputError(
                 f"{str(folder)!r} is not empty, and holds no results of a study: use another folder"
             )

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from explorer.errors import InputError, MissingExtraError
-from explorer.files import write_whole
+from explorer.files import refusal, write_whole
 from explorer.sweep.rows import Kind, Rows, columns_of
 from explorer.sweep.study import Study, decode_study, encode_study, study_hash
 
@@ -78,8 +78,12 @@ def _numbered(folder: Path) -> list[tuple[int, Path]]:
 
 
 def _visible(folder: Path) -> list[Path]:
+    try:
+        found = list(folder.glob(f"*{SUFFIX}"))
+    except OSError as error:
+        raise refusal("read", folder, error) from None
     # Readers of Parquet folders pass over the others.
-    return [path for path in folder.glob(f"*{SUFFIX}") if not path.name.startswith((".", "_"))]
+    return [path for path in found if not path.name.startswith((".", "_"))]
 
 
 def write_part(folder: Path, study: Study, chunk: int, pieces: Sequence[Rows]) -> None:

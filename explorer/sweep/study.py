@@ -22,6 +22,7 @@ from explorer.design_file import PRESETS
 from explorer.errors import InputError
 from explorer.files import read_at_most
 from explorer.home import home_pose
+from explorer.json_text import decode_strictly
 from explorer.node_measures import DEFAULT_NODES, FEWEST_NODES, MOST_NODES
 from explorer.optimise.problem import (
     OBJECTIVES,
@@ -276,14 +277,12 @@ def decode_study(data: bytes, source: str) -> Study:
         source: What to call it in an error message.
 
     Raises:
-        InputError: not JSON, of another schema, with unknown fields or unusable values.
+        InputError: not JSON, of another schema, with unknown fields, fields given twice or
+            unusable values.
     """
     if len(data) > LARGEST_FILE:
         raise InputError(f"{source}: {len(data)} bytes is no study; they stay below {LARGEST_FILE}")
-    try:
-        return msgspec.json.decode(data, type=Study)
-    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
-        raise InputError(" ".join(f"{source}: {error}".split())) from None
+    return decode_strictly(data, Study, source)
 
 
 def encode_study(study: Study) -> bytes:
@@ -301,13 +300,17 @@ def load_study(path: str | Path) -> Study:
     known = STUDIES.get(str(path))
     if known is not None:
         return known
-    file = Path(path)
-    if not file.exists():
+    try:
+        Path(path).stat()
+    except (FileNotFoundError, ValueError):
         raise InputError(
             f"no study and no file named {str(path)!r}; the studies that come along are "
             f"{', '.join(STUDIES)}"
-        )
-    return decode_study(read_at_most(file, LARGEST_FILE), str(path))
+        ) from None
+    except OSError:
+        # Why, is told when it is read.
+        pass
+    return decode_study(read_at_most(Path(path), LARGEST_FILE), str(path))
 
 
 def study_hash(study: Study) -> str:

@@ -213,7 +213,7 @@ def test_what_is_pasted_counts_as_if_it_was_typed(tab: Tab, text: str, value: fl
 
 
 def test_an_input_method_is_not_disturbed_and_its_digits_count(tab: Tab) -> None:
-    methods = tab.page.context.new_cdp_session(tab.page)
+    methods: Any = tab.page.context.new_cdp_session(tab.page)
     tab.field("x").click()
     tab.page.keyboard.press("ControlOrMeta+a")
     for text in ("３", "３２", "３２．５"):

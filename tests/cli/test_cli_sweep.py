@@ -16,6 +16,7 @@ import msgspec
 import pytest
 
 import explorer
+from explorer.app.storage.library import Library
 from explorer.cli import run
 from explorer.sweep import cluster
 from explorer.sweep.parts import part_paths
@@ -32,6 +33,9 @@ STUDY = Study(
     objectives=(Objective("volume", "max"), Objective("reach", "min")),
     chunk=4,
 )
+
+
+LONG = 300 * "x"
 
 
 @pytest.fixture
@@ -147,6 +151,21 @@ def test_another_design_takes_the_place_of_the_studys(
     assert "another study" in refusal(capsys, file, "--out", out)
 
 
+def test_a_design_that_was_saved_is_known_by_its_name(
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    file: Path,
+    tmp_path: Path,
+) -> None:
+    monkeypatch.setenv("EXPLORER_DATA", str(tmp_path / "data"))
+    # No file can have the second name, of 300 bytes.
+    for number, name in enumerate(("mine", 100 * "あ")):
+        Library().save(name, explorer.PRESETS["paper-optimal"])
+        out = tmp_path / f"results-{number}"
+        answer(capsys, file, "--design", name, "--out", out, "--limit", 1, "--workers", 1)
+        assert load_results(out).study.base.name == name
+
+
 def test_a_study_to_begin_with_is_one_that_can_be_read(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["sweep", "--new"]) == 0
     study = decode_study(capsys.readouterr().out.encode(), "new")
@@ -194,6 +213,10 @@ def test_bad_input_is_one_line_and_makes_nothing(
         ([file, "--out", out, "--sumary"], "did you mean --summary?"),
         ([file, "--out", file], "study.json"),
         ([file, "--design", "paper", "--out", out], "no preset and no file named 'paper'"),
+        ([file, "--design", LONG, "--out", out], "File name too long"),
+        ([LONG, "--out", out], "File name too long"),
+        (["--out", LONG, "--summary"], "File name too long"),
+        ([file, "--out", LONG], "choose a shorter name"),
     ]
     for argv, words in cases:
         assert words in refusal(capsys, *argv)
