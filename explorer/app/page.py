@@ -42,7 +42,7 @@ from explorer.app.path_runner import PathRunner
 from explorer.app.preferences import PreferenceFile
 from explorer.app.scene import Scene
 from explorer.app.scene.camera import Cameras, ViewName
-from explorer.app.scene.placing import Placed, scene_scale
+from explorer.app.scene.placing import Placed
 from explorer.app.session import REDO, UNDO, Session, Who
 from explorer.app.shelf import Shelf
 from explorer.app.state import Frame, State
@@ -50,7 +50,6 @@ from explorer.app.strata_feed import StrataFeed
 from explorer.app.study_folders import StudyFolders
 from explorer.app.workspace_feed import RadiusFeed, WorkspaceFeed
 from explorer.design import Design
-from explorer.pose import Pose
 
 TITLE = "Flagged 4-4 explorer"
 # What a notice is called that answers something asked for.
@@ -351,14 +350,13 @@ class Page:
     def _dragged(self, event: viser.TransformControlsEvent) -> None:
         if event.client_id is None:
             return
-        handle = self._scene.drag_handle.handle
-
-        def change(state: State) -> SetPose:
-            x, y, z = (np.asarray(handle.position) / scene_scale(state)).tolist()
-            w, i, j, k = np.asarray(handle.wxyz, dtype=np.float64).tolist()
-            return SetPose(Pose((x, y, z), (w, i, j, k)))
-
-        self.session.post("drag", change, stamp=handle.update_timestamp, who=event.client_id)
+        gizmo = self._scene.drag_handle
+        self.session.post(
+            "drag",
+            lambda state: SetPose(gizmo.pose(state)),
+            stamp=gizmo.handle.update_timestamp,
+            who=event.client_id,
+        )
 
     def _complain(self, message: str, who: Who) -> None:
         self._notify(REFUSAL, message, who)

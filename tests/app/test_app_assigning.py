@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -13,10 +13,12 @@ from monkey import explorer_with_data
 from page_props import shown_by
 
 from explorer.app import assigning, viser_gaps
-from explorer.app.actions import SetJoint, SetPosition
+from explorer.app.actions import SetAngle, SetJoint, SetPosition
 from explorer.app.assigning import CROSSING_SECONDS, QUIET_SECONDS, Assigner
 from explorer.app.panels.move import JOINT_LABELS
+from explorer.app.scene.placing import Placed
 from explorer.app.session import Session
+from explorer.app.state import Frame
 from explorer.app.viser_gaps import PLACE
 
 
@@ -165,6 +167,21 @@ def test_a_browser_that_crossed_with_the_explorer_shows_what_its_user_set() -> N
         assert values[0] == 11.5
         assert values[-1] == 12.5
         assert running.page.session.state.joints[0] == 12.5
+
+
+@pytest.mark.parametrize("step", [1e-9, 1e-7, 1.0])
+def test_the_gizmo_follows_the_smallest_steps_of_the_pose(step: float) -> None:
+    with explorer_with_data() as running:
+        page, scene = running.page, cast("Any", running.page)._scene
+        page.session.do(SetPosition(0, 9.0))
+        page.session.do(SetAngle(0, 20.0))
+        page.wait_until_drawn()
+        for action in (SetPosition(0, 9.0 + step), SetAngle(0, 20.0 + step)):
+            page.session.do(action)
+            page.wait_until_drawn()
+            placed, handle = Placed(Frame(page.session.state)), scene.drag_handle.handle
+            assert handle.position.tolist() == placed.points["b4"].tolist()
+            assert tuple(handle.wxyz) == page.session.state.pose.quaternion
 
 
 def test_figures_that_a_hand_leaves_no_time_for_come_with_the_next_frame(

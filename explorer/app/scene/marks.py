@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterator
 
 import numpy as np
@@ -10,9 +11,11 @@ import viser
 from explorer.app.assigning import Update
 from explorer.app.colours import GHOST
 from explorer.app.scene.bodies import platform_plate
-from explorer.app.scene.placing import Placed
+from explorer.app.scene.placing import Placed, scene_scale
+from explorer.app.state import State
 from explorer.arrays import FloatArray
-from explorer.pose import quaternion_from_rotation
+from explorer.errors import InputError
+from explorer.pose import Pose, quaternion_from_rotation
 from explorer.singularity import mode_name
 
 BASE_LABELS = ("a1", "a2", "a3")
@@ -136,15 +139,23 @@ class DragHandle:
             HANDLE_NAME, scale=HANDLE_SCALE, line_width=2.0, depth_test=False, opacity=0.85
         )
 
+    def pose(self, state: State) -> Pose:
+        """Return the pose of the platform where the gizmo is.
+
+        Raises:
+            InputError: it is where no platform can be.
+        """
+        x, y, z = (np.asarray(self.handle.position) / scene_scale(state)).tolist()
+        w, i, j, k = np.asarray(self.handle.wxyz, dtype=np.float64).tolist()
+        return Pose((x, y, z), (w, i, j, k))
+
     def updates(self, placed: Placed) -> Iterator[Update]:
         """Yield what keeps the gizmo on the platform."""
         state = placed.frame.state
         yield self.handle, "visible", state.view.handle
-        position = placed.points["b4"]
-        # Writing back what the hand has just set would fight with it.
-        if np.abs(np.asarray(self.handle.position) - position).max() > 1e-6:
-            yield self.handle, "position", tuple(position.tolist())
-        wxyz = np.array(state.pose.quaternion)
-        present = np.asarray(self.handle.wxyz)
-        if min(np.abs(present - wxyz).max(), np.abs(present + wxyz).max()) > 1e-6:
-            yield self.handle, "wxyz", state.pose.quaternion
+        with contextlib.suppress(InputError):
+            # Writing back what the hand has just set would fight with it.
+            if self.pose(state) == state.pose:
+                return
+        yield self.handle, "position", tuple(placed.points["b4"].tolist())
+        yield self.handle, "wxyz", state.pose.quaternion
