@@ -27,6 +27,9 @@ from monkey import BROKEN, explorer_with_data
 
 # Between two looks at whether the browser shows what the server has.
 BETWEEN_LOOKS = 50
+# Within 50 ms viser's page tells of no more than the first and the last control that is changed:
+# whatever is changed in between is lost. No hand is so quick.
+PAUSE_MS = 60
 KEYS = (
     "Control+z",
     "Control+Shift+z",
@@ -121,6 +124,7 @@ class BrowserMonkey:
         for count in range(1, actions + 1):
             _, act = self._random.choices(self._does, weights)[0]
             act()
+            self._page.wait_for_timeout(PAUSE_MS)
             if count % BETWEEN_LOOKS == 0 or count == actions:
                 self.look()
         complaints = tuple(each for each in self._tab.complaints() if not LATE.match(each))
