@@ -170,6 +170,9 @@ class Monkey:
                 fresh.page.shelf.wait_until_idle()
                 fresh.page.shelf.entries = page.shelf.entries
                 fresh.page.shelf.deleted = page.shelf.deleted
+                # To which page the list is turned is no state.
+                lists: list[Any] = [fresh.page, page]
+                lists[0]._designs._first = lists[1]._designs._first
             session.redraw()
             assert fresh.page.wait_until_drawn(PATIENCE_SECONDS)
             self.report.drift += differences(shown_by(self.running), shown_by(fresh))
