@@ -33,6 +33,8 @@ from explorer.workspace import bounds
 
 # Chords may be off by this share of the size of the workspace unless told otherwise.
 DEFAULT_TOLERANCE = 1.0 / 500.0
+# They are never off by more than this share of it: coarser, facets would miss it.
+COARSEST = 1.0 / 4.0
 # The most faces that primitives may have together.
 MOST_FACES = 2_000_000
 # A cone that is off a plane by less than this share of the tolerance is that plane.
@@ -95,7 +97,7 @@ def frame_of(
         families: Each with the limits of one workspace.
         reach: Of the design, in design units.
         tolerance: In design units; a 500th of the reach, or of the largest extent if that
-            is smaller, if None.
+            is smaller, if None; a quarter of the largest extent at the most.
 
     Raises:
         InputError: the tolerance is not positive.
@@ -107,7 +109,7 @@ def frame_of(
     lows = np.min([low for low, _ in boxes], axis=0) if boxes else np.zeros(3)
     highs = np.max([high for _, high in boxes], axis=0) if boxes else np.full(3, reach)
     middle, scale = 0.5 * (lows + highs), float((highs - lows).max())
-    chord = tolerance or DEFAULT_TOLERANCE * min(reach, scale)
+    chord = min(tolerance or DEFAULT_TOLERANCE * min(reach, scale), COARSEST * scale)
     return Frame(middle, scale, chord, Box((lows - middle) / scale, (highs - middle) / scale))
 
 

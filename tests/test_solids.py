@@ -129,6 +129,21 @@ def test_volumes_tend_to_the_exact_one_by_first_order_or_better(seed: int) -> No
     assert errors[-1] < 1e-3
 
 
+@pytest.mark.parametrize("name", PRESETS)
+@pytest.mark.parametrize("a3", [(18.3, 1e7), (8.0, 1e9), (1e9, 10.26)])
+def test_a_workspace_that_is_small_beside_the_mechanism_is_no_coarser_for_that(
+    name: str, a3: tuple[float, float]
+) -> None:
+    """Facets as coarse as a share of the reach missed it, and belonged to no limit."""
+    preset = PRESETS[name]
+    design = preset.with_variables((*a3, *preset.variables[2:]))
+    rotation = home_pose(preset).rotation
+    solid = workspace_solid(design, rotation, 0.004 * design.reach)
+    assert solid.tolerance <= 0.25 * float(np.ptp(solid.vertices, axis=0).max()) * 1.1
+    assert solid.volume == pytest.approx(workspace_volume(design, rotation).volume, rel=0.1)
+    assert set(solid.limit_of_face.tolist()) <= set(range(len(solid.limits)))
+
+
 def test_corners_and_middles_of_facets_are_within_the_tolerance_on_both_sides() -> None:
     for tolerance in (2.0, 0.5, 0.1, 0.02):
         solid = workspace_solid(OPTIMAL, tolerance=tolerance)
