@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from explorer.optimise.outcome import Iterate, Outcome, Run
     from explorer.optimise.problem import Demands, Problem, Variable
     from explorer.optimise.solver import optimise_design
+    from explorer.orientations import orientation_capability
     from explorer.performance import singularity_free_ball
     from explorer.planning import NoPathError, PlannedPath, plan_path
     from explorer.pose import (
@@ -109,6 +110,7 @@ _HOMES = {
     "optimise.problem": ("Demands", "Problem", "Variable"),
     "optimise.solver": ("optimise_design",),
     "nearest_stratum": ("nearest_in_stratum",),
+    "orientations": ("orientation_capability",),
     "performance": ("singularity_free_ball",),
     "planning": ("NoPathError", "PlannedPath", "plan_path"),
     "pose": (
@@ -205,6 +207,7 @@ __all__ = [
     "nearest_singular_poses",
     "nearest_singularities",
     "optimise_design",
+    "orientation_capability",
     "path_margins",
     "plan_path",
     "poses_are_valid",

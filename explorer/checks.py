@@ -6,7 +6,7 @@ All of them raise `DesignError`.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Set
+from collections.abc import Mapping, Sequence, Set
 from typing import Any, cast
 
 from explorer.errors import DesignError
@@ -21,7 +21,7 @@ _NOT_A_SEQUENCE = (str, bytes, bytearray, Set, Mapping)
 
 def number(name: str, value: object) -> float:
     """Return the value as a finite float."""
-    refusal = DesignError(f"{name} must be a number; got {_shown(value)}")
+    refusal = DesignError(f"{name} must be a number; got {_shown(value)}", name)
     if isinstance(value, _NOT_A_NUMBER):
         raise refusal
     try:
@@ -29,10 +29,10 @@ def number(name: str, value: object) -> float:
     except (TypeError, ValueError, OverflowError):
         raise refusal from None
     if not math.isfinite(checked):
-        raise DesignError(f"{name} must be a finite number; got {checked}")
+        raise DesignError(f"{name} must be a finite number; got {checked}", name)
     if abs(checked) > LARGEST_NUMBER:
         raise DesignError(
-            f"{name} must not exceed {LARGEST_NUMBER:g} in magnitude; got {checked:g}"
+            f"{name} must not exceed {LARGEST_NUMBER:g} in magnitude; got {checked:g}", name
         )
     return checked
 
@@ -41,7 +41,7 @@ def not_negative(name: str, value: object) -> float:
     """Return the value as a finite float of at least zero."""
     checked = number(name, value)
     if checked < 0.0:
-        raise DesignError(f"{name} must not be negative; got {checked:g}")
+        raise DesignError(f"{name} must not be negative; got {checked:g}", name)
     return checked
 
 
@@ -49,7 +49,7 @@ def positive(name: str, value: object) -> float:
     """Return the value as a finite float above zero."""
     checked = number(name, value)
     if checked <= 0.0:
-        raise DesignError(f"{name} must be positive; got {checked:g}")
+        raise DesignError(f"{name} must be positive; got {checked:g}", name)
     return checked
 
 
@@ -57,7 +57,7 @@ def ordered(name: str, low: object, high: object) -> tuple[float, float]:
     """Return both values as floats, the first not above the second."""
     first, second = number(f"{name} low", low), number(f"{name} high", high)
     if first > second:
-        raise DesignError(f"{name}: the low end {first:g} exceeds the high end {second:g}")
+        raise DesignError(f"{name}: the low end {first:g} exceeds the high end {second:g}", name)
     return first, second
 
 
@@ -65,7 +65,7 @@ def two(name: str, value: Any) -> tuple[Any, Any]:
     """Return the two entries of the value."""
     entries = _entries(value)
     if len(entries) != 2:
-        raise DesignError(f"{name} must be two values; got {_shown(value)}")
+        raise DesignError(f"{name} must be two values; got {_shown(value)}", name)
     return entries[0], entries[1]
 
 
@@ -73,15 +73,22 @@ def numbers(name: str, value: Any, count: int) -> list[float]:
     """Return the entries of the value, `count` finite floats."""
     entries = _entries(value)
     if len(entries) != count:
-        raise DesignError(f"{name} must be {count} numbers; got {_shown(value)}")
+        raise DesignError(f"{name} must be {count} numbers; got {_shown(value)}", name)
     return [number(name, entry) for entry in entries]
+
+
+def one_of(name: str, value: object, allowed: Sequence[str]) -> None:
+    """Check that the value is one of the words that are allowed."""
+    if value not in allowed:
+        words = " or ".join(f'"{word}"' for word in allowed)
+        raise DesignError(f"{name} must be {words}; got {_shown(value)}", name)
 
 
 def instance(name: str, value: object, *kinds: type) -> None:
     """Check that the value is of one of the kinds, which files cannot get wrong but code can."""
     if not isinstance(value, kinds):
         wanted = " or ".join(kind.__name__ for kind in kinds)
-        raise DesignError(f"{name} must be of type {wanted}; got {_shown(value)}")
+        raise DesignError(f"{name} must be of type {wanted}; got {_shown(value)}", name)
 
 
 def _entries(value: Any) -> list[Any]:

@@ -31,8 +31,8 @@ def proximity_colour(margin: float, warn_below: float) -> Rgb:
     """Return the colour of a margin.
 
     Args:
-        margin: Signed or not, in design units.
-        warn_below: The length below which to warn, in design units.
+        margin: Signed or not, in design units; or a level of `explorer.verdict`.
+        warn_below: The length below which to warn, in design units; 1 for a level.
     """
     share = abs(margin) / warn_below
     if share < 1.0:

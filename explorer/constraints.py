@@ -16,8 +16,8 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from explorer.arrays import FloatArray, finite_array
-from explorer.design import VARIABLES, Design, Swing
+from explorer.arrays import BoolArray, FloatArray, finite_array
+from explorer.design import TOLERANCE, VARIABLES, Design, Swing
 from explorer.home import home_pose
 from explorer.kinematics import attachment_points
 from explorer.pose import checked_rotation
@@ -30,6 +30,8 @@ Rates: TypeAlias = Mapping[str, FloatArray]
 """By parameter: the rates of a primitive's own parameters, centre or normal first."""
 
 X, Y, Z = np.eye(3)
+GAP = "gap |d1 − d3|"
+CARRIAGE_ORDER = "carriage order"
 # The sine of the angle between two lines that only rounding keeps from being parallel.
 PARALLEL = 1e-15
 
@@ -169,6 +171,12 @@ def slacks(limits: tuple[Constraint, ...], position: ArrayLike) -> FloatArray:
     return np.stack([limit.slack(p) for limit in limits], axis=-1)
 
 
+def keeps(design: Design, limits: tuple[Constraint, ...], position: ArrayLike) -> BoolArray:
+    """Return which of n limits positions (..., 3) keep, to the tolerance, shape (..., n)."""
+    allowed = [TOLERANCE if isinstance(each, Cone) else design.tolerance for each in limits]
+    return slacks(limits, position) >= -np.array(allowed)
+
+
 def _turning(vector: FloatArray) -> FloatArray:
     """Return the rate of a vector that turns about z with the platform."""
     return np.array([-vector[1], vector[0], 0.0])
@@ -233,9 +241,12 @@ def _guide(design: Design, r: FloatArray) -> Iterator[Constraint]:
                     "guide maximum": _four(np.zeros(3), 1.0),
                 },
             )
-    # |d1 - d3| is the same in every position.
-    if abs((design.b3 - design.b2) * float(u[0])) < design.limits.gap:
-        yield Never("gap |d1 − d3|")
+    # d3 - d1 is the same in every position.
+    apart = (design.b3 - design.b2) * float(u[0])
+    if abs(apart) < design.limits.gap - design.tolerance:
+        yield Never(GAP)
+    if demanded_order(design) * apart < -design.tolerance:
+        yield Never(CARRIAGE_ORDER)
 
 
 def _box(design: Design) -> Iterator[Constraint]:
@@ -349,6 +360,19 @@ def home_signs(design: Design) -> tuple[int, int, int]:
     """Return the sign triple of the design's home pose."""
     home = home_pose(design)
     return signs_of(int(mode_of(margins(home.position, home.rotation))))
+
+
+def demanded_order(design: Design) -> int:
+    """Return the sign of d3 − d1 that a design's limits demand, that of its home; 0 for either.
+
+    Where the carriages coincide in the home pose, to the tolerance, there is no order to keep.
+    """
+    if design.limits.carriage_order == "any":
+        return 0
+    apart = (design.b3 - design.b2) * float(home_pose(design).rotation[0, 0])
+    if abs(apart) <= design.tolerance:
+        return 0
+    return 1 if apart > 0.0 else -1
 
 
 PARAMETERS = (*VARIABLES, YAW)

@@ -8,11 +8,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Literal, cast
+from typing import Literal, cast, get_args
 
 import msgspec
 
-from explorer.checks import instance, not_negative, number, numbers, ordered, positive, two
+from explorer.checks import (
+    instance,
+    not_negative,
+    number,
+    numbers,
+    one_of,
+    ordered,
+    positive,
+    two,
+)
 from explorer.errors import DesignError
 from explorer.pose import Pose, Triple
 
@@ -27,6 +36,13 @@ VARIABLES = ("a3x", "a3y", "b1x", "b1y", "b2", "b3")
 
 Pair = tuple[float, float]
 Range = tuple[float, float | None]
+
+CarriageOrder = Literal["home", "any"]
+"""Which carriage comes first on the guide: as in the home pose, or either."""
+
+TOLERANCE = 1e-11
+"""How far a pose may exceed a limit and still keep it, so that rounding breaks none: a share
+of the reach for limits of lengths, in radians for limits of angles. Every limit has this one."""
 
 # Below this share of the design's size a3y, b1y and b3 - b2 are rounding noise.
 DEGENERATE_RATIO = 1e-12
@@ -62,7 +78,8 @@ class Swing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
                 checked = positive(f"limits.swing.{name}", angle)
                 if checked > 180.0:
                     raise DesignError(
-                        f"limits.swing.{name} is a half-angle of at most 180°; got {checked:g}"
+                        f"limits.swing.{name} is a half-angle of at most 180°; got {checked:g}",
+                        f"limits.swing.{name}",
                     )
                 _set(self, name, checked)
 
@@ -74,6 +91,9 @@ class Limits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         l1, d2, d4, l4: (minimum, maximum) length; a maximum of None is the reach |a3|.
         guide: (lowest, highest) carriage position; None for no bound.
         gap: smallest |d1 - d3| between the carriages.
+        carriage_order: "home" demands that d3 - d1 keeps the sign that it has in the design's
+            own home pose, since at d1 = d3 legs 2 and 3 share a point; "any" demands
+            nothing, which is the plain geometry.
         box: (lows, highs) of p; None for no bound.
         margin: smallest |margin| together with the home's sign triple; 0 demands only
             the sign triple, None nothing.
@@ -81,7 +101,8 @@ class Limits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         swing: half-angles of the cones that the joints keep the legs in.
 
     Raises:
-        DesignError: not finite, negative where a length is meant, or reversed.
+        DesignError: not finite, negative where a length is meant, reversed, or a
+            carriage order other than "home" and "any".
     """
 
     l1: Range = (0.0, None)
@@ -90,6 +111,7 @@ class Limits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     l4: Range = (0.0, None)
     guide: Pair | None = None
     gap: float = 0.0
+    carriage_order: CarriageOrder = "home"
     box: tuple[Triple, Triple] | None = None
     margin: float | None = 0.0
     leg_radii: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
@@ -103,13 +125,15 @@ class Limits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
                 high = number(f"limits.{name} maximum", high)
                 if high < low:
                     raise DesignError(
-                        f"limits.{name}: the minimum {low:g} exceeds the maximum {high:g}"
+                        f"limits.{name}: the minimum {low:g} exceeds the maximum {high:g}",
+                        f"limits.{name}",
                     )
             _set(self, name, (low, high))
         if self.guide is not None:
             low, high = ordered("limits.guide", *two("limits.guide", self.guide))
             _set(self, "guide", (low, high))
         _set(self, "gap", not_negative("limits.gap", self.gap))
+        one_of("limits.carriage_order", self.carriage_order, get_args(CarriageOrder))
         if self.box is not None:
             lows, highs = two("limits.box", self.box)
             pairs = [
@@ -202,6 +226,11 @@ class Design(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     def reach(self) -> float:
         """The characteristic length |a3|."""
         return math.hypot(*self.a3)
+
+    @property
+    def tolerance(self) -> float:
+        """How far a limit of a length may be exceeded and is still kept, in design units."""
+        return TOLERANCE * self.reach
 
     @property
     def a2x(self) -> float:

@@ -20,7 +20,20 @@ class InputError(ExplorerError, ValueError):
 
 
 class DesignError(InputError):
-    """A design, or a design file, that describes no usable manipulator."""
+    """A design, or a design file, that describes no usable manipulator.
+
+    Attributes:
+        field: The field of a design file whose name the message begins with, such as
+            `limits.gap`; empty where it begins with none.
+    """
+
+    def __init__(self, message: str, field: str = "") -> None:
+        super().__init__(message)
+        self.field = field
+
+    def said_of(self, subject: str) -> str:
+        """Return the message with another subject in the place of the field's name."""
+        return f"{subject}{str(self).removeprefix(self.field)}"
 
 
 class StorageError(InputError):

@@ -60,15 +60,19 @@ class Box:
         farthest = np.linalg.norm(self.corners[:, start:] - point, axis=1).max()
         return float(np.linalg.norm(nearest - point)), float(farthest)
 
-    def surroundings(self) -> Facets:
-        """Return a block that holds the box and touches it nowhere."""
+    def surroundings(self) -> Box:
+        """Return a box that holds this one and touches it nowhere."""
         more = BEYOND * self.size
-        return Box(self.lows - more, self.highs + more).corners, _BLOCK
+        return Box(self.lows - more, self.highs + more)
+
+    def mesh(self) -> Facets:
+        """Return the corners and faces of the box."""
+        return self.corners, _BLOCK
 
 
 def step_of(radius: float, tolerance: float) -> float:
     """Return the angle between neighbouring corners whose chord is within the tolerance."""
-    return min(WIDEST, 2.0 * math.acos(max(0.5, 1.0 - tolerance / radius)))
+    return min(WIDEST, 4.0 * math.asin(math.sqrt(min(0.25, 0.5 * tolerance / radius))))
 
 
 def facing(

@@ -14,16 +14,15 @@ import numpy as np
 
 from explorer.arrays import FloatArray
 from explorer.design import VARIABLES, Design
-from explorer.errors import InputError
 from explorer.extremes import extent_of, least_margins
 from explorer.home import home_pose
 from explorer.node_measures import node_measures
-from explorer.optimise.facts import clearance_beyond, clearance_margin_of, reach_of
+from explorer.optimise.facts import clearance_beyond, clearance_margin_of, nodes_of, reach_of
 from explorer.pose import yaw_pitch_roll_from_rotation
 from explorer.singularity import inverse_condition, jacobian, margins
 from explorer.solid import Solid
 from explorer.solids import workspace_solid
-from explorer.workspace import NodeCount, workspace_nodes, workspace_volume
+from explorer.workspace import NodeCount, workspace_volume
 
 # Of the reach: the tolerance of the mesh from which the farthest positions are looked for.
 MESH_TOLERANCE = 0.004
@@ -116,19 +115,14 @@ def figures_of(design: Design, solid: Solid | None = None) -> Figures:
     r = home.rotation
     yaw, pitch, roll = yaw_pitch_roll_from_rotation(r).tolist()
     volume = workspace_volume(design, r)
-    try:
-        nodes = workspace_nodes(design, r)
-    except InputError:
-        nodes = None
     margin = clearance_margin_of(design)
-    # Without a volume there may be positions still, all of them on a surface.
-    clearance, nearest = clearance_beyond(design, margin) if volume.volume > 0.0 else (None, None)
+    clearance, nearest = clearance_beyond(design, margin)
     grid = node_measures(design, r, nodes=MEAN_NODES)
     inner = node_measures(design, r, nodes=CONDITION_NODES).positions
     extent = worst = None
     mesh = solid
     if mesh is None and volume.volume > 0.0:
-        mesh = workspace_solid(design, r, MESH_TOLERANCE * design.reach)
+        mesh = workspace_solid(design, r, MESH_TOLERANCE * design.reach, volume=volume)
     if mesh is not None and not mesh.is_empty:
         lows, highs = extent_of(design, r, mesh)
         x, y, z = (highs - lows).tolist()
@@ -141,7 +135,7 @@ def figures_of(design: Design, solid: Solid | None = None) -> Figures:
         roll=roll,
         volume=volume.volume,
         empty_because=volume.empty_because,
-        nodes=nodes,
+        nodes=nodes_of(design),
         reach=reach_of(design),
         extent=extent,
         worst_margin=worst,

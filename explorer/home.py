@@ -7,6 +7,7 @@ mode. At the identity orientation the two lines are parallel, so home is always 
 from __future__ import annotations
 
 import itertools
+from functools import lru_cache
 
 import numpy as np
 
@@ -29,8 +30,11 @@ def home_pose(design: Design) -> Pose:
     those within the limits the one with the largest smallest margin, or where none is,
     the one that exceeds its lengths the least.
     """
-    if design.home is not None:
-        return design.home
+    return design.home or _sought(design)
+
+
+@lru_cache(64)
+def _sought(design: Design) -> Pose:
     rotations = rotation_from_yaw_pitch_roll([(yaw, 0.0, 0.0) for yaw in YAWS])
     positions = _candidates(design)
     p, r = positions[None, :, :], rotations[:, None, :, :]

@@ -6,11 +6,15 @@ import math
 from dataclasses import dataclass
 
 from explorer.arrays import FloatArray
-from explorer.constraints import angle_between, joint_cones, legs
-from explorer.design import JOINTS, LENGTHS, Design
-
-# A pose on a limit is within it, whatever its last bits say.
-SLACK = 1e-12
+from explorer.constraints import (
+    CARRIAGE_ORDER,
+    GAP,
+    angle_between,
+    demanded_order,
+    joint_cones,
+    legs,
+)
+from explorer.design import JOINTS, LENGTHS, TOLERANCE, Design
 
 
 @dataclass(frozen=True)
@@ -18,8 +22,9 @@ class Violation:
     """A broken limit.
 
     Attributes:
-        limit: What is limited: a joint, "gap |d1 − d3|", "box x", "margin κ1", "swing a1", ….
-        value: What it is, in design units; of a swing in degrees.
+        limit: What is limited: a joint, "gap |d1 − d3|", "carriage order", "box x",
+            "margin κ1", "swing a1", ….
+        value: What it is, in design units; of a swing in degrees, of the order d3 − d1.
         bound: What it may be at the most, or at the least.
         above: Whether the value exceeds the bound, rather than falling short of it.
     """
@@ -30,6 +35,10 @@ class Violation:
     above: bool
 
     def __str__(self) -> str:
+        if self.limit == CARRIAGE_ORDER:
+            sign = "negative" if self.above else "positive"
+            text = f"{self.limit}: d3 − d1 = {self.value:.4g}, but it is {sign} in the home pose"
+            return text.replace("-", "−")
         if self.limit.startswith("margin") and self.bound == 0.0:
             sign = "negative" if self.above else "positive"
             text = f"{self.limit} = {self.value:.4g}, but it is {sign} in the home mode"
@@ -47,6 +56,7 @@ def violations(
     joints: FloatArray,
     margin: FloatArray,
     home_signs: tuple[int, int, int],
+    order: int | None = None,
 ) -> tuple[Violation, ...]:
     """Return the limits that a pose breaks, in the order of the design file; none if ().
 
@@ -57,15 +67,16 @@ def violations(
         joints: Those of the pose, shape (6,).
         margin: Those of the pose, shape (3,).
         home_signs: The sign triple of the home pose.
+        order: The sign of d3 − d1 to demand, 0 for either; the one that the design demands
+            if None.
     """
-    limits = design.limits
-    slack = SLACK * design.reach
+    limits, tolerance = design.limits, design.tolerance
     found: list[Violation] = []
 
     def check(name: str, value: float, low: float | None, high: float | None) -> None:
-        if low is not None and value < low - slack:
+        if low is not None and value < low - tolerance:
             found.append(Violation(name, value, low, above=False))
-        if high is not None and value > high + slack:
+        if high is not None and value > high + tolerance:
             found.append(Violation(name, value, high, above=True))
 
     q = dict(zip(JOINTS, joints.tolist(), strict=True))
@@ -74,7 +85,11 @@ def violations(
     if limits.guide is not None:
         check("d1", q["d1"], *limits.guide)
         check("d3", q["d3"], *limits.guide)
-    check("gap |d1 − d3|", abs(q["d1"] - q["d3"]), limits.gap, None)
+    check(GAP, abs(q["d1"] - q["d3"]), limits.gap, None)
+    demanded = demanded_order(design) if order is None else order
+    if demanded:
+        low, high = (0.0, None) if demanded > 0 else (None, 0.0)
+        check(CARRIAGE_ORDER, q["d3"] - q["d1"], low, high)
     if limits.box is not None:
         for axis, value, low, high in zip("xyz", position.tolist(), *limits.box, strict=True):
             check(f"box {axis}", value, low, high)
@@ -92,7 +107,7 @@ def violations(
             if cone.axis is not None:
                 axis = rotation @ cone.axis if cone.in_platform else cone.axis
                 angle = float(angle_between(vectors[cone.leg - 1], axis))
-            if angle > cone.half_angle + SLACK or cone.axis is None:
+            if angle > cone.half_angle + TOLERANCE or cone.axis is None:
                 swing, most = math.degrees(angle), math.degrees(cone.half_angle)
                 found.append(Violation(f"swing {cone.joint}", swing, most, above=True))
     return tuple(found)

@@ -35,6 +35,7 @@ from explorer.validity import (
     RADII,
     SIGNS,
     Rules,
+    carriages_apart,
     keeps_all,
     vector,
     write_ends,
@@ -226,7 +227,7 @@ def limits_share(
     share = min(share, share_left(left, speeds[1], tolerance))
     left = min(d3 - row[GUIDE_LOW], row[GUIDE_HIGH] - d3)
     share = min(share, share_left(left, speeds[2], tolerance))
-    share = min(share, share_left(abs(d1 - d3) - row[GAP], speeds[11], tolerance))
+    share = min(share, share_left(carriages_apart(row, d1, d3) - row[GAP], speeds[11], tolerance))
     for leg in range(4):
         square = 0.0
         for i in range(3):
@@ -312,7 +313,7 @@ def write_speeds(
     """Write bounds of the speeds over a move, per share, shape (12,).
 
     Of the platform ends of the legs (4), of the angle, of κ1 to κ3, of b4 on each axis
-    (3), and of the gap of the carriages.
+    (3), and of the distance of the carriages.
     """
     forward = math.sqrt(step[0] ** 2 + step[1] ** 2 + step[2] ** 2)
     ends = ((row[B1], row[B1 + 1]), (row[B2], 0.0), (row[B3], 0.0), (0.0, 0.0))

@@ -78,7 +78,18 @@ def nearest_singularities(
         design: The manipulator.
         pose: Of its platform; it may be singular itself.
     """
-    found = nearest_singular_poses(design, pose.position, pose.rotation)
+    return each_singularity(nearest_singular_poses(design, pose.position, pose.rotation), pose)
+
+
+def each_singularity(
+    found: NearestPoses, pose: Pose
+) -> tuple[NearestSingularity, NearestSingularity, NearestSingularity]:
+    """Return the nearest singular pose of each incidence, in the order κ1, κ2, κ3.
+
+    Args:
+        found: The nearest singular poses of one pose.
+        pose: That pose.
+    """
 
     def one(index: int) -> NearestSingularity:
         distance, bound = float(found.distance[index]), float(found.bound[index])
@@ -224,6 +235,27 @@ def angles_at(r: FloatArray) -> tuple[float, float]:
     return math.atan2(-ny, nz), math.atan2(up, ex * r[0, 1] + ey * r[1, 1] + ez * r[2, 1])
 
 
+@helper
+def copy_rotation(rotation: FloatArray, into: FloatArray) -> None:
+    """Copy a rotation (3, 3) by its elements, for which Numba compiles far less code."""
+    for i in range(3):
+        for j in range(3):
+            into[i, j] = rotation[i, j]
+
+
+@helper
+def copy_pose(
+    position: FloatArray,
+    rotation: FloatArray,
+    into_position: FloatArray,
+    into_rotation: FloatArray,
+) -> None:
+    """Copy a position (3,) and a rotation (3, 3)."""
+    for i in range(3):
+        into_position[i] = position[i]
+    copy_rotation(rotation, into_rotation)
+
+
 @kernel(
     "void(f8[:,::1], f8[::1], f8[:,::1], f8[:,::1], f8[:,:,::1],"
     " f8[:,::1], f8[:,::1], f8[:,:,::1], f8[:,:,:,::1])"
@@ -261,13 +293,14 @@ def nearest_rows(
         for i in range(3):
             g[i] = p[i] + r[i, 0] * c[0] + r[i, 1] * c[1]
             distance[row, i] = bound[row, i] = 0.0
-            q[i], s[i] = p, r
+            copy_pose(p, r, q[i], s[i])
         off = r[0, 2] * p[0] + r[1, 2] * p[1] + r[2, 2] * p[2]
         if abs(off) > ROUNDING * size:
             square = write_a1_on_plane(g, r, c, forms, q[0], s[0])
             way = mean_way(points, p, r, q[0], s[0])
             if shorter_shift(way, off, r[0, 2], r[1, 2], r[2, 2], p, q[0]):
-                s[0], way = r, abs(off)
+                copy_rotation(r, s[0])
+                way = abs(off)
             distance[row, 0], bound[row, 0] = way, min(way, math.sqrt(max(0.0, square)))
         across = math.hypot(r[1, 0], r[2, 0])
         off = r[1, 0] * p[2] - r[2, 0] * p[1]
@@ -288,14 +321,17 @@ def nearest_rows(
             write_on_plane(phi, sigma, k, c, g, near_s, near_q)
             near_way = mean_way(points, p, r, near_q, near_s)
             if near_way < way:
-                q[1], s[1], way = near_q, near_s, near_way
+                copy_pose(near_q, near_s, q[1], s[1])
+                way = near_way
             off /= across
             if shorter_shift(way, off, 0.0, -r[2, 0] / across, r[1, 0] / across, p, q[1]):
-                s[1], way = r, abs(off)
+                copy_rotation(r, s[1])
+                way = abs(off)
             distance[row, 1], bound[row, 1] = way, min(way, math.sqrt(max(0.0, square)))
         if abs(p[2]) > ROUNDING * size:
             square = write_b4_on_plane(g, r, c, forms, q[2], s[2])
             way = mean_way(points, p, r, q[2], s[2])
             if shorter_shift(way, p[2], 0.0, 0.0, 1.0, p, q[2]):
-                s[2], way = r, abs(p[2])
+                copy_rotation(r, s[2])
+                way = abs(p[2])
             distance[row, 2], bound[row, 2] = way, min(way, math.sqrt(max(0.0, square)))

@@ -17,10 +17,9 @@ from scipy.spatial.transform import Rotation
 
 from explorer.arrays import BoolArray, FloatArray, finite_array, for_kernel
 from explorer.compiled import kernel
-from explorer.constraints import home_signs, joint_cones
-from explorer.design import JOINTS, LENGTHS, Design
+from explorer.constraints import demanded_order, home_signs, joint_cones
+from explorer.design import JOINTS, LENGTHS, TOLERANCE, Design
 from explorer.errors import InputError
-from explorer.limits import SLACK
 from explorer.pose import checked_rotation, rotation_from_quaternion, rotation_from_yaw_pitch_roll
 
 # The most orientations of one set.
@@ -141,8 +140,8 @@ def orientation_capability(
 def orientations_within(design: Design, position: ArrayLike, rotations: ArrayLike) -> BoolArray:
     """Return which orientations a position can have within all limits, shape (n,).
 
-    The limits are those of `explorer.limits.violations`: lengths, guide, gap, box, margin
-    with the home's sign triple, and swing cones.
+    The limits are those of `explorer.limits.violations`: lengths, guide, gap, the
+    carriages' order, box, margin with the home's sign triple, and swing cones.
 
     Args:
         design: The manipulator.
@@ -158,7 +157,7 @@ def orientations_within(design: Design, position: ArrayLike, rotations: ArrayLik
     if r.ndim != 3 or not len(r):
         raise InputError(f"rotations must have the shape (n, 3, 3); got {r.shape}")
     within = np.zeros(len(r), dtype=np.bool_)
-    limits, slack = design.limits, SLACK * design.reach
+    limits, slack = design.limits, design.tolerance
     if limits.box is not None:
         lows, highs = np.array(limits.box)
         if (p < lows - slack).any() or (p > highs + slack).any():
@@ -175,7 +174,7 @@ def orientations_within(design: Design, position: ArrayLike, rotations: ArrayLik
     cones = np.array(
         [
             # A leg without a length at home keeps no cone.
-            (cone.leg, cone.in_platform, *cone.axis, cone.half_angle + SLACK)
+            (cone.leg, cone.in_platform, *cone.axis, cone.half_angle + TOLERANCE)
             if cone.axis is not None
             else (cone.leg, cone.in_platform, 0.0, 0.0, 0.0, -1.0)
             for cone in joint_cones(design)
@@ -189,19 +188,21 @@ def orientations_within(design: Design, position: ArrayLike, rotations: ArrayLik
         for_kernel(r),
         ranges + [-slack, slack],
         demands - [0.0, slack],
+        float(demanded_order(design)),
         cones,
         within,
     )
     return within
 
 
-@kernel("void(f8[::1], f8[::1], f8[:,:,::1], f8[:,::1], f8[:,::1], f8[:,::1], b1[::1])")
+@kernel("void(f8[::1], f8[::1], f8[:,:,::1], f8[:,::1], f8[:,::1], f8, f8[:,::1], b1[::1])")
 def keep_limits(
     variables: FloatArray,
     p: FloatArray,
     rotations: FloatArray,
     ranges: FloatArray,
     demands: FloatArray,
+    order: float,
     cones: FloatArray,
     within: BoolArray,
 ) -> None:
@@ -214,6 +215,7 @@ def keep_limits(
         ranges: (lowest, highest) of each joint and of the gap, shape (7, 2).
         demands: (sign, least) of each margin, of which the product with the sign may not
             be less; minus infinity twice for no demand, shape (3, 2).
+        order: The sign of d3 − d1 that is demanded, 0 for either.
         cones: (leg, in platform, axis, half-angle), shape (k, 6).
         within: Written: whether all limits are kept, shape (n,).
     """
@@ -232,7 +234,7 @@ def keep_limits(
         l1 = math.hypot(math.hypot(legs[0, 0], legs[0, 1]), legs[0, 2])
         d2 = math.hypot(legs[1, 1], legs[1, 2])
         d4 = math.hypot(legs[2, 1], legs[2, 2])
-        gap = abs(d1 - d3)
+        gap = order * (d3 - d1) if order != 0.0 else abs(d3 - d1)
         if not (
             ranges[0, 0] <= l1 <= ranges[0, 1]
             and ranges[1, 0] <= d1 <= ranges[1, 1]

@@ -94,8 +94,9 @@ def plan_path(
 ) -> PlannedPath:
     """Return a path from a pose to another that keeps limits, margins and clearances.
 
-    The margins keep the sign triple of the start, whatever mode the home has. Where it can, the
-    path also stays off singularities and collisions, by a share of what both ends keep.
+    The margins keep the sign triple of the start, whatever mode the home has, and the carriages
+    keep the order that they have there. Where it can, the path also stays off singularities and
+    collisions, by a share of what both ends keep.
 
     Args:
         design: The manipulator.
@@ -121,7 +122,7 @@ def plan_path(
     _check_same_order(*ends)
     began = time.perf_counter()
     planner = _Planner(design, start, goal, seed)
-    exact = Rules.of(design, ends[0].signs)
+    exact = Rules.of(design, ends[0].signs, _order(ends[0]))
     margin, clearance = _comfort(*ends)
     comfortable = exact.with_room(margin, clearance)
     path = planner.straight(comfortable, margin, clearance)
@@ -227,11 +228,18 @@ def _check_same_mode(start: Snapshot, goal: Snapshot) -> None:
 
 
 def _check_within(name: str, snapshot: Snapshot, signs: tuple[int, int, int]) -> None:
+    # Of the carriages' order the two ends tell together, see `_check_same_order`.
     position = np.array(snapshot.pose.position)
     broken = [
         str(each)
         for each in violations(
-            snapshot.design, position, snapshot.rotation, snapshot.joints, snapshot.margins, signs
+            snapshot.design,
+            position,
+            snapshot.rotation,
+            snapshot.joints,
+            snapshot.margins,
+            signs,
+            order=0,
         )
     ]
     clearances = snapshot.clearances.clearance.tolist()
@@ -241,6 +249,11 @@ def _check_within(name: str, snapshot: Snapshot, signs: tuple[int, int, int]) ->
             broken.append(f"legs {first} and {second} collide (clearance {shown})")
     if broken:
         raise EndError("outside limits", f"the {name} is outside the limits: {'; '.join(broken)}")
+
+
+def _order(snapshot: Snapshot) -> int:
+    """Return the sign of d3 − d1."""
+    return int(np.sign(snapshot.joints[3] - snapshot.joints[1]))
 
 
 def _check_same_order(start: Snapshot, goal: Snapshot) -> None:

@@ -1,20 +1,21 @@
 """From limits to closed meshes: what of each limit's primitive solid meets the workspace.
 
 Everything is done in a frame in which the workspace has size one, so that designs of any
-size are tessellated alike. Limits that hold all over the workspace's box are left out.
+size are tessellated alike. The limits cut a block, and those that hold all over it are left out.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
 from explorer.arrays import FloatArray
 from explorer.constraints import Cone, Constraint, HalfSpace, Round
+from explorer.contraction import contracted
 from explorer.errors import InputError
 from explorer.facets import (
     Box,
@@ -79,6 +80,21 @@ class Frame:
         """The tolerance in this frame."""
         return self.tolerance / self.scale
 
+    def finer(self, ratio: float) -> Frame:
+        """Return the same frame with a tolerance that is smaller by a ratio."""
+        return replace(self, tolerance=self.tolerance / ratio)
+
+    def contracted(self, limits: Sequence[Constraint]) -> Frame | None:
+        """Return a frame around less that still holds what keeps all limits, as fine as if new.
+
+        None if nothing keeps them.
+        """
+        ends = contracted(limits, self.back(self.box.lows), self.back(self.box.highs))
+        if ends is None:
+            return None
+        scale = float((ends[1] - ends[0]).max())
+        return frame_around(*ends, min(self.tolerance, DEFAULT_TOLERANCE * scale))
+
     def to(self, points: FloatArray) -> FloatArray:
         """Return points (..., 3) in this frame."""
         return (points - self.middle) / self.scale
@@ -108,26 +124,42 @@ def frame_of(
     # Where all are empty any frame will do.
     lows = np.min([low for low, _ in boxes], axis=0) if boxes else np.zeros(3)
     highs = np.max([high for _, high in boxes], axis=0) if boxes else np.full(3, reach)
-    middle, scale = 0.5 * (lows + highs), float((highs - lows).max())
+    scale = float((highs - lows).max())
     chord = min(tolerance or DEFAULT_TOLERANCE * min(reach, scale), COARSEST * scale)
-    return Frame(middle, scale, chord, Box((lows - middle) / scale, (highs - middle) / scale))
+    return frame_around(lows, highs, chord)
 
 
-def pieces_of(limits: Sequence[Constraint], frame: Frame) -> list[Piece]:
+def frame_around(lows: FloatArray, highs: FloatArray, tolerance: float) -> Frame:
+    """Return the frame for what lies in a box; all in design units."""
+    middle, scale = 0.5 * (lows + highs), float((highs - lows).max())
+    return Frame(middle, scale, tolerance, Box((lows - middle) / scale, (highs - middle) / scale))
+
+
+def pieces_of(
+    limits: Sequence[Constraint], frame: Frame, *, contracted: bool = False
+) -> list[Piece]:
     """Return the primitives whose intersection, less those that cut, keeps all limits.
 
     () if nothing does, as far as that is seen at once.
+
+    Args:
+        limits: Of one workspace.
+        frame: In which they are made.
+        contracted: Whether the frame's box holds this workspace more tightly than its limits say.
     """
     ends = _box_of(limits)
     if ends is None:
         return []
     region = region_of(limits)
-    box = Box(frame.to(ends[0]), frame.to(ends[1]))
+    box = frame.box if contracted else Box(frame.to(ends[0]), frame.to(ends[1]))
+    # The box ends on surfaces of limits, on which side of them is up to rounding. The block
+    # goes beyond them, so that whether it keeps a limit is no question of rounding.
+    block = box.surroundings()
     planes = [end for end in (region.of_low, region.of_high, *region.of_planes) if end is not None]
-    found = [Piece("", False, 12, box.surroundings)]
+    found = [Piece("", False, 12, block.mesh)]
     for each in (
-        *(_half_space(plane, box, frame) for plane in planes),
-        *_rounds(region.of_rounds, box, frame),
+        *(_half_space(plane, box, block, frame) for plane in planes),
+        *_rounds(region.of_rounds, box, block, frame),
         *(_cone(limit, frame) for limit in limits if isinstance(limit, Cone)),
     ):
         if each is False:
@@ -143,21 +175,20 @@ def _box_of(limits: Sequence[Constraint]) -> tuple[FloatArray, FloatArray] | Non
     return None if region.is_empty or not (lows < highs).all() else (lows, highs)
 
 
-def _half_space(plane: HalfSpace, box: Box, frame: Frame) -> Piece | bool:
-    """Return the piece, or whether the box keeps or breaks the limit all over."""
+def _half_space(plane: HalfSpace, box: Box, block: Box, frame: Frame) -> Piece | bool:
+    """Return the piece, True if all the block keeps it, or False if all the box breaks it."""
     length = float(np.linalg.norm(plane.normal))
     normal = plane.normal / length
     offset = (plane.offset / length - float(normal @ frame.middle)) / frame.scale
-    heights = box.corners @ normal
-    if float(heights.max()) < offset:
+    if float((block.corners @ normal).max()) < offset:
         return True
-    if float(heights.min()) >= offset:
+    if float((box.corners @ normal).min()) >= offset:
         return False
     return Piece(plane.name, False, 12, partial(half_space, normal, offset, frame.box))
 
 
-def _rounds(rounds: Sequence[Round], box: Box, frame: Frame) -> Iterator[Piece | bool]:
-    """Yield the pieces, or whether the box keeps or breaks the limit all over."""
+def _rounds(rounds: Sequence[Round], box: Box, block: Box, frame: Frame) -> Iterator[Piece | bool]:
+    """Yield the pieces, True if all the block keeps one, or False if all the box breaks it."""
     kin: dict[tuple[bool, bytes], list[Round]] = {}
     for each in rounds:
         kin.setdefault((each.is_ball, each.centre.tobytes()), []).append(each)
@@ -165,17 +196,20 @@ def _rounds(rounds: Sequence[Round], box: Box, frame: Frame) -> Iterator[Piece |
         # Concentric surfaces share a pattern, so that shells thinner than a chord are whole.
         start = 0 if group[0].is_ball else 1
         centre = frame.to(group[0].centre)[start:]
-        radii = [each.radius / frame.scale for each in group]
-        near, far = box.distances(centre)
-        parts = [
-            facing(centre, radius, frame.box, frame.chord) for radius in radii if radius > near
-        ]
-        angle = max((part[1] for part in parts), default=math.pi)
-        step = step_of(max(radii), frame.chord)
-        for each, radius in zip(group, radii, strict=True):
-            if radius <= near or radius > far:
+        (near, far), beyond = box.distances(centre), block.distances(centre)[1]
+        bounding: list[tuple[Round, float]] = []
+        for each in group:
+            radius = each.radius / frame.scale
+            if radius <= near or radius > (beyond if each.inside else far):
                 yield (radius <= near) != each.inside
-                continue
+            else:
+                bounding.append((each, radius))
+        if not bounding:
+            continue
+        parts = [facing(centre, radius, frame.box, frame.chord) for _, radius in bounding]
+        angle = max(part[1] for part in parts)
+        step = step_of(max(radius for _, radius in bounding), frame.chord)
+        for each, radius in bounding:
             towards = parts[0][0]
             if each.is_ball:
                 faces = ball_faces(angle, step)

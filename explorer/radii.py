@@ -22,6 +22,7 @@ from explorer.moves import move_clearances
 from explorer.pose import checked_rotation
 from explorer.reachable_nodes import Survey, middles_over, survey
 from explorer.solids import workspace_solid
+from explorer.stages import Stages, Watch, unwatched
 from explorer.start import check_start
 from explorer.workspace import home_rotation, workspace_volume
 
@@ -29,6 +30,8 @@ DEFAULT_CELLS = 40
 POINTS = 60
 # Of the narrowest place of a step, as a share of the reach.
 TOLERANCE = 1e-4
+# Stages of the computation.
+STAGES = 4
 # Radii that differ by less than this share are one.
 SAME = 1e-9
 
@@ -85,6 +88,7 @@ def radius_curve(
     *,
     start: ArrayLike | None = None,
     cells: int = DEFAULT_CELLS,
+    watch: Watch = unwatched,
 ) -> RadiusCurve:
     """Return the reachable volume against the radius of all legs; the design's count not.
 
@@ -93,6 +97,7 @@ def radius_curve(
         rotation: Platform to base, shape (3, 3); that of the home pose if None.
         start: The position that is to be connected, shape (3,); that of the home if None.
         cells: Of the grid, on each axis of the workspace's extent.
+        watch: Called before each stage.
 
     Raises:
         InputError: the start breaks a limit, or legs cross there.
@@ -100,20 +105,25 @@ def radius_curve(
     r = home_rotation(design) if rotation is None else checked_rotation(rotation)
     p = np.array(home_pose(design).position) if start is None else np.array(start, dtype=float)
     thin = with_radius(design, 0.0)
-    whole = workspace_solid(thin, r)
+    stages = Stages(watch, STAGES)
+    stages.begin("solid of the limits")
+    exact = workspace_volume(thin, r, explain=False)
+    whole = workspace_solid(thin, r, volume=exact)
     if whole.is_empty:
         return RadiusCurve(np.zeros(1), np.zeros(1), least_clearances(thin, r))
     check_start(thin, r, p)
+    stages.begin("least clearances")
     least = least_clearances(thin, r)
+    stages.begin("grid of positions")
     lows, highs = whole.vertices.min(axis=0), whole.vertices.max(axis=0)
     found = survey(thin, r, middles_over(lows, highs, cells))
+    stages.begin("widest ways")
     widest = 0.5 * _widest(found, p)[found.within]
     radii = np.linspace(0.0, float(widest.max(initial=0.0)), POINTS)
     # A cell is reached with radii up to its own, to rounding.
     left = len(widest) - np.searchsorted(np.sort(widest), (1.0 - SAME) * radii)
     shares = np.append(left / max(1, len(widest)), 0.0)
-    volume = workspace_volume(thin, r).volume
-    return RadiusCurve(np.append(radii, radii[-1]), shares * volume, least)
+    return RadiusCurve(np.append(radii, radii[-1]), shares * exact.volume, least)
 
 
 def with_radius(design: Design, radius: float) -> Design:

@@ -35,6 +35,7 @@ from explorer.reachable_nodes import (
 from explorer.region import region_of
 from explorer.solid import Solid
 from explorer.solids import Surface, carved_solid, workspace_solid
+from explorer.stages import Stages, Watch, unwatched
 from explorer.start import check_start
 from explorer.workspace import (
     check_node_count,
@@ -53,6 +54,8 @@ BEYOND = 2
 TOUCHING = 1e-4
 # Nodes of the paper's grid, whose steps are all looked at.
 MOST_PAPER_NODES = 2_000_000
+# Stages of the computation besides those of single pairs.
+FIXED_STAGES = 5
 CUBE = np.ones((3, 3, 3), dtype=np.bool_)
 PAIR_NAMES = tuple(f"legs {first}–{second}" for first, second in PAIRS)
 """What the faces come from that lie where a pair begins to collide."""
@@ -86,8 +89,9 @@ class ReachableWorkspace:
         reachable_volume: Of what can be reached.
         solid: What can be reached.
         step: Of the paper's grid of nodes, see `explorer.workspace.NodeCount`.
-        node_count: How many of its nodes lie within the limits.
-        reachable_node_count: How many of these can be reached by steps of the grid.
+        node_count: How many of its nodes lie within the limits; None if not counted.
+        reachable_node_count: How many of these can be reached by steps of the grid; None
+            if not counted.
         pairs: In the order of `PAIRS`.
     """
 
@@ -95,8 +99,8 @@ class ReachableWorkspace:
     reachable_volume: float
     solid: Solid
     step: float
-    node_count: int
-    reachable_node_count: int
+    node_count: int | None
+    reachable_node_count: int | None
     pairs: tuple[PairCost, ...]
 
     @property
@@ -112,7 +116,9 @@ def reachable_workspace(
     start: ArrayLike | None = None,
     nodes: int = DEFAULT_NODES,
     node_step: float | None = None,
+    most_nodes: int | None = None,
     tolerance: float | None = None,
+    watch: Watch = unwatched,
 ) -> ReachableWorkspace:
     """Return what can be reached at one orientation without a collision of legs.
 
@@ -122,8 +128,11 @@ def reachable_workspace(
         start: The position that is to be connected, shape (3,); that of the home if None.
         nodes: Of the grid, on each axis of the workspace's extent.
         node_step: Of the paper's grid of nodes, as of `explorer.workspace_nodes`.
+        most_nodes: The most nodes of the paper's grid that are counted; the counts of a
+            finer grid are None. If this is None, too fine a grid is refused.
         tolerance: Of the solid where limits bound it, as of `explorer.workspace_solid`.
             Where collisions do, faces are as long as the step of the grid.
+        watch: Called before each stage.
 
     Raises:
         InputError: the start collides or breaks a limit, or a number is out of range.
@@ -135,31 +144,33 @@ def reachable_workspace(
             f"the nodes on an axis must be from {FEWEST_NODES} to {MOST_NODES}; got {nodes}"
         )
     limits = constraints(design, r)
-    whole = workspace_solid(design, r, tolerance)
+    stages = Stages(watch, FIXED_STAGES + len(ALL_PAIRS))
+    stages.begin("solid of the limits")
+    exact = workspace_volume(design, r, explain=False)
+    whole = workspace_solid(design, r, tolerance, volume=exact)
     step = node_step_of(design, node_step)
+    stages.begin("least clearances")
     least = least_clearances(design, r)
     if whole.is_empty:
         pairs = (_cost(pair, least, 0.0) for pair in ALL_PAIRS)
         return ReachableWorkspace(0.0, 0.0, whole, step, 0, 0, tuple(pairs))
     check_start(design, r, p)
-    volume = workspace_volume(design, r).volume
-    carver = _Carver(design, r, limits, p, whole, volume, tolerance, nodes)
+    volume = exact.volume
+    stages.begin("grid of positions")
+    carver = _Carver(design, r, p, whole, volume, nodes)
     blocking = [pair for pair in ALL_PAIRS if least.bound[pair] <= 0.0 and carver.blocks(pair)]
+    alone = blocking if len(blocking) > 1 else []
+    stages.count = FIXED_STAGES + len(alone)
+    stages.begin("collisions of all legs")
     solid, reachable = carver.carved(blocking)
-    costs = [
-        _cost(pair, least, _blocked(carver, pair, blocking, volume - reachable))
-        for pair in ALL_PAIRS
-    ]
-    within, reached = _paper_nodes(design, r, limits, p, step)
-    return ReachableWorkspace(volume, reachable, solid, step, within, reached, tuple(costs))
-
-
-def _blocked(carver: _Carver, pair: int, blocking: Sequence[int], all_blocked: float) -> float:
-    if pair not in blocking:
-        return 0.0
-    if len(blocking) == 1:
-        return all_blocked
-    return max(0.0, carver.volume - carver.carved([pair])[1])
+    blocked = dict.fromkeys(blocking, volume - reachable)
+    for pair in alone:
+        stages.begin(f"collisions of {PAIR_NAMES[pair]}")
+        blocked[pair] = max(0.0, volume - carver.carved([pair])[1])
+    costs = [_cost(pair, least, blocked.get(pair, 0.0)) for pair in ALL_PAIRS]
+    stages.begin("nodes of the grid")
+    counts = _paper_nodes(design, r, limits, p, step, most_nodes)
+    return ReachableWorkspace(volume, reachable, solid, step, *counts, tuple(costs))
 
 
 def _cost(pair: int, least: LeastClearances, blocked: float) -> PairCost:
@@ -173,9 +184,17 @@ def _paper_nodes(
     limits: tuple[Constraint, ...],
     start: FloatArray,
     step: float,
-) -> tuple[int, int]:
-    """Return how many nodes of the paper's grid are within the limits, and are reached."""
+    most: int | None,
+) -> tuple[int, int] | tuple[None, None]:
+    """Return how many nodes of the paper's grid are within the limits, and are reached.
+
+    None for both if the grid has more nodes than a given number.
+    """
     first, many = node_range(region_of(limits), step)
+    with np.errstate(over="ignore"):
+        is_fine = most is not None and not float(np.prod(many)) <= most
+    if is_fine:
+        return None, None
     check_node_count(many, step, MOST_PAPER_NODES)
     if not many.all():
         return 0, 0
@@ -190,11 +209,9 @@ class _Carver:
     Args:
         design: The manipulator.
         rotation: Platform to base, shape (3, 3).
-        limits: Of the design at that orientation.
         start: A position without trouble, shape (3,).
         whole: The workspace within the limits.
         volume: Its exact volume.
-        tolerance: Of the solid.
         nodes: On each axis.
     """
 
@@ -202,15 +219,13 @@ class _Carver:
         self,
         design: Design,
         rotation: FloatArray,
-        limits: tuple[Constraint, ...],
         start: FloatArray,
         whole: Solid,
         volume: float,
-        tolerance: float | None,
         nodes: int,
     ) -> None:
-        self.design, self.rotation, self.limits, self.start = design, rotation, limits, start
-        self.whole, self.volume, self.tolerance, self.nodes = whole, volume, tolerance, nodes
+        self.design, self.rotation, self.start = design, rotation, start
+        self.whole, self.volume, self.nodes = whole, volume, nodes
         self.radii = radii_of_pairs(design)
 
     @cached_property
@@ -233,12 +248,8 @@ class _Carver:
 
     def carved(self, pairs: Sequence[int]) -> tuple[Solid, float]:
         """Return the part with the start where none of these pairs collides, and its volume."""
-        args = (self.design, self.limits)
-        if not pairs:
-            solid = carved_solid(*args, None, self.start, self.tolerance)
-        else:
-            surface = self._surface(pairs)
-            solid = carved_solid(*args, surface, self.start, self.tolerance)
+        surface = self._surface(pairs) if pairs else None
+        solid = carved_solid(self.whole, surface, self.start)
         # What facets lack at the limits they lack of both, so the difference is exact there.
         return solid, max(0.0, self.volume - max(0.0, self.whole.volume - solid.volume))
 

@@ -17,13 +17,12 @@ import numpy as np
 
 from explorer.arrays import BoolArray, FloatArray, IntArray
 from explorer.clearance import PAIRS, leg_clearances
-from explorer.constraints import constraints, slacks
+from explorer.constraints import constraints, keeps
 from explorer.design import Design
 from explorer.moves import pairs_are_clear
 
 ALL_PAIRS = tuple(range(len(PAIRS)))
-# A node on a limit keeps it, and one where axes are as near as this touches; shares of
-# the reach.
+# Legs touch at a node where their axes are as near as this; a share of the reach.
 SLACK = 1e-9
 
 
@@ -159,7 +158,7 @@ def survey(design: Design, rotation: FloatArray, grid: Grid) -> Survey:
     """
     positions = grid.positions
     slack = SLACK * design.reach
-    kept = slacks(constraints(design, rotation), positions) >= -slack
+    kept = keeps(design, constraints(design, rotation), positions)
     clearance = leg_clearances(design, positions, rotation).clearance
     index = np.arange(math.prod(grid.counts)).reshape(grid.counts)
     ends = [

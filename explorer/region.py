@@ -30,6 +30,8 @@ class Region:
         low, high: The range of x; no position if low exceeds high.
         of_rounds, of_planes: The limits that the rows stand for.
         of_low, of_high: The limits that are the ends, None where a ball ends the region.
+        is_flat: Whether one surface is to be kept both inside and outside, so that the region
+            has no volume, although positions on the surface keep all limits.
     """
 
     rounds: FloatArray
@@ -41,11 +43,12 @@ class Region:
     of_planes: tuple[HalfSpace, ...]
     of_low: HalfSpace | None
     of_high: HalfSpace | None
+    is_flat: bool
 
     @property
     def is_empty(self) -> bool:
-        """Whether it is known to be empty without looking closer."""
-        return not self.low < self.high
+        """Whether it is known to have no volume without looking closer."""
+        return self.is_flat or not self.low < self.high
 
 
 def region_of(limits: Sequence[Constraint]) -> Region:
@@ -53,7 +56,7 @@ def region_of(limits: Sequence[Constraint]) -> Region:
     balls = [c for c in limits if isinstance(c, Round)]
     size = max(ball.radius + float(np.abs(ball.centre).max()) for ball in balls)
     same = SAME * max(size, 1e-300)
-    rounds, contradiction = _distinct(balls, same)
+    rounds, is_flat = _distinct(balls, same)
     low, high = -math.inf, math.inf
     of_low: HalfSpace | None = None
     of_high: HalfSpace | None = None
@@ -74,7 +77,7 @@ def region_of(limits: Sequence[Constraint]) -> Region:
             high, of_high = end, each
         elif each.normal[0] < 0.0 and end > low:
             low, of_low = end, each
-    if contradiction or any(isinstance(each, Never) for each in limits):
+    if any(isinstance(each, Never) for each in limits):
         high = -math.inf
     return Region(
         rounds=np.array(
@@ -94,19 +97,20 @@ def region_of(limits: Sequence[Constraint]) -> Region:
         of_planes=tuple(planes),
         of_low=of_low,
         of_high=of_high,
+        is_flat=is_flat,
     )
 
 
 def _distinct(balls: list[Round], same: float) -> tuple[list[Round], bool]:
-    """Return the surfaces once each, and whether one is to be kept inside and outside."""
+    """Return the surfaces once for each side, and whether one is to be kept on both sides."""
     kept: list[Round] = []
+    is_flat = False
     for each in balls:
-        twin = next((other for other in kept if _is_same(each, other, same)), None)
-        if twin is None:
+        twins = [other for other in kept if _is_same(each, other, same)]
+        is_flat = is_flat or any(twin.inside != each.inside for twin in twins)
+        if all(twin.inside != each.inside for twin in twins):
             kept.append(each)
-        elif twin.inside != each.inside:
-            return kept, True
-    return kept, False
+    return kept, is_flat
 
 
 def _is_same(a: Round, b: Round, same: float) -> bool:

@@ -66,6 +66,16 @@ def mode_name(mode: int) -> str:
     return " ".join("+" if sign > 0 else "−" for sign in signs_of(mode))
 
 
+def mode_words(modes: tuple[int, ...]) -> str:
+    """Return the modes that meet in a pose, such as "boundary of modes 1 and 3", or "5"."""
+    if len(modes) == 1:
+        return str(modes[0])
+    if len(modes) == 8:
+        return "boundary of all eight modes"
+    *most, last = modes
+    return f"boundary of modes {', '.join(map(str, most))} and {last}"
+
+
 def tetrahedron_volumes(design: Design, margin: FloatArray) -> FloatArray:
     """Return the volumes (..., 3) of the three tetrahedra, in cubed design units.
 

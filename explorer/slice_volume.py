@@ -1,8 +1,9 @@
 """Exact volumes of regions bounded by spheres, cylinders along x, and planes.
 
 The area of the slices is integrated along x, piece by piece between its breaks, by
-Gauss-Legendre quadrature, which converges to rounding since the pieces are analytic.
-Rows of circles and planes as in `explorer.slices`.
+Gauss-Legendre quadrature, which converges to rounding since the pieces are analytic. How fast
+depends on what the curves do just beyond a piece, so the worst piece is halved until the
+estimated error of all is rounding. Rows of circles and planes as in `explorer.slices`.
 """
 
 from __future__ import annotations
@@ -12,28 +13,140 @@ import math
 import numpy as np
 
 from explorer.arrays import FloatArray
+from explorer.break_points import region_size
 from explorer.breaks import find_breaks
-from explorer.compiled import kernel
+from explorer.compiled import helper, kernel
 from explorer.slices import slice_area
 
-# Pieces that the x-range of one region is cut into at the most.
-PIECES = 400
+# Breaks that one region has at the most, and pieces.
+MOST_BREAKS, MOST_PIECES = 1000, 1100
 # Arcs that the other curves may forbid on one curve, each twice if it passes angle zero.
-MOST = 64
-# A break need only be known to this share of a piece: the error is of a higher power.
-BISECTED = 1e-6
-# A cut this near to an end of a piece, as a share of it, is that end.
-SLIVER = 1e-5
+MOST_ARCS = 64
+# Slices from which on no piece is halved.
+MOST_SLICES = 2000
+# Errors, as shares of the volume and of the surface, down to which pieces are halved.
+VOLUME_TOLERANCE, SURFACE_TOLERANCE = 1e-13, 1e-9
+# Where halving leaves more than this share of an error, so many times, it is rounding.
+STALLED, MOST_STALLS = 0.8, 3
+# The fastest decay of four coefficients that is extrapolated.
+FASTEST = 0.3
+# Rounding, as a share of the terms of a sum, and of the size by which surfaces are displaced.
+ROUNDING = 2.0**-48
+# What the row of a piece begins with: its ends, how often halving it has not helped, its volume
+# and weighted surface, the errors of both, and the sizes of the terms that its areas sum.
+START, END, STALLS, VOLUME, SURFACE, VOLUME_ERROR, SURFACE_ERROR, TERMS, HEAD = range(9)
 
 
-@kernel("void(f8[:,::1], f8[:,::1], f8, f8, f8[::1], f8[::1], f8[::1], f8[:,::1], f8[:,::1])")
+@helper
+def largest(values: FloatArray, start: int) -> float:
+    """Return the largest size among four values."""
+    found = 0.0
+    for k in range(start, start + 4):
+        found = max(found, abs(values[k]))
+    return found
+
+
+@helper
+def quadrature_error(last: FloatArray, many: int) -> float:
+    """Return what a quadrature of so many nodes misses, from its last eight coefficients.
+
+    The coefficients of an analytic integrand decay geometrically on the whole, four by four;
+    the quadrature misses those of twice as many degrees as it has nodes.
+    """
+    before, after = largest(last, 0), largest(last, 4)
+    decay = min(1.0, max(FASTEST, after / before)) if before > 0.0 else 1.0
+    return after * decay ** (0.25 * many)
+
+
+@helper
+def integrate_piece(
+    piece: FloatArray,
+    circles: FloatArray,
+    planes: FloatArray,
+    bearings: FloatArray,
+    quadrature: FloatArray,
+    radii: FloatArray,
+    arcs: FloatArray,
+    span: FloatArray,
+    moments: FloatArray,
+) -> int:
+    """Integrate over one piece, from its start to its end, and return the slices computed."""
+    n, m, g = circles.shape[0], planes.shape[0], quadrature.shape[1]
+    a, b = piece[START], piece[END]
+    for k in range(VOLUME, piece.shape[0]):
+        piece[k] = 0.0
+    of_area, of_surface = np.zeros(8), np.zeros(8)
+    for i in range(g):
+        t = quadrature[0, i]
+        # Smooth to both ends, where areas begin as powers of 3/2.
+        x = a + (b - a) * t * t * (3.0 - 2.0 * t)
+        rate = quadrature[1, i] * (b - a) * 6.0 * t * (1.0 - t)
+        area, terms = slice_area(x, circles, planes, bearings, radii, arcs, span, moments)
+        if i == 0 and terms == 0.0:
+            # What is empty in the middle of a piece is empty.
+            return 1
+        # Where one face begins to take the place of another, their sum hides it: each has a
+        # weight of its own, from one to two.
+        surface = 0.0
+        for k in range(n):
+            at = HEAD + 4 * k
+            angle, r = rate * circles[k, 5] * moments[k, 0], radii[k]
+            piece[at] += angle * circles[k, 4] * (x - circles[k, 0])
+            piece[at + 1] += rate * circles[k, 5] * r * moments[k, 1]
+            piece[at + 2] += rate * circles[k, 5] * r * moments[k, 2]
+            piece[at + 3] += angle * circles[k, 3]
+            surface += (1.0 + k / (n + m)) * moments[k, 0] * circles[k, 3]
+        for k in range(m):
+            at = HEAD + 4 * (n + k)
+            square = planes[k, 1] * planes[k, 1] + planes[k, 2] * planes[k, 2]
+            per = rate / math.sqrt(square)
+            piece[at] -= per * moments[n + k, 0] * x
+            piece[at + 1] -= per * moments[n + k, 1]
+            piece[at + 2] -= per * moments[n + k, 2]
+            piece[at + 3] += per * moments[n + k, 0]
+            tilt = math.sqrt(1.0 + planes[k, 0] * planes[k, 0] / square)
+            surface += (1.0 + (n + k) / (n + m)) * moments[n + k, 0] * tilt
+        piece[VOLUME] += rate * area
+        piece[SURFACE] += rate * surface
+        piece[TERMS] += rate * terms
+        for k in range(8):
+            of_area[k] += rate * quadrature[2 + k, i] * area
+            of_surface[k] += rate * quadrature[2 + k, i] * surface
+    piece[VOLUME_ERROR] = quadrature_error(of_area, g)
+    # Faces begin as square roots, whose coefficients need not go on as they have decayed.
+    piece[SURFACE_ERROR] = largest(of_surface, 4)
+    return g
+
+
+@helper
+def excess(piece: FloatArray, volume_error: float, surface_error: float) -> float:
+    """Return the errors of a piece over those that are allowed, whichever is larger."""
+    return max(piece[VOLUME_ERROR] / volume_error, piece[SURFACE_ERROR] / surface_error)
+
+
+@helper
+def worst_piece(pieces: FloatArray, count: int, volume_error: float, surface_error: float) -> int:
+    """Return the piece to halve next, -1 if what can be mended of all is within the errors."""
+    worst, most, of_volume, of_surface = -1, 0.0, 0.0, 0.0
+    for i in range(count):
+        start, end = pieces[i, START], pieces[i, END]
+        if pieces[i, STALLS] >= MOST_STALLS or not start < 0.5 * (start + end) < end:
+            continue
+        of_volume += pieces[i, VOLUME_ERROR]
+        of_surface += pieces[i, SURFACE_ERROR]
+        beyond = excess(pieces[i], volume_error, surface_error)
+        if beyond > most:
+            worst, most = i, beyond
+    return worst if of_volume > volume_error or of_surface > surface_error else -1
+
+
+@kernel("void(f8[:,::1], f8[:,::1], f8, f8, f8[:,::1], f8[::1], f8[:,::1], f8[:,::1])")
 def integrate_slices(
     circles: FloatArray,
     planes: FloatArray,
     low: float,
     high: float,
-    nodes: FloatArray,
-    weights: FloatArray,
+    quadrature: FloatArray,
     result: FloatArray,
     by_circle: FloatArray,
     by_plane: FloatArray,
@@ -45,15 +158,16 @@ def integrate_slices(
         planes: Shape (m, 4), see the module, none of them perpendicular to x.
         low: Where the region starts along x.
         high: Where it ends.
-        nodes: Of the quadrature on [0, 1], shape (g,).
-        weights: Of the quadrature on [0, 1], shape (g,).
-        result: Written: volume, area at low, area at high, slices computed, pieces.
+        quadrature: Of g nodes on [0, 1], the middle first: nodes, weights, and the factors that
+            give the last eight Legendre coefficients of an integrand, shape (10, g).
+        result: Written: volume, area at low, area at high, slices computed, pieces, and an
+            estimate of the error of the volume, rounding included; shape (6,).
         by_circle: Written: derivatives by (x, y, z, radius), shape (n, 4).
         by_plane: Written: derivatives by (ax, ay, az, c), shape (m, 4).
     """
     n, m = circles.shape[0], planes.shape[0]
-    radii, span = np.zeros(n), np.zeros(8)
-    arcs, names = np.zeros((MOST, 2)), np.zeros(MOST, dtype=np.int64)
+    radii, span = np.zeros(n), np.zeros(6)
+    arcs = np.zeros((MOST_ARCS, 2))
     moments, bearings = np.zeros((n + m, 3)), np.zeros((n, n + m))
     for k in range(n):
         for j in range(n):
@@ -62,78 +176,52 @@ def integrate_slices(
             )
         for j in range(m):
             bearings[k, n + j] = math.atan2(planes[j, 2], planes[j, 1])
-    breaks = np.zeros(PIECES)
-    pieces = find_breaks(circles, planes, low, high, breaks) - 1
-    # A stack of pieces, since bisection may cut one into several.
-    todo = np.zeros((2 * PIECES + 2, 2))
-    for i in range(pieces):
-        todo[pieces - 1 - i, 0], todo[pieces - 1 - i, 1] = breaks[i], breaks[i + 1]
-    waiting, g = pieces, nodes.shape[0]
-    cuts, slices = 0, 0
-    marks = np.zeros(g, dtype=np.int64)
-    xs, rates, areas = np.zeros(g), np.zeros(g), np.zeros(g)
-    kept = np.zeros((g, n + m, 3))
-    by_circle[:, :] = 0.0
-    by_plane[:, :] = 0.0
-    volume = 0.0
-    while waiting > 0:
-        waiting -= 1
-        a, b = todo[waiting, 0], todo[waiting, 1]
-        split = -1
-        for i in range(g):
-            t = nodes[i]
-            # Smooth to both ends, where areas begin as powers of 3/2.
-            xs[i] = a + (b - a) * t * t * (3.0 - 2.0 * t)
-            rates[i] = weights[i] * (b - a) * 6.0 * t * (1.0 - t)
-            areas[i], marks[i] = slice_area(
-                xs[i], circles, planes, bearings, radii, arcs, names, span, moments
+    breaks = np.zeros(MOST_BREAKS)
+    count = find_breaks(circles, planes, low, high, breaks) - 1
+    pieces = np.zeros((MOST_PIECES, HEAD + 4 * (n + m)))
+    slices = 0
+    for i in range(count):
+        pieces[i, START], pieces[i, END] = breaks[i], breaks[i + 1]
+        slices += integrate_piece(
+            pieces[i], circles, planes, bearings, quadrature, radii, arcs, span, moments
+        )
+    size = region_size(circles)
+    total = np.zeros(HEAD + 4 * (n + m))
+    while True:
+        for k in range(VOLUME, HEAD):
+            total[k] = 0.0
+            for i in range(count):
+                total[k] += pieces[i, k]
+        rounding = ROUNDING * (total[TERMS] + size * total[SURFACE])
+        if slices >= MOST_SLICES or count >= MOST_PIECES or total[VOLUME] <= rounding:
+            break
+        allowed = max(VOLUME_TOLERANCE * total[VOLUME], rounding)
+        worst = worst_piece(pieces, count, allowed, SURFACE_TOLERANCE * total[SURFACE])
+        if worst < 0:
+            break
+        start, end = pieces[worst, START], pieces[worst, END]
+        middle, stalls = 0.5 * (start + end), pieces[worst, STALLS]
+        before = excess(pieces[worst], allowed, SURFACE_TOLERANCE * total[SURFACE])
+        pieces[worst, END] = pieces[count, START] = middle
+        pieces[count, END] = end
+        after = 0.0
+        for i in (worst, count):
+            slices += integrate_piece(
+                pieces[i], circles, planes, bearings, quadrature, radii, arcs, span, moments
             )
-            kept[i] = moments
-            if i > 0 and split < 0 and marks[i] != marks[i - 1]:
-                split = i
-        slices += g
-        if split > 0 and cuts < PIECES:
-            lower, upper = xs[split - 1], xs[split]
-            while upper - lower > BISECTED * (b - a):
-                middle = 0.5 * (lower + upper)
-                if not lower < middle < upper:
-                    # Neighbouring numbers, in a piece far narrower than where it lies.
-                    break
-                _, mark = slice_area(
-                    middle, circles, planes, bearings, radii, arcs, names, span, moments
-                )
-                slices += 1
-                if mark == marks[split - 1]:
-                    lower = middle
-                else:
-                    upper = middle
-            cut = 0.5 * (lower + upper)
-            # A sliver at an end of the piece is what rounding makes of a known break.
-            if cut - a > SLIVER * (b - a) and b - cut > SLIVER * (b - a):
-                cuts += 1
-                todo[waiting, 0], todo[waiting, 1] = cut, b
-                todo[waiting + 1, 0], todo[waiting + 1, 1] = a, cut
-                waiting += 2
-                continue
-        for i in range(g):
-            volume += rates[i] * areas[i]
-            for k in range(n):
-                angle = rates[i] * circles[k, 5] * kept[i, k, 0]
-                off = xs[i] - circles[k, 0]
-                square = circles[k, 3] * circles[k, 3] - circles[k, 4] * off * off
-                r = math.sqrt(max(0.0, square))
-                by_circle[k, 0] += angle * circles[k, 4] * off
-                by_circle[k, 1] += rates[i] * circles[k, 5] * r * kept[i, k, 1]
-                by_circle[k, 2] += rates[i] * circles[k, 5] * r * kept[i, k, 2]
-                by_circle[k, 3] += angle * circles[k, 3]
-            for k in range(m):
-                norm = math.sqrt(planes[k, 1] * planes[k, 1] + planes[k, 2] * planes[k, 2])
-                per = rates[i] / norm
-                by_plane[k, 0] -= per * kept[i, n + k, 0] * xs[i]
-                by_plane[k, 1] -= per * kept[i, n + k, 1]
-                by_plane[k, 2] -= per * kept[i, n + k, 2]
-                by_plane[k, 3] += per * kept[i, n + k, 0]
-    result[0] = volume
-    result[1], _ = slice_area(low, circles, planes, bearings, radii, arcs, names, span, moments)
-    result[2], _ = slice_area(high, circles, planes, bearings, radii, arcs, names, span, moments)
-    result[3], result[4] = slices, pieces + cuts
+            after += excess(pieces[i], allowed, SURFACE_TOLERANCE * total[SURFACE])
+        if after > STALLED * before:
+            stalls += 1.0
+        pieces[worst, STALLS] = pieces[count, STALLS] = stalls
+        count += 1
+    for k in range(4 * (n + m)):
+        for i in range(count):
+            total[HEAD + k] += pieces[i, HEAD + k]
+        if k < 4 * n:
+            by_circle[k // 4, k % 4] = total[HEAD + k]
+        else:
+            by_plane[k // 4 - n, k % 4] = total[HEAD + k]
+    result[0], result[3], result[4] = total[VOLUME], slices, count
+    result[1], _ = slice_area(low, circles, planes, bearings, radii, arcs, span, moments)
+    result[2], _ = slice_area(high, circles, planes, bearings, radii, arcs, span, moments)
+    result[5] = total[VOLUME_ERROR] + rounding

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 
-from explorer.arrays import FloatArray, IntArray
+from explorer.arrays import FloatArray
 from explorer.compiled import helper
 
 TWO_PI = 2.0 * math.pi
@@ -34,30 +34,28 @@ def circle_radii(circles: FloatArray, x: float, radii: FloatArray) -> bool:
 
 
 @helper
-def forbid(
-    arcs: FloatArray, names: IntArray, count: int, start: float, width: float, name: int
-) -> int:
+def forbid(arcs: FloatArray, count: int, start: float, width: float) -> int:
     """Add the forbidden arc [start, start + width] and return how many there are now."""
     start -= TWO_PI * math.floor(start / TWO_PI)
     end = start + width
-    arcs[count, 0], arcs[count, 1], names[count] = start, min(end, TWO_PI), name
+    arcs[count, 0], arcs[count, 1] = start, min(end, TWO_PI)
     count += 1
     if end > TWO_PI:
-        arcs[count, 0], arcs[count, 1], names[count] = 0.0, end - TWO_PI, name
+        arcs[count, 0], arcs[count, 1] = 0.0, end - TWO_PI
         count += 1
     return count
 
 
 @helper
-def sort_arcs(arcs: FloatArray, names: IntArray, count: int) -> None:
+def sort_arcs(arcs: FloatArray, count: int) -> None:
     """Sort the first arcs by where they start; there are few, so by insertion."""
     for i in range(1, count):
-        start, end, name = arcs[i, 0], arcs[i, 1], names[i]
+        start, end = arcs[i, 0], arcs[i, 1]
         j = i - 1
         while j >= 0 and arcs[j, 0] > start:
-            arcs[j + 1, 0], arcs[j + 1, 1], names[j + 1] = arcs[j, 0], arcs[j, 1], names[j]
+            arcs[j + 1, 0], arcs[j + 1, 1] = arcs[j, 0], arcs[j, 1]
             j -= 1
-        arcs[j + 1, 0], arcs[j + 1, 1], names[j + 1] = start, end, name
+        arcs[j + 1, 0], arcs[j + 1, 1] = start, end
 
 
 @helper
@@ -69,7 +67,6 @@ def forbidden_on_circle(
     radii: FloatArray,
     bearings: FloatArray,
     arcs: FloatArray,
-    names: IntArray,
 ) -> int:
     """Collect the arcs of circle k that the others forbid; their count, -1 for all of it."""
     count = 0
@@ -96,9 +93,9 @@ def forbidden_on_circle(
             continue
         half = math.acos(rest / reach)
         if side > 0.0:
-            count = forbid(arcs, names, count, bearings[k, j] - half, 2.0 * half, j)
+            count = forbid(arcs, count, bearings[k, j] - half, 2.0 * half)
         else:
-            count = forbid(arcs, names, count, bearings[k, j] + half, TWO_PI - 2.0 * half, j)
+            count = forbid(arcs, count, bearings[k, j] + half, TWO_PI - 2.0 * half)
     for j in range(planes.shape[0]):
         ay, az = planes[j, 1], planes[j, 2]
         reach = r * math.sqrt(ay * ay + az * az)
@@ -108,9 +105,8 @@ def forbidden_on_circle(
         if rest < -reach:
             return -1
         half = math.acos(rest / reach)
-        name = circle_count + j
-        count = forbid(arcs, names, count, bearings[k, name] - half, 2.0 * half, name)
-    sort_arcs(arcs, names, count)
+        count = forbid(arcs, count, bearings[k, circle_count + j] - half, 2.0 * half)
+    sort_arcs(arcs, count)
     return count
 
 
@@ -122,10 +118,9 @@ def forbidden_on_line(
     planes: FloatArray,
     radii: FloatArray,
     arcs: FloatArray,
-    names: IntArray,
     span: FloatArray,
 ) -> int:
-    """Write the part of line k that lines and discs leave, as (low, high, by low, by high).
+    """Write the part of line k that lines and discs leave, as (low, high), and the line.
 
     Returns:
         How many parts of it the holes forbid, collected in `arcs`; -1 for all of it.
@@ -135,7 +130,7 @@ def forbidden_on_line(
     level = (planes[k, 3] - planes[k, 0] * x) / norm
     # The region lies to the left of the direction (-az, ay).
     qy, qz, ty, tz = level * ay / norm, level * az / norm, -az / norm, ay / norm
-    low, high, by_low, by_high = -math.inf, math.inf, -1, -1
+    low, high = -math.inf, math.inf
     count = 0
     circle_count = circles.shape[0]
     for j in range(planes.shape[0]):
@@ -148,10 +143,9 @@ def forbidden_on_line(
             if rest < 0.0:
                 return -1
         elif slope > 0.0:
-            if rest / slope < high:
-                high, by_high = rest / slope, circle_count + j
-        elif rest / slope > low:
-            low, by_low = rest / slope, circle_count + j
+            high = min(high, rest / slope)
+        else:
+            low = max(low, rest / slope)
     for j in range(circle_count):
         if radii[j] == 0.0:
             continue
@@ -165,18 +159,15 @@ def forbidden_on_line(
             continue
         half = math.sqrt(square)
         if circles[j, 5] > 0.0:
-            if middle - half > low:
-                low, by_low = middle - half, j
-            if middle + half < high:
-                high, by_high = middle + half, j
+            low, high = max(low, middle - half), min(high, middle + half)
         else:
-            arcs[count, 0], arcs[count, 1], names[count] = middle - half, middle + half, j
+            arcs[count, 0], arcs[count, 1] = middle - half, middle + half
             count += 1
     if low >= high:
         return -1
-    span[0], span[1], span[2], span[3] = low, high, by_low, by_high
-    span[4], span[5], span[6], span[7] = qy, qz, ty, tz
-    sort_arcs(arcs, names, count)
+    span[0], span[1] = low, high
+    span[2], span[3], span[4], span[5] = qy, qz, ty, tz
+    sort_arcs(arcs, count)
     return count
 
 
@@ -188,31 +179,30 @@ def slice_area(
     bearings: FloatArray,
     radii: FloatArray,
     arcs: FloatArray,
-    names: IntArray,
     span: FloatArray,
     moments: FloatArray,
-) -> tuple[float, int]:
-    """Return the area of the slice at x, and a number that changes where its arcs do.
+) -> tuple[float, float]:
+    """Return the area of the slice at x, and the sum of the sizes of the terms that it sums.
 
     Writes the moments of each boundary, circles first: of a circle (angle, ∮cos, ∮sin),
     of a line (length, ∮y, ∮z).
     """
-    area, signature = 0.0, 17
+    area, terms = 0.0, 0.0
     moments[:, :] = 0.0
     if not circle_radii(circles, x, radii):
-        return 0.0, 0
+        return 0.0, 0.0
     circle_count = circles.shape[0]
     for k in range(circle_count):
         r = radii[k]
         if r == 0.0:
             continue
-        count = forbidden_on_circle(k, x, circles, planes, radii, bearings, arcs, names)
+        count = forbidden_on_circle(k, x, circles, planes, radii, bearings, arcs)
         if count < 0:
             continue
         y, z, side = circles[k, 1], circles[k, 2], circles[k, 5]
         angle, along_y, along_z = 0.0, 0.0, 0.0
         # What no forbidden arc covers is kept, from the end of one to the start of the next.
-        reached, by = 0.0, -1
+        reached = 0.0
         for i in range(count + 1):
             start = arcs[i, 0] if i < count else TWO_PI
             if start > reached:
@@ -224,32 +214,30 @@ def slice_area(
                 angle += start - reached
                 along_y += last - first
                 along_z += first_cos - last_cos
-                name = names[i] if i < count else -1
-                if reached > 0.0 or start < TWO_PI or count == 0:
-                    signature = (signature * 1000003 + 4096 * (k + 1) + 64 * by + name) % 2147483647
             if i < count and arcs[i, 1] > reached:
-                reached, by = arcs[i, 1], names[i]
+                reached = arcs[i, 1]
         moments[k, 0], moments[k, 1], moments[k, 2] = angle, along_y, along_z
         area += side * 0.5 * r * (r * angle + y * along_y + z * along_z)
+        terms += 0.5 * r * (r * angle + abs(y * along_y) + abs(z * along_z))
     for k in range(planes.shape[0]):
-        count = forbidden_on_line(k, x, circles, planes, radii, arcs, names, span)
+        count = forbidden_on_line(k, x, circles, planes, radii, arcs, span)
         if count < 0:
             continue
-        reached, by = span[0], int(span[2])
-        qy, qz, ty, tz = span[4], span[5], span[6], span[7]
+        reached = span[0]
+        qy, qz, ty, tz = span[2], span[3], span[4], span[5]
         row = circle_count + k
         for i in range(count + 1):
             start = min(arcs[i, 0], span[1]) if i < count else span[1]
             if start > reached:
                 length, middle = start - reached, 0.5 * (start + reached)
-                area += 0.5 * length * (qy * tz - qz * ty)
+                part = 0.5 * length * (qy * tz - qz * ty)
+                area += part
+                terms += abs(part)
                 moments[row, 0] += length
                 moments[row, 1] += length * (qy + middle * ty)
                 moments[row, 2] += length * (qz + middle * tz)
-                name = names[i] if i < count and arcs[i, 0] < span[1] else int(span[3])
-                signature = (signature * 1000003 + 4096 * (row + 1) + 64 * by + name) % 2147483647
             if i < count and arcs[i, 1] > reached:
-                reached, by = arcs[i, 1], names[i]
+                reached = arcs[i, 1]
             if reached >= span[1]:
                 break
-    return area, signature
+    return area, terms

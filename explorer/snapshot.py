@@ -11,6 +11,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from explorer.arrays import FloatArray
+from explorer.bruhat import incidences
 from explorer.clearance import LegClearances, leg_clearances
 from explorer.design import Design
 from explorer.feasibility import Interval, feasible_intervals
@@ -23,13 +24,19 @@ from explorer.kinematics import (
     inverse,
 )
 from explorer.limits import Violation, violations
-from explorer.nearest_singular import NearestSingularity, nearest_singularities
+from explorer.nearest_singular import (
+    NearestPoses,
+    NearestSingularity,
+    each_singularity,
+    nearest_singular_poses,
+)
 from explorer.pose import Pose
 from explorer.singularity import (
     determinant,
     inverse_condition,
     jacobian,
     margins,
+    mode_name,
     mode_of,
     signs_of,
     tetrahedron_volumes,
@@ -81,6 +88,18 @@ class Snapshot:
         """The determinant of J."""
         return float(determinant(self.design, self.joints, self.margins))
 
+    @property
+    def volume_sizes(self) -> FloatArray:
+        """The volumes with margins as long as the reach, beside which rounding is told, (3,)."""
+        return np.abs(tetrahedron_volumes(self.design, np.full(3, self.design.reach)))
+
+    @property
+    def determinant_size(self) -> float:
+        """The |determinant| with the smallest margin as long as the reach, as `volume_sizes`."""
+        long = self.margins.copy()
+        long[np.abs(long).argmin()] = self.design.reach
+        return abs(float(determinant(self.design, self.joints, long)))
+
     @cached_property
     def inverse_condition(self) -> float:
         """Of J made homogeneous with the reach, 0 (singular) to 1."""
@@ -109,6 +128,20 @@ class Snapshot:
         return signs_of(self.mode)
 
     @property
+    def bordering_modes(self) -> tuple[int, ...]:
+        """The assembly modes that meet in the pose: its own, or where singular 2, 4 or 8."""
+        free = sum(4 >> (incidence - 1) for incidence in incidences(self.stratum))
+        return tuple(mode for mode in range(8) if mode & ~free == self.mode & ~free)
+
+    @property
+    def sign_words(self) -> str:
+        """The signs of the margins as people read them, 0 for one that vanishes: "− 0 +"."""
+        signs = mode_name(self.mode).split()
+        for incidence in incidences(self.stratum):
+            signs[incidence - 1] = "0"
+        return " ".join(signs)
+
+    @property
     def proximity(self) -> float:
         """The smallest |margin| over the reach."""
         return float(np.abs(self.margins).min()) / self.design.reach
@@ -131,9 +164,19 @@ class Snapshot:
         return leg_clearances(self.design, np.array(self.pose.position), self.rotation)
 
     @cached_property
+    def nearest_distances(self) -> tuple[float, float, float]:
+        """The distances of `nearest`, without the poses, which take three times as long."""
+        first, second, third = self._nearest_poses.distance.tolist()
+        return first, second, third
+
+    @cached_property
     def nearest(self) -> tuple[NearestSingularity, NearestSingularity, NearestSingularity]:
         """The nearest singular pose of each incidence, in the order κ1, κ2, κ3."""
-        return nearest_singularities(self.design, self.pose)
+        return each_singularity(self._nearest_poses, self.pose)
+
+    @cached_property
+    def _nearest_poses(self) -> NearestPoses:
+        return nearest_singular_poses(self.design, self.pose.position, self.rotation)
 
     @cached_property
     def modes(self) -> ForwardKinematics:

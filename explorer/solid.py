@@ -18,11 +18,14 @@ class Solid:
     Attributes:
         vertices: Shape (n, 3).
         faces: Indices of vertices, counter-clockwise from outside, shape (m, 3).
-        limit_of_face: Which of the limits each face comes from, shape (m,).
+        limit_of_face: Which of the limits each face comes from, shape (m,); -1 for none, of which
+            there are only in a mesh that does not agree.
         limits: Names of limits, such as "l1 maximum".
         tolerance: Largest distance of the faces from the true surface.
         empty_because: The limits that empty it, see `explorer.workspace.Volume`; () if it
             is not empty.
+        agrees: Whether its volume agrees with the exact one, see `explorer.agreement`; of a
+            part or hull whether that of the whole does. None where no exact volume is known.
     """
 
     vertices: FloatArray
@@ -31,6 +34,7 @@ class Solid:
     limits: tuple[str, ...]
     tolerance: float
     empty_because: tuple[str, ...] = ()
+    agrees: bool | None = None
 
     @property
     def is_empty(self) -> bool:
@@ -45,6 +49,12 @@ class Solid:
         middle = 0.5 * (self.vertices.min(axis=0) + self.vertices.max(axis=0))
         a, b, c = ((self.vertices - middle)[self.faces[:, k]] for k in range(3))
         return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6.0
+
+    @cached_property
+    def area(self) -> float:
+        """The area of the faces, in squared design units."""
+        a, b, c = (self.vertices[self.faces[:, k]] for k in range(3))
+        return 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
 
     @cached_property
     def is_watertight(self) -> bool:

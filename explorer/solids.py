@@ -1,7 +1,7 @@
 """Workspaces as watertight meshes: the limits' primitive solids, combined by booleans.
 
-The only module that uses manifold3d, but for `explorer.prototype.shapes`. Each face remembers
-the limit that it comes from.
+With `explorer.booleans` the only module that uses manifold3d, but for `explorer.prototype.shapes`.
+Each face remembers the limit that it comes from.
 """
 
 from __future__ import annotations
@@ -14,36 +14,52 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from explorer.agreement import Exact, exact_of, exact_within
 from explorer.arrays import FloatArray, IntArray
+from explorer.booleans import manifold_of, mesh_of, union
 from explorer.constraints import Constraint, HalfSpace, constraints
 from explorer.design import Design
-from explorer.errors import ExplorerError, InputError
-from explorer.facets import Facets
+from explorer.errors import InputError
 from explorer.isosurface import surface_below_zero
 from explorer.pose import checked_rotation
-from explorer.primitives import MOST_FACES, Frame, Piece, frame_of, pieces_of
+from explorer.primitives import MOST_FACES, Frame, Piece, frame_around, frame_of, pieces_of
 from explorer.solid import Solid
-from explorer.workspace import home_rotation, what_empties
+from explorer.workspace import Volume, home_rotation, what_empties
 
 if TYPE_CHECKING:
     from manifold3d import Manifold
 
 CORNERS = np.array(list(itertools.product((0, 1), repeat=3)))
 
+# So many times finer is a mesh made again whose volume is not the exact one,
+FINER = 4.0
+# as often as this, and as long as its primitives have no more faces than this together.
+MOST_ROUNDS = 10
+MOST_REFINED = 60_000
+
 HULL = "convex hull"
 """What the faces of a convex hull come from."""
 
 
 def workspace_solid(
-    design: Design, rotation: ArrayLike | None = None, tolerance: float | None = None
+    design: Design,
+    rotation: ArrayLike | None = None,
+    tolerance: float | None = None,
+    *,
+    volume: Volume | None = None,
 ) -> Solid:
     """Return the constant-orientation workspace as a mesh.
+
+    Its volume is compared with the exact one. Where they disagree the mesh is made finer than
+    the tolerance asks for; `Solid.agrees` is False if they still disagree at `MOST_REFINED`
+    faces.
 
     Args:
         design: The manipulator.
         rotation: Platform to base, shape (3, 3); that of the home pose if None.
         tolerance: Largest distance of a face from the true surface, in design units; a
             500th of the reach, or of the workspace if that is smaller, if None.
+        volume: The exact volume if it is known already.
 
     Raises:
         InputError: not a rotation, or a tolerance that is not positive or too small.
@@ -51,7 +67,7 @@ def workspace_solid(
     """
     r = home_rotation(design) if rotation is None else checked_rotation(rotation)
     limits = constraints(design, r)
-    solid = _common(design, limits, tolerance)
+    solid = _agreeing(limits, frame_of([limits], design.reach, tolerance), exact_of(limits, volume))
     return replace(solid, empty_because=what_empties(limits)) if solid.is_empty else solid
 
 
@@ -77,38 +93,31 @@ class Surface:
     name_of: Callable[[FloatArray], IntArray]
 
 
-def carved_solid(
-    design: Design,
-    limits: Sequence[Constraint],
-    surface: Surface | None,
-    seed: FloatArray,
-    tolerance: float | None = None,
-) -> Solid:
-    """Return the connected part that holds a position of what limits and a surface leave.
+def carved_solid(whole: Solid, surface: Surface | None, seed: FloatArray) -> Solid:
+    """Return the connected part that holds a position of what a surface leaves of a workspace.
 
     Args:
-        design: The manipulator.
-        limits: Such as those of `explorer.constraints.constraints`.
-        surface: What else bounds it, if anything.
+        whole: What keeps the limits, as of `workspace_solid`.
+        surface: What else bounds it, if anything; it keeps to its own grid.
         seed: The position, shape (3,).
-        tolerance: As of `workspace_solid`; the surface keeps to its own grid.
 
     Raises:
-        InputError: a tolerance that is not positive or too small.
         ExplorerError: a boolean fails.
     """
     from manifold3d import Manifold
 
-    frame, names = frame_of([limits], design.reach, tolerance), _names([limits])
-    bodies, origins = _bodies([limits], frame, names)
-    body = bodies[0]
+    if whole.is_empty:
+        return whole
+    names = whole.limits
+    body, frame, origins = _body_of(whole)
     if surface is not None:
         own = Manifold.reserve_ids(1)
         origins[own] = len(names)
         body = body - _below_zero(surface, frame, own)
-    parts = [_solid(part, origins, frame, names) for part in body.decompose()]
+    made = [_solid(part, origins, frame, names) for part in body.decompose()]
+    parts = [replace(part, agrees=whole.agrees) for part in made]
     if not parts:
-        return _solid(body, origins, frame, names)
+        return replace(_solid(body, origins, frame, names), agrees=whole.agrees)
 
     def nearness(part: Solid) -> tuple[float, float]:
         # A seed on the surface is half within; one off by rounding goes to the nearest.
@@ -142,7 +151,7 @@ def _below_zero(surface: Surface, frame: Frame, own: int) -> Manifold:
     kept = values[corners[..., 0], corners[..., 1], corners[..., 2]].argmax(axis=1)
     beside = corners[np.arange(len(where)), kept]
     points = surface.settle(lows + where * surface.step, lows + beside * surface.step)
-    return _manifold_of((frame.to(points), faces), (own,), (len(faces),))
+    return manifold_of((frame.to(points), faces), (own,), (len(faces),))
 
 
 def reachable_solid(design: Design, rotations: ArrayLike, tolerance: float | None = None) -> Solid:
@@ -161,7 +170,7 @@ def reachable_solid(design: Design, rotations: ArrayLike, tolerance: float | Non
     frame = frame_of(families, design.reach, tolerance)
     names = _names(families)
     bodies, _ = _bodies(families, frame, names)
-    vertices, faces, _ = _mesh_of(_union(bodies))
+    vertices, faces, _ = mesh_of(union(bodies))
     points = frame.back(vertices)
     limits = [limit for family in families for limit in family]
     solid = Solid(points, faces, _nearest(limits, points, faces, names), names, frame.tolerance)
@@ -210,9 +219,10 @@ def convex_hull(solid: Solid) -> Solid:
     middle, scale = 0.5 * (lows + highs), float((highs - lows).max())
     points = (solid.vertices - middle) / scale
     shapes: Any = Manifold
-    vertices, faces, _ = _mesh_of(shapes.hull_points(points))
+    vertices, faces, _ = mesh_of(shapes.hull_points(points))
     origin = np.zeros(len(faces), dtype=np.int64)
-    return Solid(vertices * scale + middle, faces, origin, (HULL,), solid.tolerance)
+    points = vertices * scale + middle
+    return Solid(points, faces, origin, (HULL,), solid.tolerance, agrees=solid.agrees)
 
 
 def cut_solid(solid: Solid, half_space: HalfSpace) -> Solid:
@@ -221,26 +231,31 @@ def cut_solid(solid: Solid, half_space: HalfSpace) -> Solid:
     Raises:
         ExplorerError: the boolean fails.
     """
-    from manifold3d import Manifold
-
     if solid.is_empty:
         return solid
+    body, frame, origins = _body_of(solid)
+    length = float(np.linalg.norm(half_space.normal))
+    x, y, z = (-half_space.normal / length).tolist()
+    offset = (half_space.offset - float(half_space.normal @ frame.middle)) / (length * frame.scale)
+    names = (*solid.limits, half_space.name)
+    part = _solid(body.trim_by_plane((x, y, z), -offset), origins, frame, names)
+    of_face = np.where(part.limit_of_face < 0, len(solid.limits), part.limit_of_face)
+    return replace(part, limit_of_face=of_face, agrees=solid.agrees)
+
+
+def _body_of(solid: Solid) -> tuple[Manifold, Frame, dict[int, int]]:
+    """Return a mesh as a body, its frame, and the limits by the ids of its faces."""
+    from manifold3d import Manifold
+
     lows, highs = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
-    middle, scale = 0.5 * (lows + highs), float((highs - lows).max())
+    frame = frame_around(lows, highs, solid.tolerance)
     order = np.argsort(solid.limit_of_face, kind="stable")
     used, counts = np.unique(solid.limit_of_face, return_counts=True)
     first = Manifold.reserve_ids(len(used))
-    shape = (solid.vertices - middle) / scale, solid.faces[order].astype(np.int64)
-    body = _manifold_of(shape, tuple(range(first, first + len(used))), tuple(counts.tolist()))
-    length = float(np.linalg.norm(half_space.normal))
-    x, y, z = (-half_space.normal / length).tolist()
-    offset = (half_space.offset - float(half_space.normal @ middle)) / (length * scale)
-    vertices, faces, ids = _mesh_of(body.trim_by_plane((x, y, z), -offset))
-    names = (*solid.limits, half_space.name)
-    of_face = np.full(len(ids), len(solid.limits), dtype=np.int64)
-    for index, limit in enumerate(used.tolist()):
-        of_face[ids == first + index] = limit
-    return Solid(vertices * scale + middle, faces, of_face, names, solid.tolerance)
+    shape = frame.to(solid.vertices), solid.faces[order].astype(np.int64)
+    ids = tuple(range(first, first + len(used)))
+    body = manifold_of(shape, ids, tuple(counts.tolist()))
+    return body, frame, dict(zip(ids, used.tolist(), strict=True))
 
 
 def _families(design: Design, rotations: ArrayLike) -> list[tuple[Constraint, ...]]:
@@ -256,16 +271,54 @@ def _names(families: Sequence[Sequence[Constraint]]) -> tuple[str, ...]:
 
 def _common(design: Design, limits: Sequence[Constraint], tolerance: float | None) -> Solid:
     """Return what keeps all limits."""
-    frame, names = frame_of([limits], design.reach, tolerance), _names([limits])
-    bodies, origins = _bodies([limits], frame, names)
+    return _mesh_within(limits, frame_of([limits], design.reach, tolerance))
+
+
+def _mesh_within(limits: Sequence[Constraint], frame: Frame, *, contracted: bool = False) -> Solid:
+    names = _names([limits])
+    bodies, origins = _bodies([limits], frame, names, contracted=contracted)
     return _solid(bodies[0], origins, frame, names)
 
 
+def _agreeing(limits: Sequence[Constraint], frame: Frame, exact: Exact) -> Solid:
+    """Return what keeps all limits, as finely as the exact volume asks for."""
+    best = _mesh_within(limits, frame)
+    if exact.is_settled_by(best):
+        return replace(best, agrees=True)
+    # Facets are fine enough for the workspace if they are so for the smallest box around it.
+    finer = frame.contracted(limits)
+    if finer is None:
+        return _nothing(limits, frame)
+    exact = exact_within(limits, finer.back(finer.box.lows), finer.back(finer.box.highs))
+    for _ in range(MOST_ROUNDS):
+        pieces = pieces_of(limits, finer, contracted=True)
+        if exact.is_settled_by(best) or sum(piece.faces for piece in pieces) > MOST_REFINED:
+            break
+        solid = _mesh_within(limits, finer, contracted=True)
+        if best.is_empty or exact.excess(solid) < exact.excess(best):
+            best = solid
+        finer = finer.finer(FINER)
+    if exact.is_artefact(best):
+        return _nothing(limits, frame)
+    return replace(best, agrees=exact.excess(best) <= 0.0)
+
+
+def _nothing(limits: Sequence[Constraint], frame: Frame) -> Solid:
+    """Return an empty solid that is known to be right."""
+    faces, of_face = np.zeros((0, 3), dtype=np.int32), np.zeros(0, dtype=np.int64)
+    names = _names([limits])
+    return Solid(np.zeros((0, 3)), faces, of_face, names, frame.tolerance, agrees=True)
+
+
 def _bodies(
-    families: Sequence[Sequence[Constraint]], frame: Frame, names: tuple[str, ...]
+    families: Sequence[Sequence[Constraint]],
+    frame: Frame,
+    names: tuple[str, ...],
+    *,
+    contracted: bool = False,
 ) -> tuple[list[Manifold], dict[int, int]]:
     """Return what keeps all limits of each family, and the limits by the ids of bodies."""
-    everything = [pieces_of(limits, frame) for limits in families]
+    everything = [pieces_of(limits, frame, contracted=contracted) for limits in families]
     faces = sum(piece.faces for pieces in everything for piece in pieces)
     if faces > MOST_FACES:
         # Faces of balls are as many as the tolerance is small, others fewer.
@@ -291,23 +344,10 @@ def _body(pieces: Sequence[Piece], origins: dict[int, int], names: tuple[str, ..
         if piece.name:
             origins[own] = names.index(piece.name)
         shape = piece.make()
-        made = _manifold_of(shape, (own,), (len(shape[1]),))
+        made = manifold_of(shape, (own,), (len(shape[1]),))
         (cut if piece.cuts else kept).append(made)
     common = Manifold.batch_boolean(kept, OpType.Intersect)
     return Manifold.batch_boolean([common, *cut], OpType.Subtract)
-
-
-def _union(bodies: Sequence[Manifold]) -> Manifold:
-    """Return the union, in pairs and pairs of pairs.
-
-    Surfaces that bodies share are cut along all their other surfaces. Without what a body
-    was made of those cuts heal, and without healing the faces of 64 bodies are millions.
-    """
-    while len(bodies) > 1:
-        pairs = zip(bodies[::2], bodies[1::2], strict=False)
-        left = bodies[len(bodies) // 2 * 2 :]
-        bodies = [*((one + other).as_original().simplify(0.0) for one, other in pairs), *left]
-    return bodies[0]
 
 
 def _nearest(
@@ -326,45 +366,8 @@ def _nearest(
     return found
 
 
-def _manifold_of(shape: Facets, ids: tuple[int, ...], counts: tuple[int, ...]) -> Manifold:
-    """Return a body; so many of its faces, in their order, have each of the ids."""
-    from manifold3d import Manifold, Mesh64
-
-    vertices, faces = shape
-    return Manifold(
-        Mesh64(
-            np.ascontiguousarray(vertices),
-            faces.astype(np.uint64),
-            run_index=np.cumsum([0, *counts], dtype=np.uint64) * np.uint64(3),
-            run_original_id=np.array(ids, dtype=np.uint32),
-        )
-    )
-
-
 def _solid(body: Manifold, origins: dict[int, int], frame: Frame, names: tuple[str, ...]) -> Solid:
-    vertices, faces, ids = _mesh_of(body)
+    vertices, faces, ids = mesh_of(body)
     which, inverse = np.unique(ids, return_inverse=True)
-    of_id = np.array([origins[int(each)] for each in which], dtype=np.int64)
+    of_id = np.array([origins.get(int(each), -1) for each in which], dtype=np.int64)
     return Solid(frame.back(vertices), faces, of_id[inverse], names, frame.tolerance)
-
-
-def _mesh_of(body: Manifold) -> tuple[FloatArray, NDArray[np.int32], NDArray[np.uint32]]:
-    """Return vertices, faces, and of each face the id of the body that it comes from.
-
-    Raises:
-        ExplorerError: a boolean failed.
-    """
-    from manifold3d import Error
-
-    status = body.status()
-    if status != Error.NoError:
-        raise ExplorerError(f"the solid could not be made: manifold3d reports {status.name}")
-    mesh: Any = body.to_mesh64()
-    faces = np.asarray(mesh.tri_verts, dtype=np.int32)
-    if len(mesh.merge_from_vert):
-        same = np.arange(len(mesh.vert_properties), dtype=np.int32)
-        same[mesh.merge_from_vert] = mesh.merge_to_vert
-        faces = same[faces]
-    runs = np.diff(np.asarray(mesh.run_index, dtype=np.int64)) // 3
-    ids = np.repeat(np.asarray(mesh.run_original_id), runs)
-    return np.array(mesh.vert_properties[:, :3]), faces, ids

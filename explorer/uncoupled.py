@@ -20,8 +20,10 @@ from explorer.errors import InputError
 from explorer.pose import Pose
 from explorer.singularity import margins
 
-# A margin that changes by less than this share of a translation is one that does not.
-NO_RATE = 1e-15
+# A margin that changes by less than this share of a translation changes by rounding alone.
+NO_RATE = 1e-12
+# Of the distance of b4 from a1: a singular pose that is farther away is never reached.
+FARTHEST = 1e6
 
 
 @dataclass(frozen=True)
@@ -116,19 +118,22 @@ def travels(pose: Pose) -> tuple[Travel, ...]:
 
 def _travels(pose: Pose, motions: tuple[UncoupledMotion, ...]) -> tuple[Travel, ...]:
     found = _margins_and_rates(pose, motions)
+    farthest = FARTHEST * math.hypot(*pose.position)
     return tuple(
-        _travel(motion.kind, margin, rate)
+        _travel(motion.kind, margin, rate, farthest)
         for motion, (margin, rate) in zip(motions, found, strict=True)
     )
 
 
-def _travel(kind: Literal["translation", "rotation"], margin: float, rate: float) -> Travel:
+def _travel(
+    kind: Literal["translation", "rotation"], margin: float, rate: float, farthest: float
+) -> Travel:
     if margin == 0.0:
         return Travel(0.0, 0.0)
     if kind == "rotation":
         high = math.atan2(-margin, rate) % math.pi
         return Travel(high - math.pi, high)
-    if abs(rate) <= NO_RATE:
+    if abs(rate) <= NO_RATE or abs(margin) > farthest * abs(rate):
         return Travel(-math.inf, math.inf)
     way = -margin / rate
     return Travel(way, math.inf) if way < 0.0 else Travel(-math.inf, way)

@@ -16,9 +16,8 @@ from numpy.typing import ArrayLike
 from explorer.arrays import BoolArray, FloatArray, batch_shape, finite_array, for_kernel
 from explorer.clearance import joined_pairs, radii_of_pairs
 from explorer.compiled import helper, kernel
-from explorer.constraints import home_signs, joint_cones
-from explorer.design import LENGTHS, Design
-from explorer.limits import SLACK
+from explorer.constraints import demanded_order, home_signs, joint_cones
+from explorer.design import LENGTHS, TOLERANCE, Design
 from explorer.pose import checked_rotation
 from explorer.segments import Vector, closest_shares, minus, square_at
 
@@ -27,9 +26,9 @@ A3, B1, B2, B3 = 0, 2, 4, 5
 LENGTH_LOWS, LENGTH_HIGHS = 6, 10
 GUIDE_LOW, GUIDE_HIGH, GAP = 14, 15, 16
 BOX_LOWS, BOX_HIGHS = 17, 20
-MARGIN, SIGNS = 23, 24
-RADII = 27
-COUNT = 33
+MARGIN, SIGNS, ORDER = 23, 24, 27
+RADII = 28
+COUNT = 34
 
 
 @dataclass(frozen=True)
@@ -37,8 +36,9 @@ class Rules:
     """What a design demands of a pose, as the kernels take it.
 
     Attributes:
-        row: Design variables, limits with their slack, signs of the home and radii, shape
-            (COUNT,); what is not demanded is infinite.
+        row: Design variables, limits with their tolerance, signs of the home, the order of
+            the carriages and radii, shape (COUNT,); what is not demanded is infinite, the
+            order then 0.
         cones: Of the joints, as rows (leg, axis, cosine and sine of the half-angle, whether
             the axis turns with the platform), shape (n, 7). A row of leg 0 is never kept.
     """
@@ -47,14 +47,18 @@ class Rules:
     cones: FloatArray
 
     @staticmethod
-    def of(design: Design, signs: tuple[int, int, int] | None = None) -> Rules:
+    def of(
+        design: Design, signs: tuple[int, int, int] | None = None, order: int | None = None
+    ) -> Rules:
         """Return the rules of a design.
 
         Args:
             design: The manipulator.
             signs: The sign triple to demand instead of the home's, and at all events.
+            order: The sign of d3 − d1 to demand, 0 for either; the one that the design
+                demands if None.
         """
-        limits, slack = design.limits, SLACK * design.reach
+        limits, slack = design.limits, design.tolerance
         row = np.empty(COUNT)
         row[:LENGTH_LOWS] = design.variables
         for index, name in enumerate(LENGTHS):
@@ -69,7 +73,8 @@ class Rules:
         row[MARGIN] = -math.inf if limits.margin is None else limits.margin - slack
         if signs is not None:
             row[MARGIN] = (limits.margin or 0.0) - slack
-        row[SIGNS:RADII] = signs or home_signs(design)
+        row[SIGNS:ORDER] = signs or home_signs(design)
+        row[ORDER] = demanded_order(design) if order is None else order
         # A pair that shares a joint has no clearance to keep.
         row[RADII:] = np.where(joined_pairs(design), -1.0, radii_of_pairs(design))
         cones = [
@@ -79,8 +84,8 @@ class Rules:
                 float(each.leg),
                 *each.axis.tolist(),
                 # As the limits count it; half a turn is no bound.
-                math.cos(min(math.pi, each.half_angle + SLACK)),
-                math.sin(min(math.pi, each.half_angle + SLACK)),
+                math.cos(min(math.pi, each.half_angle + TOLERANCE)),
+                math.sin(min(math.pi, each.half_angle + TOLERANCE)),
                 float(each.in_platform),
             )
             for each in joint_cones(design)
@@ -141,6 +146,12 @@ def within(square: float, low: float, high: float) -> bool:
 
 
 @helper
+def carriages_apart(row: FloatArray, d1: float, d3: float) -> float:
+    """Return how far apart the carriages are; negative where they are not in their order."""
+    return row[ORDER] * (d3 - d1) if row[ORDER] != 0.0 else abs(d3 - d1)
+
+
+@helper
 def write_ends(
     row: FloatArray, p: FloatArray, r: FloatArray, base: FloatArray, ends: FloatArray
 ) -> None:
@@ -159,7 +170,7 @@ def write_ends(
 def keeps_limits(
     row: FloatArray, p: FloatArray, r: FloatArray, base: FloatArray, ends: FloatArray
 ) -> bool:
-    """Return whether a pose keeps lengths, guide, gap, box and margins."""
+    """Return whether a pose keeps lengths, guide, gap, the carriages' order, box and margins."""
     for i in range(3):
         if not row[BOX_LOWS + i] <= p[i] <= row[BOX_HIGHS + i]:
             return False
@@ -170,7 +181,9 @@ def keeps_limits(
         if row[SIGNS] * k1 < least or row[SIGNS + 1] * k2 < least or row[SIGNS + 2] * p[2] < least:
             return False
     d1, d3 = ends[1, 0], ends[2, 0]
-    if min(d1, d3) < row[GUIDE_LOW] or max(d1, d3) > row[GUIDE_HIGH] or abs(d1 - d3) < row[GAP]:
+    if min(d1, d3) < row[GUIDE_LOW] or max(d1, d3) > row[GUIDE_HIGH]:
+        return False
+    if carriages_apart(row, d1, d3) < row[GAP]:
         return False
     for leg in range(4):
         square = 0.0

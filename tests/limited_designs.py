@@ -1,4 +1,4 @@
-"""Random designs with random limits, ordinary and in trouble, and the reference workspaces."""
+"""Random designs with random limits: ordinary, thin-walled, in trouble; reference workspaces."""
 
 from __future__ import annotations
 
@@ -14,9 +14,14 @@ from scipy.spatial.transform import Rotation
 from explorer import Design, Limits, Pose
 from explorer.arrays import FloatArray
 from explorer.design import LENGTHS, Swing
+from explorer.design_file import decode_design
 
 REFERENCE: dict[str, Any] = json.loads(
     (Path(__file__).parent / "data" / "workspace.json").read_text(encoding="utf-8")
+)
+
+DEFECTS: dict[str, Any] = json.loads(
+    (Path(__file__).parent / "data" / "defects_solid.json").read_text(encoding="utf-8")
 )
 
 SIZES = (10.0, 1e-9, 1e9, 1e-20, 1e20)
@@ -39,8 +44,21 @@ def reference_case(index: int) -> tuple[Design, FloatArray, float]:
         name: (row["minimum"][name], row["maximum"][name]) for name in LENGTHS
     }
     low, high = row["box"]
-    limits = Limits(**lengths, guide=tuple(row["rail"]), box=(tuple(low), tuple(high)), margin=None)
+    limits = Limits(
+        **lengths,
+        guide=tuple(row["rail"]),
+        carriage_order="any",
+        box=(tuple(low), tuple(high)),
+        margin=None,
+    )
     design = Design(a3=tuple(x["a3"]), b1=tuple(x["b1"]), b2=x["b2"], b3=x["b3"], limits=limits)
+    return design, np.array(row["rotation"]), float(row["volume"])
+
+
+def defect_case(index: int) -> tuple[Design, FloatArray, float]:
+    """Return a workspace whose solid once was another: design, rotation and its exact volume."""
+    row = DEFECTS["solids"][index]
+    design = decode_design(json.dumps(row["design"]).encode(), "defects_solid.json")
     return design, np.array(row["rotation"]), float(row["volume"])
 
 
@@ -77,6 +95,58 @@ def ordinary_case(seed: int) -> tuple[Design, FloatArray]:
         margin=1e-3,
     )
     return msgspec.structs.replace(free, limits=limits, home=pose), rotation
+
+
+def shell_case(seed: int) -> tuple[Design, FloatArray]:
+    """Return a design whose minimum lengths often leave thin shells, and a rotation.
+
+    Guides, boxes and margins come and go; a quarter of the rotations turn about z alone.
+    """
+    rng = np.random.default_rng([7, seed])
+    size = float(rng.choice([1.0, 10.0, 1e-6, 1e3]))
+    near = float(rng.choice([1.0, 1.0, 1.0, 1e-2])) * size
+
+    def between(low: float, high: float) -> float:
+        return float(rng.uniform(low, high))
+
+    def away(high: float = 0.6) -> float:
+        return float(rng.choice([-1.0, 1.0])) * between(0.05, high)
+
+    limits: dict[str, Any] = {"margin": (None, None, 0.0, 0.02 * size)[int(rng.integers(4))]}
+    for name in LENGTHS:
+        high, kind = between(0.2, 2.2) * size, rng.random()
+        low = high * (1.0 - 10.0 ** -between(0.0, 3.0)) if kind < 0.4 else 0.0
+        limits[name] = (low, None if kind > 0.85 else high)
+    if rng.random() < 0.35:
+        limits["guide"] = (between(-1.5, 0.0) * size, between(0.0, 1.5) * size)
+    if rng.random() < 0.4:
+        lows = tuple(between(-1.5, 0.0) * size for _ in range(3))
+        limits["box"] = (lows, tuple(between(0.05, 1.5) * size for _ in range(3)))
+    b2 = between(-0.8, 0.8) * size
+    design = Design(
+        a3=(between(-1.0, 1.0) * size, away(1.0) * near),
+        b1=(between(-0.6, 0.6) * size, away() * size),
+        b2=b2,
+        b3=b2 + away() * near,
+        limits=Limits(**limits),
+    )
+    if rng.random() < 0.25:
+        return design, Rotation.from_euler("Z", between(-3.0, 3.0)).as_matrix()
+    return design, Rotation.random(random_state=rng).as_matrix()
+
+
+def thin_case(seed: int) -> tuple[Design, FloatArray]:
+    """Return a design whose legs may be little shorter or longer than at home, and a rotation."""
+    from explorer import inverse
+
+    design, rotation = ordinary_case(seed)
+    joints = inverse(design, design.home.position, rotation) if design.home else np.zeros(6)
+    rng = np.random.default_rng(seed)
+    lengths: dict[str, Any] = {
+        name: (value * float(rng.uniform(0.9, 0.9999)), value * float(rng.uniform(1.0001, 1.1)))
+        for name, value in zip(LENGTHS, joints[[0, 2, 4, 5]].tolist(), strict=True)
+    }
+    return limited(design, **lengths, box=None, guide=None, margin=None), rotation
 
 
 def troubled_case(seed: int) -> tuple[Design, FloatArray | None]:

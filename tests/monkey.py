@@ -29,6 +29,7 @@ from page_props import differences, shown_by
 from socket_tab import SocketTab
 
 from explorer.app.actions import Open
+from explorer.app.faults import Faults
 from explorer.app.jobs import RESTARTED
 from explorer.app.keeping import Keep
 from explorer.app.memory import given_back, keep_for_good, limit_arenas
@@ -39,6 +40,8 @@ from explorer.app.storage.library import Library
 from explorer.compiled import warm
 from explorer.design_file import PRESETS, encode_design
 
+# Where requests are kept that failed in a worker; `python tests/again.py` runs one again.
+FAULTS = Path(tempfile.gettempdir()) / "flagged-explorer-faults-of-the-monkey"
 TABS = 3
 # Between two looks at whether the page shows its state.
 BETWEEN_LOOKS = 1000
@@ -361,7 +364,9 @@ def _is(handle: Any, kind: type) -> bool:
 def explorer_with_data() -> Generator[Running]:
     """Start an explorer with a data folder of its own, to be let loose on."""
     with tempfile.TemporaryDirectory() as folder:
-        keep = Keep(Library(Path(folder) / "designs"), Autosave(Path(folder) / "sessions"))
+        library, store = Library(Path(folder) / "designs"), Autosave(Path(folder) / "sessions")
+        # What failed is to be had when the rest is gone.
+        keep = Keep(library, store, faults=Faults(FAULTS))
         running = start(PRESETS["paper-optimal"], port=0, keep=keep)
         try:
             yield running

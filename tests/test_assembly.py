@@ -197,5 +197,5 @@ def test_an_unknown_format_is_told_the_formats() -> None:
 
 def test_parts_beyond_what_3mf_holds_are_refused() -> None:
     huge = make_prototype(msgspec.structs.replace(DESIGN, unit_mm=1e9))
-    with pytest.raises(InputError, match="smaller unit_mm"):
+    with pytest.raises(InputError, match="smaller unit"):
         assembly_bytes(huge, "3mf")

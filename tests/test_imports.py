@@ -23,10 +23,13 @@ LAYERS = (
         "arrays",
         "checks",
         "colours",
+        "kernel_cache",
         "compiled",
         "descent",
         "files",
         "json_text",
+        "stages",
+        "number_text",
         "versions",
     ),
     ("pose", "design", "design_file"),
@@ -56,6 +59,8 @@ LAYERS = (
         "move_bounds",
         "moves",
         "crossings",
+        "break_points",
+        "vertices",
         "breaks",
         "slices",
         "slice_volume",
@@ -64,9 +69,13 @@ LAYERS = (
     ),
     (
         "snapshot",
+        "verdict",
         "facets",
         "primitives",
         "solid",
+        "contraction",
+        "agreement",
+        "booleans",
         "solids",
         "orientations",
         "nodes",
@@ -116,7 +125,7 @@ SLOW = ("numba", "trimesh", "manifold3d", "playwright")
 
 MAY_IMPORT_SLOW = ("app.scene", "solids")
 
-MAKE_SOLIDS = ("solids", "prototype.shapes")
+MAKE_SOLIDS = ("solids", "booleans", "prototype.shapes")
 """The modules that use manifold3d."""
 
 

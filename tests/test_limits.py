@@ -21,7 +21,14 @@ from explorer.singularity import mode_of, signs_of
 Signs = tuple[int, int, int]
 ALL_POSITIVE: Signs = (1, 1, 1)
 FREE = Limits(
-    l1=(0.0, 1e6), d2=(0.0, 1e6), d4=(0.0, 1e6), l4=(0.0, 1e6), gap=0.0, box=None, margin=None
+    l1=(0.0, 1e6),
+    d2=(0.0, 1e6),
+    d4=(0.0, 1e6),
+    l4=(0.0, 1e6),
+    gap=0.0,
+    carriage_order="any",
+    box=None,
+    margin=None,
 )
 
 

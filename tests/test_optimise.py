@@ -109,7 +109,7 @@ def test_a_clearance_is_kept_between_the_positions_that_the_solver_looks_at(
     margin = problem.demands.clearance_margin
     assert least_clearance_by_sampling(problem.start, margin, 100_000) < clearance
     assert least_clearance_by_sampling(outcome.design, margin, 100_000) >= 0.999 * clearance
-    found = facts_of(outcome.design, clearance_margin=margin).clearance
+    found = facts_of(outcome.design, demanded_margin=margin).demanded_clearance
     assert found is not None
     assert found >= 0.98 * clearance
 

@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from explorer import (
     PRESETS,
+    Design,
     InputError,
     MissingExtraError,
     NoAnswerError,
@@ -39,11 +40,11 @@ needs_ompl = pytest.mark.skipif(find_spec("ompl") is None, reason="OMPL is not i
 
 
 @cache
-def valid_poses() -> tuple[Pose, ...]:
+def valid_poses(design: Design = DESIGN) -> tuple[Pose, ...]:
     rng = np.random.default_rng(3)
     positions = rng.uniform([0, -12, 0], [20, 22, 18], (4000, 3))
     rotations = Rotation.random(4000, random_state=rng).as_matrix()
-    valid = poses_are_valid(DESIGN, positions, rotations)
+    valid = poses_are_valid(design, positions, rotations)
     pairs = zip(positions[valid], rotations[valid], strict=True)
     return tuple(Pose.of(p, r) for p, r in pairs)
 
@@ -153,11 +154,13 @@ def test_poses_of_two_modes_have_no_path(mode: int) -> None:
     assert named == differ
 
 
-def test_poses_with_the_carriages_in_another_order_have_no_path() -> None:
-    start = next(each for each in valid_poses() if order(each) == [0, 1, 2])
-    goal = next(each for each in valid_poses() if order(each) == [0, 2, 1])
+@pytest.mark.parametrize("demanded", ["home", "any"])
+def test_poses_with_the_carriages_in_another_order_have_no_path(demanded: str) -> None:
+    plain = limited(DESIGN, carriage_order="any")
+    start = next(each for each in valid_poses(plain) if order(each) == [0, 1, 2])
+    goal = next(each for each in valid_poses(plain) if order(each) == [0, 2, 1])
     with pytest.raises(NoPathError, match="order a1, d1, d3, the goal a1, d3, d1") as caught:
-        plan_path(DESIGN, start, goal)
+        plan_path(limited(DESIGN, carriage_order=demanded), start, goal)
     assert caught.value.reason == "other order"
     # On the straight move, too, the legs 2 and 3 meet.
     least = move_clearances(

@@ -361,9 +361,9 @@ def test_what_is_too_tight_is_named_with_what_would_fit(design: Design, words: s
     message = str(refusal.value)
     assert words in message
     assert "\n" not in message
-    unit, offers = "unit_mm of at least ", ("radius at most ", "radius at least ")
+    unit, offers = "unit of at least ", ("radius at most ", "radius at least ")
     offered = [phrase for phrase in (unit, *offers) if phrase in message]
-    assert offered or "no unit_mm makes that fit" in message
+    assert offered or "no unit makes that fit" in message
     for phrase in offered:
         value = least_named(message, phrase)
         if phrase != unit:
@@ -390,7 +390,7 @@ def test_homes_that_legs_cannot_have_are_refused() -> None:
     ):
         make_prototype(leaning)
     parallel = msgspec.structs.replace(OPTIMAL, home=Pose.of_yaw_pitch_roll((10, 5, 9), (90, 0, 0)))
-    with pytest.raises(InputError, match="no unit_mm makes that fit"):
+    with pytest.raises(InputError, match="no unit makes that fit"):
         make_prototype(parallel)
 
 

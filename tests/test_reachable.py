@@ -100,6 +100,8 @@ def test_thin_legs_of_table_1_cross_nowhere_but_on_the_base_plane(design: Design
     within = (slacks(constraints(design, r), flat) >= -1e-9 * design.reach).all(axis=-1)
     near = 1e-9 * design.reach
     crossing = (leg_clearances(design, flat, r).clearance <= near).any(axis=-1)
+    assert found.node_count is not None
+    assert found.reachable_node_count is not None
     assert found.node_count - found.reachable_node_count == int((within & crossing).sum()) > 0
 
 

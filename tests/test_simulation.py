@@ -290,6 +290,18 @@ def test_limits_become_ranges_in_metres() -> None:
     assert data.ten_length[0] == pytest.approx(0.01 * abs(q[1] - q[3]))
 
 
+@pytest.mark.parametrize("yaw", [-73.1, -106.9])
+def test_carriages_keep_the_order_of_home_unless_the_design_says_otherwise(yaw: float) -> None:
+    home = Pose.of_yaw_pitch_roll(home_pose(OPTIMAL).position, (yaw, 0.0, 0.0))
+    design = msgspec.structs.replace(OPTIMAL, home=home)
+    model = model_of(design)
+    data = engine.MjData(model)
+    engine.mj_forward(model, data)
+    low, high = model.tendon_range[0].tolist()
+    assert low == 0.0 < data.ten_length[0] < high
+    assert model_of(limited(design, carriage_order="any")).ntendon == 0
+
+
 @pytest.mark.parametrize("half_angle", [20.0, 60.0, 89.0])
 def test_the_hinges_of_a_swing_hold_its_whole_cone(half_angle: float) -> None:
     design = limited(OPTIMAL, margin=None, swing=Swing(a1=half_angle, a3=half_angle))
@@ -343,9 +355,9 @@ def test_what_cannot_be_simulated_is_refused_with_what_would_work() -> None:
         with pytest.raises(InputError, match="density must be positive"):
             simulation_mjcf(OPTIMAL, density)
     light = msgspec.structs.replace(OPTIMAL, unit_mm=1e-3)
-    with pytest.raises(InputError, match="unit_mm must be at least") as refusal:
+    with pytest.raises(InputError, match="the unit must be at least") as refusal:
         simulation_mjcf(light)
-    least = float(str(refusal.value).partition("unit_mm must be at least ")[2].split(",")[0])
+    least = float(str(refusal.value).partition("the unit must be at least ")[2].split(" ")[0])
     model_of(msgspec.structs.replace(OPTIMAL, unit_mm=least))
     collapsed = Pose((*OPTIMAL.a3, 0.0), (0.8, 0.0, 0.0, 0.6))
     with pytest.raises(InputError, match="leg 4 has no length"):

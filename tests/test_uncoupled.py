@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 from strategies import Case, all_cases, ordinary_cases
 
-from explorer import PRESETS, InputError, Pose, home_pose, inverse, margins
+from explorer import PRESETS, InputError, Pose, forward, home_pose, inverse, margins
 from explorer.arrays import FloatArray
 from explorer.uncoupled import UNCOUPLED, Travel, UncoupledMotion, travels
 
@@ -130,6 +130,24 @@ def test_a_level_platform_never_reaches_the_base_along_its_line() -> None:
     assert found["along the platform's x"] == Travel(-math.inf, math.inf)
     assert found["along the base's x"] == Travel(-math.inf, math.inf)
     assert math.isfinite(found["about the platform's z"].high)
+
+
+def test_travel_of_a_level_platform_in_another_mode_is_never_in_spite_of_rounding() -> None:
+    """The modes are computed, so that a level platform is level but for rounding."""
+    design = PRESETS["paper-optimal"]
+    start = Pose.of_yaw_pitch_roll((14.0, -2.0, 6.0), (-40.0, 0.0, 0.0))
+    position, rotation, _ = forward(design, inverse(design, start.position, start.rotation))
+    found = [
+        motion.travel(Pose.of(position[mode], rotation[mode]))
+        for mode in range(8)
+        for motion in UNCOUPLED
+        if motion.kind == "translation"
+    ]
+    never = Travel(-math.inf, math.inf)
+    assert never in found
+    for travel in found:
+        ends = [end for end in (travel.low, travel.high) if math.isfinite(end)]
+        assert travel == never or max(map(abs, ends)) < 1e6 * design.reach
 
 
 def test_on_the_singular_set_there_is_no_travel_left() -> None:

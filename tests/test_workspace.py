@@ -154,10 +154,10 @@ def test_more_nodes_of_the_quadrature_change_nothing(
 ) -> None:
     design, rotation = ordinary_case(seed)
     volume = workspace_volume(design, rotation).volume
-    nodes, weights = np.polynomial.legendre.leggauss(4 * measures.NODES)
-    finer = 0.5 * (nodes + 1.0), 0.5 * weights
-    monkeypatch.setattr(measures, "_quadrature", lambda: finer)
-    assert workspace_volume(design, rotation).volume == pytest.approx(volume, rel=1e-8)
+    monkeypatch.setattr(measures, "NODES", 2 * measures.NODES)
+    finer = measures.quadrature.__wrapped__()
+    monkeypatch.setattr(measures, "quadrature", lambda: finer)
+    assert workspace_volume(design, rotation).volume == pytest.approx(volume, rel=1e-12)
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -235,14 +235,13 @@ def test_kernels_say_the_same_interpreted_and_compiled(seed: int) -> None:
     design, rotation = ordinary_case(seed)
     region = region_of(constraints(limited(design, swing=Swing(a1=50.0, b2=60.0)), rotation))
     lows, highs = bounds(region)
-    nodes, weights = np.polynomial.legendre.leggauss(6)
     step = float((highs - lows).max()) / 12.0
     first = np.ceil(lows / step)
     counts = (np.floor(highs / step) - first + 1).astype(np.int64)
 
     def run(*, compiled: bool) -> list[FloatArray]:
         plain: Any = "__wrapped__"
-        volume, grid, lengths = np.zeros(5), np.zeros(7, dtype=np.int64), np.zeros(1)
+        volume, grid, lengths = np.zeros(6), np.zeros(7, dtype=np.int64), np.zeros(1)
         by_round = np.zeros((len(region.rounds), 4))
         by_plane = np.zeros((len(region.planes), 4))
         for kernel, arguments in (
@@ -250,7 +249,7 @@ def test_kernels_say_the_same_interpreted_and_compiled(seed: int) -> None:
                 integrate_slices,
                 (
                     *(region.rounds, region.planes, region.low, region.high),
-                    *(0.5 * (nodes + 1.0), 0.5 * weights, volume, by_round, by_plane),
+                    *(measures.quadrature(), volume, by_round, by_plane),
                 ),
             ),
             (

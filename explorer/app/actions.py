@@ -11,10 +11,12 @@ from typing import Protocol
 import msgspec
 import numpy as np
 
+from explorer.app.clear_length import clear_length
 from explorer.app.state import (
     Hold,
     Joints,
     State,
+    Taken,
     Unclosed,
     View,
     angles_of,
@@ -53,7 +55,7 @@ class Open:
         Raises:
             InputError: the design is being optimised.
         """
-        _check_free(state)
+        check_free(state)
         optimisation = replace(state.optimisation, run=None, refusal=None)
         after = opened(self.design, view=state.view)
         return replace(
@@ -106,16 +108,19 @@ class SetJoint:
 
 @dataclass(frozen=True)
 class UseNearest:
-    """Take the nearest length that closes, where the one asked for does not."""
+    """Take the nearest length that closes and stays clear, where the one asked for does not."""
 
     def apply(self, state: State) -> State:
-        """Return the next state."""
+        """Return the next state, with a remark on what was taken."""
         unclosed = state.unclosed
         if unclosed is None:
             return state
-        if unclosed.nearest is None:
+        found = clear_length(state)
+        if found is None:
             return moved(state, state.pose)
-        return SetJoint(unclosed.joint, unclosed.nearest).apply(state)
+        value, words = found
+        after = SetJoint(unclosed.joint, value).apply(state)
+        return replace(after, taken=Taken(after.joints, words))
 
 
 @dataclass(frozen=True)
@@ -208,7 +213,7 @@ class SetVariable:
             InputError: the legs are held and cannot close in the new design, or the
                 design is being optimised.
         """
-        _check_free(state)
+        check_free(state)
         design = state.design.with_variable(self.name, self.value)
         if state.hold == "pose":
             return moved(replace(state, design=design), state.pose, state.yaw_pitch_roll)
@@ -238,7 +243,7 @@ class SetName:
             DesignError: not one printable line.
             InputError: no name at all, or the design is being optimised.
         """
-        _check_free(state)
+        check_free(state)
         name = self.name.strip()
         if not name:
             raise InputError(f"a design needs a name; it stays {state.design.name!r}")
@@ -272,7 +277,7 @@ class SetUnit:
         Raises:
             InputError: the design is being optimised.
         """
-        _check_free(state)
+        check_free(state)
         return replace(state, design=msgspec.structs.replace(state.design, unit_mm=self.unit_mm))
 
 
@@ -288,7 +293,7 @@ class SetLimits:
         Raises:
             InputError: the design is being optimised.
         """
-        _check_free(state)
+        check_free(state)
         return replace(state, design=msgspec.structs.replace(state.design, limits=self.limits))
 
 
@@ -333,7 +338,7 @@ def moved(state: State, pose: Pose, yaw_pitch_roll: Triple | None = None) -> Sta
     )
 
 
-def _check_free(state: State) -> None:
+def check_free(state: State) -> None:
     """Refuse to change the design while it is being optimised.
 
     Raises:

@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from explorer.arrays import FloatArray
+from explorer.arrays import FloatArray, IntArray
 from explorer.colours import BAND_EDGES, OUTLINE, Rgb, band_colours
 from explorer.design import Design
 from explorer.reachable import PAIR_NAMES
@@ -22,8 +22,10 @@ WARN_CONDITION = 0.01
 PLAIN: Rgb = (110, 150, 196)
 # Where legs begin to collide: what collides has this colour all over the page.
 COLLIDING: Rgb = OUTLINE
-# A share of the reach: the longest edge of a coloured facet.
+# A share of the reach: the longest edge of a coloured facet, unless that takes too many facets.
 COLOURED_EDGE = 0.08
+# The most facets that a surface is cut into to be coloured.
+MOST_COLOURED = 100_000
 
 
 @dataclass(frozen=True)
@@ -58,18 +60,20 @@ class Colouring:
         rates = jacobian(self.design, points, self.rotation)
         return inverse_condition(rates, self.design.reach) / WARN_CONDITION
 
-    def shells(self, solid: Solid) -> tuple[Shell, ...]:
-        """Return a surface in its colours, each of them once."""
-        if solid.is_empty:
-            return ()
-        if self.measure == "plain":
-            return _by_cause(solid)
-        from trimesh import remesh
+    def shells(self, solid: Solid) -> tuple[tuple[Shell, ...], float | None]:
+        """Return a surface in its colours, each of them once.
 
-        untyped: Any = remesh
-        edge = COLOURED_EDGE * self.design.reach
-        vertices, faces = untyped.subdivide_to_size(solid.vertices, solid.faces, edge, max_iter=12)
-        rest = np.asarray(vertices, dtype=np.float64)[np.asarray(faces)]
+        The second value is the longest edge of a coloured facet in design units if that is
+        longer than usual, because the surface is large beside the reach; None if not.
+        """
+        if solid.is_empty:
+            return (), None
+        if self.measure == "plain":
+            return _by_cause(solid), None
+        usual = COLOURED_EDGE * self.design.reach
+        vertices, faces = cut_to_size(solid, usual)
+        longest = float(edge_lengths(vertices, faces).max())
+        rest = vertices[faces]
         share = self.values(rest.reshape(-1, 3)).reshape(-1, 3)
         shells: list[Shell] = []
         for colour, edge in zip(band_colours(), (*BAND_EDGES[1:], np.inf), strict=True):
@@ -77,7 +81,38 @@ class Colouring:
             if len(band):
                 corners = np.arange(3 * len(band), dtype=np.int32).reshape(-1, 3)
                 shells.append(Shell(colour, band.reshape(-1, 3), corners))
-        return tuple(shells)
+        return tuple(shells), longest if longest > usual else None
+
+
+def cut_to_size(solid: Solid, edge: float) -> tuple[FloatArray, IntArray]:
+    """Return the vertices and faces of a surface whose facets are cut until their edges are short.
+
+    A surface that is large beside the edge keeps longer ones: halving goes on only as long as
+    it makes at most `MOST_COLOURED` facets.
+
+    Args:
+        solid: With the surface; not empty.
+        edge: The longest edge that is wanted, in design units.
+    """
+    from trimesh import remesh
+
+    untyped: Any = remesh
+    vertices, faces = solid.vertices, np.asarray(solid.faces, dtype=np.int64)
+    while True:
+        lengths = edge_lengths(vertices, faces)
+        longest = float(lengths.max())
+        shorter = max(edge, 0.5 * longest)
+        # Each edge that is cut makes two facets of either facet beside it.
+        if longest <= edge or len(faces) + int((lengths > shorter).sum()) > MOST_COLOURED:
+            return vertices, faces
+        made = untyped.subdivide_to_size(vertices, faces, shorter, max_iter=12)
+        vertices, faces = np.asarray(made[0], dtype=np.float64), np.asarray(made[1])
+
+
+def edge_lengths(vertices: FloatArray, faces: IntArray) -> FloatArray:
+    """Return the lengths of the three edges of each face, shape (m, 3)."""
+    ends = vertices[faces]
+    return np.linalg.norm(ends - np.roll(ends, -1, axis=1), axis=2)
 
 
 def _by_cause(solid: Solid) -> tuple[Shell, ...]:

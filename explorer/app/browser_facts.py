@@ -18,14 +18,6 @@ NAME = "explorer-browser"
 PREFIX = "viser-user:"
 PIXEL = "data:image/gif;base64,R0lGODlhAQABAAAAACH5BAEKAAEALAAAAAABAAEAAAICTAEAOw=="
 
-# A box that was ticked or an option that was chosen with a pointer would keep all keys to
-# itself; a hand on the keyboard keeps its place.
-LET_GO = (
-    "if(!window.explorerLetsGo){window.explorerLetsGo=true;"
-    "document.addEventListener('click',event=>{const at=event.target;"
-    "if(event.detail&&at.closest('input[type=checkbox],[role=option]'))"
-    "setTimeout(()=>document.activeElement?.blur())})}"
-)
 TELL = (
     f"localStorage.setItem('{PREFIX}{NAME}',JSON.stringify({{"
     "width:innerWidth,height:innerHeight,"
@@ -57,7 +49,7 @@ def ask(client: viser.ClientHandle) -> BrowserFacts | None:
     client.local_storage.remove_item(NAME)
     pixel = client.gui.add_html(
         f'<img src="{PIXEL}" alt="" width="1" height="1" style="position:absolute" '
-        f'onload="{escape(LET_GO + TELL)}">'
+        f'onload="{escape(TELL)}">'
     )
     deadline = time.monotonic() + PATIENCE_SECONDS
     told: str | None = None

@@ -18,6 +18,7 @@ from explorer.app.assigning import Update
 from explorer.app.session import Session
 from explorer.app.state import Frame, State
 from explorer.app.viser_gaps import Mark, MarksOf
+from explorer.number_text import settled
 from explorer.pose import Triple
 
 Value = TypeVar("Value", float, bool, str, Triple)
@@ -101,7 +102,13 @@ class Slider(Control[float]):
         disabled: Callable[[State], bool] | None = None,
         marks: Callable[[Frame], tuple[Mark, ...]] | None = None,
     ) -> None:
-        super().__init__(session, handle, read, write, disabled)
+
+        def shown(frame: Frame) -> float:
+            # A field would show rounding as −0.00.
+            span_now = span(frame.state)
+            return settled(read(frame), max(abs(span_now.low), abs(span_now.high)))
+
+        super().__init__(session, handle, shown, write, disabled)
         self._slider = handle
         self._span = span
         self._marks = marks
@@ -146,6 +153,27 @@ class Number(Control[float]):
         step = self._step(frame.state)
         yield self._number, "step", step
         yield self._number, "precision", decimals(step)
+        yield from super().updates(frame)
+
+
+class Choice(Control[str]):
+    """A list to choose from, whose options follow the frame."""
+
+    def __init__(
+        self,
+        session: Session,
+        handle: viser.GuiDropdownHandle[str],
+        read: Callable[[Frame], str],
+        write: Callable[[State, str], Action],
+        options: Callable[[Frame], tuple[str, ...]],
+        disabled: Callable[[State], bool] | None,
+    ) -> None:
+        super().__init__(session, handle, read, write, disabled)
+        self._options = options
+
+    def updates(self, frame: Frame) -> Iterator[Update]:
+        """Yield what makes the list show the frame, its options first."""
+        yield self.handle, "options", self._options(frame)
         yield from super().updates(frame)
 
 
@@ -243,10 +271,15 @@ class Controls:
         write: Callable[[State, str], Action],
         *,
         disabled: Callable[[State], bool] | None = None,
+        more: Callable[[Frame], tuple[str, ...]] | None = None,
     ) -> None:
-        """Add a list to choose from."""
+        """Add a list to choose from; `more` are the options of a frame, where they vary."""
         handle = self._gui.add_dropdown(label, options, hint=hint)
-        self._controls.append(Control[str](self._session, handle, read, write, disabled))
+        if more is not None:
+            control: Control[str] = Choice(self._session, handle, read, write, more, disabled)
+        else:
+            control = Control[str](self._session, handle, read, write, disabled)
+        self._controls.append(control)
 
     def text(
         self,

@@ -7,7 +7,8 @@ in the page a number counts once it is entered: by Enter, by leaving the field, 
 in typing. What is no number, or Escape, brings back what was there; and undo is the explorer's.
 
 A line of text may hold blanks and be emptied and typed anew; left empty, it gets back what it
-held. And the arrows move a slider alone, not the camera too.
+held. Enter leaves both, so that the next key is a command again; a pointer that has ticked a box
+or chosen an option leaves it likewise. And the arrows move a slider alone, not the camera too.
 """
 
 SCRIPT = """
@@ -154,6 +155,11 @@ SCRIPT = """
       enter();
     }
     if (typing.isPending && ["Enter", "Tab", "ArrowUp", "ArrowDown"].includes(key)) enter();
+    if (key === "Enter") {
+      event.stopPropagation();
+      target.blur();
+      return;
+    }
     // The page's field would go by a text that it does not know.
     const isTyped = key.length === 1 && !event.ctrlKey && !event.metaKey;
     if (isTyped || ["Backspace", "Delete", "ArrowLeft", "ArrowRight"].includes(key)) {
@@ -194,6 +200,11 @@ SCRIPT = """
       event.stopPropagation();
     }
   }, true);
+  addEventListener("keydown", (event) => {
+    if (event.key !== "Enter" || event.isComposing || !isLine(event.target)) return;
+    event.stopPropagation();
+    event.target.blur();
+  }, true);
   addEventListener("focusout", ({ target }) => {
     if (!line || line.field !== target) return;
     const text = target.value.trim() || line.before;
@@ -202,6 +213,13 @@ SCRIPT = """
     write.call(target, text);
     target.dispatchEvent(new Event("input", { bubbles: true }));
   }, true);
+
+  // A box that was ticked or an option that was chosen with a pointer would keep all keys to
+  // itself; a hand on the keyboard keeps its place.
+  document.addEventListener("click", ({ detail, target }) => {
+    if (!detail || !target.closest("input[type=checkbox], [role=option]")) return;
+    setTimeout(() => document.activeElement?.blur());
+  });
 
   // After the page's own listeners, before viser's, which turns the camera.
   document.body.addEventListener("keydown", (event) => {

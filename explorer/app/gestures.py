@@ -1,4 +1,4 @@
-"""What hands do: an action with the control that it came from and its time.
+"""What hands do: an action with the control that it came from, its press and its time.
 
 The many events of one drag are one gesture, of which the pose where it began is kept.
 """
@@ -9,9 +9,11 @@ from dataclasses import dataclass, replace
 
 from explorer.app.actions import Action, Open, Reset, SetMode
 from explorer.app.drawable import check_drawable
+from explorer.app.presses import Press
 from explorer.app.state import Gesture, State
 
-# A hand that has not moved a control for longer, in seconds, begins a new gesture with it.
+# Where no press is told of, a hand that has not moved a control for longer, in seconds, begins a
+# new gesture with it.
 PAUSE_SECONDS = 1.0
 
 
@@ -23,11 +25,30 @@ class ByHand:
         action: What is done.
         source: The control that it came from; one of its own for what is no drag.
         time: When it happened, in seconds.
+        press: During which it happened; None for keys, and where no press is told of.
     """
 
     action: Action
     source: object
     time: float
+    press: Press | None = None
+
+    def goes_on(self, source: object, last: float, press: Press | None) -> bool:
+        """Whether this belongs to what was done before with the same control.
+
+        From press to release is one, and two presses of one browser are two; all else is told
+        apart by pauses.
+
+        Args:
+            source: The control of what was done before.
+            last: When its last event happened, in seconds.
+            press: The last press that it had, if any.
+        """
+        if self.source != source:
+            return False
+        if self.press is not None and press is not None and self.press.client == press.client:
+            return self.press == press
+        return self.time - last <= PAUSE_SECONDS
 
     def apply(self, state: State) -> State:
         """Return the next state, with the gesture that led to its pose.
@@ -45,12 +66,9 @@ class ByHand:
             # The legs did not go from one to the other.
             return None
         gesture = before.gesture
-        if (
-            gesture is not None
-            and gesture.source == self.source
-            and self.time - gesture.last <= PAUSE_SECONDS
-        ):
-            return replace(gesture, last=max(gesture.last, self.time))
+        if gesture is not None and self.goes_on(gesture.source, gesture.last, gesture.press):
+            last = max(gesture.last, self.time)
+            return replace(gesture, last=last, press=self.press or gesture.press)
         if after.pose == before.pose:
             return gesture
-        return Gesture(before.pose, self.source, self.time)
+        return Gesture(before.pose, self.source, self.time, self.press)

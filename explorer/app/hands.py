@@ -15,10 +15,12 @@ import viser
 from explorer.app.assigning import Update
 from explorer.app.browser_facts import BrowserFacts, ask
 from explorer.app.fields import SCRIPT as FIELDS
+from explorer.app.names import SCRIPT as NAMES
 from explorer.app.palette import Command, Palette
-from explorer.app.panels.keys import KeysCard, Toolbar
+from explorer.app.panels.keys import CLOSING, KeysCard, Toolbar
 from explorer.app.panels.tour import TourGuide
 from explorer.app.preferences import PreferenceFile
+from explorer.app.room import SCRIPT as ROOM
 from explorer.app.scene.camera import Cameras
 from explorer.app.session import Session, Who
 from explorer.app.session_commands import saved_commands, session_commands
@@ -31,8 +33,8 @@ from explorer.errors import StorageError
 
 # Until the panels of a new page are laid out.
 SETTLE_SECONDS = 0.7
-# So often a new browser's camera is looked after.
-MOST_LOOKS = 12
+# So often a new browser's camera is looked after, if it says nothing, and in the end so seldom.
+MOST_LOOKS, LONGEST_PAUSE_SECONDS = 12, 5.0
 # In pixels. In a narrower window the left panel goes below the right one, which leaves the
 # scene room, if the window is high enough for both.
 NARROW, HIGH_ENOUGH = 1100, 700
@@ -115,7 +117,8 @@ class Hands:
             docked: Whether panels lie beside the scene.
         """
         fit = Command("View › Fit", "Show the whole mechanism from where you look.", cameras.fit)
-        run_script(self._server, FIELDS)
+        for script in (FIELDS, ROOM, NAMES, CLOSING):
+            run_script(self._server, script)
         self._palette = Palette(self._server, (fit, *session_commands(self._session)))
         drawer.float(x=FREE // 2, y=-FREE // 2, width=DRAWER_WIDTH, height=DRAWER_HEIGHT)
         drawer.minimize()
@@ -166,12 +169,15 @@ class Hands:
         if facts is not None:
             self._suit(client, facts)
         # Some browsers tell the size of the scene before its panels are laid out, and not again
-        # before the camera moves; slow ones miss where it is put.
+        # before the camera moves; slow ones miss where it is put. Each look makes them tell.
+        pause = SETTLE_SECONDS
         for look in range(MOST_LOOKS):
-            time.sleep(SETTLE_SECONDS)
+            time.sleep(pause)
+            # The camera of one that has gone stands too.
             if look > 0 and cameras.stands(client):
                 return
             cameras.look_again(client)
+            pause = min((1.0 + look) * SETTLE_SECONDS, LONGEST_PAUSE_SECONDS)
 
     def _suit(self, client: viser.ClientHandle, facts: BrowserFacts) -> None:
         if self._stacked is not None:

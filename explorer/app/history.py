@@ -1,8 +1,9 @@
 """What was done, step by step, to be undone, redone and gone back to.
 
-A step is what one hand does with one control without a pause, so that a drag of many events
-is one step. What happens by itself, such as a path that plays on, belongs to the step before
-it. Steps hold whole states, which share all that did not change.
+A step is what one hand does with one control from press to release, however long it rests, so
+that a drag of many events is one step; without a press, as with keys, a pause ends it. What
+happens by itself, such as a path that plays on, belongs to the step before it. Steps hold whole
+states, which share all that did not change.
 """
 
 from __future__ import annotations
@@ -10,11 +11,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from explorer.app.actions import MarkSaved
-from explorer.app.gestures import PAUSE_SECONDS, ByHand
+from explorer.app.gestures import ByHand
 from explorer.app.optimising import Advance as ShowIterates
 from explorer.app.optimising import Compare
 from explorer.app.path_actions import Advance as PlayOn
 from explorer.app.path_actions import Play, TakePlan
+from explorer.app.presses import Press
 from explorer.app.state import State
 from explorer.app.step_words import words
 from explorer.errors import InputError
@@ -36,6 +38,7 @@ class Step:
         state: After it.
         source: The control that it came from.
         last: When its last event happened, in seconds.
+        press: The last press of a browser that it was part of; None if it is not known.
     """
 
     number: int
@@ -43,6 +46,7 @@ class Step:
     state: State
     source: object = None
     last: float = 0.0
+    press: Press | None = None
 
 
 @dataclass(frozen=True)
@@ -90,10 +94,11 @@ class History:
                 # Back where it began.
                 return History(done[:-1], self.at - 1)
             before = self.steps[max(self.at - 1, 0)].state
-            step = Step(here.number, words(act.action, before, kept), kept, here.source, act.time)
+            called, press = words(act.action, before, kept), act.press or here.press
+            step = Step(here.number, called, kept, here.source, act.time, press)
             return History((*done[:-1], step), self.at, is_open=True)
         called = words(act.action, here.state, kept)
-        step = Step(here.number + 1, called, kept, act.source, act.time)
+        step = Step(here.number + 1, called, kept, act.source, act.time, act.press)
         done = (*done, step)[-MOST_STEPS:]
         return History(done, len(done) - 1, is_open=True)
 
@@ -123,7 +128,7 @@ class History:
 
     def _goes_on(self, act: ByHand) -> bool:
         here = self.step
-        return self.is_open and here.source == act.source and act.time - here.last <= PAUSE_SECONDS
+        return self.is_open and act.goes_on(here.source, here.last, here.press)
 
 
 def begun(state: State) -> History:

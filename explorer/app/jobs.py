@@ -14,14 +14,19 @@ import pickle
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any, Generic, TypeVar, cast
 
+from explorer.app.faults import Fault, Faults, log_fault
 from explorer.app.worker import Cancel, Order, Reply, Told, read_frame, write_frame
 
 Item = TypeVar("Item")
+
+# A drawing that takes longer is cancelled as soon as a newer one waits; a shorter one is shown.
+LONG_SECONDS = 1.0
 
 RESTARTED = "The worker process died and was started again."
 
@@ -109,6 +114,7 @@ class _Request:
     done: Callable[[Any], None]
     failed: Callable[[str], None]
     told: Callable[[Any], None] | None
+    is_drawing: bool
 
 
 class Worker:
@@ -121,6 +127,7 @@ class Worker:
         report: Called with a message when the process died or failed unexpectedly.
         tasks: The module that holds the tasks.
         died: What to say when the process died.
+        faults: Where requests are kept that failed unexpectedly; None to keep none.
     """
 
     def __init__(
@@ -129,8 +136,10 @@ class Worker:
         *,
         tasks: str = "explorer.app.tasks",
         died: str = "The worker process died over this twice; the next change starts it again.",
+        faults: Faults | None = None,
     ) -> None:
         self._report = report
+        self._faults = faults
         self._tasks = tasks
         self._died = died
         self._numbers = itertools.count()
@@ -138,12 +147,16 @@ class Worker:
         self._stopped = False
         # Of the process: it must not be started after it was told to stop.
         self._lock = threading.Lock()
-        # Of what is written to it, of ending it by force, and of these three: the order that
-        # it does, the newest that was cancelled, and when it is ended for not heeding that.
+        # Of what is written to it, of ending it by force, and of these four: the request that
+        # it does and since when, the orders that were cancelled, and when each of these is
+        # ended for not heeding that.
         self._writing = threading.Lock()
-        self._doing: int | None = None
-        self._cancelled = -1
-        self._deadline: threading.Timer | None = None
+        self._doing: _Request | None = None
+        self._since = 0.0
+        self._cancelled: set[int] = set()
+        self._deadlines: dict[int, threading.Timer] = {}
+        # The drawing that was last found to be out of date while it was under way.
+        self._hurried = -1
         self._queue: LatestWins[_Request] = LatestWins(self._serve_all, "worker")
 
     def submit(
@@ -154,6 +167,8 @@ class Worker:
         done: Callable[[Any], None],
         failed: Callable[[str], None],
         told: Callable[[Any], None] | None = None,
+        *,
+        is_drawing: bool = False,
     ) -> int:
         """Ask for a task; one of the same key that still waits is dropped.
 
@@ -165,34 +180,73 @@ class Worker:
             failed: Called with a message for people instead.
             told: Called with what the task tells meanwhile. Given, the task takes a
                 `explorer.app.worker.Line` besides its arguments.
+            is_drawing: Whether only the newest task of this key is of use, as with drawings: one
+                that is being done is cancelled when a newer one waits and `LONG_SECONDS` have
+                passed. It is done once more should the process die, even if it tells.
 
         Returns:
             A number to cancel it by.
         """
         number = next(self._numbers)
         order = Order(number, task, arguments, tells=told is not None)
-        self._queue.post(key, number, _Request(key, order, done, failed, told))
+        request = _Request(key, order, done, failed, told, is_drawing)
+        self._queue.post(key, number, request)
+        self._hurry(key)
         return number
 
-    def cancel(self, number: int, patience: float) -> None:
-        """Ask a task, and all before it, to end early.
+    def cancel(self, number: int, patience: float | None) -> None:
+        """Ask a task to end early.
 
         One that tells hears of it; any other is not begun, or ends with its process.
 
         Args:
             number: Of the task, as `submit` returned it.
-            patience: After so many seconds it ends together with its process.
+            patience: After so many seconds it ends together with its process; None for never.
         """
         with self._writing:
-            self._cancelled = max(self._cancelled, number)
-            if self._doing == number and self._process is not None:
-                with contextlib.suppress(*GONE):
-                    write_frame(cast("IO[bytes]", self._process.stdin), Cancel(number))
-            if self._deadline is not None:
-                self._deadline.cancel()
-            self._deadline = threading.Timer(patience, self._kill, (number,))
-            self._deadline.daemon = True
-            self._deadline.start()
+            self._cancel(number, patience)
+
+    def _cancel(self, number: int, patience: float | None) -> None:
+        """Do the same while nothing else is written."""
+        self._cancelled.add(number)
+        doing = self._doing
+        if doing is not None and doing.order.number == number and self._process is not None:
+            with contextlib.suppress(*GONE):
+                write_frame(cast("IO[bytes]", self._process.stdin), Cancel(number))
+        self._forget_deadline(number)
+        if patience is None:
+            return
+        deadline = threading.Timer(patience, self._kill, (number,))
+        deadline.daemon = True
+        self._deadlines[number] = deadline
+        deadline.start()
+
+    def _forget_deadline(self, number: int) -> None:
+        deadline = self._deadlines.pop(number, None)
+        if deadline is not None:
+            deadline.cancel()
+
+    def _hurry(self, key: object) -> None:
+        """Have the drawing under way cancelled, now or soon, if a newer one of its key waits.
+
+        On a thread of its own, as writing may have to wait for the process.
+        """
+        doing, since = self._doing, self._since
+        if doing is None or not doing.is_drawing or doing.key != key:
+            return
+        number = doing.order.number
+        if number == self._hurried or not self._queue.is_waiting(key):
+            return
+        self._hurried = number
+        left = max(0.0, since + LONG_SECONDS - time.monotonic())
+        later = threading.Timer(left, self._cancel_if_doing, (number,))
+        later.daemon = True
+        later.start()
+
+    def _cancel_if_doing(self, number: int) -> None:
+        with self._writing:
+            if self._doing is not None and self._doing.order.number == number:
+                self._cancel(number, None)
 
     @property
     def process_id(self) -> int | None:
@@ -221,28 +275,37 @@ class Worker:
             # What has become out of date while others were served is left out.
             if not self._queue.is_waiting(request.key):
                 self._serve(request)
+            self._cancelled.discard(request.order.number)
 
     def _serve(self, request: _Request) -> None:
         reply = self._tried(request)
-        # What has told something cannot be begun anew without a word.
-        if reply is None and request.told is None and not self._is_over(request):
+        # What has told something cannot be begun anew without a word, unless only its end counts.
+        is_repeatable = request.told is None or request.is_drawing
+        if reply is None and is_repeatable and not self._is_over(request):
             self._report(RESTARTED)
             reply = self._tried(request)
         if reply is None:
             if self._stopped:
                 return
-            if self._cancelled < request.order.number:
-                self._report(self._died)
+            if not self._is_over(request):
+                self._tell(request, self._died, "the process died")
             request.failed(self._died)
         elif reply.problem is None:
             request.done(reply.value)
         else:
             if not reply.expected:
-                self._report(f"Something went wrong in the worker: {reply.problem}")
+                task = request.order.task.replace("_", " ")
+                message = f"Something went wrong in the worker ({task}): {reply.problem}"
+                self._tell(request, message, reply.problem, reply.trace)
             request.failed(reply.problem)
 
+    def _tell(self, request: _Request, message: str, problem: str, trace: str = "") -> None:
+        order = request.order
+        fault = Fault(self._tasks, order.task, order.arguments, order.tells, problem, trace)
+        self._report(log_fault(fault, message, self._faults))
+
     def _is_over(self, request: _Request) -> bool:
-        return self._stopped or self._cancelled >= request.order.number
+        return self._stopped or request.order.number in self._cancelled
 
     def _tried(self, request: _Request) -> Reply | None:
         """Return the reply to a request.
@@ -253,7 +316,7 @@ class Worker:
         if process is None:
             return None
         try:
-            if not self._hand_over(request.order, process):
+            if not self._hand_over(request, process):
                 return None
             return _replied(request, process)
         except GONE:
@@ -264,29 +327,33 @@ class Worker:
         finally:
             with self._writing:
                 self._doing = None
-                # One that waits for its turn yet keeps its deadline.
-                if self._deadline is not None and self._cancelled <= request.order.number:
-                    self._deadline.cancel()
+                self._forget_deadline(request.order.number)
 
-    def _hand_over(self, order: Order, process: subprocess.Popen[bytes]) -> bool:
+    def _hand_over(self, request: _Request, process: subprocess.Popen[bytes]) -> bool:
         """Write an order to the process; return whether it is to be done at all."""
+        order = request.order
         with self._writing:
-            is_cancelled = self._cancelled >= order.number
+            is_cancelled = order.number in self._cancelled
             # It would not hear of it, and the time to end it by force may have passed.
             if is_cancelled and not order.tells:
                 return False
             # Both are pipes, as they were asked for.
             stream = cast("IO[bytes]", process.stdin)
             write_frame(stream, order)
-            self._doing = order.number
+            self._since = time.monotonic()
+            self._doing = request
             if is_cancelled:
                 write_frame(stream, Cancel(order.number))
-            return True
+        # A newer one may have come before this one was known to be under way.
+        self._hurry(request.key)
+        return True
 
     def _kill(self, number: int) -> None:
         # Nothing else is handed over meanwhile, so that it cannot hit what comes next.
         with self._writing:
-            if self._doing == number and self._process is not None:
+            self._deadlines.pop(number, None)
+            doing = self._doing
+            if doing is not None and doing.order.number == number and self._process is not None:
                 self._process.kill()
 
     def _alive(self) -> subprocess.Popen[bytes] | None:

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from explorer.app.faults import FAULTS_FOLDER, Faults
 from explorer.app.history import History, Step
 from explorer.app.state import State
 from explorer.app.storage.autosave import Autosave
 from explorer.app.storage.autosaver import Autosaver, Store
 from explorer.app.storage.document import Document, Kept, first_of
+from explorer.app.storage.folder import data_folder
 from explorer.app.storage.library import Library
 
 # Steps that are kept, the nearest to the present one.
@@ -25,12 +27,14 @@ class Keep:
         store: Where the session is kept.
         left: The session to go on with; None to begin a new one.
         messages: For people, about files that could not be used.
+        faults: Where requests are kept that failed unexpectedly; None to keep none.
     """
 
     library: Library
     store: Store
     left: Document | None = None
     messages: tuple[str, ...] = ()
+    faults: Faults | None = None
 
 
 def take_up(*, resume: bool) -> Keep:
@@ -39,11 +43,11 @@ def take_up(*, resume: bool) -> Keep:
     Args:
         resume: Whether to go on with the session that was left last.
     """
-    store = Autosave()
+    store, faults = Autosave(), Faults(data_folder() / FAULTS_FOLDER)
     if not resume:
-        return Keep(Library(), store)
+        return Keep(Library(), store, faults=faults)
     found = store.adopt()
-    return Keep(Library(), store, found.document, found.messages)
+    return Keep(Library(), store, found.document, found.messages, faults)
 
 
 def document_of(history: History) -> Document:

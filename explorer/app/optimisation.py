@@ -16,6 +16,7 @@ import numpy as np
 
 from explorer.constraints import Never, constraints
 from explorer.design import VARIABLES, Design
+from explorer.errors import ExplorerError
 from explorer.home import home_pose
 from explorer.optimise.defaults import make_problem
 from explorer.optimise.facts import Facts
@@ -30,6 +31,7 @@ from explorer.optimise.problem import (
     longest_length,
 )
 from explorer.optimise.record import Record, Settings, record_of
+from explorer.optimise.refutation import Refutation, paper_box, refutations
 from explorer.optimise.starts import check_starts
 from explorer.optimise.trail import Trail
 from explorer.workspace import workspace_volume
@@ -111,6 +113,7 @@ class Verdict:
         iterations: Of the best.
         seconds: It took.
         record: By which it can be repeated; None if it had to be ended or failed.
+        holding: The limit, demand or bound that kept it from more, "" if none is known.
     """
 
     status: Status | Literal["failed"]
@@ -121,6 +124,7 @@ class Verdict:
     iterations: int = 0
     seconds: float | None = None
     record: Record | None = None
+    holding: str = ""
 
 
 @dataclass(frozen=True)
@@ -198,21 +202,31 @@ class Optimisation:
 
 def wished_volume(state: State) -> float:
     """Return the volume that is asked for."""
-    wish = state.optimisation.wish
-    if wish.volume is not None:
-        return wish.volume
-    return _volume(state.base, same=wish.objective == "smallest-reach")
+    return _wished_volume(state.base, state.optimisation.wish)
 
 
 def wished_reach(state: State) -> float:
     """Return the largest reach that is asked for."""
-    given = state.optimisation.wish.reach
-    return longest_length(state.base) if given is None else given
+    return _wished_reach(state.base, state.optimisation.wish)
 
 
 def wished_box(state: State) -> Box:
     """Return the box that is required."""
-    return state.optimisation.wish.box or box_within(state.base)
+    return _wished_box(state.base, state.optimisation.wish)
+
+
+def _wished_volume(base: Design, wish: Wish) -> float:
+    if wish.volume is not None:
+        return wish.volume
+    return _volume(base, same=wish.objective == "smallest-reach")
+
+
+def _wished_reach(base: Design, wish: Wish) -> float:
+    return longest_length(base) if wish.reach is None else wish.reach
+
+
+def _wished_box(base: Design, wish: Wish) -> Box:
+    return wish.box or box_within(base)
 
 
 def problem_of(state: State) -> Problem:
@@ -221,21 +235,57 @@ def problem_of(state: State) -> Problem:
     Raises:
         ExplorerError: it cannot be asked like that.
     """
-    wish = state.optimisation.wish
+    return _problem(state.design, state.base, state.optimisation.wish)
+
+
+def _problem(design: Design, base: Design, wish: Wish) -> Problem:
     free = [name for name in wish.free if name in (*VARIABLES, YAW)]
     if wish.needs_box and PLACE in wish.free:
         free += SHIFTS
     problem = make_problem(
-        state.design,
+        design,
         wish.objective,
-        volume=wished_volume(state) if wish.needs_volume else None,
-        reach=wished_reach(state) if wish.needs_reach else None,
+        volume=_wished_volume(base, wish) if wish.needs_volume else None,
+        reach=_wished_reach(base, wish) if wish.needs_reach else None,
         clearance=None if wish.clearance == 0.0 else wish.clearance,
-        required_box=wished_box(state) if wish.needs_box else None,
+        required_box=_wished_box(base, wish) if wish.needs_box else None,
         free=[name for name in free if name not in VARIABLES],
     )
     variables = tuple(each for each in problem.variables if each.name in free)
     return msgspec.structs.replace(problem, variables=variables)
+
+
+def refuted(state: State) -> tuple[Refutation, ...]:
+    """Return what the limits cannot give of what is asked for.
+
+    Empty if a search may give it, and where no problem can be made of it: that is told when
+    the search is asked for.
+    """
+    return _refuted(state.design, state.base, state.optimisation.wish)
+
+
+@lru_cache(maxsize=8)
+def _refuted(design: Design, base: Design, wish: Wish) -> tuple[Refutation, ...]:
+    problem = _problem_or_none(design, base, wish)
+    return () if problem is None else refutations(problem)
+
+
+def box_on_offer(state: State) -> Box | None:
+    """Return the box of the paper's optimum where that holds what is asked for."""
+    return _box_on_offer(state.design, state.base, state.optimisation.wish)
+
+
+@lru_cache(maxsize=8)
+def _box_on_offer(design: Design, base: Design, wish: Wish) -> Box | None:
+    problem = _problem_or_none(design, base, wish)
+    return None if problem is None else paper_box(problem)
+
+
+def _problem_or_none(design: Design, base: Design, wish: Wish) -> Problem | None:
+    try:
+        return _problem(design, base, wish)
+    except ExplorerError:
+        return None
 
 
 def verdict_of(outcome: Outcome, starts: int) -> Verdict:
@@ -250,6 +300,7 @@ def verdict_of(outcome: Outcome, starts: int) -> Verdict:
         iterations=run.iterations,
         seconds=outcome.seconds,
         record=record_of(outcome, Settings(starts=starts)),
+        holding=run.holding,
     )
 
 

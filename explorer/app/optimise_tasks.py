@@ -4,20 +4,16 @@ from __future__ import annotations
 
 from explorer.app.optimisation import Comparison
 from explorer.app.worker import Line
-from explorer.compiled import warm
 from explorer.design import Design
 from explorer.optimise.facts import facts_of
 from explorer.optimise.outcome import Outcome
 from explorer.optimise.problem import Box, Problem
 from explorer.optimise.solver import optimise_design
-from explorer.workspace import node_step_of
 
 
 def ready() -> None:
     """Load what a search needs, so that the first one starts at once."""
     import scipy.optimize  # noqa: F401 # pyright: ignore[reportUnusedImport]
-
-    warm()
 
 
 def optimise(problem: Problem, starts: int, line: Line) -> Outcome:
@@ -35,19 +31,21 @@ def optimise(problem: Problem, starts: int, line: Line) -> Outcome:
 
 
 def compare(
-    before: Design, after: Design, clearance_margin: float, boxes: tuple[Box | None, Box | None]
+    before: Design,
+    after: Design,
+    demanded_margin: float | None,
+    boxes: tuple[Box | None, Box | None],
 ) -> Comparison:
-    """Return the measures of two designs, by the same yardsticks.
+    """Return the measures of two designs.
 
     Args:
         before: The one to compare with.
         after: The other.
-        clearance_margin: From which margin on clearances count.
-        boxes: Over which the worst margin of each is looked for, or None.
+        demanded_margin: From which margin on a clearance was demanded; None if it was not.
+        boxes: Over which the least margin of each is looked for, or None.
     """
-    step = node_step_of(before)
     first, second = (
-        facts_of(design, clearance_margin=clearance_margin or None, box=box, step=step)
+        facts_of(design, demanded_margin=demanded_margin, box=box)
         for design, box in zip((before, after), boxes, strict=True)
     )
     return Comparison(first, second)

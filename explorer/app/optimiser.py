@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable
 
 from explorer.app.actions import Action
+from explorer.app.faults import Faults
 from explorer.app.jobs import Worker
 from explorer.app.optimisation import Run, Verdict, cut_short, verdict_of
 from explorer.app.optimising import Advance, Compare, EndRun
@@ -36,12 +37,17 @@ class Optimiser:
         session: Which is told.
         report: Called with a message when the process died or failed unexpectedly.
         is_drawn: Whether the page shows all of the last iterate.
+        faults: Where requests are kept that failed unexpectedly; None to keep none.
     """
 
     def __init__(
-        self, session: Session, report: Callable[[str], None], is_drawn: Callable[[], bool]
+        self,
+        session: Session,
+        report: Callable[[str], None],
+        is_drawn: Callable[[], bool],
+        faults: Faults | None = None,
     ) -> None:
-        self.worker = Worker(report, tasks="explorer.app.optimise_tasks", died=DIED)
+        self.worker = Worker(report, tasks="explorer.app.optimise_tasks", died=DIED, faults=faults)
         self._session = session
         self._is_drawn = is_drawn
         self._stopped = threading.Event()
@@ -137,12 +143,14 @@ class Optimiser:
         best, problem = run.best, run.problem
         if best is None:
             return
-        box = problem.demands.required_box
+        demands = problem.demands
+        margin = None if demands.clearance is None else demands.clearance_margin
+        box = demands.required_box
         boxes = (box, None if box is None else problem.required_box_at(best.values))
         self.worker.submit(
             "compare",
             "compare",
-            (run.own.design, best.design, problem.demands.clearance_margin, boxes),
+            (run.own.design, best.design, margin, boxes),
             lambda found: self._session.do(Compare(run.number, found)),
             lambda _: None,
         )

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import msgspec
 
-from explorer.app.actions import moved
+from explorer.app.actions import check_free, moved
 from explorer.app.optimisation import (
     PLACE,
     Comparison,
@@ -21,13 +21,15 @@ from explorer.app.optimisation import (
     Verdict,
     Wish,
     problem_of,
+    refuted,
 )
 from explorer.app.state import State
 from explorer.design import Design
-from explorer.errors import ExplorerError
+from explorer.errors import ExplorerError, NoAnswerError
 from explorer.home import home_pose
 from explorer.optimise.outcome import Iterate
 from explorer.optimise.problem import YAW
+from explorer.optimise.refutation import PAPER_BOX, with_box, words_of
 from explorer.pose import Pose
 
 SUFFIX = "-optimised"
@@ -59,7 +61,11 @@ class StartRun:
     """Begin to look for the best design."""
 
     def apply(self, state: State) -> State:
-        """Return the next state; with the reason if it cannot begin."""
+        """Return the next state; with the reason if it cannot begin.
+
+        Raises:
+            NoAnswerError: the limits cannot give what is asked for.
+        """
         found = state.optimisation
         if found.is_on:
             return state
@@ -67,6 +73,9 @@ class StartRun:
             problem = problem_of(state)
         except ExplorerError as error:
             return replace(state, optimisation=replace(found, refusal=str(error)))
+        impossible = refuted(state)
+        if impossible:
+            raise NoAnswerError(words_of(impossible))
         last = found.run
         # What was found and not accepted is no design of the user's yet.
         own = last.own if last is not None and last.is_undecided else state
@@ -83,6 +92,34 @@ class StartRun:
             # The workspace is what it is all about.
             view=replace(state.view, workspace=workspace),
         )
+
+
+@dataclass(frozen=True)
+class LiftBox:
+    """Take the box out of the design's limits; its home pose stays where it is."""
+
+    def apply(self, state: State) -> State:
+        """Return the next state.
+
+        Raises:
+            InputError: the design is being optimised.
+        """
+        check_free(state)
+        return replace(state, design=with_box(state.design, None))
+
+
+@dataclass(frozen=True)
+class TakePaperBox:
+    """Bound the design by the box of the paper's optimum; its home pose stays where it is."""
+
+    def apply(self, state: State) -> State:
+        """Return the next state.
+
+        Raises:
+            InputError: the design is being optimised.
+        """
+        check_free(state)
+        return replace(state, design=with_box(state.design, PAPER_BOX))
 
 
 @dataclass(frozen=True)

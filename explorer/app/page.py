@@ -40,6 +40,8 @@ from explorer.app.panels.workspace_numbers import WorkspaceNumbers
 from explorer.app.parts_feed import PartsFeed
 from explorer.app.path_runner import PathRunner
 from explorer.app.preferences import PreferenceFile
+from explorer.app.press_events import listen
+from explorer.app.presses import Presses
 from explorer.app.scene import Scene
 from explorer.app.scene.camera import Cameras, ViewName
 from explorer.app.scene.placing import Placed
@@ -101,14 +103,18 @@ class Page:
         self._is_complete = False
         self._frame = Frame(state)
         self._assigner = Assigner(server)
-        self.session = Session(state, self._draw, self._complain, self._report, history)
-        self.worker = Worker(self._tell)
+        presses = Presses()
+        self.session = Session(
+            state, self._draw, self._complain, self._report, history, press_at=presses.at
+        )
+        faults = None if keep is None else keep.faults
+        self.worker = Worker(self._tell, faults=faults)
         self.feed = WorkspaceFeed(self.worker, self.session.redraw)
         self.radius_feed = RadiusFeed(self.worker, self.session.redraw)
         self.strata_feed = StrataFeed(self.worker, self.session.redraw)
         self.parts_feed = PartsFeed(self.worker, self.session.redraw)
         self.compare_feed = CompareFeed(self.worker, self.session.redraw)
-        self.path_runner = PathRunner(self.session, self._tell)
+        self.path_runner = PathRunner(self.session, self._tell, faults)
         gui = server.gui
         gui.set_panel_label(TITLE)
         self.hands = Hands(server, self.session, preferences, self._complain)
@@ -116,6 +122,7 @@ class Page:
             self.session,
             self._tell,
             lambda: self.feed.is_settled,
+            faults,
         )
         self._scene = Scene(server, self.feed, self.compare_feed)
         self._cameras = Cameras(server.initial_camera, self._placed)
@@ -162,6 +169,8 @@ class Page:
         self._scene.drag_handle.handle.on_update(self._dragged)
         server.on_client_connect(self._cameras.connected)
         server.on_client_disconnect(self._cameras.disconnected)
+        server.on_client_connect(lambda client: listen(client, presses))
+        server.on_client_disconnect(lambda client: presses.forget(client.client_id))
         self._is_complete = True
         self.session.redraw()
         self.session.wait_until_idle()
@@ -228,6 +237,7 @@ class Page:
                     studies,
                     self._complain,
                     lambda client, tall: self.hands.set_drawer(client, drawer, tall=tall),
+                    None if keep is None else keep.faults,
                 )
         with drawer.add_tab("History"):
             self._history = HistoryPanel(gui, self.session)

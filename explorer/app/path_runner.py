@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 
 from explorer.app.actions import Action
+from explorer.app.faults import Faults
 from explorer.app.jobs import Worker
 from explorer.app.path_actions import Advance, TakePlan
 from explorer.app.paths import Journey
@@ -27,10 +28,13 @@ class PathRunner:
     Args:
         session: Which is told.
         report: Called with a message when the process died or failed unexpectedly.
+        faults: Where requests are kept that failed unexpectedly; None to keep none.
     """
 
-    def __init__(self, session: Session, report: Callable[[str], None]) -> None:
-        self.worker = Worker(report, tasks="explorer.app.path_tasks", died=DIED)
+    def __init__(
+        self, session: Session, report: Callable[[str], None], faults: Faults | None = None
+    ) -> None:
+        self.worker = Worker(report, tasks="explorer.app.path_tasks", died=DIED, faults=faults)
         self._session = session
         self._stopped = threading.Event()
         self._playing = threading.Event()

@@ -15,10 +15,9 @@ from html import escape
 import viser
 
 from explorer.app.panels.html import signed
-from explorer.app.state import State
+from explorer.app.state import Frame, State
 from explorer.app.viser_gaps import SceneMessage, scene_as_html
 from explorer.arrays import FloatArray
-from explorer.singularity import mode_name
 
 # Of what has no place in the tree of the scene, only this goes into the file.
 KEPT = (
@@ -123,7 +122,7 @@ def caption_of(state: State, date: dt.date) -> str:
     )
     return (
         f'<b style="font-size:14px">{escape(state.design.name)}</b><br>'
-        f"b4 at ({x}, {y}, {z}) · {angles} · mode {mode_name(state.mode)}<br>"
+        f"b4 at ({x}, {y}, {z}) · {angles} · mode {Frame(state).snapshot.sign_words}<br>"
         f"1 unit = {state.design.unit_mm:.6g} mm · {date.isoformat()}"
     )
 

@@ -11,9 +11,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from explorer.app.actions import Action
+from explorer.app.field_words import message_of
 from explorer.app.gestures import ByHand
 from explorer.app.history import History, begun, restored
 from explorer.app.jobs import LatestWins
+from explorer.app.presses import Press
 from explorer.app.state import Frame, State
 from explorer.errors import ExplorerError
 
@@ -58,6 +60,8 @@ class Session:
         complain: Called with a message for people and the client it is for (None: all).
         report: Called with an unexpected exception; the session goes on.
         history: That led to the state; None where it begins with it.
+        press_at: Tells the press of a client at a time, if it held anything then; None if no
+            client tells of presses.
     """
 
     def __init__(
@@ -67,12 +71,15 @@ class Session:
         complain: Callable[[str, Who], None],
         report: Callable[[Exception], None],
         history: History | None = None,
+        *,
+        press_at: Callable[[Who, float], Press | None] | None = None,
     ) -> None:
         self._state = state
         self._history = begun(state) if history is None else history
         self._draw = draw
         self._complain = complain
         self._report = report
+        self._press_at = press_at
         self._jobs: LatestWins[_Posted] = LatestWins(self._handle, "session")
 
     @property
@@ -146,7 +153,7 @@ class Session:
                 try:
                     self._make(item)
                 except ExplorerError as error:
-                    self._complain(str(error), item.who)
+                    self._complain(message_of(error), item.who)
             # Drawn also after a refusal: the control that asked for it must go back.
             self._draw(Frame(self._state))
         except Exception as error:  # noqa: BLE001 - one bad frame must not end the session
@@ -158,7 +165,8 @@ class Session:
             self._state = restored(history.step, self._state)
             self._history = history
             return
-        action = ByHand(item.change(self._state), item.key, item.stamp)
+        press = None if self._press_at is None else self._press_at(item.who, item.stamp)
+        action = ByHand(item.change(self._state), item.key, item.stamp, press)
         self._state = action.apply(self._state)
         self._history = self._history.recorded(action, self._state)
 

@@ -39,6 +39,11 @@ class SliceMap:
     highs: tuple[float, float]
 
 
+def level_within(low: float, high: float, level: float | None) -> float:
+    """Return where an extent is cut: at a level within it, else in the middle."""
+    return level if level is not None and low <= level <= high else 0.5 * (low + high)
+
+
 def slice_map(
     colouring: Colouring, axis: Axis, level: float, whole: Solid | None, reached: Solid | None
 ) -> SliceMap | None:

@@ -16,6 +16,7 @@ from explorer.app.compared import Compared
 from explorer.app.jog import Jog
 from explorer.app.optimisation import Optimisation
 from explorer.app.paths import Journey, Paths
+from explorer.app.presses import Press
 from explorer.app.prototype_view import PrototypeView
 from explorer.app.singular_view import SingularView
 from explorer.app.studies import Studies
@@ -35,6 +36,7 @@ from explorer.pose import Pose, Triple, yaw_pitch_roll_from_rotation
 from explorer.singularity import TETRAHEDRA, margins, mode_of
 from explorer.snapshot import Snapshot, evaluate
 from explorer.uncoupled import Travel, travels
+from explorer.verdict import Verdict, verdict
 
 Joints = tuple[float, float, float, float, float, float]
 Hold = Literal["pose", "legs"]
@@ -54,7 +56,8 @@ class WorkspaceView:
         orientation: Whether it is that of the present pose, or of the home pose.
         colour: By what its surface is coloured.
         cut: The axis along which it is cut open, or None.
-        level: Where it is cut, in design units.
+        level: The coordinate at which it is cut, in design units; None for the middle of its
+            extent, which also counts where this is beyond it.
         tolerance: Largest distance of a facet from the true surface, in design units; None
             for a share of the reach.
     """
@@ -67,7 +70,7 @@ class WorkspaceView:
     orientation: Literal["pose", "home"] = "pose"
     colour: Literal["plain", "margin", "condition"] = "plain"
     cut: Literal["x", "y", "z"] | None = None
-    level: float = 0.0
+    level: float | None = None
     tolerance: float | None = None
 
 
@@ -83,8 +86,9 @@ class View:
         radius_curve: Whether the reachable volume is drawn against the radius of the legs.
         ghosts: Whether the seven other assembly modes are drawn.
         twin: Whether the 6-4 twin's six legs replace the four.
-        warn_below: Margins below this length are warned of, in design units; None for a
-            share of the reach.
+        warn_below: The length below which margins are warned of, in design units; distances
+            are warned of below a share of it, see `explorer.verdict`. None for a share of the
+            reach.
         prototype: How the prototype is shown.
         workspace: How the workspace is shown.
         singular: How singularities are shown.
@@ -128,12 +132,26 @@ class Unclosed:
         which = " and ".join(" ".join(TETRAHEDRA[i]) for i in self.failing)
         kind = "tetrahedron" if len(self.failing) == 1 else "tetrahedra"
         advice = (
-            f"the nearest value that works is {self.nearest:.6g}"
+            f"the nearest value that closes is {self.nearest:.6g}, where the pose is singular; "
+            "“Use the nearest length” stops short of it"
             if self.nearest is not None
             else "with the other legs as they are, no value works"
         )
         name = JOINTS[self.joint]
         return f"{name} = {self.asked:.6g} cannot close the {kind} {which}; {advice}."
+
+
+@dataclass(frozen=True)
+class Taken:
+    """A length that was taken in the place of the one asked for.
+
+    Attributes:
+        joints: The joints that it led to; the words hold while they are the present ones.
+        words: Why it was taken, a sentence.
+    """
+
+    joints: Joints
+    words: str
 
 
 @dataclass(frozen=True)
@@ -144,11 +162,13 @@ class Gesture:
         start: The pose in which it began.
         source: What was moved by it, for instance a slider.
         last: When its last event happened, in seconds.
+        press: The last press of a browser that it was part of; None if it is not known.
     """
 
     start: Pose
     source: object
     last: float
+    press: Press | None = None
 
 
 @dataclass(frozen=True)
@@ -165,6 +185,7 @@ class State:
         hold: What stays when the design changes.
         unclosed: Why the joints asked for do not close, if they do not.
         view: What is shown.
+        taken: The length that was last taken in the place of one that does not close.
         gesture: What brought the platform to its pose; None where nothing moved it there,
             as after a change of the design.
         jog: The uncoupled motion that was last used.
@@ -183,6 +204,7 @@ class State:
     hold: Hold = "pose"
     unclosed: Unclosed | None = None
     view: View = field(default_factory=View)
+    taken: Taken | None = field(default=None, compare=False)
     gesture: Gesture | None = None
     jog: Jog | None = None
     paths: Paths = field(default_factory=Paths)
@@ -194,6 +216,12 @@ class State:
     def jog_in_use(self) -> Jog | None:
         """The uncoupled motion that brought the platform here; None once it is elsewhere."""
         return self.jog if self.jog is not None and self.jog.pose == self.pose else None
+
+    @property
+    def remark(self) -> str | None:
+        """Why the present length is not the one that was asked for; None where it is."""
+        taken = self.taken
+        return taken.words if taken is not None and taken.joints == self.joints else None
 
     @property
     def journey(self) -> Journey | None:
@@ -251,6 +279,11 @@ class Frame:
     def snapshot(self) -> Snapshot:
         """The design in its pose."""
         return evaluate(self.state.design, self.state.pose)
+
+    @cached_property
+    def verdict(self) -> Verdict:
+        """How near the pose is to a singularity; the colours of the flags follow it."""
+        return verdict(self.snapshot, self.state.warn_below)
 
     @cached_property
     def performance(self) -> Performance:

@@ -26,7 +26,7 @@ from explorer.app.actions import (
     UseNearest,
 )
 from explorer.app.comparing import Pin, SetLook, Unpin
-from explorer.app.optimising import Accept, EndRun, Revert, SetWish
+from explorer.app.optimising import Accept, EndRun, LiftBox, Revert, SetWish, TakePaperBox
 from explorer.app.path_actions import (
     CancelPlan,
     ChooseModes,
@@ -55,6 +55,7 @@ from explorer.app.study_actions import (
     SetStudyWish,
 )
 from explorer.design import JOINTS
+from explorer.number_text import significant
 from explorer.singularity import mode_name
 from explorer.uncoupled import UNCOUPLED
 
@@ -66,7 +67,7 @@ PLAIN: dict[type, str] = {
     Open: "Open {design}",
     Reset: "Reset to {design} as it was opened",
     GoHome: "Home pose",
-    UseNearest: "Nearest length that closes",
+    UseNearest: "Nearest usable length",
     StartThere: "Start where nothing is in the way",
     SetName: "Call it {design}",
     SetUnit: "Design unit = {action.unit_mm:.6g} mm",
@@ -80,6 +81,8 @@ PLAIN: dict[type, str] = {
     Plan: "Plan a path",
     CancelPlan: "Stop planning",
     EndRun: "Optimise: {design}",
+    LiftBox: "Lift the box",
+    TakePaperBox: "Take the paper's box",
     Accept: "Accept {design}",
     Revert: "Revert to {design}",
     Pin: "Pin {action.design.name}",
@@ -122,19 +125,20 @@ def words(action: object, before: State, after: State) -> str:
 def _of_value(action: object) -> str:
     match action:
         case SetJoint(joint, value):
-            said = f"{JOINTS[joint]} = {value:.6g}"
+            said = f"{JOINTS[joint]} = {significant(value, 6)}"
         case SetPosition(axis, value):
-            said = f"{'xyz'[axis]} = {value:.6g}"
+            said = f"{'xyz'[axis]} = {significant(value, 6)}"
         case SetAngle(axis, value):
-            said = f"{ANGLES[axis]} = {value:.6g}°"
+            said = f"{ANGLES[axis]} = {significant(value, 6)}°"
         case SetPose(pose):
-            said = f"Move b4 to {', '.join(f'{value:.4g}' for value in pose.position)}"
+            size = max(map(abs, pose.position))
+            said = f"Move b4 to {', '.join(significant(x, 4, size=size) for x in pose.position)}"
         case SetMode(mode):
             said = f"Assembly mode {mode} ({mode_name(mode)})"
         case Jog(number, amount):
             motion = UNCOUPLED[number]
             unit = "°" if motion.kind == "rotation" else ""
-            said = f"κ{motion.incidence} alone, by {amount:.4g}{unit}"
+            said = f"κ{motion.incidence} alone, by {significant(amount, 4)}{unit}"
         case GoToStratum(stratum):
             said = f"Go to stratum {name_of(stratum)}"
         case OpenStudy(None):
@@ -185,7 +189,7 @@ def _value(value: object) -> str:
     if isinstance(value, bool):
         return "on" if value else "off"
     if isinstance(value, float):
-        return f"{value:.6g}"
+        return significant(value, 6)
     if isinstance(value, tuple):
         return " ".join(_value(each) for each in cast("tuple[object, ...]", value))
     return str(value)

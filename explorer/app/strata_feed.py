@@ -1,4 +1,8 @@
-"""Keeps the distances of all strata in step with the pose, while their diagram is shown."""
+"""Keeps the distances of all strata in step with the pose, where they are shown.
+
+The diagram shows all of them, and the words below it those of one more incidence: at a singular
+pose these are deeper strata too, of which only the worker knows the distances.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +12,7 @@ from explorer.app.jobs import Worker
 from explorer.app.state import Frame
 from explorer.app.tasks import StrataDistances, StrataRequest
 from explorer.app.workspace_feed import Feed
+from explorer.strata import GENERIC
 
 
 class StrataFeed(Feed[StrataRequest, StrataDistances]):
@@ -18,6 +23,6 @@ class StrataFeed(Feed[StrataRequest, StrataDistances]):
 
 
 def _wanted(frame: Frame) -> StrataRequest | None:
-    if not frame.state.view.singular.strata:
+    if not frame.state.view.singular.strata and frame.snapshot.stratum == GENERIC:
         return None
     return StrataRequest(frame.state.design, frame.state.pose)

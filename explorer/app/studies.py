@@ -15,7 +15,7 @@ from explorer.arrays import BoolArray
 from explorer.design import VARIABLES, Design
 from explorer.errors import InputError
 from explorer.optimise.problem import REACH, YAW, longest_minimum, start_value
-from explorer.sweep.measures import MEASURES
+from explorer.sweep.measures import AT_NODES, MEASURES
 from explorer.sweep.study import (
     DEFAULT_MEASURES,
     LONGEST_NAME,
@@ -226,8 +226,12 @@ def unit_of(name: str) -> str:
 
 
 def spoken(name: str) -> str:
-    """Return what people call a variable or measure."""
-    return name.replace("_", " ")
+    """Return what people call a variable or measure.
+
+    What a study finds over nodes, and a comparison of designs exactly, has a name that says so.
+    """
+    words = name.replace("_", " ")
+    return f"{words} at nodes" if name in AT_NODES else words
 
 
 def titled(name: str) -> str:

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from explorer.app.faults import Faults
 from explorer.app.jobs import Worker
 from explorer.app.session import Session, Who
 from explorer.app.studies import StudyWish, study_around
@@ -51,13 +52,21 @@ class StudyRunner:
         session: In which they are opened.
         feed: That draws them; it is told when there is more to draw.
         complain: Called with a message for people and the client it is for.
+        faults: Where requests are kept that failed unexpectedly; None to keep none.
     """
 
     def __init__(
-        self, session: Session, feed: StudyFeed, complain: Callable[[str, Who], None]
+        self,
+        session: Session,
+        feed: StudyFeed,
+        complain: Callable[[str, Who], None],
+        faults: Faults | None = None,
     ) -> None:
         self.worker = Worker(
-            lambda message: complain(message, None), tasks="explorer.app.study_tasks", died=DIED
+            lambda message: complain(message, None),
+            tasks="explorer.app.study_tasks",
+            died=DIED,
+            faults=faults,
         )
         self._session = session
         self._feed = feed

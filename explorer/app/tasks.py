@@ -4,16 +4,25 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import Literal, TypeAlias
+from typing import Literal
 
 import numpy as np
 
 from explorer.app.bands import PLAIN, Colouring, Measure, Shell
 from explorer.app.compared_drawing import ComparedDrawing, ComparedRequest, compared_drawing
 from explorer.app.parts import PartsDrawing, PartsRequest, parts_drawing
+from explorer.app.reached import (
+    Reached,
+    Rows,
+    Trouble,
+    reach_workspace,
+    reached_of,
+    trouble_of,
+    watch_of,
+)
 from explorer.app.reporting import ReportFormat, make_report
-from explorer.app.slice_map import AXES, CUT, Axis, SliceMap, slice_map
+from explorer.app.slice_map import AXES, CUT, Axis, SliceMap, level_within, slice_map
+from explorer.app.worker import Line
 from explorer.arrays import FloatArray
 from explorer.bruhat import Stratum
 from explorer.constraints import HalfSpace
@@ -24,20 +33,16 @@ from explorer.nearest_stratum import nearest_in_strata
 from explorer.optimise.record import Record
 from explorer.pose import Pose, Triple
 from explorer.radii import RadiusCurve, radius_curve
-from explorer.reachable import PairCost, ReachableWorkspace, reachable_workspace
 from explorer.solid import Solid
 from explorer.solids import convex_hull, cut_solid, workspace_solid
-from explorer.start import StartError
+from explorer.stages import unwatched
 from explorer.workspace import NodeCount, workspace_nodes, workspace_volume
 
 Region = Literal["limits", "reachable"]
-Rows: TypeAlias = tuple[tuple[float, ...], ...]
-"""Of a matrix."""
-
 # Of the reach: the chord tolerance of a live solid.
 LIVE_TOLERANCE = 0.004
-# Workspaces that are kept, so that to cut or colour one takes no time.
-KEPT = 4
+# The format with exact faces rather than facets.
+STEP = "step"
 
 
 @dataclass(frozen=True)
@@ -51,7 +56,7 @@ class WorkspaceRequest:
         start: From where it is to be reached; None for the home position.
         colour: By what the surface is coloured.
         cut: The axis along which it is cut open, or None.
-        level: Where.
+        level: The coordinate of the cut; None, or one beyond the extent, for the middle of it.
         tolerance: Chord tolerance; None for a share of the reach.
         hull: Whether the convex hull is wanted.
         warn_below: The length below which margins are warned of.
@@ -63,35 +68,10 @@ class WorkspaceRequest:
     start: Triple | None
     colour: Measure
     cut: Axis | None
-    level: float
+    level: float | None
     tolerance: float | None
     hull: bool
     warn_below: float
-
-
-@dataclass(frozen=True)
-class Trouble:
-    """Why nothing can be reached, and from which position something can, if from any."""
-
-    reason: str
-    nearest: Triple | None
-
-
-@dataclass(frozen=True)
-class Reached:
-    """What of a workspace can be reached.
-
-    Attributes:
-        volume: In cubed design units.
-        node_count: Of the paper's grid.
-        pairs: What each pair of legs means for it, in the order of `PAIRS`.
-        harmless_radius: By how much all radii may grow before any two legs collide.
-    """
-
-    volume: float
-    node_count: int
-    pairs: tuple[PairCost, ...]
-    harmless_radius: float
 
 
 @dataclass(frozen=True)
@@ -101,13 +81,17 @@ class WorkspaceDrawing:
     Attributes:
         request: What was asked for.
         shells: The surface.
+        coarse_edge: The longest edge of a coloured facet, if that is longer than usual; see
+            `explorer.app.bands.Colouring.shells`.
         hull: The convex hull, if asked for.
         slice_map: The map of the slice, if it is cut.
+        level: The coordinate at which it is cut, if it is.
         volume: Within the limits; exact, see `explorer.workspace`.
         error: Of the exact volume.
         reached: What can be reached, if that was asked for and there is no trouble.
         trouble: Why all that is within the limits is drawn instead.
         mesh_volume: Of the uncut solid.
+        mesh_agrees: Whether the volume of the solid within the limits agrees with the exact one.
         hull_volume: Of the hull, if asked for.
         extent: (lows, highs) of the solid, None if it is empty.
         nodes: The paper's node count within the limits, None if the grid is too fine.
@@ -117,13 +101,16 @@ class WorkspaceDrawing:
 
     request: WorkspaceRequest
     shells: tuple[Shell, ...]
+    coarse_edge: float | None
     hull: Shell | None
     slice_map: SliceMap | None
+    level: float | None
     volume: float
     error: float
     reached: Reached | None
     trouble: Trouble | None
     mesh_volume: float
+    mesh_agrees: bool | None
     hull_volume: float | None
     extent: tuple[FloatArray, FloatArray] | None
     nodes: NodeCount | None
@@ -186,57 +173,70 @@ def ready() -> None:
     """Do nothing: the process that was asked has started."""
 
 
-def draw_workspace(request: WorkspaceRequest) -> WorkspaceDrawing:
-    """Return the workspace, drawn and measured."""
+def draw_workspace(request: WorkspaceRequest, line: Line | None = None) -> WorkspaceDrawing:
+    """Return the workspace, drawn and measured.
+
+    Args:
+        request: What to draw.
+        line: To the parent, which is told each `Stage` and may cancel; None for neither.
+    """
     begin = time.perf_counter()
     design, rotation = request.design, np.array(request.rotation)
     tolerance = request.tolerance or LIVE_TOLERANCE * design.reach
+    watch = watch_of(line)
     measured = workspace_volume(design, rotation)
-    whole = workspace_solid(design, rotation, tolerance)
+    whole = workspace_solid(design, rotation, tolerance, volume=measured)
     found = None
     if request.region == "reachable":
-        found = _reachable(design, request.rotation, request.start, tolerance)
+        found = reach_workspace(design, request.rotation, request.start, tolerance, watch)
     found, trouble = (None, found) if isinstance(found, Trouble) else (found, None)
     solid = whole if found is None else found.solid
     hull = convex_hull(solid) if request.hull and not solid.is_empty else None
     colouring = Colouring(design, rotation, request.colour, request.warn_below)
-    shown, mapped = solid, None
-    if request.cut is not None and not solid.is_empty:
+    shown, mapped, level = solid, None, None
+    extent = _extent(solid)
+    if request.cut is not None and extent is not None:
+        axis = AXES.index(request.cut)
+        level = level_within(float(extent[0][axis]), float(extent[1][axis]), request.level)
         # The half that looks at the isometric camera is taken away.
         side = -1.0 if request.cut == "y" else 1.0
-        knife = HalfSpace(CUT, side * np.eye(3)[AXES.index(request.cut)], side * request.level)
+        knife = HalfSpace(CUT, side * np.eye(3)[axis], side * level)
         shown = cut_solid(solid, knife)
         both = (None, None) if found is None else (cut_solid(whole, knife), shown)
-        mapped = slice_map(colouring, request.cut, request.level, *both)
+        mapped = slice_map(colouring, request.cut, level, *both)
     try:
         nodes = workspace_nodes(design, rotation)
     except InputError:
         nodes = None
+    shells, coarse_edge = colouring.shells(shown)
     return WorkspaceDrawing(
         request=request,
-        shells=colouring.shells(shown),
+        shells=shells,
+        coarse_edge=coarse_edge,
         hull=None if hull is None else Shell(PLAIN, hull.vertices, hull.faces),
         slice_map=mapped,
+        level=level,
         volume=measured.volume,
         error=measured.error,
-        reached=None if found is None else _reached(found),
+        reached=None if found is None else reached_of(found),
         trouble=trouble,
         mesh_volume=solid.volume,
+        mesh_agrees=solid.agrees,
         hull_volume=None if hull is None else hull.volume,
-        extent=_extent(solid),
+        extent=extent,
         nodes=nodes,
         empty_because=measured.empty_because,
         seconds=time.perf_counter() - begin,
     )
 
 
-def draw_radius_curve(request: RadiusRequest) -> RadiusDrawing:
-    """Return the reachable volume against the radius of all legs."""
+def draw_radius_curve(request: RadiusRequest, line: Line | None = None) -> RadiusDrawing:
+    """Return the reachable volume against the radius of all legs; `line` as above."""
     design, rotation = request.design, np.array(request.rotation)
     try:
-        curve = radius_curve(design, rotation, start=request.start)
+        curve = radius_curve(design, rotation, start=request.start, watch=watch_of(line))
     except ExplorerError as error:
-        return RadiusDrawing(request, None, _trouble(error))
+        return RadiusDrawing(request, None, trouble_of(error))
     return RadiusDrawing(request, curve, None)
 
 
@@ -311,17 +311,20 @@ def export_mesh(
         region: All that is within the limits, or what of it can be reached.
         start: From where it is to be reached; None for the home position.
         what: "workspace" or "hull".
-        file_format: As of `explorer.export.mesh`.
+        file_format: As of `explorer.export.mesh`, or `STEP`.
 
     Raises:
-        ExplorerError: an empty workspace, nothing to be reached, or a library that is missing.
+        ExplorerError: an empty workspace, nothing to be reached, a library that is missing, or
+            STEP of what has no exact faces.
     """
+    if file_format == STEP:
+        return _exact_file(design, rotation, region, what)
     from explorer.export.mesh import mesh_bytes
 
     if region == "limits":
         solid = workspace_solid(design, np.array(rotation), tolerance)
     else:
-        found = _reachable(design, rotation, start, tolerance)
+        found = reach_workspace(design, rotation, start, tolerance, unwatched)
         if isinstance(found, Trouble):
             raise InputError(found.reason)
         solid = found.solid
@@ -329,33 +332,29 @@ def export_mesh(
     return mesh_bytes(convex_hull(solid) if what == "hull" else solid, file_format, design, name)
 
 
+def _exact_file(design: Design, rotation: Rows, region: Region, what: str) -> bytes:
+    """Return a STEP file of the workspace within the limits.
+
+    Raises:
+        InputError: a hull, or what of the workspace can be reached: neither has exact faces.
+        ExplorerError: as of `explorer.export.step.workspace_step`.
+    """
+    meshes = "as 3mf, stl, glb, obj or ply it can be exported"
+    if what == "hull":
+        raise InputError(f"STEP takes exact faces, and a convex hull consists of facets; {meshes}")
+    if region != "limits":
+        raise InputError(
+            "STEP takes exact faces, and the surface along which legs begin to collide consists of "
+            f'facets; {meshes}, or choose the region "within the limits"'
+        )
+    from explorer.export.step import workspace_step
+
+    return workspace_step(design, np.array(rotation))
+
+
 def exported_name(region: Region, what: str) -> str:
     """Return what a file is called that holds a "workspace" or a "hull"."""
     return what if region == "limits" else f"reachable {what}"
-
-
-@lru_cache(maxsize=KEPT)
-def _reachable(
-    design: Design, rotation: Rows, start: Triple | None, tolerance: float
-) -> ReachableWorkspace | Trouble:
-    try:
-        return reachable_workspace(design, np.array(rotation), start=start, tolerance=tolerance)
-    except ExplorerError as error:
-        return _trouble(error)
-
-
-def _trouble(error: ExplorerError) -> Trouble:
-    nearest = error.nearest if isinstance(error, StartError) else None
-    if nearest is None:
-        return Trouble(str(error), None)
-    x, y, z = nearest.tolist()
-    return Trouble(str(error), (x, y, z))
-
-
-def _reached(found: ReachableWorkspace) -> Reached:
-    return Reached(
-        found.reachable_volume, found.reachable_node_count, found.pairs, found.harmless_radius
-    )
 
 
 def _extent(solid: Solid) -> tuple[FloatArray, FloatArray] | None:

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from explorer.app.actions import Action, GoHome, SetPosition, SetVariable, SetView
 from explorer.app.optimising import StartRun
 from explorer.app.state import Frame
@@ -45,12 +43,8 @@ def _move(frame: Frame) -> Action:
     return SetPosition(1, frame.state.pose.position[1] + STRIDE * frame.state.design.reach)
 
 
-def _least_margin(frame: Frame) -> float:
-    return float(np.abs(frame.snapshot.margins).min())
-
-
 def _is_near(_: Frame, now: Frame) -> bool:
-    return _least_margin(now) < now.state.warn_below
+    return now.verdict.kind != "clear"
 
 
 def _approach(frame: Frame) -> Action:

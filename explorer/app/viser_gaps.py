@@ -15,6 +15,7 @@ import websockets.asyncio.server
 from numpy.typing import ArrayLike
 
 from explorer.app.client_messages import Held
+from explorer.arrays import FloatArray
 from explorer.errors import ServerError
 
 Mark = tuple[float, str]
@@ -163,6 +164,30 @@ def _send_place(node: viser.SceneNodeHandle, name: str) -> None:
     internals._impl.api._queue_scene_message(kind(node.name, tuple(getattr(node, name).tolist())))
 
 
+def put_camera(
+    client: viser.ClientHandle, eye: FloatArray, target: FloatArray, field_of_view: float
+) -> None:
+    """Put a browser's camera at an eye, upright, looking at a target; the browser then tells of it.
+
+    viser's own handle takes what was sent for what is there: it sends nothing twice, although
+    a browser that is still loading goes back to its first camera after all that it was sent.
+    """
+    from viser import _messages
+
+    def triple(vector: FloatArray) -> tuple[float, float, float]:
+        x, y, z = vector.tolist()
+        return (x, y, z)
+
+    internals: Any = client
+    connection = internals._websock_connection
+    with client.atomic():
+        connection.queue_message(_messages.SetCameraUpDirectionMessage((0.0, 0.0, 1.0)))
+        connection.queue_message(_messages.SetCameraPositionMessage(triple(eye)))
+        connection.queue_message(_messages.SetCameraLookAtMessage(triple(target)))
+        # A browser answers this one, whatever its camera did.
+        connection.queue_message(_messages.SetCameraFovMessage(field_of_view))
+
+
 def tell_again(handle: Any, name: str) -> None:
     """Send browsers a property that they have already: `value` of a control, or a node's place."""
     from viser import _messages
@@ -208,6 +233,14 @@ def run_script(server: viser.ViserServer, source: str) -> None:
 
     internals: Any = server
     internals._websock_server.queue_message(_messages.RunJavascriptMessage(source=source))
+
+
+def run_script_in(client: viser.ClientHandle, source: str) -> None:
+    """Run a script of ours in one browser."""
+    from viser import _messages
+
+    internals: Any = client
+    internals._websock_connection.queue_message(_messages.RunJavascriptMessage(source=source))
 
 
 class ControlsOf:

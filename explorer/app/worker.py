@@ -12,12 +12,16 @@ import pickle
 import queue
 import signal
 import threading
+import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import IO, Any
 
 from explorer.compiled import warm_in_background
 from explorer.errors import ExplorerError
+
+CANCELLED = "cancelled"
+"""What a task that ended early answers with."""
 
 
 @dataclass(frozen=True)
@@ -54,12 +58,16 @@ class Told:
 
 @dataclass(frozen=True)
 class Reply:
-    """What came of an order: a value, or a message for people and whether it was expected."""
+    """What came of an order: a value, or a message for people and whether it was expected.
+
+    What was not expected comes with its traceback.
+    """
 
     number: int
     value: Any = None
     problem: str | None = None
     expected: bool = True
+    trace: str = ""
 
 
 @dataclass(frozen=True)
@@ -73,6 +81,15 @@ class Line:
 
     tell: Callable[[Any], None]
     is_cut: Callable[[], bool]
+
+    def end_if_cancelled(self) -> None:
+        """Raise `CancelledError` if the task is to end early."""
+        if self.is_cut():
+            raise CancelledError
+
+
+class CancelledError(Exception):
+    """The task ends early because the parent asked for that."""
 
 
 def write_frame(stream: IO[bytes], value: object) -> None:
@@ -110,7 +127,7 @@ class Inbox:
 
     def is_cut(self, number: int) -> bool:
         """Whether an order is to end early."""
-        return self._is_over.is_set() or self._cancelled >= number
+        return self._is_over.is_set() or self._cancelled == number
 
     def _read(self) -> None:
         try:
@@ -162,7 +179,10 @@ def _done(task: Callable[..., Any], order: Order, inbox: Inbox, answers: IO[byte
         return Reply(number, task(*arguments))
     except ExplorerError as error:
         return Reply(number, problem=str(error))
+    except CancelledError:
+        return Reply(number, problem=CANCELLED)
     except BrokenPipeError:
         raise
     except Exception as error:  # noqa: BLE001 - the parent tells, and the worker goes on
-        return Reply(number, problem=f"{type(error).__name__}: {error}", expected=False)
+        problem = " ".join(f"{type(error).__name__}: {error}".split())
+        return Reply(number, problem=problem, expected=False, trace=traceback.format_exc())

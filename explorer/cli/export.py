@@ -102,8 +102,11 @@ Facts = dict[str, Any]
 
 
 def _as_lines(facts: Facts) -> list[str]:
-    """Return what people are to know of the file: strokes may be less than the limits."""
-    return [
+    """Return what people are to know of the file: what is off, and strokes below the limits."""
+    from explorer.cli.output import DISAGREES
+
+    off = [f"This is not quite the workspace: {DISAGREES}."] if facts.get("agrees") is False else []
+    return off + [
         f"leg {each['leg']}: stroke {_range(each['stroke_mm'])} mm"
         f" (the limits ask for {_range(each['asked_mm'])} mm)"
         for each in facts.get("actuators", [])
@@ -130,7 +133,8 @@ def _mesh(command: Export, file_format: str, check: Callable[[], None]) -> Facts
     if command.what == "hull":
         solid = convex_hull(solid)
     write_mesh(solid, command.out, file_format, design, f"{command.what} of {design.name}")
-    return {"format": file_format, "volume": solid.volume, "triangles": len(solid.faces)}
+    facts: Facts = {"format": file_format, "volume": solid.volume, "triangles": len(solid.faces)}
+    return {**facts, "agrees": False} if solid.agrees is False else facts
 
 
 def _step(command: Export, check: Callable[[], None]) -> Facts:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from explorer.optimise.facts import Facts
     from explorer.optimise.findings import Finding
     from explorer.optimise.outcome import Outcome
+    from explorer.optimise.problem import Problem
 
 
 def found_design(outcome: Outcome) -> Design:
@@ -27,13 +28,15 @@ def found_design(outcome: Outcome) -> Design:
 
 def outcome_json(outcome: Outcome, written: Sequence[Path]) -> dict[str, object]:
     """Return an outcome as plain values."""
+    from explorer.optimise.facts import reach_of
+
     best, run = outcome.best, outcome.run
     return {
         "design": _design_json(found_design(outcome)),
         "objective": best.objective,
         "objective_name": outcome.problem.objective,
         "volume": best.volume,
-        "reach": outcome.design.reach,
+        "reach": reach_of(outcome.design),
         "iterations": run.iterations,
         "evaluations": run.evaluations,
         "seconds": outcome.seconds,
@@ -55,21 +58,50 @@ def outcome_json(outcome: Outcome, written: Sequence[Path]) -> dict[str, object]
     }
 
 
+def refused_json(problem: Problem, limit: str, message: str) -> dict[str, object]:
+    """Return as plain values that nothing was looked for; null is what was not measured.
+
+    Args:
+        problem: Which has no answer.
+        limit: That keeps its demands from being met.
+        message: One line for people.
+    """
+    from explorer.optimise.facts import reach_of
+
+    return {
+        "design": _design_json(problem.start),
+        "objective": None,
+        "objective_name": problem.objective,
+        "volume": None,
+        "reach": reach_of(problem.start),
+        "iterations": 0,
+        "evaluations": 0,
+        "seconds": 0.0,
+        "converged": False,
+        "status": "infeasible",
+        "holding": limit,
+        "message": message,
+        "values": dict(zip(problem.names, problem.start_values, strict=True)),
+        "runs": [],
+        "files": [],
+    }
+
+
 def outcome_lines(outcome: Outcome, written: Sequence[Path]) -> list[str]:
     """Return an outcome as lines of text: the start and what was found, side by side."""
     from explorer.optimise.facts import facts_of
 
     problem, best = outcome.problem, outcome.best
-    margin = problem.demands.clearance_margin or None
+    margin = None if problem.demands.clearance is None else problem.demands.clearance_margin
     box = problem.demands.required_box
     if box is not None:
         box = problem.required_box_at(best.values)
     facts = (
-        facts_of(problem.start, clearance_margin=margin, box=box),
-        facts_of(outcome.design, clearance_margin=margin, box=box),
+        facts_of(problem.start, demanded_margin=margin, box=box),
+        facts_of(outcome.design, demanded_margin=margin, box=box),
     )
     rows = [("", "start", "best so far" if not outcome.converged else "found", "change")]
-    for name, (before, after) in _rows(facts):
+    for name, (before, after) in fact_rows(facts):
         change = "" if before is None or after is None else f"{after - before:+.6g}"
         cells = ["none" if each is None else figure(each) for each in (before, after)]
         rows.append((name, cells[0], cells[1], change))
@@ -84,7 +116,7 @@ def outcome_lines(outcome: Outcome, written: Sequence[Path]) -> list[str]:
     return lines
 
 
-def _rows(
+def fact_rows(
     facts: tuple[Facts, Facts],
 ) -> list[tuple[str, tuple[float | None, float | None]]]:
     """Return what is told of two designs, by name."""
@@ -92,11 +124,14 @@ def _rows(
         ("yaw (degrees)", lambda each: each.yaw),
         ("reach", lambda each: each.reach),
         ("exact volume", lambda each: each.volume),
-        ("node volume", lambda each: each.node_volume),
-        ("least clearance", lambda each: each.clearance),
-        ("worst margin", lambda each: each.worst_margin),
+        ("node volume", lambda each: each.nodes and each.nodes.volume),
+        ("clearance", lambda each: each.clearance),
+        ("margin over the box", lambda each: each.box_margin),
     ]
     before, after = facts
+    if after.demanded_margin is not None:
+        words = f"clearance, margins ≥ {after.demanded_margin:.4g}"
+        named.append((words, lambda each: each.demanded_clearance))
     own = zip(VARIABLES, before.design.variables, after.design.variables, strict=True)
     return [
         *((name, (first, second)) for name, first, second in own),
@@ -114,12 +149,15 @@ def finding_json(finding: Finding) -> dict[str, object]:
         "objective": finding.objective,
         "seconds": finding.seconds,
         "volume": facts.volume,
-        "node_count": facts.node_count,
-        "node_volume": facts.node_volume,
+        "node_step": facts.nodes and facts.nodes.step,
+        "node_count": facts.nodes and facts.nodes.count,
+        "node_volume": facts.nodes and facts.nodes.volume,
         "reach": facts.reach,
-        "worst_margin": facts.worst_margin,
+        "box_margin": facts.box_margin,
         "clearance": facts.clearance,
         "nearest_legs": facts.nearest,
+        "demanded_margin": facts.demanded_margin,
+        "demanded_clearance": facts.demanded_clearance,
     }
 
 
@@ -127,32 +165,33 @@ def findings_table(found: Sequence[Finding]) -> str:
     """Return the page of findings."""
     from explorer.optimise.findings import BOX, CLEARANCE, PAPER_VOLUME, STARTS, STEP
 
+    demanded = found[0].facts.demanded_margin or 0.0
     rows = [
         (
             "",
             "iterations",
             "F",
             "exact volume",
-            "nodes",
+            f"nodes, step {STEP:g}",
             "reach",
             "margin / reach",
-            "clearance",
+            f"clearance, margins ≥ {demanded:.4g}",
             "seconds",
         )
     ]
     for each in found:
         facts = each.facts
-        margin = facts.worst_margin
+        margin, clearance = facts.box_margin, facts.demanded_clearance
         rows.append(
             (
                 each.name,
                 "–" if each.iterations is None else str(each.iterations),
                 "–" if each.objective is None else f"{each.objective:.1e}",
                 f"{facts.volume:.3f}",
-                str(facts.node_count),
+                "–" if facts.nodes is None else str(facts.nodes.count),
                 f"{facts.reach:.4f}",
                 "–" if margin is None else f"{margin / facts.reach:.4f}",
-                "–" if facts.clearance is None else f"{facts.clearance:.4f}",
+                "–" if clearance is None else f"{clearance:.4f}",
                 "–" if each.seconds is None else f"{each.seconds:.2f}",
             )
         )
@@ -161,7 +200,7 @@ def findings_table(found: Sequence[Finding]) -> str:
         f"F = |1 − V / {PAPER_VOLUME:g}|: the paper counts nodes (step {STEP:g}), here V is the "
         "exact volume.\n"
         f"Interference on: every pair of legs keeps {CLEARANCE:g} wherever every margin is at "
-        f"least {found[0].facts.clearance_margin:.4g}; clearance: the least there.\n"
+        f"least {demanded:.4g}; clearance: the least there.\n"
         f"Margin: the worst over the box {_shown(lows)} to {_shown(highs)}. It depends on the "
         "pose alone, so that of a smaller reach is larger for its size.\n"
         f"The smallest reach: the best of {STARTS} starts, with |b1y|, a3y and |b3 − b2| at "

@@ -50,7 +50,8 @@ def _joint_table(snapshot: Snapshot) -> str:
     for name, value in zip(JOINTS, snapshot.joints.tolist(), strict=True):
         bounds = design.length_range(name) if name in LENGTHS else design.limits.guide
         allowed = f"{bounds[0]:.6g} to {bounds[1]:.6g}" if bounds else "none"
-        rows.append((name, figure(value), figure(value * design.unit_mm), allowed))
+        unit, reach = design.unit_mm, design.reach
+        rows.append((name, figure(value, reach), figure(value * unit, reach * unit), allowed))
     return table(rows, "<>><")
 
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-import msgspec
 import tyro
 from tyro.constructors import PrimitiveConstructorSpec
 
@@ -17,17 +16,17 @@ from explorer.cli.found import (
     found_design,
     outcome_json,
     outcome_lines,
+    refused_json,
 )
 from explorer.cli.options import DesignOptions, JsonOptions
 from explorer.cli.output import heading, write_json, write_lines
 from explorer.cli.progress import Progress
 from explorer.cli.streams import complain
 from explorer.cli.usage import UsageError
-from explorer.cli.values import numbers, positive, whole_number
+from explorer.cli.values import numbers, numbers_or_none, positive, whole_number
 from explorer.design import Design
 from explorer.design_file import encode_design
 from explorer.errors import InputError, NoAnswerError
-from explorer.home import home_pose
 from explorer.optimise.curves import CALLED
 
 if TYPE_CHECKING:
@@ -80,11 +79,11 @@ class Optimise(JsonOptions, DesignOptions):
     """The largest reach allowed; for the largest volume that of the design unless given."""
 
     box: Annotated[
-        Six | None,
-        numbers("--box", "x-low y-low z-low x-high y-high z-high"),
+        Six | tuple[()] | None,
+        numbers_or_none("--box", "x-low y-low z-low x-high y-high z-high"),
         tyro.conf.arg(help_behavior_hint="(default: that of the design)"),
     ] = None
-    """The box that bounds the workspace, in design units."""
+    """The box that bounds the workspace, in design units; none lifts that of the design."""
 
     clearance: Annotated[float | None, positive("--clearance"), _OPTIONAL] = None
     """Least clearance of every pair of legs over the workspace, in design units."""
@@ -162,6 +161,7 @@ class Optimise(JsonOptions, DesignOptions):
             if path is not None:
                 check_writable(path)
         problem, settings = self._asked()
+        self._check_possible(problem)
         outcome = _searched(problem, settings)
         written = self._files(outcome, settings, record)
         if self.json:
@@ -201,8 +201,32 @@ class Optimise(JsonOptions, DesignOptions):
         design = self.load()
         if self.box is None:
             return design
-        limits = msgspec.structs.replace(design.limits, box=_as_box(self.box))
-        return msgspec.structs.replace(design, limits=limits, home=home_pose(design))
+        from explorer.optimise.refutation import with_box
+
+        return with_box(design, _as_box(self.box) if self.box else None)
+
+    def _check_possible(self, problem: Problem) -> None:
+        """Refuse what the limits cannot give before anything is compiled for a search.
+
+        Raises:
+            NoAnswerError: no design within the bounds meets the demands, and what would help.
+        """
+        from explorer.optimise.refutation import BOX_LIMIT, paper_box, refutations, words_of
+
+        found = refutations(problem)
+        if not found:
+            return
+        message = words_of(found)
+        if self.repeat is None and any(each.limit == BOX_LIMIT for each in found):
+            advice = "lift the box with --box none"
+            box = paper_box(problem)
+            if box is not None:
+                corners = " ".join(f"{value:g}" for corner in box for value in corner)
+                advice += f", or take the paper's with --box {corners}"
+            message += f": {advice}"
+        if self.json:
+            write_json(refused_json(problem, found[0].limit, message))
+        raise NoAnswerError(message)
 
     def _files(self, outcome: Outcome, settings: Settings, record: Path | None) -> list[Path]:
         """Write the files that were asked for, and return which."""

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from explorer.cli.streams import write
 from explorer.design import Design
+from explorer.number_text import fixed, significant
 from explorer.pose import Pose, yaw_pitch_roll_from_rotation
 
 if TYPE_CHECKING:
@@ -47,24 +48,33 @@ def table(rows: Sequence[Sequence[str]], align: str) -> str:
     )
 
 
-def figure(value: float) -> str:
-    """Return a number with six significant digits."""
-    return f"{value:#.6g}"
+def figure(value: float, size: float = 0.0) -> str:
+    """Return a number with six significant digits.
+
+    Args:
+        value: The number.
+        size: The size of the numbers that it comes from, beside which rounding reads 0.
+    """
+    return significant(value, 6, size=size, padded=True)
 
 
 def figures(values: Iterable[float]) -> list[str]:
-    """Return numbers with six significant digits each."""
-    return [figure(value) for value in values]
+    """Return numbers of one kind with six significant digits each."""
+    listed = list(values)
+    size = max(map(abs, listed), default=0.0)
+    return [figure(value, size) for value in listed]
 
 
 def degrees(values: Iterable[float]) -> list[str]:
     """Return angles in degrees with three decimals each, never a negative zero."""
-    return [f"{value:z.3f}°" for value in values]
+    return [f"{fixed(value, 3)}°" for value in values]
 
 
 def millimetres(design: Design, values: Iterable[float]) -> str:
     """Return lengths in design units as millimetres in brackets."""
-    return f"[{', '.join(f'{value * design.unit_mm:.6g}' for value in values)} mm]"
+    listed = [value * design.unit_mm for value in values]
+    size = max(map(abs, listed), default=0.0)
+    return f"[{', '.join(significant(value, 6, size=size) for value in listed)} mm]"
 
 
 def heading(design: Design) -> str:
@@ -86,6 +96,10 @@ def pose_table(design: Design, pose: Pose) -> str:
         ],
         "<<",
     )
+
+
+DISAGREES = "its volume does not agree with the exact one"
+"""What is told of a mesh that is not the workspace, see `explorer.agreement`."""
 
 
 def mesh_json(solid: Solid) -> dict[str, object]:

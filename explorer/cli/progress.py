@@ -99,6 +99,6 @@ class Progress(Meter):
             f"{iterate.phase} {self._steps}: {self.objective} {iterate.objective:.6g}, "
             f"volume {iterate.volume:.6g}"
         )
-        if iterate.spare < -1e-8:
+        if iterate.spare < 0.0:
             text += f", missed: {iterate.worst}"
         self.show(text, share)

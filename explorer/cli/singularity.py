@@ -16,9 +16,11 @@ from explorer.cli.output import (
     write_json,
     write_lines,
 )
+from explorer.colours import WARN_SHARE
 from explorer.pose import yaw_pitch_roll_from_rotation
-from explorer.singularity import INCIDENCES, TETRAHEDRA, mode_name
+from explorer.singularity import INCIDENCES, TETRAHEDRA, mode_words
 from explorer.snapshot import Snapshot, evaluate
+from explorer.verdict import verdict
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,15 +80,16 @@ class Singularity(JsonOptions, PoseOptions, DesignOptions):
 def _margin_table(snapshot: Snapshot) -> str:
     rows = [("margin", "units", "mm", "zero when", "tetrahedron", "volume")]
     for index in range(3):
-        margin = float(snapshot.margins[index])
+        margin, reach = float(snapshot.margins[index]), snapshot.design.reach
+        unit = snapshot.design.unit_mm
         rows.append(
             (
                 f"κ{index + 1}",
-                figure(margin),
-                figure(margin * snapshot.design.unit_mm),
+                figure(margin, reach),
+                figure(margin * unit, reach * unit),
                 INCIDENCES[index],
                 " ".join(TETRAHEDRA[index]),
-                figure(float(snapshot.volumes[index])),
+                figure(float(snapshot.volumes[index]), float(snapshot.volume_sizes[index])),
             )
         )
     return table(rows, "<>><<>")
@@ -95,17 +98,23 @@ def _margin_table(snapshot: Snapshot) -> str:
 def _measures(snapshot: Snapshot) -> str:
     stratum = " ".join(map(str, snapshot.stratum))
     names = [INCIDENCES[index - 1] for index in incidences(snapshot.stratum)]
+    found = verdict(snapshot, WARN_SHARE * snapshot.design.reach)
+    away = f"{figure(found.distance * snapshot.design.unit_mm)} mm"
     return table(
         [
+            ("verdict", f"{found.title.lower()}: {found.reason(away)}"),
             ("singular", " and ".join(names) or "no"),
-            ("assembly mode", f"{snapshot.mode} ({mode_name(snapshot.mode)})"),
+            ("assembly mode", f"{mode_words(snapshot.bordering_modes)} ({snapshot.sign_words})"),
             (
                 "stratum",
                 f"{stratum}, dimension {snapshot.stratum_dimension}: {words(snapshot.stratum)}",
             ),
-            ("det J", figure(snapshot.determinant)),
-            ("inverse condition", f"{figure(snapshot.inverse_condition)} (0 singular, 1 best)"),
-            ("proximity", f"{figure(snapshot.proximity)} (least |κ| over the reach)"),
+            ("det J", figure(snapshot.determinant, snapshot.determinant_size)),
+            (
+                "inverse condition",
+                f"{figure(snapshot.inverse_condition, 1.0)} (0 singular, 1 best)",
+            ),
+            ("proximity", f"{figure(snapshot.proximity, 1.0)} (least |κ| over the reach)"),
         ],
         "<<",
     )

@@ -52,6 +52,27 @@ def numbers(option: str, order: str, *, or_one: bool = False) -> PrimitiveConstr
     )
 
 
+def numbers_or_none(option: str, order: str) -> PrimitiveConstructorSpec[Any]:
+    """Return how to read an option that takes a number for each name, or the word none.
+
+    None is told as ().
+    """
+    all_numbers = numbers(option, order)
+
+    def read(words: list[str]) -> tuple[float, ...]:
+        return () if words == ["none"] else all_numbers.instance_from_str(words)
+
+    return PrimitiveConstructorSpec(
+        nargs="*",
+        metavar=f"{order.upper()} | none",
+        instance_from_str=read,
+        is_instance=all_numbers.is_instance,
+        str_from_instance=lambda value: (
+            ["none"] if value == () else all_numbers.str_from_instance(value)
+        ),
+    )
+
+
 def pose_numbers(option: str) -> PrimitiveConstructorSpec[Any]:
     """Return how to read an option that takes a position, an orientation after it or not.
 

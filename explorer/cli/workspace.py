@@ -14,7 +14,16 @@ from explorer.cli.collisions import (
     interference_table,
 )
 from explorer.cli.options import DesignOptions, JsonOptions, OrientationOptions, RadiiOptions
-from explorer.cli.output import degrees, figure, heading, mesh_json, table, write_json, write_lines
+from explorer.cli.output import (
+    DISAGREES,
+    degrees,
+    figure,
+    heading,
+    mesh_json,
+    table,
+    write_json,
+    write_lines,
+)
 from explorer.cli.values import numbers, positive, whole_number
 from explorer.design import Design
 from explorer.errors import InputError
@@ -121,13 +130,14 @@ class Workspace(JsonOptions, RadiiOptions, OrientationOptions, DesignOptions):
         )
 
         nodes = workspace_nodes(design, pose.rotation, self.step)
-        solid = workspace_solid(design, pose.rotation, self.tolerance)
+        volume = workspace_volume(design, pose.rotation)
+        solid = workspace_solid(design, pose.rotation, self.tolerance, volume=volume)
         reachable = dexterous = None
         if orientations is not None:
             reachable = reachable_solid(design, orientations, self.tolerance)
             dexterous = dexterous_solid(design, orientations, self.tolerance)
         return _Findings(
-            volume=workspace_volume(design, pose.rotation),
+            volume=volume,
             nodes=nodes,
             solid=solid,
             hull=convex_hull(solid) if self.hull else None,
@@ -226,6 +236,8 @@ class _Findings:
             "extent": None if extent is None else [list(ends) for ends in extent],
             "mesh": mesh_json(self.solid),
         }
+        if self.solid.agrees is False:
+            answer["mesh_agrees"] = False
         if self.hull is not None:
             answer["hull_volume"] = self.hull.volume
         if self.reachable is not None and self.dexterous is not None:
@@ -287,7 +299,8 @@ class _Findings:
 
 
 def _mesh_remark(solid: Solid) -> str:
+    off = f", {DISAGREES}" if solid.agrees is False else ""
     if solid.is_empty:
-        return f"empty because of {', '.join(solid.empty_because) or 'the tolerance'}"
+        return f"empty because of {', '.join(solid.empty_because) or 'the tolerance'}{off}"
     state = "watertight" if solid.is_watertight else "not watertight"
-    return f"{len(solid.faces)} triangles, {state}, tolerance {solid.tolerance:.3g}"
+    return f"{len(solid.faces)} triangles, {state}, tolerance {solid.tolerance:.3g}{off}"

@@ -116,7 +116,7 @@ def _3mf(prototype: Prototype) -> bytes:
     if largest > LARGEST_3MF:
         raise InputError(
             f"lib3mf takes coordinates up to {LARGEST_3MF:g} mm; these reach {largest:.3g} mm: use "
-            "another format, or a smaller unit_mm"
+            "another format, or a smaller unit"
         )
     library: Any = lib3mf
     try:

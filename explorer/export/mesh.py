@@ -294,7 +294,7 @@ def _3mf(solid: Solid, design: Design, name: str) -> bytes:
     if largest > LARGEST_3MF:
         raise InputError(
             f"lib3mf takes coordinates up to {LARGEST_3MF:g} mm; these reach {largest:.3g} mm: use "
-            "another format, or a smaller unit_mm"
+            "another format, or a smaller unit"
         )
     # lib3mf writes fixed decimals, by way of integers of 64 bits.
     decimals = min(16, max(4, 11 - math.floor(math.log10(largest))))

@@ -20,6 +20,7 @@ import numpy as np
 
 from explorer import __version__
 from explorer.arrays import FloatArray
+from explorer.constraints import demanded_order
 from explorer.design import JOINTS, Design
 from explorer.errors import InputError
 from explorer.files import write_whole
@@ -142,8 +143,8 @@ class _Model:
             factor = 1.02 * (LEAST_INERTIA / least) ** 0.2 if least > 0.0 else math.inf
             raise InputError(
                 f"{name} has a mass of {lightest.mass:.3g} kg and an inertia of {least:.3g} kg m², "
-                "which physics engines take for none; unit_mm must be at least "
-                f"{factor * self.design.unit_mm:.3g}, or the legs thicker"
+                "which physics engines take for none; the unit must be at least "
+                f"{factor * self.design.unit_mm:.3g} mm, or the legs thicker"
             )
 
     def text(self) -> str:
@@ -270,9 +271,9 @@ class _Model:
         return (low * self.metres, high * self.metres) if high > low else None
 
     def _gap(self, root: ET.Element) -> None:
-        """Keep the carriages apart, on the sides that they have at home."""
+        """Keep the carriages apart, in the order that they have at home."""
         gap = self.design.limits.gap
-        if gap <= 0.0:
+        if gap <= 0.0 and not demanded_order(self.design):
             return
         d1, d3 = (self.values[CHAIN_JOINTS.index(name)] for name in ("d1", "d3"))
         order = 1 if d1 > d3 else -1

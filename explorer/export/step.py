@@ -92,7 +92,7 @@ def exact_workspace(design: Design, rotation: ArrayLike | None = None) -> ExactS
     if not SMALLEST_MM <= size <= LARGEST_MM:
         raise InputError(
             f"OpenCASCADE takes solids of {SMALLEST_MM:g} to {LARGEST_MM:g} mm; this one is "
-            f"{size:.3g} mm: choose another unit_mm"
+            f"{size:.3g} mm: choose another unit"
         )
     best: ExactSolid | None = None
     off = math.inf

@@ -36,6 +36,7 @@ class ClearanceDemand:
     """
 
     is_equality = False
+    is_limit = False
     names = tuple(f"clearance of legs {first} and {second}" for first, second in PAIRS)
 
     def __init__(self, clearance: float, positions: FloatArray) -> None:

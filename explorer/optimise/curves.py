@@ -17,7 +17,7 @@ CALLED: Mapping[ObjectiveName, str] = MappingProxyType(
         "match-volume": "F",
         "smallest-reach": "reach",
         "largest-volume": "volume",
-        "largest-margin": "worst margin",
+        "largest-margin": "margin over the box",
     }
 )
 """What people call the value of each objective."""

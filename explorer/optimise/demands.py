@@ -11,11 +11,14 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from explorer.arrays import FloatArray
-from explorer.constraints import YAW, Constraint, HalfSpace, Round
+from explorer.constraints import GAP, YAW, Constraint, HalfSpace, Round
 from explorer.home import home_pose
 from explorer.optimise.problem import SHIFTS, Box
 from explorer.optimise.state import State
 from explorer.singularity import margins
+
+# How far a demand that is no limit may be missed and is still met, dimensionless.
+MET = 1e-8
 
 
 class Measured(NamedTuple):
@@ -43,6 +46,11 @@ class Demand(Protocol):
         """Whether the values must be zero, rather than at least zero."""
         ...
 
+    @property
+    def is_limit(self) -> bool:
+        """Whether the design's own limits demand it: they have the tolerance of all limits."""
+        ...
+
     def measure(self, state: State) -> Measured:
         """Return the values and their derivatives."""
         ...
@@ -58,6 +66,7 @@ class VolumeDemand:
     def __init__(self, volume: float, *, is_equality: bool) -> None:
         self.volume = volume
         self.is_equality = is_equality
+        self.is_limit = False
         self.names = (f"volume {volume:.6g}",)
 
     def measure(self, state: State) -> Measured:
@@ -72,6 +81,7 @@ class ReachDemand:
     """A largest reach."""
 
     is_equality = False
+    is_limit = False
 
     def __init__(self, reach: float) -> None:
         self.reach = reach
@@ -90,6 +100,7 @@ class DegenerateDemand:
     """
 
     is_equality = False
+    is_limit = False
     names = ("distance from a3y = 0", "distance from b1y = 0", "distance from b2 = b3")
 
     def __init__(self, least: float, start: State) -> None:
@@ -115,10 +126,14 @@ def _distances(state: State) -> FloatArray:
 
 
 class GapDemand:
-    """The smallest gap of the carriages, on the side where a run starts."""
+    """The smallest gap of the carriages, in the order that they have where a run starts.
+
+    The order itself is no demand: each design keeps that of its own home pose.
+    """
 
     is_equality = False
-    names = ("gap |d1 − d3|",)
+    is_limit = True
+    names = (GAP,)
 
     def __init__(self, start: State) -> None:
         self.sign = 1.0 if _gap(start) >= 0.0 else -1.0
@@ -146,9 +161,13 @@ class BoxDemand:
     """
 
     is_equality = False
+    is_limit = True
 
     def __init__(self, start: State) -> None:
-        self.counts = {limit.name: _points_that_tell(limit) for limit in start.limits}
+        # The gap is the same in every position, and demanded by `GapDemand`.
+        self.counts = {
+            limit.name: _points_that_tell(limit) for limit in start.limits if limit.name != GAP
+        }
         self.names = tuple(
             f"required box within {name}"
             for name, count in self.counts.items()
@@ -235,6 +254,7 @@ class MarginDemand:
     """
 
     is_equality = False
+    is_limit = False
     names = tuple(f"margin κ{i} over the required box" for i in (1, 2, 3))
 
     def measure(self, state: State) -> Measured:

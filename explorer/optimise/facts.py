@@ -9,6 +9,7 @@ import numpy as np
 
 from explorer.clearance import PAIRS
 from explorer.design import Design
+from explorer.errors import InputError
 from explorer.home import home_pose
 from explorer.least_clearance import least_clearances
 from explorer.optimise.defaults import MARGIN_OF_CLEARANCE
@@ -16,7 +17,7 @@ from explorer.optimise.demands import corners_of
 from explorer.optimise.problem import Box, longest_length
 from explorer.pose import yaw_pitch_roll_from_rotation
 from explorer.singularity import margins
-from explorer.workspace import workspace_nodes, workspace_volume
+from explorer.workspace import NodeCount, workspace_nodes, workspace_volume
 
 # To which the least clearance is certain, as a share of the reach.
 CERTAIN = 1e-3
@@ -26,36 +27,41 @@ CERTAIN = 1e-3
 class Facts:
     """Measures of a design, in design units.
 
+    Each of them depends on the design alone, and is the figure of the same name in
+    `explorer.figures`; what depends on a demand has a name that says so.
+
     Attributes:
         design: The design.
         yaw: Of its home, in degrees.
         reach: |a3|, or the largest maximum length where that is larger.
         volume: Of its workspace, exact.
-        node_count: Of the paper's nodes.
-        node_volume: Theirs.
-        worst_margin: The least |κ| over a box; None without one.
-        clearance: The least over its workspace where every margin is at least
-            `clearance_margin`; None if there is no such position.
-        clearance_margin: See above.
+        nodes: The paper's nodes; None of too fine a grid.
+        box_margin: The least |κ| over a box that is asked about; None without one.
+        clearance: The least over its workspace where every margin is at least a 20th of
+            |a3|; None if there is no such position.
         nearest: The pair of legs that has it.
+        demanded_margin: From which margin on a clearance was demanded; None if it was not.
+        demanded_clearance: The least there; None if there is no such position.
+        demanded_nearest: The pair of legs that has it.
     """
 
     design: Design
     yaw: float
     reach: float
     volume: float
-    node_count: int
-    node_volume: float
-    worst_margin: float | None
+    nodes: NodeCount | None
+    box_margin: float | None
     clearance: float | None
-    clearance_margin: float
     nearest: tuple[int, int] | None
+    demanded_margin: float | None
+    demanded_clearance: float | None
+    demanded_nearest: tuple[int, int] | None
 
 
 def facts_of(
     design: Design,
     *,
-    clearance_margin: float | None = None,
+    demanded_margin: float | None = None,
     box: Box | None = None,
     step: float | None = None,
 ) -> Facts:
@@ -63,28 +69,36 @@ def facts_of(
 
     Args:
         design: The design.
-        clearance_margin: From which margin on clearances count; a 20th of |a3| if None.
-        box: Over which the worst margin is looked for.
+        demanded_margin: From which margin on a clearance was demanded, in design units.
+        box: Over which the least margin is looked for.
         step: Of the paper's nodes; that of the design if None.
     """
     rotation = home_pose(design).rotation
-    least = clearance_margin_of(design) if clearance_margin is None else clearance_margin
-    nodes = workspace_nodes(design, rotation, step)
-    clearance, nearest = clearance_beyond(design, least)
+    clearance, nearest = clearance_beyond(design, clearance_margin_of(design))
+    demanded = (None, None)
+    if demanded_margin is not None:
+        demanded = clearance_beyond(design, demanded_margin)
     return Facts(
         design=design,
         yaw=float(yaw_pitch_roll_from_rotation(rotation)[0]),
         reach=reach_of(design),
         volume=workspace_volume(design, rotation).volume,
-        node_count=nodes.count,
-        node_volume=nodes.volume,
-        worst_margin=None
-        if box is None
-        else float(np.abs(margins(corners_of(box), rotation)).min()),
+        nodes=nodes_of(design, step),
+        box_margin=None if box is None else float(np.abs(margins(corners_of(box), rotation)).min()),
         clearance=clearance,
-        clearance_margin=least,
         nearest=nearest,
+        demanded_margin=demanded_margin,
+        demanded_clearance=demanded[0],
+        demanded_nearest=demanded[1],
     )
+
+
+def nodes_of(design: Design, step: float | None = None) -> NodeCount | None:
+    """Return the paper's nodes at the home's orientation; None of too fine a grid."""
+    try:
+        return workspace_nodes(design, step=step)
+    except InputError:
+        return None
 
 
 def reach_of(design: Design) -> float:
@@ -103,12 +117,14 @@ def clearance_beyond(
     """Return the least clearance where every margin is at least some length, and its legs.
 
     Over the workspace at the home's orientation, certain to a thousandth of the reach; None
-    if it has no such position.
+    if it has no such position, or no volume: positions may be left then, all on a surface.
 
     Args:
         design: The design; nearer to a singularity its legs may have to meet.
         margin: In design units.
     """
+    if workspace_volume(design, explain=False).volume <= 0.0:
+        return None, None
     own = design.limits.margin or 0.0
     limits = msgspec.structs.replace(design.limits, margin=max(own, margin))
     found = least_clearances(

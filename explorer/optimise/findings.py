@@ -92,10 +92,10 @@ def findings(tell: Callable[[str], None]) -> Iterator[Finding]:
     margin = paper_problem().demands.clearance_margin
 
     def facts(design: Design) -> Facts:
-        return facts_of(design, clearance_margin=margin, box=BOX, step=STEP)
+        return facts_of(design, demanded_margin=margin, box=BOX, step=STEP)
 
     optimal = facts(PRESETS["paper-optimal"])
-    counted = abs(1.0 - optimal.node_volume / PAPER_VOLUME)
+    counted = abs(1.0 - (optimal.nodes.volume if optimal.nodes else 0.0) / PAPER_VOLUME)
     yield Finding("the paper's initial design", None, None, None, facts(paper_start()))
     yield Finding("the paper's optimum, by nodes", 220, counted, None, optimal)
     for name, problem, starts in (

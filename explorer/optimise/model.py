@@ -16,6 +16,7 @@ from explorer.arrays import BoolArray, FloatArray
 from explorer.errors import DesignError
 from explorer.optimise.clearances import ClearanceDemand
 from explorer.optimise.demands import (
+    MET,
     BoxDemand,
     DegenerateDemand,
     Demand,
@@ -93,6 +94,11 @@ class Model:
         return np.array([each.is_equality for each in self.demands for _ in each.names], dtype=bool)
 
     @cached_property
+    def limits(self) -> BoolArray:
+        """Which demands are limits of the design, shape (m,), boolean."""
+        return np.array([each.is_limit for each in self.demands for _ in each.names], dtype=bool)
+
+    @cached_property
     def bounds(self) -> FloatArray:
         """Lows and highs of the scaled variables, shape (n, 2)."""
         problem = self.problem
@@ -129,10 +135,14 @@ class Model:
             self._last = self._evaluate(np.array(u, dtype=np.float64))
         return self._last
 
-    def _evaluate(self, u: FloatArray) -> Evaluation:
+    def read_back(self, at: Evaluation) -> Evaluation:
+        """Return a place with the design as its file will be read."""
+        return self._evaluate(at.u, at.state.read_back())
+
+    def _evaluate(self, u: FloatArray, state: State | None = None) -> Evaluation:
         if self._before_each is not None:
             self._before_each()
-        state = State(self.problem, u[: self.count])
+        state = state or State(self.problem, u[: self.count])
         if not np.isfinite(u).all():
             raise DesignError("the solver asked for a design that is not finite")
         # A problem may demand nothing.
@@ -167,12 +177,18 @@ class Model:
                 return -float(u[-1]), slope
 
     def worst(self, at: Evaluation) -> tuple[float, str]:
-        """Return the least value of all inequalities, below zero if missed, and its name."""
-        values = np.where(self.equalities, np.inf, at.values)
-        if not len(values) or self.equalities.all():
+        """Return the value and the name of the inequality that is missed most or comes nearest.
+
+        The value is below zero only where it is missed by more than its tolerance: that of all
+        limits for the limits of the design, `MET` for the other demands.
+        """
+        if self.equalities.all():
             return 0.0, ""
-        index = int(values.argmin())
-        return float(values[index]), self.names[index]
+        allowed = np.where(self.limits, at.state.design.tolerance / self.problem.size, MET)
+        spare = np.where(self.equalities, np.inf, at.values + allowed)
+        index = int(spare.argmin())
+        value = float(at.values[index])
+        return value if spare[index] < 0.0 else max(0.0, value), self.names[index]
 
     def reported(self, at: Evaluation) -> float:
         """Return the objective as people read it, see `reported`."""

@@ -12,7 +12,8 @@ from explorer.design import Design
 from explorer.optimise.problem import Problem
 
 Status = Literal["converged", "not converged", "infeasible", "stalled", "cancelled"]
-"""Converged: all demands are met and, within them, the objective cannot get better nearby.
+"""Converged: the design, read back from its file, meets all demands and has a workspace that
+is not empty, and within the demands the objective cannot get better nearby.
 Not converged: the iterations ended first. Infeasible: no design that meets all demands was
 found. Stalled: the demands are met, but no step made the objective better although it
 should get better. Cancelled: on request."""
@@ -35,7 +36,8 @@ class Iterate:
         objective: F = |1 − V/V′|, the reach, the volume or the worst margin.
         volume: Of its workspace, exact.
         worst: The demand that is missed most, or is nearest to being; "" if there is none.
-        spare: Its value, dimensionless: below zero where it is missed.
+        spare: Its value, dimensionless: below zero where it is missed by more than its
+            tolerance.
     """
 
     number: int

@@ -138,8 +138,8 @@ class Problem(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
             raise InputError(f"no objective {self.objective!r}; there are {', '.join(OBJECTIVES)}")
         if self.start.limits.swing != Swing():
             raise InputError(
-                "the volume has no gradient while joints bound the swing of legs: take "
-                "limits.swing out of the design to optimise it"
+                "the volume has no gradient while joints bound the swing of legs: take these "
+                "bounds out of the design to optimise it"
             )
         _check_variables(self)
         _check_demands(self)
@@ -333,8 +333,8 @@ def _check_objective(problem: Problem) -> None:
                 raise InputError(f"{problem.objective} needs a volume")
             if problem.objective == "smallest-reach" and not (REACH in names or tied):
                 raise InputError(
-                    "the design fixes maximum lengths: set them to null (the reach |a3|), or "
-                    "let the reach change as a variable of its own"
+                    "the design fixes maximum lengths: tie them to the reach |a3|, or let the "
+                    "reach change as a variable of its own"
                 )
         case "largest-volume":
             pass

@@ -2,7 +2,8 @@
 
 Nothing is called converged on the solver's own word: a volume is matched when it is, an
 optimum is one when the conditions of an optimum hold, and a clearance is kept when it has
-been looked for over the whole workspace, between the solver's positions too.
+been looked for over the whole workspace, between the solver's positions too. All of this is
+asked of the design as its file will be read.
 
 Clearances divide the designs into chambers: in the wall between two of them legs cross, and
 no solver that goes down a slope passes it. Where a chamber holds no answer, the search goes
@@ -18,8 +19,12 @@ import msgspec
 import numpy as np
 
 from explorer.arrays import FloatArray
+from explorer.optimise.binding import Binding, binding
 from explorer.optimise.crossings import crossings
+from explorer.optimise.curves import CALLED
+from explorer.optimise.demands import MET
 from explorer.optimise.elsewhere import promising
+from explorer.optimise.feasible import nearest_feasible
 from explorer.optimise.model import Evaluation, Model
 from explorer.optimise.opening import opened
 from explorer.optimise.optimality import optimality
@@ -27,7 +32,7 @@ from explorer.optimise.outcome import Iterate, Phase, Run, Status
 from explorer.optimise.problem import Problem
 from explorer.optimise.sqp import Stop, solve
 from explorer.optimise.state import State, scales
-from explorer.optimise.trail import MET, Trail
+from explorer.optimise.trail import Trail
 from explorer.workspace import what_empties
 
 # F = |1 − V/V′| from which on a volume is matched.
@@ -91,6 +96,7 @@ class Search:
         chosen = min(attempts, key=self._rank)
         if self.trail.is_cancelled:
             chosen = chosen._replace(status="cancelled", holding="", message="")
+        limit = self._binding(chosen)
         return Run(
             start=self.start,
             status=chosen.status,
@@ -98,18 +104,28 @@ class Search:
             iterations=self.steps,
             evaluations=self.evaluations,
             attempts=len(attempts),
-            holding=chosen.holding,
-            message=self._message(chosen),
+            holding=chosen.holding if limit is None else limit.limit,
+            message=self._message(chosen, limit),
         )
 
     def _rank(self, attempt: Attempt) -> tuple[bool, tuple[float, float]]:
         return attempt.status != "converged", self.trail.rank(attempt.best)
 
-    def _message(self, chosen: Attempt) -> str:
+    def _binding(self, chosen: Attempt) -> Binding | None:
+        """Return the limit that keeps a search from the volume that is wanted."""
         wanted = self.problem.demands.volume
         if chosen.status == "infeasible" and wanted is not None and 0.0 < self.largest < wanted:
+            return binding(chosen.best.design, wanted)
+        return None
+
+    def _message(self, chosen: Attempt, limit: Binding | None) -> str:
+        wanted = self.problem.demands.volume
+        if chosen.status == "infeasible" and wanted is not None and 0.0 < self.largest < wanted:
+            without = ""
+            if limit is not None:
+                without = f" (the best so far has {limit.volume:.6g} without its {limit.limit})"
             return (
-                f"no design within the bounds was found with a volume of {wanted:g}; the "
+                f"no design within the bounds was found with a volume of {wanted:g}{without}; the "
                 f"largest found is {self.largest:.6g}"
             )
         return chosen.message or _words(self.problem, chosen, self.steps)
@@ -153,10 +169,12 @@ class Search:
 
     def _solved(self, model: Model) -> Attempt:
         at, missed, has_grown = model.at(model.start), np.zeros((0, 3)), False
+        is_done = False
         for _ in range(ROUNDS):
-            at = self._sqp(model, at.u, "solving", self._is_matched)
-            if self._is_done(model, at):
-                missed = self._crossings(at.state)
+            at = self._feasible(model, self._sqp(model, at.u, "solving", self._is_matched))
+            is_done = self._is_done(model, at)
+            if is_done:
+                missed = self._crossings(at.state.read_back())
                 if not len(missed):
                     break
                 model.add_positions(missed)
@@ -173,20 +191,25 @@ class Search:
                 at = model.at(model.start)
             elif self.problem.objective == "match-volume":
                 break
-        return self._verdict(model, at, missed)
+        return self._verdict(model, at, missed, is_done=is_done)
 
     def _is_done(self, model: Model, at: Evaluation) -> bool:
         """Whether a place is what is wanted, but for clearances between positions."""
         if self.problem.objective == "match-volume":
             return self._is_matched(model, at)
-        return model.worst(at)[0] >= -MET and optimality(model, at).is_optimal
+        return self._is_kept(model, at) and optimality(model, at).is_optimal
 
     def _is_matched(self, model: Model, at: Evaluation) -> bool:
-        return (
-            self.problem.objective == "match-volume"
-            and model.reported(at) <= MATCHED
-            and model.worst(at)[0] >= -MET
-        )
+        return self.problem.objective == "match-volume" and self._is_kept(model, at)
+
+    def _is_kept(self, model: Model, at: Evaluation) -> bool:
+        """Whether all demands are met, here and by the design as its file will be read."""
+        return self._meets(model, at) and self._meets(model, model.read_back(at))
+
+    def _meets(self, model: Model, at: Evaluation) -> bool:
+        if self.problem.objective == "match-volume" and model.reported(at) > MATCHED:
+            return False
+        return model.worst(at)[0] >= 0.0 and at.state.volume > at.state.measured.error
 
     def _is_short(self, state: State) -> bool:
         """Whether the volume that is wanted has not been reached."""
@@ -201,12 +224,23 @@ class Search:
         model = Model(growing, at.state.values.tolist(), self.trail.before_each)
 
         def is_enough(model: Model, now: Evaluation) -> bool:
-            return now.state.volume >= wanted and model.worst(now)[0] >= -MET
+            return now.state.volume >= wanted and model.worst(now)[0] >= 0.0
 
         end = self._sqp(model, model.start, "growing", is_enough)
-        if model.worst(end)[0] >= -MET:
+        if model.worst(end)[0] >= 0.0:
             self.largest = max(self.largest, end.state.volume)
         return end.state.values.tolist() if is_enough(model, end) else None
+
+    def _feasible(self, model: Model, at: Evaluation) -> Evaluation:
+        """Return the place nearby that meets all demands, where one misses some by little."""
+        before = model.evaluations
+        found = nearest_feasible(model, at)
+        self.evaluations += model.evaluations - before
+        if found is None or found is at:
+            return at
+        self.steps += 1
+        self.trail.see(model, found, "solving")
+        return found
 
     def _sqp(
         self,
@@ -245,11 +279,19 @@ class Search:
             self.trail.before_each,
         )
 
-    def _verdict(self, model: Model, at: Evaluation, missed: FloatArray) -> Attempt:
-        """Say how an attempt ended, by its last place and where legs are too near there."""
+    def _verdict(
+        self, model: Model, at: Evaluation, missed: FloatArray, *, is_done: bool
+    ) -> Attempt:
+        """Say how an attempt ended.
+
+        Args:
+            model: The problem.
+            at: The last place.
+            missed: Positions where legs are too near there, shape (k, 3).
+            is_done: Whether the place was what is wanted before these positions were demanded.
+        """
         spare, worst = model.worst(at)
         holding, best = optimality(model, at).holding, self.trail.best
-        is_done = self._is_done(model, at)
         if is_done and len(missed):
             words = (
                 f"a clearance of {self.problem.demands.clearance:g} is not kept everywhere, "
@@ -257,24 +299,21 @@ class Search:
             )
             return Attempt("not converged", "clearance", words, best)
         if is_done:
-            return Attempt("converged", holding, "", best)
+            return Attempt("converged", holding, "", self.trail.last_at(at.state))
         if self.left <= 0:
-            return Attempt("not converged", worst if spare < -MET else holding, "", best)
-        if spare < -MET:
-            return Attempt("infeasible", worst, "", best)
-        if self._is_short(at.state):
-            return Attempt("infeasible", holding, "", best)
+            return Attempt("not converged", worst if spare < 0.0 else holding, "", best)
+        if spare < 0.0 or self._is_short(at.state):
+            return Attempt("infeasible", worst if spare < 0.0 else holding, "", best)
+        if at.state.volume <= 0.0:
+            because = ", ".join(what_empties(at.state.limits))
+            words = f"the workspace of the best design found is empty because of {because}"
+            return Attempt("infeasible", because, words, best)
         return Attempt("stalled", holding, "", best)
 
 
 def _words(problem: Problem, attempt: Attempt, steps: int) -> str:
     """Return one line on how a run ended."""
-    name = {
-        "match-volume": "F",
-        "smallest-reach": "reach",
-        "largest-volume": "volume",
-        "largest-margin": "worst margin",
-    }[problem.objective]
+    name = CALLED[problem.objective]
     found = f"{name} = {attempt.best.objective:.6g} after {steps} iterations"
     held = f", held by {attempt.holding}" if attempt.holding else ""
     match attempt.status:

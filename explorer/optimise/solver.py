@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 
-from explorer.compiled import warm
+from explorer.compiled import warm_in_background
 from explorer.errors import InputError
 from explorer.optimise.outcome import Outcome, Run
 from explorer.optimise.problem import Problem
@@ -29,6 +29,9 @@ def optimise_design(
 ) -> Outcome:
     """Look for the best design.
 
+    The search begins interpreted where kernels are not compiled yet, so that the last digits
+    are the same each time only after `explorer.compiled.warm`.
+
     Args:
         problem: What to look for.
         starts: From how many designs: the start of the problem, and others out of a
@@ -45,8 +48,8 @@ def optimise_design(
     check_starts(starts)
     if iterations < 1:
         raise InputError(f"the number of iterations must be at least 1; got {iterations}")
-    # Thousands of evaluations repay the second that loading compiled kernels takes.
-    warm()
+    # The first evaluations need not wait: what is compiled meanwhile takes over.
+    warm_in_background()
     began = time.perf_counter()
     trail = Trail(problem, watch, stop)
     runs: list[Run] = []

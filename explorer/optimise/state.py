@@ -16,6 +16,7 @@ from explorer.arrays import FloatArray
 from explorer.constraints import YAW as YAW_PARAMETER
 from explorer.constraints import Constraint, HalfSpace, Round, constraints
 from explorer.design import LENGTHS, VARIABLES, Design
+from explorer.design_file import decode_design, encode_design
 from explorer.home import home_pose
 from explorer.optimise.problem import REACH, YAW, Box, Problem
 from explorer.workspace import Volume, workspace_volume
@@ -35,17 +36,23 @@ class State:
     Args:
         problem: The problem.
         u: Scaled variables, shape (n,).
+        design: The design here, if it is not the one that the problem makes of them.
     """
 
-    def __init__(self, problem: Problem, u: FloatArray) -> None:
+    def __init__(self, problem: Problem, u: FloatArray, design: Design | None = None) -> None:
         self.problem = problem
         self.u = u
         self.values: FloatArray = u * scales(problem)
+        self._given = design
 
     @cached_property
     def design(self) -> Design:
         """The design here."""
-        return self.problem.design_at(self.values.tolist())
+        return self._given or self.problem.design_at(self.values.tolist())
+
+    def read_back(self) -> State:
+        """Return the same place with the design as its file will be read."""
+        return State(self.problem, self.u, decode_design(encode_design(self.design), "the design"))
 
     @cached_property
     def rotation(self) -> FloatArray:

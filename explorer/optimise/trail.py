@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from explorer.optimise.demands import MET
 from explorer.optimise.model import Evaluation, Model, reported
 from explorer.optimise.outcome import Iterate, Phase
 from explorer.optimise.problem import Problem
 from explorer.optimise.sqp import Stop
 from explorer.optimise.state import State
-
-# Demands are met if none is missed by more than this, dimensionless.
-MET = 1e-8
 
 Watch = Callable[[Iterate], None]
 
@@ -55,6 +53,11 @@ class Trail:
         """The best iterate since the beginning; the last one before if there is none."""
         return self._best or self.history[-1]
 
+    def last_at(self, state: State) -> Iterate:
+        """Return the last iterate at a place, which has been seen."""
+        values = tuple(state.values.tolist())
+        return next(each for each in reversed(self.history) if each.values == values)
+
     def see(self, model: Model, at: Evaluation, phase: Phase) -> None:
         """Record an iterate of the solver."""
         spare, worst = model.worst(at)
@@ -85,9 +88,10 @@ class Trail:
     def rank(self, iterate: Iterate) -> tuple[float, float]:
         """Return what orders iterates, the best first: demands missed, then the objective."""
         problem = self.problem
-        missed = -iterate.spare
+        missed = max(0.0, -iterate.spare)
         if problem.objective != "match-volume" and problem.demands.volume is not None:
-            missed = max(missed, 1.0 - iterate.volume / problem.demands.volume)
+            short = 1.0 - iterate.volume / problem.demands.volume
+            missed = max(missed, short) if short > MET else missed
         larger = problem.objective in ("largest-volume", "largest-margin")
         objective = -iterate.objective if larger else iterate.objective
-        return (missed if missed > MET else 0.0), objective
+        return missed, objective

@@ -94,7 +94,7 @@ def _refusal(design: Design, worst: tuple[str, float, float]) -> str:
     ways: list[str] = []
     unit = _least_unit(design)
     if unit is not None:
-        ways.append(f"with a unit_mm of at least {_rounded(unit * design.unit_mm, up=True)}")
+        ways.append(f"with a unit of at least {_rounded(unit * design.unit_mm, up=True)} mm")
     given = max(design.limits.leg_radii)
     smaller, larger = _thicker(design, 1.0, all_of=True) if given else (None, None)
     if smaller is not None:
@@ -103,7 +103,7 @@ def _refusal(design: Design, worst: tuple[str, float, float]) -> str:
         ways.append(f"with legs of radius at least {_rounded(larger * given, up=True)}")
     if not ways:
         return (
-            f"{text}; no unit_mm makes that fit: take thinner legs, another home, or points that "
+            f"{text}; no unit makes that fit: take thinner legs, another home, or points that "
             "are farther apart"
         )
     return f"{text}; it fits {' or '.join(ways)}"

@@ -18,9 +18,7 @@ from explorer.clearance import PAIRS
 from explorer.design import Design
 from explorer.home import home_pose
 from explorer.node_measures import DEFAULT_NODES, NodeMeasures, node_measures
-from explorer.optimise.defaults import MARGIN_OF_CLEARANCE
-from explorer.optimise.facts import clearance_beyond
-from explorer.optimise.problem import longest_length
+from explorer.optimise.facts import clearance_beyond, clearance_margin_of, reach_of
 from explorer.singularity import inverse_condition, jacobian
 from explorer.workspace import Volume, workspace_volume
 
@@ -45,7 +43,7 @@ class Case:
     @property
     def clearance_margin(self) -> float:
         """From which |κ| on clearances count, in design units."""
-        return MARGIN_OF_CLEARANCE * self.design.reach if self.margin is None else self.margin
+        return clearance_margin_of(self.design) if self.margin is None else self.margin
 
     @cached_property
     def volume(self) -> Volume:
@@ -142,7 +140,7 @@ MEASURES: Mapping[str, Measure] = MappingProxyType(
         "reach": Measure(
             "the reach |a3|, or the largest length where that is larger",
             "u",
-            lambda case: max(case.design.reach, longest_length(case.design)),
+            lambda case: reach_of(case.design),
         ),
         "worst_margin": Measure(
             "smallest |κ| over the nodes of the workspace",
@@ -199,6 +197,17 @@ MEASURES: Mapping[str, Measure] = MappingProxyType(
     }
 )
 """What can be measured, by the name of its column."""
+
+AT_NODES = frozenset(
+    {
+        "worst_margin",
+        "mean_margin",
+        "clearance",
+        *(f"extent_{axis}" for axis in "xyz"),
+    }
+)
+"""Measures of the nodes of a grid that `explorer.figures` has under the same name of the whole
+workspace, or of another grid."""
 
 
 def measured(case: Case, names: Collection[str]) -> dict[str, float]:

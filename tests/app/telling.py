@@ -30,6 +30,14 @@ def count_until_cut(line: Line) -> int:
     raise AssertionError
 
 
+def end_when_cancelled(line: Line) -> None:
+    """Tell one number, and end by an exception once it is to end."""
+    line.tell(0)
+    while True:
+        line.end_if_cancelled()
+        time.sleep(PAUSE)
+
+
 def hang(line: Line) -> None:
     """Tell one number, and end for no word."""
     line.tell(0)
@@ -40,6 +48,12 @@ def refuse(line: Line) -> None:
     """Tell one number, then refuse."""
     line.tell(0)
     raise InputError("refused on purpose")
+
+
+def fail(number: float, words: tuple[str, ...], line: Line) -> None:
+    """Tell one number, then fail in a way that nobody expected."""
+    line.tell(number)
+    raise ValueError(f"setting {number} with\n{words}")
 
 
 def say(text: str) -> str:

@@ -25,6 +25,7 @@ from explorer.app.actions import (
     SetView,
 )
 from explorer.app.gestures import PAUSE_SECONDS, ByHand
+from explorer.app.presses import Press
 from explorer.app.session import Session
 from explorer.app.state import Frame, State, opened
 from explorer.design import JOINTS, Limits
@@ -84,6 +85,15 @@ def test_a_pause_or_another_control_begins_a_new_move(
         action = SetAngle(0, float(i)) if is_turn else SetPosition(0, 10.5 + 0.1 * i)
         state = ByHand(action, source, time).apply(state)
         assert start_of(state) == moves[-1][0]
+
+
+def test_gesture_of_one_press_goes_on_after_a_rest_and_ends_with_it(moved: State) -> None:
+    first, second = Press(1, 1), Press(1, 2)
+    state = ByHand(SetPosition(0, 15.0), "y", 200.0, first).apply(moved)
+    rested = ByHand(SetPosition(0, 16.0), "y", 200.0 + 60 * PAUSE_SECONDS, first).apply(state)
+    assert start_of(rested) == start_of(state) == moved.pose
+    again = ByHand(SetPosition(0, 17.0), "y", 200.1 + 60 * PAUSE_SECONDS, second).apply(rested)
+    assert start_of(again) == rested.pose
 
 
 def test_events_that_arrive_late_do_not_end_a_move(moved: State) -> None:

@@ -36,6 +36,7 @@ from explorer.app.history import GO_ON, MOST_STEPS, History, begun, document, re
 from explorer.app.optimisation import Verdict, Wish
 from explorer.app.optimising import CancelRun, EndRun, SetWish, StartRun
 from explorer.app.path_actions import Advance, Play, SetPathTime, WatchModes
+from explorer.app.presses import Press
 from explorer.app.session import REDO, UNDO
 from explorer.app.singular_actions import GoToSingularity, GoToStratum, Jog
 from explorer.app.state import Joints, State, opened
@@ -120,6 +121,31 @@ def test_a_pause_or_another_control_begins_a_new_step(events: list[tuple[str, fl
         if source != last or pause > PAUSE_SECONDS:
             steps += 1
         last = source
+        assert len(history.steps) == steps + 1
+
+
+presses = st.one_of(st.none(), st.builds(Press, st.integers(1, 2), st.integers(1, 3)))
+
+
+@given(st.lists(st.tuples(presses, st.floats(0.0, 3.0 * PAUSE_SECONDS)), min_size=1))
+def test_history_from_press_to_release_is_one_step_however_long_it_rests(
+    events: list[tuple[Press | None, float]],
+) -> None:
+    state = opened(OPTIMAL)
+    history, time = begun(state), 0.0
+    steps, held = 0, None
+    for index, (press, pause) in enumerate(events):
+        time += pause
+        act = ByHand(SetPosition(0, 11.0 + 0.01 * index), "x", time, press)
+        state = act.apply(state)
+        history = history.recorded(act, state)
+        if press is not None and held is not None and press.client == held.client:
+            is_new = press != held
+        else:
+            is_new = pause > PAUSE_SECONDS
+        if is_new or index == 0:
+            steps, held = steps + 1, None
+        held = press or held
         assert len(history.steps) == steps + 1
 
 
@@ -247,7 +273,7 @@ WORDED = [
     (GoToSingularity(2), "Go to the nearest pose with κ2 = 0"),
     (Open(OTHER), f"Open {OTHER.name}"),
     (OpenStudy("trade-off"), "Study trade-off"),
-    (BrushAxis("mean_margin", ((1.0, 2.0),)), "Brush mean margin"),
+    (BrushAxis("mean_margin", ((1.0, 2.0),)), "Brush mean margin at nodes"),
 ]
 
 

@@ -32,6 +32,7 @@ from explorer.design import Design
 from explorer.design_file import PRESETS
 from explorer.interference import step_overlaps, swept_tetrahedra
 from explorer.moves import move_clearance
+from explorer.number_text import scientific
 from explorer.pose import Pose
 
 OPTIMAL = PRESETS["paper-optimal"]
@@ -199,7 +200,8 @@ def test_the_closest_pair_is_marked_wherever_the_platform_goes(server: viser.Vis
             along = np.linalg.norm(end - base) + np.linalg.norm(tip - end)
             assert along == pytest.approx(float(np.linalg.norm(tip - base)), rel=1e-4)
         np.testing.assert_allclose(label["position"], ends.mean(axis=0), rtol=1e-5, atol=1e-5)
-        assert label["text"] == f"legs {first}–{second}: {found.clearance[pair]:.3g}"
+        clearance = scientific(float(found.clearance[pair]), 3)
+        assert label["text"] == f"legs {first}–{second}: {clearance}"
     assert len(marked) > 1
 
 
@@ -311,6 +313,28 @@ def test_nothing_is_drawn_where_nothing_moved(server: viser.ViserServer) -> None
         assert list(drawn.values()) == [{"visible": False}] * 6
 
 
+# The order of the carriages
+
+
+def test_a_checkbox_says_whether_the_carriages_keep_their_order(
+    server: viser.ViserServer, desk: Desk
+) -> None:
+    panel = DesignPanel(server.gui, desk.session)
+    found: list[Any] = []
+    for handle, name, value in panel.updates(Frame(desk.state)):
+        setattr(handle, name, value)
+        is_box = isinstance(handle, viser.GuiCheckboxHandle)
+        if is_box and handle.label == "Carriages keep their order" and handle not in found:
+            found.append(handle)
+    (checkbox,) = found
+    assert checkbox.value is True
+    for on, order in ((False, "any"), (True, "home")):
+        desk.use(checkbox, on)
+        assert desk.state.design.limits.carriage_order == order
+        assert checkbox.value is on
+    assert desk.complaints == []
+
+
 # The radii
 
 
@@ -347,4 +371,4 @@ def test_a_radius_that_cannot_be_is_refused_and_changes_nothing(
     desk.use(radius_sliders(server, desk)[2], radius)
     assert desk.state == before
     (complaint,) = desk.complaints
-    assert complaint.startswith("limits.leg_radii must ")
+    assert complaint.startswith("The radius of a leg must ")

@@ -46,16 +46,19 @@ from explorer.app.optimising import (
     Advance,
     CancelRun,
     EndRun,
+    LiftBox,
     Revert,
     SetWish,
     StartRun,
+    TakePaperBox,
 )
 from explorer.app.panels.optimise import OptimisePanel
 from explorer.app.panels.optimise_plots import curves_of, data_of
 from explorer.app.panels.optimise_words import comparison_table, verdict_words
 from explorer.app.scene.required_box import FARTHEST, box_shown, edges_of, single
-from explorer.app.session import Session
+from explorer.app.session import UNDO, Session
 from explorer.app.state import Frame, State, opened
+from explorer.app.step_words import words
 from explorer.app.tasks import export_report
 from explorer.app.worker import Line
 from explorer.compiled import warm
@@ -593,11 +596,10 @@ def test_the_table_shows_old_and_new_and_their_difference(bench: Bench) -> None:
         old, new = found.before.design.variables[index], found.after.design.variables[index]
         assert [number(cell) for cell in rows[name]] == pytest.approx([old, new, new - old], 1e-3)
         assert rows[name][2][0] == ("+" if new > old else "−")
-    assert [number(cell) for cell in rows["nodes"]] == [
-        found.before.node_count,
-        found.after.node_count,
-        found.after.node_count - found.before.node_count,
-    ]
+    assert found.before.nodes is not None
+    assert found.after.nodes is not None
+    counts = (found.before.nodes.count, found.after.nodes.count)
+    assert [number(cell) for cell in rows["nodes"]] == [*counts, counts[1] - counts[0]]
     assert number(rows["clearance"][1]) >= 0.198
     assert number(rows["reach"][1]) == pytest.approx(run.best.design.reach, abs=1e-4)
     assert bench.panel._table.content == comparison_table(run)
@@ -649,7 +651,7 @@ def test_a_design_changed_since_is_told_of() -> None:
 
 
 def test_an_unreachable_volume_is_told_with_the_largest_found(bench: Bench) -> None:
-    run = bench.find(replace(SMALL, volume=1e6, free=("b2", "b3")))
+    run = bench.find(replace(SMALL, volume=1400.0, free=("b2", "b3")))
     assert run.verdict is not None
     assert run.verdict.status == "infeasible"
     assert "largest found" in bench.panel._words.content
@@ -667,3 +669,75 @@ def test_a_required_box_beyond_single_precision_is_drawn_at_its_end(
     assert points[0].tolist() == pytest.approx(
         [-min(size * scale, FARTHEST), 0.0, min(size * scale, FARTHEST)], rel=1e-6
     )
+
+
+INITIAL = PRESETS["paper-initial"]
+HELD = "the box holds at most 2,499 of the 8,000 asked for"
+
+
+def test_limits_that_cannot_give_a_volume_say_so_before_a_press_and_refuse_one(
+    bench: Bench,
+) -> None:
+    panel = bench.panel
+    bench.do(Open(INITIAL), SetWish(Wish(volume=2400.0)))
+    assert not panel._notice.visible
+    bench.do(SetWish(SMALL))
+    assert panel._notice.visible
+    assert f"T{HELD[1:]}." in panel._notice.content
+    assert panel._lift.visible
+    assert panel._paper_box.visible
+    before = bench.state
+    assert bench.do(StartRun()) == before
+    assert bench.complaints == [HELD]
+    bench.do(LiftBox())
+    assert not panel._notice.visible
+    assert not panel._lift.visible
+    assert not panel._paper_box.visible
+    bench.session.travel(UNDO)
+    assert bench.state.design == INITIAL
+    assert panel._notice.visible
+    # What no box of the paper's holds is not to be had by taking it.
+    bench.do(SetWish(Wish(volume=20_000.0)))
+    assert panel._lift.visible
+    assert not panel._paper_box.visible
+
+
+@pytest.mark.parametrize("remedy", [LiftBox(), TakePaperBox()])
+def test_one_press_and_another_solve_the_papers_problem_from_its_initial_row(
+    bench: Bench, remedy: Action
+) -> None:
+    bench.do(Open(INITIAL), SetWish(Wish(volume=8000.0, clearance=0.2)), remedy, StartRun())
+    run = bench.wait_for_end()
+    assert run.verdict is not None
+    assert run.verdict.status == "converged"
+    assert run.best is not None
+    assert run.best.objective <= 1e-9
+    assert run.own.design.home == INITIAL.home
+    assert not bench.complaints
+    assert not bench.panel._lift.visible
+    # Undone, it is the design as it was.
+    assert words(remedy, own(), own()) in ("Lift the box", "Take the paper's box")
+
+
+def test_a_design_without_a_home_of_its_own_keeps_its_pose_where_its_box_is_lifted() -> None:
+    design = msgspec.structs.replace(INITIAL, home=None)
+    state = opened(design)
+    for remedy in (LiftBox(), TakePaperBox()):
+        after = remedy.apply(state)
+        assert home_pose(after.design) == home_pose(design)
+        assert after.pose == state.pose
+        with pytest.raises(InputError, match="being optimised"):
+            remedy.apply(started())
+
+
+def test_a_search_that_the_box_kept_from_its_volume_offers_to_lift_it(bench: Bench) -> None:
+    verdict = optimiser.Verdict("infeasible", "the box is too small", holding="box")
+    state = bench.do(Open(INITIAL), SetWish(Wish(volume=2400.0)))
+    run = run_of(StartRun().apply(state))
+    best = told_by(run.problem)[0]
+    ended = replace(run, phase="ended", verdict=replace(verdict, best=best))
+    shown = replace(state, optimisation=replace(state.optimisation, run=ended))
+    told = {(id(handle), name): value for handle, name, value in bench.panel.updates(Frame(shown))}
+    assert told[id(bench.panel._lift), "visible"]
+    assert told[id(bench.panel._paper_box), "visible"]
+    assert not told[id(bench.panel._notice), "visible"]

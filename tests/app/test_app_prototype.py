@@ -69,8 +69,10 @@ class AtOnce(Worker):
         done: Callable[[Any], None],
         failed: Callable[[str], None],
         told: Callable[[Any], None] | None = None,
+        *,
+        is_drawing: bool = False,
     ) -> int:
-        del key, failed, told
+        del key, failed, told, is_drawing
         self.done.append(task)
         # As they go to another process and come back.
         answer = getattr(tasks, task)(*pickle.loads(pickle.dumps(arguments)))

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import io
+import sys
 from collections.abc import Callable, Generator
 from dataclasses import replace
-from typing import Any
+from typing import Any, Literal
 
 import msgspec
 import numpy as np
@@ -16,13 +17,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
-from explorer.app import tasks
-from explorer.app.actions import GoHome, SetLimits, SetPosition, SetView
-from explorer.app.assigning import Assigner
+from explorer.app import reached, tasks
+from explorer.app.actions import GoHome, SetLimits, SetPosition, SetVariable, SetView
+from explorer.app.assigning import Assigner, Update
 from explorer.app.bands import COLLIDING, PLAIN
 from explorer.app.panels.legs import LegsPanel
 from explorer.app.panels.radius_plot import chart_of, common_radius, radius_words, volume_at
-from explorer.app.panels.workspace import WorkspacePanel
+from explorer.app.panels.workspace import FORMATS, WorkspacePanel
 from explorer.app.panels.workspace_numbers import workspace_summary
 from explorer.app.state import Frame, State, opened
 from explorer.app.tasks import (
@@ -38,7 +39,8 @@ from explorer.clearance import PAIRS, leg_clearances
 from explorer.compiled import warm
 from explorer.constraints import constraints, slacks
 from explorer.design_file import PRESETS
-from explorer.errors import InputError
+from explorer.errors import InputError, MissingExtraError
+from explorer.export.step import workspace_step
 from explorer.least_clearance import least_clearances
 from explorer.radii import RadiusCurve, radius_curve
 from explorer.reachable import reachable_workspace
@@ -74,10 +76,17 @@ class Here:
         arguments: tuple[Any, ...],
         done: Callable[[Any], None],
         failed: Callable[[str], None],
-    ) -> None:
-        del key, failed
+        told: Callable[[Any], None] | None = None,
+        *,
+        is_drawing: bool = False,
+    ) -> int:
+        del key, failed, told, is_drawing
         self.asked.append((task, arguments[0]))
         self._waiting.append(lambda: done(getattr(tasks, task)(*arguments)))
+        return len(self.asked)
+
+    def cancel(self, number: int, patience: float | None) -> None:
+        """Leave what is asked for as it is."""
 
     def work(self) -> None:
         """Do what waits."""
@@ -229,6 +238,64 @@ def test_a_cut_takes_one_side_and_maps_what_is_reached(axis: int) -> None:
     assert clearance[kept].mean() > 0.0 > clearance[blocked].mean()
 
 
+@pytest.mark.parametrize("axis", ["x", "y", "z"])
+@pytest.mark.parametrize("name", list(PRESETS))
+def test_cut_at_its_default_goes_through_the_middle(
+    axis: Literal["x", "y", "z"], name: str
+) -> None:
+    drawing = drawing_of(shown(opened(PRESETS[name]), region="limits", cut=axis))
+    assert drawing.extent is not None
+    low, high = (float(end["xyz".index(axis)]) for end in drawing.extent)
+    assert drawing.level == pytest.approx(0.5 * (low + high))
+    assert drawing.slice_map is not None
+    filled = drawing.slice_map.pixels[..., 3] > 0
+    assert filled.mean() > 0.2
+
+
+def test_cut_beyond_the_extent_goes_through_the_middle_and_one_within_stays() -> None:
+    for level, found in ((-50.0, 10.0), (None, 10.0), (50.0, 10.0), (17.0, 17.0)):
+        state = shown(opened(OPTIMAL), region="limits", cut="x", level=level)
+        assert drawing_of(state).level == pytest.approx(found)
+
+
+def test_slider_of_the_cut_spans_the_extent_and_starts_in_its_middle(
+    server: viser.ViserServer,
+) -> None:
+    desk = Desk(shown(opened(OPTIMAL), region="limits"))
+    panel = WorkspacePanel(server.gui, desk.session, _no_export)
+
+    def show() -> tuple[WorkspaceDrawing, list[Update]]:
+        feed, _ = feed_of(desk.state)
+        assert feed.drawing is not None
+        return feed.drawing, list(panel.updates(Frame(desk.state), feed))
+
+    def slider(told: list[Update]) -> dict[str, Any]:
+        return {name: value for handle, name, value in told if getattr(handle, "label", "") == "at"}
+
+    _, told = show()
+    (cuts,) = {id(handle): handle for handle, _, value in told if value == "no cut"}.values()
+    desk.use(cuts, "across y")
+    drawing, told = show()
+    assert drawing.extent is not None
+    low, high = (float(end[1]) for end in drawing.extent)
+    found = slider(told)
+    step = found["step"]
+    assert low <= found["min"] <= low + step
+    assert high - step <= found["max"] <= high
+    assert found["value"] == pytest.approx(0.5 * (low + high), abs=step)
+    # It stays where it is while the design changes, and its slider follows the extent.
+    level = desk.state.view.workspace.level
+    desk.session.do(SetVariable("a3x", 15.0))
+    drawing, told = show()
+    assert desk.state.view.workspace.level == level == drawing.level
+    assert drawing.extent is not None
+    extent = [float(end[1]) for end in drawing.extent]
+    assert extent != [low, high]
+    assert slider(told)["min"] == pytest.approx(extent[0], abs=step)
+    assert slider(told)["max"] == pytest.approx(extent[1], abs=step)
+    desk.session.stop()
+
+
 def test_the_map_lets_the_page_through_where_nothing_is(
     server: viser.ViserServer, desk: Desk
 ) -> None:
@@ -255,7 +322,7 @@ def test_cutting_and_colouring_reach_for_nothing_anew(monkeypatch: pytest.Monkey
         calls.append(0.0)
         return reachable_workspace(*args, **kwargs)
 
-    monkeypatch.setattr(tasks, "reachable_workspace", counted)
+    monkeypatch.setattr(reached, "reachable_workspace", counted)
     state = shown(thick(opened(OPTIMAL), 0.15))
     for changes in (
         {},
@@ -285,11 +352,14 @@ def test_a_move_asks_anew_only_where_it_matters() -> None:
     assert not asks_anew(shown(THICK, start="pose", region="limits"))
 
 
-def test_an_old_failure_is_forgotten_once_a_newer_drawing_is_there() -> None:
+def test_a_failure_of_an_older_request_counts_for_nothing() -> None:
     feed, here = feed_of(THICK)
     feed.follow(Frame(shown(THICK, colour="margin")))
-    feed._failed("too late")  # pyright: ignore[reportPrivateUsage]
-    assert feed.problem == "too late"
+    first, second = 1, 2
+    feed._failed(first, "too late")  # pyright: ignore[reportPrivateUsage]
+    assert feed.problem is None
+    feed._failed(second, "it failed")  # pyright: ignore[reportPrivateUsage]
+    assert feed.problem == "it failed"
     here.work()
     assert feed.problem is None
     assert feed.is_current
@@ -474,6 +544,38 @@ def test_where_nothing_is_reached_nothing_is_exported() -> None:
     rows = drawing_of(state).request.rotation
     with pytest.raises(InputError, match="nothing can be reached from"):
         export_mesh(state.design, rows, 0.1, "reachable", None, "workspace", "stl")
+
+
+def test_step_of_the_workspace_has_its_exact_volume_and_its_faces() -> None:
+    state = shown(opened(OPTIMAL), region="limits")
+    rows = drawing_of(state).request.rotation
+    data = export_mesh(state.design, rows, 0.1, "limits", None, "workspace", tasks.STEP)
+    # The head tells the time.
+    head, _, body = data.partition(b"DATA;")
+    assert body == workspace_step(state.design, np.array(rows)).partition(b"DATA;")[2]
+    assert head.startswith(b"ISO-10303-21;")
+    assert data.count(b"ADVANCED_FACE") < 20
+    assert tasks.STEP in FORMATS
+
+
+@pytest.mark.parametrize(
+    ("region", "what", "reason"),
+    [("limits", "hull", "a convex hull"), ("reachable", "workspace", "begin to collide")],
+)
+def test_step_of_what_has_facets_is_refused_with_what_would_work(
+    region: Literal["limits", "reachable"], what: str, reason: str
+) -> None:
+    rows = drawing_of(shown(THICK, region="limits")).request.rotation
+    with pytest.raises(InputError, match=reason) as refusal:
+        export_mesh(THICK.design, rows, 0.1, region, None, what, tasks.STEP)
+    assert "as 3mf, stl, glb, obj or ply it can be exported" in str(refusal.value)
+
+
+def test_step_without_its_extra_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "OCP.gp", None)
+    rows = drawing_of(shown(opened(OPTIMAL), region="limits")).request.rotation
+    with pytest.raises(MissingExtraError, match=r"flagged-explorer\[cad\]"):
+        export_mesh(OPTIMAL, rows, 0.1, "limits", None, "workspace", tasks.STEP)
 
 
 # The radius curve

@@ -85,6 +85,38 @@ def test_a_joint_that_cannot_close_keeps_the_pose_and_names_what_would_work(
     assert closes(freed)
 
 
+@pytest.mark.parametrize("joint", range(6))
+def test_nearest_length_stays_clear_of_the_singularity_at_the_end_and_says_so(
+    state: State, joint: int
+) -> None:
+    low, high = Frame(state).snapshot.intervals[joint][-1]
+    at_the_end = SetJoint(joint, high - 1e-9 * (high - low)).apply(state)
+    assert Frame(at_the_end).verdict.kind != "clear"
+    freed = UseNearest().apply(SetJoint(joint, high + 1.0).apply(state))
+    assert Frame(freed).verdict.kind == "clear"
+    # No farther from the end than it needs to be.
+    closer = SetJoint(joint, 0.01 * high + 0.99 * freed.joints[joint]).apply(freed)
+    assert Frame(closer).verdict.kind == "near"
+    assert freed.remark is not None
+    assert JOINTS[joint] in freed.remark
+    assert f"{high:.4g}" in freed.remark
+    assert SetPosition(0, 12.0).apply(freed).remark is None
+    # With the pose held another design has other lengths.
+    assert SetVariable("b1x", state.design.b1[0] + 0.5).apply(freed).remark is None
+
+
+def test_nearest_length_where_none_stays_clear_is_the_farthest_from_singular(
+    state: State,
+) -> None:
+    _, high = Frame(state).snapshot.intervals[0][-1]
+    wary = SetView(replace(state.view, warn_below=1e3)).apply(state)
+    freed = UseNearest().apply(SetJoint(0, high + 1.0).apply(wary))
+    assert closes(freed)
+    assert Frame(freed).verdict.kind == "near"
+    assert freed.remark is not None
+    assert "none stays clear" in freed.remark
+
+
 def test_two_joints_may_pass_through_what_cannot_close(state: State) -> None:
     target = SetPosition(0, 12.0).apply(state).joints
     walking = state

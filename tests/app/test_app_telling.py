@@ -13,7 +13,9 @@ from typing import Any
 
 import pytest
 
+from explorer.app import jobs
 from explorer.app.jobs import RESTARTED, Worker
+from explorer.app.worker import CANCELLED
 
 ROOT = Path(__file__).resolve().parents[2]
 TASKS = "tests.app.telling"
@@ -30,14 +32,22 @@ class Ear:
         self._heard: Queue[tuple[str, Any]] = Queue()
         self.number = -1
 
-    def ask(self, task: str, *arguments: Any, tells: bool = True) -> None:
+    def ask(
+        self,
+        task: str,
+        *arguments: Any,
+        key: str = "task",
+        tells: bool = True,
+        is_drawing: bool = False,
+    ) -> None:
         self.number = self._worker.submit(
-            "task",
+            key,
             task,
             arguments,
             lambda value: self._heard.put(("done", value)),
             lambda problem: self._heard.put(("failed", problem)),
             told=(lambda value: self._heard.put(("told", value))) if tells else None,
+            is_drawing=is_drawing,
         )
 
     def next(self) -> tuple[str, Any]:
@@ -139,18 +149,62 @@ def test_what_does_not_tell_is_not_begun_once_it_is_cancelled(
     assert not reports
 
 
+def test_a_cancelled_task_leaves_those_before_it_alone(worker: Worker) -> None:
+    first, second, third = Ear(worker), Ear(worker), Ear(worker)
+    first.ask("count_until_cut")
+    assert first.next() == ("told", 0)
+    # Both wait for their turn.
+    second.ask("say", "still wanted", key="second", tells=False)
+    third.ask("say", "nobody asks any more", key="third", tells=False)
+    worker.cancel(third.number, NEVER)
+    worker.cancel(first.number, NEVER)
+    assert second.next() == ("done", "still wanted")
+    assert third.next() == ("failed", "it died")
+
+
+def test_a_long_drawing_ends_as_soon_as_a_newer_one_waits(
+    ear: Ear, worker: Worker, reports: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(jobs, "LONG_SECONDS", 0.0)
+    ear.ask("count_until_cut", is_drawing=True)
+    assert ear.next() == ("told", 0)
+    process = worker.process_id
+    ear.ask("count", 3, is_drawing=True)
+    told, end = ear.all()
+    # The first one ends for no other reason.
+    assert end == ("done", len(told) + 1)
+    assert ear.all() == ([0, 1, 2], ("done", 3))
+    assert worker.process_id == process
+    assert not reports
+
+
+def test_a_drawing_that_kills_its_process_is_tried_twice_although_it_tells(
+    ear: Ear, reports: list[str]
+) -> None:
+    ear.ask("die", is_drawing=True)
+    assert ear.all() == ([0, 0], ("failed", "it died"))
+    assert reports == [RESTARTED, "it died"]
+
+
+def test_a_task_that_ends_itself_when_cancelled_answers_so(ear: Ear, worker: Worker) -> None:
+    ear.ask("end_when_cancelled")
+    assert ear.next() == ("told", 0)
+    worker.cancel(ear.number, NEVER)
+    assert ear.all()[1] == ("failed", CANCELLED)
+
+
 def test_force_does_not_hit_the_next_task(ear: Ear, worker: Worker) -> None:
     ear.ask("count_until_cut")
     ear.next()
     worker.cancel(ear.number, NEVER)
-    held: Any = worker
-    deadline: threading.Timer = held._deadline
+    first = ear.number
     assert ear.all()[1][0] == "done"
     process = worker.process_id
     ear.ask("count_until_cut")
     ear.next()
     # As if the deadline of the first one passed only now.
-    deadline.function(*deadline.args)
+    held: Any = worker
+    held._kill(first)
     worker.cancel(ear.number, NEVER)
     assert ear.all()[1][0] == "done"
     assert worker.process_id == process
@@ -183,7 +237,7 @@ def test_work_that_kills_its_process_is_tried_twice(
 def test_no_process_is_left_when_the_parent_is_gone() -> None:
     code = f"""
 import os, sys
-from explorer.app.jobs import RESTARTED, Worker
+from explorer.app.jobs import Worker
 worker = Worker(print, tasks={TASKS!r})
 def told(value):
     if value == 5:

@@ -10,17 +10,18 @@ from dataclasses import replace
 from queue import Queue
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 
 from explorer.app.actions import SetLimits, SetVariable, SetView
-from explorer.app.bands import split_at
+from explorer.app.bands import COLOURED_EDGE, MOST_COLOURED, split_at
 from explorer.app.jobs import RESTARTED, Worker
 from explorer.app.state import Frame, State, opened
 from explorer.app.tasks import WorkspaceDrawing, WorkspaceRequest, draw_workspace
 from explorer.app.workspace_feed import WorkspaceFeed
 from explorer.colours import BAND_EDGES, band_colours
-from explorer.design import Limits
+from explorer.design import Design, Limits
 from explorer.design_file import PRESETS
 from explorer.home import home_pose
 from explorer.workspace import workspace_volume
@@ -213,6 +214,31 @@ def test_coloured_bands_cover_the_same_surface(colour: str) -> None:
     assert len(banded) > 1
     total = sum(area(shell.vertices[shell.faces]) for shell in banded)
     assert total == pytest.approx(area(plain.vertices[plain.faces]), rel=1e-9)
+
+
+def large_beside_its_reach(reach: float) -> Design:
+    """Return a design whose legs are far longer than its reach, and so is its workspace."""
+    long: Any = (0.0, 20.0)
+    limits = msgspec.structs.replace(OPTIMAL.limits, l1=long, d2=long, d4=long, l4=long)
+    a3 = (0.6 * reach, 0.8 * reach)
+    return msgspec.structs.replace(OPTIMAL, a3=a3, limits=limits, node_step=None)
+
+
+@pytest.mark.parametrize("reach", [5.0, 2.0])
+def test_a_workspace_large_beside_the_reach_is_coloured_with_a_bounded_number_of_facets(
+    reach: float,
+) -> None:
+    design = large_beside_its_reach(reach)
+    plain = draw_workspace(a_request(design=design)).shells
+    drawing = draw_workspace(a_request(design=design, colour="margin"))
+    # A facet that lies in several bands is split between them.
+    assert sum(len(shell.faces) for shell in drawing.shells) < 1.5 * MOST_COLOURED
+    total = sum(area(shell.vertices[shell.faces]) for shell in drawing.shells)
+    assert total == pytest.approx(sum(area(s.vertices[s.faces]) for s in plain), rel=1e-9)
+    # It is told that the colours are coarser than usual.
+    assert drawing.coarse_edge is not None
+    assert drawing.coarse_edge > COLOURED_EDGE * design.reach
+    assert draw_workspace(a_request(colour="margin")).coarse_edge is None
 
 
 def test_bands_hold_the_values_they_stand_for() -> None:

@@ -33,6 +33,7 @@ BENCHMARKS: Mapping[str, str] = {
     "drag_browser": "lag of two long drags at once, seen in two tabs of a real browser",
     "saving": "saving a session of fifty steps, and opening it again",
     "page": "from starting the explorer to the first byte of its page",
+    "first_minute": "the first searches on a machine that has never run the explorer",
     "command": "wall time of one command",
 }
 """Each benchmark and what it measures, in the order of the table."""

@@ -7,7 +7,7 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-from benchmarks.processes import first_byte
+from benchmarks.processes import first_byte, fresh_home
 from benchmarks.table import Row, seconds
 
 RUNS, RUNS_WITHOUT_CACHE = 5, 3
@@ -28,4 +28,4 @@ def run() -> Iterator[Row]:
 
 def _without_cache() -> float:
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
-        return first_byte(Path(folder))
+        return first_byte(fresh_home(Path(folder)))

@@ -9,6 +9,8 @@ import socket
 import subprocess
 import sys
 import time
+from collections.abc import Generator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -16,23 +18,36 @@ ROOT = Path(__file__).resolve().parents[2]
 EXPLORER = (sys.executable, "-m", "explorer")
 
 
-def run_to_end(*command: str) -> None:
+def run_to_end(*command: str, environment: Mapping[str, str] = os.environ) -> None:
     """Run a command and wait for it; its output is dropped.
 
     Raises:
         subprocess.CalledProcessError: it did not end well.
     """
-    subprocess.run(command, cwd=ROOT, check=True, capture_output=True)
+    subprocess.run(command, cwd=ROOT, check=True, capture_output=True, env=environment)
 
 
-def first_byte(cache: Path | None = None) -> float:
-    """Return the seconds from starting the explorer to the first byte of its page.
+def fresh_home(folder: Path) -> dict[str, str]:
+    """Return the environment of somebody who has never run the explorer."""
+    return {
+        **os.environ,
+        "XDG_CACHE_HOME": str(folder / "cache"),
+        "LOCALAPPDATA": str(folder / "cache"),
+        "EXPLORER_DATA": str(folder / "data"),
+    }
 
-    Args:
-        cache: The folder to keep compiled code in; the user's own if None.
-    """
-    environment = os.environ if cache is None else {**os.environ, "XDG_CACHE_HOME": str(cache)}
+
+def first_byte(environment: Mapping[str, str] = os.environ) -> float:
+    """Return the seconds from starting the explorer to the first byte of its page."""
     start = time.perf_counter()
+    with served(environment) as address:
+        _get_first_byte(address)
+        return time.perf_counter() - start
+
+
+@contextmanager
+def served(environment: Mapping[str, str] = os.environ) -> Generator[str]:
+    """Serve the page from a process of its own and give its address."""
     process = subprocess.Popen(
         [*EXPLORER, "serve", "--no-open", "--port", "0"],
         cwd=ROOT,
@@ -44,8 +59,7 @@ def first_byte(cache: Path | None = None) -> float:
     )
     try:
         assert process.stderr is not None
-        _get_first_byte(_address(process.stderr.readline()))
-        return time.perf_counter() - start
+        yield _address(process.stderr.readline())
     finally:
         _end(process)
 

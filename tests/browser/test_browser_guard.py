@@ -506,6 +506,9 @@ def call_until_refused(host: str, port: int) -> None:
             line = socket.create_connection((host, port))
         except ConnectionRefusedError:
             return
+        except ConnectionResetError:
+            # It stopped between taking the call up and answering it.
+            continue
         with line, suppress(ConnectionError):
             line.sendall(b"GET /nothing HTTP/1.1\r\n\r\n")
             while line.recv(4096):

@@ -5,15 +5,20 @@ from __future__ import annotations
 from collections.abc import Generator
 from contextlib import closing, contextmanager
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 from playwright.sync_api import Browser, Locator
 from tab import Tab
 
-from explorer.app.hands import NARROW
+from explorer.app.hands import DRAWER_HEIGHT, NARROW, TALL_DRAWER
 from explorer.app.preferences import PreferenceFile, Preferences
-from explorer.app.screenshot import SCENE_CANVAS
+from explorer.app.scene.camera import framing
+from explorer.app.scene.placing import Placed
+from explorer.app.screenshot import SCENE_CANVAS, settle
 from explorer.app.server import Running, start
+from explorer.app.state import Frame
 from explorer.app.tour import STEPS
 from explorer.design_file import PRESETS
 
@@ -122,6 +127,106 @@ def test_the_keys_are_told_on_a_card(tab: Tab) -> None:
     assert card.locator("kbd").count() > 40
     press(tab, "k")
     card.wait_for(state="detached")
+
+
+def test_card_of_keys_is_closed_by_escape_and_by_a_click_beside_it(tab: Tab) -> None:
+    card = tab.page.get_by_role("dialog")
+    for close in (lambda: press(tab, "Escape"), lambda: tab.page.mouse.click(5, 240)):
+        press(tab, "k")
+        card.get_by_text("Ctrl+Shift+Z").click()
+        # A text that is marked from the card outwards leaves it open.
+        tab.page.mouse.down()
+        tab.page.mouse.move(5, 240)
+        tab.page.mouse.up()
+        tab.page.wait_for_timeout(200)
+        assert card.is_visible()
+        close()
+        card.wait_for(state="detached")
+    # The server knows of it.
+    press(tab, "k")
+    card.wait_for()
+
+
+def drawer_of(tab: Tab) -> Locator:
+    """Return the drawer, opened."""
+    tab.turn_to("Compare")
+    drawer = tab.page.locator("[data-floating-window]", has=tab.page.get_by_role("tab")).first
+    tab.wait_for(lambda: _bottom(drawer) - _top(drawer) > DRAWER_HEIGHT - 8, "an open drawer")
+    return drawer
+
+
+def _top(box: Locator) -> float:
+    found = box.bounding_box()
+    assert found is not None
+    return found["y"]
+
+
+def _bottom(box: Locator) -> float:
+    found = box.bounding_box()
+    assert found is not None
+    return found["y"] + found["height"]
+
+
+def test_drawer_that_was_moved_grows_and_shrinks_within_the_window(
+    browser: Browser, running: Running
+) -> None:
+    width, height = SIZES[0]
+    with closing(Tab(browser, running, size=SIZES[0])) as tab:
+        drawer = drawer_of(tab)
+        # By a hand: from then on it is no more tied to the foot of the page.
+        grip = drawer.locator("[data-dock-resize=top]").bounding_box()
+        assert grip is not None
+        tab.page.mouse.move(grip["x"] + 0.5 * grip["width"], grip["y"] + 0.5 * grip["height"])
+        tab.page.mouse.down()
+        tab.page.mouse.move(grip["x"] + 0.5 * grip["width"], grip["y"] + 30, steps=4)
+        tab.page.mouse.up()
+        hands: Any = tab.running.page.hands
+        _, panel = hands._stacked
+        hands.set_drawer(tab.client, panel, tall=True)
+        tab.wait_for(lambda: _bottom(drawer) - _top(drawer) > TALL_DRAWER - 8, "a tall drawer")
+        tab.wait_for(lambda: _bottom(drawer) <= height + 1 and _top(drawer) >= 0, "all of it")
+        for less in (200, 300):
+            tab.page.set_viewport_size({"width": width, "height": height - less})
+            tab.wait_for(
+                lambda less=less: _bottom(drawer) <= height - less + 1 and _top(drawer) >= 0,
+                "all of it in a smaller window",
+            )
+        assert tab.complaints() == []
+
+
+def test_scene_keeps_beside_the_panels_where_the_page_gave_it_the_size_before_them(
+    browser: Browser, running: Running
+) -> None:
+    """Some first loads end so: the page measures the scene before its panels are there."""
+    with closing(Tab(browser, running, size=SIZES[0])) as tab:
+        settle(tab.page, tab.client)
+        scene = tab.page.locator(SCENE_CANVAS)
+        beside = scene.bounding_box()
+        assert beside is not None
+        assert beside["width"] < SIZES[0][0] - 500
+        tab.page.evaluate("size => window.__viserMutable.syncCanvasSize(...size)", [*SIZES[0]])
+        tab.wait_for(lambda: scene.bounding_box() == beside, "the scene beside the panels")
+        tab.wait_for(lambda: is_framed(tab), "all in the picture")
+        assert tab.complaints() == []
+
+
+def test_camera_that_a_loading_page_moves_back_is_put_again(tab: Tab) -> None:
+    """It does so once it has drawn, after all that it was sent."""
+    tab.wait_for(lambda: is_framed(tab), "all in the picture")
+    tab.page.evaluate("window.__viserMutable.resetCameraPose(false)")
+    # Longer than it takes to hear of it.
+    tab.page.wait_for_timeout(500)
+    tab.wait_for(lambda: is_framed(tab), "all in the picture again")
+
+
+def is_framed(tab: Tab) -> bool:
+    """Whether a browser's camera, as it is in the page, frames the mechanism in its picture."""
+    x, y, z, aspect = tab.page.evaluate(
+        "(({camera: {position: p, aspect}}) => [p.x, p.y, p.z, aspect])(window.__viserMutable)"
+    )
+    eye, _ = framing(Placed(Frame(tab.state)), "isometric", aspect)
+    # In the page, y is up.
+    return bool(np.allclose((-z, -x, y), eye, rtol=0.01))
 
 
 @pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}x{size[1]}")

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -53,6 +54,21 @@ def test_inverse_names_every_limit_that_the_pose_breaks(
     found = answer(capsys, "inverse", "--position", "30", "5", "9")
     assert found["within_limits"] is False
     assert any("box x" in each for each in found["violations"])
+
+
+def test_inverse_names_the_order_of_the_carriages_that_a_pose_breaks(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    other = ["--position", "10", "5", "9", "--yaw-pitch-roll", "-106.9", "0", "0"]
+    found = answer(capsys, "inverse", *other)
+    assert found["within_limits"] is False
+    (told,) = found["violations"]
+    assert told.startswith("carriage order: d3 − d1 = −0.66")
+    limits = msgspec.structs.replace(PRESET.limits, carriage_order="any")
+    plain = msgspec.structs.replace(PRESET, limits=limits)
+    file = tmp_path / "plain.json"
+    file.write_bytes(explorer.encode_design(plain))
+    assert answer(capsys, "inverse", *other, "--design", str(file))["within_limits"] is True
 
 
 def test_singularity_gives_what_the_snapshot_holds(capsys: pytest.CaptureFixture[str]) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -24,7 +25,7 @@ from explorer.optimise.record import load_record
 BOX = ["--box", "0", "-12", "0", "20", "22", "18"]
 PAPER = ["--design", "paper-initial", *BOX, "--target-volume", "8000"]
 CONTRACT = {"design", "objective", "volume", "iterations", "evaluations", "seconds", "converged"}
-IMPOSSIBLE = ["--target-volume", "30000", "--bounds", "a3x=5:22", "a3y=1:12"]
+IMPOSSIBLE = ["--target-volume", "12000", "--bounds", "a3x=5:22", "a3y=1:12"]
 
 
 def answer(capsys: pytest.CaptureFixture[str], *argv: str, status: int = 0) -> dict[str, Any]:
@@ -93,15 +94,64 @@ def test_without_convergence_the_best_is_told_and_no_design_is_written(
     assert found["converged"] is False
     assert found["status"] == "infeasible"
     assert found["volume"] == pytest.approx(float(found["message"].rsplit(" ", 1)[1]), rel=1e-3)
+    without = re.search(r"has ([0-9.]+) without its box\)", found["message"])
+    assert without is not None
+    assert float(without[1]) >= 12_000.0
+    assert found["holding"] == "box"
     assert out.read_text() == "as it was"
     assert found["files"] == [str(kept)]
     assert load_record(kept).runs[0].status == "infeasible"
     assert run(["optimise", *IMPOSSIBLE]) == 1
     captured = capsys.readouterr()
     last = captured.err.splitlines()[-1]
-    assert last.startswith("explorer: no design within the bounds was found with a volume of 30000")
+    assert last.startswith("explorer: no design within the bounds was found with a volume of 12000")
     assert "best so far" in captured.out
     assert sorted(path.name for path in tmp_path.iterdir()) == ["design.json", "run.json"]
+
+
+@pytest.mark.parametrize("json_too", [False, True])
+def test_what_the_box_cannot_hold_is_refused_before_anything_is_searched(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, json_too: bool
+) -> None:
+    def never(*_: object, **__: object) -> None:
+        pytest.fail("it searches, or compiles for a search")
+
+    monkeypatch.setattr("explorer.optimise.solver.optimise_design", never)
+    monkeypatch.setattr("explorer.compiled.warm", never)
+    words = (
+        "the box holds at most 2,499 of the 8,000 asked for: lift the box with --box none, or "
+        "take the paper's with --box 0 -12 0 20 22 18"
+    )
+    argv = ["--design", "paper-initial", "--target-volume", "8000", "--clearance", "0.2"]
+    if json_too:
+        found = answer(capsys, *argv, status=1)
+        assert set(found) >= CONTRACT
+        assert (found["converged"], found["status"], found["holding"]) == (
+            False,
+            "infeasible",
+            "box",
+        )
+        assert (found["message"], found["iterations"], found["volume"]) == (words, 0, None)
+    else:
+        assert run(["optimise", *argv]) == 1
+        assert capsys.readouterr() == ("", f"explorer: {words}\n")
+    huge = ["--design", "paper-initial", "--target-volume", "20000"]
+    assert run(["optimise", *huge]) == 1
+    assert capsys.readouterr().err.endswith("asked for: lift the box with --box none\n")
+
+
+def test_the_box_of_a_design_is_lifted_by_one_option(capsys: pytest.CaptureFixture[str]) -> None:
+    argv = ["--design", "paper-initial", "--target-volume", "8000", "--clearance", "0.2"]
+    found = answer(capsys, *argv, "--box", "none")
+    assert found["converged"] is True
+    assert found["objective"] <= 1e-9
+    assert found["design"]["limits"]["box"] is None
+    assert "none lifts that of the design" in " ".join(help_of(capsys).split())
+
+
+def help_of(capsys: pytest.CaptureFixture[str]) -> str:
+    assert run(["optimise", "--help"]) == 0
+    return capsys.readouterr().out
 
 
 def test_other_objectives_and_variables(capsys: pytest.CaptureFixture[str]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ import explorer
 from explorer.cli import run
 from explorer.orientations import cone_of_directions, orientation_capability, yaw_pitch_roll_range
 from explorer.radii import with_radius
+from explorer.solid import Solid
 from explorer.solids import convex_hull, dexterous_solid, reachable_solid, workspace_solid
 from explorer.workspace import workspace_nodes, workspace_volume
 
@@ -62,6 +64,20 @@ def test_the_answer_is_what_the_package_measures(capsys: pytest.CaptureFixture[s
         "triangles": len(solid.faces),
         "watertight": True,
     }
+
+
+def test_mesh_that_disagrees_with_the_exact_volume_is_told(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wrong = replace(workspace_solid(OPTIMAL), agrees=False)
+
+    def make(*_args: object, **_options: object) -> Solid:
+        return wrong
+
+    monkeypatch.setattr("explorer.solids.workspace_solid", make)
+    assert answer(capsys)["mesh_agrees"] is False
+    assert run(["workspace"]) == 0
+    assert "its volume does not agree with the exact one" in capsys.readouterr().out
 
 
 def test_orientation_step_and_tolerance_count(capsys: pytest.CaptureFixture[str]) -> None:

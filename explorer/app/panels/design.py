@@ -11,6 +11,7 @@ import viser
 from explorer.app.actions import Action, Open, Reset, SetHold, SetLimits, SetUnit, SetVariable
 from explorer.app.assigning import Update
 from explorer.app.controls import Controls, Span
+from explorer.app.field_words import SWINGS
 from explorer.app.panels.ranges import coordinate_span, length_span, radius_span, variable_span
 from explorer.app.session import Session
 from explorer.app.state import Frame, Hold, State
@@ -28,14 +29,6 @@ VARIABLE_HINTS = {
 }
 HOLDS: dict[str, Hold] = {"hold the pose": "pose", "hold the legs": "legs"}
 NO_PRESET = "—"
-SWINGS = {
-    "a1": "U joint",
-    "a3": "U joint",
-    "b1": "ball",
-    "b2": "ball",
-    "b3": "ball",
-    "b4": "ball",
-}
 # A half-angle, in degrees, that bounds nothing.
 NO_SWING = 180.0
 
@@ -156,6 +149,14 @@ class DesignPanel:
             lambda frame: frame.state.design.limits.gap,
             lambda state, value: _limited(state, "gap", value),
             length_span,
+        )
+        self._controls.checkbox(
+            "Carriages keep their order",
+            "Demand that d3 − d1 keeps the sign that it has in the home pose. At d1 = d3 legs 2 "
+            "and 3 share a point, so the carriages cannot pass each other. Clear this for the "
+            "plain geometry, which counts both orders.",
+            lambda frame: frame.state.design.limits.carriage_order == "home",
+            lambda state, on: _limited(state, "carriage_order", "home" if on else "any"),
         )
 
     def _end(self, label: str, index: int, write: Callable[[State, float], Action]) -> None:

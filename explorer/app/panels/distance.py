@@ -53,14 +53,15 @@ class DistancePanel:
 
 def distance_table(frame: Frame) -> str:
     """Return the three distances as HTML, the least of them in bold."""
-    unit, warn = frame.state.design.unit_mm, frame.state.warn_below
-    nearest = frame.snapshot.nearest
+    unit, levels = frame.state.design.unit_mm, frame.verdict.levels
+    nearest, reach = frame.snapshot.nearest, frame.state.design.reach
     least = min(each.distance for each in nearest)
     rows = "".join(
         f'<tr title="{escape(each.name)}" style="{"font-weight:600" * (each.distance == least)}">'
-        f'<td style="padding:1px 0">{_swatch(each.distance, warn)}κ{each.incidence} = 0</td>'
-        f'<td style="text-align:right">{scientific(each.distance)}</td>'
-        f'<td style="text-align:right">{scientific(each.distance * unit, 3)}</td></tr>'
+        f'<td style="padding:1px 0">{_swatch(levels[each.incidence - 1])}κ{each.incidence} = 0</td>'
+        f'<td style="text-align:right">{scientific(each.distance, size=reach)}</td>'
+        f'<td style="text-align:right">'
+        f"{scientific(each.distance * unit, 3, size=reach * unit)}</td></tr>"
         for each in nearest
     )
     return (
@@ -73,8 +74,8 @@ def distance_table(frame: Frame) -> str:
     )
 
 
-def _swatch(distance: float, warn: float) -> str:
+def _swatch(level: float) -> str:
     return (
         f'<span style="display:inline-block;width:9px;height:9px;border-radius:2px;'
-        f'background:{css(proximity_colour(distance, warn))};margin-right:7px"></span>'
+        f'background:{css(proximity_colour(level, 1.0))};margin-right:7px"></span>'
     )

@@ -6,6 +6,7 @@ import math
 from html import escape
 
 from explorer.app.colours import OUTLINE, css
+from explorer.number_text import fixed, scientific, settled, with_true_minus
 
 
 def by_theme(light: str, dark: str) -> str:
@@ -17,11 +18,14 @@ def by_theme(light: str, dark: str) -> str:
 GREY = ("#5f666e", "#a3a9b1")
 GREEN = ("#1f7a4a", "#5fca90")
 RED = ("#c43408", "#ff8f66")
+AMBER = ("#96590a", "#f0b04c")
 
 DIM = "color:var(--mantine-color-dimmed)"
 # What keeps its bounds, and what does not.
 WITHIN = by_theme(*GREEN)
 BEYOND = by_theme(*RED)
+# What is close to its bounds.
+CLOSE = by_theme(*AMBER)
 
 
 def alert(title: str, body: str) -> str:
@@ -34,9 +38,19 @@ def alert(title: str, body: str) -> str:
     )
 
 
+def remark(title: str, body: str) -> str:
+    """Return a box that says what was done, where that is not quite what was asked for."""
+    return (
+        '<div role="status" style="margin:6px 10px;padding:7px 10px;border-left:4px solid '
+        f"{CLOSE};border-radius:3px;font-size:12.5px;line-height:1.4;"
+        'background:color-mix(in srgb,currentColor 6%,transparent)">'
+        f"<b>{escape(title)}</b><br>{escape(body)}</div>"
+    )
+
+
 def signed(value: float, digits: int = 3) -> str:
     """Return a number with a true minus sign."""
-    return f"{value:.{digits}f}".replace("-", "−")
+    return with_true_minus(fixed(value, digits))
 
 
 # Beyond these sizes numbers are told with a power of ten.
@@ -57,15 +71,11 @@ def fitted(value: float, size: float, digits: int) -> str:
         digits: That one of this size has.
     """
     if size != 0.0 and not LEAST <= size < MOST:
-        return scientific(value, digits)
+        return scientific(value, digits, size=size)
     return signed(value, decimals_for(size, digits))
 
 
 def share(value: float) -> str:
     """Return a number from 0 to 1 with four decimals, or more where it would look like 0."""
-    return scientific(value, 3) if 0.0 < value < LEAST else f"{value:.4f}"
-
-
-def scientific(value: float, digits: int = 4) -> str:
-    """Return a number in the shorter of both notations, with a true minus sign."""
-    return f"{value:.{digits}g}".replace("-", "−")
+    value = settled(value, 1.0)
+    return scientific(value, 3) if 0.0 < value < LEAST else fixed(value, 4)

@@ -131,13 +131,13 @@ def travel_table(frame: Frame, frame_name: str) -> str:
 def _row(frame: Frame, motion: UncoupledMotion) -> str:
     travel = in_shown_units(motion, frame.travels[UNCOUPLED.index(motion)])
     unit = "°" if motion.kind == "rotation" else ""
-    margin = float(frame.snapshot.margins[motion.incidence - 1])
-    colour = css(proximity_colour(margin, frame.state.warn_below))
+    colour = css(proximity_colour(frame.verdict.levels[motion.incidence - 1], 1.0))
     swatch = (
         '<span style="display:inline-block;width:8px;height:8px;border-radius:2px;'
         f'background:{colour};margin-right:6px"></span>'
     )
-    back, ahead = (_end(end, unit) for end in (travel.low, travel.high))
+    size = 180.0 if motion.kind == "rotation" else frame.state.design.reach
+    back, ahead = (_end(end, unit, size) for end in (travel.low, travel.high))
     if motion.incidence in incidences(frame.snapshot.stratum):
         back, ahead = "singular", "here"
     return (
@@ -146,7 +146,7 @@ def _row(frame: Frame, motion: UncoupledMotion) -> str:
     )
 
 
-def _end(value: float, unit: str) -> str:
+def _end(value: float, unit: str, size: float) -> str:
     if math.isinf(value):
         return f'<span style="{DIM}">never</span>'
-    return f"{scientific(value, 3)}{unit}"
+    return f"{scientific(value, 3, size=size)}{unit}"

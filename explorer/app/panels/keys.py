@@ -27,6 +27,33 @@ OPEN_PALETTE = (
     "{key:'k',code:'KeyK',ctrlKey:true,bubbles:true}))"
 )
 
+# viser leaves it to the server to close a card, whatever is pressed in the browser. A part of the
+# card therefore names the button that does.
+CLOSED_BY = "data-closed-by"
+CLOSING = """
+(() => {
+  if (window.explorerClosing) return;
+  window.explorerClosing = true;
+  const CARD = ".mantine-Modal-content", AROUND = ".mantine-Modal-inner, .mantine-Modal-overlay";
+  const isBeside = (it) => !!it.closest?.(AROUND) && !it.closest(CARD);
+  const close = () => {
+    const card = [...document.querySelectorAll(`${CARD} [data-closed-by]`)].at(-1);
+    if (card) document.getElementById(card.getAttribute("data-closed-by"))?.click();
+  };
+  addEventListener("keydown", (event) => {
+    // The palette may lie over a card, and is closed first.
+    if (event.key === "Escape" && !event.target.closest?.(".mantine-Spotlight-content")) close();
+  }, true);
+  // What was pressed on a card and let go beside it, such as a marked text, closes nothing.
+  let isPressedBeside = false;
+  addEventListener("pointerdown", ({ target }) => { isPressedBeside = isBeside(target); }, true);
+  addEventListener("click", ({ target }) => {
+    if (isPressedBeside && isBeside(target)) close();
+  }, true);
+})();
+"""
+"""Closes the card on top in a browser by Escape, and by a click beside it."""
+
 # viser's own grey is too pale to be read easily, on white and on black.
 LEGIBLE = f"<style>:root:root:root{{--mantine-color-dimmed:{by_theme(*GREY)}}}</style>"
 
@@ -50,8 +77,9 @@ class KeysCard:
             modal = client.gui.add_modal("Keys")
             self._open[client.client_id] = modal.close
             with modal:
-                client.gui.add_html(keys_table(commands))
-                button = client.gui.add_button("Close", hint="Put the card away; Key: K.")
+                table = client.gui.add_html("")
+                button = client.gui.add_button("Close", hint="Put the card away; Keys: K, Escape.")
+                table.content = closed_by(element_id(button), keys_table(commands))
             button.on_click(lambda _: self.close(client))
 
     def close(self, client: viser.ClientHandle) -> None:
@@ -123,6 +151,11 @@ def keycap(key: str) -> str:
         "white-space:nowrap;border:1px solid color-mix(in srgb,currentColor 35%,transparent);"
         f'background:color-mix(in srgb,currentColor 7%,transparent)">{escape(key)}</kbd>'
     )
+
+
+def closed_by(button: str, content: str) -> str:
+    """Return what is on a card, HTML, so that the card is closed by the button with this id."""
+    return f'<div {CLOSED_BY}="{escape(button)}">{content}</div>'
 
 
 def keys_table(commands: Iterable[Command]) -> str:

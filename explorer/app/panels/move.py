@@ -18,14 +18,14 @@ from explorer.app.actions import (
 )
 from explorer.app.assigning import Update
 from explorer.app.controls import Controls, Span
-from explorer.app.panels.html import alert
+from explorer.app.panels.html import alert, remark, scientific
 from explorer.app.panels.ranges import coordinate_span, length_span
 from explorer.app.session import Session
 from explorer.app.state import Frame, State
 from explorer.app.viser_gaps import Mark
 from explorer.design import JOINTS, LENGTHS
 from explorer.feasibility import Interval
-from explorer.singularity import mode_name
+from explorer.singularity import mode_name, mode_words
 
 JOINT_HINTS = {
     "l1": "Leg 1: length of the actuator from a1 to b1 (U joint, actuator, ball joint).",
@@ -62,9 +62,11 @@ class MovePanel:
             for joint, name in enumerate(JOINTS):
                 self._add_joint(joint, name)
             self._alert = gui.add_html("", visible=False)
+            self._remark = gui.add_html("", visible=False)
             self._nearest = controls.button(
                 "Use the nearest length",
-                "Move this leg to the nearest length that closes, the others as they are.",
+                "Move this leg to the nearest length that closes and stays clear of "
+                "singularities, the others as they are.",
                 UseNearest,
                 icon=viser.Icon.MAGNET,
             )
@@ -84,8 +86,11 @@ class MovePanel:
                 "κ1 κ2 κ3",
                 "The eight ways to assemble these leg lengths, by the signs of the margins.",
                 MODES,
-                lambda frame: MODES[frame.state.mode],
-                lambda _, chosen: SetMode(MODES.index(chosen)),
+                lambda frame: mode_options(frame)[-1 if is_between(frame) else frame.state.mode],
+                lambda state, chosen: (
+                    SetMode(MODES.index(chosen)) if chosen in MODES else SetView(state.view)
+                ),
+                more=mode_options,
             )
             controls.checkbox(
                 "Other modes as ghosts",
@@ -137,7 +142,24 @@ class MovePanel:
         yield self._nearest, "visible", unclosed is not None and unclosed.nearest is not None
         if unclosed is not None:
             yield self._alert, "content", alert("These lengths cannot close", str(unclosed))
+        words = None if unclosed is not None else frame.state.remark
+        yield self._remark, "visible", words is not None
+        if words is not None:
+            yield self._remark, "content", remark("Not quite the length asked for", words)
         yield from self._controls.updates(frame)
+
+
+def is_between(frame: Frame) -> bool:
+    """Whether the pose is singular, so that it lies in no mode but between some."""
+    return len(frame.snapshot.bordering_modes) > 1
+
+
+def mode_options(frame: Frame) -> tuple[str, ...]:
+    """Return the modes to choose from; at a singular pose its boundary comes last."""
+    if not is_between(frame):
+        return MODES
+    snapshot = frame.snapshot
+    return (*MODES, f"{snapshot.sign_words}:  {mode_words(snapshot.bordering_modes)}")
 
 
 def interval_marks(intervals: tuple[Interval, ...], span: Span) -> tuple[Mark, ...]:
@@ -152,7 +174,8 @@ def interval_marks(intervals: tuple[Interval, ...], span: Span) -> tuple[Mark, .
     for low, high in intervals:
         start, end = (min(max(v, span.low), span.high) for v in (low, high))
         first, last = ((v - span.low) / (span.high - span.low) for v in (start, end))
-        texts = (f"{low:.3g}".replace("-", "−"), f"{high:.3g}".replace("-", "−"))
+        size = max(abs(span.low), abs(span.high))
+        texts = (scientific(low, 3, size=size), scientific(high, 3, size=size))
         if first - labelled < LABEL_ROOM:
             texts = ("", "")
         elif last - first < LABEL_ROOM:

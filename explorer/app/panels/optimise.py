@@ -11,15 +11,37 @@ import viser
 from explorer.app.actions import Action
 from explorer.app.assigning import Update
 from explorer.app.controls import Controls
-from explorer.app.optimisation import PLACE, Wish, wished_box, wished_reach, wished_volume
-from explorer.app.optimising import Accept, CancelRun, Revert, SetWish, StartRun
+from explorer.app.optimisation import (
+    PLACE,
+    Wish,
+    box_on_offer,
+    refuted,
+    wished_box,
+    wished_reach,
+    wished_volume,
+)
+from explorer.app.optimising import (
+    Accept,
+    CancelRun,
+    LiftBox,
+    Revert,
+    SetWish,
+    StartRun,
+    TakePaperBox,
+)
 from explorer.app.panels.html import alert
 from explorer.app.panels.optimise_plots import OptimisePlots
-from explorer.app.panels.optimise_words import comparison_table, progress_line, verdict_words
+from explorer.app.panels.optimise_words import (
+    comparison_table,
+    progress_line,
+    refused_words,
+    verdict_words,
+)
 from explorer.app.session import Session
 from explorer.app.state import Frame, State
 from explorer.design import VARIABLES
 from explorer.optimise.problem import YAW, ObjectiveName
+from explorer.optimise.refutation import BOX_LIMIT
 from explorer.pose import Triple
 
 OBJECTIVES: dict[str, ObjectiveName] = {
@@ -36,7 +58,7 @@ FREE = {
 FREE_LABELS = {YAW: "yaw of home", PLACE: "place of the box"}
 ACCEPT, REVERT = "Accept", "Revert"
 HULL_FILE, DESIGN_FILE, SEARCH_FILE = "Hull", "Design", "Search"
-CANCEL_COLOUR = "red"
+CANCEL_COLOUR, REMEDY_COLOUR = "red", "gray"
 STEP = 0.001
 
 Send = Callable[[int | None], None]
@@ -69,6 +91,21 @@ class OptimisePanel:
         with gui.add_folder("What may change", expand_by_default=False):
             for name, hint in FREE.items():
                 self._add_free(name, hint)
+        self._notice = gui.add_html("", visible=False)
+        self._lift = controls.button(
+            "Lift the box",
+            "Take the box for b4 out of the limits of the design; one undo brings it back.",
+            LiftBox,
+            icon=viser.Icon.BOX_OFF,
+        )
+        self._paper_box = controls.button(
+            "Take the paper's box",
+            "Bound b4 by the box of the paper's optimum; one undo brings yours back.",
+            TakePaperBox,
+            icon=viser.Icon.BOX,
+        )
+        for each in (self._lift, self._paper_box):
+            each.color, each.visible = REMEDY_COLOUR, False
         self._optimise = controls.button(
             "Optimise",
             "Look for the best design from the present one; its limits hold throughout.",
@@ -109,6 +146,7 @@ class OptimisePanel:
         yield from self._controls.updates(frame)
         found = frame.state.optimisation
         run = found.run
+        yield from self._refused(frame.state)
         yield self._optimise, "visible", not found.is_on
         yield self._cancel, "visible", found.is_on
         yield self._cancel, "disabled", run is not None and run.phase == "cancelling"
@@ -128,6 +166,25 @@ class OptimisePanel:
         if run is not None and has_result:
             yield self._table, "content", comparison_table(run)
         yield from self._plots.updates(run)
+
+    def _refused(self, state: State) -> Iterator[Update]:
+        """Yield what tells that the limits cannot give what is asked for, and what would help."""
+        found = state.optimisation
+        refusals = () if found.is_on else refuted(state)
+        yield self._notice, "visible", bool(refusals)
+        if refusals:
+            yield self._notice, "content", refused_words(refusals)
+        verdict = None if found.run is None or found.run.accepted else found.run.verdict
+        held = {each.limit for each in refusals}
+        is_same_box = found.run is not None and (
+            found.run.problem.start.limits.box == state.design.limits.box
+        )
+        if verdict is not None and verdict.status == "infeasible" and is_same_box:
+            held.add(verdict.holding)
+        is_boxed = BOX_LIMIT in held and state.design.limits.box is not None and not found.is_on
+        box = box_on_offer(state) if is_boxed else None
+        yield self._lift, "visible", is_boxed
+        yield self._paper_box, "visible", box is not None and box != state.design.limits.box
 
     def _add_wish(self) -> None:
         controls = self._controls

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from html import escape
 
@@ -10,10 +10,11 @@ from explorer.app.optimisation import Run, Verdict
 from explorer.app.panels.html import BEYOND, DIM, WITHIN, alert, decimals_for, scientific
 from explorer.app.state import State
 from explorer.design import VARIABLES
+from explorer.figures import FIGURES
 from explorer.optimise.curves import CALLED
 from explorer.optimise.facts import Facts
 from explorer.optimise.problem import YAW, Problem
-from explorer.optimise.trail import MET
+from explorer.optimise.refutation import BOX_LIMIT, Refutation
 
 BOX = (
     '<div style="padding:6px 12px 4px;font-size:12.5px;line-height:1.45;'
@@ -32,6 +33,15 @@ DIGITS = 6
 KNOWN = 1e-3
 
 
+def refused_words(refusals: Sequence[Refutation]) -> str:
+    """Return what the limits cannot give of what is asked for, as HTML."""
+    title = "No design can keep these demands"
+    body = " ".join(_sentence(each.message) for each in refusals)
+    if any(each.limit != BOX_LIMIT for each in refusals):
+        body += " Ask for less, or change the limits in the tab Design."
+    return alert(title, body)
+
+
 def progress_line(run: Run) -> str:
     """Return how far a run has got, as HTML."""
     if run.phase == "cancelling":
@@ -41,7 +51,7 @@ def progress_line(run: Run) -> str:
     last = run.iterates[-1]
     inside = sum(each.run == last.run for each in run.iterates) - 1
     start = f"start {last.run + 1} of {run.starts}, " if run.starts > 1 else ""
-    missed = f", missed: {last.worst}" if last.spare < -MET else ""
+    missed = f", missed: {last.worst}" if last.spare < 0.0 else ""
     name = CALLED[run.problem.objective]
     return _running(
         f"{start}{last.phase} {inside}".capitalize(),
@@ -122,58 +132,72 @@ def measure_rows(problem: Problem, before: Facts, after: Facts) -> Iterator[Row]
     missed = [abs(volume - (demands.volume or 0.0)) for volume in volumes]
     nearer = goal == "match-volume" and missed[1] < missed[0]
     grown = goal == "largest-volume" and volumes[1] > volumes[0]
-    yield Row(
-        "volume, units³",
-        "Exact, at the orientation of home",
+    yield _figure(
+        "volume",
         *volumes,
         colour=WITHIN if nearer or grown else None,
         is_goal=goal in ("match-volume", "largest-volume"),
     )
     shorter = goal == "smallest-reach" and reaches[1] < reaches[0]
-    yield Row(
-        "reach, units",
-        "|a3|, or the longest leg where that is longer",
+    yield _figure(
+        "reach",
         *reaches,
         colour=WITHIN if shorter else None,
         is_goal=goal == "smallest-reach",
     )
-    yield Row(
-        "nodes",
-        "The paper's measure of volume, by the grid of the old design",
-        before.node_count,
-        after.node_count,
-        whole=True,
-    )
-    if before.worst_margin is not None or after.worst_margin is not None:
-        margins = (before.worst_margin, after.worst_margin)
+    counts = tuple(each.nodes for each in (before, after))
+    yield _figure("nodes", *(each and each.count for each in counts))
+    yield _figure("node volume", *(each and each.volume for each in counts))
+    if before.box_margin is not None or after.box_margin is not None:
+        margins = (before.box_margin, after.box_margin)
         better = goal == "largest-margin" and (margins[1] or 0.0) > (margins[0] or 0.0)
         yield Row(
-            "worst margin, units",
+            "margin over box, units",
             "The least |κ| over the required box",
             *margins,
             colour=WITHIN if better else None,
             is_goal=goal == "largest-margin",
         )
-    pair = "" if after.nearest is None else f", in the new one of legs {_pair(after.nearest)}"
-    yield Row(
-        "clearance, units",
-        f"The least of two legs wherever all margins are at least "
-        f"{after.clearance_margin:.3g}{pair}",
+    known = KNOWN * after.reach
+    has_none = after.clearance is not None and after.clearance <= known
+    yield _figure(
+        "clearance",
         before.clearance,
         after.clearance,
-        colour=_clearance_colour(demands.clearance, after),
+        more=_pair(after.nearest),
+        colour=BEYOND if has_none else None,
     )
+    if demands.clearance is not None and after.demanded_margin is not None:
+        found = after.demanded_clearance
+        # It is known to a thousandth of the reach.
+        is_kept = found is None or found >= demands.clearance - known
+        yield Row(
+            f"clearance, |κ| ≥ {after.demanded_margin:.3g}",
+            f"As it was demanded: the least of any two legs over the workspace, wherever every |κ| "
+            f"is at least {after.demanded_margin:.3g} units{_pair(after.demanded_nearest)}",
+            before.demanded_clearance,
+            found,
+            colour=WITHIN if is_kept else BEYOND,
+        )
     if YAW in problem.names:
         yield Row("yaw, °", "Of home", before.yaw, after.yaw)
 
 
-def _clearance_colour(demanded: float | None, after: Facts) -> str | None:
-    if after.clearance is None:
-        return None
-    if demanded is not None:
-        # It is known to a thousandth of the reach.
-        return WITHIN if after.clearance >= demanded - KNOWN * after.reach else BEYOND
-    return BEYOND if after.clearance <= KNOWN * after.reach else None
+def _figure(
+    name: str,
+    before: float | None,
+    after: float | None,
+    *,
+    more: str = "",
+    colour: str | None = None,
+    is_goal: bool = False,
+) -> Row:
+    """Return the row of one of `FIGURES`, by its name there."""
+    figure = next(each for each in FIGURES if each.name == name)
+    unit = {0: "", 1: ", units", 3: ", units³"}[figure.power]
+    return Row(
+        f"{name}{unit}", f"{figure.hint}{more}", before, after, figure.is_whole, colour, is_goal
+    )
 
 
 def _row(row: Row, *, is_first: bool = False) -> str:
@@ -227,5 +251,5 @@ def _sentence(text: str) -> str:
     return f"{text[:1].upper()}{text[1:]}{'' if text.endswith('.') else '.'}"
 
 
-def _pair(legs: tuple[int, int]) -> str:
-    return f"{legs[0]} and {legs[1]}"
+def _pair(legs: tuple[int, int] | None) -> str:
+    return "" if legs is None else f"; in the new design that of legs {legs[0]} and {legs[1]}"

@@ -163,7 +163,7 @@ def _cells(pose: Pose | None) -> str:
         return f'<td colspan="2" style="text-align:right;{DIM}">move there, then store it</td>'
     place = ", ".join(f"{signed(v, 1)}" for v in pose.position)
     angles = yaw_pitch_roll_from_rotation(pose.rotation).tolist()
-    turn = ", ".join(f"{signed(v + 0.0, 0)}°" for v in angles)
+    turn = ", ".join(f"{signed(v, 0)}°" for v in angles)
     right = '<td style="text-align:right;white-space:nowrap">'
     return f"{right}{place}</td>{right}{turn}</td>"
 

@@ -14,6 +14,7 @@ from explorer.app.assigning import Update
 from explorer.app.colours import Rgb, css
 from explorer.app.panels.charts import BLUE, ORANGE, TEAL, VIOLET, axis
 from explorer.app.panels.html import DIM, alert, scientific
+from explorer.app.panels.under_way import UnderWay, problem, progress
 from explorer.app.state import Frame
 from explorer.app.workspace_feed import RadiusFeed
 from explorer.arrays import FloatArray
@@ -68,6 +69,7 @@ class RadiusPlot:
             visible=False,
         )
         self._words = gui.add_html("", visible=False)
+        self._under_way = UnderWay(gui, "curve")
         self._plotted: tuple[RadiusCurve, float | None] | None = None
         self._data: tuple[NDArray[Any], ...] = (BLANK,) * 5
 
@@ -75,6 +77,7 @@ class RadiusPlot:
         """Yield what makes them show the frame."""
         shown = frame.state.view.radius_curve
         drawing = feed.drawing if shown else None
+        yield from self._under_way.updates(feed)
         yield self._words, "visible", shown
         if shown:
             yield self._words, "content", radius_words(frame, feed)
@@ -143,11 +146,12 @@ def chart_of(curve: RadiusCurve, radius: float | None) -> tuple[FloatArray, ...]
 def radius_words(frame: Frame, feed: RadiusFeed) -> str:
     """Return what the chart tells as HTML, or why there is none."""
     if feed.problem is not None:
-        return alert("The curve could not be drawn", feed.problem)
+        return problem(feed, "The curve could not be drawn", "Compute the curve")
     drawing = feed.drawing
     if drawing is None:
-        return f'{BOX}<div style="{DIM}">Computing …</div></div>'
-    note = "" if feed.is_current else f' <span style="{DIM};font-size:11.5px">computing …</span>'
+        return f'{BOX}<div style="{DIM}">{progress(feed).capitalize()}</div></div>'
+    waits = f' <span style="{DIM};font-size:11.5px">{progress(feed)}</span>'
+    note = "" if feed.is_current else waits
     if drawing.curve is None:
         reason = "" if drawing.trouble is None else drawing.trouble.reason
         text = f"{reason[:1].upper()}{reason[1:]}."

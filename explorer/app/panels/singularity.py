@@ -13,17 +13,22 @@ from explorer.app.assigning import Update
 from explorer.app.colours import CLEAR, FAR, FAR_WARNINGS, SINGULAR, WARNED, css, proximity_colour
 from explorer.app.controls import Controls
 from explorer.app.panels.distance import DistancePanel
-from explorer.app.panels.html import BEYOND, DIM, WITHIN, fitted, scientific, share
+from explorer.app.panels.html import BEYOND, CLOSE, DIM, WITHIN, fitted, scientific, share
 from explorer.app.panels.performance import PerformancePanel
 from explorer.app.panels.ranges import length_span
 from explorer.app.panels.strata import StrataPanel
 from explorer.app.session import Session
 from explorer.app.state import Frame
 from explorer.app.strata_feed import StrataFeed
-from explorer.bruhat import incidences
-from explorer.singularity import INCIDENCES, mode_name
+from explorer.singularity import INCIDENCES, mode_name, mode_words
 from explorer.snapshot import Snapshot
 from explorer.strata import GENERIC
+from explorer.verdict import DISTANCE_SHARE
+
+VERDICT_HINT = (
+    "How far b1 to b4 go to the nearest singular pose, as a root mean square, position and "
+    "orientation being free"
+)
 
 
 class SingularityPanel:
@@ -34,7 +39,8 @@ class SingularityPanel:
         self._numbers = gui.add_html("")
         self._controls.number(
             "Warn below",
-            "Margins below this length are drawn orange, in design units.",
+            "Margins below this length are drawn orange, and singular poses nearer than a third "
+            "of it; in design units.",
             lambda frame: frame.state.warn_below,
             lambda state, value: SetView(replace(state.view, warn_below=value)),
             least=0.0,
@@ -58,57 +64,63 @@ class SingularityPanel:
 
 def summary(frame: Frame) -> str:
     """Return the panel's contents as HTML."""
-    snapshot, warn = frame.snapshot, frame.state.warn_below
-    unit = snapshot.design.unit_mm
     return (
         '<div style="padding:4px 12px 2px;font-size:12.5px;line-height:1.45;'
         'font-variant-numeric:tabular-nums">'
-        f"{_status(frame)}{_legend(warn)}"
-        f"{''.join(_margin(snapshot, i, warn, unit) for i in range(3))}"
-        f"{_table(frame)}{_limits(snapshot)}</div>"
+        f"{_status(frame)}{_legend(frame.state.warn_below)}"
+        f"{''.join(_margin(frame, index) for index in range(3))}"
+        f"{_table(frame)}{_limits(frame.snapshot)}</div>"
     )
 
 
 def _status(frame: Frame) -> str:
-    snapshot = frame.snapshot
-    near = snapshot.proximity * snapshot.design.reach < frame.state.warn_below
-    word, colour = ("Near a singularity", BEYOND) if near else ("Clear of singularities", WITHIN)
-    which = ""
-    if snapshot.stratum != GENERIC:
-        word, colour = "Singular", BEYOND
-        which = "; ".join(
-            f"κ{index} = 0: {INCIDENCES[index - 1]}" for index in incidences(snapshot.stratum)
-        )
-    note = f'<div style="color:{colour};margin-bottom:6px">{escape(which)}</div>' if which else ""
+    found, design = frame.verdict, frame.state.design
+    colour = {"clear": WITHIN, "near": CLOSE, "singular": BEYOND}[found.kind]
+    millimetres = f"{scientific(found.distance * design.unit_mm, 3)} mm"
+    note = DIM if found.kind == "clear" else f"color:{colour}"
     return (
-        f'<div style="font-size:15px;font-weight:600;color:{colour};'
-        f'margin-bottom:{2 if which else 6}px">{word}</div>{note}'
+        f'<div style="font-size:15px;font-weight:600;color:{colour};margin-bottom:2px">'
+        f'{found.title}</div><div style="{note};min-height:36px;margin-bottom:6px" '
+        f'title="{escape(VERDICT_HINT)}">'
+        f"{escape(found.reason(millimetres))}</div>"
     )
 
 
 def _legend(warn: float) -> str:
     share = 100.0 / FAR_WARNINGS
     stops = f"{css(SINGULAR)} 0%,{css(WARNED)} {share:g}%,{css(CLEAR)} {share:g}%,{css(FAR)} 100%"
+    return (
+        f'<div style="{DIM};margin-bottom:3px">Margin |κ| or distance, the worse (units)</div>'
+        f'<div style="height:11px;border-radius:2px;background:linear-gradient(90deg,{stops})">'
+        f"</div>{_ticks('|κ|', warn)}{_ticks('distance', DISTANCE_SHARE * warn)}"
+    )
+
+
+def _ticks(name: str, warn: float) -> str:
+    """Return what stands below the legend for one of the two measures."""
     ticks = "".join(
         f'<span style="position:absolute;left:{left:g}%;transform:translateX({shift});'
         f'white-space:nowrap">{text}</span>'
         for left, shift, text in (
             (0.0, "0", "0"),
-            (share, "-50%", f"{warn:.3g}"),
+            (100.0 / FAR_WARNINGS, "-50%", f"{warn:.3g}"),
+            (60.0, "-50%", name),
             (100.0, "-100%", f"≥ {FAR_WARNINGS * warn:.3g}"),
         )
     )
-    return (
-        f'<div style="{DIM};margin-bottom:3px">Distance |κ| to singular (design units)</div>'
-        f'<div style="height:11px;border-radius:2px;background:linear-gradient(90deg,{stops})">'
-        f'</div><div style="position:relative;height:18px;font-size:11px;{DIM}">{ticks}</div>'
+    return f'<div style="position:relative;height:16px;font-size:11px;{DIM}">{ticks}</div>'
+
+
+def _margin(frame: Frame, index: int) -> str:
+    snapshot, level = frame.snapshot, frame.verdict.levels[index]
+    value, reach, unit_mm = (
+        float(snapshot.margins[index]),
+        snapshot.design.reach,
+        snapshot.design.unit_mm,
     )
-
-
-def _margin(snapshot: Snapshot, index: int, warn: float, unit_mm: float) -> str:
-    value, reach = float(snapshot.margins[index]), snapshot.design.reach
-    colour = css(proximity_colour(value, warn))
-    filled = min(100.0, 100.0 * abs(value) / (FAR_WARNINGS * warn))
+    colour = css(proximity_colour(level, 1.0))
+    filled = min(100.0, 100.0 * level / FAR_WARNINGS)
+    volume, size = float(snapshot.volumes[index]), float(snapshot.volume_sizes[index])
     return (
         '<div style="margin:7px 0 0"><div style="display:flex;align-items:baseline;gap:7px">'
         f'<span style="width:11px;height:11px;border-radius:2px;background:{colour};'
@@ -117,7 +129,7 @@ def _margin(snapshot: Snapshot, index: int, warn: float, unit_mm: float) -> str:
         f'<span style="{DIM};font-size:11.5px">{fitted(value * unit_mm, reach * unit_mm, 4)} mm'
         f'</span><span style="{DIM};margin-left:auto;font-size:11.5px" '
         'title="Volume of its tetrahedron, signed">'
-        f"V {scientific(float(snapshot.volumes[index]))} units³</span></div>"
+        f"V {scientific(volume, size=size)} units³</span></div>"
         '<div style="height:3px;border-radius:2px;margin:3px 0 2px;'
         'background:color-mix(in srgb,currentColor 12%,transparent)">'
         f'<div style="height:3px;border-radius:2px;width:{filled:.1f}%;background:{colour}">'
@@ -131,7 +143,7 @@ def _table(frame: Frame) -> str:
     rows = (
         (
             "det J",
-            f"{scientific(snapshot.determinant)} units³",
+            f"{scientific(snapshot.determinant, size=snapshot.determinant_size)} units³",
             "Determinant of the actuator Jacobian",
         ),
         (
@@ -140,11 +152,7 @@ def _table(frame: Frame) -> str:
             "Inverse condition number of J made homogeneous with the reach; 0 is singular",
         ),
         ("min |κ| / reach", share(snapshot.proximity), "Smallest margin over the reach |a3|"),
-        (
-            "Mode",
-            f"{mode_name(frame.state.mode)} &nbsp;({frame.state.mode})",
-            "Assembly mode: the signs of κ1, κ2, κ3",
-        ),
+        *_mode_rows(frame),
         (
             "Stratum",
             f"({', '.join(map(str, snapshot.stratum))})",
@@ -158,6 +166,18 @@ def _table(frame: Frame) -> str:
         for name, value, hint in rows
     )
     return f'<table style="width:100%;border-collapse:collapse;margin:12px 0 8px">{cells}</table>'
+
+
+def _mode_rows(frame: Frame) -> tuple[tuple[str, str, str], ...]:
+    snapshot, mode = frame.snapshot, frame.state.mode
+    hint = "Assembly mode: the signs of κ1, κ2, κ3"
+    if snapshot.stratum == GENERIC:
+        return (("Mode", f"{mode_name(mode)} &nbsp;({mode})", hint),)
+    between = "At a singular pose the modes meet whose signs differ where a margin is 0"
+    return (
+        ("Mode", snapshot.sign_words, hint),
+        ("", mode_words(snapshot.bordering_modes), between),
+    )
 
 
 def _limits(snapshot: Snapshot) -> str:

@@ -21,6 +21,7 @@ from explorer.app.strata_feed import StrataFeed
 from explorer.app.viser_gaps import element_id
 from explorer.bruhat import COVERED, OF_INCIDENCES, Stratum, codimension, incidences, words
 from explorer.strata import GENERIC, STRATA, inversions
+from explorer.verdict import DISTANCE_SHARE
 
 # In pixels: from row to row, and the size of a node.
 ROW, NODE_WIDTH, NODE_HEIGHT = 50, 36, 30
@@ -88,10 +89,17 @@ def diagram(frame: Frame, distances: Mapping[Stratum, float], ids: Mapping[Strat
         distances: As far as they are known, by stratum, in design units.
         ids: Of the buttons that the nodes push.
     """
-    here, warn = frame.snapshot.stratum, frame.state.warn_below
+    here = frame.snapshot.stratum
+    warn = DISTANCE_SHARE * frame.state.warn_below
+    levels = {w: distance / warn for w, distance in distances.items()}
+
+    def below(stratum: Stratum) -> str:
+        return _distance(distances.get(stratum), 3, frame)
+
+    # One incidence has one colour all over the page.
+    levels.update(zip(OF_INCIDENCES, frame.verdict.levels, strict=True))
     nodes = "".join(
-        _node(stratum, distances.get(stratum), warn, ids.get(stratum), is_here=stratum == here)
-        for stratum in STRATA
+        _node(w, below(w), levels.get(w), ids.get(w), is_here=w == here) for w in STRATA
     )
     ranks = "".join(
         f'<span style="position:absolute;left:0;top:{_top(d) + 8}px;font-size:10.5px;{DIM}" '
@@ -111,7 +119,7 @@ def diagram(frame: Frame, distances: Mapping[Stratum, float], ids: Mapping[Strat
 def neighbours(frame: Frame, distances: Mapping[Stratum, float]) -> str:
     """Return where the pose lies and where one more incidence leads, in words, as HTML."""
     here = frame.snapshot.stratum
-    rows = "".join(_neighbour(w, distances.get(w)) for w in COVERED[here])
+    rows = "".join(_neighbour(w, _distance(distances.get(w), 4, frame)) for w in COVERED[here])
     rest = (
         f'<div style="{DIM};margin:7px 0 3px;display:flex;'
         f'justify-content:space-between"><span>One incidence from here</span><span>units</span>'
@@ -136,8 +144,13 @@ def _sentence(stratum: Stratum) -> str:
     return f"{zero} = 0: {words(stratum)}"
 
 
-def _neighbour(stratum: Stratum, distance: float | None) -> str:
-    value = "…" if distance is None else scientific(distance, 4)
+def _distance(distance: float | None, digits: int, frame: Frame) -> str:
+    if distance is None:
+        return "…"
+    return scientific(distance, digits, size=frame.state.design.reach)
+
+
+def _neighbour(stratum: Stratum, value: str) -> str:
     return (
         '<div style="display:flex;justify-content:space-between;gap:8px;padding:2px 0">'
         f"<span>{escape(_sentence(stratum))}</span><span>{value}</span></div>"
@@ -145,19 +158,23 @@ def _neighbour(stratum: Stratum, distance: float | None) -> str:
 
 
 def _node(
-    stratum: Stratum, distance: float | None, warn: float, button: str | None, *, is_here: bool
+    stratum: Stratum,
+    below: str,
+    level: float | None,
+    button: str | None,
+    *,
+    is_here: bool,
 ) -> str:
     column, count = _place(stratum)
     left = 100.0 * (column + 0.5) / count
-    colour = "currentColor" if distance is None else css(proximity_colour(distance, warn))
-    below = "…" if distance is None else scientific(distance, 3)
+    colour = "currentColor" if level is None else css(proximity_colour(level, 1.0))
     look = "background:var(--mantine-color-body);"
     edge = f"border:1.5px solid color-mix(in srgb,{colour} 75%,transparent);"
     if is_here:
         below = "here"
         edge, look = f"border:1.5px solid {colour};", f"background:{colour};color:#fff;"
         if stratum == GENERIC:
-            colour = css(proximity_colour(float("inf"), warn))
+            colour = css(proximity_colour(float("inf"), 1.0))
             edge, look = f"border:1.5px solid {colour};", f"background:{colour};color:#fff;"
     elif stratum == GENERIC:
         below = "any"

@@ -11,6 +11,7 @@ import viser
 from explorer.app.actions import Action
 from explorer.app.assigning import Update
 from explorer.app.controls import Control
+from explorer.app.faults import Faults
 from explorer.app.panels.html import DIM, alert
 from explorer.app.panels.labels import labelled, out_of_sight
 from explorer.app.panels.study_plots import HINT, StudyPlots
@@ -48,6 +49,7 @@ class StudiesPanel:
         folders: Where studies lie.
         complain: Called with a message for people and the client it is for.
         resize: Makes the drawer taller in a browser, or as low as it was.
+        faults: Where requests are kept that failed unexpectedly; None to keep none.
     """
 
     def __init__(
@@ -58,6 +60,7 @@ class StudiesPanel:
         folders: StudyFolders,
         complain: Callable[[str, Who], None],
         resize: Resize,
+        faults: Faults | None = None,
     ) -> None:
         self._session = session
         self._complain = complain
@@ -86,7 +89,7 @@ class StudiesPanel:
         self.status = gui.add_html("")
         self.plots = StudyPlots(server, tab, session, self.pick)
         self.feed = StudyFeed(folders, session.redraw, lambda: self.plots.inbox_id)
-        self.runner = StudyRunner(session, self.feed, complain)
+        self.runner = StudyRunner(session, self.feed, complain, faults)
         self.legend = gui.add_html("")
         self.along = gui.add_button_group(
             "Along the front", tuple(ALONG), hint="Open a design of the front, beside the live one."

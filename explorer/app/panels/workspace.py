@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
@@ -13,15 +14,17 @@ from numpy.typing import NDArray
 from explorer.app.actions import Action, SetView, StartThere
 from explorer.app.assigning import Update
 from explorer.app.controls import Controls, Span
-from explorer.app.panels.html import DIM, alert
+from explorer.app.panels.html import DIM, alert, scientific
 from explorer.app.panels.ranges import coordinate_span, fine_step, round_up
+from explorer.app.panels.under_way import UnderWay
 from explorer.app.session import Session
+from explorer.app.slice_map import level_within
 from explorer.app.state import Frame, State
-from explorer.app.tasks import LIVE_TOLERANCE, WorkspaceDrawing
+from explorer.app.tasks import LIVE_TOLERANCE, STEP, WorkspaceDrawing
 from explorer.app.workspace_feed import WorkspaceFeed
 from explorer.pose import Pose
 
-FORMATS = ("3mf", "stl", "glb", "obj", "ply")
+FORMATS = ("3mf", "stl", "glb", "obj", "ply", STEP)
 REGIONS = {"within the limits": "limits", "reachable": "reachable"}
 STARTS = {"the home position": "home", "the present position": "pose"}
 COLOURINGS = {"one colour": "plain", "smallest margin": "margin", "1 / cond J": "condition"}
@@ -40,6 +43,8 @@ class WorkspacePanel:
         self._controls = controls = Controls(gui, session)
         self._session = session
         self._there: Pose | None = None
+        # Of the solid that is drawn, which the cut is laid through.
+        self._drawing: WorkspaceDrawing | None = None
         with gui.add_folder("Workspace of constant orientation"):
             controls.checkbox(
                 "Solid",
@@ -63,6 +68,7 @@ class WorkspacePanel:
                 lambda state, chosen: _changed(state, start=STARTS[chosen]),
                 disabled=lambda state: state.view.workspace.region == "limits",
             )
+            self._under_way = UnderWay(gui, "workspace")
             self._trouble = gui.add_html("", visible=False)
             self._go = gui.add_button(
                 "Go there",
@@ -103,14 +109,14 @@ class WorkspacePanel:
                 "Take away one side of the solid, to see inside.",
                 tuple(CUTS),
                 lambda frame: _key(CUTS, frame.state.view.workspace.cut),
-                lambda state, chosen: _changed(state, cut=CUTS[chosen]),
+                lambda state, chosen: self._cut(state, CUTS[chosen]),
             )
             controls.slider(
                 "at",
                 "Where the cutting plane stands, in design units.",
-                lambda frame: frame.state.view.workspace.level,
+                lambda frame: self._level(frame.state),
                 lambda state, value: _changed(state, level=value),
-                coordinate_span,
+                self._cut_span,
                 disabled=lambda state: state.view.workspace.cut is None,
             )
             self._caption = gui.add_html("", visible=False)
@@ -126,7 +132,8 @@ class WorkspacePanel:
             self._format = gui.add_dropdown(
                 "Format",
                 FORMATS,
-                hint="3MF carries unit, name and colour; STL is a bare mesh in millimetres.",
+                hint="3MF carries unit, name and colour; STL is a bare mesh in millimetres; STEP "
+                "has the exact faces of the workspace within the limits, and needs the extra cad.",
             )
             for what in ("workspace", "hull"):
                 self._add_export(gui, what, export)
@@ -138,19 +145,21 @@ class WorkspacePanel:
 
     def updates(self, frame: Frame, feed: WorkspaceFeed) -> Iterator[Update]:
         """Yield what makes the panel show the frame."""
+        drawing = self._drawing = feed.drawing
         yield from self._controls.updates(frame)
-        drawing = feed.drawing
+        yield from self._under_way.updates(feed)
         yield from self._show_trouble(drawing)
         slice_map = drawing.slice_map if drawing is not None else None
         for handle in (self._caption, self._map):
             yield handle, "visible", slice_map is not None
         if drawing is not None and slice_map is not None:
             across, up = slice_map.axes
-            text = (
-                f"{across} from {slice_map.lows[0]:.4g} to {slice_map.highs[0]:.4g}, "
-                f"{up} from {slice_map.lows[1]:.4g} to {slice_map.highs[1]:.4g} upwards"
+            reach = frame.state.design.reach
+            (left, low), (right, high) = (
+                [scientific(float(end), size=reach) for end in ends]
+                for ends in (slice_map.lows, slice_map.highs)
             )
-            text = text.replace("-", "−")
+            text = f"{across} from {left} to {right}, {up} from {low} to {high} upwards"
             if drawing.reached is not None:
                 text += "; pale red: within the limits and out of reach"
             yield (
@@ -159,6 +168,39 @@ class WorkspacePanel:
                 f'<div style="{DIM};font-size:12px;padding:2px 10px">{text}</div>',
             )
             yield self._map, "image", _enlarged(slice_map.pixels)
+
+    def _cut(self, state: State, axis: str | None) -> Action:
+        """Return what cuts the solid open: on another axis than before, through its middle."""
+        if axis is None or axis == state.view.workspace.cut:
+            return _changed(state, cut=axis)
+        ends = self._ends(axis)
+        if ends is None:
+            return _changed(state, cut=axis, level=None)
+        step = coordinate_span(state).step
+        middle = round(0.5 * sum(ends) / step) * step
+        return _changed(state, cut=axis, level=level_within(*ends, middle))
+
+    def _level(self, state: State) -> float:
+        """Return where the solid is cut; where it would be, if it is not."""
+        view = state.view.workspace
+        ends = None if view.cut is None else self._ends(view.cut)
+        return (view.level or 0.0) if ends is None else level_within(*ends, view.level)
+
+    def _cut_span(self, state: State) -> Span:
+        """Return the extent of the solid on the axis across which it is cut."""
+        span, axis = coordinate_span(state), state.view.workspace.cut
+        ends = None if axis is None else self._ends(axis)
+        if ends is None:
+            return span
+        low, high = math.ceil(ends[0] / span.step), math.floor(ends[1] / span.step)
+        return Span(low * span.step, high * span.step, span.step) if low < high else span
+
+    def _ends(self, axis: str) -> tuple[float, float] | None:
+        """Return the extent of the solid that is drawn on an axis, None if there is none."""
+        if self._drawing is None or self._drawing.extent is None:
+            return None
+        low, high = (float(end["xyz".index(axis)]) for end in self._drawing.extent)
+        return low, high
 
     def _show_trouble(self, drawing: WorkspaceDrawing | None) -> Iterator[Update]:
         """Yield why nothing can be reached, and where it could be started from."""
@@ -180,7 +222,7 @@ class WorkspacePanel:
 
     def _add_export(self, gui: viser.GuiApi, what: str, export: Export) -> None:
         button = gui.add_button(
-            f"Export {what}", icon=viser.Icon.DOWNLOAD, hint=f"Download the {what} as a mesh."
+            f"Export {what}", icon=viser.Icon.DOWNLOAD, hint=f"Download the {what} as a file."
         )
 
         @button.on_click

@@ -12,6 +12,7 @@ from explorer.app.assigning import Update
 from explorer.app.bands import COLLIDING, PLAIN, WARN_CONDITION
 from explorer.app.colours import css
 from explorer.app.panels.html import BEYOND, DIM, WITHIN, alert, scientific
+from explorer.app.panels.under_way import problem, progress
 from explorer.app.state import Frame
 from explorer.app.tasks import Reached, WorkspaceDrawing
 from explorer.app.workspace_feed import WorkspaceFeed
@@ -36,35 +37,47 @@ def workspace_summary(frame: Frame, feed: WorkspaceFeed) -> str:
     """Return the numbers of the workspace as HTML."""
     view = frame.state.view.workspace
     if feed.problem is not None:
-        return alert("The workspace could not be drawn", feed.problem)
+        return problem(feed, "The workspace could not be drawn", "Compute the workspace")
     if not (view.solid or view.hull):
         return _note("Show the solid in the tab Workspace to measure it.")
     drawing = feed.drawing
     if drawing is None:
-        return _note("Computing …")
+        return _note(progress(feed).capitalize())
     # What is within the limits is there at once.
     waits = view.region == "reachable" and not feed.is_current
-    parts = [_headline(drawing, frame.state.design.unit_mm, waits=waits), _numbers(drawing)]
+    note = progress(feed) if waits else ""
+    parts = [_headline(drawing, frame.state.design.unit_mm, note), _numbers(drawing)]
     if drawing.reached is not None and drawing.volume > 0.0:
         parts.append(_pairs(drawing.reached, coloured=view.colour == "plain"))
     if view.colour != "plain":
         parts.append(_legend(view.colour, frame.state.warn_below))
+    if drawing.coarse_edge is not None:
+        parts.append(
+            f'<div style="{DIM};margin-top:4px">The workspace is large beside the reach: colours '
+            f"are computed at corners up to {drawing.coarse_edge:.3g} units apart.</div>"
+        )
     return (
         '<div style="padding:4px 12px 8px;font-size:12.5px;line-height:1.45;'
         f'font-variant-numeric:tabular-nums">{"".join(parts)}</div>'
     )
 
 
-def _headline(drawing: WorkspaceDrawing, unit_mm: float, *, waits: bool) -> str:
+def _headline(drawing: WorkspaceDrawing, unit_mm: float, waits: str) -> str:
     if drawing.volume <= 0.0:
         causes = ", ".join(drawing.empty_because)
         return alert("The workspace is empty", f"Emptied by: {causes}.")
     reached = drawing.reached
+    disagrees = ""
+    if drawing.mesh_agrees is False:
+        disagrees = alert(
+            "The solid is not quite the workspace",
+            "The workspace is too thin for its triangles: their volume is not the exact one.",
+        )
     volume = drawing.volume if reached is None else reached.volume
     litres = volume * (unit_mm / 100.0) ** 3
     word = "exact volume" if reached is None else "can be reached"
-    note = f'<span style="{DIM};font-size:11.5px">computing …</span>' if waits else ""
-    text = (
+    note = f'<span style="{DIM};font-size:11.5px">{waits}</span>' if waits else ""
+    text = disagrees + (
         '<div style="display:flex;align-items:baseline;justify-content:space-between">'
         f'<span style="font-size:15px;font-weight:600">{volume:.6g} units³</span>{note}</div>'
         f'<div style="{DIM};margin-bottom:6px">{word}, {litres:.4g} litres</div>'
@@ -95,7 +108,7 @@ def _share(reached: float, volume: float) -> str:
 def _numbers(drawing: WorkspaceDrawing) -> str:
     rows: list[tuple[str, str, str]] = []
     nodes, reached = drawing.nodes, drawing.reached
-    if nodes is not None and reached is not None:
+    if nodes is not None and reached is not None and reached.node_count is not None:
         there = f"{reached.node_count:,} of {nodes.count:,}"
         least = f"{reached.node_count * nodes.step**3:.6g}"
         rows += [
@@ -104,14 +117,18 @@ def _numbers(drawing: WorkspaceDrawing) -> str:
             ("Node step", f"{nodes.step:.4g}", "Of the grid, in design units"),
         ]
     elif nodes is not None:
+        hint = "The paper's measure: grid nodes within the limits"
+        if reached is not None:
+            hint += "; too many to look at each step between them"
         rows += [
-            ("Nodes", f"{nodes.count:,}", "The paper's measure: grid nodes within the limits"),
+            ("Nodes", f"{nodes.count:,}", hint),
             ("Node volume", f"{nodes.volume:.6g}", "Nodes times step³; it overstates the volume"),
             ("Node step", f"{nodes.step:.4g}", "Of the grid, in design units"),
         ]
     if drawing.extent is not None:
         for axis, low, high in zip("xyz", *drawing.extent, strict=True):
-            text = f"{low:.4g} … {high:.4g}".replace("-", "−")
+            size = drawing.request.design.reach
+            text = f"{scientific(low, size=size)} … {scientific(high, size=size)}"
             rows.append((f"Extent {axis}", text, "Of the solid, in design units"))
     volume = drawing.volume if reached is None else reached.volume
     if volume > 0.0:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, get_args
@@ -15,6 +16,7 @@ from explorer.app.scene.legs import guide_span
 from explorer.app.scene.marks import ghost_points, handle_tips
 from explorer.app.scene.placing import Placed
 from explorer.app.scene.prototype import part_corners
+from explorer.app.viser_gaps import put_camera
 from explorer.arrays import FloatArray
 
 ViewName = Literal["isometric", "front", "side", "top"]
@@ -112,17 +114,29 @@ class Cameras:
     """The cameras of all open browsers.
 
     A browser tells its size before its panels are laid out, and people resize windows. A
-    camera that still stands where it was put is therefore put again when the size changes.
+    camera that still stands where it was put is therefore put again when the size changes,
+    and so is one that a browser, while it loads, moved back to where it began. Where a camera
+    stands is only ever what its browser told: what was sent to a browser may not have come
+    to anything.
 
     Args:
         first: Where the camera of a new browser begins; put to show what there is now.
         placed: Gives what to frame at the time.
+        put: Sends a browser the eye and the target of its camera, and makes it tell of them.
     """
 
-    def __init__(self, first: viser.InitialCameraConfig, placed: Callable[[], Placed]) -> None:
+    def __init__(
+        self,
+        first: viser.InitialCameraConfig,
+        placed: Callable[[], Placed],
+        put: Callable[[viser.ClientHandle, FloatArray, FloatArray], None] | None = None,
+    ) -> None:
         self._first = first
         self._placed = placed
+        self._send = _put_with_this_lens if put is None else put
         self._aimed: dict[int, _Aimed] = {}
+        # Browsers tell of several sizes at once while they load: the last one counts.
+        self._lock = threading.RLock()
         first.position, first.look_at = framing(placed(), "isometric", FIRST_ASPECT)
 
     def point(self, client: viser.ClientHandle, view: ViewName) -> None:
@@ -138,22 +152,24 @@ class Cameras:
 
     def connected(self, client: viser.ClientHandle) -> None:
         """Point a new browser's camera and keep it framed while nobody moves it."""
-        client.camera.on_update(lambda _: self._resized(client))
         self.point(client, "isometric")
+        client.camera.on_update(lambda _: self._told(client))
 
     def disconnected(self, client: viser.ClientHandle) -> None:
         """Forget a browser."""
-        self._aimed.pop(client.client_id, None)
+        with self._lock:
+            self._aimed.pop(client.client_id, None)
 
     def look_again(self, client: viser.ClientHandle) -> None:
         """Put a browser's camera where it was put last, unless somebody moved it."""
-        aimed = self._aimed.get(client.client_id)
-        if aimed is None or not aimed.has(client):
-            return
-        if client.camera.aspect == aimed.aspect:
-            _tell(client, aimed.eyes[-1], aimed.target)
-        else:
-            self._put(client, aimed.view)
+        with self._lock:
+            aimed = self._aimed.get(client.client_id)
+            if aimed is None or not aimed.has(client):
+                return
+            if client.camera.aspect == aimed.aspect:
+                self._send(client, aimed.eyes[-1], aimed.target)
+            else:
+                self._put(client, aimed.view)
 
     def stands(self, client: viser.ClientHandle) -> bool:
         """Whether a browser's camera is where it was put last, or where somebody moved it.
@@ -165,27 +181,29 @@ class Cameras:
             return True
         return aimed.is_at(client, aimed.eyes[-1]) or not aimed.has(client)
 
-    def _resized(self, client: viser.ClientHandle) -> None:
-        aimed = self._aimed.get(client.client_id)
-        if aimed is not None and client.camera.aspect != aimed.aspect and aimed.has(client):
-            self._put(client, aimed.view)
+    def _told(self, client: viser.ClientHandle) -> None:
+        """Follow what a browser tells of its camera."""
+        with self._lock:
+            aimed = self._aimed.get(client.client_id)
+            if aimed is None:
+                return
+            has_new_shape = client.camera.aspect != aimed.aspect
+            if has_new_shape or not aimed.is_at(client, aimed.eyes[-1]):
+                self.look_again(client)
 
     def _put(self, client: viser.ClientHandle, view: ViewName | FloatArray) -> None:
-        given = client.camera.aspect
-        aspect = given if math.isfinite(given) and given > 0.0 else 1.0
-        eye, target = framing(self._placed(), view, aspect)
-        aimed = self._aimed.get(client.client_id)
-        if aimed is None:
-            first, before = (self._first.position, np.array(client.camera.position)), ()
-        else:
-            first, before = aimed.first, aimed.eyes[-REMEMBERED:]
-        self._aimed[client.client_id] = _Aimed(view, given, first, (*before, eye), target)
-        _tell(client, eye, target)
+        with self._lock:
+            given = client.camera.aspect
+            aspect = given if math.isfinite(given) and given > 0.0 else 1.0
+            eye, target = framing(self._placed(), view, aspect)
+            aimed = self._aimed.get(client.client_id)
+            if aimed is None:
+                first, before = (self._first.position, np.array(client.camera.position)), ()
+            else:
+                first, before = aimed.first, aimed.eyes[-REMEMBERED:]
+            self._aimed[client.client_id] = _Aimed(view, given, first, (*before, eye), target)
+            self._send(client, eye, target)
 
 
-def _tell(client: viser.ClientHandle, eye: FloatArray, target: FloatArray) -> None:
-    with client.atomic():
-        client.camera.fov = FIELD_OF_VIEW
-        client.camera.up_direction = (0.0, 0.0, 1.0)
-        client.camera.position = eye
-        client.camera.look_at = target
+def _put_with_this_lens(client: viser.ClientHandle, eye: FloatArray, target: FloatArray) -> None:
+    put_camera(client, eye, target, FIELD_OF_VIEW)

@@ -12,6 +12,7 @@ from explorer.app.colours import OUTLINE, TUBE
 from explorer.app.scene.placing import Placed
 from explorer.app.scene.shapes import Balls, Rods
 from explorer.clearance import PAIRS, leg_axes
+from explorer.number_text import scientific
 
 CAPSULE_OPACITY = 0.22
 
@@ -55,4 +56,5 @@ class ClearanceScene:
             first, second = PAIRS[pair]
             yield self._line, "points", ends[None].astype(np.float32)
             yield self._label, "position", tuple(ends.mean(axis=0).tolist())
-            yield self._label, "text", f"legs {first}–{second}: {found.clearance[pair]:.3g}"
+            clearance = scientific(float(found.clearance[pair]), 3)
+            yield self._label, "text", f"legs {first}–{second}: {clearance}"

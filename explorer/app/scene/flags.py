@@ -41,10 +41,8 @@ class Flag:
     def updates(self, placed: Placed, corners: FloatArray, size: float) -> Iterator[Update]:
         """Yield what draws it with a plane of four corners, the first two on its line."""
         state = placed.frame.state
-        margins = placed.frame.snapshot.margins
-        point, along, plane = (
-            proximity_colour(float(margins[k]), state.warn_below) for k in self._kappas
-        )
+        levels = placed.frame.verdict.levels
+        point, along, plane = (proximity_colour(levels[k], 1.0) for k in self._kappas)
         low, high = corners[:2, 0].tolist()
         for handle in (self._point, self._line):
             yield handle, "visible", state.view.flags

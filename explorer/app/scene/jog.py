@@ -88,8 +88,7 @@ class JogScene:
         for index in shown:
             motion = UNCOUPLED[index]
             drawn = drawn_motion(placed, motion, placed.frame.travels[index])
-            margin = float(placed.frame.snapshot.margins[motion.incidence - 1])
-            colour = proximity_colour(margin, placed.frame.state.warn_below)
+            colour = proximity_colour(placed.frame.verdict.levels[motion.incidence - 1], 1.0)
             segments = np.stack([drawn.points[:-1], drawn.points[1:]], axis=1)
             segments = np.concatenate([segments, drawn.spoke[None]])
             yield self._lines[index], "points", segments.astype(np.float32)

@@ -14,6 +14,7 @@ from explorer.app.scene.placing import Placed
 from explorer.app.scene.shapes import sphere
 from explorer.arrays import FloatArray, IntArray
 from explorer.nearest_singular import NearestSingularity
+from explorer.number_text import scientific
 from explorer.pose import quaternion_from_rotation
 from explorer.strata import GENERIC
 
@@ -78,7 +79,8 @@ class NearestGhost:
         bases[3] = placed.points["a3"]
         yield self._legs, "points", np.stack([bases, tips], axis=1).astype(np.float32)
         yield self._ways, "points", np.stack([here, tips], axis=1).astype(np.float32)
-        yield self._label, "text", f"κ{nearest.incidence} = 0: {nearest.distance:.4g} away"
+        away = scientific(nearest.distance, size=placed.frame.state.design.reach)
+        yield self._label, "text", f"κ{nearest.incidence} = 0: {away} away"
         yield self._label, "position", tuple(tips[0].tolist())
 
 
@@ -140,7 +142,7 @@ class EllipsoidScene:
             np.stack([centre - ways, centre + ways], axis=1).astype(np.float32),
         )
         longest = int(gain.argmax())
-        value = "∞" if np.isinf(gain[longest]) else f"{gain[longest]:.3g}"
+        value = "∞" if np.isinf(gain[longest]) else scientific(float(gain[longest]), 3)
         yield self._label, "text", f"{kind} ≤ {value} per unit"
         way = ways[longest] * (1.0 if ways[longest, 2] >= 0.0 else -1.0)
         yield self._label, "position", tuple((centre + way).tolist())
@@ -180,13 +182,14 @@ class BallScene:
             return
         ball = placed.frame.free_ball
         centre, touch = placed.points["b4"], placed.scale * ball.touches
-        colour = proximity_colour(ball.radius, placed.frame.state.warn_below)
+        colour = proximity_colour(placed.frame.verdict.levels[ball.incidence - 1], 1.0)
         yield self._ball, "position", tuple(centre.tolist())
         yield self._ball, "scale", placed.scale * ball.radius
         yield self._ball, "color", colour
         yield self._touch, "position", tuple(touch.tolist())
         yield self._line, "points", np.stack([centre, touch])[None].astype(np.float32)
-        yield self._label, "text", f"κ{ball.incidence} = 0: {ball.radius:.4g} away"
+        away = scientific(ball.radius, size=placed.frame.state.design.reach)
+        yield self._label, "text", f"κ{ball.incidence} = 0: {away} away"
         yield self._label, "position", tuple(touch.tolist())
 
 

@@ -20,7 +20,7 @@ OPACITY = 0.1
 
 
 class Tetrahedra:
-    """Each translucent in the colour of its margin; one that cannot close is outlined."""
+    """Each translucent in the colour of its incidence; one that cannot close is outlined."""
 
     def __init__(self, scene: viser.SceneApi) -> None:
         self._meshes = [
@@ -53,9 +53,9 @@ class Tetrahedra:
         state = placed.frame.state
         failing = state.unclosed.failing if state.unclosed else ()
         for index, names in enumerate(TETRAHEDRA):
-            margin = float(placed.frame.snapshot.margins[index])
+            level = placed.frame.verdict.levels[index]
             fails = index in failing
-            colour = OUTLINE if fails else proximity_colour(margin, state.warn_below)
+            colour = OUTLINE if fails else proximity_colour(level, 1.0)
             corners = np.array([placed.points[name] for name in names])
             mesh, edges = self._meshes[index], self._edges[index]
             shown = state.view.tetrahedra[index]

@@ -19,6 +19,7 @@ from explorer.app.workspace_feed import WorkspaceFeed, workspace_rotation
 from explorer.arrays import FloatArray
 from explorer.colours import band_colours
 from explorer.constraints import Cone, HalfSpace, Never, Round, constraints
+from explorer.number_text import scientific
 
 ArrayPair: TypeAlias = tuple[NDArray[np.float32], NDArray[np.uint32]]
 
@@ -121,14 +122,14 @@ class WorkspaceScene:
                 if isinstance(limit, Never | Cone):
                     continue
                 slack = float(limit.slack(p))
-                if slack < 0.0 and (worst is None or slack < worst[0]):
+                if slack < -frame.state.design.tolerance and (worst is None or slack < worst[0]):
                     worst = slack, limit.name, _nearest(limit, p)
         for handle in (self._broken, self._broken_label):
             yield handle, "visible", worst is not None
         if worst is not None:
             ends = placed.scale * np.array([frame.state.pose.position, worst[2]])
             yield self._broken, "points", ends[None].astype(np.float32)
-            yield self._broken_label, "text", f"{worst[1]}: {-worst[0]:.3g} beyond"
+            yield self._broken_label, "text", f"{worst[1]}: {scientific(-worst[0], 3)} beyond"
             yield self._broken_label, "position", tuple(ends[1].tolist())
 
 
@@ -150,7 +151,7 @@ class _SingularPlane:
         yield self._label, "visible", normal is not None
         if normal is None:
             return
-        colour = proximity_colour(float(snapshot.margins[self._index]), state.warn_below)
+        colour = proximity_colour(placed.frame.verdict.levels[self._index], 1.0)
         along = np.cross(normal, [0.0, 1.0, 0.0])
         if np.linalg.norm(along) < 0.1:
             along = np.array([1.0, 0.0, 0.0])

@@ -111,7 +111,7 @@ def find(design: Design, pose: Pose | None = None, record: Record | None = None)
     volume = workspace_volume(design, r)
     solid = Missing("the workspace is empty")
     if volume.volume > 0.0:
-        solid = _attempt(lambda: workspace_solid(design, r))
+        solid = _attempt(lambda: workspace_solid(design, r, volume=volume))
     thick = any(design.limits.leg_radii)
     return Findings(
         snapshot=evaluate(design, at),

@@ -19,6 +19,7 @@ from explorer.export.report.labels import labels
 from explorer.export.report.markup import coordinate, element, text, written
 from explorer.export.report.projection import Projection, ViewName, fitted
 from explorer.snapshot import Snapshot
+from explorer.verdict import verdict
 
 WIDTH = 720.0
 # Of a leg, how much of it is cylinder.
@@ -110,10 +111,8 @@ def mechanism(
     """Yield what draws a mechanism; with labels within a box, or without any if None."""
     points = snapshot.points
     legs = leg_axes(snapshot.design, snapshot.pose.position, snapshot.rotation)
-    tints = [
-        css(proximity_colour(float(margin), WARN_SHARE * snapshot.design.reach))
-        for margin in snapshot.margins
-    ]
+    found = verdict(snapshot, WARN_SHARE * snapshot.design.reach)
+    tints = [css(proximity_colour(level, 1.0)) for level in found.levels]
     low, high = _guide(snapshot)
     yield _area(view, [low, high, points.a3], tints[2])
     yield _line(view, low, high, "rail")

@@ -50,8 +50,8 @@ def mechanism_section(found: Findings) -> Iterator[Element]:
         sheet(found.snapshot),
         f"The mechanism in {pose_words(found)}, in three views at one scale (third angle). "
         "Colours tell how near each element of the two flags is to its incidence: "
-        f"blue is clear of it, orange below the warning length of {100.0 * WARN_SHARE:g} % "
-        "of the reach.",
+        f"orange where its margin is below the warning length of {100.0 * WARN_SHARE:g} % of the "
+        "reach, or the nearest singular pose is nearer than a third of it; blue beyond.",
     )
     yield element("div", _variables(found), _pose(found), class_="pair")
     yield _joints(found)
@@ -130,6 +130,8 @@ def _limits(found: Findings) -> Element:
     else:
         rows.append(("box of b4", "none", "none"))
     rows.append(("gap |d1 − d3|, at least", limits.gap, limits.gap * unit))
+    order = {"home": "as at home", "any": "no demand"}[limits.carriage_order]
+    rows.append(("order of the carriages", order, ""))
     if limits.margin is None:
         rows.append(("margins", "no demand", ""))
     elif limits.margin == 0.0:

@@ -5,23 +5,38 @@ from __future__ import annotations
 from collections.abc import Iterator
 from xml.etree.ElementTree import Element
 
-from explorer.bruhat import incidences, words
+from explorer.bruhat import words
+from explorer.colours import WARN_SHARE
 from explorer.export.report.findings import Findings
-from explorer.export.report.markup import Cell, count, element, figure, paragraph, table, written
+from explorer.export.report.markup import (
+    Cell,
+    Piece,
+    count,
+    element,
+    figure,
+    paragraph,
+    table,
+    written,
+)
 from explorer.export.report.mechanism_section import pose_words
 from explorer.performance import Ellipsoid
 from explorer.pose import yaw_pitch_roll_from_rotation
-from explorer.singularity import INCIDENCES, TETRAHEDRA, mode_name
+from explorer.singularity import INCIDENCES, TETRAHEDRA, mode_words
+from explorer.verdict import verdict
 
 
 def singularity_section(found: Findings) -> Iterator[Element]:
     """Yield the section on singularities."""
     snapshot, unit = found.snapshot, found.design.unit_mm
     yield element("h2", "Singularities")
-    vanishing = incidences(snapshot.stratum)
-    if vanishing:
-        names = " and ".join(INCIDENCES[index - 1] for index in vanishing)
+    here = verdict(snapshot, WARN_SHARE * found.design.reach)
+    if here.kind == "singular":
+        names = " and ".join(INCIDENCES[index - 1] for index in here.incidences)
         yield paragraph(f"The pose is singular: {names}.", class_="note")
+    else:
+        away = f"{written(here.distance * unit, 3)} mm"
+        note = None if here.kind == "clear" else "note"
+        yield paragraph(f"{here.title}: {here.reason(away)}.", class_=note)
     yield paragraph(
         "The mechanism is singular exactly where one of three margins is zero; each is the height "
         "of a tetrahedron. The signs of the three name the assembly mode."
@@ -52,7 +67,7 @@ def singularity_section(found: Findings) -> Iterator[Element]:
                 "0 singular, 1 best",
             ),
             ("proximity: smallest |κ| over the reach", snapshot.proximity, ""),
-            ("assembly mode", count(snapshot.mode), mode_name(snapshot.mode)),
+            ("assembly mode", _mode_figure(snapshot.bordering_modes), snapshot.sign_words),
             (
                 "stratum of the two flags",
                 " ".join(map(str, snapshot.stratum)),
@@ -84,6 +99,10 @@ def singularity_section(found: Findings) -> Iterator[Element]:
         "direction: where the platform is fast, it is weak.",
         class_="dim",
     )
+
+
+def _mode_figure(modes: tuple[int, ...]) -> Piece:
+    return count(modes[0]) if len(modes) == 1 else mode_words(modes)
 
 
 def _nearest(found: Findings) -> Element:

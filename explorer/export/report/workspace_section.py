@@ -107,7 +107,7 @@ def _volumes(found: Findings) -> Element:
     def add(name: str, volume: float, *remark: Cell) -> None:
         rows.append((name, volume, volume * centimetres, *(remark or ("",))))
 
-    exact = "exact" if found.volume.error <= 1e-9 * found.volume.volume else "to four digits"
+    exact = "exact" if found.volume.error <= 1e-6 * found.volume.volume else "to four digits"
     add("exact volume", found.volume.volume, exact)
     if isinstance(found.nodes, Missing):
         rows.append(("node volume", "–", "–", found.nodes.reason))
@@ -121,17 +121,11 @@ def _volumes(found: Findings) -> Element:
         add("convex hull", found.hull_volume, "of the mesh")
     reachable = found.reachable
     if reachable is not None and not isinstance(reachable, Missing):
-        add(
-            "reachable",
-            reachable.reachable_volume,
-            (
-                "without a collision of legs; ",
-                count(reachable.reachable_node_count),
-                " of ",
-                count(reachable.node_count),
-                " nodes",
-            ),
-        )
+        remark = ("without a collision of legs",)
+        of, within = reachable.reachable_node_count, reachable.node_count
+        if of is not None and within is not None:
+            remark = (*remark, "; ", count(of), " of ", count(within), " nodes")
+        add("reachable", reachable.reachable_volume, remark)
     return table(("volume", "units³", "cm³", ""), rows, align="<>><", caption="Volumes")
 
 

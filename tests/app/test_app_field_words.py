@@ -1,0 +1,86 @@
+"""What the page refuses is told in its own words, and what a file holds in the file's."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import msgspec
+import pytest
+import viser
+from desk import Desk
+
+from explorer.app.field_words import FIELD_WORDS, message_of
+from explorer.app.panels.design import DesignPanel
+from explorer.app.panels.move import MovePanel
+from explorer.app.session import UNDO
+from explorer.design import Design, Limits, Swing
+from explorer.design_file import decode_design
+from explorer.errors import DesignError, InputError
+
+# What no text for people holds: names with an underscore or a point within, and JSON's.
+CODE = re.compile(r"[a-z]_[a-z]|[a-z]\.[a-z]|\bnull\b|\bNone\b")
+BAD = (-1.0, 0.0, 181.0, 1e9, 1e45)
+
+
+def test_refusals_of_the_page_hold_no_names_of_the_code(
+    server: viser.ViserServer, desk: Desk
+) -> None:
+    gui: Any = server.gui
+    before = set(gui._gui_input_handle_from_uuid)
+    DesignPanel(server.gui, desk.session)
+    MovePanel(server.gui, desk.session)
+    handles = [h for u, h in gui._gui_input_handle_from_uuid.items() if u not in before]
+    start, said = desk.state, list[str]()
+    for handle in handles:
+        if not isinstance(handle.value, float):
+            continue
+        for value in BAD:
+            desk.use(handle, value)
+            if desk.state != start:
+                desk.session.travel(UNDO)
+                start = desk.state
+        said += desk.complaints
+        desk.complaints.clear()
+    assert (
+        len({words for words in FIELD_WORDS.values() if any(words in each for each in said)}) > 20
+    )
+    assert [message for message in said if CODE.search(message)] == []
+
+
+@pytest.mark.parametrize(
+    ("field", "message"),
+    [
+        ('"unit_mm": 0', "The unit must be positive; got 0"),
+        ('"node_step": -1', "The step of the nodes must be positive; got -1"),
+        (
+            '"limits": {"l1": [3, 2]}',
+            "The length l1: the minimum 3 exceeds the maximum 2",
+        ),
+        ('"limits": {"swing": {"b2": 200}}', "The swing of the b2 ball is a half-angle of at most"),
+    ],
+)
+def test_refusal_of_a_file_names_its_field_and_the_page_says_it_in_words(
+    field: str, message: str
+) -> None:
+    data = f'{{"schema": 1, "a3": [9, 4], "b1": [4, -1], "b2": 3, "b3": 1.5, {field}}}'
+    name = field.strip('"').partition('"')[0]
+    with pytest.raises(DesignError, match=name):
+        decode_design(data.encode(), "mine.json")
+    with pytest.raises(DesignError) as refusal:
+        made(data)
+    assert message_of(refusal.value).startswith(message)
+
+
+def made(data: str) -> Design:
+    """Return the design of a file's fields, not read from a file."""
+    fields: dict[str, Any] = msgspec.json.decode(data)
+    limits = fields.pop("limits", {})
+    swing = Swing(**limits.pop("swing", {}))
+    fields["limits"] = Limits(**limits, swing=swing)
+    return Design(**fields)
+
+
+def test_messages_without_a_field_stay_as_they_are() -> None:
+    assert message_of(InputError("unit_mm")) == "unit_mm"
+    assert message_of(DesignError("degenerate design")) == "degenerate design"

@@ -1,0 +1,215 @@
+"""Drawings that take long: they tell their stages, can be cancelled, and are bounded."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import Any, cast
+
+import msgspec
+import pytest
+
+from explorer.app import workspace_feed
+from explorer.app.actions import SetLimits, SetVariable, SetView
+from explorer.app.jobs import Worker
+from explorer.app.panels.workspace_numbers import workspace_summary
+from explorer.app.reached import MOST_LIVE_NODES, Stage, reach_workspace
+from explorer.app.state import Frame, State, WorkspaceView, opened
+from explorer.app.tasks import RadiusRequest, WorkspaceRequest, draw_radius_curve, draw_workspace
+from explorer.app.worker import CancelledError, Line
+from explorer.app.workspace_feed import WorkspaceFeed
+from explorer.design import Design
+from explorer.design_file import PRESETS
+from explorer.home import home_pose
+from explorer.radii import with_radius
+from explorer.workspace import workspace_nodes
+
+PATIENCE = 300.0
+THICK = with_radius(PRESETS["paper-optimal"], 0.3)
+"""With these radii several pairs of legs collide within the limits."""
+
+
+def rows_of(design: Design) -> tuple[tuple[float, ...], ...]:
+    return tuple(tuple(row) for row in home_pose(design).rotation.tolist())
+
+
+def reachable_request(design: Design, **changes: Any) -> WorkspaceRequest:
+    request = WorkspaceRequest(
+        design=design,
+        rotation=rows_of(design),
+        region="reachable",
+        start=None,
+        colour="plain",
+        cut=None,
+        level=0.0,
+        tolerance=0.5,
+        hull=False,
+        warn_below=1.0,
+    )
+    return replace(request, **changes)
+
+
+class Watched:
+    """A line that keeps what is told, and cancels at a stage."""
+
+    def __init__(self, last: int | None = None) -> None:
+        self.stages: list[Stage] = []
+        self.line = Line(self.stages.append, lambda: len(self.stages) == last)
+
+
+def test_a_reachable_workspace_tells_each_pair_of_legs_that_it_carves() -> None:
+    watched = Watched()
+    drawing = draw_workspace(reachable_request(THICK, level=1.0), watched.line)
+    assert drawing.reached is not None
+    blocking = [pair.legs for pair in drawing.reached.pairs if pair.blocked_volume > 0.0]
+    assert len(blocking) > 1
+    words = " ".join(stage.words for stage in watched.stages)
+    assert all(f"legs {first}–{second}" in words for first, second in blocking)
+    shares = [stage.share for stage in watched.stages]
+    assert shares == sorted(set(shares))
+    assert shares[0] == 0.0
+    assert shares[-1] < 1.0
+
+
+@pytest.mark.parametrize("last", [0, 2, 3])
+def test_a_cancelled_drawing_ends_at_the_next_stage_and_keeps_nothing_of_it(last: int) -> None:
+    # A tolerance that no other test asks for, so that nothing is kept yet.
+    request = reachable_request(THICK, tolerance=0.51)
+    watched = Watched(last)
+    with pytest.raises(CancelledError):
+        draw_workspace(request, watched.line)
+    assert len(watched.stages) == last
+    curve = Watched(last)
+    with pytest.raises(CancelledError):
+        draw_radius_curve(RadiusRequest(THICK, rows_of(THICK), None), curve.line)
+    assert len(curve.stages) == last
+
+
+def test_a_grid_too_fine_to_look_at_each_step_leaves_the_rest_of_the_drawing() -> None:
+    design = msgspec.structs.replace(PRESETS["paper-optimal"], node_step=0.25)
+    assert workspace_nodes(design).count > MOST_LIVE_NODES
+    drawing = draw_workspace(reachable_request(design))
+    assert drawing.trouble is None
+    assert drawing.reached is not None
+    assert drawing.reached.node_count is None
+    same = draw_workspace(reachable_request(PRESETS["paper-optimal"])).reached
+    assert same is not None
+    assert same.node_count is not None
+    assert drawing.reached.volume == same.volume
+
+
+def test_only_the_newest_reachable_workspaces_are_kept() -> None:
+    asked: list[str] = []
+
+    def reach(tolerance: float) -> None:
+        reach_workspace(
+            THICK, rows_of(THICK), None, tolerance, lambda words, _: asked.append(words)
+        )
+
+    reach(0.52)
+    assert asked
+    asked.clear()
+    reach(0.52)
+    assert not asked
+
+
+class Answering:
+    """A worker whose answers are given by hand."""
+
+    def __init__(self) -> None:
+        self.done: list[Callable[[Any], None]] = []
+
+    def submit(self, *order: Any, **_: Any) -> int:
+        self.done.append(order[3])
+        return len(self.done)
+
+    def cancel(self, number: int, patience: float | None) -> None:
+        pass
+
+
+def test_a_stopped_drawing_leaves_none_of_an_older_design() -> None:
+    worker = Answering()
+    feed = WorkspaceFeed(cast("Worker", worker), lambda: None)
+    view = replace(opened(THICK).view, workspace=WorkspaceView(solid=True))
+    state = SetView(view).apply(opened(THICK))
+    feed.follow(Frame(state))
+    assert feed.asked is not None
+    drawing = draw_workspace(feed.asked)
+    worker.done[0](drawing)
+    assert feed.drawing is drawing
+    feed.follow(Frame(SetVariable("a3x", 18.0).apply(state)))
+    assert feed.drawing is drawing
+    feed.cancel()
+    assert feed.drawing is None
+    worker.done[0](drawing)
+    assert feed.drawing is None
+    feed.ask_again()
+    assert not feed.is_settled
+
+
+class Followed:
+    """A feed in a worker of its own, and a bell that rings when it is to be drawn again."""
+
+    def __init__(self, worker: Worker) -> None:
+        self.bell = threading.Semaphore(0)
+        self.feed = WorkspaceFeed(worker, self.bell.release)
+
+    def wait_for(self, what: Any) -> None:
+        while not what():
+            assert self.bell.acquire(timeout=PATIENCE)
+
+
+@pytest.fixture
+def worker() -> Iterator[Worker]:
+    made = Worker(lambda _: None)
+    yield made
+    made.stop()
+
+
+def reachable_state() -> State:
+    state = SetLimits(THICK.limits).apply(opened(PRESETS["paper-optimal"]))
+    workspace = replace(state.view.workspace, solid=True, region="reachable")
+    return SetView(replace(state.view, workspace=workspace)).apply(state)
+
+
+def test_a_drawing_shows_its_stage_and_can_be_cancelled_and_asked_for_again(
+    worker: Worker, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(workspace_feed, "LONG_SECONDS", 0.0)
+    frame, followed = Frame(reachable_state()), Followed(worker)
+    feed = followed.feed
+    feed.follow(frame)
+    followed.wait_for(lambda: feed.stage is not None)
+    assert "% done" in workspace_summary(frame, feed)
+    feed.cancel()
+    assert feed.is_cancelled
+    assert feed.is_settled
+    assert feed.stage is None
+    assert "Stopped" in workspace_summary(frame, feed)
+    # The same frame does not ask for it again by itself.
+    feed.follow(frame)
+    assert worker.wait_until_idle(PATIENCE)
+    assert feed.is_cancelled
+    assert feed.drawing is None
+    feed.ask_again()
+    followed.wait_for(lambda: feed.is_current)
+    assert not feed.is_cancelled
+    assert "units³" in workspace_summary(frame, feed)
+
+
+def test_what_is_shown_no_more_is_not_computed_to_its_end(
+    worker: Worker, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(workspace_feed, "LONG_SECONDS", 0.0)
+    state, followed = reachable_state(), Followed(worker)
+    feed = followed.feed
+    feed.follow(Frame(state))
+    followed.wait_for(lambda: feed.stage is not None)
+    workspace = replace(state.view.workspace, solid=False)
+    feed.follow(Frame(SetView(replace(state.view, workspace=workspace)).apply(state)))
+    assert worker.wait_until_idle(PATIENCE)
+    assert feed.problem is None
+    assert feed.drawing is None
+    feed.follow(Frame(state))
+    followed.wait_for(lambda: feed.is_current)

@@ -1,0 +1,78 @@
+"""The first minute on a machine that has never run the explorer: nothing is compiled yet."""
+
+from __future__ import annotations
+
+import re
+import statistics
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+
+from benchmarks.processes import EXPLORER, fresh_home, run_to_end, served
+from benchmarks.table import Row, seconds
+from benchmarks.timing import elapsed
+from explorer.app.chromium import find_chromium
+from explorer.app.screenshot import headless_browser
+
+RUNS = 5
+SEARCH = (
+    *("optimise", "--design", "paper-initial", "--target-volume", "8000"),
+    *("--box", "0", "-12", "0", "20", "22", "18", "--clearance", "0.2"),
+)
+COMPILE_ALL = """
+import explorer.app.server, explorer.optimise.solver, explorer.planning, explorer.reachable
+from explorer.compiled import warm
+warm()
+"""
+SIZE = (1440, 900)
+# Milliseconds that the page is waited for.
+PATIENCE = 180_000.0
+
+
+def run() -> Iterator[Row]:
+    """Yield a row of the command line, one of the page and one of all kernels."""
+    run_to_end(*EXPLORER, *SEARCH)
+    compiled = statistics.median(elapsed(lambda: run_to_end(*EXPLORER, *SEARCH)) for _ in range(3))
+    yield Row(
+        f"first `explorer optimise … --clearance 0.2`, median of {RUNS}",
+        _median(lambda home: elapsed(lambda: run_to_end(*EXPLORER, *SEARCH, environment=home))),
+        "10 s",
+        f"once all is compiled: {seconds(compiled)}",
+    )
+    title = f"first Optimise on the page, software renderer, {SIZE[0]} × {SIZE[1]}"
+    if find_chromium() is None:
+        yield Row(title, "not measured: no Chromium", "25 s")
+    else:
+        yield Row(f"{title}, from the press, median of {RUNS}", _median(_first_press), "25 s")
+    yield Row(
+        f"until all kernels are compiled, median of {RUNS}",
+        _median(
+            lambda home: elapsed(
+                lambda: run_to_end(sys.executable, "-c", COMPILE_ALL, environment=home)
+            )
+        ),
+    )
+
+
+def _median(measure: Callable[[Mapping[str, str]], float]) -> str:
+    times: list[float] = []
+    for _ in range(RUNS):
+        with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
+            times.append(measure(fresh_home(Path(folder))))
+    return f"{seconds(statistics.median(times))}, worst {seconds(max(times))}"
+
+
+def _first_press(home: Mapping[str, str]) -> float:
+    """Return the seconds from the first press of Optimise until its result is shown."""
+    with served(home) as address, headless_browser() as browser:
+        page = browser.new_page(viewport={"width": SIZE[0], "height": SIZE[1]})
+        page.set_default_timeout(PATIENCE)
+        page.goto(address)
+        page.get_by_role("tab", name="Optimise", exact=True).click()
+        button = page.get_by_role("button", name=re.compile("^Optimise$"))
+        button.click()
+        start = time.perf_counter()
+        page.get_by_text("Found", exact=True).wait_for()
+        return time.perf_counter() - start

@@ -1,0 +1,51 @@
+"""Controls of a real page as a screen reader knows them: each has a name, also those that come."""
+
+from __future__ import annotations
+
+from contextlib import closing
+from typing import Any
+
+from monkey import explorer_with_data
+from playwright.sync_api import Browser
+from tab import Tab
+
+from explorer.app.actions import SetUnit
+
+ROLES = {"slider", "spinbutton", "textbox", "searchbox", "combobox", "checkbox", "button", "tab"}
+SIZE = (1280, 720)
+
+
+def controls(tab: Tab) -> list[tuple[str, str]]:
+    """Return role and name of every control of the page."""
+    inspector: Any = tab.page.context.new_cdp_session(tab.page)
+    nodes: list[dict[str, Any]] = inspector.send("Accessibility.getFullAXTree")["nodes"]
+    inspector.detach()
+    return [
+        (node["role"]["value"], node.get("name", {}).get("value", "").strip())
+        for node in nodes
+        if not node.get("ignored") and node.get("role", {}).get("value") in ROLES
+    ]
+
+
+def test_every_control_has_a_name_in_every_tab(browser: Browser) -> None:
+    with explorer_with_data() as running, closing(Tab(browser, running, size=SIZE)) as tab:
+        tabs = tab.page.get_by_role("tab")
+        for index, name in enumerate(tabs.all_inner_texts()):
+            tabs.nth(index).click()
+            tab.wait_for(
+                lambda: all(named for _, named in controls(tab)), f"names of all controls in {name}"
+            )
+        tab.turn_to("Move")
+        tab.wait_for(lambda: ("slider", "l1 leg 1") in controls(tab), "the first slider")
+        assert len([1 for role, _ in controls(tab) if role == "slider"]) >= 10
+        for words in ("x", "yaw (°)"):
+            assert ("slider", words) in controls(tab)
+            assert ("textbox", words) in controls(tab)
+        # What comes later has one too.
+        tab.page.keyboard.press("k")
+        tab.page.get_by_role("dialog").wait_for()
+        running.page.session.do(SetUnit(0.0))
+        # As the page says it.
+        tab.page.get_by_text("The unit must be positive; got 0").wait_for()
+        tab.wait_for(lambda: all(named for _, named in controls(tab)), "names of what came")
+        assert tab.complaints() == []

@@ -1,0 +1,87 @@
+"""Presses in a real page: from press to release is one step of undo, however long a hand rests."""
+
+from __future__ import annotations
+
+from tab import TRACK, Tab
+
+from explorer.app.gestures import PAUSE_SECONDS
+from explorer.app.scene.marks import HANDLE_REACH
+from explorer.app.scene.placing import Placed
+from explorer.app.screenshot import settle
+from explorer.app.state import Frame
+
+REST = 1000 * (PAUSE_SECONDS + 0.3)
+
+
+def steps(tab: Tab) -> int:
+    assert tab.running.page.session.wait_until_idle()
+    return len(tab.running.page.session.history.steps) - 1
+
+
+def grab(tab: Tab, words: str) -> tuple[float, float, float]:
+    """Press the thumb of a slider; return its place, and how wide the slider is."""
+    thumb = tab.slider(words)
+    thumb.scroll_into_view_if_needed()
+    box, track = thumb.bounding_box(), tab.row(words).locator(TRACK).bounding_box()
+    assert box is not None
+    assert track is not None
+    x, y = box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"]
+    tab.page.mouse.move(x, y)
+    tab.page.mouse.down()
+    return x, y, track["width"]
+
+
+def move(tab: Tab, x: float, y: float) -> None:
+    """Move the pointer, and wait until the platform has followed."""
+    before = tab.state.pose
+    tab.page.mouse.move(x, y, steps=3)
+    tab.wait_for(lambda: tab.state.pose != before, "a move")
+
+
+def test_drag_of_a_slider_that_rests_is_one_step_and_the_next_drag_another(tab: Tab) -> None:
+    settle(tab.page, tab.client)
+    first = tab.state.pose
+    for drag in (1, 2):
+        x, y, width = grab(tab, "x")
+        for share in (0.02, 0.04, 0.06):
+            move(tab, x + share * width, y)
+            tab.page.wait_for_timeout(REST)
+        # The window may lose the focus while a hand holds.
+        tab.page.evaluate("dispatchEvent(new Event('blur'))")
+        tab.page.wait_for_timeout(REST)
+        move(tab, x + 0.08 * width, y)
+        tab.page.mouse.up()
+        assert steps(tab) == drag
+    tab.page.keyboard.press("ControlOrMeta+z")
+    tab.page.keyboard.press("ControlOrMeta+z")
+    tab.wait_for(lambda: tab.state.pose == first, "the pose of before")
+
+
+def test_drag_of_the_gizmo_that_rests_is_one_step(tab: Tab) -> None:
+    tab.look_from("isometric")
+    placed = Placed(Frame(tab.state))
+    arrow = tab.state.pose.rotation[:, 0]
+    tip = placed.points["b4"] + 0.7 * HANDLE_REACH * arrow
+    tab.page.mouse.move(*tab.on_screen(tip))
+    tab.page.mouse.down()
+    for share in (0.5, 1.0, 1.5):
+        move(tab, *tab.on_screen(tip + share * arrow))
+        tab.page.wait_for_timeout(REST)
+    tab.page.mouse.up()
+    assert steps(tab) == 1
+
+
+def test_release_that_was_lost_ends_with_the_next_move_of_the_pointer(tab: Tab) -> None:
+    settle(tab.page, tab.client)
+    x, y, width = grab(tab, "x")
+    move(tab, x + 0.05 * width, y)
+    # In another window the page hears of none.
+    tab.page.evaluate(
+        "addEventListener('pointerup', event => event.stopImmediatePropagation(), true)"
+    )
+    tab.page.mouse.up()
+    tab.page.mouse.move(x, y + 40, steps=2)
+    tab.page.wait_for_timeout(REST)
+    tab.slider("x").focus()
+    tab.page.keyboard.press("ArrowRight")
+    tab.wait_for(lambda: steps(tab) == 2, "a step of its own")
