@@ -20,9 +20,9 @@ from typing import Any
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from explorer.app.faults import read_fault
-from explorer.app.worker import Line
-from explorer.compiled import warm
+from explorer.app.session.faults import read_fault
+from explorer.app.session.worker import Line
+from explorer.numerics.compiled import warm
 
 
 def main() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
-from explorer.arrays import FloatArray
+from explorer.numerics.arrays import FloatArray
 
 
 def moved(position: FloatArray, rotation: FloatArray, twist: FloatArray) -> tuple[FloatArray, ...]:

@@ -16,7 +16,6 @@ import re
 import sys
 import time
 from collections import Counter
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -24,13 +23,17 @@ import numpy as np
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from explorer.app.actions import Open
-from explorer.app.drawable import check_drawable
-from explorer.app.gestures import ByHand
-from explorer.app.state import Frame, State, opened
-from explorer.compiled import warm
-from explorer.design_file import PRESETS, decode_design, encode_design
+
+from collections.abc import Callable
+
+from explorer.app.session.gestures import ByHand
+from explorer.app.state.actions import Open
+from explorer.app.state.drawable import check_drawable
+from explorer.app.state.frame import Frame
+from explorer.app.state.state import State, opened
 from explorer.errors import ExplorerError
+from explorer.mechanism.design_file import PRESETS, decode_design, encode_design
+from explorer.numerics.compiled import warm
 
 SEED = 4_4
 COUNT = 100_000

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from explorer.arrays import FloatArray
+from explorer.numerics.arrays import FloatArray
 
 
 def tetrahedron_volume(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> float:

@@ -12,9 +12,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from explorer import Design, Limits, Pose
-from explorer.arrays import FloatArray
-from explorer.design import LENGTHS, Swing
-from explorer.design_file import decode_design
+from explorer.mechanism.design import LENGTHS, Swing
+from explorer.mechanism.design_file import decode_design
+from explorer.numerics.arrays import FloatArray
 
 REFERENCE: dict[str, Any] = json.loads(
     (Path(__file__).parent / "data" / "workspace.json").read_text(encoding="utf-8")

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from explorer.arrays import BoolArray, FloatArray
-from explorer.solid import Solid
+from explorer.numerics.arrays import BoolArray, FloatArray
+from explorer.workspace.solids.solid import Solid
 
 
 def corners_of(solid: Solid) -> tuple[FloatArray, FloatArray, FloatArray]:

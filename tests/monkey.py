@@ -28,17 +28,17 @@ import viser
 from page_props import differences, shown_by
 from socket_tab import SocketTab
 
-from explorer.app.actions import Open
-from explorer.app.faults import Faults
-from explorer.app.jobs import RESTARTED
-from explorer.app.keeping import Keep
-from explorer.app.memory import given_back, keep_for_good, limit_arenas
 from explorer.app.page import REFUSAL
 from explorer.app.server import Running, start
+from explorer.app.session.faults import Faults
+from explorer.app.session.jobs import RESTARTED
+from explorer.app.session.memory import given_back, keep_for_good, limit_arenas
+from explorer.app.state.actions import Open
 from explorer.app.storage.autosave import Autosave
+from explorer.app.storage.keeping import Keep
 from explorer.app.storage.library import Library
-from explorer.compiled import warm
-from explorer.design_file import PRESETS, encode_design
+from explorer.mechanism.design_file import PRESETS, encode_design
+from explorer.numerics.compiled import warm
 
 # Where requests are kept that failed in a worker; `python tests/again.py` runs one again.
 FAULTS = Path(tempfile.gettempdir()) / "flagged-explorer-faults-of-the-monkey"

@@ -11,7 +11,7 @@ from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
 from explorer import Design
-from explorer.arrays import FloatArray
+from explorer.numerics.arrays import FloatArray
 
 
 def platform_points(design: Design) -> FloatArray:

@@ -18,31 +18,30 @@ import msgspec
 import numpy as np
 from playwright.sync_api import Browser, FloatRect
 
-from explorer.app.actions import Action, Open, SetJoint, SetLimits, SetVariable, SetView
-from explorer.app.compared import Look
-from explorer.app.comparing import Pin, SetLook
-from explorer.app.optimisation import Wish
-from explorer.app.optimising import SetWish, StartRun
-from explorer.app.prototype_view import PrototypeView
-from explorer.app.reporting import make_report
+from explorer.app.browser.headless import headless_browser
+from explorer.app.features.compare.actions import Pin, SetLook
+from explorer.app.features.optimise.actions import SetWish, StartRun
+from explorer.app.features.sharing.reporting import make_report
+from explorer.app.features.singularity.actions import Jog
+from explorer.app.features.studies.actions import BrushAxis, OpenStudy, PickDesign
+from explorer.app.features.studies.folders import StudyFolders
 from explorer.app.scene.camera import ViewName
-from explorer.app.screenshot import headless_browser, open_page, picture, settle, stable_picture
+from explorer.app.screenshot import open_page, picture, settle, stable_picture
 from explorer.app.server import Running, start
-from explorer.app.singular_actions import Jog
-from explorer.app.singular_view import SingularView
-from explorer.app.state import View, WorkspaceView
-from explorer.app.studies import Brush, within
-from explorer.app.study_actions import BrushAxis, OpenStudy, PickDesign
-from explorer.app.study_folders import StudyFolders
-from explorer.design import JOINTS
-from explorer.design_file import PRESETS
+from explorer.app.state.actions import Action, Open, SetJoint, SetLimits, SetVariable, SetView
+from explorer.app.state.compared import Look
+from explorer.app.state.optimisation import Wish
+from explorer.app.state.studies import Brush, within
+from explorer.app.state.view import PrototypeView, SingularView, View, WorkspaceView
+from explorer.mechanism.design import JOINTS
+from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.pose import Pose
 from explorer.optimise.findings import CLEARANCE, PAPER_VOLUME, paper_start
-from explorer.pose import Pose
-from explorer.radii import with_radius
 from explorer.sweep.results import load_results
 from explorer.sweep.run import run_study
 from explorer.sweep.study import STUDIES, Sampling
 from explorer.sweep.workers import LocalWorkers
+from explorer.workspace.accessible.radii import with_radius
 
 FOLDER = Path(__file__).resolve().parents[1] / "assets" / "pictures"
 DESIGN = PRESETS["paper-optimal"]

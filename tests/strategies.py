@@ -15,7 +15,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from explorer import Design, margins, rotation_from_quaternion
-from explorer.arrays import FloatArray
+from explorer.numerics.arrays import FloatArray
 
 EPSILON = 2.0**-52
 

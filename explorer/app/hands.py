@@ -12,23 +12,23 @@ from collections.abc import Callable, Iterator
 
 import viser
 
-from explorer.app.assigning import Update
-from explorer.app.browser_facts import BrowserFacts, ask
-from explorer.app.fields import SCRIPT as FIELDS
-from explorer.app.names import SCRIPT as NAMES
-from explorer.app.palette import Command, Palette
-from explorer.app.panels.keys import CLOSING, KeysCard, Toolbar
-from explorer.app.panels.tour import TourGuide
-from explorer.app.preferences import PreferenceFile
-from explorer.app.room import SCRIPT as ROOM
+from explorer.app.browser.browser_facts import BrowserFacts, ask
+from explorer.app.browser.fields import SCRIPT as FIELDS
+from explorer.app.browser.room import SCRIPT as ROOM
+from explorer.app.browser.viser_gaps import placed_for, run_script
+from explorer.app.features.designs.shelf import Shelf
+from explorer.app.features.help.keys_panel import CLOSING, KeysCard, Toolbar
+from explorer.app.features.help.tour_panel import TourGuide
+from explorer.app.features.history.commands import saved_commands, session_commands
 from explorer.app.scene.camera import Cameras
-from explorer.app.session import Session, Who
-from explorer.app.session_commands import saved_commands, session_commands
-from explorer.app.shelf import Shelf
-from explorer.app.state import Frame
+from explorer.app.session.session import Session, Who
+from explorer.app.state.frame import Frame
 from explorer.app.storage.library import Entry
-from explorer.app.theme import Theme
-from explorer.app.viser_gaps import placed_for, run_script
+from explorer.app.storage.preferences import PreferenceFile
+from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.names import SCRIPT as NAMES
+from explorer.app.widgets.palette import Command, Palette
+from explorer.app.widgets.theme import Theme
 from explorer.errors import StorageError
 
 # Until the panels of a new page are laid out.

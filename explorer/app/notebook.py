@@ -13,12 +13,12 @@ from html import escape
 from types import TracebackType
 from typing import Self
 
-from explorer.app.actions import Action, Open, SetPose
 from explorer.app.server import Running, start
-from explorer.design import Design
-from explorer.design_file import load_design
+from explorer.app.state.actions import Action, Open, SetPose
 from explorer.errors import InputError
-from explorer.pose import Pose
+from explorer.mechanism.design import Design
+from explorer.mechanism.design_file import load_design
+from explorer.mechanism.pose import Pose
 
 LEAST_HEIGHT = 100
 STYLE = "border:1px solid rgba(128,128,128,0.35);border-radius:4px"

@@ -12,46 +12,47 @@ from typing import get_args
 import numpy as np
 import viser
 
-from explorer.app.actions import SetPose
-from explorer.app.assigning import QUIET_SECONDS, Assigner, Update
-from explorer.app.compare_feed import CompareFeed
-from explorer.app.downloads import Downloads
+from explorer.app.browser.press_events import listen
+from explorer.app.drawing import Scene
+from explorer.app.features.compare.feed import CompareFeed
+from explorer.app.features.compare.panel import ComparePanel
+from explorer.app.features.designs.panel import DesignsPanel
+from explorer.app.features.designs.shelf import Shelf
+from explorer.app.features.history.panel import HistoryPanel
+from explorer.app.features.legs.panel import LegsPanel
+from explorer.app.features.mechanism.design_panel import DesignPanel
+from explorer.app.features.mechanism.pose_panel import MovePanel
+from explorer.app.features.mechanism.show_panel import ViewPanel
+from explorer.app.features.optimise.panel import OptimisePanel
+from explorer.app.features.optimise.runner import Optimiser
+from explorer.app.features.paths.panel import PathsPanel
+from explorer.app.features.paths.runner import PathRunner
+from explorer.app.features.prototype.feed import PartsFeed
+from explorer.app.features.prototype.panel import PrototypePanel
+from explorer.app.features.sharing.downloads import Downloads
+from explorer.app.features.sharing.panel import SharePanel
+from explorer.app.features.singularity.feed import StrataFeed
+from explorer.app.features.singularity.jog_panel import JogPanel
+from explorer.app.features.singularity.panel import SingularityPanel
+from explorer.app.features.studies.folders import StudyFolders
+from explorer.app.features.studies.panel import StudiesPanel
+from explorer.app.features.workspace.feed import RadiusFeed, WorkspaceFeed
+from explorer.app.features.workspace.numbers import WorkspaceNumbers
+from explorer.app.features.workspace.panel import WorkspacePanel
 from explorer.app.hands import Hands
-from explorer.app.history import History
-from explorer.app.jobs import Worker
-from explorer.app.keeping import Keep, Keeper
-from explorer.app.optimiser import Optimiser
-from explorer.app.panels.compare import ComparePanel
-from explorer.app.panels.design import DesignPanel
-from explorer.app.panels.designs import DesignsPanel
-from explorer.app.panels.history import HistoryPanel
-from explorer.app.panels.jog import JogPanel
-from explorer.app.panels.legs import LegsPanel
-from explorer.app.panels.move import MovePanel
-from explorer.app.panels.optimise import OptimisePanel
-from explorer.app.panels.paths import PathsPanel
-from explorer.app.panels.prototype import PrototypePanel
-from explorer.app.panels.share import SharePanel
-from explorer.app.panels.singularity import SingularityPanel
-from explorer.app.panels.studies import StudiesPanel
-from explorer.app.panels.view import ViewPanel
-from explorer.app.panels.workspace import WorkspacePanel
-from explorer.app.panels.workspace_numbers import WorkspaceNumbers
-from explorer.app.parts_feed import PartsFeed
-from explorer.app.path_runner import PathRunner
-from explorer.app.preferences import PreferenceFile
-from explorer.app.press_events import listen
-from explorer.app.presses import Presses
-from explorer.app.scene import Scene
 from explorer.app.scene.camera import Cameras, ViewName
 from explorer.app.scene.placing import Placed
-from explorer.app.session import REDO, UNDO, Session, Who
-from explorer.app.shelf import Shelf
-from explorer.app.state import Frame, State
-from explorer.app.strata_feed import StrataFeed
-from explorer.app.study_folders import StudyFolders
-from explorer.app.workspace_feed import RadiusFeed, WorkspaceFeed
-from explorer.design import Design
+from explorer.app.session.history import History
+from explorer.app.session.jobs import Worker
+from explorer.app.session.session import REDO, UNDO, Session, Who
+from explorer.app.state.actions import SetPose
+from explorer.app.state.frame import Frame
+from explorer.app.state.presses import Presses
+from explorer.app.state.state import State
+from explorer.app.storage.keeping import Keep, Keeper
+from explorer.app.storage.preferences import PreferenceFile
+from explorer.app.widgets.assigning import QUIET_SECONDS, Assigner, Update
+from explorer.mechanism.design import Design
 
 TITLE = "Flagged 4-4 explorer"
 # What a notice is called that answers something asked for.

@@ -6,37 +6,22 @@ no graphics card, and the README's can be made again by anyone.
 
 from __future__ import annotations
 
-import os
 import time
-from collections.abc import Callable, Generator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from explorer.app.chromium import find_chromium
+from explorer.app.browser.headless import PictureError, headless_browser
 from explorer.app.scene.camera import ViewName
 from explorer.app.server import Running, start
-from explorer.design import Design
-from explorer.errors import ExplorerError, MissingExtraError
-from explorer.files import write_whole
-from explorer.pose import Pose
+from explorer.files.writing import write_whole
+from explorer.mechanism.design import Design
+from explorer.mechanism.pose import Pose
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
     from viser import ClientHandle
 
-# The renderer that every Chromium brings along.
-SWIFTSHADER = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")
-CHROMIUM_FLAGS = (
-    "--no-sandbox",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--disable-quic",
-    "--no-first-run",
-    "--hide-scrollbars",
-    "--force-color-profile=srgb",
-)
 # A software renderer on a busy machine takes seconds for a large picture.
 PATIENCE_SECONDS = 60.0
 # Charts have canvases too; three.js marks its own.
@@ -48,10 +33,6 @@ SAME_SHAPE = 0.01
 SCENE_ALONE = (
     f"body *:not(:has({SCENE_CANVAS})):not({SCENE_CANVAS}) {{ visibility: hidden !important; }}"
 )
-
-
-class PictureError(ExplorerError):
-    """The browser did not start or did not draw in time."""
 
 
 def take(
@@ -124,51 +105,6 @@ def picture(
             page.close()
     finally:
         running.stop()
-
-
-@contextmanager
-def headless_browser(
-    graphics: Sequence[str] = SWIFTSHADER, environment: Mapping[str, str] | None = None
-) -> Generator[Browser]:
-    """Start a headless Chromium and close it in the end.
-
-    Args:
-        graphics: Its flags that choose what draws.
-        environment: Variables that it is to have beside those of this process.
-
-    Raises:
-        MissingExtraError: Playwright or a Chromium is missing.
-        PictureError: the browser did not start, or failed at what it was then told to do.
-    """
-    try:
-        from playwright.sync_api import Error, sync_playwright
-    except ImportError:
-        raise MissingExtraError(
-            'pictures need the extra "screenshot": pip install "flagged-explorer[screenshot]"'
-        ) from None
-    chromium = find_chromium()
-    if chromium is None:
-        raise MissingExtraError(
-            "pictures need a Chromium: install chromium or google-chrome with the system's "
-            "package manager, or run: playwright install chromium"
-        )
-    with sync_playwright() as playwright:
-        try:
-            browser = playwright.chromium.launch(
-                executable_path=chromium,
-                args=[*CHROMIUM_FLAGS, *graphics],
-                env={**os.environ, **(environment or {})},
-            )
-        except Error as error:
-            reason = str(error).splitlines()[0]
-            raise PictureError(f"the browser {chromium} did not start: {reason}") from None
-        try:
-            yield browser
-        except Error as error:
-            reason = str(error).splitlines()[0]
-            raise PictureError(f"the browser {chromium} failed: {reason}") from None
-        finally:
-            browser.close()
 
 
 def open_page(

@@ -14,28 +14,28 @@ from pathlib import Path
 
 import viser
 
-from explorer.app.access import EVERYWHERE, Access, is_loopback
-from explorer.app.drawable import check_drawable
-from explorer.app.guard import Guard
-from explorer.app.keeping import Keep, history_of, take_up
-from explorer.app.memory import given_back, keep_for_good, limit_arenas
-from explorer.app.page import TITLE, Page
-from explorer.app.preferences import PreferenceFile
-from explorer.app.state import opened
-from explorer.app.storage.folder import data_folder
-from explorer.app.study_folders import STUDIES_FOLDER, StudyFolders
-from explorer.app.viser_gaps import (
+from explorer.app.browser.viser_gaps import (
     ControlsOf,
     refuse_tunnels,
     start_viser,
     stop_viser,
     tell_uploads_to_their_senders,
 )
-from explorer.compiled import warm_in_background
-from explorer.design import Design
-from explorer.design_file import PRESETS
+from explorer.app.features.studies.folders import STUDIES_FOLDER, StudyFolders
+from explorer.app.page import TITLE, Page
+from explorer.app.security.access import EVERYWHERE, Access, is_loopback
+from explorer.app.security.guard import Guard
+from explorer.app.session.memory import given_back, keep_for_good, limit_arenas
+from explorer.app.state.drawable import check_drawable
+from explorer.app.state.state import opened
+from explorer.app.storage.folder import data_folder
+from explorer.app.storage.keeping import Keep, history_of, take_up
+from explorer.app.storage.preferences import PreferenceFile
 from explorer.errors import ExplorerError, ServerError
-from explorer.pose import Pose
+from explorer.mechanism.design import Design
+from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.pose import Pose
+from explorer.numerics.compiled import warm_in_background
 
 # Opens where there is no session to go on with.
 FIRST_DESIGN = "paper-optimal"

@@ -6,11 +6,11 @@ import math
 from typing import TYPE_CHECKING
 
 from explorer.cli.output import figure, mesh_json, table
-from explorer.design import Design
+from explorer.mechanism.design import Design
 
 if TYPE_CHECKING:
-    from explorer.radii import RadiusCurve
-    from explorer.reachable import ReachableWorkspace
+    from explorer.workspace.accessible.radii import RadiusCurve
+    from explorer.workspace.accessible.workspace import ReachableWorkspace
 
 # Of the radius curve in a table.
 ROWS = 10

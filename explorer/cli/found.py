@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 
 from explorer.cli.output import figure, table
-from explorer.design import VARIABLES, Design
-from explorer.design_file import encode_design
+from explorer.mechanism.design import VARIABLES, Design
+from explorer.mechanism.design_file import encode_design
 
 if TYPE_CHECKING:
     from explorer.optimise.facts import Facts

@@ -11,11 +11,11 @@ import msgspec
 import tyro
 
 from explorer.cli.values import numbers
-from explorer.design import Design
-from explorer.design_file import load_design
 from explorer.errors import DesignError, ExplorerError, InputError
-from explorer.home import home_pose
-from explorer.pose import Pose, Quadruple, Triple
+from explorer.mechanism.design import Design
+from explorer.mechanism.design_file import load_design
+from explorer.mechanism.home import home_pose
+from explorer.mechanism.pose import Pose, Quadruple, Triple
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,12 +10,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from explorer.cli.streams import write
-from explorer.design import Design
-from explorer.number_text import fixed, significant
-from explorer.pose import Pose, yaw_pitch_roll_from_rotation
+from explorer.mechanism.design import Design
+from explorer.mechanism.pose import Pose, yaw_pitch_roll_from_rotation
+from explorer.numerics.number_text import fixed, significant
 
 if TYPE_CHECKING:
-    from explorer.solid import Solid
+    from explorer.workspace.solids.solid import Solid
 
 
 def write_json(answer: Mapping[str, object]) -> None:
@@ -99,7 +99,7 @@ def pose_table(design: Design, pose: Pose) -> str:
 
 
 DISAGREES = "its volume does not agree with the exact one"
-"""What is told of a mesh that is not the workspace, see `explorer.agreement`."""
+"""What is told of a mesh that is not the workspace, see `explorer.workspace.solids.agreement`."""
 
 
 def mesh_json(solid: Solid) -> dict[str, object]:

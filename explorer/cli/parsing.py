@@ -49,7 +49,7 @@ def load_command(name: str, known: Iterable[str]) -> type[Command]:
     if name not in known:
         hint = suggestion(name, known) or f"there are {', '.join(known)}"
         raise UsageError(f"no command {name!r} ({hint}); see explorer --help")
-    module = importlib.import_module(f"explorer.cli.{name}")
+    module = importlib.import_module(f"explorer.cli.commands.{name}")
     return getattr(module, name.capitalize())
 
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 from explorer.cli.output import figure, table
-from explorer.design_file import PRESETS
-from explorer.workspace import NodeCount, workspace_nodes, workspace_volume
+from explorer.mechanism.design_file import PRESETS
+from explorer.workspace.slices.volume import NodeCount, workspace_nodes, workspace_volume
 
 Extent = tuple[tuple[float, float, float], tuple[float, float, float]]
 

@@ -9,7 +9,7 @@ from typing import Any
 from tyro.constructors import PrimitiveConstructorSpec
 
 from explorer.cli.usage import UsageError
-from explorer.design import LARGEST_SIZE
+from explorer.mechanism.design import LARGEST_SIZE
 
 _COUNTS = {2: "two", 3: "three", 4: "four", 6: "six", 7: "seven"}
 

@@ -19,7 +19,6 @@ from typing import Any
 
 import numpy as np
 
-from explorer.arrays import FloatArray
 from explorer.errors import ExplorerError, InputError
 from explorer.export.mesh import (
     APPLICATION,
@@ -31,9 +30,10 @@ from explorer.export.mesh import (
     mesh_bytes,
     pack_glb,
 )
-from explorer.files import write_whole
-from explorer.home import home_pose
-from explorer.pose import quaternion_from_rotation
+from explorer.files.writing import write_whole
+from explorer.mechanism.home import home_pose
+from explorer.mechanism.pose import quaternion_from_rotation
+from explorer.numerics.arrays import FloatArray
 from explorer.prototype.assembly import Prototype
 from explorer.prototype.chains import BODIES, CHAIN_JOINTS, LEGS, ON_GUIDE, Places
 

@@ -20,11 +20,11 @@ import msgspec
 import numpy as np
 
 from explorer import __version__
-from explorer.arrays import FloatArray
-from explorer.design import Design
 from explorer.errors import ExplorerError, InputError, NoAnswerError
-from explorer.files import write_whole
-from explorer.solid import Solid
+from explorer.files.writing import write_whole
+from explorer.mechanism.design import Design
+from explorer.numerics.arrays import FloatArray
+from explorer.workspace.solids.solid import Solid
 
 Rgb: TypeAlias = tuple[int, int, int]
 

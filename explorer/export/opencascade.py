@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from explorer.arrays import FloatArray
 from explorer.errors import ExplorerError, MissingExtraError
 from explorer.export.mesh import Rgb, linear
-from explorer.pose import Triple
+from explorer.mechanism.pose import Triple
+from explorer.numerics.arrays import FloatArray
 from explorer.prototype.kernel import Circle
 
 SCHEMA = "AP242DIS"

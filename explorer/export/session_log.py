@@ -12,13 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from explorer.arrays import FloatArray
-from explorer.design import VARIABLES
-from explorer.design_file import PRESETS
 from explorer.export.trajectory import COLUMNS as OF_TRAJECTORIES
-from explorer.kinematics import inverse
-from explorer.pose import rotation_from_quaternion
-from explorer.singularity import margins
+from explorer.mechanism.design import VARIABLES
+from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.kinematics import inverse
+from explorer.mechanism.margins import margins
+from explorer.mechanism.pose import rotation_from_quaternion
+from explorer.numerics.arrays import FloatArray
 
 COLUMNS = (
     *OF_TRAJECTORIES,

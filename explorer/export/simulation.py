@@ -19,13 +19,12 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from explorer import __version__
-from explorer.arrays import FloatArray
-from explorer.constraints import demanded_order
-from explorer.design import JOINTS, Design
 from explorer.errors import InputError
-from explorer.files import write_whole
-from explorer.home import home_pose
-from explorer.pose import quaternion_from_rotation
+from explorer.files.writing import write_whole
+from explorer.mechanism.design import JOINTS, Design
+from explorer.mechanism.home import home_pose
+from explorer.mechanism.pose import quaternion_from_rotation
+from explorer.numerics.arrays import FloatArray
 from explorer.prototype.chains import (
     ACTUATED,
     BODIES,
@@ -37,6 +36,7 @@ from explorer.prototype.chains import (
 )
 from explorer.prototype.mass import Mass
 from explorer.prototype.sketch import BALL, ROD, leg_radii, platform_points, sketch_masses
+from explorer.workspace.limits.constraints import demanded_order
 
 DENSITY = 1240.0
 """Of what the bodies are made unless told otherwise, in kg/m³: that of printed PLA."""

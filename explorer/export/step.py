@@ -1,8 +1,8 @@
 """The constant-orientation workspace as STEP: true spheres, cylinders, cones and planes.
 
 Each limit is an exact primitive of OpenCASCADE, which the booleans keep, so that the file is
-small and its volume that of `explorer.workspace`. AP242, in millimetres of the base frame;
-each face has the name and the colour of the limit that it comes from.
+small and its volume that of `explorer.workspace.slices.volume`. AP242, in millimetres of the base
+frame; each face has the name and the colour of the limit that it comes from.
 
 Needs the extra `cad`, which is imported only when asked for.
 """
@@ -18,9 +18,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from explorer.arrays import FloatArray
-from explorer.constraints import Cone, Constraint, HalfSpace, Round, constraints
-from explorer.design import Design
 from explorer.errors import ExplorerError, InputError, NoAnswerError
 from explorer.export.mesh import colour_of
 from explorer.export.opencascade import (
@@ -32,10 +29,13 @@ from explorer.export.opencascade import (
     point,
     volume_of,
 )
-from explorer.files import write_whole
-from explorer.pose import checked_rotation
-from explorer.region import Region, region_of
-from explorer.workspace import bounds, home_rotation, workspace_volume
+from explorer.files.writing import write_whole
+from explorer.mechanism.design import Design
+from explorer.mechanism.pose import checked_rotation
+from explorer.numerics.arrays import FloatArray
+from explorer.workspace.limits.constraints import Cone, Constraint, HalfSpace, Round, constraints
+from explorer.workspace.limits.region import Region, region_of
+from explorer.workspace.slices.volume import bounds, home_rotation, workspace_volume
 
 # OpenCASCADE takes points that are nearer than 1e-7 for one, whatever the unit.
 SMALLEST_MM, LARGEST_MM = 1e-1, 1e7

@@ -11,8 +11,8 @@ from typing import Any
 
 from explorer.export.assembly import COLOURS, groups_of
 from explorer.export.opencascade import Document, ExactKernel, ExactShape, occ, placed
-from explorer.files import write_whole
-from explorer.home import home_pose
+from explorer.files.writing import write_whole
+from explorer.mechanism.home import home_pose
 from explorer.prototype.chains import BODIES, Chains
 from explorer.prototype.forms import forms_of
 from explorer.prototype.sizes import Sizes

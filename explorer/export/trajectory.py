@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from explorer.design import JOINTS
-from explorer.files import write_whole
-from explorer.trajectory import Trajectory
+from explorer.files.writing import write_whole
+from explorer.mechanism.design import JOINTS
+from explorer.paths.trajectory import Trajectory
 
 COLUMNS = ("time_s", *JOINTS, "x", "y", "z", "qw", "qx", "qy", "qz")
 """The names of the columns; lengths are in design units, angles nowhere."""

@@ -9,7 +9,7 @@ from typing import Literal, Protocol
 
 import numpy as np
 
-from explorer.arrays import FloatArray
+from explorer.numerics.arrays import FloatArray
 from explorer.optimise.problem import ObjectiveName, Problem
 
 CALLED: Mapping[ObjectiveName, str] = MappingProxyType(

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
-from explorer.design import VARIABLES, Design
 from explorer.errors import InputError
+from explorer.mechanism.design import VARIABLES, Design
 from explorer.optimise.problem import (
     DISTANCES,
     REACH,
@@ -117,7 +117,7 @@ def default_variable(start: Design, name: str) -> Variable:
 
 
 def _own_volume(start: Design) -> float:
-    from explorer.workspace import workspace_volume
+    from explorer.workspace.slices.volume import workspace_volume
 
     volume = workspace_volume(start).volume
     if volume <= 0.0:

@@ -7,17 +7,17 @@ from dataclasses import dataclass
 import msgspec
 import numpy as np
 
-from explorer.clearance import PAIRS
-from explorer.design import Design
 from explorer.errors import InputError
-from explorer.home import home_pose
-from explorer.least_clearance import least_clearances
+from explorer.legs.clearance import PAIRS
+from explorer.mechanism.design import Design
+from explorer.mechanism.home import home_pose
+from explorer.mechanism.margins import margins
+from explorer.mechanism.pose import yaw_pitch_roll_from_rotation
 from explorer.optimise.defaults import MARGIN_OF_CLEARANCE
-from explorer.optimise.demands import corners_of
 from explorer.optimise.problem import Box, longest_length
-from explorer.pose import yaw_pitch_roll_from_rotation
-from explorer.singularity import margins
-from explorer.workspace import NodeCount, workspace_nodes, workspace_volume
+from explorer.optimise.search.demands import corners_of
+from explorer.workspace.least_clearance import least_clearances
+from explorer.workspace.slices.volume import NodeCount, workspace_nodes, workspace_volume
 
 # To which the least clearance is certain, as a share of the reach.
 CERTAIN = 1e-3
@@ -28,7 +28,7 @@ class Facts:
     """Measures of a design, in design units.
 
     Each of them depends on the design alone, and is the figure of the same name in
-    `explorer.figures`; what depends on a demand has a name that says so.
+    `explorer.optimise.figures`; what depends on a demand has a name that says so.
 
     Attributes:
         design: The design.

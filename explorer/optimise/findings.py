@@ -10,13 +10,13 @@ from dataclasses import dataclass
 
 import msgspec
 
-from explorer.design import Design
-from explorer.design_file import PRESETS
+from explorer.mechanism.design import Design
+from explorer.mechanism.design_file import PRESETS
 from explorer.optimise.defaults import make_problem
 from explorer.optimise.facts import Facts, facts_of
 from explorer.optimise.problem import Box, Problem, Variable
 from explorer.optimise.solver import optimise_design
-from explorer.workspace import workspace_volume
+from explorer.workspace.slices.volume import workspace_volume
 
 PAPER_VOLUME = 8000.0
 """The volume that the paper asks for, V′."""

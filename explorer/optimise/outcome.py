@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from explorer.design import Design
+from explorer.mechanism.design import Design
 from explorer.optimise.problem import Problem
 
 Status = Literal["converged", "not converged", "infeasible", "stalled", "cancelled"]

@@ -12,11 +12,11 @@ from typing import Literal, get_args
 
 import msgspec
 
-from explorer.checks import not_negative, number, numbers, ordered, positive, two
-from explorer.design import DEGENERATE_RATIO, LENGTHS, VARIABLES, Design, Limits, Swing
 from explorer.errors import InputError
-from explorer.home import home_pose
-from explorer.pose import Pose, Triple, yaw_pitch_roll_from_rotation
+from explorer.mechanism.design import DEGENERATE_RATIO, LENGTHS, VARIABLES, Design, Limits, Swing
+from explorer.mechanism.home import home_pose
+from explorer.mechanism.pose import Pose, Triple, yaw_pitch_roll_from_rotation
+from explorer.numerics.checks import not_negative, number, numbers, ordered, positive, two
 
 ObjectiveName = Literal["match-volume", "smallest-reach", "largest-volume", "largest-margin"]
 

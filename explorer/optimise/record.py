@@ -11,12 +11,12 @@ from typing import Literal
 
 import msgspec
 
-from explorer.design import Design
 from explorer.errors import InputError
-from explorer.json_text import decode_strictly
+from explorer.files.json_text import decode_strictly
+from explorer.files.versions import versions
+from explorer.mechanism.design import Design
 from explorer.optimise.outcome import Iterate, Outcome, Phase, Status
 from explorer.optimise.problem import Problem
-from explorer.versions import versions
 
 # No honest record comes near this size, in bytes.
 LARGEST_FILE = 200_000_000

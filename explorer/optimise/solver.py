@@ -5,13 +5,13 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 
-from explorer.compiled import warm_in_background
 from explorer.errors import InputError
+from explorer.numerics.compiled import warm_in_background
 from explorer.optimise.outcome import Outcome, Run
 from explorer.optimise.problem import Problem
-from explorer.optimise.search import Search
-from explorer.optimise.starts import check_starts, more_starts
-from explorer.optimise.trail import Trail, Watch
+from explorer.optimise.search.search import Search
+from explorer.optimise.search.starts import check_starts, more_starts
+from explorer.optimise.search.trail import Trail, Watch
 
 MOST_ITERATIONS = 300
 # Objectives that differ by less than this share are the same.
@@ -30,7 +30,7 @@ def optimise_design(
     """Look for the best design.
 
     The search begins interpreted where kernels are not compiled yet, so that the last digits
-    are the same each time only after `explorer.compiled.warm`.
+    are the same each time only after `explorer.numerics.compiled.warm`.
 
     Args:
         problem: What to look for.

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from explorer.arrays import FloatArray
-from explorer.design import Design
+from explorer.mechanism.design import Design
+from explorer.numerics.arrays import FloatArray
 from explorer.prototype.chains import BODIES, Chains, Places
 from explorer.prototype.fitting import sizes_of
 from explorer.prototype.mass import Mass, together

@@ -16,11 +16,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from explorer.arrays import FloatArray
-from explorer.design import Design
-from explorer.home import home_pose
-from explorer.kinematics import attachment_points
-from explorer.pose import checked_rotation
+from explorer.mechanism.design import Design
+from explorer.mechanism.home import home_pose
+from explorer.mechanism.kinematics import attachment_points
+from explorer.mechanism.pose import checked_rotation
+from explorer.numerics.arrays import FloatArray
 
 LEGS = (1, 2, 3, 4)
 ON_GUIDE = (2, 3)
@@ -35,7 +35,8 @@ CHAIN_JOINTS = (
 """The joints of the four chains, from the base to the platform; angles in radians."""
 
 ACTUATED = (2, 3, 5, 6, 8, 11)
-"""Which of them are the joints of the design, in the order of `explorer.design.JOINTS`."""
+"""Which of them are the joints of the design, in the order of
+`explorer.mechanism.design.JOINTS`."""
 
 BODIES = (
     "base",

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from explorer.arrays import FloatArray
+from explorer.numerics.arrays import FloatArray
 from explorer.prototype.assembly import Prototype
 from explorer.prototype.chains import LEGS, Places
 

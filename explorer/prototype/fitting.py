@@ -11,10 +11,10 @@ import math
 import msgspec
 import numpy as np
 
-from explorer.arrays import FloatArray
-from explorer.design import Design
 from explorer.errors import InputError
-from explorer.home import home_pose
+from explorer.mechanism.design import Design
+from explorer.mechanism.home import home_pose
+from explorer.numerics.arrays import FloatArray
 from explorer.prototype.chains import LEGS
 from explorer.prototype.motion import hindrances
 from explorer.prototype.sizes import Sizes

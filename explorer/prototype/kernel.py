@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple, Protocol, TypeAlias
 
-from explorer.pose import Triple
+from explorer.mechanism.pose import Triple
 
 Shape: TypeAlias = Any
 """A body: `+`, `-` and `^` are union, difference and intersection; it has the methods

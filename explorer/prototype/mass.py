@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from explorer.arrays import FloatArray
+from explorer.numerics.arrays import FloatArray
 
 
 @dataclass(frozen=True)

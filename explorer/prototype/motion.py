@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import ArrayLike
 
-from explorer.arrays import FloatArray
+from explorer.numerics.arrays import FloatArray
 from explorer.prototype.chains import BODIES, LEGS, ON_GUIDE
 from explorer.prototype.dimensions import FIRST_SWING, SECOND_SWING
 from explorer.prototype.sizes import Sizes

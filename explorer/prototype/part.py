@@ -8,10 +8,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from explorer.arrays import FloatArray
+from explorer.numerics.arrays import FloatArray
 from explorer.prototype.chains import BODIES
 from explorer.prototype.mass import Mass, mesh_mass
-from explorer.solid import Solid
+from explorer.workspace.solids.solid import Solid
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from explorer.arrays import FloatArray
 from explorer.errors import ExplorerError
-from explorer.pose import Triple
+from explorer.mechanism.pose import Triple
+from explorer.numerics.arrays import FloatArray
 from explorer.prototype.chains import Places
 from explorer.prototype.forms import forms_of
 from explorer.prototype.kernel import Circle

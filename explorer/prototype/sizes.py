@@ -12,14 +12,14 @@ from functools import cached_property
 
 import numpy as np
 
-from explorer.constraints import constraints
-from explorer.design import LENGTHS, Design
-from explorer.home import home_pose
+from explorer.mechanism.design import LENGTHS, Design
+from explorer.mechanism.home import home_pose
 from explorer.prototype.chains import LEGS, ON_GUIDE, Chains
 from explorer.prototype.dimensions import CLEARANCE, THINNEST, GuideSizes, LegSizes, Stroke
 from explorer.prototype.sketch import platform_points
-from explorer.region import region_of
-from explorer.workspace import bounds
+from explorer.workspace.limits.constraints import constraints
+from explorer.workspace.limits.region import region_of
+from explorer.workspace.slices.volume import bounds
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from explorer.arrays import FloatArray
-from explorer.design import Design
+from explorer.mechanism.design import Design
+from explorer.numerics.arrays import FloatArray
 from explorer.prototype.chains import ON_GUIDE, Chains
 from explorer.prototype.mass import Mass, ball, bar, together
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 
 from explorer.errors import InputError
-from explorer.files import make_folder, refusal
+from explorer.files.writing import make_folder, refusal
 from explorer.sweep.parts import BadPartError, part_paths, read_part
 from explorer.sweep.study import Study, study_hash
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from explorer.arrays import BoolArray, FloatArray, IntArray
+from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 from explorer.sweep.study import Objective
 
 

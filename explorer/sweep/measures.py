@@ -13,14 +13,14 @@ from types import MappingProxyType
 
 import numpy as np
 
-from explorer.arrays import FloatArray
-from explorer.clearance import PAIRS
-from explorer.design import Design
-from explorer.home import home_pose
-from explorer.node_measures import DEFAULT_NODES, NodeMeasures, node_measures
+from explorer.legs.clearance import PAIRS
+from explorer.mechanism.design import Design
+from explorer.mechanism.home import home_pose
+from explorer.numerics.arrays import FloatArray
 from explorer.optimise.facts import clearance_beyond, clearance_margin_of, reach_of
-from explorer.singularity import inverse_condition, jacobian
-from explorer.workspace import Volume, workspace_volume
+from explorer.singularity.jacobian import inverse_condition, jacobian
+from explorer.workspace.node_measures import DEFAULT_NODES, NodeMeasures, node_measures
+from explorer.workspace.slices.volume import Volume, workspace_volume
 
 
 @dataclass
@@ -77,8 +77,8 @@ class Case:
     def reachable_volume(self) -> float:
         """Return the volume that the home pose leads to."""
         # Imports the kernel of solids.
-        from explorer.reachable import reachable_workspace
-        from explorer.start import StartError
+        from explorer.workspace.accessible.start import StartError
+        from explorer.workspace.accessible.workspace import reachable_workspace
 
         try:
             return reachable_workspace(self.design).reachable_volume
@@ -206,8 +206,8 @@ AT_NODES = frozenset(
         *(f"extent_{axis}" for axis in "xyz"),
     }
 )
-"""Measures of the nodes of a grid that `explorer.figures` has under the same name of the whole
-workspace, or of another grid."""
+"""Measures of the nodes of a grid that `explorer.optimise.figures` has under the same name of the
+whole workspace, or of another grid."""
 
 
 def measured(case: Case, names: Collection[str]) -> dict[str, float]:

@@ -17,14 +17,14 @@ from pathlib import Path
 from typing import Any
 
 from explorer.errors import InputError, MissingExtraError
-from explorer.files import refusal, write_whole
+from explorer.files.writing import refusal, write_whole
 from explorer.sweep.rows import Kind, Rows, columns_of
 from explorer.sweep.study import Study, decode_study, encode_study, study_hash
 
 SUFFIX = ".parquet"
 
 _STUDY, _HASH, _SEED = b"explorer.study", b"explorer.study_hash", b"explorer.seed"
-_CHUNK, _VERSIONS = b"explorer.chunk", b"explorer.versions"
+_CHUNK, _VERSIONS = b"explorer.chunk", b"explorer.files.versions"
 
 
 class BadPartError(InputError):

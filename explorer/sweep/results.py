@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from explorer.arrays import BoolArray
-from explorer.design import Design
 from explorer.errors import InputError
+from explorer.mechanism.design import Design
+from explorer.numerics.arrays import BoolArray
 from explorer.sweep.front import costs, front, incomparable, undominated
 from explorer.sweep.parts import sound_parts, stray_paths
 from explorer.sweep.rows import Value, columns_of, design_of

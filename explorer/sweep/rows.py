@@ -16,14 +16,14 @@ from typing import Literal, TypeAlias
 
 import msgspec
 
-from explorer.compiled import warm
-from explorer.design import Design
 from explorer.errors import DesignError, InputError
+from explorer.files.versions import versions
+from explorer.mechanism.design import Design
+from explorer.numerics.compiled import warm
 from explorer.optimise.problem import YAW, Problem, Variable, start_value, varied, with_strokes
 from explorer.sweep.measures import Case, measured
 from explorer.sweep.sampling import samples
 from explorer.sweep.study import RADIUS, Study, decode_study
-from explorer.versions import versions
 
 Status = Literal[
     "done", "not converged", "empty workspace", "invalid design", "failed", "worker died"
@@ -257,7 +257,7 @@ def load_kernels(study: Study) -> None:
     if study.polish is not None:
         importlib.import_module("explorer.optimise.solver")
     if "reachable_volume" in study.measures:
-        importlib.import_module("explorer.reachable")
+        importlib.import_module("explorer.workspace.accessible.workspace")
 
 
 @functools.lru_cache(4)

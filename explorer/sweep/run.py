@@ -14,14 +14,14 @@ from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
 
-from explorer.compiled import fill_cache
 from explorer.errors import ExplorerError
+from explorer.files.versions import versions
+from explorer.numerics.compiled import fill_cache
 from explorer.sweep.folder import claimed
 from explorer.sweep.parts import pyarrow, sound_parts, write_part
 from explorer.sweep.rows import Answer, Rows, answer, check_study, evaluate, load_kernels, lost
 from explorer.sweep.study import Study, encode_study
 from explorer.sweep.workers import LocalWorkers, NoWorkerError, Workers
-from explorer.versions import versions
 
 # Tasks under way for each worker: enough that none waits for this process.
 AHEAD = 4

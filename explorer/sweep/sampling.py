@@ -15,7 +15,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from explorer.arrays import FloatArray
+from explorer.numerics.arrays import FloatArray
 from explorer.sweep.study import Study
 
 WordArray: TypeAlias = NDArray[np.uint64]

@@ -9,21 +9,20 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Iterable, Mapping
-from importlib import resources
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal, cast
 
 import msgspec
 
-from explorer.checks import instance, number, positive, two
-from explorer.design import VARIABLES, Design, Pair
-from explorer.design_file import PRESETS
 from explorer.errors import InputError
-from explorer.files import read_at_most
-from explorer.home import home_pose
-from explorer.json_text import decode_strictly
-from explorer.node_measures import DEFAULT_NODES, FEWEST_NODES, MOST_NODES
+from explorer.files.json_text import decode_strictly
+from explorer.files.packaged import packaged_files
+from explorer.files.writing import read_at_most
+from explorer.mechanism.design import VARIABLES, Design, Pair
+from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.home import home_pose
+from explorer.numerics.checks import instance, number, positive, two
 from explorer.optimise.problem import (
     OBJECTIVES,
     REACH,
@@ -33,6 +32,7 @@ from explorer.optimise.problem import (
     longest_minimum,
 )
 from explorer.sweep.measures import MEASURES
+from explorer.workspace.node_measures import DEFAULT_NODES, FEWEST_NODES, MOST_NODES
 
 Method = Literal["sobol", "latin-hypercube", "grid"]
 Sense = Literal["min", "max"]
@@ -362,10 +362,7 @@ def _once(field: str, names: Iterable[str]) -> None:
 
 
 def _load_studies() -> Mapping[str, Study]:
-    # In a wheel they lie inside the package, in a checkout beside it.
-    packaged = resources.files("explorer").joinpath("studies")
-    folder = packaged if packaged.is_dir() else Path(__file__).parents[2] / "assets" / "studies"
-    files = sorted((f for f in folder.iterdir() if f.name.endswith(".json")), key=lambda f: f.name)
+    files = packaged_files("studies", ".json")
     studies = [decode_study(file.read_bytes(), file.name) for file in files]
     return MappingProxyType({study.name: study for study in studies})
 

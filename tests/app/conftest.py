@@ -8,9 +8,9 @@ import pytest
 import viser
 from desk import Desk
 
-from explorer.app.state import opened
-from explorer.app.viser_gaps import start_viser, stop_viser
-from explorer.design_file import PRESETS
+from explorer.app.browser.viser_gaps import start_viser, stop_viser
+from explorer.app.state.state import opened
+from explorer.mechanism.design_file import PRESETS
 
 
 @pytest.fixture(scope="module")

@@ -8,9 +8,9 @@ from typing import Any
 import msgspec
 import viser
 
-from explorer.app.actions import SetLimits
-from explorer.app.session import Session
-from explorer.app.state import State
+from explorer.app.session.session import Session
+from explorer.app.state.actions import SetLimits
+from explorer.app.state.state import State
 
 
 class Desk:

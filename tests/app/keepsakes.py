@@ -9,7 +9,29 @@ from dataclasses import replace
 import msgspec
 from hypothesis import strategies as st
 
-from explorer.app.actions import (
+from explorer.app.features.compare.actions import Pin, SetLook, Unpin
+from explorer.app.features.optimise.actions import (
+    Accept,
+    Advance,
+    CancelRun,
+    Compare,
+    EndRun,
+    SetWish,
+    StartRun,
+)
+from explorer.app.features.paths.actions import (
+    ChooseModes,
+    Plan,
+    Play,
+    SetPathTime,
+    SetPlanSeconds,
+    StoreEnd,
+    WatchModes,
+)
+from explorer.app.features.singularity.actions import Jog, SetSingularView
+from explorer.app.features.studies.actions import BrushAxis, OpenStudy
+from explorer.app.session.gestures import ByHand
+from explorer.app.state.actions import (
     Action,
     GoHome,
     Open,
@@ -24,27 +46,13 @@ from explorer.app.actions import (
     SetView,
     UseNearest,
 )
-from explorer.app.compared import Look
-from explorer.app.comparing import Pin, SetLook, Unpin
-from explorer.app.gestures import ByHand
-from explorer.app.optimisation import PLACE, Comparison, Verdict
-from explorer.app.optimising import Accept, Advance, CancelRun, Compare, EndRun, SetWish, StartRun
-from explorer.app.path_actions import (
-    ChooseModes,
-    Plan,
-    Play,
-    SetPathTime,
-    SetPlanSeconds,
-    StoreEnd,
-    WatchModes,
-)
-from explorer.app.singular_actions import Jog, SetSingularView
-from explorer.app.singular_view import SingularView
-from explorer.app.state import State, opened
-from explorer.app.study_actions import BrushAxis, OpenStudy
-from explorer.design import VARIABLES, Limits
-from explorer.design_file import PRESETS
+from explorer.app.state.compared import Look
+from explorer.app.state.optimisation import PLACE, Comparison, SearchResult
+from explorer.app.state.state import State, opened
+from explorer.app.state.view import SingularView
 from explorer.errors import ExplorerError
+from explorer.mechanism.design import VARIABLES, Limits
+from explorer.mechanism.design_file import PRESETS
 from explorer.optimise.facts import facts_of
 from explorer.optimise.outcome import Iterate
 from explorer.optimise.problem import YAW
@@ -182,7 +190,7 @@ def _end(state: State, count: int) -> Action:
     run = state.optimisation.run
     shown = (() if run is None else run.iterates) + iterates_of(state, count)
     best = shown[-1] if shown else None
-    verdict = Verdict("stalled", "no step made it better", best, 2, 1, count, 0.1)
+    verdict = SearchResult("stalled", "no step made it better", best, 2, 1, count, 0.1)
     return EndRun(state.optimisation.count, verdict, iterates_of(state, count))
 
 

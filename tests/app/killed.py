@@ -15,11 +15,11 @@ import sys
 import time
 from pathlib import Path
 
-from explorer.app.actions import SetPosition
-from explorer.app.state import opened
+from explorer.app.state.actions import SetPosition
+from explorer.app.state.state import opened
 from explorer.app.storage.autosave import Autosave
 from explorer.app.storage.document import Document, Kept, decode_document, decode_header
-from explorer.design_file import PRESETS
+from explorer.mechanism.design_file import PRESETS
 
 ACKNOWLEDGED = struct.Struct("qq")
 # Seconds until the kill.

@@ -6,7 +6,7 @@ import itertools
 import os
 import time
 
-from explorer.app.worker import Line
+from explorer.app.session.worker import Line
 from explorer.errors import InputError
 
 # Seconds between two values.

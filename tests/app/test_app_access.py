@@ -6,10 +6,9 @@ import socket
 from http import HTTPStatus
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
-from explorer.app.access import Access, Head, Refusal, is_loopback
+from explorer.app.security.access import Access, Head, Refusal, is_loopback
 from explorer.errors import ServerError
 
 PORT = 8080

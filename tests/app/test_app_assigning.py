@@ -12,14 +12,15 @@ from client import client_of
 from monkey import explorer_with_data
 from page_props import shown_by
 
-from explorer.app import assigning, viser_gaps
-from explorer.app.actions import SetAngle, SetJoint, SetPosition
-from explorer.app.assigning import CROSSING_SECONDS, QUIET_SECONDS, Assigner
-from explorer.app.panels.move import JOINT_LABELS
+from explorer.app.browser import viser_gaps
+from explorer.app.browser.viser_gaps import PLACE
+from explorer.app.features.mechanism.pose_panel import JOINT_LABELS
 from explorer.app.scene.placing import Placed
-from explorer.app.session import Session
-from explorer.app.state import Frame
-from explorer.app.viser_gaps import PLACE
+from explorer.app.session.session import Session
+from explorer.app.state.actions import SetAngle, SetJoint, SetPosition
+from explorer.app.state.frame import Frame
+from explorer.app.widgets import assigning
+from explorer.app.widgets.assigning import CROSSING_SECONDS, QUIET_SECONDS, Assigner
 
 
 @pytest.mark.parametrize("size", [1e-12, 1e-6, 1.0, 1e6])

@@ -11,19 +11,20 @@ from desk import Desk
 from hypothesis import given
 from strategies import Case, all_cases
 
-from explorer.app.assigning import Update
-from explorer.app.jobs import Worker
-from explorer.app.panels.move import MODES, MovePanel, mode_options
-from explorer.app.panels.singularity import summary
-from explorer.app.panels.strata import distances_of, neighbours
-from explorer.app.singular_actions import GoToSingularity, GoToStratum
-from explorer.app.state import Frame, State, opened
-from explorer.app.strata_feed import StrataFeed
-from explorer.bruhat import COVERED, OF_INCIDENCES, incidences
-from explorer.design_file import PRESETS
-from explorer.pose import Pose
-from explorer.singularity import mode_words
-from explorer.snapshot import evaluate
+from explorer.app.features.mechanism.pose_panel import MODES, MovePanel, mode_options
+from explorer.app.features.singularity.actions import GoToSingularity, GoToStratum
+from explorer.app.features.singularity.feed import StrataFeed
+from explorer.app.features.singularity.panel import summary
+from explorer.app.features.singularity.strata import distances_of, neighbours
+from explorer.app.session.jobs import Worker
+from explorer.app.state.frame import Frame
+from explorer.app.state.state import State, opened
+from explorer.app.widgets.assigning import Update
+from explorer.measures.snapshot import evaluate
+from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.margins import mode_words
+from explorer.mechanism.pose import Pose
+from explorer.singularity.bruhat import COVERED, OF_INCIDENCES, incidences
 
 OPTIMAL = PRESETS["paper-optimal"]
 

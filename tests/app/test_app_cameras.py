@@ -11,9 +11,10 @@ import pytest
 
 from explorer.app.scene.camera import FIRST_ASPECT, REMEMBERED, Cameras, framing
 from explorer.app.scene.placing import Placed
-from explorer.app.state import Frame, opened
-from explorer.arrays import FloatArray
-from explorer.design_file import PRESETS
+from explorer.app.state.frame import Frame
+from explorer.app.state.state import opened
+from explorer.mechanism.design_file import PRESETS
+from explorer.numerics.arrays import FloatArray
 
 PLACED = Placed(Frame(opened(PRESETS["paper-optimal"])))
 # Of viser, before it is told where to begin.

@@ -7,10 +7,9 @@ from typing import Any
 
 import msgspec
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
-from explorer.app.client_messages import (
+from explorer.app.security.client_messages import (
     LARGEST_MESSAGE,
     LARGEST_UPLOAD,
     LARGEST_WHOLE,

@@ -20,7 +20,28 @@ import pytest
 import viser
 
 import explorer.app
-from explorer.app.actions import (
+from explorer.app.browser.viser_gaps import start_viser, stop_viser
+from explorer.app.features.optimise.actions import Advance as ShowIterates, Compare, EndRun
+from explorer.app.features.paths.actions import (
+    Advance as PlayOn,
+    ChooseModes,
+    SetPathTime,
+    SetPlanSeconds,
+    TakePlan,
+)
+from explorer.app.features.singularity.actions import Jog
+from explorer.app.features.studies.actions import (
+    BrushAxis,
+    BrushBox,
+    PickDesign,
+    SetAxes,
+    SetStudyWish,
+)
+from explorer.app.features.studies.folders import StudyFolders
+from explorer.app.server import Running, start
+from explorer.app.session.gestures import ByHand
+from explorer.app.session.session import UNDO, Session
+from explorer.app.state.actions import (
     MarkSaved,
     SetAngle,
     SetJoint,
@@ -31,30 +52,20 @@ from explorer.app.actions import (
     SetVariable,
     StartThere,
 )
-from explorer.app.commands import CAMERA_KEYS, KEYS, OPEN_LISTS, PALETTE_KEY, offers, with_keys
-from explorer.app.gestures import ByHand
-from explorer.app.keeping import take_up
-from explorer.app.optimising import Advance as ShowIterates
-from explorer.app.optimising import Compare, EndRun
-from explorer.app.palette import Command, Palette
-from explorer.app.path_actions import Advance as PlayOn
-from explorer.app.path_actions import ChooseModes, SetPathTime, SetPlanSeconds, TakePlan
-from explorer.app.server import Running, start
-from explorer.app.session import UNDO, Session
-from explorer.app.singular_actions import Jog
-from explorer.app.state import State
-from explorer.app.study_actions import (
-    BrushAxis,
-    BrushBox,
-    PickDesign,
-    SetAxes,
-    SetStudyWish,
+from explorer.app.state.state import State
+from explorer.app.storage.keeping import take_up
+from explorer.app.widgets.commands import (
+    CAMERA_KEYS,
+    KEYS,
+    OPEN_LISTS,
+    PALETTE_KEY,
+    offers,
+    with_keys,
 )
-from explorer.app.study_folders import StudyFolders
-from explorer.app.viser_gaps import start_viser, stop_viser
-from explorer.app.widgets import Widget, widgets
-from explorer.design_file import PRESETS
+from explorer.app.widgets.palette import Command, Palette
+from explorer.app.widgets.pieces import Widget, widgets
 from explorer.errors import ExplorerError
+from explorer.mechanism.design_file import PRESETS
 
 OF_VALUES = {
     SetJoint: "sliders of the legs",

@@ -13,32 +13,32 @@ import numpy as np
 import pytest
 import viser
 from desk import Desk
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
-from explorer.app.actions import Open, SetVariable
-from explorer.app.assigning import Assigner
-from explorer.app.colours import COMPARED
-from explorer.app.compare_feed import LIVE, CompareFeed
-from explorer.app.compared import SLOTS, Compared, Look, unnamed
-from explorer.app.compared_drawing import ComparedDrawing, ComparedRequest, compared_drawing
-from explorer.app.comparing import Pin, SetLook, Unpin
-from explorer.app.jobs import Worker
-from explorer.app.panels.compare import NOTHING, ComparePanel
-from explorer.app.panels.compare_bars import DRAWN, bars
-from explorer.app.panels.compare_columns import Column, best_of, columns_of, notes, told
-from explorer.app.panels.compare_table import table
-from explorer.app.scene.compared import APART, ComparedScene
+from explorer.app.features.compare.actions import Pin, SetLook, Unpin
+from explorer.app.features.compare.bars import DRAWN, bars
+from explorer.app.features.compare.columns import Column, best_of, columns_of, notes, told
+from explorer.app.features.compare.drawing import ComparedDrawing, ComparedRequest, compared_drawing
+from explorer.app.features.compare.feed import LIVE, CompareFeed
+from explorer.app.features.compare.panel import NOTHING, ComparePanel
+from explorer.app.features.compare.scene import APART, ComparedScene
+from explorer.app.features.compare.table import table
 from explorer.app.scene.placing import Placed
-from explorer.app.session import UNDO
-from explorer.app.state import Frame, State, opened
-from explorer.design import Design
-from explorer.design_file import PRESETS
+from explorer.app.session.jobs import Worker
+from explorer.app.session.session import UNDO
+from explorer.app.state.actions import Open, SetVariable
+from explorer.app.state.compared import SLOTS, Compared, Look, unnamed
+from explorer.app.state.frame import Frame
+from explorer.app.state.state import State, opened
+from explorer.app.widgets.assigning import Assigner
+from explorer.app.widgets.colours import COMPARED
 from explorer.errors import InputError
-from explorer.figures import FIGURES, figures_of
-from explorer.home import home_pose
-from explorer.pose import Pose
-from explorer.workspace import workspace_nodes, workspace_volume
+from explorer.mechanism.design import Design
+from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.home import home_pose
+from explorer.mechanism.pose import Pose
+from explorer.optimise.figures import FIGURES, figures_of
+from explorer.workspace.slices.volume import workspace_nodes, workspace_volume
 
 INITIAL, OPTIMAL = PRESETS.values()
 DEEDS = [(f"open{slot}", f"unpin{slot}") for slot in range(3)]

@@ -10,14 +10,14 @@ import pytest
 import viser
 from desk import Desk
 
-from explorer.app.actions import MarkSaved, Open, SetName, SetUnit, SetVariable
-from explorer.app.panels.designs import ROWS, DesignsPanel, rows_of
-from explorer.app.session import UNDO
-from explorer.app.shelf import Shelf
-from explorer.app.state import Frame
+from explorer.app.features.designs.panel import ROWS, DesignsPanel, rows_of
+from explorer.app.features.designs.shelf import Shelf
+from explorer.app.session.session import UNDO
+from explorer.app.state.actions import MarkSaved, Open, SetName, SetUnit, SetVariable
+from explorer.app.state.frame import Frame
 from explorer.app.storage.library import Library
-from explorer.design_file import PRESETS, encode_design
 from explorer.errors import InputError, StorageError
+from explorer.mechanism.design_file import PRESETS, encode_design
 
 OPTIMAL = PRESETS["paper-optimal"]
 

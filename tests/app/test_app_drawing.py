@@ -8,24 +8,24 @@ import re
 import msgspec
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
-from explorer.app.bands import COLLIDING, PLAIN
-from explorer.app.colours import FAR, FAR_WARNINGS, SINGULAR, Rgb, proximity_colour
-from explorer.app.controls import Span, decimals
-from explorer.app.panels.html import share
-from explorer.app.panels.move import interval_marks
-from explorer.app.panels.ranges import coordinate_span, length_span, round_up, variable_span
-from explorer.app.panels.singularity import summary
+from explorer.app.features.mechanism.pose_panel import interval_marks
+from explorer.app.features.singularity.panel import summary
+from explorer.app.scene.bands import COLLIDING, PLAIN
 from explorer.app.scene.camera import FIELD_OF_VIEW, VIEWS, ViewName, framing, outermost_points
 from explorer.app.scene.placing import Placed, round_step
 from explorer.app.scene.shapes import cylinder, plate, sphere, turned_to
-from explorer.app.state import Frame, opened
-from explorer.arrays import FloatArray, IntArray
-from explorer.design import Design, Limits
-from explorer.design_file import PRESETS
-from explorer.pose import Pose
+from explorer.app.state.frame import Frame
+from explorer.app.state.state import opened
+from explorer.app.widgets.colours import FAR, FAR_WARNINGS, SINGULAR, Rgb, proximity_colour
+from explorer.app.widgets.controls import Span, decimals
+from explorer.app.widgets.markup import share
+from explorer.app.widgets.ranges import coordinate_span, length_span, round_up, variable_span
+from explorer.mechanism.design import Design, Limits
+from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.pose import Pose
+from explorer.numerics.arrays import FloatArray, IntArray
 
 OPTIMAL = PRESETS["paper-optimal"]
 

@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from explorer.app import faults as module
-from explorer.app.faults import Fault, Faults, log_fault, read_fault
-from explorer.app.jobs import RESTARTED, Worker
-from explorer.app.tasks import StrataRequest
-from explorer.design_file import PRESETS
+from explorer.app.session import faults as module
+from explorer.app.session.faults import Fault, Faults, log_fault, read_fault
+from explorer.app.session.jobs import RESTARTED, Worker
+from explorer.app.session.tasks import StrataRequest
 from explorer.errors import InputError
-from explorer.home import home_pose
+from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.home import home_pose
 
 ROOT = Path(__file__).resolve().parents[2]
 TASKS = "tests.app.telling"

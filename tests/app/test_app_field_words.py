@@ -10,13 +10,13 @@ import pytest
 import viser
 from desk import Desk
 
-from explorer.app.field_words import FIELD_WORDS, message_of
-from explorer.app.panels.design import DesignPanel
-from explorer.app.panels.move import MovePanel
-from explorer.app.session import UNDO
-from explorer.design import Design, Limits, Swing
-from explorer.design_file import decode_design
+from explorer.app.features.mechanism.design_panel import DesignPanel
+from explorer.app.features.mechanism.pose_panel import MovePanel
+from explorer.app.session.session import UNDO
+from explorer.app.state.field_words import FIELD_WORDS, message_of
 from explorer.errors import DesignError, InputError
+from explorer.mechanism.design import Design, Limits, Swing
+from explorer.mechanism.design_file import decode_design
 
 # What no text for people holds: names with an underscore or a point within, and JSON's.
 CODE = re.compile(r"[a-z]_[a-z]|[a-z]\.[a-z]|\bnull\b|\bNone\b")

@@ -7,10 +7,11 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
-from explorer.app.actions import (
+from explorer.app.session.gestures import PAUSE_SECONDS, ByHand
+from explorer.app.session.session import Session
+from explorer.app.state.actions import (
     Action,
     GoHome,
     Open,
@@ -24,15 +25,14 @@ from explorer.app.actions import (
     SetVariable,
     SetView,
 )
-from explorer.app.gestures import PAUSE_SECONDS, ByHand
-from explorer.app.presses import Press
-from explorer.app.session import Session
-from explorer.app.state import Frame, State, opened
-from explorer.design import JOINTS, Limits
-from explorer.design_file import PRESETS
+from explorer.app.state.frame import Frame
+from explorer.app.state.presses import Press
+from explorer.app.state.state import State, opened
 from explorer.errors import DesignError
-from explorer.moves import move_clearance
-from explorer.pose import Pose
+from explorer.legs.moves import move_clearance
+from explorer.mechanism.design import JOINTS, Limits
+from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.pose import Pose
 
 OPTIMAL = PRESETS["paper-optimal"]
 OTHER = PRESETS["paper-initial"]

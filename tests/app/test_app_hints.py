@@ -7,17 +7,17 @@ from collections.abc import Generator
 
 import pytest
 
-from explorer.app.colours import OUTLINE, Rgb
-from explorer.app.commands import NEVER
-from explorer.app.keeping import take_up
-from explorer.app.panels import charts
-from explorer.app.panels.html import GREEN, GREY, RED
+from explorer.app.features.studies.folders import StudyFolders
 from explorer.app.scene.bodies import GRID
 from explorer.app.server import Running, start
-from explorer.app.study_folders import StudyFolders
-from explorer.app.theme import BRAND, BRAND_ON_DARK
-from explorer.app.widgets import Widget, widgets
-from explorer.design_file import PRESETS
+from explorer.app.storage.keeping import take_up
+from explorer.app.widgets import charts
+from explorer.app.widgets.colours import OUTLINE, Rgb
+from explorer.app.widgets.commands import NEVER
+from explorer.app.widgets.markup import GREEN, GREY, RED
+from explorer.app.widgets.pieces import Widget, widgets
+from explorer.app.widgets.theme import BRAND, BRAND_ON_DARK
+from explorer.mechanism.design_file import PRESETS
 
 # Of panels, of the scene, and of fields within panels, as viser draws them.
 LIGHT = {"panel": "#ffffff", "scene": "#ffffff", "field": "#ffffff"}

@@ -10,12 +10,18 @@ from dataclasses import replace
 import msgspec
 import pytest
 from desk import Desk
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 import explorer.app
-from explorer.app import step_words
-from explorer.app.actions import (
+from explorer.app.features.optimise.actions import CancelRun, EndRun, SetWish, StartRun
+from explorer.app.features.paths.actions import Advance, Play, SetPathTime, WatchModes
+from explorer.app.features.singularity.actions import GoToSingularity, GoToStratum, Jog
+from explorer.app.features.studies.actions import BrushAxis, OpenStudy
+from explorer.app.session import step_words
+from explorer.app.session.gestures import PAUSE_SECONDS, ByHand
+from explorer.app.session.history import GO_ON, MOST_STEPS, History, begun, document, restored
+from explorer.app.session.session import REDO, UNDO
+from explorer.app.state.actions import (
     Action,
     GoHome,
     Open,
@@ -31,20 +37,13 @@ from explorer.app.actions import (
     SetVariable,
     SetView,
 )
-from explorer.app.gestures import PAUSE_SECONDS, ByHand
-from explorer.app.history import GO_ON, MOST_STEPS, History, begun, document, restored
-from explorer.app.optimisation import Verdict, Wish
-from explorer.app.optimising import CancelRun, EndRun, SetWish, StartRun
-from explorer.app.path_actions import Advance, Play, SetPathTime, WatchModes
-from explorer.app.presses import Press
-from explorer.app.session import REDO, UNDO
-from explorer.app.singular_actions import GoToSingularity, GoToStratum, Jog
-from explorer.app.state import Joints, State, opened
-from explorer.app.study_actions import BrushAxis, OpenStudy
-from explorer.design import VARIABLES
-from explorer.design_file import PRESETS
+from explorer.app.state.optimisation import SearchResult, Wish
+from explorer.app.state.presses import Press
+from explorer.app.state.state import Joints, State, opened
 from explorer.errors import ExplorerError, InputError
-from explorer.pose import Pose
+from explorer.mechanism.design import VARIABLES
+from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.pose import Pose
 
 OPTIMAL, OTHER = PRESETS["paper-optimal"], PRESETS["paper-initial"]
 
@@ -212,7 +211,7 @@ def test_a_search_is_one_step_and_nothing_is_undone_while_it_goes_on() -> None:
     view = replace(state.view, labels=False)
     history, state = done(history, state, SetView(view), "view", 3.0)
     history, state = done(history, state, CancelRun(), "start", 4.0)
-    verdict = Verdict("cancelled", "cancelled before the first iterate")
+    verdict = SearchResult("cancelled", "cancelled before the first iterate")
     history, state = done(history, state, EndRun(1, verdict), "optimiser", 5.0)
     assert len(history.steps) == 3
     after = restored(history.moved(-1).step, state)

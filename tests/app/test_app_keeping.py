@@ -6,18 +6,17 @@ from pathlib import Path
 
 import pytest
 from desk import Desk
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
-from explorer.app.actions import SetName, SetPosition, SetUnit
-from explorer.app.gestures import ByHand
-from explorer.app.history import History, begun, document
-from explorer.app.keeping import MOST_KEPT, Keeper, document_of, history_of, take_up
-from explorer.app.optimising import StartRun
-from explorer.app.session import REDO, UNDO, Session
-from explorer.app.state import State, opened
+from explorer.app.features.optimise.actions import StartRun
+from explorer.app.session.gestures import ByHand
+from explorer.app.session.history import History, begun, document
+from explorer.app.session.session import REDO, UNDO, Session
+from explorer.app.state.actions import SetName, SetPosition, SetUnit
+from explorer.app.state.state import State, opened
 from explorer.app.storage.autosave import Autosave
-from explorer.design_file import PRESETS
+from explorer.app.storage.keeping import MOST_KEPT, Keeper, document_of, history_of, take_up
+from explorer.mechanism.design_file import PRESETS
 
 OPTIMAL = PRESETS["paper-optimal"]
 

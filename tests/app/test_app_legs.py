@@ -12,28 +12,29 @@ import pytest
 import viser
 from desk import Desk, number, rows_of, thick
 
-from explorer.app.actions import SetPose, SetPosition, SetView
-from explorer.app.assigning import Update
-from explorer.app.colours import OUTLINE, SWEPT, TUBE
-from explorer.app.gestures import ByHand
-from explorer.app.jobs import Worker
-from explorer.app.panels.design import DesignPanel
-from explorer.app.panels.html import BEYOND, WITHIN
-from explorer.app.panels.legs import LegsPanel, clearance_table, move_table
-from explorer.app.panels.ranges import radius_span
-from explorer.app.scene.clearance import ClearanceScene
-from explorer.app.scene.legs import Legs
+from explorer.app.features.legs.clearance import ClearanceScene
+from explorer.app.features.legs.panel import LegsPanel, clearance_table, move_table
+from explorer.app.features.legs.swept import SweptTetrahedra
+from explorer.app.features.mechanism.design_panel import DesignPanel
+from explorer.app.features.mechanism.legs import Legs
+from explorer.app.features.workspace.feed import RadiusFeed
 from explorer.app.scene.placing import Placed
-from explorer.app.scene.swept import SweptTetrahedra
-from explorer.app.state import Frame, State, opened
-from explorer.app.workspace_feed import RadiusFeed
-from explorer.clearance import PAIRS, leg_axes, leg_clearances
-from explorer.design import Design
-from explorer.design_file import PRESETS
-from explorer.interference import step_overlaps, swept_tetrahedra
-from explorer.moves import move_clearance
-from explorer.number_text import scientific
-from explorer.pose import Pose
+from explorer.app.session.gestures import ByHand
+from explorer.app.session.jobs import Worker
+from explorer.app.state.actions import SetPose, SetPosition, SetView
+from explorer.app.state.frame import Frame
+from explorer.app.state.state import State, opened
+from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.colours import OUTLINE, SWEPT, TUBE
+from explorer.app.widgets.markup import BEYOND, WITHIN
+from explorer.app.widgets.ranges import radius_span
+from explorer.legs.clearance import PAIRS, leg_axes, leg_clearances
+from explorer.legs.interference import step_overlaps, swept_tetrahedra
+from explorer.legs.moves import move_clearance
+from explorer.mechanism.design import Design
+from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.pose import Pose
+from explorer.numerics.number_text import scientific
 
 OPTIMAL = PRESETS["paper-optimal"]
 # Started when it is first needed, and so never.

@@ -11,14 +11,14 @@ import weakref
 
 import pytest
 
-from explorer.app import memory
-from explorer.app.memory import keep_for_good
-from explorer.compiled import warm_in_background
+from explorer.app.session import memory
+from explorer.app.session.memory import keep_for_good
+from explorer.numerics.compiled import warm_in_background
 
 # Prints how many arenas there are once many threads have had memory of their own.
 COUNT = """
 import ctypes, sys, tempfile, threading
-from explorer.app.memory import limit_arenas
+from explorer.app.session.memory import limit_arenas
 if sys.argv[1] == "few":
     assert limit_arenas()
 everybody = threading.Barrier(16)
@@ -41,7 +41,7 @@ with tempfile.NamedTemporaryFile() as told:
 # Prints how many bytes the process has less once what it freed is given back.
 RETURN = """
 import psutil
-from explorer.app.memory import give_back
+from explorer.app.session.memory import give_back
 size = lambda: psutil.Process().memory_info().rss
 # Too small to be mapped one by one; those that stay lie between those that go.
 kept = [bytearray(3000) for _ in range(70_000)][::70]

@@ -15,8 +15,36 @@ import pytest
 import viser
 from desk import number, rows_of
 
-from explorer.app import optimiser
-from explorer.app.actions import (
+from explorer.app.features.optimise import runner as optimiser
+from explorer.app.features.optimise.actions import (
+    Accept,
+    Advance,
+    CancelRun,
+    EndRun,
+    LiftBox,
+    Revert,
+    SetWish,
+    StartRun,
+    TakePaperBox,
+)
+from explorer.app.features.optimise.panel import OptimisePanel
+from explorer.app.features.optimise.plots import curves_of, data_of
+from explorer.app.features.optimise.problem import (
+    box_within,
+    problem_of,
+    wished_box,
+    wished_reach,
+    wished_volume,
+)
+from explorer.app.features.optimise.runner import Optimiser
+from explorer.app.features.optimise.scene import FARTHEST, box_shown, edges_of, single
+from explorer.app.features.optimise.tasks import compare, optimise
+from explorer.app.features.optimise.words import comparison_table, verdict_words
+from explorer.app.session.session import UNDO, Session
+from explorer.app.session.step_words import words
+from explorer.app.session.tasks import export_report
+from explorer.app.session.worker import Line
+from explorer.app.state.actions import (
     Action,
     Open,
     Reset,
@@ -28,54 +56,25 @@ from explorer.app.actions import (
     SetVariable,
     SetView,
 )
-from explorer.app.assigning import Assigner
-from explorer.app.optimisation import (
-    PLACE,
-    Run,
-    Wish,
-    box_within,
-    problem_of,
-    wished_box,
-    wished_reach,
-    wished_volume,
-)
-from explorer.app.optimise_tasks import compare, optimise
-from explorer.app.optimiser import Optimiser
-from explorer.app.optimising import (
-    Accept,
-    Advance,
-    CancelRun,
-    EndRun,
-    LiftBox,
-    Revert,
-    SetWish,
-    StartRun,
-    TakePaperBox,
-)
-from explorer.app.panels.optimise import OptimisePanel
-from explorer.app.panels.optimise_plots import curves_of, data_of
-from explorer.app.panels.optimise_words import comparison_table, verdict_words
-from explorer.app.scene.required_box import FARTHEST, box_shown, edges_of, single
-from explorer.app.session import UNDO, Session
-from explorer.app.state import Frame, State, opened
-from explorer.app.step_words import words
-from explorer.app.tasks import export_report
-from explorer.app.worker import Line
-from explorer.compiled import warm
-from explorer.constraints import constraints, slacks
-from explorer.design import VARIABLES, Swing
-from explorer.design_file import PRESETS
+from explorer.app.state.frame import Frame
+from explorer.app.state.optimisation import PLACE, Wish
+from explorer.app.state.state import Run, State, opened
+from explorer.app.widgets.assigning import Assigner
 from explorer.errors import InputError
-from explorer.home import home_pose
-from explorer.optimise.demands import corners_of
+from explorer.mechanism.design import VARIABLES, Swing
+from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.home import home_pose
+from explorer.mechanism.pose import Pose
+from explorer.numerics.compiled import warm
 from explorer.optimise.findings import paper_start
 from explorer.optimise.outcome import Iterate
 from explorer.optimise.problem import YAW
 from explorer.optimise.record import decode_record, encode_record, record_of
+from explorer.optimise.search.demands import corners_of
+from explorer.optimise.search.trail import Trail
 from explorer.optimise.solver import optimise_design
-from explorer.optimise.trail import Trail
-from explorer.pose import Pose
-from explorer.workspace import workspace_volume
+from explorer.workspace.limits.constraints import constraints, slacks
+from explorer.workspace.slices.volume import workspace_volume
 
 OPTIMAL = PRESETS["paper-optimal"]
 PATIENCE = 240.0
@@ -731,7 +730,7 @@ def test_a_design_without_a_home_of_its_own_keeps_its_pose_where_its_box_is_lift
 
 
 def test_a_search_that_the_box_kept_from_its_volume_offers_to_lift_it(bench: Bench) -> None:
-    verdict = optimiser.Verdict("infeasible", "the box is too small", holding="box")
+    verdict = optimiser.SearchResult("infeasible", "the box is too small", holding="box")
     state = bench.do(Open(INITIAL), SetWish(Wish(volume=2400.0)))
     run = run_of(StartRun().apply(state))
     best = told_by(run.problem)[0]

@@ -14,10 +14,7 @@ import pytest
 import viser
 from desk import Desk
 
-from explorer.app.actions import SetLimits, SetPose, SetPosition, SetVariable
-from explorer.app.panels.margin_plot import columns_of, crossing_time, path_words
-from explorer.app.panels.paths import PathsPanel, ends_table, plan_words
-from explorer.app.path_actions import (
+from explorer.app.features.paths.actions import (
     Advance,
     CancelPlan,
     ChooseModes,
@@ -30,20 +27,24 @@ from explorer.app.path_actions import (
     WatchModes,
     chosen_modes,
 )
-from explorer.app.path_runner import DIED, PathRunner
-from explorer.app.path_tasks import plan
-from explorer.app.paths import MODES_SECONDS, Journey
-from explorer.app.scene.path import PathScene
+from explorer.app.features.paths.margin_plot import columns_of, crossing_time, path_words
+from explorer.app.features.paths.panel import PathsPanel, ends_table, plan_words
+from explorer.app.features.paths.runner import DIED, PathRunner
+from explorer.app.features.paths.scene import PathScene
+from explorer.app.features.paths.tasks import plan
 from explorer.app.scene.placing import Placed
-from explorer.app.session import Session
-from explorer.app.state import Frame, State, joints_of, opened
-from explorer.design_file import PRESETS
+from explorer.app.session.session import Session
+from explorer.app.state.actions import SetLimits, SetPose, SetPosition, SetVariable
+from explorer.app.state.frame import Frame
+from explorer.app.state.paths import MODES_SECONDS, Journey
+from explorer.app.state.state import State, joints_of, opened
 from explorer.errors import ExplorerError, InputError
-from explorer.kinematics import forward
-from explorer.pose import Pose
-from explorer.radii import with_radius
-from explorer.singularity import margins, mode_of
-from explorer.validity import poses_are_valid
+from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.kinematics import forward
+from explorer.mechanism.margins import margins, mode_of
+from explorer.mechanism.pose import Pose
+from explorer.workspace.accessible.radii import with_radius
+from explorer.workspace.limits.valid_poses import poses_are_valid
 
 OPTIMAL = PRESETS["paper-optimal"]
 TILTED = Pose.of_yaw_pitch_roll((10.0, 5.0, 9.0), (-73.1, 12.0, 9.0))

@@ -10,10 +10,10 @@ from typing import Any
 import pytest
 from socket_tab import SocketTab
 
-from explorer.app import gestures
-from explorer.app.presses import LATE_SECONDS, MOST_PRESSES, Press, Presses
 from explorer.app.server import Running, start
-from explorer.design_file import PRESETS
+from explorer.app.session import gestures
+from explorer.app.state.presses import LATE_SECONDS, MOST_PRESSES, Press, Presses
+from explorer.mechanism.design_file import PRESETS
 
 PATIENCE = 30.0
 

@@ -14,13 +14,9 @@ import viser
 from desk import Desk, number, rows_of, thick
 from test_app_drawing import closed_volume
 
-from explorer.app import tasks
-from explorer.app.actions import SetPose, SetPosition, SetUnit, SetVariable, SetView
-from explorer.app.assigning import Assigner, Update
-from explorer.app.colours import OUTLINE
-from explorer.app.creases import creased
-from explorer.app.jobs import Worker
-from explorer.app.panels.prototype import (
+from explorer.app.features.mechanism.legs import Legs
+from explorer.app.features.prototype.feed import PartsFeed
+from explorer.app.features.prototype.panel import (
     PROTOTYPE,
     SCHEMATIC,
     STEP,
@@ -29,21 +25,26 @@ from explorer.app.panels.prototype import (
     parts_table,
     trouble_of,
 )
-from explorer.app.parts import Parts, PartsRequest, parts_drawing
-from explorer.app.parts_feed import PartsFeed
-from explorer.app.parts_list import Bar, stock_of
-from explorer.app.prototype_view import ALUMINIUM, PrototypeView
+from explorer.app.features.prototype.parts import Parts, PartsRequest, parts_drawing
+from explorer.app.features.prototype.parts_list import Bar, stock_of
+from explorer.app.features.prototype.scene import PrototypeScene, part_corners, shown_places
 from explorer.app.scene.bodies import Bodies
 from explorer.app.scene.camera import outermost_points
-from explorer.app.scene.legs import Legs
+from explorer.app.scene.creases import creased
 from explorer.app.scene.placing import Placed
-from explorer.app.scene.prototype import PrototypeScene, part_corners, shown_places
 from explorer.app.scene.shapes import cylinder
-from explorer.app.state import Frame, State, opened
-from explorer.design_file import PRESETS
+from explorer.app.session import tasks
+from explorer.app.session.jobs import Worker
+from explorer.app.state.actions import SetPose, SetPosition, SetUnit, SetVariable, SetView
+from explorer.app.state.frame import Frame
+from explorer.app.state.state import State, opened
+from explorer.app.state.view import ALUMINIUM, PrototypeView
+from explorer.app.widgets.assigning import Assigner, Update
+from explorer.app.widgets.colours import OUTLINE
 from explorer.errors import InputError, MissingExtraError
 from explorer.export.assembly import FORMATS, assembly_bytes
-from explorer.pose import Pose
+from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.pose import Pose
 from explorer.prototype.assembly import make_prototype
 from explorer.prototype.bill import bill_of_materials
 from explorer.prototype.chains import LEGS, ON_GUIDE, Places

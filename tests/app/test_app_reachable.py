@@ -13,38 +13,39 @@ import numpy as np
 import pytest
 import viser
 from desk import Desk, number, rows_of, thick
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from PIL import Image
 
-from explorer.app import reached, tasks
-from explorer.app.actions import GoHome, SetLimits, SetPosition, SetVariable, SetView
-from explorer.app.assigning import Assigner, Update
-from explorer.app.bands import COLLIDING, PLAIN
-from explorer.app.panels.legs import LegsPanel
-from explorer.app.panels.radius_plot import chart_of, common_radius, radius_words, volume_at
-from explorer.app.panels.workspace import FORMATS, WorkspacePanel
-from explorer.app.panels.workspace_numbers import workspace_summary
-from explorer.app.state import Frame, State, opened
-from explorer.app.tasks import (
+from explorer.app.features.legs.panel import LegsPanel
+from explorer.app.features.legs.radius_plot import chart_of, common_radius, radius_words, volume_at
+from explorer.app.features.workspace import reached
+from explorer.app.features.workspace.feed import RadiusFeed, WorkspaceFeed
+from explorer.app.features.workspace.numbers import workspace_summary
+from explorer.app.features.workspace.panel import FORMATS, WorkspacePanel
+from explorer.app.scene.bands import COLLIDING, PLAIN
+from explorer.app.session import tasks
+from explorer.app.session.tasks import (
     WorkspaceDrawing,
     draw_radius_curve,
     draw_workspace,
     export_mesh,
     exported_name,
 )
-from explorer.app.workspace_feed import RadiusFeed, WorkspaceFeed
-from explorer.arrays import FloatArray
-from explorer.clearance import PAIRS, leg_clearances
-from explorer.compiled import warm
-from explorer.constraints import constraints, slacks
-from explorer.design_file import PRESETS
+from explorer.app.state.actions import GoHome, SetLimits, SetPosition, SetVariable, SetView
+from explorer.app.state.frame import Frame
+from explorer.app.state.state import State, opened
+from explorer.app.widgets.assigning import Assigner, Update
 from explorer.errors import InputError, MissingExtraError
 from explorer.export.step import workspace_step
-from explorer.least_clearance import least_clearances
-from explorer.radii import RadiusCurve, radius_curve
-from explorer.reachable import reachable_workspace
-from explorer.start import StartError, check_start
+from explorer.legs.clearance import PAIRS, leg_clearances
+from explorer.mechanism.design_file import PRESETS
+from explorer.numerics.arrays import FloatArray
+from explorer.numerics.compiled import warm
+from explorer.workspace.accessible.radii import RadiusCurve, radius_curve
+from explorer.workspace.accessible.start import StartError, check_start
+from explorer.workspace.accessible.workspace import reachable_workspace
+from explorer.workspace.least_clearance import least_clearances
+from explorer.workspace.limits.constraints import constraints, slacks
 
 OPTIMAL = PRESETS["paper-optimal"]
 RADIUS = 0.2

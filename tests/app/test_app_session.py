@@ -9,11 +9,12 @@ from contextlib import contextmanager
 
 import pytest
 
-from explorer.app.actions import Action, SetJoint, SetPosition, SetVariable
-from explorer.app.jobs import LatestWins
-from explorer.app.session import Session
-from explorer.app.state import Frame, State, opened
-from explorer.design_file import PRESETS
+from explorer.app.session.jobs import LatestWins
+from explorer.app.session.session import Session
+from explorer.app.state.actions import Action, SetJoint, SetPosition, SetVariable
+from explorer.app.state.frame import Frame
+from explorer.app.state.state import State, opened
+from explorer.mechanism.design_file import PRESETS
 
 
 class Watched:

@@ -16,18 +16,13 @@ import msgspec
 import numpy as np
 import pytest
 import zstandard
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from numpy.testing import assert_allclose
 
-from explorer import JOINTS, VARIABLES, forward, rotation_from_quaternion
-from explorer import margins as margins_of
-from explorer.app.actions import Open, SetMode, SetPosition, SetUnit, SetVariable, SetView
-from explorer.app.scene_html import Eye, caption_of, scene_html, shown
-from explorer.app.server import Running, start
-from explorer.app.session_log import SessionLog
-from explorer.app.state import State, View, opened
-from explorer.app.view_picture import (
+from explorer import JOINTS, VARIABLES, forward, margins as margins_of, rotation_from_quaternion
+from explorer.app.features.sharing.scene_html import Eye, caption_of, scene_html, shown
+from explorer.app.features.sharing.session_log import SessionLog
+from explorer.app.features.sharing.view_picture import (
     ALIKE,
     LEAST,
     MOST,
@@ -37,9 +32,13 @@ from explorer.app.view_picture import (
     encoded,
     on_background,
 )
-from explorer.design_file import PRESETS
+from explorer.app.server import Running, start
+from explorer.app.state.actions import Open, SetMode, SetPosition, SetUnit, SetVariable, SetView
+from explorer.app.state.state import State, opened
+from explorer.app.state.view import View
 from explorer.errors import InputError
 from explorer.export.session_log import COLUMNS, SessionTable, session_csv
+from explorer.mechanism.design_file import PRESETS
 
 OPTIMAL = PRESETS["paper-optimal"]
 DATE = dt.date(2031, 2, 3)

@@ -13,11 +13,17 @@ import pytest
 import viser
 from desk import Desk, number, rows_of
 
-from explorer.app.actions import GoHome, Open, SetPose, SetPosition
-from explorer.app.assigning import Update
-from explorer.app.jobs import Worker
-from explorer.app.panels.distance import DistancePanel, distance_table
-from explorer.app.panels.jog import (
+from explorer.app.browser.viser_gaps import element_id
+from explorer.app.features.singularity.actions import (
+    GoToSingularity,
+    GoToStratum,
+    Jog,
+    SetSingularView,
+    name_of,
+)
+from explorer.app.features.singularity.distance import DistancePanel, distance_table
+from explorer.app.features.singularity.feed import StrataFeed
+from explorer.app.features.singularity.jog_panel import (
     JogPanel,
     in_shown_units,
     jog_amount,
@@ -25,36 +31,32 @@ from explorer.app.panels.jog import (
     travel_marks,
     travel_table,
 )
-from explorer.app.panels.performance import performance_table
-from explorer.app.panels.ranges import coordinate_span
-from explorer.app.panels.singularity import SingularityPanel, summary
-from explorer.app.panels.strata import StrataPanel, distances_of, neighbours
-from explorer.app.scene.jog import JogScene, drawn_motion, shown_motions
+from explorer.app.features.singularity.jog_scene import JogScene, drawn_motion, shown_motions
+from explorer.app.features.singularity.panel import SingularityPanel, summary
+from explorer.app.features.singularity.performance import performance_table
+from explorer.app.features.singularity.scene import LONGEST, BallScene, EllipsoidScene, NearestGhost
+from explorer.app.features.singularity.strata import StrataPanel, distances_of, neighbours
 from explorer.app.scene.placing import Placed
-from explorer.app.scene.singular import LONGEST, BallScene, EllipsoidScene, NearestGhost
-from explorer.app.singular_actions import (
-    GoToSingularity,
-    GoToStratum,
-    Jog,
-    SetSingularView,
-    name_of,
-)
-from explorer.app.singular_view import SingularView
-from explorer.app.state import Frame, State, opened
-from explorer.app.strata_feed import StrataFeed
-from explorer.app.tasks import StrataRequest, strata_distances
-from explorer.app.viser_gaps import element_id
-from explorer.bruhat import COVERED, OF_INCIDENCES, WORDS, conditions, incidences
-from explorer.design_file import PRESETS
-from explorer.displacement import displacement
+from explorer.app.session.jobs import Worker
+from explorer.app.session.tasks import StrataRequest, strata_distances
+from explorer.app.state.actions import GoHome, Open, SetPose, SetPosition
+from explorer.app.state.frame import Frame
+from explorer.app.state.state import State, opened
+from explorer.app.state.view import SingularView
+from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.ranges import coordinate_span
 from explorer.errors import InputError
-from explorer.kinematics import attachment_points
-from explorer.nearest_singular import nearest_singularities
-from explorer.nearest_stratum import nearest_in_stratum
-from explorer.pose import Pose
-from explorer.singularity import INCIDENCES, jacobian, margins
-from explorer.strata import GENERIC, STRATA
-from explorer.uncoupled import UNCOUPLED
+from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.displacement import displacement
+from explorer.mechanism.kinematics import attachment_points
+from explorer.mechanism.margins import INCIDENCES, margins
+from explorer.mechanism.pose import Pose
+from explorer.singularity.bruhat import COVERED, OF_INCIDENCES, WORDS, conditions, incidences
+from explorer.singularity.jacobian import jacobian
+from explorer.singularity.nearest import nearest_singularities
+from explorer.singularity.nearest_stratum import nearest_in_stratum
+from explorer.singularity.strata import GENERIC, STRATA
+from explorer.singularity.uncoupled import UNCOUPLED
 
 OPTIMAL = PRESETS["paper-optimal"]
 # Started when it is first needed, and so never.

@@ -8,10 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
-from explorer.app.actions import (
+from explorer.app.state.actions import (
     Action,
     GoHome,
     Open,
@@ -28,12 +27,13 @@ from explorer.app.actions import (
     SetView,
     UseNearest,
 )
-from explorer.app.state import Frame, State, joints_of, mode_at, opened
-from explorer.design import JOINTS, LENGTHS, VARIABLES, Limits
-from explorer.design_file import PRESETS
+from explorer.app.state.frame import Frame
+from explorer.app.state.state import State, joints_of, mode_at, opened
 from explorer.errors import DesignError, ExplorerError, InputError
-from explorer.kinematics import forward
-from explorer.pose import Pose
+from explorer.mechanism.design import JOINTS, LENGTHS, VARIABLES, Limits
+from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.kinematics import forward
+from explorer.mechanism.pose import Pose
 
 OPTIMAL = PRESETS["paper-optimal"]
 

@@ -14,14 +14,14 @@ from pathlib import Path
 
 import pytest
 
-from explorer.app.actions import SetPosition
-from explorer.app.state import opened
+from explorer.app.state.actions import SetPosition
+from explorer.app.state.state import opened
 from explorer.app.storage.autosave import MOST_ORPHANS, Autosave
 from explorer.app.storage.autosaver import Autosaver
 from explorer.app.storage.document import Document, decode_header, encode_document
 from explorer.app.storage.folder import alone_in, data_folder, taken
-from explorer.design_file import PRESETS
 from explorer.errors import StorageError
+from explorer.mechanism.design_file import PRESETS
 
 HERE = Path(__file__).parent
 NEVER = 1e6
@@ -344,11 +344,11 @@ FULL = """
 import json, resource, sys
 from dataclasses import replace
 from pathlib import Path
-from explorer.app.state import opened
+from explorer.app.state.state import opened
 from explorer.app.storage.autosave import Autosave
 from explorer.app.storage.autosaver import Autosaver
 from explorer.app.storage.document import Document
-from explorer.design_file import PRESETS
+from explorer.mechanism.design_file import PRESETS
 
 folder, told, seen = Path(sys.argv[1]), [], []
 state = opened(PRESETS["paper-optimal"])

@@ -11,15 +11,14 @@ from typing import Any, cast
 
 import msgspec
 import pytest
-from hypothesis import example, given
-from hypothesis import strategies as st
+from hypothesis import example, given, strategies as st
 from keepsakes import OPTIMAL, Doing, doings, done, iterates_of, rich_state
 
-from explorer.app.actions import SetPose, SetPosition
-from explorer.app.compared import Compared
-from explorer.app.optimisation import Run
-from explorer.app.optimising import Accept, Advance, Revert, StartRun
-from explorer.app.state import State, opened
+from explorer.app.features.optimise.actions import Accept, Advance, Revert, StartRun
+from explorer.app.state.actions import SetPose, SetPosition
+from explorer.app.state.compared import Compared
+from explorer.app.state.state import Run, State, opened
+from explorer.app.state.studies import Studies
 from explorer.app.storage import document as module
 from explorer.app.storage.document import (
     MOST_BYTES,
@@ -33,10 +32,9 @@ from explorer.app.storage.document import (
     shortened,
 )
 from explorer.app.storage.saved import restored, saved
-from explorer.app.studies import Studies
-from explorer.design_file import MIGRATIONS
 from explorer.errors import StorageError
-from explorer.pose import Pose
+from explorer.mechanism.design_file import MIGRATIONS
+from explorer.mechanism.pose import Pose
 
 OLDEST = Path(__file__).parents[1] / "data" / "session-1.json"
 """A rich state as the first schema wrote it, with the steps of a short history."""

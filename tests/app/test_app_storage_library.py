@@ -12,14 +12,13 @@ from typing import Any
 
 import msgspec
 import pytest
-from hypothesis import example, given, settings
-from hypothesis import strategies as st
+from hypothesis import example, given, settings, strategies as st
 
 from explorer.app.storage.folder import alone_in
 from explorer.app.storage.library import MOST_DELETED, Entry, Library, copy_name, file_of
-from explorer.design import Design
-from explorer.design_file import PRESETS, decode_design, encode_design
 from explorer.errors import InputError, StorageError
+from explorer.mechanism.design import Design
+from explorer.mechanism.design_file import PRESETS, decode_design, encode_design
 
 OPTIMAL = PRESETS["paper-optimal"]
 

@@ -18,16 +18,9 @@ import msgspec
 import numpy as np
 import pytest
 from desk import Desk
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
-from explorer.app.actions import SetVariable
-from explorer.app.panels.study_words import legend, status
-from explorer.app.plot_events import LONGEST_LINE, Boxed, Brushed, Picked, event_of
-from explorer.app.session import UNDO
-from explorer.app.state import Frame, State, opened
-from explorer.app.studies import Brush, Studies, StudyWish, range_around, study_around, within
-from explorer.app.study_actions import (
+from explorer.app.features.studies.actions import (
     MOST_RANGES,
     BrushAxis,
     BrushBox,
@@ -36,14 +29,21 @@ from explorer.app.study_actions import (
     PickDesign,
     SetStudyWish,
 )
-from explorer.app.study_feed import Request, StudyDrawing, StudyFeed, reasons
-from explorer.app.study_figures import PAPER, packed, parallel, scatter
-from explorer.app.study_folders import StudyFolders, check_given, keep_study, study_in
-from explorer.app.study_runner import StudyRunner
-from explorer.app.study_shown import Shown, default_axes, shown, thinned
-from explorer.design import VARIABLES, Design
-from explorer.design_file import PRESETS
+from explorer.app.features.studies.feed import Request, StudyDrawing, StudyFeed, reasons
+from explorer.app.features.studies.figures import PAPER, packed, parallel, scatter
+from explorer.app.features.studies.folders import StudyFolders, check_given, keep_study, study_in
+from explorer.app.features.studies.plot_events import LONGEST_LINE, Boxed, Brushed, Picked, event_of
+from explorer.app.features.studies.runner import StudyRunner
+from explorer.app.features.studies.shown import Shown, default_axes, shown, thinned
+from explorer.app.features.studies.words import legend, status
+from explorer.app.session.session import UNDO
+from explorer.app.state.actions import SetVariable
+from explorer.app.state.frame import Frame
+from explorer.app.state.state import State, opened
+from explorer.app.state.studies import Brush, Studies, StudyWish, range_around, study_around, within
 from explorer.errors import InputError
+from explorer.mechanism.design import VARIABLES, Design
+from explorer.mechanism.design_file import PRESETS
 from explorer.sweep.measures import MEASURES
 from explorer.sweep.parts import part_paths, write_part
 from explorer.sweep.results import Results, load_results

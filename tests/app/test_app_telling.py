@@ -13,9 +13,9 @@ from typing import Any
 
 import pytest
 
-from explorer.app import jobs
-from explorer.app.jobs import RESTARTED, Worker
-from explorer.app.worker import CANCELLED
+from explorer.app.session import jobs
+from explorer.app.session.jobs import RESTARTED, Worker
+from explorer.app.session.worker import CANCELLED
 
 ROOT = Path(__file__).resolve().parents[2]
 TASKS = "tests.app.telling"
@@ -237,7 +237,7 @@ def test_work_that_kills_its_process_is_tried_twice(
 def test_no_process_is_left_when_the_parent_is_gone() -> None:
     code = f"""
 import os, sys
-from explorer.app.jobs import Worker
+from explorer.app.session.jobs import Worker
 worker = Worker(print, tasks={TASKS!r})
 def told(value):
     if value == 5:

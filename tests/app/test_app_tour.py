@@ -12,16 +12,17 @@ import pytest
 import viser
 from desk import Desk
 
-from explorer.app.browser_facts import BrowserFacts, facts_of
+from explorer.app.browser.browser_facts import BrowserFacts, facts_of
+from explorer.app.features.help.tour import STEPS, Tour, begun
+from explorer.app.features.help.tour_panel import TourGuide, card_words
+from explorer.app.features.optimise.actions import StartRun
 from explorer.app.hands import is_narrow
-from explorer.app.optimising import StartRun
-from explorer.app.panels.tour import TourGuide, card_words
-from explorer.app.preferences import NAME, PreferenceFile, Preferences
-from explorer.app.state import Frame, State, opened
-from explorer.app.theme import BRAND, BRAND_ON_DARK, Theme
-from explorer.app.tour import STEPS, Tour, begun
-from explorer.design_file import PRESETS
+from explorer.app.state.frame import Frame
+from explorer.app.state.state import State, opened
+from explorer.app.storage.preferences import NAME, PreferenceFile, Preferences
+from explorer.app.widgets.theme import BRAND, BRAND_ON_DARK, Theme
 from explorer.errors import StorageError
+from explorer.mechanism.design_file import PRESETS
 
 IDS = {name: f"id-{name}" for name in ("Skip", "Back", "Show me", "Next")}
 OPENED = opened(PRESETS["paper-optimal"])

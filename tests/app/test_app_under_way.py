@@ -10,20 +10,28 @@ from typing import Any, cast
 import msgspec
 import pytest
 
-from explorer.app import workspace_feed
-from explorer.app.actions import SetLimits, SetVariable, SetView
-from explorer.app.jobs import Worker
-from explorer.app.panels.workspace_numbers import workspace_summary
-from explorer.app.reached import MOST_LIVE_NODES, Stage, reach_workspace
-from explorer.app.state import Frame, State, WorkspaceView, opened
-from explorer.app.tasks import RadiusRequest, WorkspaceRequest, draw_radius_curve, draw_workspace
-from explorer.app.worker import CancelledError, Line
-from explorer.app.workspace_feed import WorkspaceFeed
-from explorer.design import Design
-from explorer.design_file import PRESETS
-from explorer.home import home_pose
-from explorer.radii import with_radius
-from explorer.workspace import workspace_nodes
+from explorer.app.features.workspace import feed as workspace_feed
+from explorer.app.features.workspace.feed import WorkspaceFeed
+from explorer.app.features.workspace.numbers import workspace_summary
+from explorer.app.features.workspace.reached import MOST_LIVE_NODES, reach_workspace
+from explorer.app.session.feed import Stage
+from explorer.app.session.jobs import Worker
+from explorer.app.session.tasks import (
+    RadiusRequest,
+    WorkspaceRequest,
+    draw_radius_curve,
+    draw_workspace,
+)
+from explorer.app.session.worker import CancelledError, Line
+from explorer.app.state.actions import SetLimits, SetVariable, SetView
+from explorer.app.state.frame import Frame
+from explorer.app.state.state import State, opened
+from explorer.app.state.view import WorkspaceView
+from explorer.mechanism.design import Design
+from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.home import home_pose
+from explorer.workspace.accessible.radii import with_radius
+from explorer.workspace.slices.volume import workspace_nodes
 
 PATIENCE = 300.0
 THICK = with_radius(PRESETS["paper-optimal"], 0.3)

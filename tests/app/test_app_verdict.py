@@ -11,17 +11,18 @@ import pytest
 from hypothesis import given
 from strategies import Case, all_cases
 
-from explorer.app.colours import SINGULAR, WARNED, proximity_colour
-from explorer.app.panels.singularity import summary
-from explorer.app.singular_actions import GoToSingularity, Jog
-from explorer.app.state import Frame, opened
-from explorer.colours import WARN_SHARE, css
-from explorer.design import Design
-from explorer.design_file import PRESETS
-from explorer.pose import Pose
-from explorer.snapshot import evaluate
-from explorer.uncoupled import UNCOUPLED
-from explorer.verdict import DISTANCE_SHARE, TITLES, verdict
+from explorer.app.features.singularity.actions import GoToSingularity, Jog
+from explorer.app.features.singularity.panel import summary
+from explorer.app.state.frame import Frame
+from explorer.app.state.state import opened
+from explorer.app.widgets.colours import SINGULAR, WARNED, proximity_colour
+from explorer.measures.snapshot import evaluate
+from explorer.measures.verdict import DISTANCE_SHARE, TITLES, verdict
+from explorer.mechanism.design import Design
+from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.pose import Pose
+from explorer.singularity.colours import WARN_SHARE, css
+from explorer.singularity.uncoupled import UNCOUPLED
 
 OPTIMAL = PRESETS["paper-optimal"]
 ABOUT_PLATFORM_Z = next(

@@ -14,17 +14,18 @@ import msgspec
 import numpy as np
 import pytest
 
-from explorer.app.actions import SetLimits, SetVariable, SetView
-from explorer.app.bands import COLOURED_EDGE, MOST_COLOURED, split_at
-from explorer.app.jobs import RESTARTED, Worker
-from explorer.app.state import Frame, State, opened
-from explorer.app.tasks import WorkspaceDrawing, WorkspaceRequest, draw_workspace
-from explorer.app.workspace_feed import WorkspaceFeed
-from explorer.colours import BAND_EDGES, band_colours
-from explorer.design import Design, Limits
-from explorer.design_file import PRESETS
-from explorer.home import home_pose
-from explorer.workspace import workspace_volume
+from explorer.app.features.workspace.feed import WorkspaceFeed
+from explorer.app.scene.bands import COLOURED_EDGE, MOST_COLOURED, split_at
+from explorer.app.session.jobs import RESTARTED, Worker
+from explorer.app.session.tasks import WorkspaceDrawing, WorkspaceRequest, draw_workspace
+from explorer.app.state.actions import SetLimits, SetVariable, SetView
+from explorer.app.state.frame import Frame
+from explorer.app.state.state import State, opened
+from explorer.mechanism.design import Design, Limits
+from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.home import home_pose
+from explorer.singularity.colours import BAND_EDGES, band_colours
+from explorer.workspace.slices.volume import workspace_volume
 
 OPTIMAL = PRESETS["paper-optimal"]
 PATIENCE = 120.0

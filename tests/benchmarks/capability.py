@@ -8,8 +8,8 @@ from benchmarks.samples import DESIGN
 from benchmarks.table import Row, seconds, times
 from benchmarks.timing import best_of, elapsed
 from explorer import Pose, evaluate, home_pose
-from explorer.compiled import warm
-from explorer.orientations import orientation_capability, uniform_rotations
+from explorer.numerics.compiled import warm
+from explorer.workspace.orientations import orientation_capability, uniform_rotations
 
 ORIENTATIONS, ONE_BY_ONE = 100_000, 1_000
 

@@ -18,8 +18,8 @@ from benchmarks.ready_page import ready_page
 from benchmarks.socket_client import EVENTS_PER_SECOND
 from benchmarks.sweeps import sweep
 from benchmarks.table import Row, seconds
-from explorer.app.chromium import find_chromium
-from explorer.app.screenshot import CHROMIUM_FLAGS, SWIFTSHADER
+from explorer.app.browser.chromium import find_chromium
+from explorer.app.browser.headless import CHROMIUM_FLAGS, SWIFTSHADER
 from explorer.app.server import Running
 
 if TYPE_CHECKING:

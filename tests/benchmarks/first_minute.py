@@ -13,8 +13,8 @@ from pathlib import Path
 from benchmarks.processes import EXPLORER, fresh_home, run_to_end, served
 from benchmarks.table import Row, seconds
 from benchmarks.timing import elapsed
-from explorer.app.chromium import find_chromium
-from explorer.app.screenshot import headless_browser
+from explorer.app.browser.chromium import find_chromium
+from explorer.app.browser.headless import headless_browser
 
 RUNS = 5
 SEARCH = (
@@ -22,8 +22,9 @@ SEARCH = (
     *("--box", "0", "-12", "0", "20", "22", "18", "--clearance", "0.2"),
 )
 COMPILE_ALL = """
-import explorer.app.server, explorer.optimise.solver, explorer.planning, explorer.reachable
-from explorer.compiled import warm
+import explorer.app.server, explorer.optimise.solver, explorer.paths.planning
+import explorer.workspace.accessible.workspace
+from explorer.numerics.compiled import warm
 warm()
 """
 SIZE = (1440, 900)

@@ -12,8 +12,8 @@ import numpy as np
 from benchmarks.numeric_root import LoopEquations, nearby
 from benchmarks.table import Row, times
 from explorer import Design, forward
-from explorer.arrays import FloatArray
-from explorer.singularity import mode_of
+from explorer.mechanism.margins import mode_of
+from explorer.numerics.arrays import FloatArray
 
 CASES = Path(__file__).resolve().parents[1] / "data" / "kinematics.json"
 

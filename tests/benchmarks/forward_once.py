@@ -8,7 +8,7 @@ from benchmarks.samples import DESIGN, around_home, searches
 from benchmarks.table import Row, seconds, times
 from benchmarks.timing import best_of
 from explorer import forward
-from explorer.compiled import warm
+from explorer.numerics.compiled import warm
 
 CALLS = 500
 

@@ -12,8 +12,8 @@ from benchmarks.samples import DESIGN, SIZE, around_home
 from benchmarks.table import Row, per_second, seconds, times
 from benchmarks.timing import best_of
 from explorer import leg_clearances, moves_are_clear, tetrahedra_overlap
-from explorer.arrays import BoolArray, FloatArray
-from explorer.compiled import warm
+from explorer.numerics.arrays import BoolArray, FloatArray
+from explorer.numerics.compiled import warm
 
 PAIRS_COUNT = 200_000
 # Of the same pairs, as many as an object each for.

@@ -12,9 +12,9 @@ from benchmarks.samples import DESIGN, SIZE, around_home
 from benchmarks.table import Row, seconds, times
 from benchmarks.timing import best_of
 from explorer import Pose, nearest_singular_poses, nearest_singularities
-from explorer.compiled import warm
-from explorer.crossings import path_margins
-from explorer.nearest_stratum import nearest_in_strata
+from explorer.numerics.compiled import warm
+from explorer.paths.crossings import path_margins
+from explorer.singularity.nearest_stratum import nearest_in_strata
 
 CALLS, POSES, SEARCHES, MOVES = 200, 5_000, 10, 100
 # So many that the search, too, finds the nearest for nearly all poses.

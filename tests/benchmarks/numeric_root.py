@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import root
 
 from explorer import Design
-from explorer.arrays import FloatArray
+from explorer.numerics.arrays import FloatArray
 
 # Where the search starts: this far off, as a share of the size and in radians.
 OFF_BY = 0.02

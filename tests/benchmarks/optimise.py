@@ -14,9 +14,9 @@ import numpy as np
 from scipy import optimize
 
 from benchmarks.table import Row, seconds, times
-from explorer.arrays import BoolArray, FloatArray
-from explorer.compiled import warm
 from explorer.errors import DesignError
+from explorer.numerics.arrays import BoolArray, FloatArray
+from explorer.numerics.compiled import warm
 from explorer.optimise.defaults import make_problem
 from explorer.optimise.findings import (
     CLEARANCE,
@@ -25,10 +25,10 @@ from explorer.optimise.findings import (
     paper_problem,
     reach_problem,
 )
-from explorer.optimise.model import Evaluation, Model
 from explorer.optimise.problem import Problem
+from explorer.optimise.search.model import Evaluation, Model
+from explorer.optimise.search.starts import more_starts
 from explorer.optimise.solver import optimise_design
-from explorer.optimise.starts import more_starts
 
 ROUNDS = 5
 # The other solvers end once they have what ours has, or after this many evaluations.

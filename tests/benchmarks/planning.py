@@ -16,9 +16,9 @@ from benchmarks.samples import DESIGN
 from benchmarks.table import Row, seconds, times
 from benchmarks.timing import Spread, elapsed
 from explorer import Pose, evaluate
-from explorer.compiled import warm
-from explorer.planning import NoPathError, plan_path
-from explorer.validity import poses_are_valid
+from explorer.numerics.compiled import warm
+from explorer.paths.planning import NoPathError, plan_path
+from explorer.workspace.limits.valid_poses import poses_are_valid
 
 PATHS, PLAIN, SECONDS = 100, 10, 2.0
 RADIUS = 0.2

@@ -12,13 +12,14 @@ from benchmarks.ready_page import ready_page
 from benchmarks.samples import DESIGN
 from benchmarks.table import Row, seconds
 from benchmarks.timing import Spread
-from explorer.app.actions import SetPosition, SetVariable, SetView
-from explorer.app.assigning import Assigner
-from explorer.app.prototype_view import PrototypeView
+from explorer.app.features.prototype.scene import PrototypeScene
 from explorer.app.scene.placing import Placed
-from explorer.app.scene.prototype import PrototypeScene
 from explorer.app.server import Running
-from explorer.app.state import Frame, State
+from explorer.app.state.actions import SetPosition, SetVariable, SetView
+from explorer.app.state.frame import Frame
+from explorer.app.state.state import State
+from explorer.app.state.view import PrototypeView
+from explorer.app.widgets.assigning import Assigner
 
 CHANGES, MOVES, WARM_UP = 60, 300, 10
 

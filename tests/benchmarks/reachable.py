@@ -12,13 +12,13 @@ from scipy.spatial.transform import Rotation
 from benchmarks.table import Row, seconds, times
 from benchmarks.timing import best_of
 from explorer import PRESETS, radius_curve, reachable_workspace
-from explorer.arrays import FloatArray
-from explorer.clearance import PAIRS, leg_axes
-from explorer.compiled import warm
-from explorer.constraints import constraints, slacks
-from explorer.radii import with_radius
-from explorer.reachable_nodes import middles_over, survey
-from explorer.workspace import home_rotation
+from explorer.legs.clearance import PAIRS, leg_axes
+from explorer.numerics.arrays import FloatArray
+from explorer.numerics.compiled import warm
+from explorer.workspace.accessible.nodes import middles_over, survey
+from explorer.workspace.accessible.radii import with_radius
+from explorer.workspace.limits.constraints import constraints, slacks
+from explorer.workspace.slices.volume import home_rotation
 
 DESIGN = PRESETS["paper-optimal"]
 NODES = 40

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from explorer import PRESETS
-from explorer.app.memory import keep_for_good
 from explorer.app.server import Running, start
-from explorer.compiled import warm
-from explorer.design import Design
+from explorer.app.session.memory import keep_for_good
+from explorer.mechanism.design import Design
+from explorer.numerics.compiled import warm
 
 
 def ready_page(design: Design = PRESETS["paper-optimal"]) -> Running:

@@ -13,9 +13,9 @@ from benchmarks.processes import EXPLORER, run_to_end
 from benchmarks.samples import DESIGN
 from benchmarks.table import Row, seconds
 from benchmarks.timing import best_of, elapsed
-from explorer.app.reporting import make_report
-from explorer.design_file import encode_design
-from explorer.radii import with_radius
+from explorer.app.features.sharing.reporting import make_report
+from explorer.mechanism.design_file import encode_design
+from explorer.workspace.accessible.radii import with_radius
 
 RUNS = 3
 # What tells the same figures, one by one, and one picture.

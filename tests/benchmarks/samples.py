@@ -10,7 +10,7 @@ import numpy as np
 from benchmarks.numeric_root import LoopEquations, nearby, turned
 from benchmarks.timing import best_of
 from explorer import PRESETS, home_pose, inverse
-from explorer.arrays import FloatArray
+from explorer.numerics.arrays import FloatArray
 
 DESIGN = PRESETS["paper-optimal"]
 SIZE = max(map(abs, DESIGN.variables))

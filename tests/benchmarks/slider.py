@@ -21,12 +21,12 @@ from benchmarks.sweeps import sweep
 from benchmarks.table import Row, seconds
 from benchmarks.timing import Spread
 from explorer import Pose
-from explorer.app.actions import Reset
-from explorer.app.assigning import Assigner, Update
-from explorer.app.panels.move import JOINT_LABELS
+from explorer.app.features.mechanism.pose_panel import JOINT_LABELS
 from explorer.app.scene.placing import scene_scale
 from explorer.app.server import Running
-from explorer.app.state import State
+from explorer.app.state.actions import Reset
+from explorer.app.state.state import State
+from explorer.app.widgets.assigning import Assigner, Update
 
 ROUNDS, EVENTS, WARM_UP_EVENTS = 3, 100, 20
 

@@ -22,7 +22,7 @@ from client import CAMERA, PROTOCOL
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.typing import Origin
 
-from explorer.pose import Pose, Triple
+from explorer.mechanism.pose import Pose, Triple
 
 EVENTS_PER_SECOND = 30.0
 # So long nothing must come before all is known to have come.

@@ -10,12 +10,12 @@ import numpy as np
 from benchmarks.samples import DESIGN
 from benchmarks.table import Row, seconds, times
 from benchmarks.timing import best_of
-from explorer.arrays import FloatArray
-from explorer.compiled import warm
-from explorer.constraints import HalfSpace, Round, constraints
-from explorer.solid import Solid
-from explorer.solids import workspace_solid
-from explorer.workspace import home_rotation, workspace_volume
+from explorer.numerics.arrays import FloatArray
+from explorer.numerics.compiled import warm
+from explorer.workspace.limits.constraints import HalfSpace, Round, constraints
+from explorer.workspace.slices.volume import home_rotation, workspace_volume
+from explorer.workspace.solids.solid import Solid
+from explorer.workspace.solids.solids import workspace_solid
 
 ERROR = 1e-3
 ROUNDS = 10

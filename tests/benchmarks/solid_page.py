@@ -12,8 +12,8 @@ from benchmarks.ready_page import ready_page
 from benchmarks.samples import DESIGN
 from benchmarks.table import Row, seconds
 from benchmarks.timing import Spread
-from explorer.app.actions import SetVariable, SetView
-from explorer.app.state import State
+from explorer.app.state.actions import SetVariable, SetView
+from explorer.app.state.state import State
 
 CHANGES, WARM_UP = 120, 15
 

@@ -32,7 +32,7 @@ from explorer import (
     run_study,
     workspace_volume,
 )
-from explorer.compiled import warm
+from explorer.numerics.compiled import warm
 from explorer.sweep import rows
 from explorer.sweep.results import load_results
 from explorer.sweep.rows import design_of

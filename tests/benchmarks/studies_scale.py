@@ -21,7 +21,7 @@ from benchmarks.studies import of_designs
 from benchmarks.table import Row, per_second, seconds
 from benchmarks.timing import best_of, elapsed
 from explorer import DaskWorkers, LocalWorkers
-from explorer.compiled import warm
+from explorer.numerics.compiled import warm
 from explorer.sweep import rows
 from explorer.sweep.parts import part_path, write_part
 from explorer.sweep.run import AHEAD

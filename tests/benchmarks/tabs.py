@@ -24,13 +24,13 @@ from benchmarks.socket_client import PLATFORM, Seen, SliderDrag, dragging_proces
 from benchmarks.sweeps import sweep
 from benchmarks.table import Row, seconds
 from benchmarks.timing import Spread
-from explorer.app.controls import Slider
-from explorer.app.panels.move import JOINT_LABELS
+from explorer.app.features.mechanism.pose_panel import JOINT_LABELS
 from explorer.app.server import Running
-from explorer.app.session import Session
-from explorer.app.state import State
-from explorer.design import JOINTS, VARIABLES
-from explorer.pose import Triple
+from explorer.app.session.session import Session
+from explorer.app.state.state import State
+from explorer.app.widgets.controls import Slider
+from explorer.mechanism.design import JOINTS, VARIABLES
+from explorer.mechanism.pose import Triple
 
 TABS, RATE, SECONDS = 20, 10.0, 30.0
 ANGLES = ("yaw (°)", "pitch (°)", "roll (°)")

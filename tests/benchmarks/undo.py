@@ -15,7 +15,8 @@ from benchmarks.ready_page import ready_page
 from benchmarks.table import Row, seconds
 from benchmarks.timing import Spread
 from explorer import PRESETS
-from explorer.app.actions import (
+from explorer.app.session.session import REDO, UNDO
+from explorer.app.state.actions import (
     Action,
     Open,
     SetAngle,
@@ -26,9 +27,8 @@ from explorer.app.actions import (
     SetVariable,
     SetView,
 )
-from explorer.app.session import REDO, UNDO
-from explorer.app.state import State
-from explorer.design import VARIABLES
+from explorer.app.state.state import State
+from explorer.mechanism.design import VARIABLES
 
 STEPS = 300
 

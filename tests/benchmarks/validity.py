@@ -11,9 +11,9 @@ from benchmarks.samples import DESIGN, around_home
 from benchmarks.table import Row, per_second, seconds, times
 from benchmarks.timing import best_of
 from explorer import Pose, evaluate
-from explorer.compiled import warm
-from explorer.move_validity import moves_are_valid
-from explorer.validity import Rules, poses_are_valid, valid_rows
+from explorer.numerics.compiled import warm
+from explorer.workspace.limits.valid_moves import moves_are_valid
+from explorer.workspace.limits.valid_poses import Rules, poses_are_valid, valid_rows
 
 POSES, MOVES, PLAIN, ROUNDS = 200_000, 5_000, 200, 10
 RADIUS = 0.2

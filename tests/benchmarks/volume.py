@@ -9,11 +9,11 @@ import numpy as np
 from benchmarks.samples import DESIGN
 from benchmarks.table import Row, seconds, times
 from benchmarks.timing import best_of
-from explorer.compiled import warm
-from explorer.constraints import constraints
-from explorer.nodes import count_nodes
-from explorer.region import region_of
-from explorer.workspace import bounds, home_rotation, workspace_volume
+from explorer.numerics.compiled import warm
+from explorer.workspace.limits.constraints import constraints
+from explorer.workspace.limits.region import region_of
+from explorer.workspace.slices.nodes import count_nodes
+from explorer.workspace.slices.volume import bounds, home_rotation, workspace_volume
 
 CALLS, ROUNDS = 20, 20
 VOXELS = 480

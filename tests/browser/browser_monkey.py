@@ -9,21 +9,23 @@ import random
 import re
 import sys
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from graphics import quick_browser
-from playwright.sync_api import Browser
 from tab import Tab
 
 from explorer.app.screenshot import SCENE_CANVAS
-from explorer.app.server import Running
-from explorer.design_file import PRESETS, encode_design
+from explorer.mechanism.design_file import PRESETS, encode_design
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
+from collections.abc import Callable
+
 from monkey import BROKEN, explorer_with_data
+from playwright.sync_api import Browser
+
+from explorer.app.server import Running
 
 # Between two looks at whether the browser shows what the server has.
 BETWEEN_LOOKS = 50

@@ -11,7 +11,7 @@ from tab import Tab
 
 from explorer.app.screenshot import PATIENCE_SECONDS
 from explorer.app.server import Running, start
-from explorer.design_file import PRESETS
+from explorer.mechanism.design_file import PRESETS
 
 OpenTab = Callable[[], Tab]
 

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 
 from playwright.sync_api import Browser
 
-from explorer.app.screenshot import headless_browser
+from explorer.app.browser.headless import headless_browser
 
 MESA = ("--use-angle=gl-egl", "--ignore-gpu-blocklist")
 # Its software renderer, whatever else the machine has.

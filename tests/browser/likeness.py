@@ -20,7 +20,7 @@ import numpy as np
 from PIL import Image
 from skimage import color, metrics
 
-from explorer.arrays import FloatArray
+from explorer.numerics.arrays import FloatArray
 
 FAILED = Path(__file__).resolve().parents[1] / "failed"
 

@@ -15,8 +15,9 @@ from explorer.app.scene.camera import ViewName, framing
 from explorer.app.scene.placing import Placed
 from explorer.app.screenshot import PATIENCE_SECONDS, SCENE_CANVAS, evenly_drawn, settle
 from explorer.app.server import Running
-from explorer.app.state import Frame, State
-from explorer.arrays import FloatArray
+from explorer.app.state.frame import Frame
+from explorer.app.state.state import State
+from explorer.numerics.arrays import FloatArray
 
 # Small, since what the pictures look like is tested elsewhere; panels and scene side by side.
 SIZE = (860, 480)

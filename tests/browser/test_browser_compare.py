@@ -10,11 +10,11 @@ from likeness import decoded
 from playwright.sync_api import expect
 from tab import Tab
 
-from explorer.app.actions import SetView
 from explorer.app.screenshot import PATIENCE_SECONDS
-from explorer.app.state import View
-from explorer.design_file import PRESETS
-from explorer.workspace import workspace_volume
+from explorer.app.state.actions import SetView
+from explorer.app.state.view import View
+from explorer.mechanism.design_file import PRESETS
+from explorer.workspace.slices.volume import workspace_volume
 
 # Pixels that tell a surface from edges.
 MANY = 800

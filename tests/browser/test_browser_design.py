@@ -7,9 +7,9 @@ import pytest
 from playwright.sync_api import expect
 from tab import Tab
 
-from explorer.app.state import joints_of, opened
-from explorer.design import VARIABLES
-from explorer.design_file import PRESETS
+from explorer.app.state.state import joints_of, opened
+from explorer.mechanism.design import VARIABLES
+from explorer.mechanism.design_file import PRESETS
 
 OPTIMAL, INITIAL = PRESETS["paper-optimal"], PRESETS["paper-initial"]
 

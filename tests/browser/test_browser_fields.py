@@ -11,8 +11,8 @@ from monkey import explorer_with_data
 from playwright.sync_api import Browser, expect
 from tab import Tab
 
-from explorer.app.actions import SetPosition
 from explorer.app.screenshot import settle
+from explorer.app.state.actions import SetPosition
 
 
 def words_of_steps(tab: Tab) -> list[str]:

@@ -25,16 +25,21 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin, Subprotocol
 
-from explorer.app import client_messages
-from explorer.app.access import Access
-from explorer.app.client_messages import LARGEST_PICTURE, LARGEST_UPLOAD, MOST_PARTS, PATIENCE
-from explorer.app.guard import MOST_WAITING, Guard
-from explorer.app.panels.optimise import DESIGN_FILE
+from explorer.app.browser.viser_gaps import start_viser, stop_viser
+from explorer.app.features.optimise.panel import DESIGN_FILE
 from explorer.app.screenshot import PATIENCE_SECONDS
+from explorer.app.security import client_messages
+from explorer.app.security.access import Access
+from explorer.app.security.client_messages import (
+    LARGEST_PICTURE,
+    LARGEST_UPLOAD,
+    MOST_PARTS,
+    PATIENCE,
+)
+from explorer.app.security.guard import MOST_WAITING, Guard
 from explorer.app.server import Running, start
-from explorer.app.viser_gaps import start_viser, stop_viser
-from explorer.design_file import PRESETS
 from explorer.errors import ServerError
+from explorer.mechanism.design_file import PRESETS
 
 DESIGN = PRESETS["paper-optimal"]
 TOKEN = "a-token_of-16-or-more"
@@ -472,8 +477,8 @@ def test_a_viser_that_serves_in_another_way_is_not_used(monkeypatch: pytest.Monk
         stop_viser(server)
 
     # As if viser had come to serve from elsewhere.
-    monkeypatch.setattr("explorer.app.viser_gaps.SERVES", "viser.elsewhere")
-    monkeypatch.setattr("explorer.app.viser_gaps.stop_viser", stop)
+    monkeypatch.setattr("explorer.app.browser.viser_gaps.SERVES", "viser.elsewhere")
+    monkeypatch.setattr("explorer.app.browser.viser_gaps.stop_viser", stop)
     with pytest.raises(
         ServerError, match=r"^viser [^\n]* does not guard; [^\n]*pip install[^\n]*$"
     ):

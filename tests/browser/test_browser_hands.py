@@ -12,15 +12,15 @@ import pytest
 from playwright.sync_api import Browser, Locator
 from tab import Tab
 
+from explorer.app.features.help.tour import STEPS
 from explorer.app.hands import DRAWER_HEIGHT, NARROW, TALL_DRAWER
-from explorer.app.preferences import PreferenceFile, Preferences
 from explorer.app.scene.camera import framing
 from explorer.app.scene.placing import Placed
 from explorer.app.screenshot import SCENE_CANVAS, settle
 from explorer.app.server import Running, start
-from explorer.app.state import Frame
-from explorer.app.tour import STEPS
-from explorer.design_file import PRESETS
+from explorer.app.state.frame import Frame
+from explorer.app.storage.preferences import PreferenceFile, Preferences
+from explorer.mechanism.design_file import PRESETS
 
 # A small laptop's screen, and a tablet either way up.
 SIZES = ((1280, 720), (1024, 768), (768, 1024))

@@ -11,13 +11,14 @@ from conftest import OpenTab
 from playwright.sync_api import expect
 from tab import Tab
 
-from explorer.app.panels.move import JOINT_LABELS, MODES
-from explorer.app.scene.marks import HANDLE_REACH
+from explorer.app.features.mechanism.marks import HANDLE_REACH
+from explorer.app.features.mechanism.pose_panel import JOINT_LABELS, MODES
 from explorer.app.scene.placing import Placed
-from explorer.app.state import Frame, State, joints_of
-from explorer.design import JOINTS
-from explorer.home import home_pose
-from explorer.kinematics import forward
+from explorer.app.state.frame import Frame
+from explorer.app.state.state import State, joints_of
+from explorer.mechanism.design import JOINTS
+from explorer.mechanism.home import home_pose
+from explorer.mechanism.kinematics import forward
 
 LABELS = [JOINT_LABELS[name] for name in JOINTS]
 MODE_LABEL = "κ1 κ2 κ3"

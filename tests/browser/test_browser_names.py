@@ -9,7 +9,7 @@ from monkey import explorer_with_data
 from playwright.sync_api import Browser
 from tab import Tab
 
-from explorer.app.actions import SetUnit
+from explorer.app.state.actions import SetUnit
 
 ROLES = {"slider", "spinbutton", "textbox", "searchbox", "combobox", "checkbox", "button", "tab"}
 SIZE = (1280, 720)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from conftest import OpenTab
 from playwright.sync_api import expect
 
-from explorer.design_file import PRESETS, decode_design
+from explorer.mechanism.design_file import PRESETS, decode_design
 from explorer.optimise.record import decode_record
-from explorer.workspace import workspace_volume
+from explorer.workspace.slices.volume import workspace_volume
 
 OPTIMAL = PRESETS["paper-optimal"]
 

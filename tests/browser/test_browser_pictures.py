@@ -15,15 +15,16 @@ from pictures import DESIGN, FOLDER, SCENES, draw
 from playwright.sync_api import Browser, Page
 from scipy import ndimage
 
-from explorer.app.actions import Action, SetPose, SetPosition, SetView
-from explorer.app.assigning import Update
-from explorer.app.scene import Scene
-from explorer.app.scene.legs import Telescopes
+from explorer.app.drawing import Scene
+from explorer.app.features.mechanism.legs import Telescopes
 from explorer.app.scene.placing import Placed
 from explorer.app.screenshot import SCENE_ALONE, open_page, settle, stable_picture
 from explorer.app.server import Running, start
-from explorer.app.state import Frame, State, opened
-from explorer.arrays import FloatArray
+from explorer.app.state.actions import Action, SetPose, SetPosition, SetView
+from explorer.app.state.frame import Frame
+from explorer.app.state.state import State, opened
+from explorer.app.widgets.assigning import Update
+from explorer.numerics.arrays import FloatArray
 
 # One browser draws the same picture to the last bit each time. Another version or machine may
 # smooth edges differently, but never shift them by a whole pixel: that shift measures up to

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from tab import TRACK, Tab
 
-from explorer.app.gestures import PAUSE_SECONDS
-from explorer.app.scene.marks import HANDLE_REACH
+from explorer.app.features.mechanism.marks import HANDLE_REACH
 from explorer.app.scene.placing import Placed
 from explorer.app.screenshot import settle
-from explorer.app.state import Frame
+from explorer.app.session.gestures import PAUSE_SECONDS
+from explorer.app.state.frame import Frame
 
 REST = 1000 * (PAUSE_SECONDS + 0.3)
 

@@ -8,9 +8,9 @@ from likeness import decoded, likeness
 from playwright.sync_api import expect
 from tab import Tab
 
-from explorer.app.actions import SetLimits, SetPosition, SetView
 from explorer.app.screenshot import PATIENCE_SECONDS
-from explorer.radii import with_radius
+from explorer.app.state.actions import SetLimits, SetPosition, SetView
+from explorer.workspace.accessible.radii import with_radius
 
 # A difference of two pictures that the eye cannot miss.
 PLAIN_TO_SEE = 5.0

@@ -11,10 +11,10 @@ from likeness import decoded
 from playwright.sync_api import expect
 from tab import Tab
 
-from explorer.app.actions import SetLimits
-from explorer.app.panels.move import JOINT_LABELS
+from explorer.app.features.mechanism.pose_panel import JOINT_LABELS
 from explorer.app.screenshot import PATIENCE_SECONDS
-from explorer.radii import with_radius
+from explorer.app.state.actions import SetLimits
+from explorer.workspace.accessible.radii import with_radius
 
 # Pixels that tell a surface from the edges that a moved leg brings.
 MANY = 800

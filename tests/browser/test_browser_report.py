@@ -12,7 +12,7 @@ from pictures import FOLDER, draw_report
 from playwright.sync_api import Browser
 
 import explorer
-from explorer.app.reporting import make_report
+from explorer.app.features.sharing.reporting import make_report
 from explorer.cli import run
 
 OPTIMAL = explorer.PRESETS["paper-optimal"]

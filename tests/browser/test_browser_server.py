@@ -20,10 +20,10 @@ import viser
 from client import PROTOCOL, opened
 
 from explorer.app import server as server_module
+from explorer.app.browser.viser_gaps import Serve, start_viser
 from explorer.app.server import Running, start
-from explorer.app.viser_gaps import Serve, start_viser
-from explorer.design_file import PRESETS
 from explorer.errors import ServerError
+from explorer.mechanism.design_file import PRESETS
 
 DESIGN = PRESETS["paper-optimal"]
 DESIGNED = ("--design", DESIGN.name)

@@ -21,10 +21,10 @@ from playwright.sync_api import Browser, Download, Locator, Page, expect
 from tab import Tab
 
 import explorer
-from explorer.app.actions import SetPosition, SetView
+from explorer.app.features.sharing.view_picture import Pixels
 from explorer.app.screenshot import PATIENCE_SECONDS, SCENE_CANVAS, settle
-from explorer.app.state import View
-from explorer.app.view_picture import Pixels
+from explorer.app.state.actions import SetPosition, SetView
+from explorer.app.state.view import View
 
 OpenTab = Callable[[], Tab]
 untyped: Any = imageio.v3

@@ -10,12 +10,12 @@ import pytest
 from playwright.sync_api import expect
 from tab import Tab
 
-from explorer.app.path_actions import StoreEnd
-from explorer.app.state import Frame
-from explorer.arrays import FloatArray
-from explorer.home import home_pose
-from explorer.pose import Pose
-from explorer.singularity import margins
+from explorer.app.features.paths.actions import StoreEnd
+from explorer.app.state.frame import Frame
+from explorer.mechanism.home import home_pose
+from explorer.mechanism.margins import margins
+from explorer.mechanism.pose import Pose
+from explorer.numerics.arrays import FloatArray
 
 
 def kappas(tab: Tab) -> FloatArray:
@@ -56,7 +56,7 @@ def test_a_jog_moves_one_margin_by_mouse_and_by_keyboard(tab: Tab) -> None:
 
 def test_a_path_is_watched_planned_and_saved(tab: Tab, monkeypatch: pytest.MonkeyPatch) -> None:
     # So long that even a slow browser can stop it on the way.
-    monkeypatch.setattr("explorer.app.paths.MODES_SECONDS", 60.0)
+    monkeypatch.setattr("explorer.app.state.paths.MODES_SECONDS", 60.0)
     tab.turn_to("Paths")
     chart = tab.page.locator(".uplot canvas")
     expect(chart).to_be_hidden()

@@ -12,14 +12,14 @@ import numpy as np
 import pytest
 from tab import Tab
 
+from explorer.app.features.studies.actions import OpenStudy, SetStudyWish
+from explorer.app.features.studies.feed import NO_WISH, PlotJson
+from explorer.app.features.studies.folders import StudyFolders
 from explorer.app.screenshot import settle
 from explorer.app.server import Running, start
-from explorer.app.session import UNDO
-from explorer.app.studies import MOST, StudyWish
-from explorer.app.study_actions import OpenStudy, SetStudyWish
-from explorer.app.study_feed import NO_WISH, PlotJson
-from explorer.app.study_folders import StudyFolders
-from explorer.design_file import PRESETS
+from explorer.app.session.session import UNDO
+from explorer.app.state.studies import MOST, StudyWish
+from explorer.mechanism.design_file import PRESETS
 from explorer.sweep.parts import write_part
 from explorer.sweep.results import Results, load_results
 from explorer.sweep.rows import evaluate

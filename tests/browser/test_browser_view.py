@@ -8,10 +8,10 @@ from collections.abc import Callable
 from likeness import decoded, likeness
 from tab import Tab
 
-from explorer.app.panels.view import SWITCHES
+from explorer.app.features.mechanism.show_panel import SWITCHES
 from explorer.app.scene.camera import VIEWS
-from explorer.app.state import View
-from explorer.singularity import TETRAHEDRA
+from explorer.app.state.view import View
+from explorer.mechanism.margins import TETRAHEDRA
 
 
 def shows(name: str) -> Callable[[View], bool]:

@@ -12,7 +12,7 @@ import pytest
 
 import explorer
 from explorer.cli import run
-from explorer.feasibility import feasible_intervals
+from explorer.mechanism.feasible_intervals import feasible_intervals
 
 POSITION = (8.0, -2.5, 1.1e1)
 ANGLES = (-60.0, 12.5, -7.0)

@@ -14,7 +14,7 @@ import trimesh
 import explorer
 from explorer.cli import run
 from explorer.export.mesh import FORMATS
-from explorer.solids import convex_hull, workspace_solid
+from explorer.workspace.solids.solids import convex_hull, workspace_solid
 
 OPTIMAL = explorer.PRESETS["paper-optimal"]
 untyped: Any = trimesh

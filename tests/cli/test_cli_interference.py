@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import explorer
-from explorer.clearance import leg_axes
 from explorer.cli import run
+from explorer.legs.clearance import leg_axes
 
 OPTIMAL = explorer.PRESETS["paper-optimal"]
 HOME = explorer.home_pose(OPTIMAL)

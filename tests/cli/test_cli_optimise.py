@@ -17,7 +17,7 @@ import pytest
 import explorer
 from explorer.cli import run
 from explorer.cli.found import findings_table
-from explorer.compiled import warm
+from explorer.numerics.compiled import warm
 from explorer.optimise.facts import facts_of
 from explorer.optimise.findings import Finding
 from explorer.optimise.record import load_record
@@ -117,7 +117,7 @@ def test_what_the_box_cannot_hold_is_refused_before_anything_is_searched(
         pytest.fail("it searches, or compiles for a search")
 
     monkeypatch.setattr("explorer.optimise.solver.optimise_design", never)
-    monkeypatch.setattr("explorer.compiled.warm", never)
+    monkeypatch.setattr("explorer.numerics.compiled.warm", never)
     words = (
         "the box holds at most 2,499 of the 8,000 asked for: lift the box with --box none, or "
         "take the paper's with --box 0 -12 0 20 22 18"

@@ -12,7 +12,7 @@ import pytest
 
 import explorer
 from explorer.cli import run
-from explorer.pose import rotation_from_yaw_pitch_roll
+from explorer.mechanism.pose import rotation_from_yaw_pitch_roll
 
 PRESET = explorer.PRESETS["paper-optimal"]
 HOME = explorer.home_pose(PRESET)

@@ -246,7 +246,7 @@ def test_a_scheduler_without_workers_is_told_and_waited_for(
             said.append(words)
             farm.scale(1)
 
-        monkeypatch.setattr("explorer.cli.sweep.complain", send_one)
+        monkeypatch.setattr("explorer.cli.commands.sweep.complain", send_one)
         scheduler = farm.scheduler_address
         found = answer(capsys, file, "--out", tmp_path / "out", "--scheduler", scheduler)
     assert (found["done"], found["complete"]) == (20, True)

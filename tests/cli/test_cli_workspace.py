@@ -13,11 +13,20 @@ import pytest
 
 import explorer
 from explorer.cli import run
-from explorer.orientations import cone_of_directions, orientation_capability, yaw_pitch_roll_range
-from explorer.radii import with_radius
-from explorer.solid import Solid
-from explorer.solids import convex_hull, dexterous_solid, reachable_solid, workspace_solid
-from explorer.workspace import workspace_nodes, workspace_volume
+from explorer.workspace.accessible.radii import with_radius
+from explorer.workspace.orientations import (
+    cone_of_directions,
+    orientation_capability,
+    yaw_pitch_roll_range,
+)
+from explorer.workspace.slices.volume import workspace_nodes, workspace_volume
+from explorer.workspace.solids.solid import Solid
+from explorer.workspace.solids.solids import (
+    convex_hull,
+    dexterous_solid,
+    reachable_solid,
+    workspace_solid,
+)
 
 OPTIMAL = explorer.PRESETS["paper-optimal"]
 COARSE = ["--tolerance", "0.4"]
@@ -74,7 +83,7 @@ def test_mesh_that_disagrees_with_the_exact_volume_is_told(
     def make(*_args: object, **_options: object) -> Solid:
         return wrong
 
-    monkeypatch.setattr("explorer.solids.workspace_solid", make)
+    monkeypatch.setattr("explorer.workspace.solids.solids.workspace_solid", make)
     assert answer(capsys)["mesh_agrees"] is False
     assert run(["workspace"]) == 0
     assert "its volume does not agree with the exact one" in capsys.readouterr().out

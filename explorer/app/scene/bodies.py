@@ -7,11 +7,11 @@ from collections.abc import Iterator
 import numpy as np
 import viser
 
-from explorer.app.assigning import Update
-from explorer.app.colours import BASE_BODY, PLATFORM_BODY, Rgb
-from explorer.app.scene.legs import PLATE_TOP
+from explorer.app.features.mechanism.legs import PLATE_TOP
 from explorer.app.scene.placing import Placed
 from explorer.app.scene.shapes import Mesh, plate
+from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.colours import BASE_BODY, PLATFORM_BODY, Rgb
 
 PLATE_THICKNESS = 0.22
 PLATFORM_THICKNESS = 0.2

@@ -11,13 +11,13 @@ from typing import Literal, get_args
 import numpy as np
 import viser
 
-from explorer.app.scene.flags import flag_corners
-from explorer.app.scene.legs import guide_span
-from explorer.app.scene.marks import ghost_points, handle_tips
+from explorer.app.browser.viser_gaps import put_camera
+from explorer.app.features.mechanism.flags import flag_corners
+from explorer.app.features.mechanism.legs import guide_span
+from explorer.app.features.mechanism.marks import ghost_points, handle_tips
+from explorer.app.features.prototype.scene import part_corners
 from explorer.app.scene.placing import Placed
-from explorer.app.scene.prototype import part_corners
-from explorer.app.viser_gaps import put_camera
-from explorer.arrays import FloatArray
+from explorer.numerics.arrays import FloatArray
 
 ViewName = Literal["isometric", "front", "side", "top"]
 VIEWS: tuple[ViewName, ...] = get_args(ViewName)

@@ -12,9 +12,10 @@ from functools import cached_property
 
 import numpy as np
 
-from explorer.app.parts import Parts
-from explorer.app.state import Frame, State
-from explorer.arrays import FloatArray
+from explorer.app.features.prototype.parts import Parts
+from explorer.app.state.frame import Frame
+from explorer.app.state.state import State
+from explorer.numerics.arrays import FloatArray
 
 # What the reach of a design measures in the scene, roughly.
 SCENE_REACH = 10.0

@@ -15,9 +15,9 @@ import viser
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
-from explorer.app.assigning import Update
-from explorer.app.colours import Rgb
-from explorer.arrays import FloatArray, IntArray
+from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.colours import Rgb
+from explorer.numerics.arrays import FloatArray, IntArray
 
 Mesh: TypeAlias = tuple[FloatArray, IntArray]
 

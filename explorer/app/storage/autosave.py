@@ -26,7 +26,7 @@ from explorer.app.storage.document import (
 )
 from explorer.app.storage.folder import LOCK, alone_in, data_folder, taken
 from explorer.errors import StorageError
-from explorer.files import move, read_at_most, write_whole
+from explorer.files.writing import move, read_at_most, write_whole
 
 SESSIONS = "sessions"
 """The folder of sessions, in that of the user's data."""

@@ -14,11 +14,10 @@ from typing import Annotated, Any, TypeVar, cast
 
 import msgspec
 
-from explorer.app.state import State
+from explorer.app.state.state import State
 from explorer.app.storage.saved import SavedSession, restored, saved
-from explorer.design_file import MIGRATIONS as MIGRATIONS_OF_DESIGNS
-from explorer.design_file import up_to_date
 from explorer.errors import ExplorerError, InputError, StorageError
+from explorer.mechanism.design_file import MIGRATIONS as MIGRATIONS_OF_DESIGNS, up_to_date
 
 SCHEMA = 1
 """Of what is written; files of an older one are migrated."""

@@ -11,7 +11,7 @@ from filelock import FileLock, Timeout
 from platformdirs import user_data_path
 
 from explorer.errors import StorageError
-from explorer.files import make_folder, refusal
+from explorer.files.writing import make_folder, refusal
 
 NAME = "flagged-explorer"
 

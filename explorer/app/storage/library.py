@@ -18,10 +18,10 @@ from typing import Annotated
 import msgspec
 
 from explorer.app.storage.folder import alone_in, data_folder
-from explorer.design import Design
-from explorer.design_file import LARGEST_FILE, decode_design, encode_design
 from explorer.errors import InputError, StorageError
-from explorer.files import make_folder, move, read_at_most, write_whole
+from explorer.files.writing import make_folder, move, read_at_most, write_whole
+from explorer.mechanism.design import Design
+from explorer.mechanism.design_file import LARGEST_FILE, decode_design, encode_design
 
 DESIGNS = "designs"
 """The folder of named designs, in that of the user's data."""

@@ -11,27 +11,21 @@ from typing import Annotated, Literal
 
 import msgspec
 
-from explorer.app.actions import SetJoint
-from explorer.app.compared import Compared
-from explorer.app.jog import Jog
-from explorer.app.optimisation import (
-    PLACE,
-    Optimisation,
-    Run,
-    Verdict,
-    Wish,
-    cut_short,
-)
-from explorer.app.optimising import EndRun
-from explorer.app.paths import Journey, Paths
-from explorer.app.state import Hold, Joints, State, View
-from explorer.app.studies import Studies
-from explorer.design import VARIABLES, Design
+from explorer.app.features.optimise.actions import EndRun
+from explorer.app.state.actions import SetJoint
+from explorer.app.state.compared import Compared
+from explorer.app.state.jog import Jog
+from explorer.app.state.optimisation import PLACE, SearchResult, Wish, cut_short
+from explorer.app.state.paths import Journey, Paths
+from explorer.app.state.state import Hold, Joints, Optimisation, Run, State
+from explorer.app.state.studies import Studies
+from explorer.app.state.view import View
 from explorer.errors import InputError
+from explorer.mechanism.design import VARIABLES, Design
+from explorer.mechanism.pose import Pose, Triple
 from explorer.optimise.problem import YAW, Problem
 from explorer.optimise.record import Step, iterate_of, step_of
-from explorer.pose import Pose, Triple
-from explorer.uncoupled import UNCOUPLED
+from explorer.singularity.uncoupled import UNCOUPLED
 
 Mode = Annotated[int, msgspec.Meta(ge=0, le=7)]
 Joint = Annotated[int, msgspec.Meta(ge=0, le=5)]
@@ -63,7 +57,7 @@ class SavedRun(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     starts: Count
     own: SavedSession
     iterates: tuple[Step, ...]
-    verdict: Verdict
+    verdict: SearchResult
     accepted: bool
 
 

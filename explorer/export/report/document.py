@@ -9,9 +9,8 @@ from importlib import resources
 from xml.etree.ElementTree import Element
 
 from explorer import __version__
-from explorer.design_file import PRESETS
+from explorer.export.report.drawings.mechanism import lead
 from explorer.export.report.findings import Findings, Missing
-from explorer.export.report.legs_section import legs_section
 from explorer.export.report.markup import (
     Piece,
     as_html,
@@ -23,14 +22,15 @@ from explorer.export.report.markup import (
     table,
     written,
 )
-from explorer.export.report.mechanism import lead
-from explorer.export.report.mechanism_section import mechanism_section, pose_words
-from explorer.export.report.parts_section import parts_section
-from explorer.export.report.search_section import search_section
-from explorer.export.report.singularity_section import singularity_section
-from explorer.export.report.workspace_section import workspace_section
-from explorer.reachable import ReachableWorkspace
-from explorer.versions import versions
+from explorer.export.report.sections.legs import legs_section
+from explorer.export.report.sections.mechanism import mechanism_section, pose_words
+from explorer.export.report.sections.parts import parts_section
+from explorer.export.report.sections.search import search_section
+from explorer.export.report.sections.singularity import singularity_section
+from explorer.export.report.sections.workspace import workspace_section
+from explorer.files.versions import versions
+from explorer.mechanism.design_file import PRESETS
+from explorer.workspace.accessible.workspace import ReachableWorkspace
 
 # What a browser may fetch for this page: nothing at all.
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"

@@ -10,28 +10,28 @@ from dataclasses import dataclass
 from hashlib import sha256
 from typing import TypeVar
 
-from explorer.design import Design
-from explorer.design_file import encode_design
 from explorer.errors import ExplorerError
 from explorer.export.simulation import DENSITY
-from explorer.home import home_pose
-from explorer.least_clearance import LeastClearances, least_clearances
+from explorer.measures.snapshot import Snapshot, evaluate
+from explorer.mechanism.design import Design
+from explorer.mechanism.design_file import encode_design
+from explorer.mechanism.home import home_pose
+from explorer.mechanism.pose import Pose
 from explorer.optimise.record import Record
-from explorer.performance import (
+from explorer.prototype.assembly import make_prototype
+from explorer.prototype.bill import Bill, bill_of_materials
+from explorer.singularity.ellipsoids import (
     Performance,
     SingularityFreeBall,
     certified_radius,
     performance,
     singularity_free_ball,
 )
-from explorer.pose import Pose
-from explorer.prototype.assembly import make_prototype
-from explorer.prototype.bill import Bill, bill_of_materials
-from explorer.reachable import ReachableWorkspace, reachable_workspace
-from explorer.snapshot import Snapshot, evaluate
-from explorer.solid import Solid
-from explorer.solids import convex_hull, workspace_solid
-from explorer.workspace import NodeCount, Volume, workspace_nodes, workspace_volume
+from explorer.workspace.accessible.workspace import ReachableWorkspace, reachable_workspace
+from explorer.workspace.least_clearance import LeastClearances, least_clearances
+from explorer.workspace.slices.volume import NodeCount, Volume, workspace_nodes, workspace_volume
+from explorer.workspace.solids.solid import Solid
+from explorer.workspace.solids.solids import convex_hull, workspace_solid
 
 T = TypeVar("T")
 

@@ -1,0 +1,108 @@
+"""The public names, each written once: where it is loaded from when it is first used."""
+
+from .app.notebook import Shown as Shown, show as show
+from .errors import (
+    DesignError as DesignError,
+    ExplorerError as ExplorerError,
+    InputError as InputError,
+    MissingExtraError as MissingExtraError,
+    NoAnswerError as NoAnswerError,
+)
+from .legs.clearance import (
+    PAIRS as PAIRS,
+    LegClearances as LegClearances,
+    leg_clearances as leg_clearances,
+)
+from .legs.interference import (
+    step_is_free as step_is_free,
+    step_overlaps as step_overlaps,
+    swept_tetrahedra as swept_tetrahedra,
+)
+from .legs.moves import (
+    MoveClearance as MoveClearance,
+    MoveClearances as MoveClearances,
+    move_clearance as move_clearance,
+    move_clearances as move_clearances,
+    moves_are_clear as moves_are_clear,
+    poses_between as poses_between,
+)
+from .legs.tetrahedra import tetrahedra_overlap as tetrahedra_overlap
+from .measures.snapshot import Snapshot as Snapshot, evaluate as evaluate
+from .mechanism.design import (
+    JOINTS as JOINTS,
+    VARIABLES as VARIABLES,
+    Design as Design,
+    Limits as Limits,
+)
+from .mechanism.design_file import (
+    PRESETS as PRESETS,
+    decode_design as decode_design,
+    encode_design as encode_design,
+    load_design as load_design,
+)
+from .mechanism.home import home_pose as home_pose
+from .mechanism.kinematics import (
+    attachment_points as attachment_points,
+    discriminants as discriminants,
+    forward as forward,
+    inverse as inverse,
+)
+from .mechanism.margins import margins as margins
+from .mechanism.pose import (
+    Pose as Pose,
+    quaternion_from_rotation as quaternion_from_rotation,
+    rotation_from_quaternion as rotation_from_quaternion,
+    rotation_from_yaw_pitch_roll as rotation_from_yaw_pitch_roll,
+    yaw_pitch_roll_from_rotation as yaw_pitch_roll_from_rotation,
+)
+from .optimise.defaults import make_problem as make_problem
+from .optimise.outcome import Iterate as Iterate, Outcome as Outcome, Run as Run
+from .optimise.problem import Demands as Demands, Problem as Problem, Variable as Variable
+from .optimise.solver import optimise_design as optimise_design
+from .paths.crossings import path_margins as path_margins
+from .paths.planning import (
+    NoPathError as NoPathError,
+    PlannedPath as PlannedPath,
+    plan_path as plan_path,
+)
+from .prototype.assembly import Prototype as Prototype, make_prototype as make_prototype
+from .singularity.ellipsoids import singularity_free_ball as singularity_free_ball
+from .singularity.jacobian import jacobian as jacobian
+from .singularity.nearest import (
+    NearestSingularity as NearestSingularity,
+    nearest_singular_poses as nearest_singular_poses,
+    nearest_singularities as nearest_singularities,
+)
+from .singularity.nearest_stratum import nearest_in_stratum as nearest_in_stratum
+from .singularity.strata import stratum as stratum
+from .singularity.uncoupled import UNCOUPLED as UNCOUPLED
+from .sweep.cluster import DaskWorkers as DaskWorkers
+from .sweep.results import Results as Results, load_results as load_results
+from .sweep.run import run_study as run_study
+from .sweep.study import Study as Study, load_study as load_study
+from .sweep.workers import LocalWorkers as LocalWorkers
+from .workspace.accessible.radii import RadiusCurve as RadiusCurve, radius_curve as radius_curve
+from .workspace.accessible.workspace import (
+    PairCost as PairCost,
+    ReachableWorkspace as ReachableWorkspace,
+    reachable_workspace as reachable_workspace,
+)
+from .workspace.least_clearance import (
+    LeastClearances as LeastClearances,
+    least_clearances as least_clearances,
+)
+from .workspace.limits.valid_moves import moves_are_valid as moves_are_valid
+from .workspace.limits.valid_poses import poses_are_valid as poses_are_valid
+from .workspace.orientations import orientation_capability as orientation_capability
+from .workspace.slices.fields import slice_field as slice_field
+from .workspace.slices.volume import (
+    NodeCount as NodeCount,
+    Volume as Volume,
+    workspace_nodes as workspace_nodes,
+    workspace_volume as workspace_volume,
+)
+from .workspace.solids.solid import Solid as Solid
+from .workspace.solids.solids import convex_hull as convex_hull, workspace_solid as workspace_solid
+
+__all__: list[str]
+__version__: str

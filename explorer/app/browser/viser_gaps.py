@@ -1,0 +1,321 @@
+"""What viser does but offers no public name for; every private name of it is in here."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import threading
+import warnings
+from collections.abc import Callable, Generator
+from typing import Any, cast
+
+import numpy as np
+import viser
+import websockets.asyncio.server
+from numpy.typing import ArrayLike
+
+from explorer.app.security.client_messages import Held
+from explorer.errors import ServerError
+from explorer.numerics.arrays import FloatArray
+
+Mark = tuple[float, str]
+SceneMessage = dict[str, Any]
+"""What makes or changes a part of the scene: its type, its fields by name."""
+Serve = Callable[..., Any]
+
+# Where a node of the scene is, by the names of its properties.
+PLACE = ("position", "wxyz")
+
+# The module of viser that serves.
+SERVES = "viser.infra._infra"
+_serving = threading.Lock()
+
+
+def start_viser(
+    host: str, port: int, guarded: Callable[[Serve], Serve] | None = None
+) -> viser.ViserServer:
+    """Return a running server, without the banner that viser prints to standard output.
+
+    Args:
+        host: The address to listen on.
+        port: The port to listen on; any free one if 0.
+        guarded: Returns what viser shall call in place of the function of websockets by
+            which it serves; everybody gets in if None.
+
+    Raises:
+        ServerError: this viser does not serve in the way that is guarded.
+    """
+    # A tab may close while something is on its way to it; that is no news.
+    warnings.filterwarnings("ignore", "Queued a .* on a closed connection")
+    with contextlib.redirect_stdout(io.StringIO()), _serving_through(guarded) as is_guarded:
+        server = viser.ViserServer(host=host, port=port, verbose=False)
+    if not is_guarded():
+        stop_viser(server)
+        raise ServerError(
+            f"viser {viser.__version__} serves in a way that the explorer does not guard; "
+            "install the version that it asks for: pip install --force-reinstall flagged-explorer"
+        )
+    return server
+
+
+@contextlib.contextmanager
+def _serving_through(guarded: Callable[[Serve], Serve] | None) -> Generator[Callable[[], bool]]:
+    """Let viser, and nobody else, serve through `guarded`; what is yielded says if it did."""
+    if guarded is None:
+        yield lambda: True
+        return
+    websockets_server: Any = websockets.asyncio.server
+    plain = websockets_server.serve
+    used: list[Serve] = []
+
+    def serve(handler: Any, *args: Any, **options: Any) -> Any:
+        if handler.__module__ != SERVES:
+            return plain(handler, *args, **options)
+        # viser tries port after port; each time it is the same guard.
+        used[:] = used or [guarded(plain)]
+        return used[0](handler, *args, **options)
+
+    with _serving:
+        websockets_server.serve = serve
+        try:
+            yield lambda: bool(used)
+        finally:
+            websockets_server.serve = plain
+
+
+def stop_viser(server: viser.ViserServer) -> None:
+    """Stop a server, without the line that its thread prints to standard output."""
+    internals: Any = server
+    with contextlib.redirect_stdout(io.StringIO()):
+        server.stop()
+        thread = getattr(internals._websock_server, "_server_thread", None)
+        if thread is not None:
+            thread.join(timeout=5.0)
+
+
+class MarksOf:
+    """The marks below a slider: its constructor takes them, its handle does not."""
+
+    def __init__(self, slider: viser.GuiSliderHandle[float]) -> None:
+        self._slider: Any = slider
+
+    @property
+    def marks(self) -> tuple[Mark, ...]:
+        """Position and label of each mark."""
+        return tuple((mark.value, mark.label) for mark in self._slider._marks)
+
+    @marks.setter
+    def marks(self, marks: tuple[Mark, ...]) -> None:
+        from viser import _messages
+
+        self._slider._marks = tuple(_messages.GuiSliderMark(value, label) for value, label in marks)
+
+
+def refuse_tunnels(server: viser.ViserServer) -> None:
+    """Ignore every request for a public tunnel; viser opens one for any client that asks."""
+    from viser import _messages
+
+    internals: Any = server
+    internals._websock_server.unregister_handler(_messages.ShareUrlRequest)
+
+
+def tell_uploads_to_their_senders(server: viser.ViserServer) -> None:
+    """Tell how far an upload is to the browser that sends it alone.
+
+    viser tells all of them, and those that come later, which then announce a file of no name.
+    """
+    from viser import _messages
+
+    gui: Any = server.gui
+    interface = gui._websock_interface
+    tell_all = interface.queue_message
+
+    def queue_message(message: Any) -> None:
+        if not isinstance(message, _messages.FileTransferPartAck):
+            tell_all(message)
+            return
+        upload = gui._current_file_upload_states.get(message.transfer_uuid)
+        sender: Any = server.get_clients().get(upload["client_id"]) if upload else None
+        if sender is not None:
+            sender._websock_connection.queue_message(message)
+
+    interface.queue_message = queue_message
+
+
+def place(node: viser.SceneNodeHandle, name: str, value: ArrayLike) -> None:
+    """Assign `position` or `wxyz` of a node of the scene to the last bit.
+
+    viser's own assignment leaves out what `np.allclose` calls unchanged, so that a node
+    lags behind by up to 1e-5 of its place, and small steps never add up.
+    """
+    held: Any = getattr(node, name)
+    numbers = tuple(np.asarray(value, dtype=np.float64).tolist())
+    if tuple(held.tolist()) == numbers:
+        return
+    held[:] = numbers
+    _send_place(node, name)
+
+
+def _send_place(node: viser.SceneNodeHandle, name: str) -> None:
+    from viser import _messages
+
+    internals: Any = node
+    kind = _messages.SetPositionMessage if name == "position" else _messages.SetOrientationMessage
+    internals._impl.api._queue_scene_message(kind(node.name, tuple(getattr(node, name).tolist())))
+
+
+def put_camera(
+    client: viser.ClientHandle, eye: FloatArray, target: FloatArray, field_of_view: float
+) -> None:
+    """Put a browser's camera at an eye, upright, looking at a target; the browser then tells of it.
+
+    viser's own handle takes what was sent for what is there: it sends nothing twice, although
+    a browser that is still loading goes back to its first camera after all that it was sent.
+    """
+    from viser import _messages
+
+    def triple(vector: FloatArray) -> tuple[float, float, float]:
+        x, y, z = vector.tolist()
+        return (x, y, z)
+
+    internals: Any = client
+    connection = internals._websock_connection
+    with client.atomic():
+        connection.queue_message(_messages.SetCameraUpDirectionMessage((0.0, 0.0, 1.0)))
+        connection.queue_message(_messages.SetCameraPositionMessage(triple(eye)))
+        connection.queue_message(_messages.SetCameraLookAtMessage(triple(target)))
+        # A browser answers this one, whatever its camera did.
+        connection.queue_message(_messages.SetCameraFovMessage(field_of_view))
+
+
+def tell_again(handle: Any, name: str) -> None:
+    """Send browsers a property that they have already: `value` of a control, or a node's place."""
+    from viser import _messages
+
+    if name in PLACE:
+        _send_place(handle, name)
+    else:
+        state = handle._impl
+        message = _messages.GuiUpdateMessage(state.uuid, {name: getattr(state, name)})
+        state.gui_api._websock_interface.queue_message(message)
+
+
+def is_misled(handle: Any, name: str) -> bool:
+    """Whether browsers were told another `value` of a control last than the one it holds.
+
+    viser's setter tells them first and holds it after: what a hand sets in between is told
+    last, and then overwritten.
+    """
+    from viser import _messages
+
+    if name in PLACE:
+        return False
+    state = handle._impl
+    held = getattr(state, name)
+    message = _messages.GuiUpdateMessage(state.uuid, {name: held})
+    buffer = state.gui_api._websock_interface.get_message_buffer()
+    with buffer.buffer_lock:
+        told = buffer.message_from_id.get(
+            buffer.id_from_redundancy_key.get(message.redundancy_key())
+        )
+    return told is not None and told.updates[name] != held
+
+
+def element_id(control: viser.GuiInputHandle[Any] | viser.GuiButtonHandle) -> str:
+    """Return the id of a control in the page: a label of HTML can be for the button with it."""
+    internals: Any = control
+    return str(internals._impl.uuid)
+
+
+def run_script(server: viser.ViserServer, source: str) -> None:
+    """Run a script of ours in every browser, also in those that come later."""
+    from viser import _messages
+
+    internals: Any = server
+    internals._websock_server.queue_message(_messages.RunJavascriptMessage(source=source))
+
+
+def run_script_in(client: viser.ClientHandle, source: str) -> None:
+    """Run a script of ours in one browser."""
+    from viser import _messages
+
+    internals: Any = client
+    internals._websock_connection.queue_message(_messages.RunJavascriptMessage(source=source))
+
+
+class ControlsOf:
+    """What the controls of a server and of its clients hold, by their ids."""
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        self._server = server
+        # A viser without them is found out now, rather than when somebody comes.
+        self._inputs()
+
+    def held(self, uuid: str) -> Held | None:
+        """Return what a control holds; None if there is no such control."""
+        handle = self._handle(uuid)
+        if handle is None:
+            return None
+        state = handle._impl
+        options = getattr(state.props, "options", None)
+        return Held(state.value, None if options is None else tuple(options))
+
+    def takes_files(self, uuid: str) -> bool:
+        """Whether this is a button to upload files with."""
+        return isinstance(self._handle(uuid), viser.GuiUploadButtonHandle)
+
+    def _handle(self, uuid: str) -> Any:
+        return next((i[uuid] for i in self._inputs() if uuid in i), None)
+
+    def _inputs(self) -> list[Any]:
+        guis: list[Any] = [self._server.gui]
+        guis += [client.gui for client in self._server.get_clients().values()]
+        return [gui._gui_input_handle_from_uuid for gui in guis]
+
+
+def scene_as_html(
+    server: viser.ViserServer,
+    chosen: Callable[[list[SceneMessage]], list[SceneMessage]],
+) -> str:
+    """Return viser's page with a scene in it that it plays by itself.
+
+    Args:
+        server: Whose scene it is.
+        chosen: Returns of all that makes the scene what goes into the page.
+    """
+    serializer: Any = server.get_scene_serializer()
+    # It would go on to record.
+    serializer._filter = _nothing
+    messages = chosen([message for _, message in serializer._messages])
+    serializer._messages = [(0.0, message) for message in messages]
+    used = set(_arrays_in(messages))
+    serializer._binary_buffers = [
+        data if index in used else memoryview(b"")
+        for index, data in enumerate(serializer._binary_buffers)
+    ]
+    return str(serializer.as_html())
+
+
+def _nothing(_: object) -> bool:
+    return False
+
+
+def _arrays_in(value: object) -> Generator[int]:
+    """Yield the numbers of the arrays that messages hold."""
+    if isinstance(value, dict):
+        fields = cast("dict[str, Any]", value)
+        if "__binary_index" in fields:
+            yield fields["__binary_index"]
+        else:
+            for each in fields.values():
+                yield from _arrays_in(each)
+    elif isinstance(value, list | tuple):
+        for each in cast("list[object]", value):
+            yield from _arrays_in(each)
+
+
+def placed_for(client: viser.ClientHandle, panel: viser.PanelHandle) -> viser.PanelHandle:
+    """Return a handle by which a panel that all browsers share is placed in one of them."""
+    own = viser.PanelHandle.__new__(viser.PanelHandle)
+    own.__dict__.update({**panel.__dict__, "_placement_gui_api": client.gui})
+    return own

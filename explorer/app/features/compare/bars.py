@@ -1,0 +1,89 @@
+"""Designs side by side: small bars from zero, a drawing for each figure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+
+from explorer.app.features.compare.columns import Column, best_of, unit_of
+from explorer.app.widgets.colours import css
+from explorer.app.widgets.markup import scientific
+from explorer.optimise.figures import FIGURES, Figure
+
+DRAWN = (
+    "volume",
+    "volume / reach³",
+    "node volume",
+    "reach",
+    "extent x",
+    "extent y",
+    "extent z",
+    "clearance",
+    "worst margin",
+    "mean margin",
+    "margin at home",
+    "mean 1 / cond J",
+)
+"""The figures that are drawn, row by row."""
+
+ACROSS = 4
+# Of one drawing, its title, a bar, its letter and the room of its number, in pixels.
+WIDTH, TITLE, BAR, GAP = 148.0, 17.0, 11.0, 3.0
+LETTER, NUMBER, SPACE = 24.0, 52.0, 9.0
+
+
+def bars(columns: Sequence[Column], *, millimetres: bool) -> str:
+    """Return the bars as an SVG.
+
+    Args:
+        columns: The live design first.
+        millimetres: Whether lengths are told in millimetres, rather than in design units.
+    """
+    figures = {figure.name: figure for figure in FIGURES}
+    height = TITLE + len(columns) * (BAR + GAP) + SPACE
+    drawings = "".join(
+        f'<g transform="translate({(index % ACROSS) * WIDTH:g},{(index // ACROSS) * height:g})">'
+        f"{_drawing(figures[name], columns, millimetres=millimetres)}</g>"
+        for index, name in enumerate(DRAWN)
+    )
+    rows = -(-len(DRAWN) // ACROSS)
+    return (
+        f'<svg viewBox="0 0 {ACROSS * WIDTH:g} {rows * height:g}" width="100%" '
+        'style="display:block;font-size:10.5px;fill:currentColor" role="img" '
+        f'aria-label="Figures of the designs as bars">{drawings}</svg>'
+    )
+
+
+def _drawing(figure: Figure, columns: Sequence[Column], *, millimetres: bool) -> str:
+    values = [column.value(figure) for column in columns]
+    known = [value for value in values if value is not None]
+    low, high = min([0.0, *known]), max([0.0, *known])
+    room = WIDTH - LETTER - NUMBER - 8.0
+    scale = room / (high - low) if high > low else 0.0
+    zero = LETTER - low * scale
+    best = best_of(figure, values)
+    unit = unit_of(figure, millimetres=millimetres)
+    arrow = {"more": " ↑", "less": " ↓", None: ""}[figure.better]
+    better = {"more": "; more is better", "less": "; less is better", None: ""}[figure.better]
+    title = (
+        f"<title>{escape(figure.hint + better)}</title>"
+        f'<text x="0" y="11" font-weight="600">{escape(figure.name)}'
+        f'<tspan font-weight="400" fill-opacity="0.6"> {unit}{arrow}</tspan></text>'
+    )
+    parts = [title]
+    for index, (column, value) in enumerate(zip(columns, values, strict=True)):
+        y = TITLE + index * (BAR + GAP)
+        line = y + BAR - 2.0
+        parts.append(f'<text x="0" y="{line:g}" fill-opacity="0.6">{column.letter}</text>')
+        if value is None:
+            parts.append(f'<text x="{zero + 4.0:.1f}" y="{line:g}" fill-opacity="0.6">–</text>')
+            continue
+        start, end = sorted((zero, zero + value * scale))
+        weight = 700 if index in best else 400
+        parts.append(
+            f'<rect x="{start:.2f}" y="{y:g}" width="{max(end - start, 0.8):.2f}" '
+            f'height="{BAR:g}" rx="1.5" fill="{css(column.colour)}"/>'
+            f'<text x="{end + 4.0:.1f}" y="{line:g}" font-weight="{weight}">'
+            f"{scientific(value)}</text>"
+        )
+    return "".join(parts)

@@ -1,0 +1,121 @@
+"""The workspaces of the compared designs over one another, each in its colour, to true size."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import viser
+from numpy.typing import NDArray
+
+from explorer.app.features.compare.drawing import ComparedDrawing
+from explorer.app.features.compare.feed import COLUMNS, LIVE, CompareFeed, true_size
+from explorer.app.features.workspace.scene import EMPTY, ArrayPair
+from explorer.app.scene.placing import Placed
+from explorer.app.state.compared import SLOTS
+from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.colours import COMPARED
+from explorer.mechanism.design import Design
+from explorer.numerics.arrays import FloatArray
+
+OPACITY = 0.3
+# Each workspace is drawn larger by this share than the one before: designs share limits, and
+# of two faces in one plane no renderer knows which is in front.
+APART = 3e-4
+NAMES = ("live", *SLOTS)
+
+
+class ComparedScene:
+    """Draws what the feed has of each column."""
+
+    def __init__(self, scene: viser.SceneApi, feed: CompareFeed) -> None:
+        self._feed = feed
+        self._columns = [_Column(scene, column) for column in range(COLUMNS)]
+
+    def updates(self, placed: Placed) -> Iterator[Update]:
+        """Yield what draws the workspaces of this frame."""
+        for index, column in enumerate(self._columns):
+            yield from column.updates(placed, self._feed.drawing(index))
+
+
+class _Column:
+    """The workspace of one design, its letter, and its outline."""
+
+    def __init__(self, scene: viser.SceneApi, column: int) -> None:
+        self._column = column
+        name, colour = f"/compared/{NAMES[column]}", COMPARED[column]
+        self._mesh = scene.add_mesh_simple(
+            f"{name}/workspace",
+            *EMPTY,
+            color=colour,
+            opacity=OPACITY,
+            side="double",
+            flat_shading=True,
+            cast_shadow=False,
+            receive_shadow=False,
+            visible=False,
+        )
+        self._lines = scene.add_line_segments(
+            f"{name}/outline",
+            np.zeros((1, 2, 3)),
+            colour,
+            thickness=2.5,
+            thickness_units="screen",
+            visible=False,
+        )
+        self._label = scene.add_label(f"{name}/label", NAMES[column], visible=False)
+        self._drawn: tuple[ComparedDrawing, float] | None = None
+        self._workspace: ArrayPair | None = None
+        self._outline: NDArray[np.float32] = np.zeros((1, 2, 3), dtype=np.float32)
+        self._top: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def updates(self, placed: Placed, drawing: ComparedDrawing | None) -> Iterator[Update]:
+        """Yield what draws it in this frame."""
+        state = placed.frame.state
+        compared, column = state.compared, self._column
+        design = state.design if column == LIVE else compared.pinned[column - 1]
+        look = compared.look
+        if drawing is not None and design is not None:
+            self._place(drawing, placed.scale * true_size(design, state.design))
+        # Nothing is overlaid where there is nothing to compare.
+        shown = look.overlay and drawing is not None and self._workspace is not None
+        yield self._mesh, "visible", shown
+        yield self._label, "visible", shown
+        if shown and self._workspace is not None:
+            yield self._mesh, "vertices", self._workspace[0]
+            yield self._mesh, "faces", self._workspace[1]
+            yield self._label, "text", NAMES[column] if column == LIVE else _named(column, design)
+            yield self._label, "position", self._top
+        # The live mechanism itself is there.
+        outlined = look.outlines and column != LIVE and drawing is not None
+        yield self._lines, "visible", outlined
+        if outlined:
+            yield self._lines, "points", self._outline
+
+    def _place(self, drawing: ComparedDrawing, scale: float) -> None:
+        """Bring a new drawing into scene units, once, so that it is compared by identity."""
+        if self._drawn is not None and self._drawn[0] is drawing and self._drawn[1] == scale:
+            return
+        self._drawn = drawing, scale
+        self._outline = _single(drawing.outline, scale)
+        self._workspace = None
+        if drawing.shell is not None:
+            vertices = _single(_grown(drawing.shell.vertices, self._column * APART), scale)
+            self._workspace = vertices, np.asarray(drawing.shell.faces, dtype=np.uint32)
+            x, y, z = vertices[int(vertices[:, 2].argmax())].tolist()
+            self._top = (x, y, z)
+
+
+def _named(column: int, design: Design | None) -> str:
+    name = "" if design is None else f" {design.name}"
+    return f"{NAMES[column]}{name}"
+
+
+def _grown(points: FloatArray, share: float) -> FloatArray:
+    """Return points (n, 3) that lie further from the middle of their box by a share."""
+    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    return middle + (1.0 + share) * (points - middle)
+
+
+def _single(points: FloatArray, scale: float) -> NDArray[np.float32]:
+    return np.asarray(points * scale, dtype=np.float32)

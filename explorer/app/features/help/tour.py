@@ -1,0 +1,158 @@
+"""The tour of first-time users: five steps, each done by the user or shown, or passed over."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from explorer.app.features.optimise.actions import StartRun
+from explorer.app.state.actions import Action, GoHome, SetPosition, SetVariable, SetView
+from explorer.app.state.frame import Frame
+
+# What the tour does by itself: how far it moves the platform, in reaches, how near a
+# singularity it goes, in warning lengths, and how much larger it makes a variable.
+STRIDE, NEAR, GROWTH = 0.1, 0.5, 1.1
+
+
+@dataclass(frozen=True)
+class Step:
+    """A step of the tour.
+
+    Attributes:
+        title: What to do.
+        text: How, and what to look at; plain text.
+        tab: To turn to.
+        is_done: Whether it was done, from the frame in which it began and the present one.
+        show: What does it for the user.
+        after: What is done when the user goes on.
+    """
+
+    title: str
+    text: str
+    tab: str
+    is_done: Callable[[Frame, Frame], bool]
+    show: Callable[[Frame], Action]
+    after: Action | None = None
+
+
+def _is_moved(before: Frame, now: Frame) -> bool:
+    return before.state.pose != now.state.pose
+
+
+def _move(frame: Frame) -> Action:
+    return SetPosition(1, frame.state.pose.position[1] + STRIDE * frame.state.design.reach)
+
+
+def _is_near(_: Frame, now: Frame) -> bool:
+    return now.verdict.kind != "clear"
+
+
+def _approach(frame: Frame) -> Action:
+    """Lower b4 towards the base plane: κ3 is its height."""
+    height = NEAR * frame.state.warn_below
+    return SetPosition(2, height if frame.state.pose.position[2] >= 0.0 else -height)
+
+
+def _is_changed(before: Frame, now: Frame) -> bool:
+    return before.state.design.variables != now.state.design.variables
+
+
+def _change(frame: Frame) -> Action:
+    return SetVariable("a3x", GROWTH * frame.state.design.variables[0])
+
+
+def _is_solid(_: Frame, now: Frame) -> bool:
+    return now.state.view.workspace.solid
+
+
+def _show_solid(frame: Frame) -> Action:
+    view = frame.state.view
+    return SetView(replace(view, workspace=replace(view.workspace, solid=True)))
+
+
+def _is_optimised(before: Frame, now: Frame) -> bool:
+    return now.state.optimisation.count > before.state.optimisation.count
+
+
+STEPS = (
+    Step(
+        "Move the platform",
+        "Drag an arrow or an arc at b4, or a slider of Move. The legs and the pose stay in step.",
+        "Move",
+        _is_moved,
+        _move,
+    ),
+    Step(
+        "Come close to a singularity",
+        "Lower z. The two flags turn from blue to orange as they come close: where they meet, the "
+        "mechanism is singular. Singularity, on the left, tells how far it is.",
+        "Move",
+        _is_near,
+        _approach,
+        GoHome(),
+    ),
+    Step(
+        "Change the design",
+        "Move a slider of Design, such as a3x. The pose is held, or the lengths of the legs.",
+        "Design",
+        _is_changed,
+        _change,
+    ),
+    Step(
+        "See the workspace",
+        "Tick Solid in Workspace: all positions of b4 within the limits. Cut it open, or colour "
+        "it by the distance to the nearest singularity.",
+        "Workspace",
+        _is_solid,
+        _show_solid,
+    ),
+    Step(
+        "Optimise, and take it with you",
+        "Press Optimise, and accept or revert what it finds. Files for CAD, simulation and print "
+        "are in Workspace, View and Share. Ctrl-Z undoes every step of this tour.",
+        "Optimise",
+        _is_optimised,
+        lambda _: StartRun(),
+    ),
+)
+
+
+@dataclass(frozen=True)
+class Tour:
+    """How far the tour of one user has got.
+
+    Attributes:
+        at: The index of the step.
+        began: The frame in which it began.
+        is_done: Whether the user has done what it asks for.
+    """
+
+    at: int
+    began: Frame
+    is_done: bool = False
+
+    @property
+    def step(self) -> Step:
+        """The step at hand."""
+        return STEPS[self.at]
+
+    @property
+    def is_last(self) -> bool:
+        """Whether no step follows."""
+        return self.at == len(STEPS) - 1
+
+    def seen(self, frame: Frame) -> Tour:
+        """Return the tour after a frame: the step may be done by it."""
+        if self.is_done or not self.step.is_done(self.began, frame):
+            return self
+        return replace(self, is_done=True)
+
+    def moved(self, steps: int, frame: Frame) -> Tour:
+        """Return the tour so many steps on, at the first or the last at most."""
+        at = min(max(self.at + steps, 0), len(STEPS) - 1)
+        return Tour(at, frame)
+
+
+def begun(frame: Frame) -> Tour:
+    """Return the tour at its first step."""
+    return Tour(0, frame)

@@ -1,0 +1,1 @@
+"""Clearances of the legs, swept tetrahedra and radii."""

@@ -1,0 +1,96 @@
+"""Both flags, coloured by the incidences: a point, a line and a plane that hangs from it.
+
+Each element takes the colour of the incidence that it is part of: a1 and the platform
+plane that of κ1, the two lines that of κ2, b4 and the base plane that of κ3.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import viser
+
+from explorer.app.features.mechanism.legs import guide_span
+from explorer.app.scene.placing import Placed
+from explorer.app.scene.shapes import Patch, cylinder, sphere, turned_to
+from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.colours import proximity_colour
+from explorer.numerics.arrays import FloatArray
+
+POINT_RADIUS = 0.36
+LINE_RADIUS = 0.075
+PLANE_OPACITY = 0.2
+ALONG_X = turned_to(np.array([[1.0, 0.0, 0.0]]))[0]
+
+
+class Flag:
+    """One flag in its own frame: the point at the origin, the line along x."""
+
+    def __init__(self, scene: viser.SceneApi, root: str, kappas: tuple[int, int, int]) -> None:
+        # Which margin colours the point, the line and the plane.
+        self._kappas = kappas
+        self._point = scene.add_mesh_simple(
+            f"{root}/flag/point", *sphere(), scale=POINT_RADIUS, cast_shadow=False
+        )
+        self._line = scene.add_mesh_simple(
+            f"{root}/flag/line", *cylinder(), wxyz=ALONG_X, cast_shadow=False
+        )
+        self._patch = Patch(scene, f"{root}/flag", opacity=PLANE_OPACITY)
+
+    def updates(self, placed: Placed, corners: FloatArray, size: float) -> Iterator[Update]:
+        """Yield what draws it with a plane of four corners, the first two on its line."""
+        state = placed.frame.state
+        levels = placed.frame.verdict.levels
+        point, along, plane = (proximity_colour(levels[k], 1.0) for k in self._kappas)
+        low, high = corners[:2, 0].tolist()
+        for handle in (self._point, self._line):
+            yield handle, "visible", state.view.flags
+        yield from self._patch.shown(state.view.flags)
+        yield self._point, "color", point
+        yield self._point, "scale", POINT_RADIUS * size
+        yield self._line, "color", along
+        yield self._line, "position", (low, 0.0, 0.0)
+        yield self._line, "scale", (LINE_RADIUS * size, LINE_RADIUS * size, high - low)
+        yield from self._patch.spanned(corners, plane)
+
+
+class Flags:
+    """The base's flag and the platform's."""
+
+    def __init__(self, scene: viser.SceneApi) -> None:
+        self._base = Flag(scene, "/base", kappas=(0, 1, 2))
+        self._platform = Flag(scene, "/platform", kappas=(2, 1, 0))
+
+    def updates(self, placed: Placed) -> Iterator[Update]:
+        """Yield what draws the flags of this frame."""
+        yield from self._base.updates(placed, _base_corners(placed), 1.0)
+        yield from self._platform.updates(
+            placed, _platform_corners(placed), max(0.6, placed.thickness)
+        )
+
+
+def flag_corners(placed: Placed) -> FloatArray:
+    """Return the corners of both planes in the scene, shape (8, 3)."""
+    rotation = placed.frame.snapshot.rotation
+    platform = placed.points["b4"] + _platform_corners(placed) @ rotation.T
+    return np.concatenate([_base_corners(placed), platform])
+
+
+def _base_corners(placed: Placed) -> FloatArray:
+    low, high = guide_span(placed)
+    return _hanging(low - 1.0, high + 1.0, 1.2 * float(placed.points["a3"][1]))
+
+
+def _platform_corners(placed: Placed) -> FloatArray:
+    local = placed.platform_points
+    stations = [float(local[name][0]) for name in ("b1", "b2", "b3", "b4")]
+    beyond = 0.16 * placed.reach
+    side = float(local["b1"][1])
+    hang = side + float(np.copysign(0.5 * beyond, side))
+    return _hanging(min(stations) - beyond, max(stations) + beyond, hang)
+
+
+def _hanging(low: float, high: float, hang: float) -> FloatArray:
+    """Return the corners of a plane that hangs from a line along x to y, shape (4, 3)."""
+    return np.array([[low, 0, 0], [high, 0, 0], [high, hang, 0], [low, hang, 0]], float)

@@ -1,0 +1,189 @@
+"""Moving the mechanism: by its legs, by its pose, or from one assembly mode to another."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import viser
+
+from explorer.app.browser.viser_gaps import Mark
+from explorer.app.session.session import Session
+from explorer.app.state.actions import (
+    GoHome,
+    SetAngle,
+    SetJoint,
+    SetMode,
+    SetPosition,
+    SetView,
+    UseNearest,
+)
+from explorer.app.state.frame import Frame
+from explorer.app.state.state import State
+from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.controls import Controls, Span
+from explorer.app.widgets.markup import alert, remark, scientific
+from explorer.app.widgets.ranges import coordinate_span, length_span
+from explorer.mechanism.design import JOINTS, LENGTHS
+from explorer.mechanism.feasible_intervals import Interval
+from explorer.mechanism.margins import mode_name, mode_words
+
+JOINT_HINTS = {
+    "l1": "Leg 1: length of the actuator from a1 to b1 (U joint, actuator, ball joint).",
+    "d1": "Leg 2: where its carriage stands on the guide, from a1.",
+    "d2": "Leg 2: length of the actuator from the guide, perpendicular to it, to b2.",
+    "d3": "Leg 3: where its carriage stands on the guide, from a1.",
+    "d4": "Leg 3: length of the actuator from the guide, perpendicular to it, to b3.",
+    "l4": "Leg 4: length of the actuator from a3 to b4 (U joint, actuator, ball joint).",
+}
+JOINT_LABELS = {
+    "l1": "l1  leg 1",
+    "d1": "d1  leg 2 slide",
+    "d2": "d2  leg 2",
+    "d3": "d3  leg 3 slide",
+    "d4": "d4  leg 3",
+    "l4": "l4  leg 4",
+}
+ANGLES = (
+    ("yaw", "about the base's z, first", 180.0),
+    ("pitch", "about the turned y, second", 90.0),
+    ("roll", "about the twice turned x, third", 180.0),
+)
+# Share of a slider that a label takes.
+LABEL_ROOM = 0.24
+MODES = tuple(f"{mode}:  {mode_name(mode)}" for mode in range(8))
+
+
+class MovePanel:
+    """Sliders for legs and pose, the list of modes, and word of lengths that cannot close."""
+
+    def __init__(self, gui: viser.GuiApi, session: Session) -> None:
+        self._controls = controls = Controls(gui, session)
+        with gui.add_folder("Legs (design units)"):
+            for joint, name in enumerate(JOINTS):
+                self._add_joint(joint, name)
+            self._alert = gui.add_html("", visible=False)
+            self._remark = gui.add_html("", visible=False)
+            self._nearest = controls.button(
+                "Use the nearest length",
+                "Move this leg to the nearest length that closes and stays clear of "
+                "singularities, the others as they are.",
+                UseNearest,
+                icon=viser.Icon.MAGNET,
+            )
+        with gui.add_folder("Pose of b4 (design units, degrees)"):
+            for axis, name in enumerate("xyz"):
+                self._add_position(axis, name)
+            for axis, (name, order, edge) in enumerate(ANGLES):
+                self._add_angle(axis, name, order, edge)
+            controls.button(
+                "Home pose",
+                "Return to the pose that the design opens with.",
+                GoHome,
+                icon=viser.Icon.HOME,
+            )
+        with gui.add_folder("Assembly mode"):
+            controls.dropdown(
+                "κ1 κ2 κ3",
+                "The eight ways to assemble these leg lengths, by the signs of the margins.",
+                MODES,
+                lambda frame: mode_options(frame)[-1 if is_between(frame) else frame.state.mode],
+                lambda state, chosen: (
+                    SetMode(MODES.index(chosen)) if chosen in MODES else SetView(state.view)
+                ),
+                more=mode_options,
+            )
+            controls.checkbox(
+                "Other modes as ghosts",
+                "Draw the seven other ways to assemble the same leg lengths.",
+                lambda frame: frame.state.view.ghosts,
+                lambda state, on: SetView(replace(state.view, ghosts=on)),
+            )
+
+    def _add_joint(self, joint: int, name: str) -> None:
+        span = length_span if name in LENGTHS else coordinate_span
+
+        def marks(frame: Frame) -> tuple[Mark, ...]:
+            return interval_marks(frame.snapshot.intervals[joint], span(frame.state))
+
+        self._controls.slider(
+            JOINT_LABELS[name],
+            f"{JOINT_HINTS[name]} The marks bound the values that close, the others held.",
+            lambda frame: frame.state.joints[joint],
+            lambda _, value: SetJoint(joint, value),
+            span,
+            marks=marks,
+        )
+
+    def _add_position(self, axis: int, name: str) -> None:
+        self._controls.slider(
+            name,
+            f"The {name} coordinate of b4 in the base frame.",
+            lambda frame: frame.state.pose.position[axis],
+            lambda _, value: SetPosition(axis, value),
+            coordinate_span,
+        )
+
+    def _add_angle(self, axis: int, name: str, order: str, edge: float) -> None:
+        def span(_: State) -> Span:
+            return Span(-edge, edge, 0.1)
+
+        self._controls.slider(
+            f"{name} (°)",
+            f"Rotation of the platform {order}, in degrees.",
+            lambda frame: frame.state.yaw_pitch_roll[axis],
+            lambda _, value: SetAngle(axis, value),
+            span,
+        )
+
+    def updates(self, frame: Frame) -> Iterator[Update]:
+        """Yield what makes the panel show the frame."""
+        unclosed = frame.state.unclosed
+        yield self._alert, "visible", unclosed is not None
+        yield self._nearest, "visible", unclosed is not None and unclosed.nearest is not None
+        if unclosed is not None:
+            yield self._alert, "content", alert("These lengths cannot close", str(unclosed))
+        words = None if unclosed is not None else frame.state.remark
+        yield self._remark, "visible", words is not None
+        if words is not None:
+            yield self._remark, "content", remark("Not quite the length asked for", words)
+        yield from self._controls.updates(frame)
+
+
+def is_between(frame: Frame) -> bool:
+    """Whether the pose is singular, so that it lies in no mode but between some."""
+    return len(frame.snapshot.bordering_modes) > 1
+
+
+def mode_options(frame: Frame) -> tuple[str, ...]:
+    """Return the modes to choose from; at a singular pose its boundary comes last."""
+    if not is_between(frame):
+        return MODES
+    snapshot = frame.snapshot
+    return (*MODES, f"{snapshot.sign_words}:  {mode_words(snapshot.bordering_modes)}")
+
+
+def interval_marks(intervals: tuple[Interval, ...], span: Span) -> tuple[Mark, ...]:
+    """Return marks at the ends of the intervals, with labels that do not overlap.
+
+    Args:
+        intervals: In which the lengths close.
+        span: Of the slider that is marked.
+    """
+    marks: list[Mark] = []
+    labelled = -1.0
+    for low, high in intervals:
+        start, end = (min(max(v, span.low), span.high) for v in (low, high))
+        first, last = ((v - span.low) / (span.high - span.low) for v in (start, end))
+        size = max(abs(span.low), abs(span.high))
+        texts = (scientific(low, 3, size=size), scientific(high, 3, size=size))
+        if first - labelled < LABEL_ROOM:
+            texts = ("", "")
+        elif last - first < LABEL_ROOM:
+            # Too close for two labels: the end with more room beside it carries both.
+            both = f"{texts[0]} … {texts[1]}"
+            texts = ("", both) if first < 0.5 else (both, "")
+        if any(texts):
+            labelled = last
+        marks += [(start, texts[0]), (end, texts[1])]
+    return tuple(marks)

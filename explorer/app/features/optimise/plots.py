@@ -1,0 +1,157 @@
+"""Three charts of a run: the objective, the volume and the worst constraint by iterates."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from html import escape
+from typing import NamedTuple
+
+import numpy as np
+import viser
+from numpy.typing import NDArray
+from viser import uplot
+
+from explorer.app.state.state import Run
+from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.charts import BLUE, FONT, ORANGE
+from explorer.app.widgets.colours import css
+from explorer.app.widgets.markup import DIM, scientific
+from explorer.optimise import curves
+from explorer.optimise.outcome import Iterate
+from explorer.optimise.problem import Problem
+
+HEIGHT = 96
+BLANK = np.zeros(2)
+# Of the span of the values: how far an axis goes beyond them.
+BEYOND = 0.12
+
+
+class Curve(NamedTuple):
+    """What a chart shows.
+
+    Attributes:
+        caption: What it is, with the last value.
+        values: One for each iterate.
+        level: What they are compared with, or None.
+        powers: Whether values are powers of ten, each told by its exponent.
+    """
+
+    caption: str
+    values: NDArray[np.float64]
+    level: float | None
+    powers: bool = False
+
+
+class OptimisePlots:
+    """Captions and charts; hidden until there is a run."""
+
+    def __init__(self, gui: viser.GuiApi) -> None:
+        self._charts = [self._add(gui) for _ in range(3)]
+
+    def _add(self, gui: viser.GuiApi) -> tuple[viser.GuiHtmlHandle, viser.GuiUplotHandle]:
+        caption = gui.add_html("", visible=False)
+        chart = gui.add_uplot(
+            (BLANK,) * 3,
+            _series(),
+            scales=_scales(Curve("", BLANK, None)),
+            axes=_axes(),
+            legend={"show": False},
+            cursor={"drag": {"x": False, "y": False}},
+            height=HEIGHT,
+            padding=(6, 14, 0, 0),
+            visible=False,
+        )
+        return caption, chart
+
+    def updates(self, run: Run | None) -> Iterator[Update]:
+        """Yield what makes them show a run."""
+        shown = [] if run is None else curves_of(run)
+        for index, (caption, chart) in enumerate(self._charts):
+            curve = shown[index] if index < len(shown) else None
+            yield caption, "visible", curve is not None
+            yield chart, "visible", curve is not None
+            if curve is not None:
+                yield caption, "content", _caption(curve.caption)
+                yield chart, "scales", _scales(curve)
+                yield chart, "data", data_of(curve)
+
+
+def curves_of(run: Run) -> list[Curve]:
+    """Return the curves of the start that is looked at: the present one, in the end the best."""
+    if not run.iterates:
+        return []
+    which = (run.best or run.iterates[-1]).run
+    iterates = [each for each in run.iterates if each.run == which]
+    if not iterates:
+        return []
+    return [
+        Curve(_words(run.problem, iterates[-1], curve), curve.values, curve.level, curve.powers)
+        for curve in curves.curves_of(run.problem, iterates)
+    ]
+
+
+def _words(problem: Problem, last: Iterate, curve: curves.Curve) -> str:
+    """Return what a curve is, with its last value."""
+    if curve.kind == "spare":
+        return f"Worst constraint, missed below 0: {last.worst or 'none'}"
+    if curve.kind == "volume":
+        target = "" if curve.level is None else f", wanted {curve.level:.6g}"
+        return f"Volume (units³): {last.volume:.6g}{target}"
+    if curve.powers:
+        return f"log10 of F = |1 − V / V′|; F = {last.objective:.2g}".replace("e-", "e−")
+    name = curves.CALLED[problem.objective].capitalize()
+    return f"{name} (units): {scientific(last.objective, 6)}"
+
+
+def data_of(curve: Curve) -> tuple[NDArray[np.float64], ...]:
+    """Return the columns of a chart: iterations, values, and the level or nothing."""
+    x = np.arange(len(curve.values), dtype=np.float64)
+    level = np.full(len(x), np.nan if curve.level is None else curve.level)
+    return x, curve.values, level
+
+
+def _caption(text: str) -> str:
+    return (
+        f'<div style="{DIM};font-size:11.5px;padding:4px 12px 0;overflow:hidden;'
+        f'text-overflow:ellipsis;white-space:nowrap;font-variant-numeric:tabular-nums">'
+        f"{escape(text)}</div>"
+    )
+
+
+def _series() -> tuple[uplot.Series, ...]:
+    values: uplot.Series = {
+        "label": "value",
+        "stroke": css(BLUE),
+        "width": 2.0,
+        # Shown where they are apart.
+        "points": {"size": 5, "fill": css(BLUE)},
+    }
+    level: uplot.Series = {
+        "label": "level",
+        "stroke": css(ORANGE),
+        "width": 1.0,
+        "dash": (4, 4),
+        "points": {"show": False},
+    }
+    return ({"label": "iteration"}, values, level)
+
+
+def _scales(curve: Curve) -> dict[str, uplot.Scale]:
+    last = max(1.0, len(curve.values) - 1.0)
+    every = [*curve.values.tolist(), *([] if curve.level is None else [curve.level])]
+    low, high = min(every), max(every)
+    if curve.powers:
+        low = math.floor(low)
+        edges = float(low), float(max(math.ceil(high), low + 1))
+    else:
+        room = BEYOND * (high - low) or 0.05 * abs(high) or 1.0
+        edges = low - room, high + room
+    return {"x": {"time": False, "range": (0.0, last)}, "y": {"range": edges}}
+
+
+def _axes() -> tuple[uplot.Axis, uplot.Axis]:
+    return (
+        {"gap": 3, "ticks": {"size": 4}, "font": FONT, "size": 20, "space": 40},
+        {"gap": 3, "ticks": {"size": 4}, "font": FONT, "size": 50, "space": 16},
+    )

@@ -1,0 +1,1 @@
+"""Paths between two poses: planned, shown and played."""

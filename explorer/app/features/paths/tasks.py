@@ -1,0 +1,12 @@
+"""What the planner's own process does."""
+
+from __future__ import annotations
+
+from explorer.mechanism.design import Design
+from explorer.mechanism.pose import Pose
+from explorer.paths.planning import PlannedPath, plan_path
+
+
+def plan(design: Design, start: Pose, goal: Pose, seconds: float) -> PlannedPath:
+    """Return a path between two poses, see `explorer.paths.planning`."""
+    return plan_path(design, start, goal, seconds=seconds)

@@ -1,0 +1,1 @@
+"""The virtual prototype and its parts."""

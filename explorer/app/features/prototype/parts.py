@@ -1,0 +1,63 @@
+"""The parts of the prototype as they are drawn, made in the worker."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+from explorer.app.features.prototype.parts_list import PartsList, parts_list
+from explorer.app.scene.creases import Drawn, creased
+from explorer.errors import ExplorerError
+from explorer.mechanism.design import Design
+from explorer.prototype.assembly import Prototype, make_prototype
+
+
+@dataclass(frozen=True)
+class PartsRequest:
+    """Of which design to make the parts; its name does not count."""
+
+    design: Design
+
+
+@dataclass(frozen=True)
+class Parts:
+    """What was made of a design.
+
+    Attributes:
+        prototype: The parts, which know their places in a pose.
+        meshes: To draw them, in their order and frames, in design units.
+        listed: The same for the workshop.
+    """
+
+    prototype: Prototype
+    meshes: tuple[Drawn, ...]
+    listed: PartsList
+
+
+@dataclass(frozen=True)
+class PartsDrawing:
+    """The parts of a design, or why there are none.
+
+    Attributes:
+        request: What was asked for.
+        parts: None if the design is too tight for them.
+        refusal: Why, and what would fit.
+        seconds: How long it took.
+    """
+
+    request: PartsRequest
+    parts: Parts | None
+    refusal: str | None
+    seconds: float
+
+
+def parts_drawing(request: PartsRequest) -> PartsDrawing:
+    """Return the parts of a design, ready to be drawn."""
+    begin = time.perf_counter()
+    try:
+        prototype = make_prototype(request.design)
+    except ExplorerError as error:
+        return PartsDrawing(request, None, str(error), time.perf_counter() - begin)
+    meshes = tuple(creased(part.vertices, part.faces) for part in prototype.parts)
+    parts = Parts(prototype, meshes, parts_list(prototype))
+    return PartsDrawing(request, parts, None, time.perf_counter() - begin)

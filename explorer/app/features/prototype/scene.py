@@ -1,0 +1,130 @@
+"""The prototype: parts in place of the schematic legs and bodies, moved as rigid bodies.
+
+A node for each part is there from the start. It gets a mesh when the design has changed, and
+in each frame no more than its place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import viser
+
+from explorer.app.features.mechanism.legs import colliding_legs
+from explorer.app.features.prototype.parts import Parts
+from explorer.app.scene.creases import Drawn
+from explorer.app.scene.placing import Placed
+from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.colours import (
+    BALL,
+    CARRIAGE,
+    OUTLINE,
+    PLATFORM_BODY,
+    RAIL,
+    ROD,
+    TUBE,
+    Rgb,
+)
+from explorer.mechanism.pose import quaternion_from_rotation
+from explorer.numerics.arrays import FloatArray
+from explorer.prototype.chains import BODIES, LEGS, Places
+from explorer.prototype.exploded import Explosion
+
+COLOURS: dict[str, Rgb] = {
+    "base": PLATFORM_BODY,
+    "cross": TUBE,
+    "carriage": CARRIAGE,
+    "cylinder": RAIL,
+    "rod": ROD,
+    "platform": PLATFORM_BODY,
+    "ball": BALL,
+}
+"""Greys, as of the schematic parts: orange and blue belong to the singularities."""
+
+BALLS = tuple(f"ball {leg}" for leg in LEGS)
+NAMES = (*BODIES, *BALLS)
+ON_BODIES = ("base", "platform")
+"""What the switch of the bodies shows; balls go with the platform, the rest with the legs."""
+
+
+class PrototypeScene:
+    """Draws the parts, together or drawn apart."""
+
+    def __init__(self, scene: viser.SceneApi) -> None:
+        empty = np.zeros((3, 3)), np.array([[0, 1, 2]])
+        self._nodes: dict[str, viser.MeshHandle] = {}
+        for name in NAMES:
+            # A ball hangs on the platform, so that it moves with it without a word.
+            path = f"platform/{name}" if name in BALLS else name
+            kind = name.partition(" ")[0]
+            self._nodes[name] = scene.add_mesh_simple(
+                f"/prototype/{path}", *empty, color=COLOURS[kind], visible=False
+            )
+        self._drawn: tuple[Parts, float] | None = None
+        self._meshes: dict[str, Drawn] = {}
+
+    def updates(self, placed: Placed) -> Iterator[Update]:
+        """Yield what draws the parts of this frame."""
+        view, parts = placed.frame.state.view, placed.parts
+        for name, node in self._nodes.items():
+            switch = view.bodies if name in ON_BODIES or name in BALLS else view.legs
+            yield node, "visible", switch and parts is not None
+        if parts is None:
+            return
+        yield from self._shapes(parts, placed.scale)
+        yield from self._places(placed, parts)
+        alarms = colliding_legs(placed.frame.snapshot)
+        for leg, alarm in zip(LEGS, alarms, strict=True):
+            for kind in ("cylinder", "rod"):
+                colour = OUTLINE if alarm else COLOURS[kind]
+                yield self._nodes[f"{kind} {leg}"], "color", colour
+
+    def _shapes(self, parts: Parts, scale: float) -> Iterator[Update]:
+        if self._drawn is None or self._drawn[0] is not parts or self._drawn[1] != scale:
+            self._drawn = parts, scale
+            names = (part.name for part in parts.prototype.parts)
+            self._meshes = {
+                name: (vertices * np.float32(scale), faces)
+                for name, (vertices, faces) in zip(names, parts.meshes, strict=True)
+            }
+        for name, (vertices, faces) in self._meshes.items():
+            yield self._nodes[name], "vertices", vertices
+            yield self._nodes[name], "faces", faces
+
+    def _places(self, placed: Placed, parts: Parts) -> Iterator[Update]:
+        places = shown_places(placed, parts)
+        names = [part.name for part in parts.prototype.parts]
+        positions = (placed.scale * places.origin).tolist()
+        turns = quaternion_from_rotation(places.rotation).tolist()
+        plate = names.index("platform")
+        for index, name in enumerate(names):
+            if name in BALLS:
+                off = (places.origin[index] - places.origin[plate]) @ places.rotation[plate]
+                yield self._nodes[name], "position", tuple((placed.scale * off).tolist())
+            else:
+                yield self._nodes[name], "position", tuple(positions[index])
+                yield self._nodes[name], "wxyz", tuple(turns[index])
+
+
+def shown_places(placed: Placed, parts: Parts) -> Places:
+    """Return where the parts are drawn, in their order and in design units."""
+    frame = placed.frame
+    places = parts.prototype.places(frame.state.pose.position, frame.snapshot.rotation)
+    share = frame.state.view.prototype.exploded
+    if share == 0.0:
+        return places
+    away = share * Explosion(parts.prototype).offsets(places)
+    return Places(places.origin + away, places.rotation)
+
+
+def part_corners(placed: Placed, parts: Parts) -> FloatArray:
+    """Return the corners of boxes about the parts in the scene, shape (n, 3)."""
+    places, seen = shown_places(placed, parts), list[FloatArray]()
+    for (vertices, _), origin, turn in zip(
+        parts.meshes, places.origin, places.rotation, strict=True
+    ):
+        ends = np.stack([vertices.min(axis=0), vertices.max(axis=0)])
+        corners = np.array(np.meshgrid(*ends.T)).reshape(3, -1).T
+        seen.append(placed.scale * (corners @ turn.T + origin))
+    return np.concatenate(seen)

@@ -1,0 +1,1 @@
+"""Downloads, pictures, reports and records."""

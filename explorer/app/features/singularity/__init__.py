@@ -1,0 +1,1 @@
+"""Nearest singular poses, uncoupled motions, strata and ellipsoids."""

@@ -1,0 +1,1 @@
+"""Design studies: set up, run, explored."""

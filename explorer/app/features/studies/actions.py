@@ -1,0 +1,140 @@
+"""The actions of looking at studies: open one, brush, choose axes, pick a design, wish for one."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from explorer.app.state.actions import Open
+from explorer.app.state.state import State
+from explorer.app.state.studies import Range, Studies, StudyWish, spoken
+from explorer.errors import InputError
+
+# Of one axis; hands make a few.
+MOST_RANGES = 16
+
+
+@dataclass(frozen=True)
+class OpenStudy:
+    """Look at a study by its name, or at none."""
+
+    name: str | None
+
+    def apply(self, state: State) -> State:
+        """Return the next state; what was brushed and picked in another study is forgotten."""
+        if self.name == state.studies.name:
+            return state
+        return replace(state, studies=Studies(name=self.name, wish=state.studies.wish))
+
+
+@dataclass(frozen=True)
+class BrushAxis:
+    """Ask for designs that lie within ranges of an axis; with none the axis is free."""
+
+    axis: str
+    ranges: tuple[Range, ...]
+
+    def apply(self, state: State) -> State:
+        """Return the next state.
+
+        Raises:
+            InputError: too many ranges, or one without numbers.
+        """
+        return _with(state, state.studies.brushed(self.axis, _checked(self.axis, self.ranges)))
+
+
+@dataclass(frozen=True)
+class BrushBox:
+    """Ask for designs within a box of the scatter plot; without ranges both axes are free."""
+
+    across: str
+    up: str
+    box: tuple[Range, Range] | None
+
+    @property
+    def spoken(self) -> str:
+        """What people call both axes."""
+        return f"{spoken(self.across)} and {spoken(self.up)}"
+
+    def apply(self, state: State) -> State:
+        """Return the next state.
+
+        Raises:
+            InputError: ranges without numbers.
+        """
+        studies = state.studies
+        for index, axis in enumerate((self.across, self.up)):
+            ranges = () if self.box is None else (self.box[index],)
+            studies = studies.brushed(axis, _checked(axis, ranges))
+        return _with(state, studies)
+
+
+@dataclass(frozen=True)
+class ClearBrushes:
+    """Free all axes."""
+
+    def apply(self, state: State) -> State:
+        """Return the next state."""
+        return _with(state, replace(state.studies, brushes=()))
+
+
+@dataclass(frozen=True)
+class SetAxes:
+    """Choose what the scatter plot shows and what colours the plots; None for an objective."""
+
+    across: str | None
+    up: str | None
+    colour: str | None
+
+    def apply(self, state: State) -> State:
+        """Return the next state."""
+        studies = replace(state.studies, across=self.across, up=self.up, colour=self.colour)
+        return _with(state, studies)
+
+
+@dataclass(frozen=True)
+class PickDesign(Open):
+    """Open the design of a row of the open study.
+
+    Attributes:
+        index: Of the design in its study.
+        study: Its name.
+    """
+
+    index: int = 0
+    study: str = ""
+
+    def apply(self, state: State) -> State:
+        """Return the next state.
+
+        Raises:
+            InputError: the design is being optimised, or another study is open by now.
+        """
+        if state.studies.name != self.study:
+            raise InputError(f"the study {self.study!r} is not open any more")
+        after = super().apply(state)
+        return _with(after, replace(after.studies, picked=self.index))
+
+
+@dataclass(frozen=True)
+class SetStudyWish:
+    """Change the small study that can be started."""
+
+    wish: StudyWish
+
+    def apply(self, state: State) -> State:
+        """Return the next state."""
+        return _with(state, replace(state.studies, wish=self.wish))
+
+
+def _with(state: State, studies: Studies) -> State:
+    return replace(state, studies=studies)
+
+
+def _checked(axis: str, ranges: tuple[Range, ...]) -> tuple[Range, ...]:
+    if len(ranges) > MOST_RANGES:
+        raise InputError(f"an axis takes {MOST_RANGES} ranges; {axis} was given {len(ranges)}")
+    for low, high in ranges:
+        if not (math.isfinite(low) and math.isfinite(high) and low <= high):
+            raise InputError(f"a range of {axis} goes from low to high; got {low:g} to {high:g}")
+    return ranges

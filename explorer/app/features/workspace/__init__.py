@@ -1,0 +1,1 @@
+"""The workspace: solid, cut, map and numbers."""

@@ -1,0 +1,198 @@
+"""The workspace around the mechanism: solid, hull, slice, and the three singular planes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TypeAlias
+
+import numpy as np
+import viser
+from numpy.typing import NDArray
+
+from explorer.app.features.workspace.feed import WorkspaceFeed, workspace_rotation
+from explorer.app.scene.bands import COLLIDING, PLAIN, Shell
+from explorer.app.scene.placing import Placed
+from explorer.app.scene.shapes import Patch
+from explorer.app.session.tasks import WorkspaceDrawing
+from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.colours import OUTLINE, Rgb, proximity_colour
+from explorer.numerics.arrays import FloatArray
+from explorer.numerics.number_text import scientific
+from explorer.singularity.colours import band_colours
+from explorer.workspace.limits.constraints import Cone, HalfSpace, Never, Round, constraints
+
+ArrayPair: TypeAlias = tuple[NDArray[np.float32], NDArray[np.uint32]]
+
+EMPTY: ArrayPair = np.zeros((3, 3), dtype=np.float32), np.array([[0, 1, 2]], dtype=np.uint32)
+SOLID_OPACITY = 0.42
+# Of where legs collide, which is to be seen through the rest.
+COLLIDING_OPACITY = 0.8
+CUT_OPACITY = 0.96
+PLANE_OPACITY = 0.12
+HULL_COLOUR: Rgb = (90, 100, 116)
+HULL_OPACITY = 0.3
+
+
+class WorkspaceScene:
+    """Draws what the feed has, and where p leaves it the limit that is broken."""
+
+    def __init__(self, scene: viser.SceneApi, feed: WorkspaceFeed) -> None:
+        self._feed = feed
+        # Collisions are made first, and so drawn first: what is in front of them shows them.
+        self._colours: tuple[Rgb, ...] = (COLLIDING, PLAIN, *band_colours())
+        self._shells = [
+            scene.add_mesh_simple(
+                f"/workspace/shell/{index}",
+                *EMPTY,
+                color=colour,
+                side="double",
+                flat_shading=True,
+                cast_shadow=False,
+                receive_shadow=False,
+                visible=False,
+            )
+            for index, colour in enumerate(self._colours)
+        ]
+        self._hull = scene.add_mesh_simple(
+            "/workspace/hull",
+            *EMPTY,
+            color=HULL_COLOUR,
+            wireframe=True,
+            opacity=HULL_OPACITY,
+            visible=False,
+        )
+        self._planes = [_SingularPlane(scene, index) for index in range(3)]
+        self._broken = scene.add_line_segments(
+            "/workspace/broken/lines",
+            np.zeros((1, 2, 3)),
+            OUTLINE,
+            thickness=4.0,
+            thickness_units="screen",
+            visible=False,
+        )
+        self._broken_label = scene.add_label(
+            "/workspace/broken/label", "limit", font_screen_scale=0.9, visible=False
+        )
+        self._placed_for: tuple[WorkspaceDrawing, float] | None = None
+        self._scaled: dict[Rgb, ArrayPair] = {}
+        self._scaled_hull = EMPTY
+
+    def updates(self, placed: Placed) -> Iterator[Update]:
+        """Yield what draws the workspace of this frame."""
+        view = placed.frame.state.view.workspace
+        drawing = self._feed.drawing
+        self._scale(drawing, placed.scale)
+        is_cut = drawing is not None and drawing.request.cut is not None
+        for colour, handle in zip(self._colours, self._shells, strict=True):
+            shell = self._scaled.get(colour)
+            yield handle, "visible", view.solid and shell is not None
+            if view.solid and shell is not None:
+                yield handle, "opacity", _opacity(colour, is_cut=is_cut)
+                yield handle, "vertices", shell[0]
+                yield handle, "faces", shell[1]
+        has_hull = view.hull and drawing is not None and drawing.hull is not None
+        yield self._hull, "visible", has_hull
+        if has_hull:
+            yield self._hull, "vertices", self._scaled_hull[0]
+            yield self._hull, "faces", self._scaled_hull[1]
+        for plane in self._planes:
+            yield from plane.updates(placed)
+        yield from self._broken_limit(placed)
+
+    def _scale(self, drawing: WorkspaceDrawing | None, scale: float) -> None:
+        """Bring a new drawing into scene units, once, so that it is compared by identity."""
+        if drawing is None:
+            self._placed_for, self._scaled = None, {}
+        elif self._placed_for is None or (
+            self._placed_for[0] is not drawing or self._placed_for[1] != scale
+        ):
+            self._placed_for = drawing, scale
+            self._scaled = {shell.colour: _scaled(shell, scale) for shell in drawing.shells}
+            if drawing.hull is not None:
+                self._scaled_hull = _scaled(drawing.hull, scale)
+
+    def _broken_limit(self, placed: Placed) -> Iterator[Update]:
+        """Show the limit that p breaks the most: from p to the nearest place that keeps it."""
+        frame = placed.frame
+        shown = frame.state.view.workspace.solid and frame.state.unclosed is None
+        worst: tuple[float, str, FloatArray] | None = None
+        if shown and frame.snapshot.violations:
+            p = np.array(frame.state.pose.position)
+            for limit in constraints(frame.state.design, workspace_rotation(frame)):
+                if isinstance(limit, Never | Cone):
+                    continue
+                slack = float(limit.slack(p))
+                if slack < -frame.state.design.tolerance and (worst is None or slack < worst[0]):
+                    worst = slack, limit.name, _nearest(limit, p)
+        for handle in (self._broken, self._broken_label):
+            yield handle, "visible", worst is not None
+        if worst is not None:
+            ends = placed.scale * np.array([frame.state.pose.position, worst[2]])
+            yield self._broken, "points", ends[None].astype(np.float32)
+            yield self._broken_label, "text", f"{worst[1]}: {scientific(-worst[0], 3)} beyond"
+            yield self._broken_label, "position", tuple(ends[1].tolist())
+
+
+class _SingularPlane:
+    """One of the three planes of singular positions, all through a1."""
+
+    def __init__(self, scene: viser.SceneApi, index: int) -> None:
+        self._index = index
+        self._patch = Patch(scene, f"/singular/{index + 1}", opacity=PLANE_OPACITY, visible=False)
+        self._label = scene.add_label(
+            f"/singular/{index + 1}/label", f"κ{index + 1} = 0", visible=False
+        )
+
+    def updates(self, placed: Placed) -> Iterator[Update]:
+        """Yield what draws it in this frame."""
+        state, snapshot = placed.frame.state, placed.frame.snapshot
+        normal = self._normal(snapshot.rotation) if state.view.workspace.planes else None
+        yield from self._patch.shown(normal is not None)
+        yield self._label, "visible", normal is not None
+        if normal is None:
+            return
+        colour = proximity_colour(placed.frame.verdict.levels[self._index], 1.0)
+        along = np.cross(normal, [0.0, 1.0, 0.0])
+        if np.linalg.norm(along) < 0.1:
+            along = np.array([1.0, 0.0, 0.0])
+        along /= np.linalg.norm(along)
+        across = np.cross(normal, along)
+        half = 1.1 * placed.reach
+        corners = half * np.array([a * along + b * across for a, b in CORNERS])
+        yield from self._patch.spanned(corners, colour)
+        yield self._label, "position", tuple(corners[2].tolist())
+
+    def _normal(self, rotation: FloatArray) -> FloatArray | None:
+        """Return its unit normal; None with parallel lines, where every position is singular."""
+        x = rotation[:, 0]
+        normal = (-rotation[:, 2], np.array([0.0, -x[2], x[1]]), np.array([0.0, 0.0, 1.0]))[
+            self._index
+        ]
+        length = float(np.linalg.norm(normal))
+        return normal / length if length > 1e-9 else None
+
+
+CORNERS = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
+
+
+def _opacity(colour: Rgb, *, is_cut: bool) -> float:
+    if is_cut:
+        return CUT_OPACITY
+    return COLLIDING_OPACITY if colour == COLLIDING else SOLID_OPACITY
+
+
+def _scaled(shell: Shell, scale: float) -> ArrayPair:
+    vertices = np.asarray(shell.vertices * scale, dtype=np.float32)
+    return vertices, np.asarray(shell.faces, dtype=np.uint32)
+
+
+def _nearest(limit: Round | HalfSpace, p: FloatArray) -> FloatArray:
+    """Return the place nearest to p on the surface of a limit."""
+    if isinstance(limit, HalfSpace):
+        excess = float(limit.normal @ p) - limit.offset
+        return p - limit.normal * excess / float(limit.normal @ limit.normal)
+    axes = np.array([1.0 if limit.is_ball else 0.0, 1.0, 1.0])
+    off = (p - limit.centre) * axes
+    distance = float(np.linalg.norm(off))
+    outward = off / distance if distance > 0.0 else np.array([0.0, 0.0, 1.0])
+    return p + outward * (limit.radius - distance)

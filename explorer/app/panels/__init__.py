@@ -1,1 +1,0 @@
-"""The panels beside the scene: move, design and view on the right, singularity on the left."""

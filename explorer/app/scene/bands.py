@@ -1,0 +1,170 @@
+"""Surfaces in bands of colour: by how near a singularity is, or by what bounds them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from explorer.mechanism.design import Design
+from explorer.mechanism.margins import margins
+from explorer.numerics.arrays import FloatArray, IntArray
+from explorer.singularity.colours import BAND_EDGES, OUTLINE, Rgb, band_colours
+from explorer.singularity.jacobian import inverse_condition, jacobian
+from explorer.workspace.accessible.workspace import PAIR_NAMES
+from explorer.workspace.solids.solid import Solid
+
+Measure = Literal["plain", "margin", "condition"]
+
+# An inverse condition number below this is coloured as a warning.
+WARN_CONDITION = 0.01
+PLAIN: Rgb = (110, 150, 196)
+# Where legs begin to collide: what collides has this colour all over the page.
+COLLIDING: Rgb = OUTLINE
+# A share of the reach: the longest edge of a coloured facet, unless that takes too many facets.
+COLOURED_EDGE = 0.08
+# The most facets that a surface is cut into to be coloured.
+MOST_COLOURED = 100_000
+
+
+@dataclass(frozen=True)
+class Shell:
+    """A part of a surface in one colour: vertices (n, 3) in design units, faces (m, 3)."""
+
+    colour: Rgb
+    vertices: FloatArray
+    faces: NDArray[np.int32]
+
+
+@dataclass(frozen=True)
+class Colouring:
+    """By what positions are coloured at one orientation.
+
+    Attributes:
+        design: The manipulator.
+        rotation: Platform to base, shape (3, 3).
+        measure: What counts.
+        warn_below: The length below which margins are warned of.
+    """
+
+    design: Design
+    rotation: FloatArray
+    measure: Measure
+    warn_below: float
+
+    def values(self, points: FloatArray) -> FloatArray:
+        """Return what colours points (n, 3), as multiples of the value to warn below."""
+        if self.measure != "condition":
+            return np.abs(margins(points, self.rotation)).min(axis=-1) / self.warn_below
+        rates = jacobian(self.design, points, self.rotation)
+        return inverse_condition(rates, self.design.reach) / WARN_CONDITION
+
+    def shells(self, solid: Solid) -> tuple[tuple[Shell, ...], float | None]:
+        """Return a surface in its colours, each of them once.
+
+        The second value is the longest edge of a coloured facet in design units if that is
+        longer than usual, because the surface is large beside the reach; None if not.
+        """
+        if solid.is_empty:
+            return (), None
+        if self.measure == "plain":
+            return _by_cause(solid), None
+        usual = COLOURED_EDGE * self.design.reach
+        vertices, faces = cut_to_size(solid, usual)
+        longest = float(edge_lengths(vertices, faces).max())
+        rest = vertices[faces]
+        share = self.values(rest.reshape(-1, 3)).reshape(-1, 3)
+        shells: list[Shell] = []
+        for colour, edge in zip(band_colours(), (*BAND_EDGES[1:], np.inf), strict=True):
+            band, rest, share = split_at(rest, share, edge)
+            if len(band):
+                corners = np.arange(3 * len(band), dtype=np.int32).reshape(-1, 3)
+                shells.append(Shell(colour, band.reshape(-1, 3), corners))
+        return tuple(shells), longest if longest > usual else None
+
+
+def cut_to_size(solid: Solid, edge: float) -> tuple[FloatArray, IntArray]:
+    """Return the vertices and faces of a surface whose facets are cut until their edges are short.
+
+    A surface that is large beside the edge keeps longer ones: halving goes on only as long as
+    it makes at most `MOST_COLOURED` facets.
+
+    Args:
+        solid: With the surface; not empty.
+        edge: The longest edge that is wanted, in design units.
+    """
+    from trimesh import remesh
+
+    untyped: Any = remesh
+    vertices, faces = solid.vertices, np.asarray(solid.faces, dtype=np.int64)
+    while True:
+        lengths = edge_lengths(vertices, faces)
+        longest = float(lengths.max())
+        shorter = max(edge, 0.5 * longest)
+        # Each edge that is cut makes two facets of either facet beside it.
+        if longest <= edge or len(faces) + int((lengths > shorter).sum()) > MOST_COLOURED:
+            return vertices, faces
+        made = untyped.subdivide_to_size(vertices, faces, shorter, max_iter=12)
+        vertices, faces = np.asarray(made[0], dtype=np.float64), np.asarray(made[1])
+
+
+def edge_lengths(vertices: FloatArray, faces: IntArray) -> FloatArray:
+    """Return the lengths of the three edges of each face, shape (m, 3)."""
+    ends = vertices[faces]
+    return np.linalg.norm(ends - np.roll(ends, -1, axis=1), axis=2)
+
+
+def _by_cause(solid: Solid) -> tuple[Shell, ...]:
+    """Return what limits bound in one colour, and in another where legs collide."""
+    pairs = [index for index, name in enumerate(solid.limits) if name in PAIR_NAMES]
+    collide = np.isin(solid.limit_of_face, pairs)
+    parts = ((PLAIN, solid.faces[~collide]), (COLLIDING, solid.faces[collide]))
+    return tuple(Shell(colour, solid.vertices, faces) for colour, faces in parts if len(faces))
+
+
+def split_at(
+    triangles: FloatArray, values: FloatArray, level: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Split triangles along the line where a value that is linear on each is a level.
+
+    Args:
+        triangles: Shape (n, 3, 3).
+        values: At their corners, shape (n, 3).
+        level: Where to split.
+
+    Returns:
+        The triangles below, the triangles above, and the values of those above.
+    """
+    high = values >= level
+    count = high.sum(axis=1)
+    low_side, high_side = [triangles[count == 0]], [triangles[count == 3]]
+    high_values = [values[count == 3]]
+    for lone_is_high, mixed in ((True, count == 1), (False, count == 2)):
+        if not mixed.any():
+            continue
+        t, v, h = triangles[mixed], values[mixed], high[mixed]
+        # Turn each so that the corner alone on its side comes first.
+        lone = np.argmax(h == lone_is_high, axis=1)
+        order = (lone[:, None] + np.arange(3)) % 3
+        t = np.take_along_axis(t, order[:, :, None], axis=1)
+        v = np.take_along_axis(v, order, axis=1)
+        share = ((level - v[:, :1]) / (v[:, 1:] - v[:, :1]))[:, :, None]
+        cut = t[:, :1] + share * (t[:, 1:] - t[:, :1])
+        tip = np.stack([t[:, 0], cut[:, 0], cut[:, 1]], axis=1)
+        base = np.concatenate(
+            [
+                np.stack([cut[:, 0], t[:, 1], t[:, 2]], axis=1),
+                np.stack([cut[:, 0], t[:, 2], cut[:, 1]], axis=1),
+            ]
+        )
+        at = np.full(len(t), level)
+        tip_values = np.stack([v[:, 0], at, at], axis=1)
+        base_values = np.concatenate(
+            [np.stack([at, v[:, 1], v[:, 2]], axis=1), np.stack([at, v[:, 2], at], axis=1)]
+        )
+        (high_side if lone_is_high else low_side).append(tip)
+        (low_side if lone_is_high else high_side).append(base)
+        high_values.append(tip_values if lone_is_high else base_values)
+    return np.concatenate(low_side), np.concatenate(high_side), np.concatenate(high_values)

@@ -1,0 +1,1 @@
+"""Who may connect to the server, and what a browser may send."""

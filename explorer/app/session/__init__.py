@@ -1,0 +1,1 @@
+"""The one door through which the state changes, and the processes that work for it."""

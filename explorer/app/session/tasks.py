@@ -1,0 +1,370 @@
+"""The heavy tasks that the worker process does; each takes and returns plain values."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from explorer.app.features.compare.drawing import ComparedDrawing, ComparedRequest, compared_drawing
+from explorer.app.features.prototype.parts import PartsDrawing, PartsRequest, parts_drawing
+from explorer.app.features.sharing.reporting import ReportFormat, make_report
+from explorer.app.features.workspace.reached import (
+    Reached,
+    Rows,
+    Trouble,
+    reach_workspace,
+    reached_of,
+    trouble_of,
+    watch_of,
+)
+from explorer.app.features.workspace.slice_map import (
+    AXES,
+    CUT,
+    Axis,
+    SliceMap,
+    level_within,
+    slice_map,
+)
+from explorer.app.scene.bands import PLAIN, Colouring, Measure, Shell
+from explorer.app.session.worker import Line
+from explorer.errors import ExplorerError, InputError
+from explorer.export.session_log import SessionTable, session_csv
+from explorer.mechanism.design import Design
+from explorer.mechanism.pose import Pose, Triple
+from explorer.numerics.arrays import FloatArray
+from explorer.numerics.stages import unwatched
+from explorer.optimise.record import Record
+from explorer.singularity.bruhat import Stratum
+from explorer.singularity.nearest_stratum import nearest_in_strata
+from explorer.workspace.accessible.radii import RadiusCurve, radius_curve
+from explorer.workspace.limits.constraints import HalfSpace
+from explorer.workspace.slices.volume import NodeCount, workspace_nodes, workspace_volume
+from explorer.workspace.solids.solid import Solid
+from explorer.workspace.solids.solids import convex_hull, cut_solid, workspace_solid
+
+Region = Literal["limits", "reachable"]
+# Of the reach: the chord tolerance of a live solid.
+LIVE_TOLERANCE = 0.004
+# The format with exact faces rather than facets.
+STEP = "step"
+
+
+@dataclass(frozen=True)
+class WorkspaceRequest:
+    """What to draw and measure of a workspace; lengths in design units.
+
+    Attributes:
+        design: The manipulator.
+        rotation: Platform to base, rows of the matrix.
+        region: All that is within the limits, or what of it can be reached.
+        start: From where it is to be reached; None for the home position.
+        colour: By what the surface is coloured.
+        cut: The axis along which it is cut open, or None.
+        level: The coordinate of the cut; None, or one beyond the extent, for the middle of it.
+        tolerance: Chord tolerance; None for a share of the reach.
+        hull: Whether the convex hull is wanted.
+        warn_below: The length below which margins are warned of.
+    """
+
+    design: Design
+    rotation: Rows
+    region: Region
+    start: Triple | None
+    colour: Measure
+    cut: Axis | None
+    level: float | None
+    tolerance: float | None
+    hull: bool
+    warn_below: float
+
+
+@dataclass(frozen=True)
+class WorkspaceDrawing:
+    """A workspace drawn and measured; lengths in design units.
+
+    Attributes:
+        request: What was asked for.
+        shells: The surface.
+        coarse_edge: The longest edge of a coloured facet, if that is longer than usual; see
+            `explorer.app.scene.bands.Colouring.shells`.
+        hull: The convex hull, if asked for.
+        slice_map: The map of the slice, if it is cut.
+        level: The coordinate at which it is cut, if it is.
+        volume: Within the limits; exact, see `explorer.workspace.slices.volume`.
+        error: Of the exact volume.
+        reached: What can be reached, if that was asked for and there is no trouble.
+        trouble: Why all that is within the limits is drawn instead.
+        mesh_volume: Of the uncut solid.
+        mesh_agrees: Whether the volume of the solid within the limits agrees with the exact one.
+        hull_volume: Of the hull, if asked for.
+        extent: (lows, highs) of the solid, None if it is empty.
+        nodes: The paper's node count within the limits, None if the grid is too fine.
+        empty_because: The limits that empty it.
+        seconds: How long it took.
+    """
+
+    request: WorkspaceRequest
+    shells: tuple[Shell, ...]
+    coarse_edge: float | None
+    hull: Shell | None
+    slice_map: SliceMap | None
+    level: float | None
+    volume: float
+    error: float
+    reached: Reached | None
+    trouble: Trouble | None
+    mesh_volume: float
+    mesh_agrees: bool | None
+    hull_volume: float | None
+    extent: tuple[FloatArray, FloatArray] | None
+    nodes: NodeCount | None
+    empty_because: tuple[str, ...]
+    seconds: float
+
+
+@dataclass(frozen=True)
+class RadiusRequest:
+    """Of what to draw the reachable volume against the radius of the legs.
+
+    Attributes:
+        design: The manipulator; its legs without radii, since these do not count.
+        rotation: Platform to base, rows of the matrix.
+        start: From where it is to be reached; None for the home position.
+    """
+
+    design: Design
+    rotation: Rows
+    start: Triple | None
+
+
+@dataclass(frozen=True)
+class RadiusDrawing:
+    """The reachable volume against the radius.
+
+    Attributes:
+        request: What was asked for.
+        curve: None if there is trouble.
+        trouble: Why there is no curve.
+    """
+
+    request: RadiusRequest
+    curve: RadiusCurve | None
+    trouble: Trouble | None
+
+
+@dataclass(frozen=True)
+class StrataRequest:
+    """From which pose to measure the way to each stratum."""
+
+    design: Design
+    pose: Pose
+
+
+@dataclass(frozen=True)
+class StrataDistances:
+    """The root-mean-square way of b1 to b4 to the nearest pose in each of the 24 strata.
+
+    Attributes:
+        request: What was asked for.
+        distances: In design units, by stratum.
+    """
+
+    request: StrataRequest
+    distances: dict[Stratum, float]
+
+
+def ready() -> None:
+    """Do nothing: the process that was asked has started."""
+
+
+def draw_workspace(request: WorkspaceRequest, line: Line | None = None) -> WorkspaceDrawing:
+    """Return the workspace, drawn and measured.
+
+    Args:
+        request: What to draw.
+        line: To the parent, which is told each `Stage` and may cancel; None for neither.
+    """
+    begin = time.perf_counter()
+    design, rotation = request.design, np.array(request.rotation)
+    tolerance = request.tolerance or LIVE_TOLERANCE * design.reach
+    watch = watch_of(line)
+    measured = workspace_volume(design, rotation)
+    whole = workspace_solid(design, rotation, tolerance, volume=measured)
+    found = None
+    if request.region == "reachable":
+        found = reach_workspace(design, request.rotation, request.start, tolerance, watch)
+    found, trouble = (None, found) if isinstance(found, Trouble) else (found, None)
+    solid = whole if found is None else found.solid
+    hull = convex_hull(solid) if request.hull and not solid.is_empty else None
+    colouring = Colouring(design, rotation, request.colour, request.warn_below)
+    shown, mapped, level = solid, None, None
+    extent = _extent(solid)
+    if request.cut is not None and extent is not None:
+        axis = AXES.index(request.cut)
+        level = level_within(float(extent[0][axis]), float(extent[1][axis]), request.level)
+        # The half that looks at the isometric camera is taken away.
+        side = -1.0 if request.cut == "y" else 1.0
+        knife = HalfSpace(CUT, side * np.eye(3)[axis], side * level)
+        shown = cut_solid(solid, knife)
+        both = (None, None) if found is None else (cut_solid(whole, knife), shown)
+        mapped = slice_map(colouring, request.cut, level, *both)
+    try:
+        nodes = workspace_nodes(design, rotation)
+    except InputError:
+        nodes = None
+    shells, coarse_edge = colouring.shells(shown)
+    return WorkspaceDrawing(
+        request=request,
+        shells=shells,
+        coarse_edge=coarse_edge,
+        hull=None if hull is None else Shell(PLAIN, hull.vertices, hull.faces),
+        slice_map=mapped,
+        level=level,
+        volume=measured.volume,
+        error=measured.error,
+        reached=None if found is None else reached_of(found),
+        trouble=trouble,
+        mesh_volume=solid.volume,
+        mesh_agrees=solid.agrees,
+        hull_volume=None if hull is None else hull.volume,
+        extent=extent,
+        nodes=nodes,
+        empty_because=measured.empty_because,
+        seconds=time.perf_counter() - begin,
+    )
+
+
+def draw_radius_curve(request: RadiusRequest, line: Line | None = None) -> RadiusDrawing:
+    """Return the reachable volume against the radius of all legs; `line` as above."""
+    design, rotation = request.design, np.array(request.rotation)
+    try:
+        curve = radius_curve(design, rotation, start=request.start, watch=watch_of(line))
+    except ExplorerError as error:
+        return RadiusDrawing(request, None, trouble_of(error))
+    return RadiusDrawing(request, curve, None)
+
+
+def strata_distances(request: StrataRequest) -> StrataDistances:
+    """Return how far the pose is from each stratum."""
+    found = nearest_in_strata(request.design, request.pose)
+    return StrataDistances(request, {w: nearest.distance for w, nearest in found.items()})
+
+
+def draw_parts(request: PartsRequest) -> PartsDrawing:
+    """Return the parts of the prototype, or why there are none."""
+    return parts_drawing(request)
+
+
+def draw_compared(request: ComparedRequest) -> ComparedDrawing:
+    """Return the figures of a design that is compared, and its workspace if asked for."""
+    return compared_drawing(request)
+
+
+def export_assembly(design: Design, file_format: str) -> bytes:
+    """Return a file of the prototype, assembled in the home pose.
+
+    Args:
+        design: The manipulator.
+        file_format: As of `explorer.export.assembly`, or "step".
+
+    Raises:
+        ExplorerError: a design too tight for the parts, or a library that is missing.
+    """
+    from explorer.export.assembly import assembly_bytes
+    from explorer.prototype.assembly import make_prototype
+
+    if file_format == "step":
+        from explorer.export.step_assembly import assembly_step
+        from explorer.prototype.fitting import sizes_of
+
+        return assembly_step(sizes_of(design))
+    return assembly_bytes(make_prototype(design), file_format)
+
+
+def export_session(table: SessionTable) -> bytes:
+    """Return the poses of a session as comma-separated values."""
+    return session_csv(table).encode()
+
+
+def export_report(
+    design: Design, pose: Pose, record: Record | None, file_format: ReportFormat
+) -> bytes:
+    """Return the report of a design in a pose, with the search that found it, if one did.
+
+    Raises:
+        ExplorerError: PDF without what prints it.
+    """
+    return make_report(design, pose, record=record, file_format=file_format)
+
+
+def export_mesh(
+    design: Design,
+    rotation: Rows,
+    tolerance: float,
+    region: Region,
+    start: Triple | None,
+    what: str,
+    file_format: str,
+) -> bytes:
+    """Return a file of the workspace or of its hull, in millimetres.
+
+    Args:
+        design: The manipulator.
+        rotation: Platform to base, rows of the matrix.
+        tolerance: Chord tolerance, in design units.
+        region: All that is within the limits, or what of it can be reached.
+        start: From where it is to be reached; None for the home position.
+        what: "workspace" or "hull".
+        file_format: As of `explorer.export.mesh`, or `STEP`.
+
+    Raises:
+        ExplorerError: an empty workspace, nothing to be reached, a library that is missing, or
+            STEP of what has no exact faces.
+    """
+    if file_format == STEP:
+        return _exact_file(design, rotation, region, what)
+    from explorer.export.mesh import mesh_bytes
+
+    if region == "limits":
+        solid = workspace_solid(design, np.array(rotation), tolerance)
+    else:
+        found = reach_workspace(design, rotation, start, tolerance, unwatched)
+        if isinstance(found, Trouble):
+            raise InputError(found.reason)
+        solid = found.solid
+    name = f"{design.name} {exported_name(region, what)}"
+    return mesh_bytes(convex_hull(solid) if what == "hull" else solid, file_format, design, name)
+
+
+def _exact_file(design: Design, rotation: Rows, region: Region, what: str) -> bytes:
+    """Return a STEP file of the workspace within the limits.
+
+    Raises:
+        InputError: a hull, or what of the workspace can be reached: neither has exact faces.
+        ExplorerError: as of `explorer.export.step.workspace_step`.
+    """
+    meshes = "as 3mf, stl, glb, obj or ply it can be exported"
+    if what == "hull":
+        raise InputError(f"STEP takes exact faces, and a convex hull consists of facets; {meshes}")
+    if region != "limits":
+        raise InputError(
+            "STEP takes exact faces, and the surface along which legs begin to collide consists of "
+            f'facets; {meshes}, or choose the region "within the limits"'
+        )
+    from explorer.export.step import workspace_step
+
+    return workspace_step(design, np.array(rotation))
+
+
+def exported_name(region: Region, what: str) -> str:
+    """Return what a file is called that holds a "workspace" or a "hull"."""
+    return what if region == "limits" else f"reachable {what}"
+
+
+def _extent(solid: Solid) -> tuple[FloatArray, FloatArray] | None:
+    if solid.is_empty:
+        return None
+    return solid.vertices.min(axis=0), solid.vertices.max(axis=0)

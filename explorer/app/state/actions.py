@@ -1,0 +1,366 @@
+"""Everything that can be done to the state, each a small frozen value.
+
+An action turns one state into the next, or raises an `ExplorerError` and changes nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import msgspec
+import numpy as np
+
+from explorer.app.state.clear_length import clear_length
+from explorer.app.state.state import (
+    Hold,
+    Joints,
+    State,
+    Taken,
+    Unclosed,
+    angles_of,
+    joints_of,
+    mode_at,
+    opened,
+)
+from explorer.app.state.view import View
+from explorer.errors import InputError
+from explorer.mechanism.design import VARIABLES, Design, Limits
+from explorer.mechanism.feasible_intervals import feasible_intervals, nearest_feasible
+from explorer.mechanism.kinematics import discriminants, forward
+from explorer.mechanism.pose import Pose, Triple
+
+
+class Action(Protocol):
+    """A change of the state."""
+
+    def apply(self, state: State) -> State:
+        """Return the next state.
+
+        Raises:
+            ExplorerError: the change is not possible; the state stays as it was.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class Open:
+    """Open a design in its home pose; the view, comparisons and studies stay."""
+
+    design: Design
+
+    def apply(self, state: State) -> State:
+        """Return the next state.
+
+        Raises:
+            InputError: the design is being optimised.
+        """
+        check_free(state)
+        optimisation = replace(state.optimisation, run=None, refusal=None)
+        after = opened(self.design, view=state.view)
+        return replace(
+            after,
+            hold=state.hold,
+            optimisation=optimisation,
+            compared=state.compared,
+            studies=state.studies,
+        )
+
+
+@dataclass(frozen=True)
+class Reset:
+    """Return to the design as it was opened, in its home pose."""
+
+    def apply(self, state: State) -> State:
+        """Return the next state."""
+        return Open(state.base).apply(state)
+
+
+@dataclass(frozen=True)
+class GoHome:
+    """Move to the home pose."""
+
+    def apply(self, state: State) -> State:
+        """Return the next state."""
+        return moved(state, opened(state.design).pose)
+
+
+@dataclass(frozen=True)
+class SetJoint:
+    """Set one joint, named by its index in `JOINTS`; the others stay."""
+
+    joint: int
+    value: float
+
+    def apply(self, state: State) -> State:
+        """Return the next state; where the lengths cannot close, with the last pose."""
+        asked = list(state.joints)
+        asked[self.joint] = self.value
+        solution = forward(state.design, asked)
+        joints = _six(asked)
+        if not solution.feasible:
+            return replace(state, joints=joints, unclosed=_unclosed(state.design, joints, self))
+        pose = Pose.of(solution.position[state.mode], solution.rotation[state.mode])
+        return replace(
+            state, pose=pose, yaw_pitch_roll=angles_of(pose), joints=joints, unclosed=None
+        )
+
+
+@dataclass(frozen=True)
+class UseNearest:
+    """Take the nearest length that closes and stays clear, where the one asked for does not."""
+
+    def apply(self, state: State) -> State:
+        """Return the next state, with a remark on what was taken."""
+        unclosed = state.unclosed
+        if unclosed is None:
+            return state
+        found = clear_length(state)
+        if found is None:
+            return moved(state, state.pose)
+        value, words = found
+        after = SetJoint(unclosed.joint, value).apply(state)
+        return replace(after, taken=Taken(after.joints, words))
+
+
+@dataclass(frozen=True)
+class SetPosition:
+    """Set one coordinate of b4, 0 to 2."""
+
+    axis: int
+    value: float
+
+    def apply(self, state: State) -> State:
+        """Return the next state."""
+        position = list(state.pose.position)
+        position[self.axis] = self.value
+        x, y, z = position
+        return moved(state, Pose((x, y, z), state.pose.quaternion), state.yaw_pitch_roll)
+
+
+@dataclass(frozen=True)
+class SetAngle:
+    """Set yaw, pitch or roll, 0 to 2, in degrees."""
+
+    axis: int
+    value: float
+
+    def apply(self, state: State) -> State:
+        """Return the next state."""
+        angles = list(state.yaw_pitch_roll)
+        angles[self.axis] = self.value
+        yaw, pitch, roll = angles
+        pose = Pose.of_yaw_pitch_roll(state.pose.position, angles)
+        return moved(state, pose, (yaw, pitch, roll))
+
+
+@dataclass(frozen=True)
+class SetPose:
+    """Set the whole pose, for instance by the drag handle."""
+
+    pose: Pose
+
+    def apply(self, state: State) -> State:
+        """Return the next state."""
+        return moved(state, self.pose)
+
+
+@dataclass(frozen=True)
+class StartThere:
+    """Move to a pose, and let what can be reached be reached from there."""
+
+    pose: Pose
+
+    def apply(self, state: State) -> State:
+        """Return the next state."""
+        workspace = replace(state.view.workspace, start="pose")
+        return moved(replace(state, view=replace(state.view, workspace=workspace)), self.pose)
+
+
+@dataclass(frozen=True)
+class SetMode:
+    """Jump to another assembly mode of the same joints."""
+
+    mode: int
+
+    def apply(self, state: State) -> State:
+        """Return the next state."""
+        joints = joints_of(state.design, state.pose)
+        solution = forward(state.design, joints)
+        pose = Pose.of(solution.position[self.mode], solution.rotation[self.mode])
+        return replace(
+            state,
+            pose=pose,
+            yaw_pitch_roll=angles_of(pose),
+            joints=joints,
+            mode=self.mode,
+            unclosed=None,
+        )
+
+
+@dataclass(frozen=True)
+class SetVariable:
+    """Set one design variable, named as in `VARIABLES`; pose or legs are held."""
+
+    name: str
+    value: float
+
+    def apply(self, state: State) -> State:
+        """Return the next state.
+
+        Raises:
+            DesignError: the design would be degenerate.
+            InputError: the legs are held and cannot close in the new design, or the
+                design is being optimised.
+        """
+        check_free(state)
+        design = state.design.with_variable(self.name, self.value)
+        if state.hold == "pose":
+            return moved(replace(state, design=design), state.pose, state.yaw_pitch_roll)
+        solution = forward(design, state.joints)
+        if not solution.feasible:
+            was = state.design.variables[VARIABLES.index(self.name)]
+            raise InputError(
+                f"{self.name} = {self.value:.6g} cannot be assembled while the legs are held; "
+                f"it stays {was:.6g}. Hold the pose to go further."
+            )
+        pose = Pose.of(solution.position[state.mode], solution.rotation[state.mode])
+        return replace(
+            state, design=design, pose=pose, yaw_pitch_roll=angles_of(pose), unclosed=None
+        )
+
+
+@dataclass(frozen=True)
+class SetName:
+    """Give the design another name."""
+
+    name: str
+
+    def apply(self, state: State) -> State:
+        """Return the next state.
+
+        Raises:
+            DesignError: not one printable line.
+            InputError: no name at all, or the design is being optimised.
+        """
+        check_free(state)
+        name = self.name.strip()
+        if not name:
+            raise InputError(f"a design needs a name; it stays {state.design.name!r}")
+        return replace(state, design=msgspec.structs.replace(state.design, name=name))
+
+
+@dataclass(frozen=True)
+class MarkSaved:
+    """Take a design that has been saved as the one to which reset returns."""
+
+    design: Design
+
+    def apply(self, state: State) -> State:
+        """Return the next state; the design has the name under which it was saved."""
+        renamed = msgspec.structs.replace(state.design, name=self.design.name)
+        if renamed != self.design:
+            # It went on meanwhile.
+            return replace(state, base=self.design)
+        return replace(state, design=renamed, base=self.design)
+
+
+@dataclass(frozen=True)
+class SetUnit:
+    """Set the millimetres in one design unit."""
+
+    unit_mm: float
+
+    def apply(self, state: State) -> State:
+        """Return the next state.
+
+        Raises:
+            InputError: the design is being optimised.
+        """
+        check_free(state)
+        return replace(state, design=msgspec.structs.replace(state.design, unit_mm=self.unit_mm))
+
+
+@dataclass(frozen=True)
+class SetLimits:
+    """Set the limits; the mechanism stays where it is, within them or not."""
+
+    limits: Limits
+
+    def apply(self, state: State) -> State:
+        """Return the next state.
+
+        Raises:
+            InputError: the design is being optimised.
+        """
+        check_free(state)
+        return replace(state, design=msgspec.structs.replace(state.design, limits=self.limits))
+
+
+@dataclass(frozen=True)
+class SetHold:
+    """Choose what stays when the design changes."""
+
+    hold: Hold
+
+    def apply(self, state: State) -> State:
+        """Return the next state."""
+        return replace(state, hold=self.hold)
+
+
+@dataclass(frozen=True)
+class SetView:
+    """Change what is shown."""
+
+    view: View
+
+    def apply(self, state: State) -> State:
+        """Return the next state.
+
+        Raises:
+            InputError: the warning length is not positive.
+        """
+        warn = self.view.warn_below
+        if warn is not None and not (np.isfinite(warn) and warn > 0.0):
+            raise InputError(f"the warning length must be positive; got {warn:g}")
+        return replace(state, view=self.view)
+
+
+def moved(state: State, pose: Pose, yaw_pitch_roll: Triple | None = None) -> State:
+    """Return the state in another pose, its joints and mode following."""
+    return replace(
+        state,
+        pose=pose,
+        yaw_pitch_roll=angles_of(pose) if yaw_pitch_roll is None else yaw_pitch_roll,
+        joints=joints_of(state.design, pose),
+        mode=mode_at(pose, state.mode),
+        unclosed=None,
+    )
+
+
+def check_free(state: State) -> None:
+    """Refuse to change the design while it is being optimised.
+
+    Raises:
+        InputError: it is.
+    """
+    if state.optimisation.is_on:
+        raise InputError("the design is being optimised: wait until that is done, or cancel it")
+
+
+def _unclosed(design: Design, joints: Joints, cause: SetJoint) -> Unclosed:
+    values = np.array(joints)
+    squares = discriminants(design, values)
+    failing = tuple(int(i) for i in np.flatnonzero(squares < 0.0))
+    intervals = feasible_intervals(design, values)[cause.joint]
+    return Unclosed(
+        joint=cause.joint,
+        asked=cause.value,
+        nearest=nearest_feasible(design, values, cause.joint, intervals),
+        failing=failing,
+    )
+
+
+def _six(values: list[float]) -> Joints:
+    l1, d1, d2, d3, d4, l4 = values
+    return (l1, d1, d2, d3, d4, l4)

@@ -1,0 +1,88 @@
+"""The nearest length that closes and stays clear of singularities.
+
+Lengths that just close lie on the singular set, since there a tetrahedron is flat. So the length
+to go to is a little inside the interval of those that close: the first from its end at which the
+verdict on the pose is clear, or where there is none, the one that is farthest from singular.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from explorer.app.state.state import State
+from explorer.measures.snapshot import evaluate
+from explorer.measures.verdict import verdict
+from explorer.mechanism.design import JOINTS
+from explorer.mechanism.feasible_intervals import feasible_intervals
+from explorer.mechanism.kinematics import forward
+from explorer.mechanism.pose import Pose
+from explorer.numerics.number_text import scientific
+
+# The lengths between both ends of an interval that are tried, and the halvings that follow.
+TRIALS, HALVINGS = 24, 14
+
+
+def clear_length(state: State) -> tuple[float, str] | None:
+    """Return the nearest clear length of the joint that does not close, and why it is taken.
+
+    Args:
+        state: With lengths that do not close.
+
+    Returns:
+        The length with a sentence for people; None if no length closes, or if every one that
+        was tried is singular.
+    """
+    unclosed = state.unclosed
+    if unclosed is None or unclosed.nearest is None:
+        return None
+    joint, end = unclosed.joint, unclosed.nearest
+    intervals = feasible_intervals(state.design, np.array(state.joints))[joint]
+    low, high = min(intervals, key=lambda each: min(abs(each[0] - end), abs(each[1] - end)))
+    far = high if abs(end - low) < abs(high - end) else low
+
+    def length(share: float) -> float:
+        return end + share * (far - end)
+
+    found, is_clear = _first_clear(lambda share: _level(state, joint, length(share)))
+    if found == 0.0:
+        return None
+    value = length(found)
+    taken, singular = scientific(value), scientific(end)
+    instead = f"{JOINTS[joint]} = {taken} instead of {scientific(unclosed.asked, 6)}. "
+    why = f"{instead}The nearest value that closes, {singular}, is singular; "
+    if is_clear:
+        return value, f"{why}this is the nearest that stays clear."
+    return value, f"{why}none stays clear, and this is the farthest from singular."
+
+
+def _first_clear(level: Callable[[float], float]) -> tuple[float, bool]:
+    """Return the least share from 0 to 1 with a level of one, and whether there is any.
+
+    If there is none, the share with the highest level is returned; 0 if all levels are zero.
+    """
+    best, before, best_level = 0.0, 0.0, 0.0
+    for trial in range(1, TRIALS):
+        share = trial / TRIALS
+        here = level(share)
+        if here >= 1.0:
+            for _ in range(HALVINGS):
+                middle = 0.5 * (before + share)
+                before, share = (before, middle) if level(middle) >= 1.0 else (middle, share)
+            return share, True
+        if here > best_level:
+            best, best_level = share, here
+        before = share
+    return best, False
+
+
+def _level(state: State, joint: int, value: float) -> float:
+    """Return how near the pose is to a singularity, as levels of a verdict; 0 without a pose."""
+    trial = np.array(state.joints)
+    trial[joint] = value
+    solution = forward(state.design, trial)
+    if not solution.feasible:
+        return 0.0
+    pose = Pose.of(solution.position[state.mode], solution.rotation[state.mode])
+    return min(verdict(evaluate(state.design, pose), state.warn_below).levels)

@@ -1,0 +1,47 @@
+"""What the page calls the fields of a design file where it refuses their values.
+
+Who edits a file needs the names of its fields; who moves a slider needs the words beside it.
+"""
+
+from __future__ import annotations
+
+from explorer.errors import DesignError, ExplorerError
+from explorer.mechanism.design import LENGTHS
+
+SWINGS = {
+    "a1": "U joint",
+    "a3": "U joint",
+    "b1": "ball",
+    "b2": "ball",
+    "b3": "ball",
+    "b4": "ball",
+}
+"""The kind of each joint in which a leg may swing, by its point."""
+
+FIELD_WORDS = {
+    "unit_mm": "The unit",
+    "node_step": "The step of the nodes",
+    "limits.guide": "The guide",
+    "limits.guide low": "The end of the guide, \u201cd least\u201d,",
+    "limits.guide high": "The end of the guide, \u201cd most\u201d,",
+    "limits.gap": "The gap of the carriages",
+    "limits.carriage_order": "The order of the carriages",
+    "limits.margin": "The margin",
+    "limits.leg_radii": "The radius of a leg",
+    "limits.box": "The box for b4",
+    "limits.box lows": "The lower corner of the box for b4",
+    "limits.box highs": "The upper corner of the box for b4",
+    **{f"limits.box {axis}": f"The box for b4 along {axis}" for axis in "xyz"},
+    **{f"limits.{name}": f"The length {name}" for name in LENGTHS},
+    **{f"limits.{name} minimum": f"The least length {name}" for name in LENGTHS},
+    **{f"limits.{name} maximum": f"The greatest length {name}" for name in LENGTHS},
+    **{f"limits.swing.{name}": f"The swing of the {name} {kind}" for name, kind in SWINGS.items()},
+}
+"""What each field is called where a sentence begins with it."""
+
+
+def message_of(error: ExplorerError) -> str:
+    """Return the message of an error as the page tells it."""
+    if isinstance(error, DesignError) and error.field in FIELD_WORDS:
+        return error.said_of(FIELD_WORDS[error.field])
+    return str(error)

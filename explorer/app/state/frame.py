@@ -1,0 +1,63 @@
+"""A state and what follows from it, computed when it is first asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from explorer.app.state.state import State
+from explorer.errors import InputError
+from explorer.legs.moves import MoveClearance, move_clearance
+from explorer.measures.snapshot import Snapshot, evaluate
+from explorer.measures.verdict import Verdict, verdict
+from explorer.singularity.ellipsoids import (
+    Performance,
+    SingularityFreeBall,
+    performance,
+    singularity_free_ball,
+)
+from explorer.singularity.uncoupled import Travel, travels
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A state and what follows from it: all that scene and panels need to draw."""
+
+    state: State
+
+    @cached_property
+    def snapshot(self) -> Snapshot:
+        """The design in its pose."""
+        return evaluate(self.state.design, self.state.pose)
+
+    @cached_property
+    def verdict(self) -> Verdict:
+        """How near the pose is to a singularity; the colours of the flags follow it."""
+        return verdict(self.snapshot, self.state.warn_below)
+
+    @cached_property
+    def performance(self) -> Performance:
+        """How fast and how strong the platform is in its pose."""
+        return performance(self.state.design, self.state.pose)
+
+    @cached_property
+    def travels(self) -> tuple[Travel, ...]:
+        """How far each of the six uncoupled motions may go from here to the singularity."""
+        return travels(self.state.pose)
+
+    @cached_property
+    def free_ball(self) -> SingularityFreeBall:
+        """The largest ball of positions about the pose without a singular one."""
+        return singularity_free_ball(self.state.pose)
+
+    @cached_property
+    def last_move(self) -> MoveClearance | None:
+        """The straight move from where the last gesture began, in one step; None without one."""
+        gesture = self.state.gesture
+        if gesture is None:
+            return None
+        try:
+            return move_clearance(self.state.design, gesture.start, self.state.pose)
+        except InputError:
+            # There and back again: a move of no length, the one thing that is refused.
+            return None

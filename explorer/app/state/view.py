@@ -1,0 +1,136 @@
+"""What of the mechanism is shown, and how."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Literal
+
+from explorer.errors import InputError
+
+ALUMINIUM = 2700.0
+"""Its density, in kg/m³."""
+
+
+@dataclass(frozen=True)
+class WorkspaceView:
+    """How the constant-orientation workspace is shown.
+
+    Attributes:
+        solid: Whether the solid is drawn.
+        region: Whether it is all that is within the limits, or what of it can be reached
+            without a collision of legs.
+        start: Whether it is to be reached from the home position, or from the present one.
+        hull: Whether its convex hull is drawn.
+        planes: Whether the three singularity planes are drawn.
+        orientation: Whether it is that of the present pose, or of the home pose.
+        colour: By what its surface is coloured.
+        cut: The axis along which it is cut open, or None.
+        level: The coordinate at which it is cut, in design units; None for the middle of its
+            extent, which also counts where this is beyond it.
+        tolerance: Largest distance of a facet from the true surface, in design units; None
+            for a share of the reach.
+    """
+
+    solid: bool = False
+    region: Literal["limits", "reachable"] = "limits"
+    start: Literal["home", "pose"] = "home"
+    hull: bool = False
+    planes: bool = False
+    orientation: Literal["pose", "home"] = "pose"
+    colour: Literal["plain", "margin", "condition"] = "plain"
+    cut: Literal["x", "y", "z"] | None = None
+    level: float | None = None
+    tolerance: float | None = None
+
+
+@dataclass(frozen=True)
+class PrototypeView:
+    """How the prototype is shown.
+
+    Attributes:
+        shown: Whether its parts replace the schematic legs and bodies.
+        exploded: How far they are drawn apart, 0 to 1.
+        density: Of all parts, in kg/m³.
+
+    Raises:
+        InputError: a share beyond 0 to 1, or a density that is not positive.
+    """
+
+    shown: bool = False
+    exploded: float = 0.0
+    density: float = ALUMINIUM
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.exploded <= 1.0:
+            raise InputError(f"parts are drawn apart by 0 to 1; got {self.exploded:g}")
+        if not (math.isfinite(self.density) and self.density > 0.0):
+            raise InputError(
+                f"the density must be positive; got {self.density:g} (aluminium: 2700 kg/m³)"
+            )
+
+
+Ghost = Literal["none", "κ1 = 0", "κ2 = 0", "κ3 = 0", "nearest"]
+
+
+Arrows = Literal["one in use", "all six", "none"]
+
+
+Gain = Literal["none", "speed", "force"]
+
+
+@dataclass(frozen=True)
+class SingularView:
+    """How singularities are shown.
+
+    Attributes:
+        ghost: Which of the nearest singular poses is drawn.
+        strata: Whether the diagram of the strata is drawn.
+        arrows: Which of the six uncoupled motions are drawn.
+        ellipsoid: Which of them is drawn at b4, of speeds or of forces.
+        ball: Whether the largest ball without singular positions is drawn.
+    """
+
+    ghost: Ghost = "none"
+    strata: bool = False
+    arrows: Arrows = "one in use"
+    ellipsoid: Gain = "none"
+    ball: bool = False
+
+
+@dataclass(frozen=True)
+class View:
+    """What is shown, and how.
+
+    Attributes:
+        flags, bodies, legs, labels, grid, handle: Whether each is drawn.
+        tetrahedra: Whether each of the three is drawn.
+        clearance: Whether the closest pair of legs is marked.
+        swept: Whether the tetrahedra are drawn that the legs swept in the last move.
+        radius_curve: Whether the reachable volume is drawn against the radius of the legs.
+        ghosts: Whether the seven other assembly modes are drawn.
+        twin: Whether the 6-4 twin's six legs replace the four.
+        warn_below: The length below which margins are warned of, in design units; distances
+            are warned of below a share of it, see `explorer.measures.verdict`. None for a share of
+            the reach.
+        prototype: How the prototype is shown.
+        workspace: How the workspace is shown.
+        singular: How singularities are shown.
+    """
+
+    flags: bool = True
+    bodies: bool = True
+    legs: bool = True
+    labels: bool = True
+    grid: bool = True
+    handle: bool = True
+    tetrahedra: tuple[bool, bool, bool] = (True, True, True)
+    clearance: bool = False
+    swept: bool = False
+    radius_curve: bool = False
+    ghosts: bool = False
+    twin: bool = False
+    warn_below: float | None = None
+    prototype: PrototypeView = field(default_factory=PrototypeView)
+    workspace: WorkspaceView = field(default_factory=WorkspaceView)
+    singular: SingularView = field(default_factory=SingularView)

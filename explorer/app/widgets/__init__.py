@@ -1,0 +1,1 @@
+"""What panels are made of: bound controls, markup and charts."""

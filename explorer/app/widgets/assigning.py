@@ -1,0 +1,128 @@
+"""Assigning to viser's handles: only what differs, and all of one frame together.
+
+An assignment costs viser some 30 µs even when nothing changes, and a frame has hundreds,
+so the last value of each property is remembered here.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable
+from typing import Any, TypeAlias, TypeGuard, cast
+
+import numpy as np
+import viser
+from numpy.typing import NDArray
+
+from explorer.app.browser.viser_gaps import PLACE, is_misled, place, tell_again
+from explorer.numerics.arrays import FloatArray
+
+Update: TypeAlias = tuple[Any, str, object]
+"""A handle, the property to assign, and its value: computed first, assigned together."""
+
+# A hand may not have seen what was sent so many seconds before, on a slow connection.
+CROSSING_SECONDS = 5.0
+# Hands that have done nothing for so long rest.
+QUIET_SECONDS = 0.6
+# Types of most values, which compare at once.
+PLAIN = (bool, int, float, str)
+
+
+class Assigner:
+    """Remembers what was assigned, and assigns what differs.
+
+    What is sent to a browser may cross with what a hand sets there: the hand is followed,
+    and the browser then shows what was sent before. Such controls are told again.
+    """
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        self._server = server
+        # The handles are held too, so that no identity is used again.
+        self._last: dict[tuple[int, str], tuple[Any, object]] = {}
+        # Of what browsers change too: when it was sent last.
+        self._sent: dict[tuple[int, str], tuple[Any, float]] = {}
+
+    def assign(self, updates: Iterable[Update], *, since: float | None = None) -> list[Update]:
+        """Assign in one block, which the browsers apply together; return what differed.
+
+        Args:
+            updates: What to assign.
+            since: When their computing began: what a hand has set since then stays, since
+                a frame that knows of it follows.
+        """
+        new = [update for update in updates if self._is_new(update)]
+        if since is not None:
+            new = [update for update in new if not _is_overtaken(update, since)]
+        if not new:
+            return new
+        # Nothing is computed in here: the block holds up every browser.
+        with self._server.atomic():
+            for handle, name, value in new:
+                if name in PLACE:
+                    place(handle, name, cast("FloatArray", value))
+                else:
+                    setattr(handle, name, value)
+                if is_set_by_clients(handle, name):
+                    # After it, since viser takes an assignment for a touch too.
+                    self._sent[id(handle), name] = handle, time.time()
+        return new
+
+    def settle(self) -> bool:
+        """Tell again what may have crossed, once hands rest; return whether any is to wait."""
+        waits = False
+        now = time.time()
+        for key, (handle, sent) in tuple(self._sent.items()):
+            touched = handle.update_timestamp
+            has_crossed = sent < touched <= sent + CROSSING_SECONDS or is_misled(handle, key[1])
+            if not has_crossed:
+                if not sent <= now <= sent + CROSSING_SECONDS:
+                    del self._sent[key]
+            elif touched <= now < touched + QUIET_SECONDS:
+                waits = True
+            else:
+                tell_again(handle, key[1])
+                self._sent[key] = handle, now
+        return waits
+
+    def _is_new(self, update: Update) -> bool:
+        handle, name, value = update
+        if is_set_by_clients(handle, name):
+            return not _same(getattr(handle, name), value)
+        key = (id(handle), name)
+        last = self._last.get(key)
+        if last is not None and _same(last[1], value):
+            return False
+        self._last[key] = (handle, value)
+        return True
+
+
+def is_set_by_clients(handle: object, name: str) -> bool:
+    """Whether browsers change this property too, so that what was assigned says little."""
+    if name in PLACE:
+        return isinstance(handle, viser.TransformControlsHandle)
+    return name == "value"
+
+
+def _is_overtaken(update: Update, since: float) -> bool:
+    handle, name, _ = update
+    # A clock that was set back leaves times behind that have not come yet.
+    return is_set_by_clients(handle, name) and since < handle.update_timestamp <= time.time()
+
+
+def _same(a: object, b: object) -> bool:
+    if a is b:
+        return True
+    if type(a) in PLAIN:
+        return a == b
+    if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
+        return np.array_equal(np.asarray(a), np.asarray(b))
+    if is_columns(a) and is_columns(b):
+        return len(a) == len(b) and all(map(_same, a, b))
+    return a == b
+
+
+def is_columns(value: object) -> TypeGuard[tuple[NDArray[Any], ...]]:
+    """Whether a value is the data of a chart, a tuple of arrays."""
+    if not isinstance(value, tuple):
+        return False
+    return any(isinstance(each, np.ndarray) for each in cast("tuple[object, ...]", value))

@@ -1,0 +1,55 @@
+"""The colours of the scene; `explorer.singularity.colours` has those it shares with reports."""
+
+from __future__ import annotations
+
+from explorer.singularity.colours import (
+    CLEAR,
+    FAR,
+    FAR_WARNINGS,
+    OUTLINE,
+    SINGULAR,
+    WARNED,
+    Rgb,
+    css,
+    proximity_colour,
+)
+
+__all__ = [
+    "BALL",
+    "BASE_BODY",
+    "CARRIAGE",
+    "CLEAR",
+    "COMPARED",
+    "FAR",
+    "FAR_WARNINGS",
+    "GHOST",
+    "JOINT",
+    "OUTLINE",
+    "PLATFORM_BODY",
+    "RAIL",
+    "ROD",
+    "SINGULAR",
+    "SWEPT",
+    "TUBE",
+    "WARNED",
+    "Rgb",
+    "css",
+    "proximity_colour",
+]
+
+TUBE: Rgb = (84, 96, 114)
+ROD: Rgb = (188, 197, 209)
+JOINT: Rgb = (52, 60, 72)
+BALL: Rgb = (232, 235, 240)
+BASE_BODY: Rgb = (214, 219, 226)
+PLATFORM_BODY: Rgb = (150, 160, 176)
+RAIL: Rgb = (128, 138, 152)
+CARRIAGE: Rgb = (104, 115, 132)
+GHOST: Rgb = (120, 134, 156)
+SWEPT: Rgb = (92, 60, 156)
+COMPARED: tuple[Rgb, ...] = ((0, 158, 115), (120, 70, 200), (225, 110, 190), (170, 150, 20))
+"""Of the live design and of the pinned ones.
+
+Apart from each other for every common colour-vision deficiency, from the scale of proximity,
+and from light and dark pages. A letter stands beside each.
+"""

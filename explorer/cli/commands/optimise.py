@@ -1,0 +1,295 @@
+"""`explorer optimise`: the best design for a purpose, or how far the search got."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import tyro
+from tyro.constructors import PrimitiveConstructorSpec
+
+from explorer.cli.found import (
+    finding_json,
+    findings_table,
+    found_design,
+    outcome_json,
+    outcome_lines,
+    refused_json,
+)
+from explorer.cli.options import DesignOptions, JsonOptions
+from explorer.cli.output import heading, write_json, write_lines
+from explorer.cli.progress import Progress
+from explorer.cli.streams import complain
+from explorer.cli.usage import UsageError
+from explorer.cli.values import numbers, numbers_or_none, positive, whole_number
+from explorer.errors import InputError, NoAnswerError
+from explorer.mechanism.design import Design
+from explorer.mechanism.design_file import encode_design
+from explorer.optimise.curves import CALLED
+
+if TYPE_CHECKING:
+    from explorer.optimise.outcome import Outcome
+    from explorer.optimise.problem import Box, Problem, Variable
+    from explorer.optimise.record import Settings
+
+Six = tuple[float, float, float, float, float, float]
+
+_OPTIONAL = tyro.conf.arg(help_behavior_hint="(optional)")
+_FILE = tyro.conf.arg(metavar="FILE", help_behavior_hint="(optional)")
+
+
+def _words(option: str, metavar: str) -> PrimitiveConstructorSpec[Any]:
+    """Return how to read an option that takes any number of words, at least one."""
+
+    def read(words: list[str]) -> tuple[str, ...]:
+        if not words:
+            raise UsageError(f"{option} needs at least one value, such as {metavar}")
+        return tuple(words)
+
+    return PrimitiveConstructorSpec(
+        nargs="*",
+        metavar=metavar,
+        instance_from_str=read,
+        is_instance=lambda value: isinstance(value, tuple),
+        str_from_instance=list,
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Optimise(JsonOptions, DesignOptions):
+    """Look for the best design by SQP: a volume to match, the smallest reach or others.
+
+    The gradients are exact, and the search begins at a given design.
+
+    The limits of the design hold throughout. A design is called found only if all demands hold
+    and it cannot get better nearby; otherwise the exit status is 1, and the best so far is told.
+    """
+
+    objective: Literal["match-volume", "smallest-reach", "largest-volume", "largest-margin"] = (
+        "match-volume"
+    )
+    """What is wanted; F = |1 − V/V′| of the exact volume, or the worst margin over a box."""
+
+    target_volume: Annotated[float | None, positive("--target-volume"), _OPTIONAL] = None
+    """The volume to match, or at least; for the smallest reach that of the design unless given."""
+
+    target_reach: Annotated[float | None, positive("--target-reach"), _OPTIONAL] = None
+    """The largest reach allowed; for the largest volume that of the design unless given."""
+
+    box: Annotated[
+        Six | tuple[()] | None,
+        numbers_or_none("--box", "x-low y-low z-low x-high y-high z-high"),
+        tyro.conf.arg(help_behavior_hint="(default: that of the design)"),
+    ] = None
+    """The box that bounds the workspace, in design units; none lifts that of the design."""
+
+    clearance: Annotated[float | None, positive("--clearance"), _OPTIONAL] = None
+    """Least clearance of every pair of legs over the workspace, in design units."""
+
+    clearance_margin: Annotated[
+        float | None,
+        positive("--clearance-margin"),
+        tyro.conf.arg(help_behavior_hint="(default: a 20th of the reach)"),
+    ] = None
+    """Demand it only where every margin is this large: legs meet at singularities."""
+
+    stroke_ratio: Annotated[float | None, positive("--stroke-ratio"), _OPTIONAL] = None
+    """Longest over shortest length of each actuator."""
+
+    required_box: Annotated[
+        Six | None,
+        numbers("--required-box", "x-low y-low z-low x-high y-high z-high"),
+        _OPTIONAL,
+    ] = None
+    """A box that must lie in the workspace, in design units."""
+
+    least: Annotated[
+        float | None,
+        positive("--least"),
+        tyro.conf.arg(help_behavior_hint="(default: a 20th of the largest variable)"),
+    ] = None
+    """Smallest |a3y|, |b1y| and |b3 − b2|, which a degenerate design has at zero."""
+
+    free: Annotated[tuple[str, ...], _words("--free", "yaw|reach|shift-x|…"), _OPTIONAL] = ()
+    """What else may change: yaw, reach, or the required box by shift-x, shift-y, shift-z."""
+
+    bounds: Annotated[tuple[str, ...], _words("--bounds", "NAME=LOW:HIGH …"), _OPTIONAL] = ()
+    """Bounds of variables, such as b1x=-10:10 yaw=-90:-45."""
+
+    starts: Annotated[int, whole_number("--starts", 1, 10_000)] = 1
+    """From how many designs to start: the given one, and others within the bounds."""
+
+    seed: Annotated[int, whole_number("--seed", 0, 2**31 - 1)] = 0
+    """Of the sequence of other starts."""
+
+    iterations: Annotated[int, whole_number("--iterations", 1, 100_000)] = 300
+    """The most steps from each start."""
+
+    out: Annotated[Path | None, _FILE] = None
+    """Write the design found to this file, and the record of the search beside it."""
+
+    record: Annotated[
+        Path | None,
+        tyro.conf.arg(metavar="FILE", help_behavior_hint="(default: OUT with .record.json)"),
+    ] = None
+    """Write problem, history and versions to this file, whether or not a design was found."""
+
+    repeat: Annotated[Path | None, _FILE] = None
+    """Run the problem in a record again, instead of one given by options."""
+
+    findings: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    """Put our optima beside the paper's instead."""
+
+    def run(self) -> None:
+        """Write what was found.
+
+        Raises:
+            InputError: a design, problem or file that cannot be used.
+            NoAnswerError: no design was found; the best so far has been told.
+        """
+        if self.findings:
+            self._write_findings()
+            return
+        from explorer.files.writing import check_writable
+
+        record = self.record
+        if record is None and self.out is not None:
+            record = self.out.with_suffix(".record.json")
+        for path in (self.out, record):
+            if path is not None:
+                check_writable(path)
+        problem, settings = self._asked()
+        self._check_possible(problem)
+        outcome = _searched(problem, settings)
+        written = self._files(outcome, settings, record)
+        if self.json:
+            write_json(outcome_json(outcome, written))
+        else:
+            write_lines(heading(found_design(outcome)), *outcome_lines(outcome, written))
+        if not outcome.converged:
+            raise NoAnswerError(outcome.run.message)
+
+    def _asked(self) -> tuple[Problem, Settings]:
+        """Return what the options ask for."""
+        from explorer.optimise.defaults import make_problem
+        from explorer.optimise.record import Settings, load_record
+
+        if self.repeat is not None:
+            record = load_record(self.repeat)
+            return record.problem, record.settings
+        if self.objective == "match-volume" and self.target_volume is None:
+            raise InputError("say which volume to match with --target-volume")
+        problem = make_problem(
+            self._start(),
+            self.objective,
+            volume=self.target_volume,
+            reach=self.target_reach,
+            clearance=self.clearance,
+            clearance_margin=self.clearance_margin,
+            least=self.least,
+            stroke_ratio=self.stroke_ratio,
+            required_box=None if self.required_box is None else _as_box(self.required_box),
+            free=self.free,
+            bounds=[_as_variable(word) for word in self.bounds],
+        )
+        return problem, Settings(starts=self.starts, seed=self.seed, iterations=self.iterations)
+
+    def _start(self) -> Design:
+        """Return the design to start from, with its home as it is before the box changes."""
+        design = self.load()
+        if self.box is None:
+            return design
+        from explorer.optimise.refutation.refutation import with_box
+
+        return with_box(design, _as_box(self.box) if self.box else None)
+
+    def _check_possible(self, problem: Problem) -> None:
+        """Refuse what the limits cannot give before anything is compiled for a search.
+
+        Raises:
+            NoAnswerError: no design within the bounds meets the demands, and what would help.
+        """
+        from explorer.optimise.refutation.refutation import (
+            BOX_LIMIT,
+            paper_box,
+            refutations,
+            words_of,
+        )
+
+        found = refutations(problem)
+        if not found:
+            return
+        message = words_of(found)
+        if self.repeat is None and any(each.limit == BOX_LIMIT for each in found):
+            advice = "lift the box with --box none"
+            box = paper_box(problem)
+            if box is not None:
+                corners = " ".join(f"{value:g}" for corner in box for value in corner)
+                advice += f", or take the paper's with --box {corners}"
+            message += f": {advice}"
+        if self.json:
+            write_json(refused_json(problem, found[0].limit, message))
+        raise NoAnswerError(message)
+
+    def _files(self, outcome: Outcome, settings: Settings, record: Path | None) -> list[Path]:
+        """Write the files that were asked for, and return which."""
+        from explorer.files.writing import write_whole
+        from explorer.optimise.record import encode_record, record_of
+
+        written: list[Path] = []
+        if self.out is not None and outcome.converged:
+            write_whole(self.out, encode_design(found_design(outcome)))
+            written.append(self.out)
+        if record is not None and (outcome.converged or self.record is not None):
+            write_whole(record, encode_record(record_of(outcome, settings)))
+            written.append(record)
+        return written
+
+    def _write_findings(self) -> None:
+        from explorer.numerics.compiled import warm
+        from explorer.optimise.findings import findings
+
+        warm()
+        found = list(findings(lambda name: complain(f"looking for: {name}")))
+        if self.json:
+            write_json({"findings": [finding_json(each) for each in found]})
+        else:
+            write_lines(findings_table(found))
+
+
+def _searched(problem: Problem, settings: Settings) -> Outcome:
+    """Run a search, showing how far it has got."""
+    from explorer.optimise.solver import optimise_design
+
+    called = CALLED[problem.objective]
+    with Progress(settings.starts, settings.iterations, called) as progress:
+        return optimise_design(
+            problem,
+            starts=settings.starts,
+            seed=settings.seed,
+            iterations=settings.iterations,
+            watch=progress.see,
+        )
+
+
+def _as_box(six: Six) -> Box:
+    return six[:3], six[3:]
+
+
+def _as_variable(word: str) -> Variable:
+    """Return the variable in a word such as b1x=-10:10."""
+    from explorer.optimise.problem import Variable
+
+    match = re.fullmatch(r"([^=]+)=([^:]+):([^:]+)", word)
+    try:
+        ends = [float(end) for end in match.groups()[1:]] if match else []
+    except ValueError:
+        ends = []
+    if match is None or not ends:
+        raise UsageError(
+            f"--bounds takes NAME=LOW:HIGH, such as b1x=-10:10; got {word!r}",
+            "explorer optimise",
+        )
+    return Variable(match[1].strip(), *ends)

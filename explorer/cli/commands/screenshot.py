@@ -1,0 +1,59 @@
+"""`explorer screenshot`: a picture of a pose, drawn by a headless browser."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+from explorer.cli.options import DesignOptions, JsonOptions, PoseOptions
+from explorer.cli.output import write_json, write_lines
+from explorer.cli.values import pixels
+from explorer.errors import InputError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Screenshot(JsonOptions, PoseOptions, DesignOptions):
+    """Draw a pose into a PNG file.
+
+    Writes the path of the file to standard output. Needs the extra "screenshot" and a
+    Chromium, which EXPLORER_CHROMIUM may name.
+    """
+
+    view: Literal["isometric", "front", "side", "top"] = "isometric"
+    """From where to look."""
+
+    out: Path = Path("shot.png")
+    """The file to write; an existing one is replaced."""
+
+    size: Annotated[tuple[int, int], pixels("--size", 64, 8192)] = (1280, 800)
+    """Size of the picture in pixels."""
+
+    panels: bool = False
+    """Whether the panels of the page are in the picture, or the scene alone."""
+
+    def run(self) -> None:
+        """Draw the picture and write its path.
+
+        Raises:
+            InputError: a design, pose or file that cannot be used.
+            MissingExtraError: what draws the picture is not installed.
+        """
+        from explorer.files.writing import check_writable
+
+        if self.out.suffix.lower() != ".png":
+            raise InputError(f"--out must end in .png; got {str(self.out)!r}")
+        check_writable(self.out)
+        design = self.load()
+        pose = self.pose(design)
+        from explorer.app.screenshot import take
+
+        # Standard output belongs to the answer; viser reports there when a server stops.
+        with contextlib.redirect_stdout(io.StringIO()):
+            take(design, pose, view=self.view, out=self.out, size=self.size, panels=self.panels)
+        if self.json:
+            write_json({"file": str(self.out), "size": list(self.size)})
+        else:
+            write_lines(str(self.out))

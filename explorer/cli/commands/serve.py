@@ -1,0 +1,67 @@
+"""`explorer serve`: the explorer's page, served to the browser of this machine."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from explorer.cli.options import load
+from explorer.cli.values import whole_number
+
+
+@dataclass(frozen=True, kw_only=True)
+class Serve:
+    """Serve the explorer's page and open it in the browser (the default)."""
+
+    design: Annotated[str | None, tyro.conf.arg(metavar="PRESET_OR_FILE")] = None
+    """A preset, a design file (JSON), or a design saved on the page, by its name; the session
+    that was left last if none is given."""
+
+    host: str = "127.0.0.1"
+    """Address to listen on; the default is for this machine alone."""
+
+    port: Annotated[int, whole_number("--port", 0, 65535)] = 8080
+    """Port to listen on; 0 takes any free one, a taken one is an error."""
+
+    token: str | None = None
+    """What has to be known to get in, 16 to 128 letters, digits, - and _; by default that of
+    the environment variable EXPLORER_TOKEN, else a random one where other machines get in."""
+
+    study: Annotated[
+        tuple[Path, ...],
+        tyro.conf.arg(metavar="FOLDER …", help_behavior_hint="(optional)"),
+    ] = ()
+    """Results of explorer sweep that the page offers, beside the studies made on it."""
+
+    open: bool = True
+    """Whether to open the browser."""
+
+    def run(self) -> None:
+        """Serve the page until interrupted.
+
+        Raises:
+            DesignError: a design that cannot be used.
+            InputError: a folder without the results of a study.
+            ServerError: the server cannot start, for instance because the port is taken, or
+                the token cannot be used.
+        """
+        design = None if self.design is None else load(self.design)
+        from explorer.app.features.studies.folders import check_given
+        from explorer.app.server import serve
+
+        check_given(self.study)
+
+        # Other users of this machine see arguments, but not the environment.
+        token = os.environ.get("EXPLORER_TOKEN") if self.token is None else self.token
+        serve(
+            design,
+            host=self.host,
+            port=self.port,
+            token=token,
+            open_browser=self.open,
+            studies=self.study,
+        )

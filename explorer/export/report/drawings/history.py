@@ -1,0 +1,104 @@
+"""How a search went, as charts: objective, volume and worst demand over its iterations."""
+
+from __future__ import annotations
+
+import math
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from explorer.export.report.drawings.mechanism import WIDTH, drawing, round_length
+from explorer.export.report.markup import coordinate, element, power_of_ten, text, written
+from explorer.optimise.curves import CALLED, Curve, curves_of
+from explorer.optimise.record import Record, Step
+
+HEIGHT = 190.0
+LEFT, RIGHT, TOP, BOTTOM = 52.0, 14.0, 26.0, 36.0
+_TICKS = 5
+
+
+def steps_of(record: Record) -> list[Step]:
+    """Return the iterates of the start that was chosen."""
+    return [step for step in record.history if step.run == record.chosen]
+
+
+def charts(record: Record) -> Element | None:
+    """Return the charts of the start that was chosen; None if it has no iterates."""
+    steps = steps_of(record)
+    if not steps:
+        return None
+    curves = curves_of(record.problem, steps)
+    width = WIDTH / len(curves)
+    made: list[Element] = []
+    for index, curve in enumerate(curves):
+        made.append(
+            element(
+                "text", _title(record, curve), x=index * width + LEFT - 30.0, y=13.0, class_="title"
+            )
+        )
+        made.extend(_chart(curve, index * width + LEFT, width - LEFT - RIGHT))
+    return drawing(HEIGHT, "The search, by iterations", *made)
+
+
+def _title(record: Record, curve: Curve) -> str:
+    if curve.kind == "volume":
+        return "Exact volume (units³)"
+    if curve.kind == "spare":
+        return "Worst demand; missed below 0"
+    if curve.powers:
+        return "F = |1 − V / V′|"
+    return f"{CALLED[record.problem.objective].capitalize()} (units)"
+
+
+def _chart(curve: Curve, left: float, width: float) -> list[Element]:
+    """Return one chart with its axes."""
+    tall = HEIGHT - TOP - BOTTOM
+    low, high = _range(curve)
+    last = max(1, len(curve.values) - 1)
+
+    def place(index: float, value: float) -> tuple[float, float]:
+        return left + width * index / last, TOP + tall * (high - value) / (high - low)
+
+    made = element("g", class_="ruler")
+    made.append(
+        element("path", d=f"M{coordinate(left)},{TOP}v{tall}h{coordinate(width)}", class_="frame")
+    )
+    for tick in _ticks(low, high, whole=curve.powers):
+        _, y = place(0.0, tick)
+        made.append(element("line", x1=left, y1=y, x2=left + width, y2=y, class_="grid"))
+        words = power_of_ten(round(tick)) if curve.powers else written(tick, 5)
+        made.append(text(words, left - 5.0, y + 3.5, anchor="end"))
+    for tick in _ticks(0.0, float(last), whole=True):
+        x, _ = place(tick, low)
+        made.append(element("line", x1=x, y1=TOP + tall, x2=x, y2=TOP + tall + 4.0))
+        made.append(text(written(tick), x, TOP + tall + 15.0))
+    made.append(text("iteration", left + 0.5 * width, HEIGHT - 6.0, class_="axis"))
+    pieces = [made]
+    if curve.level is not None:
+        _, y = place(0.0, curve.level)
+        pieces.append(element("line", x1=left, y1=y, x2=left + width, y2=y, class_="level"))
+    points = [place(index, value) for index, value in enumerate(curve.values.tolist())]
+    data = "M" + "L".join(f"{coordinate(x)},{coordinate(y)}" for x, y in points)
+    pieces.append(element("path", d=data, class_="curve"))
+    if len(points) <= 60:
+        pieces += [element("circle", cx=x, cy=y, r=2.2, class_="point") for x, y in points]
+    return pieces
+
+
+def _range(curve: Curve) -> tuple[float, float]:
+    every = [*curve.values.tolist(), *([] if curve.level is None else [curve.level])]
+    finite = [value for value in every if math.isfinite(value)] or [0.0]
+    low, high = min(finite), max(finite)
+    if curve.powers:
+        low = math.floor(low)
+        return float(low), float(max(math.ceil(high), low + 1))
+    room = 0.08 * (high - low) or 0.05 * abs(high) or 1.0
+    return low - room, high + room
+
+
+def _ticks(low: float, high: float, *, whole: bool) -> list[float]:
+    step = round_length((high - low) / _TICKS * 1.6)
+    if whole:
+        step = max(1.0, float(np.ceil(step)))
+    first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
+    return [tick * step for tick in range(first, last + 1)]

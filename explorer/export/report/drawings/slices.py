@@ -1,0 +1,257 @@
+"""Maps of slices as drawings: exact outlines, filled in bands by the smallest margin.
+
+At one orientation each margin is linear in the position, so the positions of a slice at which
+every margin is at least a level are polygons: the bands are as exact as the outline.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from explorer.export.report.drawings.mechanism import path_of, round_length
+from explorer.export.report.markup import coordinate, element
+from explorer.legs.clearance import leg_clearances
+from explorer.mechanism.design import Design, Swing
+from explorer.numerics.arrays import BoolArray, FloatArray
+from explorer.singularity.colours import BAND_EDGES, OUTLINE, WARN_SHARE, band_colours, css
+from explorer.singularity.ellipsoids import planes_of_singularity
+from explorer.workspace.limits.constraints import constraints
+from explorer.workspace.limits.region import region_of
+from explorer.workspace.slices.fields import AXES, slice_field
+from explorer.workspace.slices.outline import Edge, Outline, slice_outline
+from explorer.workspace.slices.volume import bounds
+
+# Points of paper on the longer side of a workspace, in the drawing's own coordinates.
+OWN_SIZE = 1000.0
+# Cells on the longer side, where a slice has no exact outline and where legs collide.
+CELLS = 240
+COLLISION_CELLS = 160
+# More contours than a workspace can have.
+CONTOURS = 60
+
+
+@dataclass(frozen=True)
+class Slices:
+    """The workspace of a design at an orientation, to slice.
+
+    Attributes:
+        design: The manipulator.
+        rotation: Platform to base, shape (3, 3).
+        lows, highs: Of a box that holds the workspace, each (3,).
+    """
+
+    design: Design
+    rotation: FloatArray
+    lows: FloatArray
+    highs: FloatArray
+
+    @staticmethod
+    def of(design: Design, rotation: FloatArray, extent: tuple[FloatArray, FloatArray]) -> Slices:
+        """Return the slices of a workspace that is not empty, of known extent."""
+        lows, highs = bounds(region_of(constraints(design, rotation)))
+        return Slices(design, rotation, np.maximum(lows, extent[0]), np.minimum(highs, extent[1]))
+
+    @property
+    def warn_below(self) -> float:
+        """The length below which margins are warned of, in design units."""
+        return WARN_SHARE * self.design.reach
+
+    @property
+    def own_scale(self) -> float:
+        """The drawing's own points in a design unit."""
+        return OWN_SIZE / float((self.highs - self.lows).max())
+
+    @property
+    def contour_step(self) -> float:
+        """Of the margin, from one contour to the next, in design units."""
+        return round_length(0.15 * float((self.highs - self.lows).max()))
+
+    @property
+    def are_exact(self) -> bool:
+        """Whether outlines are arcs and lines, rather than those of a grid."""
+        return self.design.limits.swing == Swing()
+
+    @cached_property
+    def _thick(self) -> bool:
+        return any(self.design.limits.leg_radii)
+
+    def area(self, axis: str, level: float) -> float | None:
+        """Return the exact area of a slice, in squared design units; None with cones."""
+        outline = self.outline(axis, level)
+        return None if outline is None else outline.area
+
+    def outline(self, axis: str, level: float) -> Outline | None:
+        """Return the exact outline of a slice; None with cones."""
+        return slice_outline(self.design, self.rotation, axis, level)
+
+    def map(self, axis: str, level: float, name: str) -> Element:
+        """Return the map of a slice, in its own coordinates: scaled, from the lows, y upwards.
+
+        Args:
+            axis: Across which it is cut.
+            level: Where, in design units.
+            name: Of its outline, unique in the document.
+        """
+        outline = self.outline(axis, level)
+        own = self._own(axis)
+        if outline is None:
+            field = slice_field(
+                self.design,
+                self.rotation,
+                "margin",
+                axis=axis,
+                level=level,
+                steps=CELLS,
+                extent=(self.lows, self.highs),
+            )
+            data, edge = _runs(field.inside, own(_ends(field.columns, field.rows))), None
+        else:
+            data = "".join(_loop(loop, own, self.own_scale) for loop in outline.loops)
+            edge = element("path", d=data, class_="edge") if data else None
+        if not data:
+            return element("g")
+        corners = own(self._corners(axis))
+        filled = element("g", clip_path=f"url(#{name})")
+        colours = band_colours()
+        filled.append(element("path", d=path_of(corners), fill=css(colours[0])))
+        for share, colour in zip(BAND_EDGES[1:], colours[1:], strict=True):
+            polygons = [path_of(own(each)) for each in self._beyond(axis, level, share)]
+            if polygons:
+                filled.append(element("path", d="".join(polygons), fill=css(colour)))
+        for number in range(1, CONTOURS):
+            share = number * self.contour_step / self.warn_below
+            polygons = [path_of(own(each)) for each in self._beyond(axis, level, share)]
+            if polygons and share > BAND_EDGES[-1]:
+                filled.append(element("path", d="".join(polygons), class_="contour"))
+        if self._thick:
+            filled.append(self._collisions(axis, level))
+        clip = element("clipPath", element("path", d=data, clip_rule="evenodd"), id=name)
+        return element("g", clip, filled, edge)
+
+    def _own(self, axis: str) -> _Own:
+        cut = AXES.index(axis)
+        first, second = (each for each in range(3) if each != cut)
+        return _Own(self.lows[[first, second]], self.own_scale)
+
+    def _corners(self, axis: str) -> FloatArray:
+        first, second = (k for k, name in enumerate(AXES) if name != axis)
+        (u0, v0), (u1, v1) = self.lows[[first, second]], self.highs[[first, second]]
+        return np.array([[u0, v0], [u1, v0], [u1, v1], [u0, v1]])
+
+    def _beyond(self, axis: str, level: float, share: float) -> Iterator[FloatArray]:
+        """Yield the polygons in which every margin is at least a share of the warning length."""
+        cut = AXES.index(axis)
+        first, second = (each for each in range(3) if each != cut)
+        gradients = planes_of_singularity(self.rotation)
+        for signs in itertools.product((-1.0, 1.0), repeat=3):
+            polygon = self._corners(axis)
+            for sign, gradient in zip(signs, gradients, strict=True):
+                least = share * self.warn_below - sign * float(gradient[cut]) * level
+                values = sign * (polygon @ gradient[[first, second]]) - least
+                polygon = _clipped(polygon, values)
+                if not len(polygon):
+                    break
+            else:
+                yield polygon
+
+    def _collisions(self, axis: str, level: float) -> Element:
+        cut = AXES.index(axis)
+        first, second = (each for each in range(3) if each != cut)
+        sides = (self.highs - self.lows)[[first, second]]
+        many = np.maximum(1.0, np.rint(COLLISION_CELLS * sides / sides.max()))
+        columns, rows = (
+            low + side / n * (np.arange(n, dtype=np.float64) + 0.5)
+            for low, side, n in (
+                (float(self.lows[first]), float(sides[0]), int(many[0])),
+                (float(self.lows[second]), float(sides[1]), int(many[1])),
+            )
+        )
+        points = np.empty((len(rows), len(columns), 3))
+        points[..., cut] = level
+        points[..., first], points[..., second] = columns, rows[:, None]
+        collide = leg_clearances(self.design, points, self.rotation).clearance.min(axis=-1) <= 0.0
+        data = _runs(collide, self._own(axis)(_ends(columns, rows)))
+        return element("path", d=data, fill=css(OUTLINE))
+
+
+@dataclass(frozen=True)
+class _Own:
+    """From design units to a drawing's own coordinates."""
+
+    lows: FloatArray
+    scale: float
+
+    def __call__(self, points: FloatArray) -> FloatArray:
+        return (points - self.lows) * self.scale
+
+
+def _loop(loop: tuple[Edge, ...], own: _Own, scale: float) -> str:
+    """Return a closed loop of edges as the data of a path."""
+    x, y = own(np.array(loop[0].start)).tolist()
+    data = [f"M{coordinate(x)},{coordinate(y)}"]
+    for edge in loop:
+        x, y = own(np.array(edge.end)).tolist()
+        end = f"{coordinate(x)},{coordinate(y)}"
+        if edge.centre is None:
+            data.append(f"L{end}")
+            continue
+        radius = coordinate(edge.radius * scale)
+        sweep = int(edge.turn > 0.0)
+        if abs(edge.turn) > math.pi - 1e-6:
+            # An arc of a path must be less than a whole circle: two halves are plain.
+            half = _middle(edge)
+            mx, my = own(half).tolist()
+            data.append(f"A{radius},{radius} 0 0 {sweep} {coordinate(mx)},{coordinate(my)}")
+        data.append(f"A{radius},{radius} 0 0 {sweep} {end}")
+    return "".join((*data, "Z"))
+
+
+def _middle(edge: Edge) -> FloatArray:
+    centre = np.array(edge.centre)
+    off = np.array(edge.start) - centre
+    c, s = math.cos(0.5 * edge.turn), math.sin(0.5 * edge.turn)
+    return centre + np.array([c * off[0] - s * off[1], s * off[0] + c * off[1]])
+
+
+def _clipped(polygon: FloatArray, values: FloatArray) -> FloatArray:
+    """Return the part of a convex polygon (n, 2) where a linear value is not negative."""
+    kept: list[FloatArray] = []
+    for k in range(len(polygon)):
+        a, b = values[k - 1], values[k]
+        if (a >= 0.0) != (b >= 0.0):
+            kept.append(polygon[k - 1] + a / (a - b) * (polygon[k] - polygon[k - 1]))
+        if b >= 0.0:
+            kept.append(polygon[k])
+    return np.array(kept) if len(kept) > 2 else np.zeros((0, 2))
+
+
+def _ends(columns: FloatArray, rows: FloatArray) -> FloatArray:
+    """Return the edges of cells about columns and rows, as points (n + 1, 2), NaN-padded."""
+    many = max(len(columns), len(rows)) + 1
+    ends = np.full((many, 2), np.nan)
+    for k, middles in enumerate((columns, rows)):
+        step = float(middles[1] - middles[0]) if len(middles) > 1 else 1.0
+        ends[: len(middles) + 1, k] = middles[0] + step * (np.arange(len(middles) + 1) - 0.5)
+    return ends
+
+
+def _runs(cells: BoolArray, ends: FloatArray) -> str:
+    """Return the cells that are set, each run of a row as a rectangle."""
+    data: list[str] = []
+    for row, flags in enumerate(cells):
+        jumps = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
+        low, high = float(ends[row, 1]), float(ends[row + 1, 1])
+        for first, last in jumps.reshape(-1, 2).tolist():
+            left, right = float(ends[first, 0]), float(ends[last, 0])
+            data.append(
+                f"M{coordinate(left)},{coordinate(low)}H{coordinate(right)}"
+                f"V{coordinate(high)}H{coordinate(left)}Z"
+            )
+    return "".join(data)

@@ -1,0 +1,82 @@
+"""A solid as a drawing: shaded faces from the back to the front, and the edges of its limits.
+
+The workspace is an intersection of balls, cylinders and half-spaces, convex where no length
+has a minimum: then its visible faces cover nothing of each other, and the drawing is exact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from explorer.export.report.drawings.mechanism import path_of
+from explorer.export.report.drawings.projection import Projection
+from explorer.export.report.markup import coordinate, element
+from explorer.numerics.arrays import FloatArray
+from explorer.singularity.colours import css, mixed
+from explorer.workspace.solids.solid import Solid
+
+# Where the light comes from: right, up and towards the eye.
+_LIGHT = np.array([-0.45, 0.65, 0.62])
+_DARK, _PALE = (86, 124, 172), (222, 232, 243)
+_SHADES = 24
+
+
+def shaded(solid: Solid, view: Projection) -> Element:
+    """Return the faces of a solid that are seen, in shades by how they face the light."""
+    corners = solid.vertices[solid.faces]
+    normals = _normals(solid)
+    seen = np.flatnonzero(normals @ view.toward > 0.0)
+    order = seen[np.argsort(view.depth(corners[seen].mean(axis=1)), kind="stable")]
+    light = _LIGHT / np.linalg.norm(_LIGHT)
+    facing = 0.5 + 0.5 * (normals[order] @ view.axes.T @ light)
+    shades = np.rint(facing * (_SHADES - 1)).astype(int).tolist()
+    flat = view.to(corners[order])
+    made = element("g", class_="faces")
+    last, data = -1, list[str]()
+    for shade, triangle in zip(shades, flat, strict=True):
+        if shade != last and data:
+            made.append(_faces(last, data))
+            data = []
+        last = shade
+        data.append(path_of(triangle))
+    if data:
+        made.append(_faces(last, data))
+    return made
+
+
+def edges(solid: Solid, view: Projection) -> Element:
+    """Return the seen edges: where two limits meet, and where faces turn away."""
+    return element("path", d="".join(_edges(solid, view)), class_="edge")
+
+
+def _faces(shade: int, data: list[str]) -> Element:
+    colour = css(mixed(_DARK, _PALE, shade / (_SHADES - 1)))
+    return element("path", d="".join(data), fill=colour, stroke=colour)
+
+
+def _normals(solid: Solid) -> FloatArray:
+    a, b, c = (solid.vertices[solid.faces[:, k]] for k in range(3))
+    # In units of the solid's own size, squares neither over- nor underflow.
+    size = float(np.ptp(solid.vertices, axis=0).max())
+    normals = np.cross((b - a) / size, (c - a) / size)
+    return np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None])
+
+
+def _edges(solid: Solid, view: Projection) -> Iterator[str]:
+    faces = solid.faces.astype(np.int64)
+    pairs = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    owners = np.repeat(np.arange(len(faces)), 3)
+    order = np.lexsort((pairs[:, 1], pairs[:, 0]))
+    # Each edge of a closed mesh comes twice.
+    one, other = owners[order[::2]], owners[order[1::2]]
+    ends = pairs[order[::2]]
+    facing = _normals(solid) @ view.toward > 0.0
+    differs = solid.limit_of_face[one] != solid.limit_of_face[other]
+    drawn = (facing[one] & facing[other] & differs) | (facing[one] != facing[other])
+    flat = view.to(solid.vertices)
+    for a, b in ends[drawn].tolist():
+        (x1, y1), (x2, y2) = flat[a].tolist(), flat[b].tolist()
+        yield (f"M{coordinate(x1)},{coordinate(y1)}L{coordinate(x2)},{coordinate(y2)}")

@@ -1,0 +1,71 @@
+"""The workspace about the mechanism as drawings: whole, and cut open through the pose."""
+
+from __future__ import annotations
+
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from explorer.export.report.drawings.mechanism import (
+    ROOM,
+    WIDTH,
+    axes_cross,
+    drawing,
+    mechanism,
+    outermost,
+    scale_bar,
+)
+from explorer.export.report.drawings.projection import Projection, extents, fitted
+from explorer.export.report.drawings.slices import Slices
+from explorer.export.report.drawings.solid_drawing import edges, shaded
+from explorer.export.report.markup import element
+from explorer.measures.snapshot import Snapshot
+from explorer.workspace.limits.constraints import HalfSpace
+from explorer.workspace.solids.solid import Solid
+from explorer.workspace.solids.solids import cut_solid
+
+MOST_HEIGHT = 380.0
+
+
+def whole_and_cut(snapshot: Snapshot, solid: Solid, slices: Slices) -> Element:
+    """Return the workspace with the mechanism in it, and cut open at the pose's y.
+
+    Args:
+        snapshot: The design in its pose.
+        solid: Its workspace, not empty.
+        slices: The same, to slice.
+    """
+    points = np.concatenate([outermost(snapshot), solid.vertices])
+    lows, highs = extents("isometric", points)
+    half = 0.5 * WIDTH
+    wide, high = (highs - lows).tolist()
+    scale = min((half - 2.0 * ROOM) / wide, (MOST_HEIGHT - 2.0 * ROOM) / high)
+    height = scale * high + 2.0 * ROOM
+    whole = fitted("isometric", points, (0.0, 0.0, half, height), scale)
+    opened = fitted("isometric", points, (half, 0.0, half, height), scale)
+    level = snapshot.pose.position[1]
+    kept = cut_solid(solid, HalfSpace("cut", np.array([0.0, -1.0, 0.0]), -level))
+    pieces = [
+        element("g", *mechanism(snapshot, whole, None)),
+        element("g", shaded(solid, whole), opacity="0.66"),
+        edges(solid, whole),
+        scale_bar(whole, snapshot.design.unit_mm, 4.0, height - 6.0),
+        axes_cross(whole, half - 40.0, height - 30.0),
+    ]
+    if not kept.is_empty:
+        pieces += [shaded(kept, opened), edges(kept, opened)]
+    pieces.append(_on_cut(slices, level, opened))
+    pieces.append(element("g", *mechanism(snapshot, opened, None), opacity="0.9"))
+    return drawing(height, "The workspace, whole and cut open", *pieces)
+
+
+def _on_cut(slices: Slices, level: float, view: Projection) -> Element:
+    """Return the map of the slice across y in its place in space."""
+    group = slices.map("y", level, "slice-cut")
+    corner = np.array([slices.lows[0], level, slices.lows[2]])
+    origin = view.to(corner)
+    x, _, z = np.eye(3) / slices.own_scale
+    columns = view.to(corner + x) - origin, view.to(corner + z) - origin, origin
+    numbers = " ".join(f"{value:.6g}" for column in columns for value in column.tolist())
+    group.set("transform", f"matrix({numbers})")
+    return group

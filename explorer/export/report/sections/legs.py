@@ -1,0 +1,40 @@
+"""What a report tells of the legs: how far they keep from each other."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from xml.etree.ElementTree import Element
+
+from explorer.export.report.findings import Findings, Missing
+from explorer.export.report.markup import Cell, element, paragraph, table
+from explorer.legs.clearance import PAIRS
+
+
+def legs_section(found: Findings) -> Iterator[Element]:
+    """Yield the section on the clearances of the legs."""
+    unit, at = found.design.unit_mm, found.snapshot.clearances
+    least, reachable = found.least, found.reachable
+    yield element("h2", "Legs")
+    yield paragraph(
+        "The clearance of a pair is the distance of the legs’ axes less both radii; below zero "
+        "they collide. The least is that over the whole workspace at this orientation, found by "
+        "branch and bound. A pair that shares a joint has none."
+    )
+    blocked = reachable is not None and not isinstance(reachable, Missing)
+    heads = ["legs", "here, units", "here, mm", "least, units", "least, mm"]
+    rows: list[tuple[Cell, ...]] = []
+    for index, (first, second) in enumerate(PAIRS):
+        cells: list[Cell] = [element("b", f"{first}–{second}")]
+        for clearance in (float(at.clearance[index]), float(least.clearance[index])):
+            cells += [_known(clearance), _known(clearance * unit)]
+        if reachable is not None and not isinstance(reachable, Missing):
+            cells.append(reachable.pairs[index].blocked_volume)
+        rows.append(tuple(cells))
+    if blocked:
+        heads.append("blocks, units³")
+    yield table(heads, rows, align="<" + ">" * (len(heads) - 1))
+
+
+def _known(clearance: float) -> Cell:
+    return clearance if math.isfinite(clearance) else "–"

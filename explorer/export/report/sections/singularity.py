@@ -1,0 +1,139 @@
+"""What a report tells of singularities: margins, measures, the nearest poses, performance."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from xml.etree.ElementTree import Element
+
+from explorer.export.report.findings import Findings
+from explorer.export.report.markup import (
+    Cell,
+    Piece,
+    count,
+    element,
+    figure,
+    paragraph,
+    table,
+    written,
+)
+from explorer.export.report.sections.mechanism import pose_words
+from explorer.measures.verdict import verdict
+from explorer.mechanism.margins import INCIDENCES, TETRAHEDRA, mode_words
+from explorer.mechanism.pose import yaw_pitch_roll_from_rotation
+from explorer.singularity.bruhat import words
+from explorer.singularity.colours import WARN_SHARE
+from explorer.singularity.ellipsoids import Ellipsoid
+
+
+def singularity_section(found: Findings) -> Iterator[Element]:
+    """Yield the section on singularities."""
+    snapshot, unit = found.snapshot, found.design.unit_mm
+    yield element("h2", "Singularities")
+    here = verdict(snapshot, WARN_SHARE * found.design.reach)
+    if here.kind == "singular":
+        names = " and ".join(INCIDENCES[index - 1] for index in here.incidences)
+        yield paragraph(f"The pose is singular: {names}.", class_="note")
+    else:
+        away = f"{written(here.distance * unit, 3)} mm"
+        note = None if here.kind == "clear" else "note"
+        yield paragraph(f"{here.title}: {here.reason(away)}.", class_=note)
+    yield paragraph(
+        "The mechanism is singular exactly where one of three margins is zero; each is the height "
+        "of a tetrahedron. The signs of the three name the assembly mode."
+    )
+    yield table(
+        ("margin", "zero when", "units", "mm", "tetrahedron", "volume, units³"),
+        [
+            (
+                element("b", f"κ{k + 1}"),
+                INCIDENCES[k],
+                float(snapshot.margins[k]),
+                float(snapshot.margins[k]) * unit,
+                " ".join(TETRAHEDRA[k]),
+                float(snapshot.volumes[k]),
+            )
+            for k in range(3)
+        ],
+        align="<<>><>",
+        caption=f"Margins in {pose_words(found)}",
+    )
+    yield table(
+        (),
+        [
+            ("determinant of the Jacobian", snapshot.determinant, ""),
+            (
+                "inverse condition number, with the reach",
+                snapshot.inverse_condition,
+                "0 singular, 1 best",
+            ),
+            ("proximity: smallest |κ| over the reach", snapshot.proximity, ""),
+            ("assembly mode", _mode_figure(snapshot.bordering_modes), snapshot.sign_words),
+            (
+                "stratum of the two flags",
+                " ".join(map(str, snapshot.stratum)),
+                f"dimension {snapshot.stratum_dimension}: {words(snapshot.stratum)}",
+            ),
+            (
+                "ball of positions without a singular one",
+                found.ball.radius,
+                ("radius in units; ", figure(found.ball.radius * unit), " mm"),
+            ),
+            (
+                "all poses nearer than this are regular",
+                found.certified,
+                ("units, mean way of b1 to b4; ", figure(found.certified * unit), " mm"),
+            ),
+        ],
+        align="<><",
+        caption="Measures",
+    )
+    yield _nearest(found)
+    yield element(
+        "div",
+        _ellipsoid(found.performance.translation, "Speed of b4 per actuator speed"),
+        _ellipsoid(found.performance.rotation, "Turning, times the reach"),
+        class_="pair",
+    )
+    yield paragraph(
+        "Gains are also the actuator force per force, or per moment over the reach, along the same "
+        "direction: where the platform is fast, it is weak.",
+        class_="dim",
+    )
+
+
+def _mode_figure(modes: tuple[int, ...]) -> Piece:
+    return count(modes[0]) if len(modes) == 1 else mode_words(modes)
+
+
+def _nearest(found: Findings) -> Element:
+    unit = found.design.unit_mm
+    rows: list[tuple[Cell, ...]] = []
+    for each in found.snapshot.nearest:
+        angles = yaw_pitch_roll_from_rotation(each.pose.rotation).tolist()
+        rows.append(
+            (
+                element("b", f"κ{each.incidence} = 0"),
+                each.distance,
+                each.distance * unit,
+                *(figure(value, 5) for value in each.pose.position),
+                *((figure(value, 5), "°") for value in angles),
+            )
+        )
+    return table(
+        ("nearest with", "units", "mm", "x", "y", "z", "yaw", "pitch", "roll"),
+        rows,
+        align="<>>>>>>>>",
+        caption="Nearest singular poses, by the root-mean-square way of b1 to b4",
+    )
+
+
+def _ellipsoid(ellipsoid: Ellipsoid, caption: str) -> Element:
+    rows: list[tuple[Cell, ...]] = [
+        (
+            written(index, 1),
+            float(gain),
+            ", ".join(f"{x:z.3f}".replace("-", "−") for x in axis.tolist()),
+        )
+        for index, (gain, axis) in enumerate(zip(ellipsoid.gain, ellipsoid.axes.T, strict=True), 1)
+    ]
+    return table(("", "gain", "along (x, y, z)"), rows, align="<>>", caption=caption)

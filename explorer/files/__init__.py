@@ -1,0 +1,1 @@
+"""Files written whole, text in JSON, and the versions that results depend on."""

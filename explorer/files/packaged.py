@@ -1,0 +1,19 @@
+"""The files that come with the explorer, and the folder that it is imported from."""
+
+from __future__ import annotations
+
+from importlib import resources
+from importlib.resources.abc import Traversable
+from pathlib import Path
+
+SOURCES = Path(__file__).parents[2]
+"""The folder of the package `explorer`, for processes that must import these very sources."""
+
+
+def packaged_files(folder: str, suffix: str) -> list[Traversable]:
+    """Return the files with a suffix in one of the folders that come along, ordered by name."""
+    # In a wheel the folders lie inside the package, in a checkout beside it.
+    packaged = resources.files("explorer").joinpath(folder)
+    place = packaged if packaged.is_dir() else SOURCES / "assets" / folder
+    files = (file for file in place.iterdir() if file.name.endswith(suffix))
+    return sorted(files, key=lambda file: file.name)

@@ -1,0 +1,1 @@
+"""The legs as capsules: their clearance at a pose and along a move."""

@@ -1,0 +1,178 @@
+"""How far the four legs keep from each other in a pose (design.md, section 7).
+
+A leg is a capsule about its axis: from its base end (a1; the carriages on the guide at d1
+and d3; a3) to its platform end (b1, b2, b3, b4). The clearance of a pair is the distance
+of the axes less both radii; below zero the pair collides.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from explorer.legs.segments import write_closest
+from explorer.mechanism.design import DEGENERATE_RATIO, Design
+from explorer.mechanism.kinematics import attachment_points
+from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
+from explorer.numerics.compiled import kernel
+
+PAIRS = ((1, 2), (1, 3), (1, 4), (2, 3), (2, 4), (3, 4))
+"""The pairs of legs in their one order; the array axis of six in everything about pairs."""
+
+
+class LegClearances(NamedTuple):
+    """The clearances of all pairs of legs, in the order of `PAIRS`.
+
+    A pair that shares a joint (see `joined_pairs`) touches by construction: its clearance
+    and distance are infinite, and both its points are the joint.
+
+    Attributes:
+        clearance: The distance less both radii, shape (..., 6); below zero in collision.
+        distance: That of the axes, shape (..., 6).
+        points: The closest points of the two axes, the leg named first first, shape
+            (..., 6, 2, 3), in the base frame.
+    """
+
+    clearance: FloatArray
+    distance: FloatArray
+    points: FloatArray
+
+    @property
+    def closest(self) -> IntArray:
+        """The index into `PAIRS` of the pair with the least clearance, shape (...)."""
+        return np.asarray(self.clearance.argmin(axis=-1), dtype=np.int64)
+
+
+def joined_pairs(design: Design) -> BoolArray:
+    """Return which pairs of legs share a joint, shape (6,), in the order of `PAIRS`.
+
+    b2 or b3 is b4 where it is zero, to rounding. Such a pair is left out of every test.
+    """
+    least = DEGENERATE_RATIO * max(map(abs, design.variables))
+    return np.array(
+        [
+            second == 4
+            and (
+                (first == 2 and abs(design.b2) <= least) or (first == 3 and abs(design.b3) <= least)
+            )
+            for first, second in PAIRS
+        ]
+    )
+
+
+def radii_of_pairs(design: Design) -> FloatArray:
+    """Return the sum of both radii of each pair, shape (6,)."""
+    radii = design.limits.leg_radii
+    return np.array([radii[first - 1] + radii[second - 1] for first, second in PAIRS])
+
+
+def leg_axes(design: Design, position: ArrayLike, rotation: ArrayLike) -> FloatArray:
+    """Return the axes of the four legs, base end and platform end, shape (..., 4, 2, 3).
+
+    Args:
+        design: The manipulator.
+        position: b4 in the base frame, shape (..., 3), in design units.
+        rotation: Platform to base, shape (..., 3, 3).
+
+    Raises:
+        InputError: a pose that is not finite or not a rotation.
+    """
+    points = attachment_points(design, position, rotation)
+    axes = np.zeros((*points.b1.shape[:-1], 4, 2, 3))
+    axes[..., 1, 0, 0], axes[..., 2, 0, 0] = points.b2[..., 0], points.b3[..., 0]
+    axes[..., 3, 0, :] = points.a3
+    for leg, end in enumerate((points.b1, points.b2, points.b3, points.b4)):
+        axes[..., leg, 1, :] = end
+    return axes
+
+
+def leg_clearances(design: Design, position: ArrayLike, rotation: ArrayLike) -> LegClearances:
+    """Return the clearances of all six pairs of legs.
+
+    Args:
+        design: The manipulator; the radii are those of its limits.
+        position: b4 in the base frame, shape (..., 3), in design units.
+        rotation: Platform to base, shape (..., 3, 3).
+
+    Raises:
+        InputError: a pose that is not finite or not a rotation.
+    """
+    axes = leg_axes(design, position, rotation)
+    batch = axes.shape[:-3]
+    rows = axes.reshape(-1, 4, 2, 3)
+    distance, points = np.empty((len(rows), 6)), np.empty((len(rows), 6, 2, 3))
+    pair_rows(len(rows), rows, distance, points)
+    joined = joined_pairs(design)
+    distance[:, joined] = math.inf
+    points[:, joined] = rows[:, 3, None, 1, None, :]
+    return LegClearances(
+        (distance - radii_of_pairs(design)).reshape(*batch, 6),
+        distance.reshape(*batch, 6),
+        points.reshape(*batch, 6, 2, 3),
+    )
+
+
+def distance_gradients(
+    design: Design, position: ArrayLike, rotation: ArrayLike, found: LegClearances
+) -> FloatArray:
+    """Return the rates of the distances of all pairs with the position, shape (..., 6, 3).
+
+    Zero where the axes of a pair cross, where a distance has no rate, and for a pair that
+    shares a joint.
+
+    Args:
+        design: The manipulator.
+        position: b4 in the base frame, shape (..., 3), in design units.
+        rotation: Platform to base, shape (..., 3, 3).
+        found: The clearances there.
+    """
+    off = found.points[..., 0, :] - found.points[..., 1, :]
+    length = np.linalg.norm(off, axis=-1, keepdims=True)
+    normal = off / np.where(length > 0.0, length, 1.0)
+    return normal * point_rates(leg_axes(design, position, rotation), found.points)
+
+
+def point_rates(axes: FloatArray, points: FloatArray) -> FloatArray:
+    """Return by how much more the first of two points moves than the second with p, by axis.
+
+    Args:
+        axes: Of the legs, shape (..., 4, 2, 3).
+        points: Of each pair, one on each axis, shape (..., 6, 2, 3).
+
+    Returns:
+        The diagonals of the matrices that the positions are multiplied with, shape
+        (..., 6, 3): platform ends move as p does, a base end on the guide along x only.
+    """
+    sides: list[FloatArray] = []
+    for side in (0, 1):
+        which = [pair[side] - 1 for pair in PAIRS]
+        base, end = axes[..., which, 0, :], axes[..., which, 1, :]
+        along = end - base
+        square = (along * along).sum(axis=-1)
+        share = ((points[..., side, :] - base) * along).sum(axis=-1)
+        share = share / np.where(square > 0.0, square, 1.0)
+        rates = np.repeat(share[..., None], 3, axis=-1)
+        on_guide = [leg in (1, 2) for leg in which]
+        rates[..., on_guide, 0] = 1.0
+        sides.append(rates)
+    return sides[0] - sides[1]
+
+
+@kernel("void(f8[:,:,:,::1], f8[:,::1], f8[:,:,:,::1])")
+def pair_rows(axes: FloatArray, distance: FloatArray, points: FloatArray) -> None:
+    """Write the distances and closest points of the six pairs of four axes.
+
+    Args:
+        axes: Shape (n, 4, 2, 3).
+        distance: Written, shape (n, 6).
+        points: Written, shape (n, 6, 2, 3).
+    """
+    for row in range(axes.shape[0]):
+        pair = 0
+        for i in range(4):
+            for j in range(i + 1, 4):
+                distance[row, pair] = write_closest(axes[row, i], axes[row, j], points[row, pair])
+                pair += 1

@@ -1,0 +1,1 @@
+"""The manipulator: its design, its poses and its kinematics in closed form."""

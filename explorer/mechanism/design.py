@@ -1,0 +1,261 @@
+"""A design of the flagged 4-4 manipulator and its limits (design variables X of the paper).
+
+The six design variables place the attachment points: a3 in the base, b1, b2 and b3 in
+the platform; a1 and b4 are the two origins.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Literal, cast, get_args
+
+import msgspec
+
+from explorer.errors import DesignError
+from explorer.mechanism.pose import Pose, Triple
+from explorer.numerics.checks import (
+    instance,
+    not_negative,
+    number,
+    numbers,
+    one_of,
+    ordered,
+    positive,
+    two,
+)
+
+JOINTS = ("l1", "d1", "d2", "d3", "d4", "l4")
+"""The joint variables in their one order; the array axis of six everywhere."""
+
+LENGTHS = ("l1", "d2", "d4", "l4")
+"""The joints that are lengths of actuators, hence not negative; in the order of the legs."""
+
+VARIABLES = ("a3x", "a3y", "b1x", "b1y", "b2", "b3")
+"""The design variables X in the paper's order."""
+
+Pair = tuple[float, float]
+Range = tuple[float, float | None]
+
+CarriageOrder = Literal["home", "any"]
+"""Which carriage comes first on the guide: as in the home pose, or either."""
+
+TOLERANCE = 1e-11
+"""How far a pose may exceed a limit and still keep it, so that rounding breaks none: a share
+of the reach for limits of lengths, in radians for limits of angles. Every limit has this one."""
+
+# Below this share of the design's size a3y, b1y and b3 - b2 are rounding noise.
+DEGENERATE_RATIO = 1e-12
+# The determinant of the Jacobian grows with the seventh power of the size.
+SMALLEST_SIZE, LARGEST_SIZE = 1e-30, 1e30
+
+
+def _set(struct: msgspec.Struct, name: str, value: object) -> None:
+    msgspec.structs.force_setattr(struct, name, value)
+
+
+class Swing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """How far a leg may swing in its universal and ball joints; None for no bound.
+
+    Each is the half-angle, in degrees, of a cone about the leg's direction in the home
+    pose: fixed in the base for the universal joints, in the platform for the ball joints.
+
+    Raises:
+        DesignError: not between 0 and 180.
+    """
+
+    a1: float | None = None
+    a3: float | None = None
+    b1: float | None = None
+    b2: float | None = None
+    b3: float | None = None
+    b4: float | None = None
+
+    def __post_init__(self) -> None:
+        for name in self.__struct_fields__:
+            angle = getattr(self, name)
+            if angle is not None:
+                checked = positive(f"limits.swing.{name}", angle)
+                if checked > 180.0:
+                    raise DesignError(
+                        f"limits.swing.{name} is a half-angle of at most 180°; got {checked:g}",
+                        f"limits.swing.{name}",
+                    )
+                _set(self, name, checked)
+
+
+class Limits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What the actuators, the guide and the user allow, all in design units.
+
+    Attributes:
+        l1, d2, d4, l4: (minimum, maximum) length; a maximum of None is the reach |a3|.
+        guide: (lowest, highest) carriage position; None for no bound.
+        gap: smallest |d1 - d3| between the carriages.
+        carriage_order: "home" demands that d3 - d1 keeps the sign that it has in the design's
+            own home pose, since at d1 = d3 legs 2 and 3 share a point; "any" demands
+            nothing, which is the plain geometry.
+        box: (lows, highs) of p; None for no bound.
+        margin: smallest |margin| together with the home's sign triple; 0 demands only
+            the sign triple, None nothing.
+        leg_radii: radii of the four capsule legs, in the order of the legs.
+        swing: half-angles of the cones that the joints keep the legs in.
+
+    Raises:
+        DesignError: not finite, negative where a length is meant, reversed, or a
+            carriage order other than "home" and "any".
+    """
+
+    l1: Range = (0.0, None)
+    d2: Range = (0.0, None)
+    d4: Range = (0.0, None)
+    l4: Range = (0.0, None)
+    guide: Pair | None = None
+    gap: float = 0.0
+    carriage_order: CarriageOrder = "home"
+    box: tuple[Triple, Triple] | None = None
+    margin: float | None = 0.0
+    leg_radii: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    swing: Swing = Swing()
+
+    def __post_init__(self) -> None:
+        for name in LENGTHS:
+            low, high = two(f"limits.{name}", getattr(self, name))
+            low = not_negative(f"limits.{name} minimum", low)
+            if high is not None:
+                high = number(f"limits.{name} maximum", high)
+                if high < low:
+                    raise DesignError(
+                        f"limits.{name}: the minimum {low:g} exceeds the maximum {high:g}",
+                        f"limits.{name}",
+                    )
+            _set(self, name, (low, high))
+        if self.guide is not None:
+            low, high = ordered("limits.guide", *two("limits.guide", self.guide))
+            _set(self, "guide", (low, high))
+        _set(self, "gap", not_negative("limits.gap", self.gap))
+        one_of("limits.carriage_order", self.carriage_order, get_args(CarriageOrder))
+        if self.box is not None:
+            lows, highs = two("limits.box", self.box)
+            pairs = [
+                ordered(f"limits.box {axis}", low, high)
+                for axis, low, high in zip(
+                    "xyz",
+                    numbers("limits.box lows", lows, 3),
+                    numbers("limits.box highs", highs, 3),
+                    strict=True,
+                )
+            ]
+            _set(self, "box", (tuple(low for low, _ in pairs), tuple(high for _, high in pairs)))
+        if self.margin is not None:
+            _set(self, "margin", not_negative("limits.margin", self.margin))
+        instance("limits.swing", self.swing, Swing)
+        radii = numbers("limits.leg_radii", self.leg_radii, 4)
+        _set(self, "leg_radii", tuple(not_negative("limits.leg_radii", r) for r in radii))
+
+
+class Design(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A flagged 4-4 manipulator, ready for use: degenerate ones cannot be made.
+
+    Attributes:
+        schema: version of the file format.
+        name: what people call it.
+        unit_mm: millimetres in one design unit.
+        node_step: grid step of the paper's node counting; None is reach / 15.
+        a3: (x, y) of a3 in the base frame.
+        b1: (x, y) of b1 in the platform frame.
+        b2, b3: x of b2 and b3 in the platform frame.
+        limits: what the mechanism may do.
+        home: the pose it opens with, whose orientation and sign triple the workspace
+            has; None for a sensible one, see `explorer.mechanism.home`.
+
+    Raises:
+        DesignError: not finite, degenerate (a3y = 0, b1y = 0 or b2 = b3), or beyond the
+            sizes that double precision carries.
+    """
+
+    schema: Literal[1] = 1
+    name: str = "untitled"
+    unit_mm: float = 10.0
+    node_step: float | None = None
+    a3: Pair
+    b1: Pair
+    b2: float
+    b3: float
+    limits: Limits = Limits()
+    home: Pose | None = None
+
+    def __post_init__(self) -> None:
+        if self.schema != 1:
+            raise DesignError(f"schema must be 1; got {self.schema!r}")
+        instance("name", self.name, str)
+        if len(self.name) > 100 or not self.name.isprintable():
+            raise DesignError("name must be one printable line of at most 100 characters")
+        instance("limits", self.limits, Limits)
+        instance("home", self.home, Pose, type(None))
+        _set(self, "a3", tuple(numbers("a3", self.a3, 2)))
+        _set(self, "b1", tuple(numbers("b1", self.b1, 2)))
+        _set(self, "b2", number("b2", self.b2))
+        _set(self, "b3", number("b3", self.b3))
+        _set(self, "unit_mm", positive("unit_mm", self.unit_mm))
+        if self.node_step is not None:
+            _set(self, "node_step", positive("node_step", self.node_step))
+        size = max(map(abs, self.variables))
+        if not SMALLEST_SIZE <= size <= LARGEST_SIZE:
+            raise DesignError(
+                f"the largest design variable must lie between {SMALLEST_SIZE:g} and "
+                f"{LARGEST_SIZE:g}; got {size:g}"
+            )
+        for name, value, zero in (
+            ("a3y", self.a3[1], "a1, a2 and a3 lie on one line"),
+            ("b1y", self.b1[1], "b1, b2 and b3 lie on one line"),
+            ("b3 - b2", self.b3 - self.b2, "b2 and b3 are one point"),
+        ):
+            if abs(value) <= DEGENERATE_RATIO * size:
+                raise DesignError(
+                    f"degenerate design: {name} = {value:g}, so {zero} and every pose is "
+                    f"singular; it must exceed {DEGENERATE_RATIO:g} of the largest "
+                    f"variable ({size:g}) in magnitude"
+                )
+
+    @property
+    def variables(self) -> tuple[float, float, float, float, float, float]:
+        """X = (a3x, a3y, b1x, b1y, b2, b3)."""
+        return (*self.a3, *self.b1, self.b2, self.b3)
+
+    @property
+    def reach(self) -> float:
+        """The characteristic length |a3|."""
+        return math.hypot(*self.a3)
+
+    @property
+    def tolerance(self) -> float:
+        """How far a limit of a length may be exceeded and is still kept, in design units."""
+        return TOLERANCE * self.reach
+
+    @property
+    def a2x(self) -> float:
+        """Where a2 is drawn on the guide: at its end. No result depends on it."""
+        ends = self.limits.guide or (0.0, self.reach)
+        return ends[1] or ends[0] or self.reach
+
+    def length_range(self, name: str) -> tuple[float, float]:
+        """Return (minimum, maximum) of l1, d2, d4 or l4 with the tie to the reach resolved."""
+        low, high = cast("Range", getattr(self.limits, name))
+        return low, self.reach if high is None else high
+
+    def with_variables(self, values: Sequence[float]) -> Design:
+        """Return this design with other values of X.
+
+        Raises:
+            DesignError: the values make a degenerate design.
+        """
+        a3x, a3y, b1x, b1y, b2, b3 = numbers("design variables", values, 6)
+        return msgspec.structs.replace(self, a3=(a3x, a3y), b1=(b1x, b1y), b2=b2, b3=b3)
+
+    def with_variable(self, name: str, value: float) -> Design:
+        """Return this design with one variable, named as in `VARIABLES`, changed."""
+        if name not in VARIABLES:
+            raise DesignError(f"no design variable {name!r}; there are {', '.join(VARIABLES)}")
+        values = list(self.variables)
+        values[VARIABLES.index(name)] = value
+        return self.with_variables(values)

@@ -1,0 +1,108 @@
+"""Design files: JSON, read strictly, and the designs that come along.
+
+Unknown fields are refused, so that a misspelt limit is never silently ignored, and so are
+fields given twice. A file of an older schema is brought up to date first, one of a newer
+schema is refused. The presets are both rows of the paper's Table 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import msgspec
+
+from explorer.errors import DesignError
+from explorer.files.json_text import check_each_once, refusing
+from explorer.files.packaged import packaged_files
+from explorer.mechanism.design import Design
+
+# No honest design file comes near this size, in bytes.
+LARGEST_FILE = 1_000_000
+SCHEMA = 1
+
+MIGRATIONS: dict[int, Callable[[dict[str, Any]], dict[str, Any]]] = {}
+"""By schema: what turns the fields of a file into those of the next schema."""
+
+
+class _Dated(msgspec.Struct):
+    """What every schema has; a file that does not tell is of the first one."""
+
+    schema: int = 1
+
+
+def decode_design(data: bytes, source: str) -> Design:
+    """Return the design in a JSON text.
+
+    Args:
+        data: The text, UTF-8.
+        source: What to call it in an error message.
+
+    Raises:
+        DesignError: not JSON, of a newer schema, with unknown fields, fields given twice or
+            unusable values.
+    """
+    if len(data) > LARGEST_FILE:
+        raise DesignError(
+            f"{source}: {len(data)} bytes is no design file; they stay below {LARGEST_FILE}"
+        )
+    with refusing(source, DesignError):
+        schema = msgspec.json.decode(data, type=_Dated).schema
+        if schema > SCHEMA:
+            raise DesignError(
+                f"schema {schema} was made by a newer explorer; this one reads up to {SCHEMA}"
+            )
+        if schema in MIGRATIONS:
+            fields = msgspec.json.decode(data, type=dict[str, Any])
+            design = msgspec.convert(up_to_date(fields), Design)
+        else:
+            design = msgspec.json.decode(data, type=Design)
+        check_each_once(data)
+        return design
+
+
+def up_to_date(fields: dict[str, Any]) -> dict[str, Any]:
+    """Return the fields of a design, of this schema or an older one, as those of this one."""
+    for older in range(fields.get("schema", 1), SCHEMA):
+        fields = MIGRATIONS[older](fields)
+    return fields | {"schema": SCHEMA}
+
+
+def encode_design(design: Design) -> bytes:
+    """Return the design as indented JSON, which `decode_design` reads back unchanged."""
+    return msgspec.json.format(msgspec.json.encode(design), indent=2) + b"\n"
+
+
+def load_design(preset_or_file: str) -> Design:
+    """Return a preset by name, or the design in a file.
+
+    Raises:
+        DesignError: no such preset or file, or a file that holds no design.
+    """
+    preset = PRESETS.get(preset_or_file)
+    if preset is not None:
+        return preset
+    path = Path(preset_or_file)
+    try:
+        with path.open("rb") as file:
+            data = file.read(LARGEST_FILE + 1)
+    except FileNotFoundError:
+        raise DesignError(
+            f"no preset and no file named {preset_or_file!r}; the presets are {', '.join(PRESETS)}"
+        ) from None
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        raise DesignError(f"cannot read {preset_or_file!r}: {reason}") from None
+    return decode_design(data, preset_or_file)
+
+
+def _load_presets() -> Mapping[str, Design]:
+    files = packaged_files("presets", ".json")
+    designs = [decode_design(file.read_bytes(), file.name) for file in files]
+    return MappingProxyType({design.name: design for design in designs})
+
+
+PRESETS: Mapping[str, Design] = _load_presets()
+"""The designs that come along, by name: both rows of the paper's Table 1."""

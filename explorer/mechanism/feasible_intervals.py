@@ -1,0 +1,198 @@
+"""For which values of each joint, the others held, the lengths can close: exact intervals.
+
+Each of the three discriminants of `explorer.mechanism.trilateration` is a polynomial of degree at
+most four in a carriage position or in the square of a length. Their real roots bound the
+intervals, so nothing is sampled: one trial in each gap says whether the lengths close.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+
+import numpy as np
+
+from explorer.mechanism.design import JOINTS, LENGTHS, Design
+from explorer.mechanism.kinematics import LARGEST_RATIO, checked_joints, forward
+from explorer.numerics.arrays import FloatArray
+
+Interval = tuple[float, float]
+
+_IS_LENGTH = tuple(name in LENGTHS for name in JOINTS)
+
+
+def feasible_intervals(design: Design, joints: FloatArray) -> tuple[tuple[Interval, ...], ...]:
+    """Return, per joint, the disjoint ascending intervals in which the lengths close.
+
+    Args:
+        design: The manipulator.
+        joints: (l1, d1, d2, d3, d4, l4), shape (6,); for each joint the other five count.
+    """
+    held = checked_joints(design, joints)
+    # Dividing by the largest length keeps the roots near one, whatever the units.
+    scale = max(map(abs, (*design.variables, *held.tolist())))
+    polynomials, joint_of = _discriminants(design, held / scale, scale)
+    largest = LARGEST_RATIO * max(map(abs, design.variables))
+    breaks = [
+        _breaks(offset + slope * np.array(roots), scale, largest, is_length)
+        for roots, (offset, slope), is_length in zip(
+            _real_roots(polynomials), joint_of.tolist(), _IS_LENGTH, strict=True
+        )
+    ]
+    return _between(design, held, breaks)
+
+
+def nearest_feasible(
+    design: Design, joints: FloatArray, joint: int, intervals: Sequence[Interval]
+) -> float | None:
+    """Return the value of one joint nearest to the present one that closes; None if none.
+
+    Args:
+        design: The manipulator.
+        joints: Shape (6,).
+        joint: Its index in `JOINTS`.
+        intervals: What `feasible_intervals` gives for it.
+    """
+    value = float(joints[joint])
+    ends = [(min(max(value, low), high), low, high) for low, high in intervals]
+    if not ends:
+        return None
+    nearest, low, high = min(ends, key=lambda end: abs(end[0] - value))
+    # The last bits of a root may lie outside: step inwards until the lengths do close.
+    towards = 0.5 * (low + high)
+    for share in (0.0, *(10.0**-k for k in range(15, 2, -1))):
+        candidate = nearest + share * (towards - nearest)
+        trial = joints.copy()
+        trial[joint] = candidate
+        if forward(design, trial).feasible:
+            return candidate
+    return None
+
+
+def _discriminants(
+    design: Design, joints: FloatArray, scale: float
+) -> tuple[FloatArray, FloatArray]:
+    """Return κ1², κ2², κ3² over scale², shape (3, 6, 5), and the joints, shape (6, 2).
+
+    Row j of the middle axis leaves one unknown, which is moderate even where joint j can
+    hardly move; the last axis holds ascending coefficients of it. Row j of the joints is
+    (offset, slope): joint j over scale, or its square, is offset + slope * unknown. The
+    algebra is that of `trilateration.solve_rows`.
+    """
+    values, squares = np.zeros((6, 6, 3)), np.zeros((6, 6, 3))
+    values[:, :, 0], squares[:, :, 0] = joints[:, None], joints[:, None] ** 2
+    a3x, a3y, b1x, b1y, b2, b3 = (v / scale for v in design.variables)
+    one, unknown = np.eye(3)[:2]
+
+    # The carriages move within b2b3 of each other, and the radii differ by as much at most.
+    span = b3 - b2
+    values[1, 1] = values[3, 1] - span * unknown
+    values[3, 3] = values[1, 3] + span * unknown
+    squares[2, 2] = squares[4, 2] + span * unknown
+    squares[4, 4] = squares[2, 4] + span * unknown
+    d1, d3 = values[1], values[3]
+    l1_2, d2_2, d4_2, l4_2 = squares[0], squares[2], squares[4], squares[5]
+    c = (d3 - d1) / span
+    px = d1 - b2 * c
+    s2 = one - _product(c, c)[:, :3]
+    t = -b2 / span
+    r2 = (1.0 - t) * d2_2 + t * d4_2 - t * (1.0 - t) * span * span * s2
+    w = (d4_2 - d2_2 - (b3 + b2) * span * s2) / (2.0 * span)
+    from_a3 = px - a3x * one
+    l4_2_at_0 = _product(from_a3, from_a3)[:, :3] + r2 + a3y * a3y * one
+    py = (l4_2_at_0 - l4_2) / (2.0 * a3y)
+    py[5] = unknown
+    p2 = _product(px, px)[:, :3] + r2
+    along = _product(c, px)[:, :3] + w
+    l1_2_at_0 = p2 + (b1x * b1x + b1y * b1y) * one + 2.0 * b1x * along
+    across = (l1_2 - l1_2_at_0) / (2.0 * b1y)
+    across[0] = unknown
+    joint_of = np.stack(
+        [
+            l1_2_at_0[0] + 2.0 * b1y * unknown,
+            d1[1],
+            d2_2[2],
+            d3[3],
+            d4_2[4],
+            l4_2_at_0[5] - 2.0 * a3y * unknown,
+        ]
+    )
+    room = ((0, 0), (0, 2))
+    polynomials = np.stack(
+        [
+            np.pad(p2, room) - _product(along, along) - _product(across, across),
+            _product(s2, r2) - _product(w, w),
+            np.pad(r2, room) - _product(py, py),
+        ]
+    )
+    return polynomials, joint_of[:, :2]
+
+
+def _product(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Return the products of quadratics (n, 3), shape (n, 5)."""
+    out = np.zeros((len(a), 5))
+    for power in range(3):
+        out[:, power : power + 3] += a[:, power, None] * b
+    return out
+
+
+def _real_roots(polynomials: FloatArray) -> list[list[float]]:
+    """Return the real roots of the polynomials (3, 6, 5), for each of the six."""
+    found: list[list[float]] = [[] for _ in JOINTS]
+    rows = polynomials.reshape(-1, 5)
+    # Coefficients that are rounding noise beside the largest have no say in the degree.
+    significant = np.abs(rows) > 1e-14 * np.abs(rows).max(axis=1, keepdims=True)
+    degrees = np.where(significant, np.arange(5), 0).max(axis=1)
+    for degree in range(1, 5):
+        (chosen,) = np.nonzero(degrees == degree)
+        if not len(chosen):
+            continue
+        companion = np.zeros((len(chosen), degree, degree))
+        companion[:, range(1, degree), range(degree - 1)] = 1.0
+        companion[:, :, -1] = -rows[chosen, :degree] / rows[chosen, degree, None]
+        values = np.linalg.eigvals(companion)
+        # A double root comes back as a close complex pair; a needless break does no harm.
+        real = np.abs(values.imag) <= 1e-6 * (1.0 + np.abs(values))
+        for row, roots, keep in zip(chosen.tolist(), values.real, real, strict=True):
+            found[row % len(JOINTS)].extend(roots[keep].tolist())
+    return found
+
+
+def _breaks(ends: FloatArray, scale: float, largest: float, is_length: bool) -> list[float]:
+    """Return where the lengths may begin or cease to close, ascending, from scaled ends.
+
+    |d1 - d3| and with it every length is bounded by a few times the largest of the others,
+    so nothing closes beyond the ends, and one far off is that of a vanishing term.
+    """
+    values = np.sort(ends)
+    if is_length:
+        values = np.sqrt(np.append(0.0, values[values > 0.0]))
+    values = values * scale
+    return values[np.abs(values) <= largest].tolist()
+
+
+def _between(
+    design: Design, joints: FloatArray, breaks: list[list[float]]
+) -> tuple[tuple[Interval, ...], ...]:
+    """Return, per joint, the intervals between breaks in whose middle the lengths close.
+
+    The forward kinematics decides, so that a discriminant that is zero but for rounding,
+    as in every singular pose, counts as closing here as it does there.
+    """
+    gaps = [
+        (joint, low, high)
+        for joint, ends in enumerate(breaks)
+        for low, high in itertools.pairwise(ends)
+        if low < high
+    ]
+    trials = np.repeat(joints[None, :], len(gaps), axis=0)
+    for trial, (joint, low, high) in zip(trials, gaps, strict=True):
+        trial[joint] = 0.5 * (low + high)
+    found: list[list[Interval]] = [[] for _ in JOINTS]
+    closes = forward(design, trials).feasible.tolist()
+    for joint, low, high in itertools.compress(gaps, closes):
+        start = low
+        if found[joint] and found[joint][-1][1] == low:
+            start = found[joint].pop()[0]
+        found[joint].append((start, high))
+    return tuple(tuple(intervals) for intervals in found)

@@ -1,0 +1,175 @@
+"""Inverse and forward kinematics, closed form, over any batch (design.md's joint order).
+
+The inverse takes four distances and two projections. The forward takes the three
+trilaterations of `explorer.mechanism.trilateration` and returns all eight assembly modes.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from explorer.errors import InputError
+from explorer.mechanism.design import JOINTS, LENGTHS, Design
+from explorer.mechanism.pose import checked_rotation
+from explorer.mechanism.trilateration import solve_rows
+from explorer.numerics.arrays import BoolArray, FloatArray, batch_shape, finite_array, for_kernel
+
+# Beyond this multiple of the design's size its points are one point in double precision.
+LARGEST_RATIO = 1e15
+
+
+class AttachmentPoints(NamedTuple):
+    """The attachment points in the base frame, each of shape (..., 3), in design units."""
+
+    a1: FloatArray
+    a2: FloatArray
+    a3: FloatArray
+    b1: FloatArray
+    b2: FloatArray
+    b3: FloatArray
+    b4: FloatArray
+
+
+class ForwardKinematics(NamedTuple):
+    """The eight assembly modes; mode k has the sign triple of the bits of k.
+
+    Bit 2 is set where κ1 is positive, bit 1 where κ2 is, bit 0 where κ3 is.
+
+    Attributes:
+        position: b4 in the base frame, shape (..., 8, 3).
+        rotation: Platform to base, shape (..., 8, 3, 3).
+        feasible: Whether the lengths close, shape (...); all eight modes or none. Where
+            they do not, the poses are finite but have other lengths.
+    """
+
+    position: FloatArray
+    rotation: FloatArray
+    feasible: BoolArray
+
+
+def attachment_points(design: Design, position: ArrayLike, rotation: ArrayLike) -> AttachmentPoints:
+    """Return the seven attachment points of a pose.
+
+    Args:
+        design: The manipulator.
+        position: b4 in the base frame, shape (..., 3).
+        rotation: Platform to base, shape (..., 3, 3).
+
+    Raises:
+        InputError: a pose that is not finite or not a rotation.
+    """
+    p = finite_array("position", position, (3,))
+    r = checked_rotation(rotation)
+    shape = (*batch_shape((p, 1), (r, 2)), 3)
+    x = r[..., 0]
+    b1x, b1y = design.b1
+    return AttachmentPoints(
+        a1=np.zeros(shape),
+        a2=np.broadcast_to(np.array([design.a2x, 0.0, 0.0]), shape),
+        a3=np.broadcast_to(np.array([*design.a3, 0.0]), shape),
+        b1=p + b1x * x + b1y * r[..., 1],
+        b2=p + design.b2 * x,
+        b3=p + design.b3 * x,
+        b4=np.broadcast_to(p, shape),
+    )
+
+
+def inverse(design: Design, position: ArrayLike, rotation: ArrayLike) -> FloatArray:
+    """Return the joints (l1, d1, d2, d3, d4, l4) of a pose, shape (..., 6).
+
+    Args:
+        design: The manipulator.
+        position: b4 in the base frame, shape (..., 3), in design units.
+        rotation: Platform to base, shape (..., 3, 3).
+
+    Raises:
+        InputError: a pose that is not finite or not a rotation.
+    """
+    points = attachment_points(design, position, rotation)
+    return np.stack(
+        [
+            _length(points.b1),
+            points.b2[..., 0],
+            np.hypot(points.b2[..., 1], points.b2[..., 2]),
+            points.b3[..., 0],
+            np.hypot(points.b3[..., 1], points.b3[..., 2]),
+            _length(points.b4 - points.a3),
+        ],
+        axis=-1,
+    )
+
+
+def forward(design: Design, joints: ArrayLike) -> ForwardKinematics:
+    """Return all eight assembly modes of the joints.
+
+    Args:
+        design: The manipulator.
+        joints: (l1, d1, d2, d3, d4, l4), shape (..., 6), in design units.
+
+    Raises:
+        InputError: not six finite numbers, a negative length, or one beyond precision.
+    """
+    position, rotation, feasible, _ = _solve(design, joints)
+    return ForwardKinematics(position, rotation, feasible)
+
+
+def discriminants(design: Design, joints: ArrayLike) -> FloatArray:
+    """Return κ1², κ2², κ3² of the joints, shape (..., 3), in squared design units.
+
+    The lengths close where none is negative (to rounding). One that is negative names the
+    trilateration that fails, and by how much.
+
+    Raises:
+        InputError: not six finite numbers, a negative length, or one beyond precision.
+    """
+    return _solve(design, joints)[3]
+
+
+def checked_joints(design: Design, joints: ArrayLike) -> FloatArray:
+    """Return joints (..., 6) once they are known to be usable.
+
+    Raises:
+        InputError: not six finite numbers, a negative length, or so large that double
+            precision cannot tell the design's points apart.
+    """
+    array = finite_array(f"joints ({', '.join(JOINTS)})", joints, (6,))
+    for index, name in enumerate(JOINTS):
+        if name in LENGTHS and (array[..., index] < 0.0).any():
+            raise InputError(
+                f"{name} is a length and must not be negative; "
+                f"got {float(array[..., index].min()):g}"
+            )
+    largest = LARGEST_RATIO * max(map(abs, design.variables))
+    if (np.abs(array) > largest).any():
+        raise InputError(
+            f"joints must not exceed {LARGEST_RATIO:g} times the largest design variable, "
+            f"{largest:g}; got {float(np.abs(array).max()):g}"
+        )
+    return array
+
+
+def _solve(
+    design: Design, joints: ArrayLike
+) -> tuple[FloatArray, FloatArray, BoolArray, FloatArray]:
+    q = checked_joints(design, joints)
+    batch = q.shape[:-1]
+    rows = for_kernel(q.reshape(-1, 6))
+    count = len(rows)
+    position = np.empty((count, 8, 3))
+    rotation = np.empty((count, 8, 3, 3))
+    feasible = np.empty(count, dtype=np.bool_)
+    squares = np.empty((count, 3))
+    solve_rows(count, np.array(design.variables), rows, position, rotation, feasible, squares)
+    return (
+        position.reshape(*batch, 8, 3),
+        rotation.reshape(*batch, 8, 3, 3),
+        feasible.reshape(batch),
+        squares.reshape(*batch, 3),
+    )
+
+
+def _length(vector: FloatArray) -> FloatArray:
+    return np.hypot(np.hypot(vector[..., 0], vector[..., 1]), vector[..., 2])

@@ -1,0 +1,153 @@
+"""The pose of the platform: the position of b4 and the rotation from platform to base.
+
+Quaternions are (w, x, y, z). Yaw, pitch and roll are degrees about the intrinsic z, y
+and x axes, in this order, so R = Rz(yaw) Ry(pitch) Rx(roll).
+"""
+
+from __future__ import annotations
+
+import functools
+
+import msgspec
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
+
+from explorer.errors import InputError
+from explorer.numerics.arrays import FloatArray, finite_array
+from explorer.numerics.checks import LARGEST_NUMBER
+
+Triple = tuple[float, float, float]
+Quadruple = tuple[float, float, float, float]
+
+# A rotation is accepted when it is orthonormal to this, then used as it was given.
+ORTHONORMAL_TOLERANCE = 1e-6
+
+
+class Pose(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A pose of the platform.
+
+    Attributes:
+        position: b4 in the base frame, in design units.
+        quaternion: (w, x, y, z), platform to base; kept at unit length.
+
+    Raises:
+        InputError: not three and four finite numbers, a position beyond 1e40, or a
+            quaternion of length zero.
+    """
+
+    position: Triple
+    quaternion: Quadruple
+
+    def __post_init__(self) -> None:
+        position = finite_array("position", self.position, (3,))
+        quaternion = finite_array("quaternion", self.quaternion, (4,))
+        if position.ndim != 1 or quaternion.ndim != 1:
+            raise InputError("a pose has one position and one quaternion, not a batch")
+        farthest = float(np.abs(position).max())
+        if farthest > LARGEST_NUMBER:
+            raise InputError(
+                f"position must not exceed {LARGEST_NUMBER:g} in magnitude; got {farthest:g}"
+            )
+        size = float(np.abs(quaternion).max())
+        if size == 0.0:
+            raise InputError("quaternion must not be all zeros; no rotation is (1, 0, 0, 0)")
+        unit = quaternion / size
+        norm = float(np.linalg.norm(unit))
+        # One already of unit length is kept to the last bit, so that files round-trip.
+        if abs(norm * size - 1.0) > 4e-16:
+            w, x, y, z = (unit / norm).tolist()
+            msgspec.structs.force_setattr(self, "quaternion", (w, x, y, z))
+
+    @property
+    def rotation(self) -> FloatArray:
+        """The rotation matrix, platform to base, shape (3, 3), read-only."""
+        return _rotation(self.quaternion)
+
+    @staticmethod
+    def of(position: ArrayLike, rotation: ArrayLike) -> Pose:
+        """Return the pose with this position (3,) and rotation matrix (3, 3)."""
+        x, y, z = finite_array("position", position, (3,)).tolist()
+        w, i, j, k = quaternion_from_rotation(rotation).tolist()
+        return Pose((x, y, z), (w, i, j, k))
+
+    @staticmethod
+    def of_yaw_pitch_roll(position: ArrayLike, yaw_pitch_roll: ArrayLike) -> Pose:
+        """Return the pose with this position (3,) and these angles (3,), in degrees."""
+        return Pose.of(position, rotation_from_yaw_pitch_roll(yaw_pitch_roll))
+
+
+def rotation_from_quaternion(quaternion: ArrayLike) -> FloatArray:
+    """Return rotation matrices (..., 3, 3) of quaternions (..., 4), of any length but zero."""
+    array = finite_array("quaternion", quaternion, (4,))
+    if not np.abs(array).max(axis=-1).all():
+        raise InputError("quaternion must not be all zeros; no rotation is (1, 0, 0, 0)")
+    return Rotation.from_quat(array, scalar_first=True).as_matrix()
+
+
+def quaternion_from_rotation(rotation: ArrayLike) -> FloatArray:
+    """Return unit quaternions (..., 4), w not negative, of rotation matrices (..., 3, 3)."""
+    matrix = checked_rotation(rotation)
+    return Rotation.from_matrix(matrix).as_quat(canonical=True, scalar_first=True)
+
+
+def rotation_from_yaw_pitch_roll(yaw_pitch_roll: ArrayLike) -> FloatArray:
+    """Return rotation matrices (..., 3, 3) of angles (..., 3), in degrees."""
+    angles = finite_array("yaw, pitch and roll", yaw_pitch_roll, (3,))
+    return Rotation.from_euler("ZYX", angles, degrees=True).as_matrix()
+
+
+def yaw_pitch_roll_from_rotation(rotation: ArrayLike) -> FloatArray:
+    """Return yaw, pitch and roll (..., 3) in degrees, pitch within ±90°.
+
+    At a pitch of ±90° only yaw ∓ roll is determined; roll is then zero.
+    """
+    matrix = checked_rotation(rotation)
+    return Rotation.from_matrix(matrix).as_euler("ZYX", degrees=True, suppress_warnings=True)
+
+
+def checked_rotation(rotation: ArrayLike) -> FloatArray:
+    """Return rotation matrices (..., 3, 3) once they are known to be proper rotations.
+
+    Raises:
+        InputError: not orthonormal to 1e-6, or a reflection.
+    """
+    matrix = finite_array("rotation", rotation, (3, 3))
+    off, is_reflection = _flaws_of_one(matrix) if matrix.ndim == 2 else _flaws(matrix)
+    if off > ORTHONORMAL_TOLERANCE:
+        raise InputError(
+            f"rotation must be orthonormal to {ORTHONORMAL_TOLERANCE:g}; "
+            f"R Rᵀ is off the identity by {off:.3g}"
+        )
+    if is_reflection:
+        raise InputError("rotation must have determinant +1; this one is a reflection")
+    return matrix
+
+
+def _flaws(matrices: FloatArray) -> tuple[float, bool]:
+    """Return how far R Rᵀ is off the identity at the most, and whether any is a reflection."""
+    residual = np.abs(matrices @ np.swapaxes(matrices, -1, -2) - np.eye(3))
+    return float(residual.max(initial=0.0)), bool((np.linalg.det(matrices) < 0.0).any())
+
+
+def _flaws_of_one(matrix: FloatArray) -> tuple[float, bool]:
+    """Return the same of one matrix, in plain numbers: a tenth of the time."""
+    (ax, ay, az), (bx, by, bz), (cx, cy, cz) = matrix.tolist()
+    off = max(
+        abs(ax * ax + ay * ay + az * az - 1.0),
+        abs(bx * bx + by * by + bz * bz - 1.0),
+        abs(cx * cx + cy * cy + cz * cz - 1.0),
+        abs(ax * bx + ay * by + az * bz),
+        abs(ax * cx + ay * cy + az * cz),
+        abs(bx * cx + by * cy + bz * cz),
+    )
+    det = ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)
+    return off, det < 0.0
+
+
+@functools.lru_cache(64)
+def _rotation(quaternion: Quadruple) -> FloatArray:
+    rotation = rotation_from_quaternion(quaternion)
+    # It is shared between all who ask.
+    rotation.flags.writeable = False
+    return rotation

@@ -1,0 +1,1 @@
+"""Arrays, checks, compiled kernels and other numerical tools; nothing of the mechanism."""

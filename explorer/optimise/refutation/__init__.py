@@ -1,0 +1,1 @@
+"""What limits cannot give, told before a search."""

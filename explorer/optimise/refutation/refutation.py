@@ -1,0 +1,261 @@
+"""What the limits of a problem cannot give, known before a search starts.
+
+A demand is refuted only where no design within the bounds can keep it: each test compares it
+with a bound that holds for all of them. What is not refuted may still be impossible.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
+
+import msgspec
+
+from explorer.legs.clearance import PAIRS
+from explorer.mechanism.design import Design, Pair
+from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.home import home_pose
+from explorer.optimise.problem import SHIFTS, Box, Problem
+from explorer.optimise.refutation.most_volume import ceilings, margin_planes, near_singular
+from explorer.optimise.refutation.ranges import Ranges, largest, smallest
+from explorer.workspace.limits.constraints import GAP
+
+# What a demand must exceed its bound by to be refuted, as a share: searches have tolerances.
+SPARE = 1e-6
+
+PAPER_BOX = PRESETS["paper-optimal"].limits.box
+"""The box of the paper's optimum."""
+
+BOX_LIMIT = "box"
+"""The limit that the commands and the page offer to lift."""
+
+
+class Refutation(NamedTuple):
+    """A demand that no design within the bounds keeps.
+
+    Attributes:
+        limit: The limit that keeps it from being met, such as "box".
+        message: A clause for people, with the demand and what the limit gives.
+    """
+
+    limit: str
+    message: str
+
+
+def refutations(problem: Problem) -> tuple[Refutation, ...]:
+    """Return why no design within the bounds meets the demands; () if nothing speaks against it.
+
+    Of each limit the first reason is told.
+    """
+    ranges = Ranges(problem)
+    found: dict[str, Refutation] = {}
+    for each in (
+        *_volume(ranges),
+        *_required_box(ranges),
+        *_reach(ranges),
+        *_gap(ranges),
+        *_clearance(ranges),
+    ):
+        found.setdefault(each.limit, each)
+    return tuple(found.values())
+
+
+def words_of(found: Iterable[Refutation]) -> str:
+    """Return all reasons in one line."""
+    return "; ".join(each.message for each in found)
+
+
+def with_box(design: Design, box: Box | None) -> Design:
+    """Return a design with another box, or none; its home stays where it was."""
+    limits = msgspec.structs.replace(design.limits, box=box)
+    return msgspec.structs.replace(design, limits=limits, home=home_pose(design))
+
+
+def paper_box(problem: Problem) -> Box | None:
+    """Return the box of the paper's optimum, or None where that would not do either."""
+    boxed = msgspec.structs.replace(problem, start=with_box(problem.start, PAPER_BOX))
+    is_refuted = any(each.limit == BOX_LIMIT for each in refutations(boxed))
+    return None if is_refuted else PAPER_BOX
+
+
+def _volume(ranges: Ranges) -> Iterator[Refutation]:
+    problem = ranges.problem
+    wanted = problem.demands.volume or 0.0
+    if problem.objective == "largest-volume":
+        wanted = 0.0
+    elif wanted == 0.0:
+        return
+    for each in ceilings(ranges):
+        # A workspace without any volume is none that anybody looks for.
+        if each.volume <= wanted * (1.0 - SPARE):
+            room = "" if each.limit == BOX_LIMIT else "room for "
+            most, asked = _amounts(each.volume, wanted)
+            words = f"{each.words} {room}at most {most} of the {asked} asked for"
+            if wanted == 0.0:
+                words = f"{each.words} {room}no volume"
+            yield Refutation(each.limit, f"{words}{each.place and f', {each.place}'}")
+
+
+def _required_box(ranges: Ranges) -> Iterator[Refutation]:
+    problem = ranges.problem
+    required = problem.demands.required_box
+    if required is None:
+        return
+    volume = math.prod(high - low for low, high in zip(*required, strict=True))
+    wanted = problem.demands.volume
+    if problem.objective == "match-volume" and wanted and volume > wanted * (1.0 + SPARE):
+        has, asked = _amounts(volume, wanted)
+        yield Refutation(
+            "required box", f"the required box has a volume of {has} and {asked} is to be matched"
+        )
+    yield from _box_within_box(ranges, required)
+    yield from _box_beyond_margins(ranges, required)
+    yield from _box_beyond_lengths(ranges, required)
+
+
+def _box_within_box(ranges: Ranges, required: Box) -> Iterator[Refutation]:
+    box = ranges.problem.start.limits.box
+    if box is None:
+        return
+    for axis, name in enumerate("xyz"):
+        (low, high), (least, most) = ((ends[0][axis], ends[1][axis]) for ends in (required, box))
+        back, on = ranges.of(SHIFTS[axis])
+        spare = SPARE * max(most - least, high - low)
+        # It may be shifted by what lies in both intervals, if anything does.
+        if max(least - low, back) > min(most - high, on) + spare:
+            words = (
+                f"the required box lies beyond the box along {name}: from {low:g} to {high:g}, "
+                f"and the box from {least:g} to {most:g}"
+            )
+            yield Refutation(BOX_LIMIT, words)
+
+
+def _box_beyond_margins(ranges: Ranges, required: Box) -> Iterator[Refutation]:
+    for normal, least in margin_planes(ranges, ranges.problem.start.limits.margin):
+        best = 0.0
+        for axis, slope in enumerate(normal.tolist()):
+            low, high = required[0][axis], required[1][axis]
+            best += min(slope * low, slope * high)
+            best += max(slope * shift for shift in ranges.of(SHIFTS[axis]))
+        if best < least - SPARE * ranges.problem.size:
+            words = (
+                f"at its worst corner the required box has a margin of at most {best:.4g} on the "
+                f"home's side, and the limits demand {least:g}"
+            ).replace("-", "−")
+            yield Refutation("margin", words)
+
+
+def _box_beyond_lengths(ranges: Ranges, required: Box) -> Iterator[Refutation]:
+    lows, highs = required
+    for name, axes in (("l1", (0, 1, 2)), ("d2", (1, 2)), ("d4", (1, 2)), ("l4", (0, 1, 2))):
+        most = ranges.length(name)[1]
+        half = 0.5 * math.hypot(*(highs[axis] - lows[axis] for axis in axes))
+        farthest = max(half, _farthest_corner(ranges, name, axes, required))
+        if farthest > most * (1.0 + SPARE):
+            limit = "reach" if ranges.is_tied(name) else f"{name} maximum"
+            words = (
+                f"{name} must be {farthest:.4g} at the least to get to all of the required box, "
+                f"and at most {most:.6g} is allowed"
+            )
+            yield Refutation(limit, words)
+
+
+def _farthest_corner(ranges: Ranges, name: str, axes: tuple[int, ...], required: Box) -> float:
+    """Return how far the farthest corner is from the nearest place of a length's centre."""
+    centre: tuple[Pair, ...] = ((0.0, 0.0),) * 3
+    if name == "l4":
+        centre = (ranges.of("a3x"), ranges.of("a3y"), (0.0, 0.0))
+    within = {
+        "l1": ranges.arm,
+        "d2": largest(ranges.of("b2")),
+        "d4": largest(ranges.of("b3")),
+        "l4": 0.0,
+    }[name]
+    # In each axis on its own the farther side of the box, where it can be shifted the nearest.
+    away = [
+        max(
+            smallest(
+                (
+                    required[side][axis] + ranges.of(SHIFTS[axis])[0] - centre[axis][1],
+                    required[side][axis] + ranges.of(SHIFTS[axis])[1] - centre[axis][0],
+                )
+            )
+            for side in (0, 1)
+        )
+        for axis in axes
+    ]
+    return math.hypot(*away) - within
+
+
+def _reach(ranges: Ranges) -> Iterator[Refutation]:
+    demanded = ranges.problem.demands.reach
+    if demanded is None or ranges.problem.objective == "smallest-reach":
+        return
+    least = ranges.reach[0]
+    if least > demanded * (1.0 + SPARE):
+        words = (
+            f"the reach is at least {least:.6g} within the bounds, and {demanded:g} is asked for"
+        )
+        yield Refutation("reach", words)
+
+
+def _gap(ranges: Ranges) -> Iterator[Refutation]:
+    gap = ranges.problem.start.limits.gap
+    if ranges.apart < gap * (1.0 - SPARE):
+        words = (
+            f"the carriages are at most {ranges.apart:.4g} apart within the bounds, and the gap "
+            f"is to be {gap:g}"
+        )
+        yield Refutation(GAP, words)
+
+
+def _clearance(ranges: Ranges) -> Iterator[Refutation]:
+    """Yield the pairs of legs of which two ends never are as far apart as the legs are to be."""
+    problem = ranges.problem
+    demanded, volume = problem.demands.clearance, problem.demands.volume
+    # All of a smaller workspace may lie where no clearance is demanded.
+    if demanded is None or problem.objective == "largest-volume" or volume is None:
+        return
+    if volume * (1.0 - SPARE) <= near_singular(ranges, problem.demands.clearance_margin):
+        return
+    radii = problem.start.limits.leg_radii
+    for first, second in PAIRS:
+        most = _ends_apart(ranges, first, second) - radii[first - 1] - radii[second - 1]
+        if most < demanded * (1.0 - SPARE):
+            words = (
+                f"legs {first} and {second} keep at most {most:.4g} of the clearance of "
+                f"{demanded:g} asked for, within the bounds"
+            ).replace("-", "−")
+            yield Refutation(f"clearance of legs {first} and {second}", words)
+
+
+def _ends_apart(ranges: Ranges, first: int, second: int) -> float:
+    """Return the most that the nearer two ends of a pair of legs are apart."""
+    b1x, b1y = ranges.of("b1x"), largest(ranges.of("b1y"))
+    match first, second:
+        case 1, 4:
+            return min(ranges.arm, ranges.distance_a3[1])
+        case 1, _:
+            other = ranges.of("b2" if second == 2 else "b3")
+            return math.hypot(max(b1x[1] - other[0], other[1] - b1x[0]), b1y)
+        case 2, 3:
+            return ranges.apart
+        case _:
+            along = ranges.of("b2" if first == 2 else "b3")
+            # Legs that share a joint are let be.
+            return math.inf if smallest(along) == 0.0 else largest(along)
+
+
+def _amounts(one: float, other: float) -> tuple[str, str]:
+    """Return two volumes with as few digits as tell them apart, four at the least."""
+    digits = 4
+    while digits < 17 and _amount(one, digits) == _amount(other, digits):
+        digits += 1
+    return _amount(one, digits), _amount(other, digits)
+
+
+def _amount(value: float, digits: int) -> str:
+    if not 1e3 <= value < 1e9:
+        return f"{value:.{digits}g}"
+    return f"{value:,.{max(0, digits - 1 - math.floor(math.log10(value)))}f}"

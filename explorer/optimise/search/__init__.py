@@ -1,0 +1,1 @@
+"""The search for the best design by sequential quadratic programming."""

@@ -1,0 +1,284 @@
+"""What a problem demands, as smooth functions with their exact gradients.
+
+Each demand is dimensionless and of about unit size: at least zero where it is met, or
+exactly zero for an equality. All are measured at a `State`.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from explorer.mechanism.home import home_pose
+from explorer.mechanism.margins import margins
+from explorer.numerics.arrays import FloatArray
+from explorer.optimise.problem import SHIFTS, Box
+from explorer.optimise.search.state import State
+from explorer.workspace.limits.constraints import GAP, YAW, Constraint, HalfSpace, Round
+
+# How far a demand that is no limit may be missed and is still met, dimensionless.
+MET = 1e-8
+
+
+class Measured(NamedTuple):
+    """The values of m demands and their derivatives by the n scaled variables.
+
+    Attributes:
+        values: Shape (m,).
+        gradients: Shape (m, n).
+    """
+
+    values: FloatArray
+    gradients: FloatArray
+
+
+class Demand(Protocol):
+    """One or several conditions of one kind."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What people call each of them."""
+        ...
+
+    @property
+    def is_equality(self) -> bool:
+        """Whether the values must be zero, rather than at least zero."""
+        ...
+
+    @property
+    def is_limit(self) -> bool:
+        """Whether the design's own limits demand it: they have the tolerance of all limits."""
+        ...
+
+    def measure(self, state: State) -> Measured:
+        """Return the values and their derivatives."""
+        ...
+
+
+class VolumeDemand:
+    """The volume of the workspace, exactly or at least, by its cube root.
+
+    A volume grows with the cube of the design, so that its cube root is nearly linear:
+    Newton's steps on it are long and true.
+    """
+
+    def __init__(self, volume: float, *, is_equality: bool) -> None:
+        self.volume = volume
+        self.is_equality = is_equality
+        self.is_limit = False
+        self.names = (f"volume {volume:.6g}",)
+
+    def measure(self, state: State) -> Measured:
+        """Return (V / V′)^⅓ − 1."""
+        share = state.volume / self.volume
+        root = share ** (1.0 / 3.0)
+        slope = root / (3.0 * state.volume) if state.volume > 0.0 else 0.0
+        return Measured(np.array([root - 1.0]), slope * state.volume_gradient[None, :])
+
+
+class ReachDemand:
+    """A largest reach."""
+
+    is_equality = False
+    is_limit = False
+
+    def __init__(self, reach: float) -> None:
+        self.reach = reach
+        self.names = (f"reach {reach:.6g}",)
+
+    def measure(self, state: State) -> Measured:
+        """Return 1 − reach / largest."""
+        value, gradient = state.reach
+        return Measured(np.array([1.0 - value / self.reach]), -gradient[None, :] / self.reach)
+
+
+class DegenerateDemand:
+    """Distances from degenerate designs, on the side where a run starts.
+
+    They are linear, so that from a start that keeps them no step of the solver leaves them.
+    """
+
+    is_equality = False
+    is_limit = False
+    names = ("distance from a3y = 0", "distance from b1y = 0", "distance from b2 = b3")
+
+    def __init__(self, least: float, start: State) -> None:
+        self.least = least
+        self.signs = np.sign(_distances(start))
+
+    def measure(self, state: State) -> Measured:
+        """Return sign · distance − least, over the size of the start."""
+        size = state.problem.size
+        rows = np.zeros((3, len(state.u)))
+        for row, terms in enumerate(
+            ((("a3y", 1.0),), (("b1y", 1.0),), (("b3", 1.0), ("b2", -1.0)))
+        ):
+            for name, factor in terms:
+                rows[row] += factor * state.along({name: 1.0})
+        values = self.signs * _distances(state) - self.least
+        return Measured(values / size, self.signs[:, None] * rows / size)
+
+
+def _distances(state: State) -> FloatArray:
+    design = state.design
+    return np.array([design.a3[1], design.b1[1], design.b3 - design.b2])
+
+
+class GapDemand:
+    """The smallest gap of the carriages, in the order that they have where a run starts.
+
+    The order itself is no demand: each design keeps that of its own home pose.
+    """
+
+    is_equality = False
+    is_limit = True
+    names = (GAP,)
+
+    def __init__(self, start: State) -> None:
+        self.sign = 1.0 if _gap(start) >= 0.0 else -1.0
+
+    def measure(self, state: State) -> Measured:
+        """Return sign · (d3 − d1) − gap, over the size of the start."""
+        size, u = state.problem.size, state.rotation[:, 0]
+        span = state.design.b3 - state.design.b2
+        slope = state.along({"b3": float(u[0]), "b2": -float(u[0]), YAW: -span * float(u[1])})
+        value = self.sign * _gap(state) - state.design.limits.gap
+        return Measured(np.array([value / size]), self.sign * slope[None, :] / size)
+
+
+def _gap(state: State) -> float:
+    return (state.design.b3 - state.design.b2) * float(state.rotation[0, 0])
+
+
+class BoxDemand:
+    """A required box within the workspace.
+
+    What is within a ball, a cylinder or a half-space with all its corners is within it
+    altogether; of a half-space its worst corner is enough. Outside a ball, where a least
+    length keeps it, counts the point of the box that is nearest to the centre, or if that
+    lies inside, how deep.
+    """
+
+    is_equality = False
+    is_limit = True
+
+    def __init__(self, start: State) -> None:
+        # The gap is the same in every position, and demanded by `GapDemand`.
+        self.counts = {
+            limit.name: _points_that_tell(limit) for limit in start.limits if limit.name != GAP
+        }
+        self.names = tuple(
+            f"required box within {name}"
+            for name, count in self.counts.items()
+            for _ in range(count)
+        )
+
+    def measure(self, state: State) -> Measured:
+        """Return the slacks of the points that tell of each limit, over the size."""
+        size, n = state.problem.size, len(state.u)
+        found = {limit.name: limit for limit in state.limits}
+        values: list[FloatArray] = []
+        gradients: list[FloatArray] = []
+        for name, count in self.counts.items():
+            limit = found.get(name)
+            if isinstance(limit, Round | HalfSpace):
+                value, by_u, by_p = _slack_of_box(state, limit)
+                for axis, shift in enumerate(SHIFTS):
+                    by_u = by_u + np.outer(by_p[:, axis], state.along({shift: 1.0}))
+                values.append(value / size)
+                gradients.append(by_u / size)
+            else:
+                # It cannot be kept, in no position.
+                values.append(np.full(count, -1.0))
+                gradients.append(np.zeros((count, n)))
+        return Measured(np.concatenate(values), np.vstack(gradients))
+
+
+def _points_that_tell(limit: Constraint) -> int:
+    """Return how many points of a box tell whether it keeps a limit."""
+    if isinstance(limit, Round) and limit.inside:
+        return 8 if limit.is_ball else 4
+    return 1
+
+
+def _slack_of_box(
+    state: State, limit: Round | HalfSpace
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return what `State.slack` does, of the points of the required box that tell."""
+    corners = corners_of(state.box)
+    if isinstance(limit, HalfSpace):
+        worst = int((corners @ limit.normal).argmax())
+        return state.slack(limit, corners[worst : worst + 1])
+    if limit.inside:
+        # To a cylinder along x both ends along x are the same.
+        return state.slack(limit, corners if limit.is_ball else corners[::2])
+    return _outside(state, limit, state.box)
+
+
+def _outside(state: State, limit: Round, box: Box) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return what `State.slack` does, of the point of a box that is nearest to a centre."""
+    lows, highs = np.array(box)
+    centre = limit.centre.copy()
+    if not limit.is_ball:
+        centre[0] = 0.5 * (lows[0] + highs[0])
+    nearest = np.clip(centre, lows, highs)
+    slack, by_u, by_p = state.slack(limit, nearest[None, :])
+    if (nearest == centre).all():
+        # The centre is inside: how far it is from the nearest face, to push it out by.
+        axes = (0, 1, 2) if limit.is_ball else (1, 2)
+        axis, side = min(
+            ((a, s) for a in axes for s in (0, 1)),
+            key=lambda face: abs(float(centre[face[0]] - (lows, highs)[face[1]][face[0]])),
+        )
+        normal = np.zeros(3)
+        normal[axis] = 1.0 if side == 1 else -1.0
+        deep = float(normal[axis] * ((lows, highs)[side][axis] - centre[axis]))
+        slack = np.array([-deep - limit.radius])
+        own = np.array([*normal, -1.0])
+        by_u = state.along({name: float(own @ rate) for name, rate in limit.rates.items()})[None, :]
+        by_p = -normal[None, :]
+    return slack, by_u, by_p
+
+
+def corners_of(box: Box) -> FloatArray:
+    """Return the corners of a box, shape (8, 3)."""
+    lows, highs = box
+    return np.array([[(lows, highs)[c >> a & 1][a] for a in range(3)] for c in range(8)])
+
+
+class MarginDemand:
+    """The margins over a required box, each to be at least the worst, which is raised.
+
+    Margins are linear in p, so that the corners of the box have the worst one.
+    """
+
+    is_equality = False
+    is_limit = False
+    names = tuple(f"margin κ{i} over the required box" for i in (1, 2, 3))
+
+    def measure(self, state: State) -> Measured:
+        """Return sign · κ at the corner that is worst for each κ, over the size of the start."""
+        value, gradient = box_margins(state)
+        worst = value.argmin(axis=1)
+        rows, size = np.arange(3), state.problem.size
+        return Measured(value[rows, worst] / size, gradient[rows, worst] / size)
+
+
+def box_margins(state: State) -> tuple[FloatArray, FloatArray]:
+    """Return sign · κ at the corners of the required box, shape (3, 8), and (3, 8, n).
+
+    The signs are those of the home pose.
+    """
+    home = home_pose(state.design)
+    corners, n, r = corners_of(state.box), len(state.u), state.rotation
+    signs = np.sign(margins(home.position, r))
+    u, normal = r[:, 0], r[:, 2]
+    slopes = np.array([-normal, [0.0, -u[2], u[1]], [0.0, 0.0, 1.0]])
+    # Turning about the base's z-axis moves x to y and y to −x.
+    turned = np.array([[normal[1], -normal[0], 0.0], [0.0, 0.0, u[0]], [0.0, 0.0, 0.0]])
+    gradients = np.zeros((3, 8, n))
+    gradients += (turned @ corners.T)[:, :, None] * state.along({YAW: 1.0})
+    for axis, shift in enumerate(SHIFTS):
+        gradients += slopes[:, axis, None, None] * state.along({shift: 1.0})
+    return signs[:, None] * (slopes @ corners.T), signs[:, None, None] * gradients

@@ -1,0 +1,230 @@
+"""A problem as the functions that an SQP solver wants, over scaled variables.
+
+One more variable is appended where the worst of several values is raised: it stays below
+all of them, which keeps the functions smooth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from explorer.errors import DesignError
+from explorer.numerics.arrays import BoolArray, FloatArray
+from explorer.optimise.problem import Problem
+from explorer.optimise.search.clearances import ClearanceDemand
+from explorer.optimise.search.demands import (
+    MET,
+    BoxDemand,
+    DegenerateDemand,
+    Demand,
+    GapDemand,
+    MarginDemand,
+    ReachDemand,
+    VolumeDemand,
+    box_margins,
+)
+from explorer.optimise.search.starts import first_positions
+from explorer.optimise.search.state import State, scales
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """A problem evaluated at one place.
+
+    Attributes:
+        u: Scaled variables, shape (n,).
+        state: The problem there.
+        objective: What is minimised, about of unit size.
+        slope: Its derivatives, shape (n,).
+        values: Of all demands, shape (m,).
+        gradients: Theirs, shape (m, n).
+    """
+
+    u: FloatArray
+    state: State
+    objective: float
+    slope: FloatArray
+    values: FloatArray
+    gradients: FloatArray
+
+
+class Model:
+    """A problem from one start, ready for a solver.
+
+    Args:
+        problem: The problem.
+        start: Values of its variables to start from.
+        before_each: Called before each evaluation; may raise to end the search.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        start: Sequence[float],
+        before_each: Callable[[], None] | None = None,
+    ) -> None:
+        self.problem = problem
+        self._before_each = before_each
+        self.scales = scales(problem)
+        self.count = len(problem.names)
+        self.raises_worst = problem.objective == "largest-margin"
+        u = np.array(start) / self.scales
+        here = State(problem, u)
+        self.demands: list[Demand] = _demands(problem, here)
+        self.margins = next((d for d in self.demands if isinstance(d, MarginDemand)), None)
+        if self.raises_worst:
+            u = np.append(u, float(box_margins(here)[0].min()) / problem.size)
+        self.start: FloatArray = u
+        self._volume = problem.demands.volume or here.volume or problem.size**3
+        self._last: Evaluation | None = None
+        self.evaluations = 0
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """The names of all demands, m of them."""
+        return tuple(name for each in self.demands for name in each.names)
+
+    @cached_property
+    def equalities(self) -> BoolArray:
+        """Which demands are equalities, shape (m,), boolean."""
+        return np.array([each.is_equality for each in self.demands for _ in each.names], dtype=bool)
+
+    @cached_property
+    def limits(self) -> BoolArray:
+        """Which demands are limits of the design, shape (m,), boolean."""
+        return np.array([each.is_limit for each in self.demands for _ in each.names], dtype=bool)
+
+    @cached_property
+    def bounds(self) -> FloatArray:
+        """Lows and highs of the scaled variables, shape (n, 2)."""
+        problem = self.problem
+        pairs = [
+            (each.low / scale, each.high / scale)
+            for each, scale in zip(problem.variables, self.scales, strict=True)
+        ]
+        if self.raises_worst:
+            pairs.append((-np.inf, np.inf))
+        return np.array(pairs)
+
+    @property
+    def positions(self) -> FloatArray:
+        """Where clearance is demanded, shape (k, 3)."""
+        return np.vstack([np.zeros((0, 3)), *(d.positions for d in self._clearances())])
+
+    def add_positions(self, positions: FloatArray) -> None:
+        """Demand clearance at more positions, shape (k, 3)."""
+        for demand in self._clearances():
+            demand.positions = np.vstack([demand.positions, positions])
+        self._last = None
+
+    def _clearances(self) -> list[ClearanceDemand]:
+        return [each for each in self.demands if isinstance(each, ClearanceDemand)]
+
+    def at(self, u: FloatArray) -> Evaluation:
+        """Return everything at scaled variables; the last place is remembered.
+
+        Raises:
+            DesignError: a degenerate design.
+        """
+        if self._last is None or not np.array_equal(self._last.u, u):
+            self.evaluations += 1
+            self._last = self._evaluate(np.array(u, dtype=np.float64))
+        return self._last
+
+    def read_back(self, at: Evaluation) -> Evaluation:
+        """Return a place with the design as its file will be read."""
+        return self._evaluate(at.u, at.state.read_back())
+
+    def _evaluate(self, u: FloatArray, state: State | None = None) -> Evaluation:
+        if self._before_each is not None:
+            self._before_each()
+        state = state or State(self.problem, u[: self.count])
+        if not np.isfinite(u).all():
+            raise DesignError("the solver asked for a design that is not finite")
+        # A problem may demand nothing.
+        values, gradients = [np.zeros(0)], [np.zeros((0, len(u)))]
+        for demand in self.demands:
+            value, gradient = demand.measure(state)
+            if self.raises_worst:
+                is_margin = demand is self.margins
+                column = np.full((len(value), 1), -1.0 if is_margin else 0.0)
+                value = value - u[-1] if is_margin else value
+                gradient = np.hstack([gradient, column])
+            values.append(value)
+            gradients.append(gradient)
+        objective, slope = self._objective(state, u)
+        return Evaluation(u, state, objective, slope, np.concatenate(values), np.vstack(gradients))
+
+    def _objective(self, state: State, u: FloatArray) -> tuple[float, FloatArray]:
+        match self.problem.objective:
+            case "match-volume":
+                # The demand says it all; each step is the smallest that meets it to first order.
+                return 0.0, np.zeros(len(u))
+            case "smallest-reach":
+                value, gradient = state.reach
+                return value / self.problem.size, gradient / self.problem.size
+            case "largest-volume":
+                root = (state.volume / self._volume) ** (1.0 / 3.0)
+                slope = root / (3.0 * state.volume) if state.volume > 0.0 else 0.0
+                return -root, -slope * state.volume_gradient
+            case "largest-margin":
+                slope = np.zeros(len(u))
+                slope[-1] = -1.0
+                return -float(u[-1]), slope
+
+    def worst(self, at: Evaluation) -> tuple[float, str]:
+        """Return the value and the name of the inequality that is missed most or comes nearest.
+
+        The value is below zero only where it is missed by more than its tolerance: that of all
+        limits for the limits of the design, `MET` for the other demands.
+        """
+        if self.equalities.all():
+            return 0.0, ""
+        allowed = np.where(self.limits, at.state.design.tolerance / self.problem.size, MET)
+        spare = np.where(self.equalities, np.inf, at.values + allowed)
+        index = int(spare.argmin())
+        value = float(at.values[index])
+        return value if spare[index] < 0.0 else max(0.0, value), self.names[index]
+
+    def reported(self, at: Evaluation) -> float:
+        """Return the objective as people read it, see `reported`."""
+        return reported(self.problem, at.state)
+
+
+def reported(problem: Problem, state: State) -> float:
+    """Return F, the reach, the volume or the worst margin, whichever a problem is about."""
+    match problem.objective:
+        case "match-volume":
+            return abs(1.0 - state.volume / problem.wanted_volume)
+        case "smallest-reach":
+            return state.reach[0]
+        case "largest-volume":
+            return state.volume
+        case "largest-margin":
+            return float(box_margins(state)[0].min())
+
+
+def _demands(problem: Problem, start: State) -> list[Demand]:
+    demands = problem.demands
+    found: list[Demand] = []
+    if demands.volume is not None and problem.objective != "largest-volume":
+        exact = problem.objective == "match-volume"
+        found.append(VolumeDemand(demands.volume, is_equality=exact))
+    if demands.reach is not None and problem.objective != "smallest-reach":
+        found.append(ReachDemand(demands.reach))
+    if demands.least > 0.0:
+        found.append(DegenerateDemand(demands.least, start))
+    if start.design.limits.gap > 0.0:
+        found.append(GapDemand(start))
+    if demands.required_box is not None:
+        found.append(BoxDemand(start))
+    if problem.objective == "largest-margin":
+        found.append(MarginDemand())
+    if demands.clearance is not None:
+        positions = first_positions(problem, start.design)
+        found.append(ClearanceDemand(demands.clearance, positions))
+    return found

@@ -1,0 +1,121 @@
+"""From a design with an empty workspace to one nearby that has room in it.
+
+An empty workspace has no volume to climb. But each limit says by how much a position breaks
+it, so a position and a design are sought together, as near to the start as they come, with
+a ball of some radius around the position within all limits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from explorer.errors import DesignError
+from explorer.numerics.arrays import FloatArray
+from explorer.optimise.problem import Problem
+from explorer.optimise.search.demands import DegenerateDemand, GapDemand
+from explorer.optimise.search.sqp import slsqp
+from explorer.optimise.search.state import State, scales
+from explorer.workspace.limits.constraints import HalfSpace, Round
+
+# Positions an axis among which the least broken one is where to begin.
+SEARCHED = 13
+# How much moving the position costs beside changing the design.
+COST_OF_PLACE = 0.01
+MOST_ITERATIONS = 60
+# What each limit is missed by where there is no design.
+NO_DESIGN = -1e3
+
+
+def room(problem: Problem) -> float:
+    """Return the radius of the ball that an open workspace holds at least."""
+    volume = problem.demands.volume
+    return 0.1 * (volume ** (1.0 / 3.0) if volume is not None else problem.size)
+
+
+def opened(
+    problem: Problem, start: FloatArray, *, see: Callable[[State, str], None]
+) -> FloatArray | None:
+    """Return scaled variables at which a ball fits into the workspace; None if none is found.
+
+    Args:
+        problem: The problem.
+        start: Scaled variables, shape (n,).
+        see: Called with each iterate and the limit that it breaks most; may raise.
+    """
+    here, size, n = State(problem, start), problem.size, len(start)
+    radius = room(problem)
+    sides: list[DegenerateDemand | GapDemand] = []
+    if problem.demands.least > 0.0:
+        sides.append(DegenerateDemand(problem.demands.least, here))
+    if here.design.limits.gap > 0.0:
+        sides.append(GapDemand(here))
+    names = [each.name for each in here.limits if isinstance(each, Round | HalfSpace)]
+    labels = [*names, *(name for side in sides for name in side.names)]
+    count = len(labels)
+    place = _least_broken(here) / size
+    first = np.concatenate([start, place])
+    last: list[tuple[FloatArray, FloatArray, FloatArray]] = []
+
+    def measured(x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        if last and np.array_equal(last[0][0], x):
+            return last[0][1:]
+        values: list[float] = []
+        rows: list[FloatArray] = []
+        try:
+            state = State(problem, x[:n])
+            found = {each.name: each for each in state.limits}
+        except DesignError:
+            return np.full(count, NO_DESIGN), np.zeros((count, len(x)))
+        for name in names:
+            limit = found.get(name)
+            if not isinstance(limit, Round | HalfSpace):
+                # One that can never be kept where it is now.
+                values.append(NO_DESIGN)
+                rows.append(np.zeros(len(x)))
+                continue
+            slack, by_u, by_p = state.slack(limit, x[None, n:] * size)
+            norm = float(np.linalg.norm(limit.normal)) if isinstance(limit, HalfSpace) else 1.0
+            values.append((float(slack[0]) / norm - radius) / size)
+            rows.append(np.concatenate([by_u[0] / size, by_p[0]]) / norm)
+        for side in sides:
+            value, gradient = side.measure(state)
+            values.extend(value.tolist())
+            rows.extend(np.concatenate([row, np.zeros(3)]) for row in gradient)
+        last[:] = [(x.copy(), np.array(values), np.array(rows))]
+        return last[0][1:]
+
+    costs = np.concatenate([np.ones(n), np.full(3, COST_OF_PLACE)])
+
+    def slope(x: FloatArray) -> FloatArray:
+        see(State(problem, x[:n]), labels[int(measured(x)[0].argmin())])
+        return costs * (x - first)
+
+    bounds = [
+        (each.low / unit, each.high / unit)
+        for each, unit in zip(problem.variables, scales(problem), strict=True)
+    ]
+    found, _ = slsqp(
+        lambda x: 0.5 * float(costs @ (x - first) ** 2),
+        slope,
+        first,
+        np.array([*bounds, *[(-np.inf, np.inf)] * 3]),
+        [("ineq", lambda x: measured(x)[0], lambda x: measured(x)[1])],
+        most=MOST_ITERATIONS,
+        precision=1e-8,
+    )
+    u = found[:n]
+    return u if State(problem, u).volume > 0.0 else None
+
+
+def _least_broken(state: State) -> FloatArray:
+    """Return the position on a grid that breaks its limits the least, shape (3,)."""
+    reach = state.reach[0]
+    lows, highs = state.design.limits.box or ((-reach,) * 3, (reach,) * 3)
+    # Not the ends themselves, where a limit is just met.
+    shares = np.linspace(0.0, 1.0, SEARCHED + 2)[1:-1]
+    axes = [low + (high - low) * shares for low, high in zip(lows, highs, strict=True)]
+    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    slack = [each.slack(grid) for each in state.limits if isinstance(each, Round | HalfSpace)]
+    return grid[int(np.min(slack, axis=0).argmax())]

@@ -1,0 +1,117 @@
+"""Whether a place is an optimum, checked from the conditions themselves.
+
+At one the slope of the objective is a sum of the gradients of the demands and bounds that
+are just met, those of inequalities with a factor of at least zero (Karush, Kuhn and
+Tucker). SciPy's own verdict only says that its steps became small.
+
+Volumes have kinks where two limits become the same surface, and optima like to lie there:
+the workspace is largest for its reach where the balls of legs 1 and 4 are one. There the
+gradients all around take part, each as if it were one more demand (J. V. Burke, A. S.
+Lewis, M. L. Overton, "A robust gradient sampling algorithm", 2005).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from explorer.errors import DesignError
+from explorer.numerics.arrays import FloatArray
+from explorer.optimise.search.model import Evaluation, Model
+
+# A demand or bound within this of being met exactly takes part.
+ACTIVE = 1e-6
+# An optimum's conditions hold if their residual is below this.
+OPTIMAL = 1e-5
+# How far away gradients are looked at where there may be a kink, and how many for each variable.
+AROUND = 1e-5
+SAMPLES = 6
+
+
+class Optimality(NamedTuple):
+    """How nearly the conditions hold.
+
+    Attributes:
+        residual: What no sum makes up, over the slope of the objective.
+        holding: The demand or bound with the largest factor, "" if none has one.
+    """
+
+    residual: float
+    holding: str
+
+    @property
+    def is_optimal(self) -> bool:
+        """Whether the conditions hold."""
+        return self.residual <= OPTIMAL
+
+
+def optimality(model: Model, at: Evaluation) -> Optimality:
+    """Return how nearly a place that meets all demands is an optimum."""
+    smooth = _conditions(model, at, [at])
+    if smooth.is_optimal or model.problem.objective == "match-volume":
+        return smooth
+    return min(smooth, _conditions(model, at, [at, *_around(model, at)]))
+
+
+def _around(model: Model, at: Evaluation) -> list[Evaluation]:
+    """Return the problem at places close by, within the bounds."""
+    lows, highs = model.bounds.T
+    random = np.random.default_rng(0)
+    found: list[Evaluation] = []
+    for _ in range(SAMPLES * len(at.u)):
+        step = random.normal(size=len(at.u))
+        step *= AROUND / float(np.linalg.norm(step))
+        try:
+            found.append(model.at(np.clip(at.u + step, lows, highs)))
+        except DesignError:
+            continue
+    return found
+
+
+def _conditions(model: Model, at: Evaluation, around: list[Evaluation]) -> Optimality:
+    """Return how nearly the conditions hold with the gradients at some places."""
+    from scipy.optimize import nnls
+
+    rows: list[FloatArray] = []
+    names: list[str] = []
+    for index, (value, name) in enumerate(zip(at.values.tolist(), model.names, strict=True)):
+        if not (model.equalities[index] or value <= ACTIVE):
+            continue
+        for each in around:
+            rows.append(each.gradients[index])
+            names.append(name)
+            if model.equalities[index]:
+                # An equality may pull either way.
+                rows.append(-each.gradients[index])
+                names.append(name)
+    lows, highs = model.bounds.T
+    for index, variable in enumerate(model.problem.names):
+        unit = np.zeros(len(at.u))
+        unit[index] = 1.0
+        if at.u[index] <= lows[index] + ACTIVE:
+            rows.append(unit)
+            names.append(f"lower bound of {variable}")
+        if at.u[index] >= highs[index] - ACTIVE:
+            rows.append(-unit)
+            names.append(f"upper bound of {variable}")
+    steepness = float(np.linalg.norm(at.slope))
+    if steepness == 0.0:
+        return Optimality(0.0, "")
+    slopes = np.array([each.slope for each in around]).T
+    # Some mean of the slopes less some sum of the gradients is to be nothing; the last row
+    # makes it a mean.
+    demands = np.array(rows).reshape(-1, len(at.u)).T
+    columns = np.vstack(
+        [
+            np.hstack([slopes, -demands]) / steepness,
+            np.hstack([np.ones(slopes.shape[1]), np.zeros(len(rows))]),
+        ]
+    )
+    goal = np.zeros(len(at.u) + 1)
+    goal[-1] = 1.0
+    factors, residual = nnls(columns, goal)
+    pulls = factors[len(around) :] * np.linalg.norm(demands, axis=0)
+    if not len(pulls) or not pulls.max() > 0.0:
+        return Optimality(float(residual), "")
+    return Optimality(float(residual), names[int(pulls.argmax())])

@@ -1,0 +1,178 @@
+"""A problem at one place of its variables: the design there, and how all parameters move.
+
+The solver works in scaled variables u of about unit size: lengths over the size of the
+start, the yaw in radians. An objective may append one more, see `explorer.optimise.search.model`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from functools import cached_property
+
+import numpy as np
+
+from explorer.mechanism.design import LENGTHS, VARIABLES, Design
+from explorer.mechanism.design_file import decode_design, encode_design
+from explorer.mechanism.home import home_pose
+from explorer.numerics.arrays import FloatArray
+from explorer.optimise.problem import REACH, YAW, Box, Problem
+from explorer.workspace.limits.constraints import (
+    YAW as YAW_PARAMETER,
+    Constraint,
+    HalfSpace,
+    Round,
+    constraints,
+)
+from explorer.workspace.slices.volume import Volume, workspace_volume
+
+Chain = Mapping[str, FloatArray]
+"""By parameter of a workspace: its derivatives by the n scaled variables, shape (n,)."""
+
+
+def scales(problem: Problem) -> FloatArray:
+    """Return what one unit of each scaled variable is, shape (n,)."""
+    return np.array([math.degrees(1.0) if name == YAW else problem.size for name in problem.names])
+
+
+class State:
+    """A problem at scaled variables; what is asked for is computed once.
+
+    Args:
+        problem: The problem.
+        u: Scaled variables, shape (n,).
+        design: The design here, if it is not the one that the problem makes of them.
+    """
+
+    def __init__(self, problem: Problem, u: FloatArray, design: Design | None = None) -> None:
+        self.problem = problem
+        self.u = u
+        self.values: FloatArray = u * scales(problem)
+        self._given = design
+
+    @cached_property
+    def design(self) -> Design:
+        """The design here."""
+        return self._given or self.problem.design_at(self.values.tolist())
+
+    def read_back(self) -> State:
+        """Return the same place with the design as its file will be read."""
+        return State(self.problem, self.u, decode_design(encode_design(self.design), "the design"))
+
+    @cached_property
+    def rotation(self) -> FloatArray:
+        """The orientation of the workspace, shape (3, 3)."""
+        return home_pose(self.design).rotation
+
+    @cached_property
+    def box(self) -> Box:
+        """The required box where it lies now."""
+        return self.problem.required_box_at(self.values.tolist())
+
+    @cached_property
+    def limits(self) -> tuple[Constraint, ...]:
+        """The limits of the workspace."""
+        return constraints(self.design, self.rotation)
+
+    @cached_property
+    def measured(self) -> Volume:
+        """The workspace, without what empties it."""
+        return workspace_volume(self.design, self.rotation, explain=False)
+
+    @property
+    def volume(self) -> float:
+        """The exact volume of the workspace."""
+        return self.measured.volume
+
+    @cached_property
+    def volume_gradient(self) -> FloatArray:
+        """The derivatives of the volume by the scaled variables, shape (n,)."""
+        return self.along(self.measured.gradient)
+
+    @cached_property
+    def chain(self) -> Chain:
+        """How each parameter of the workspace moves with the scaled variables."""
+        problem, n = self.problem, len(self.u)
+        chain: dict[str, FloatArray] = {}
+        for index, (name, scale) in enumerate(zip(problem.names, scales(problem), strict=True)):
+            unit = np.zeros(n)
+            unit[index] = scale
+            if name in VARIABLES:
+                chain[name] = unit
+            elif name == YAW:
+                chain[YAW_PARAMETER] = np.radians(unit)
+            elif name == REACH:
+                chain.update({f"{length} maximum": unit for length in LENGTHS})
+            else:
+                chain[name] = unit
+        ratio = problem.demands.stroke_ratio
+        if ratio is not None:
+            for length in LENGTHS:
+                low, high = self.design.length_range(length)
+                if low <= high / ratio:
+                    chain[f"{length} minimum"] = self._of_maximum(length, chain) / ratio
+        return chain
+
+    def _of_maximum(self, length: str, chain: Chain) -> FloatArray:
+        if getattr(self.design.limits, length)[1] is not None:
+            return chain.get(f"{length} maximum", np.zeros(len(self.u)))
+        return _of_reach(self.design, chain, len(self.u))
+
+    @cached_property
+    def reach(self) -> tuple[float, FloatArray]:
+        """The reach as a variable of its own, else |a3|, and its derivatives, shape (n,)."""
+        if REACH in self.problem.names:
+            index = self.problem.names.index(REACH)
+            return float(self.values[index]), self.chain[f"{LENGTHS[0]} maximum"]
+        return self.design.reach, _of_reach(self.design, self.chain, len(self.u))
+
+    def along(self, gradient: Mapping[str, float]) -> FloatArray:
+        """Return derivatives by the scaled variables of what has these by parameters."""
+        total = np.zeros(len(self.u))
+        for name, derivative in gradient.items():
+            if name in self.chain:
+                total += derivative * self.chain[name]
+        return total
+
+    def slack(
+        self, limit: Round | HalfSpace, p: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return by how much positions keep a limit, in design units, and derivatives.
+
+        Args:
+            limit: One of `limits`.
+            p: Shape (k, 3).
+
+        Returns:
+            The slacks, shape (k,), their derivatives by the scaled variables with p held,
+            shape (k, n), and by p, shape (k, 3).
+        """
+        own = np.zeros((len(p), 4))
+        match limit:
+            case Round():
+                off = p - limit.centre
+                if not limit.is_ball:
+                    off[:, 0] = 0.0
+                distance = np.sqrt(np.einsum("ki,ki->k", off, off))
+                away = off / np.maximum(distance, 1e-300)[:, None]
+                side = 1.0 if limit.inside else -1.0
+                own[:, :3], own[:, 3] = side * away, side
+                slack, by_p = side * (limit.radius - distance), -side * away
+            case HalfSpace():
+                own[:, :3], own[:, 3] = -p, 1.0
+                slack = limit.offset - p @ limit.normal
+                by_p = np.broadcast_to(-limit.normal, p.shape)
+        by_u = np.zeros((len(p), len(self.u)))
+        for name, rate in limit.rates.items():
+            if name in self.chain:
+                by_u += np.outer(own @ rate, self.chain[name])
+        return slack, by_u, by_p
+
+
+def _of_reach(design: Design, chain: Chain, n: int) -> FloatArray:
+    """Return the derivatives of |a3| by the scaled variables, shape (n,)."""
+    total = np.zeros(n)
+    for name, value in zip(("a3x", "a3y"), design.a3, strict=True):
+        if name in chain:
+            total += value / design.reach * chain[name]
+    return total

@@ -1,0 +1,1 @@
+"""Moves between poses: paths that keep all limits, and trajectories along them."""

@@ -1,0 +1,143 @@
+"""Shorter and rounder paths: shortcuts between random points, then corners cut off.
+
+Every new piece is a straight move that is proved valid before it is taken (see
+`explorer.workspace.limits.valid_moves`); what is left of the old ones is valid as a part of them.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from explorer.legs.moves import poses_between
+from explorer.mechanism.design import Design
+from explorer.mechanism.displacement import displacement
+from explorer.mechanism.pose import Pose
+from explorer.numerics.arrays import FloatArray
+from explorer.workspace.limits.valid_moves import moves_are_valid
+from explorer.workspace.limits.valid_poses import Rules
+
+# Shortcuts that are tried at once, and rounds without gain after which there are no more.
+TRIES, PATIENCE, MOST_ROUNDS = 24, 4, 60
+# Of the length: what is a gain.
+GAIN = 1e-3
+# Where corners are cut, as a share of the moves beside them, the widest cut first; how often.
+CUTS, CUT_ROUNDS = (0.25, 0.08), 3
+
+
+@dataclass(frozen=True)
+class Smoother:
+    """Makes paths shorter and rounder.
+
+    Attributes:
+        design: The manipulator.
+        rules: What every pose is to keep.
+        seed: Of the random shortcuts.
+    """
+
+    design: Design
+    rules: Rules
+    seed: int = 0
+
+    def smoothed(self, poses: Sequence[Pose]) -> tuple[Pose, ...]:
+        """Return a path with the same ends, shorter and with its corners cut off."""
+        return tuple(self._rounded(self._shortened(list(poses))))
+
+    def lengths(self, poses: Sequence[Pose]) -> FloatArray:
+        """Return the root-mean-square way of each move, shape (n,)."""
+        p, r = _arrays(poses)
+        return displacement(self.design, p[:-1], r[:-1], p[1:], r[1:])
+
+    def is_valid(self, start: Pose, end: Pose) -> bool:
+        """Return whether the straight move between two poses is valid."""
+        return self._are_valid([(start, end)])[0]
+
+    def _are_valid(self, pieces: Sequence[tuple[Pose, Pose]]) -> list[bool]:
+        (p, r), (q, s) = (_arrays(each) for each in zip(*pieces, strict=True))
+        return moves_are_valid(self.design, p, r, q, s, rules=self.rules).tolist()
+
+    def _shortened(self, poses: list[Pose]) -> list[Pose]:
+        rng = np.random.default_rng(self.seed)
+        idle = 0
+        for _ in range(MOST_ROUNDS):
+            if len(poses) < 3 or idle >= PATIENCE:
+                break
+            ends = np.concatenate([[0.0], np.cumsum(self.lengths(poses))])
+            pairs = np.sort(rng.uniform(0.0, ends[-1], (TRIES, 2)), axis=1)
+            # Now and then from corner to corner, which takes all between away.
+            pairs[0] = ends[0], ends[-1]
+            pairs[1:4] = np.sort(ends[rng.integers(0, len(ends), (3, 2))], axis=1)
+            shorter = [self._shortcut(poses, ends, *pair) for pair in pairs.tolist()]
+            worth = [each for each in shorter if each.gain > GAIN * float(ends[-1])]
+            found: list[Pose] | None = None
+            if worth:
+                worth.sort(key=lambda each: -each.gain)
+                valid = self._are_valid([each.piece for each in worth])
+                found = next((w.poses for w, v in zip(worth, valid, strict=True) if v), None)
+            idle = 0 if found else idle + 1
+            poses = found or poses
+        return poses
+
+    def _shortcut(
+        self, poses: list[Pose], ends: FloatArray, first: float, last: float
+    ) -> _Shortcut:
+        """Return the path with a straight move between two points of it."""
+        i, start = self._at(poses, ends, first)
+        j, end = self._at(poses, ends, last)
+        if i == j:
+            return _Shortcut(poses, (start, end), 0.0)
+        gain = last - first - float(self.lengths([start, end])[0])
+        path = [*poses[: i + 1], start, end, *poses[j + 1 :]]
+        return _Shortcut(_without_repeats(path), (start, end), gain)
+
+    def _at(self, poses: list[Pose], ends: FloatArray, way: float) -> tuple[int, Pose]:
+        """Return the move, and the pose, after some way."""
+        index = int(np.searchsorted(ends, way, side="right")) - 1
+        if index >= len(poses) - 1:
+            return len(poses) - 2, poses[-1]
+        length = float(ends[index + 1] - ends[index])
+        share = (way - float(ends[index])) / length
+        return index, poses[index] if share == 0.0 else _between(
+            poses[index], poses[index + 1], share
+        )
+
+    def _rounded(self, poses: list[Pose]) -> list[Pose]:
+        for _ in range(CUT_ROUNDS):
+            if len(poses) < 3:
+                break
+            corners = list(zip(poses, poses[1:], poses[2:], strict=False))
+            cuts = [
+                [(_between(b, a, share), _between(b, c, share)) for share in CUTS]
+                for a, b, c in corners
+            ]
+            valid = iter(self._are_valid([each for own in cuts for each in own]))
+            path: list[Pose] = [poses[0]]
+            for corner, own in zip(corners, cuts, strict=True):
+                good = [cut for cut in own if next(valid)]
+                path += list(good[0]) if good else [corner[1]]
+            poses = [*path, poses[-1]]
+        return poses
+
+
+@dataclass(frozen=True)
+class _Shortcut:
+    """A path with one straight piece in it, and what it gains if that piece is valid."""
+
+    poses: list[Pose]
+    piece: tuple[Pose, Pose]
+    gain: float
+
+
+def _arrays(poses: Sequence[Pose]) -> tuple[FloatArray, FloatArray]:
+    return np.array([each.position for each in poses]), np.array([each.rotation for each in poses])
+
+
+def _between(start: Pose, end: Pose, share: float) -> Pose:
+    return Pose.of(*poses_between(start, end, share))
+
+
+def _without_repeats(poses: list[Pose]) -> list[Pose]:
+    return [poses[0], *(b for a, b in itertools.pairwise(poses) if a != b)]

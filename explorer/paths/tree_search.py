@@ -1,0 +1,199 @@
+"""Trees of straight moves over SE(3), by OMPL: a path between two poses under given rules.
+
+RRT-Connect (Kuffner and LaValle 2000) grows a tree from either end. Each of its moves is proved
+valid as a whole (see `explorer.workspace.limits.valid_moves`), so that no step can be too coarse.
+"""
+
+from __future__ import annotations
+
+import functools
+import importlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from explorer.errors import MissingExtraError
+from explorer.mechanism.design import Design
+from explorer.mechanism.pose import Pose
+from explorer.numerics.arrays import BoolArray, FloatArray
+from explorer.workspace.limits.valid_moves import DEFAULT_TOLERANCE, valid_move_rows
+from explorer.workspace.limits.valid_poses import Rules, valid_rows
+
+# Of the whole extent: the longest move of a tree.
+LONGEST_MOVE = 0.25
+
+
+def search_is_possible() -> bool:
+    """Return whether OMPL can be imported."""
+    try:
+        _Ompl.loaded()
+    except MissingExtraError:
+        return False
+    return True
+
+
+def compile_checks() -> None:
+    """Have the checks of poses and moves compiled; it takes seconds, once on a machine."""
+    valid_move_rows.compile()
+    valid_rows.compile()
+
+
+@dataclass(frozen=True)
+class _Ompl:
+    """The modules of OMPL, which has no types."""
+
+    base: Any
+    geometric: Any
+
+    @staticmethod
+    def loaded() -> _Ompl:
+        try:
+            util: Any = importlib.import_module("ompl.util")
+            modules = _Ompl(
+                importlib.import_module("ompl.base"), importlib.import_module("ompl.geometric")
+            )
+        except ImportError:
+            raise MissingExtraError(
+                "a path that is no straight move needs OMPL: pip install "
+                "'flagged-explorer[planning]'"
+            ) from None
+        _prepare(util)
+        return modules
+
+
+@functools.cache
+def _prepare(util: Any) -> None:
+    """Make OMPL quiet, and its random numbers the same in every process."""
+    util.setLogLevel(util.LOG_NONE)
+    util.RNG.setSeed(1)
+
+
+class TreeSearch:
+    """One search over SE(3).
+
+    Args:
+        design: The manipulator.
+        rules: What every pose of the path is to keep.
+
+    Attributes:
+        checked: How many moves have been checked.
+    """
+
+    def __init__(self, design: Design, rules: Rules) -> None:
+        self.checked = 0
+        self._design = design
+        self._rules = rules
+        self._tolerance = DEFAULT_TOLERANCE * design.reach
+        self._places: FloatArray = np.empty((2, 1, 3))
+        self._turns: FloatArray = np.empty((2, 1, 3, 3))
+        self._valid: BoolArray = np.empty(1, dtype=np.bool_)
+
+    def path(self, start: Pose, goal: Pose, seconds: float) -> tuple[Pose, ...] | None:
+        """Return the corners of a path, or None if there was too little time.
+
+        Args:
+            start: Where it starts; valid.
+            goal: Where it ends; valid.
+            seconds: To look for it.
+
+        Raises:
+            MissingExtraError: OMPL is not installed.
+        """
+        ompl = _Ompl.loaded()
+        base, geometric = ompl.base, ompl.geometric
+        space = base.SE3StateSpace()
+        bounds = base.RealVectorBounds(3)
+        lows, highs = _box(self._design, start, goal)
+        for axis in range(3):
+            bounds.setLow(axis, lows[axis])
+            bounds.setHigh(axis, highs[axis])
+        space.setBounds(bounds)
+        # Half the angle times the reach: a turn counts as what it does to b4 seen from a1.
+        space.setSubspaceWeight(1, self._design.reach)
+        setup = geometric.SimpleSetup(space)
+        information = setup.getSpaceInformation()
+        setup.setStateValidityChecker(self._state_is_valid)
+        validator = _validator(base, information, self._move_is_valid)
+        information.setMotionValidator(validator)
+        setup.setStartAndGoalStates(_state(space, start), _state(space, goal))
+        planner = geometric.RRTConnect(information)
+        planner.setRange(LONGEST_MOVE * space.getMaximumExtent())
+        setup.setPlanner(planner)
+        setup.solve(seconds)
+        if not setup.haveExactSolutionPath():
+            return None
+        states = setup.getSolutionPath().getStates()
+        # The ends as they were given, to the last bit.
+        return (start, *(_pose(state) for state in list(states)[1:-1]), goal)
+
+    def _read(self, which: int, state: Any) -> None:
+        place, turn, q = self._places[which, 0], self._turns[which, 0], state.rotation()
+        place[0], place[1], place[2] = state.getX(), state.getY(), state.getZ()
+        w, x, y, z = q.w, q.x, q.y, q.z
+        turn[0] = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)
+        turn[1] = 2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)
+        turn[2] = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)
+
+    def _state_is_valid(self, state: Any) -> bool:
+        self._read(0, state)
+        rules = self._rules
+        valid_rows(1, rules.row, rules.cones, self._places[0], self._turns[0], self._valid)
+        return bool(self._valid[0])
+
+    def _move_is_valid(self, start: Any, end: Any) -> bool:
+        self.checked += 1
+        self._read(0, start)
+        self._read(1, end)
+        rules = self._rules
+        valid_move_rows(
+            1,
+            rules.row,
+            rules.cones,
+            self._places[0],
+            self._turns[0],
+            self._places[1],
+            self._turns[1],
+            self._tolerance,
+            self._valid,
+        )
+        return bool(self._valid[0])
+
+
+def _validator(base: Any, information: Any, is_valid: Callable[[Any, Any], bool]) -> Any:
+    """Return OMPL's check of moves; a class made here, as its base is imported late."""
+
+    def check(_: Any, start: Any, end: Any) -> bool:
+        return is_valid(start, end)
+
+    kind = type("MoveValidator", (base.MotionValidator,), {"checkMotion": check})
+    return kind(information)
+
+
+def _box(design: Design, start: Pose, goal: Pose) -> tuple[list[float], list[float]]:
+    """Return lows and highs of the positions that can be within the limits."""
+    centre, radius = np.array([*design.a3, 0.0]), design.length_range("l4")[1]
+    lows, highs = centre - radius, centre + radius
+    if design.limits.box is not None:
+        lows = np.maximum(lows, design.limits.box[0])
+        highs = np.minimum(highs, design.limits.box[1])
+    # Both ends are within the limits, to rounding.
+    ends = np.array([start.position, goal.position])
+    spare = 1e-9 * design.reach
+    lows = np.minimum(lows, ends.min(axis=0)) - spare
+    highs = np.maximum(highs, ends.max(axis=0)) + spare
+    return lows.tolist(), highs.tolist()
+
+
+def _state(space: Any, pose: Pose) -> Any:
+    state = space.allocState()
+    state.setXYZ(*pose.position)
+    q = state.rotation()
+    q.w, q.x, q.y, q.z = pose.quaternion
+    return state
+
+
+def _pose(state: Any) -> Pose:
+    q = state.rotation()
+    return Pose((state.getX(), state.getY(), state.getZ()), (q.w, q.x, q.y, q.z))

@@ -1,0 +1,92 @@
+"""The actuator Jacobian, its determinant and condition, and the volumes of the tetrahedra."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from explorer.mechanism.design import Design
+from explorer.mechanism.kinematics import attachment_points
+from explorer.numerics.arrays import FloatArray, dot
+
+
+def tetrahedron_volumes(design: Design, margin: FloatArray) -> FloatArray:
+    """Return the volumes (..., 3) of the three tetrahedra, in cubed design units.
+
+    Those of the second and third grow with a2x, that is with where a2 is drawn.
+    """
+    span = design.b3 - design.b2
+    factors = np.array(
+        [design.b1[1] * span, design.a2x * span, design.a2x * design.a3[1]], dtype=np.float64
+    )
+    return np.abs(margin * factors) / 6.0
+
+
+def jacobian(design: Design, position: ArrayLike, rotation: ArrayLike) -> FloatArray:
+    """Return the actuator Jacobian J, shape (..., 6, 6): joint rates = J @ twist.
+
+    The twist is (velocity of b4, angular velocity), both in the base frame; the columns
+    of the velocity are dimensionless, those of the angular velocity lengths. Where a
+    length is zero its direction is undefined and its row is zero: such a pose is singular.
+
+    Args:
+        design: The manipulator.
+        position: b4 in the base frame, shape (..., 3), in design units.
+        rotation: Platform to base, shape (..., 3, 3).
+
+    Raises:
+        InputError: a pose that is not finite or not a rotation.
+    """
+    points = attachment_points(design, position, rotation)
+    p = points.b4
+    radial = np.array([0.0, 1.0, 1.0])
+    spokes = [points.b1, points.b2 * radial, points.b3 * radial, p - points.a3]
+    out = np.zeros((*p.shape[:-1], 6, 6))
+    out[..., [0, 2, 4, 5], :3] = _unit(np.stack(spokes, axis=-2))
+    out[..., [1, 3], 0] = 1.0
+    b1, b2, b3 = points.b1 - p, points.b2 - p, points.b3 - p
+    arms = np.stack([b1, b2, b2, b3, b3, np.zeros_like(p)], axis=-2)
+    # The moment arm × direction of all rows at once; np.cross takes three times as long.
+    dx, dy, dz = (out[..., i] for i in range(3))
+    ax, ay, az = (arms[..., i] for i in range(3))
+    out[..., 3] = ay * dz - az * dy
+    out[..., 4] = az * dx - ax * dz
+    out[..., 5] = ax * dy - ay * dx
+    return out
+
+
+def determinant(design: Design, joints: FloatArray, margin: FloatArray) -> FloatArray:
+    """Return det J, shape (...), by det J · l1 d2 d4 l4 = -b1y a3y (b3 - b2)² κ1 κ2 κ3.
+
+    Where a length is zero the determinant has no limit and zero is returned, in keeping
+    with `jacobian`.
+
+    Args:
+        design: The manipulator.
+        joints: Those of the pose, shape (..., 6).
+        margin: Those of the pose, shape (..., 3).
+    """
+    lengths = joints[..., [0, 2, 4, 5]]
+    product = np.prod(lengths, axis=-1)
+    numerator = (
+        -design.b1[1] * design.a3[1] * (design.b3 - design.b2) ** 2 * np.prod(margin, axis=-1)
+    )
+    return np.divide(numerator, product, out=np.zeros_like(product), where=product > 0.0)
+
+
+def inverse_condition(jacobian: FloatArray, length: float) -> FloatArray:
+    """Return the least over the largest singular value of J made homogeneous, shape (...).
+
+    Args:
+        jacobian: Shape (..., 6, 6).
+        length: The characteristic length that divides the columns of the angular
+            velocity, in design units.
+    """
+    homogeneous = jacobian / np.array([1.0, 1.0, 1.0, length, length, length])
+    values = np.linalg.svd(homogeneous, compute_uv=False)
+    return np.asarray(values[..., -1] / values[..., 0])
+
+
+def _unit(vector: FloatArray) -> FloatArray:
+    length = np.sqrt(dot(vector, vector))[..., None]
+    return np.divide(vector, length, out=np.zeros_like(vector), where=length > 0.0)

@@ -1,0 +1,337 @@
+"""The nearest singular pose of each of the three incidences, by the way of b1, b2, b3 and b4.
+
+The distance is the root-mean-square way of the platform's four points, see
+`explorer.mechanism.displacement`: it is in design units and asks for no length to weigh angles
+with. Each of the three is a global least with a proof beside it, see
+`explorer.singularity.nearest_plane` for κ1 and κ3 and `explorer.singularity.nearest_lines` for κ2.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from explorer.mechanism.design import Design
+from explorer.mechanism.displacement import PlatformPoints
+from explorer.mechanism.margins import INCIDENCES
+from explorer.mechanism.pose import Pose, checked_rotation
+from explorer.numerics.arrays import FloatArray, batch_shape, finite_array
+from explorer.numerics.compiled import helper, kernel
+from explorer.singularity.nearest_lines import ROOM, least_on_torus, polished, write_on_plane
+from explorer.singularity.nearest_plane import nearest_quaternion, write_form, write_turned
+
+# A margin is zero within this share of what it is made of.
+ROUNDING = 1e-14
+
+
+class NearestPoses(NamedTuple):
+    """The nearest singular poses of a batch of poses, in the order κ1, κ2, κ3.
+
+    Attributes:
+        distance: The root-mean-square way of b1 to b4, shape (..., 3), in design units.
+        bound: What no pose with the incidence undercuts, shape (..., 3). Its square is
+            within 1e-8 of the distance's, relative, or 1e-13 of the platform's size squared;
+            but looser where the two lines nearly coincide, for the size of the platform.
+        position: b4 of the nearest poses in the base frame, shape (..., 3, 3).
+        rotation: Their rotations, platform to base, shape (..., 3, 3, 3).
+    """
+
+    distance: FloatArray
+    bound: FloatArray
+    position: FloatArray
+    rotation: FloatArray
+
+
+@dataclass(frozen=True)
+class NearestSingularity:
+    """The nearest pose with one of the three incidences.
+
+    Attributes:
+        incidence: 1, 2 or 3, for κ1, κ2 or κ3.
+        distance: The root-mean-square way of b1 to b4 to it, in design units; 0 for a pose
+            that has the incidence, which is then its own nearest.
+        bound: What the distance is proved not to undercut, see `NearestPoses`.
+        pose: The nearest pose.
+    """
+
+    incidence: int
+    distance: float
+    bound: float
+    pose: Pose
+
+    @property
+    def name(self) -> str:
+        """What the incidence is, such as "a1 on the platform plane"."""
+        return INCIDENCES[self.incidence - 1]
+
+
+def nearest_singularities(
+    design: Design, pose: Pose
+) -> tuple[NearestSingularity, NearestSingularity, NearestSingularity]:
+    """Return the nearest singular pose of each incidence, in the order κ1, κ2, κ3.
+
+    Args:
+        design: The manipulator.
+        pose: Of its platform; it may be singular itself.
+    """
+    return each_singularity(nearest_singular_poses(design, pose.position, pose.rotation), pose)
+
+
+def each_singularity(
+    found: NearestPoses, pose: Pose
+) -> tuple[NearestSingularity, NearestSingularity, NearestSingularity]:
+    """Return the nearest singular pose of each incidence, in the order κ1, κ2, κ3.
+
+    Args:
+        found: The nearest singular poses of one pose.
+        pose: That pose.
+    """
+
+    def one(index: int) -> NearestSingularity:
+        distance, bound = float(found.distance[index]), float(found.bound[index])
+        if distance == 0.0:
+            return NearestSingularity(index + 1, 0.0, 0.0, pose)
+        nearest = Pose.of(found.position[index], found.rotation[index])
+        return NearestSingularity(index + 1, distance, bound, nearest)
+
+    return one(0), one(1), one(2)
+
+
+def nearest_singular_poses(
+    design: Design, position: ArrayLike, rotation: ArrayLike
+) -> NearestPoses:
+    """Return the nearest singular poses of many poses.
+
+    Args:
+        design: The manipulator.
+        position: b4 in the base frame, shape (..., 3), in design units.
+        rotation: Platform to base, shape (..., 3, 3).
+
+    Raises:
+        InputError: a pose that is not finite or not a rotation.
+    """
+    p, r = finite_array("position", position, (3,)), checked_rotation(rotation)
+    batch = batch_shape((p, 1), (r, 2))
+    platform = PlatformPoints.of(design)
+    # In units of the platform's own length no product of lengths can over- or underflow.
+    unit = platform.length
+    p_rows = (np.broadcast_to(p, (*batch, 3)) / unit).reshape(-1, 3)
+    r_rows = np.broadcast_to(r, (*batch, 3, 3)).reshape(-1, 3, 3).copy()
+    count = len(p_rows)
+    distance, bound = np.empty((count, 3)), np.empty((count, 3))
+    found_p, found_r = np.empty((count, 3, 3)), np.empty((count, 3, 3, 3))
+    nearest_rows(
+        # The branch and bound looks at some hundred boxes.
+        100 * count,
+        platform.points / unit,
+        platform.centroid / unit,
+        platform.scatter / unit**2,
+        p_rows,
+        r_rows,
+        distance,
+        bound,
+        found_p,
+        found_r,
+    )
+    return NearestPoses(
+        (distance * unit).reshape(*batch, 3),
+        (bound * unit).reshape(*batch, 3),
+        (found_p * unit).reshape(*batch, 3, 3),
+        found_r.reshape(*batch, 3, 3, 3),
+    )
+
+
+@helper
+def mean_way(
+    points: FloatArray, p: FloatArray, r: FloatArray, q: FloatArray, s: FloatArray
+) -> float:
+    """Return the root-mean-square way of points from the pose (p, r) to (q, s)."""
+    total = 0.0
+    for point in range(points.shape[0]):
+        for i in range(3):
+            way = q[i] - p[i]
+            for j in range(3):
+                way += (s[i, j] - r[i, j]) * points[point, j]
+            total += way * way
+    return math.sqrt(total / points.shape[0])
+
+
+@helper
+def write_a1_on_plane(
+    g: FloatArray, r: FloatArray, c: FloatArray, forms: FloatArray, q: FloatArray, s: FloatArray
+) -> float:
+    """Write the nearest pose (q, s) with κ1 = 0 and return a bound of its square.
+
+    Args:
+        g: The centroid in the base frame, shape (3,).
+        r: The rotation of the pose to start from, shape (3, 3).
+        c: The centroid in the platform frame, shape (3,).
+        forms: The scatter's in the first place; the others are overwritten, shape (5, 4, 4).
+        q: Written, shape (3,).
+        s: Written, shape (3, 3).
+    """
+    # x is the distance of a1 from the turned plane through the centroid.
+    linear = forms[4]
+    for i in range(3):
+        linear[i, 0] = linear[i, 1] = 0.0
+        linear[i, 2] = -(r[0, i] * g[0] + r[1, i] * g[1] + r[2, i] * g[2])
+    write_form(linear, forms[1])
+    turn, least = nearest_quaternion(forms[0], forms[1], 0.0, forms[2], forms[3])
+    write_turned(r, turn, s)
+    for i in range(3):
+        q[i] = g[i] - s[i, 0] * c[0] - s[i, 1] * c[1]
+    # Twice: the second time takes the rounding of the first.
+    for _ in range(2):
+        off = s[0, 2] * q[0] + s[1, 2] * q[1] + s[2, 2] * q[2]
+        for i in range(3):
+            q[i] -= off * s[i, 2]
+    return 2.0 + least
+
+
+@helper
+def write_b4_on_plane(
+    g: FloatArray, r: FloatArray, c: FloatArray, forms: FloatArray, q: FloatArray, s: FloatArray
+) -> float:
+    """Write the nearest pose with κ3 = 0, as `write_a1_on_plane` does for κ1."""
+    # x is the height of b4 with the centroid where it was.
+    linear = forms[4]
+    for i in range(3):
+        for j in range(3):
+            linear[i, j] = -r[2, i] * c[j]
+    write_form(linear, forms[1])
+    turn, least = nearest_quaternion(forms[0], forms[1], g[2], forms[2], forms[3])
+    write_turned(r, turn, s)
+    for i in range(2):
+        q[i] = g[i] - s[i, 0] * c[0] - s[i, 1] * c[1]
+    q[2] = 0.0
+    return 2.0 + least
+
+
+@helper
+def shorter_shift(
+    way: float, shift: float, nx: float, ny: float, nz: float, p: FloatArray, q: FloatArray
+) -> bool:
+    """Write the shift of p along n (a multiple of it) into q if it is the shorter way.
+
+    Below the root of the rounding, squares do not tell which way is the shortest.
+    """
+    if way <= abs(shift):
+        return False
+    q[0], q[1], q[2] = p[0] - shift * nx, p[1] - shift * ny, p[2] - shift * nz
+    return True
+
+
+@helper
+def angles_at(r: FloatArray) -> tuple[float, float]:
+    """Return the angles on the torus of a rotation whose line keeps its direction."""
+    across = math.hypot(r[1, 0], r[2, 0])
+    ny, nz = -r[2, 0] / across, r[1, 0] / across
+    ex, ey, ez = ny * r[2, 0] - nz * r[1, 0], nz * r[0, 0], -ny * r[0, 0]
+    up = ny * r[1, 1] + nz * r[2, 1]
+    return math.atan2(-ny, nz), math.atan2(up, ex * r[0, 1] + ey * r[1, 1] + ez * r[2, 1])
+
+
+@helper
+def copy_rotation(rotation: FloatArray, into: FloatArray) -> None:
+    """Copy a rotation (3, 3) by its elements, for which Numba compiles far less code."""
+    for i in range(3):
+        for j in range(3):
+            into[i, j] = rotation[i, j]
+
+
+@helper
+def copy_pose(
+    position: FloatArray,
+    rotation: FloatArray,
+    into_position: FloatArray,
+    into_rotation: FloatArray,
+) -> None:
+    """Copy a position (3,) and a rotation (3, 3)."""
+    for i in range(3):
+        into_position[i] = position[i]
+    copy_rotation(rotation, into_rotation)
+
+
+@kernel(
+    "void(f8[:,::1], f8[::1], f8[:,::1], f8[:,::1], f8[:,:,::1],"
+    " f8[:,::1], f8[:,::1], f8[:,:,::1], f8[:,:,:,::1])"
+)
+def nearest_rows(
+    points: FloatArray,
+    c: FloatArray,
+    scatter: FloatArray,
+    position: FloatArray,
+    rotation: FloatArray,
+    distance: FloatArray,
+    bound: FloatArray,
+    found_position: FloatArray,
+    found_rotation: FloatArray,
+) -> None:
+    """Write the three nearest singular poses of each pose.
+
+    Args:
+        points: b1 to b4 in the platform frame, shape (4, 3).
+        c: Their centroid, shape (3,).
+        scatter: Theirs, shape (3, 3), with a trace of one.
+        position: Shape (n, 3).
+        rotation: Shape (n, 3, 3).
+        distance: Written, shape (n, 3).
+        bound: Written, shape (n, 3).
+        found_position: Written, shape (n, 3, 3).
+        found_rotation: Written, shape (n, 3, 3, 3).
+    """
+    forms, boxes, k, g = np.zeros((5, 4, 4)), np.empty((ROOM, 4)), np.empty(10), np.empty(3)
+    near_q, near_s = np.empty(3), np.empty((3, 3))
+    write_form(scatter, forms[0])
+    for row in range(position.shape[0]):
+        p, r, q, s = position[row], rotation[row], found_position[row], found_rotation[row]
+        size = math.sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2])
+        for i in range(3):
+            g[i] = p[i] + r[i, 0] * c[0] + r[i, 1] * c[1]
+            distance[row, i] = bound[row, i] = 0.0
+            copy_pose(p, r, q[i], s[i])
+        off = r[0, 2] * p[0] + r[1, 2] * p[1] + r[2, 2] * p[2]
+        if abs(off) > ROUNDING * size:
+            square = write_a1_on_plane(g, r, c, forms, q[0], s[0])
+            way = mean_way(points, p, r, q[0], s[0])
+            if shorter_shift(way, off, r[0, 2], r[1, 2], r[2, 2], p, q[0]):
+                copy_rotation(r, s[0])
+                way = abs(off)
+            distance[row, 0], bound[row, 0] = way, min(way, math.sqrt(max(0.0, square)))
+        across = math.hypot(r[1, 0], r[2, 0])
+        off = r[1, 0] * p[2] - r[2, 0] * p[1]
+        if across > ROUNDING and abs(off) > ROUNDING * across * size:
+            for i in range(2):
+                k[i] = r[i + 1, 0] * scatter[0, 0] + r[i + 1, 1] * scatter[1, 0]
+                k[i + 2] = r[i + 1, 0] * scatter[0, 1] + r[i + 1, 1] * scatter[1, 1]
+                k[i + 4] = g[i + 1]
+            k[6] = r[0, 0] * scatter[0, 0] + r[0, 1] * scatter[1, 0]
+            k[7] = r[0, 0] * scatter[0, 1] + r[0, 1] * scatter[1, 1]
+            k[8], k[9] = c[1], 2.0
+            phi, sigma, square = least_on_torus(k, boxes)
+            write_on_plane(phi, sigma, k, c, g, s[1], q[1])
+            way = mean_way(points, p, r, q[1], s[1])
+            # For the same reason, that which the pose itself descends to.
+            phi, sigma = angles_at(r)
+            phi, sigma = polished(phi, sigma, k)
+            write_on_plane(phi, sigma, k, c, g, near_s, near_q)
+            near_way = mean_way(points, p, r, near_q, near_s)
+            if near_way < way:
+                copy_pose(near_q, near_s, q[1], s[1])
+                way = near_way
+            off /= across
+            if shorter_shift(way, off, 0.0, -r[2, 0] / across, r[1, 0] / across, p, q[1]):
+                copy_rotation(r, s[1])
+                way = abs(off)
+            distance[row, 1], bound[row, 1] = way, min(way, math.sqrt(max(0.0, square)))
+        if abs(p[2]) > ROUNDING * size:
+            square = write_b4_on_plane(g, r, c, forms, q[2], s[2])
+            way = mean_way(points, p, r, q[2], s[2])
+            if shorter_shift(way, p[2], 0.0, 0.0, 1.0, p, q[2]):
+                copy_rotation(r, s[2])
+                way = abs(p[2])
+            distance[row, 2], bound[row, 2] = way, min(way, math.sqrt(max(0.0, square)))

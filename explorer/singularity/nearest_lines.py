@@ -1,0 +1,248 @@
+"""The nearest poses in which the line b2b3 meets the guide, or is parallel to it, exactly.
+
+Two lines meet or are parallel where one plane holds both. That plane turns about the guide
+by an angle φ, and the platform about its own line by an angle σ from the plane's normal n.
+For given φ and σ the best direction of the line in the plane and the best translation, the
+shortest one along n, are closed forms. What is left is a function on a torus,
+
+    f(φ, σ) = 2 tr M − 2 |W| − 2 b sin σ + (γ − c_y sin σ)²,
+    W = (a' + k cos σ, h − b' cos σ),
+
+with a and b the parts along n of m = R M x̂ and l = R M ŷ (M the scatter of the platform's
+points), γ that of their centroid, a' and b' the rates with φ, and h and k the parts of m and l
+along the guide. Its least is found by
+branch and bound: on a box of half-sides α and β, f is at least the least over its four corners
+of f linearised inside |·| and (·)², which is concave, less the second-order terms.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TypeAlias
+
+from explorer.numerics.arrays import FloatArray
+from explorer.numerics.compiled import helper
+
+Angles: TypeAlias = tuple[float, float]
+
+# The boxes that are looked at first, over half the torus: (φ + π, σ + π) is the same pose.
+FIRST_PHI, FIRST_SIGMA = 6, 12
+# Enough for all but poses in which the two lines nearly coincide.
+MOST_HALVINGS = 4_000
+ROOM = FIRST_PHI * FIRST_SIGMA + 2 * MOST_HALVINGS
+POLISH_STEPS = 60
+# Of the least, and of the scatter: what a box must promise to be looked into.
+RELATIVE_GAIN, LEAST_GAIN = 1e-9, 1e-14
+EPSILON = 2.0**-52
+
+
+@helper
+def parts_at(
+    phi: float, sigma: float, k: FloatArray
+) -> tuple[float, float, float, float, float, float, float, float, float, float]:
+    """Return a, b, γ, their rates a', b', γ', both sines and cosines, of φ first.
+
+    Args:
+        phi: The angle of the plane about the guide.
+        sigma: The angle of the platform about its line.
+        k: The constants, see `least_on_torus`.
+    """
+    cp, sp, cs, ss = math.cos(phi), math.sin(phi), math.cos(sigma), math.sin(sigma)
+    # n = (0, −sin φ, cos φ): at φ = 0 the plane is that of the base.
+    return (
+        -sp * k[0] + cp * k[1],
+        -sp * k[2] + cp * k[3],
+        -sp * k[4] + cp * k[5],
+        -cp * k[0] - sp * k[1],
+        -cp * k[2] - sp * k[3],
+        -cp * k[4] - sp * k[5],
+        sp,
+        cp,
+        ss,
+        cs,
+    )
+
+
+@helper
+def value_at(phi: float, sigma: float, k: FloatArray) -> float:
+    """Return f."""
+    _, b, g, da, db, _, _, _, ss, cs = parts_at(phi, sigma, k)
+    y = g - k[8] * ss
+    return k[9] - 2.0 * math.hypot(da + k[7] * cs, k[6] - db * cs) - 2.0 * b * ss + y * y
+
+
+@helper
+def bound_over(phi: float, sigma: float, alpha: float, beta: float, k: FloatArray) -> float:
+    """Return what f does not undercut within α of φ and β of σ."""
+    a, b, g, da, db, dg, _, _, ss, cs = parts_at(phi, sigma, k)
+    y = g - k[8] * ss
+    w0, w1 = da + k[7] * cs, k[6] - db * cs
+    w0_phi, w1_phi = -a * alpha, b * cs * alpha
+    w0_sigma, w1_sigma = -k[7] * ss * beta, db * ss * beta
+    slope_phi = (-2.0 * db * ss + 2.0 * y * dg) * alpha
+    slope_sigma = (-2.0 * b * cs - 2.0 * y * k[8] * cs) * beta
+    least = math.inf
+    for corner in range(4):
+        i = 1.0 if corner & 1 else -1.0
+        j = 1.0 if corner & 2 else -1.0
+        long = math.hypot(w0 + i * w0_phi + j * w0_sigma, w1 + i * w1_phi + j * w1_sigma)
+        least = min(least, i * slope_phi + j * slope_sigma - 2.0 * long)
+    # Second derivatives: of W, of b sin σ, and of γ − c_y sin σ.
+    size_a, size_b = math.hypot(k[0], k[1]), math.hypot(k[2], k[3])
+    second_w = (
+        math.hypot(size_a, size_b) * alpha * alpha
+        + 2.0 * size_b * alpha * beta
+        + math.hypot(k[7], size_b) * beta * beta
+    )
+    second_b = size_b * (alpha + beta) * (alpha + beta)
+    second_y = math.hypot(k[4], k[5]) * alpha * alpha + abs(k[8]) * beta * beta
+    return k[9] - 2.0 * b * ss + y * y + least - second_w - second_b - abs(y) * second_y
+
+
+@helper
+def polished(phi: float, sigma: float, k: FloatArray) -> Angles:
+    """Return the angles of the local least that Newton's method descends to."""
+    value = value_at(phi, sigma, k)
+    for _ in range(POLISH_STEPS):
+        a, b, g, da, db, dg, _, _, ss, cs = parts_at(phi, sigma, k)
+        y = g - k[8] * ss
+        w0, w1 = da + k[7] * cs, k[6] - db * cs
+        w = math.hypot(w0, w1)
+        if w == 0.0:
+            # A ridge: any way off it descends.
+            phi, sigma = phi + 1e-3, sigma + 1e-3
+            value = value_at(phi, sigma, k)
+            continue
+        p0, p1, s0, s1 = -a, b * cs, -k[7] * ss, db * ss
+        along_p, along_s = (w0 * p0 + w1 * p1) / w, (w0 * s0 + w1 * s1) / w
+        pp = (p0 * p0 + p1 * p1 - w0 * da + w1 * db * cs - along_p * along_p) / w
+        ps = (p0 * s0 + p1 * s1 - w1 * b * ss - along_p * along_s) / w
+        square = s0 * s0 + s1 * s1 - w0 * k[7] * cs + w1 * db * cs
+        sss = (square - along_s * along_s) / w
+        y_sigma = -k[8] * cs
+        slope_p = -2.0 * along_p - 2.0 * db * ss + 2.0 * y * dg
+        slope_s = -2.0 * along_s - 2.0 * b * cs + 2.0 * y * y_sigma
+        hpp = -2.0 * pp + 2.0 * b * ss + 2.0 * dg * dg - 2.0 * y * g
+        hps = -2.0 * ps - 2.0 * db * cs + 2.0 * dg * y_sigma
+        hss = -2.0 * sss + 2.0 * b * ss + 2.0 * y_sigma * y_sigma + 2.0 * y * k[8] * ss
+        # Where f is not convex, raise both eigenvalues to above zero.
+        middle, half = 0.5 * (hpp + hss), math.hypot(0.5 * (hpp - hss), hps)
+        raised = 0.0 if middle - half > 1e-9 * half else half - middle + 1e-3 * half
+        hpp, hss = hpp + raised, hss + raised
+        determinant = hpp * hss - hps * hps
+        if not determinant > 0.0:
+            break
+        step_p = -(hss * slope_p - hps * slope_s) / determinant
+        step_s = -(hpp * slope_s - hps * slope_p) / determinant
+        longest = max(abs(step_p), abs(step_s))
+        share = min(1.0, 0.5 / longest) if longest > 0.0 else 1.0
+        moved = value
+        for _ in range(30):
+            moved = value_at(phi + share * step_p, sigma + share * step_s, k)
+            if moved <= value + 8.0 * EPSILON * (abs(value) + k[9]):
+                break
+            share *= 0.25
+        phi, sigma = phi + share * step_p, sigma + share * step_s
+        value = moved
+        if share * longest <= 4.0 * EPSILON:
+            break
+    return phi, sigma
+
+
+@helper
+def least_on_torus(k: FloatArray, boxes: FloatArray) -> tuple[float, float, float]:
+    """Return the angles of the least f, and a bound that f undercuts nowhere.
+
+    Args:
+        k: m_y, m_z, l_y, l_z, g_y, g_z, m_x, l_x, c_y and 2 tr M, shape (10,); the
+            vectors in the base frame.
+        boxes: Overwritten, shape (ROOM, 4).
+    """
+    alpha, beta = 0.5 * math.pi / FIRST_PHI, math.pi / FIRST_SIGMA
+    last = 0
+    best, phi, sigma = math.inf, 0.0, 0.0
+    for i in range(FIRST_PHI):
+        for j in range(FIRST_SIGMA):
+            boxes[last, 0], boxes[last, 1] = (2 * i + 1) * alpha, (2 * j + 1) * beta
+            boxes[last, 2], boxes[last, 3] = alpha, beta
+            value = value_at(boxes[last, 0], boxes[last, 1], k)
+            if value < best:
+                best, phi, sigma = value, boxes[last, 0], boxes[last, 1]
+            last += 1
+    phi, sigma = polished(phi, sigma, k)
+    best = value_at(phi, sigma, k)
+    bound, first = math.inf, 0
+    # What bounds leave out grows with these, so boxes are longer where f bends less.
+    size_b = math.hypot(k[2], k[3])
+    bend_phi = math.hypot(math.hypot(k[0], k[1]), size_b) + k[4] * k[4] + k[5] * k[5]
+    bend_sigma = math.hypot(k[7], size_b) + k[8] * k[8]
+    # The largest boxes first, so that what is left in the end is bounded evenly.
+    while first < last:
+        p, s, alpha, beta = boxes[first]
+        first += 1
+        low, value = bound_over(p, s, alpha, beta, k), value_at(p, s, k)
+        if value < best:
+            best, phi, sigma = value, p, s
+            p_down, s_down = polished(p, s, k)
+            value = value_at(p_down, s_down, k)
+            if value < best:
+                best, phi, sigma = value, p_down, s_down
+        enough = best - RELATIVE_GAIN * abs(best) - LEAST_GAIN * k[9]
+        if low >= enough or last + 2 > ROOM:
+            bound = min(bound, low)
+            continue
+        halves_phi = bend_phi * alpha * alpha > bend_sigma * beta * beta
+        if halves_phi:
+            alpha *= 0.5
+        else:
+            beta *= 0.5
+        for side in (-1.0, 1.0):
+            boxes[last, 0] = p + side * alpha if halves_phi else p
+            boxes[last, 1] = s if halves_phi else s + side * beta
+            boxes[last, 2], boxes[last, 3] = alpha, beta
+            last += 1
+    return phi, sigma, min(bound, best)
+
+
+@helper
+def write_on_plane(
+    phi: float,
+    sigma: float,
+    k: FloatArray,
+    centroid: FloatArray,
+    g: FloatArray,
+    rotation: FloatArray,
+    position: FloatArray,
+) -> None:
+    """Write the best rotation (3, 3) and position (3,) at two angles.
+
+    Args:
+        phi: The angle of the plane about the guide.
+        sigma: The angle of the platform about its line.
+        k: The constants, see `least_on_torus`.
+        centroid: Of the platform's points, in its own frame, shape (3,).
+        g: The same of the pose to start from, in the base frame, shape (3,).
+        rotation: Written.
+        position: Written.
+    """
+    _, _, _, da, db, _, sp, cp, ss, cs = parts_at(phi, sigma, k)
+    w0, w1 = da + k[7] * cs, k[6] - db * cs
+    w = math.hypot(w0, w1)
+    if w > 0.0:
+        w0, w1 = w0 / w, w1 / w
+    else:
+        w0, w1 = 0.0, 1.0
+    # The guide, the plane's normal n, and n' = x̂ × n, the plane's direction across the guide.
+    x, n, across = (1.0, 0.0, 0.0), (0.0, -sp, cp), (0.0, -cp, -sp)
+    for i in range(3):
+        u = w1 * x[i] + w0 * across[i]
+        e = w0 * x[i] - w1 * across[i]
+        rotation[i, 0] = u
+        rotation[i, 1] = cs * e + ss * n[i]
+        rotation[i, 2] = cs * n[i] - ss * e
+        position[i] = g[i] - rotation[i, 0] * centroid[0] - rotation[i, 1] * centroid[1]
+    # Twice: the second time takes the rounding of the first.
+    for _ in range(2):
+        off = n[1] * position[1] + n[2] * position[2]
+        position[1] -= off * n[1]
+        position[2] -= off * n[2]

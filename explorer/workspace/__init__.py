@@ -1,0 +1,1 @@
+"""Which poses a design can take: positions at one orientation, and orientations at one position."""

@@ -1,0 +1,1 @@
+"""What of a workspace a collision-free move leads to from home."""

@@ -1,0 +1,189 @@
+"""Which nodes of a grid can be reached from a place without a collision of legs.
+
+The nodes keep all limits, the steps between neighbours are certified to be clear of every
+pair of legs (`explorer.legs.moves`), and what can be reached is a connected component of that
+graph (design.md, section 7). The grid goes on beyond the limits, so that a surface of
+collision can be followed up to them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from explorer.legs.clearance import PAIRS, leg_clearances
+from explorer.legs.moves import pairs_are_clear
+from explorer.mechanism.design import Design
+from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
+from explorer.workspace.limits.constraints import constraints, keeps
+
+ALL_PAIRS = tuple(range(len(PAIRS)))
+# Legs touch at a node where their axes are as near as this; a share of the reach.
+SLACK = 1e-9
+
+
+@dataclass(frozen=True)
+class Grid:
+    """A grid of positions.
+
+    Attributes:
+        lows: Of its first node, shape (3,), in design units.
+        step: Between neighbours on each axis, shape (3,), in design units.
+        counts: Nodes on each axis, at least 2.
+    """
+
+    lows: FloatArray
+    step: FloatArray
+    counts: tuple[int, int, int]
+
+    @cached_property
+    def positions(self) -> FloatArray:
+        """The nodes, shape (nx, ny, nz, 3)."""
+        axes = [
+            low + step * np.arange(count)
+            for low, step, count in zip(self.lows, self.step, self.counts, strict=True)
+        ]
+        return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+
+    def cell_around(self, position: FloatArray, wider: int = 0) -> tuple[slice, slice, slice]:
+        """Return the nodes of the cell that holds a position, or of cells around it too."""
+        first = np.floor((position - self.lows) / self.step).astype(np.int64)
+        x, y, z = (
+            slice(max(0, int(i) - wider), max(0, min(int(i) + 2 + wider, many)))
+            for i, many in zip(first, self.counts, strict=True)
+        )
+        return x, y, z
+
+
+def grid_over(lows: FloatArray, highs: FloatArray, nodes: int, beyond: int) -> Grid:
+    """Return a grid over a box: its first and last nodes on the box, and some beyond it.
+
+    Args:
+        lows: Of the box, shape (3,).
+        highs: Of the box, shape (3,).
+        nodes: On each axis, at least 2.
+        beyond: How many more nodes on either side.
+    """
+    step = (highs - lows) / (nodes - 1)
+    many = nodes + 2 * beyond
+    return Grid(lows - beyond * step, step, (many, many, many))
+
+
+def middles_over(lows: FloatArray, highs: FloatArray, cells: int) -> Grid:
+    """Return the grid of the middles of a box's cells, `cells` on each axis, at least 2."""
+    step = (highs - lows) / cells
+    return Grid(lows + 0.5 * step, step, (cells, cells, cells))
+
+
+@dataclass(frozen=True)
+class Survey:
+    """What is known of a grid of positions at one orientation.
+
+    Attributes:
+        design: The manipulator.
+        rotation: Platform to base, shape (3, 3).
+        grid: The nodes.
+        within: Whether each keeps all limits, shape (nx, ny, nz).
+        clearance: Of each pair at each node, shape (nx, ny, nz, 6).
+        first, second: The nodes of each step along an axis, as flat indices, shape (m,).
+        clear: Which pairs are certified to be clear all along each step, shape (m, 6).
+    """
+
+    design: Design
+    rotation: FloatArray
+    grid: Grid
+    within: BoolArray
+    clearance: FloatArray
+    first: IntArray
+    second: IntArray
+    clear: BoolArray
+
+    def reached(self, start: FloatArray, pairs: Sequence[int] = ALL_PAIRS) -> BoolArray:
+        """Return which nodes can be reached within the limits, shape (nx, ny, nz).
+
+        Args:
+            start: A position that keeps all limits and clearances, shape (3,).
+            pairs: Indices of the pairs that count.
+        """
+        return self._component(self.linked(start, pairs), self.within, pairs)
+
+    def flooded(self, reached: BoolArray, pairs: Sequence[int] = ALL_PAIRS) -> BoolArray:
+        """Return what can be reached if the limits may be left, but not come back within.
+
+        Nodes that keep the limits belong to it only if they are reached. What separates
+        it from the others are collisions alone, at the limits and beyond.
+        """
+        return self._component(reached, reached | ~self.within, pairs)
+
+    def linked(self, start: FloatArray, pairs: Sequence[int] = ALL_PAIRS) -> BoolArray:
+        """Return the nodes next to a position that a straight clear move leads to."""
+        linked = np.zeros(self.within.shape, dtype=np.bool_)
+        for wider in range(3):
+            cell = self.grid.cell_around(start, wider)
+            near = self.grid.positions[cell]
+            clear = pairs_are_clear(self.design, start, self.rotation, near, self.rotation)
+            linked[cell] = clear[..., list(pairs)].all(axis=-1) & self.within[cell]
+            if linked.any():
+                break
+        return linked
+
+    def _component(self, seeds: BoolArray, among: BoolArray, pairs: Sequence[int]) -> BoolArray:
+        """Return the nodes among some that clear steps connect with seeds."""
+        from scipy.sparse import coo_array
+        from scipy.sparse.csgraph import connected_components
+
+        allowed = among.ravel()
+        clear = self.clear[:, list(pairs)].all(axis=-1)
+        kept = clear & allowed[self.first] & allowed[self.second]
+        ends = (self.first[kept], self.second[kept])
+        ones = np.ones(len(ends[0]), dtype=np.int8)
+        graph = coo_array((ones, ends), shape=(allowed.size, allowed.size))
+        count, labels = connected_components(graph, directed=False)
+        is_home = np.zeros(count, dtype=np.bool_)
+        is_home[labels[seeds.ravel() & allowed]] = True
+        return np.asarray((is_home[labels] & allowed).reshape(among.shape))
+
+
+def survey(design: Design, rotation: FloatArray, grid: Grid) -> Survey:
+    """Return what limits and collisions leave of a grid of positions.
+
+    Args:
+        design: The manipulator.
+        rotation: Platform to base, shape (3, 3).
+        grid: The nodes.
+    """
+    positions = grid.positions
+    slack = SLACK * design.reach
+    kept = keeps(design, constraints(design, rotation), positions)
+    clearance = leg_clearances(design, positions, rotation).clearance
+    index = np.arange(math.prod(grid.counts)).reshape(grid.counts)
+    ends = [
+        (np.delete(index, -1, axis).ravel(), np.delete(index, 0, axis).ravel()) for axis in range(3)
+    ]
+    first, second = (np.concatenate(side) for side in zip(*ends, strict=True))
+    length = np.repeat(grid.step, [len(one) for one, _ in ends])
+    flat = clearance.reshape(-1, len(PAIRS))
+    a, b = flat[first], flat[second]
+    # At a fixed orientation a clearance changes by no more than the position does, so that
+    # most steps are clear beyond doubt, or not clear because an end is not.
+    clear = a + b > (1.0 + SLACK) * length[:, None]
+    apart = (a > slack) & (b > slack)
+    doubtful = np.flatnonzero((~clear & apart).any(axis=-1))
+    nodes = positions.reshape(-1, 3)
+    clear[doubtful] |= pairs_are_clear(
+        design, nodes[first[doubtful]], rotation, nodes[second[doubtful]], rotation
+    )
+    return Survey(
+        design=design,
+        rotation=rotation,
+        grid=grid,
+        within=np.asarray(kept.all(axis=-1)),
+        clearance=clearance,
+        first=first,
+        second=second,
+        clear=clear & apart,
+    )

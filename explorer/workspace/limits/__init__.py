@@ -1,0 +1,1 @@
+"""The limits of a design, as surfaces in the space of positions and as tests of poses."""

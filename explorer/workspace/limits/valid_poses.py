@@ -1,0 +1,289 @@
+"""Whether poses keep everything that a design demands, as a compiled yes or no.
+
+Limits, the home's sign triple and the clearances of all pairs of legs together, without
+saying which is broken: for that see `explorer.workspace.limits.broken` and
+`explorer.legs.clearance`, with which this agrees.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from explorer.legs.clearance import joined_pairs, radii_of_pairs
+from explorer.legs.segments import Vector, closest_shares, minus, square_at
+from explorer.mechanism.design import LENGTHS, TOLERANCE, Design
+from explorer.mechanism.pose import checked_rotation
+from explorer.numerics.arrays import BoolArray, FloatArray, batch_shape, finite_array, for_kernel
+from explorer.numerics.compiled import helper, kernel
+from explorer.workspace.limits.constraints import demanded_order, home_signs, joint_cones
+
+# Where in the row of rules what is; see `Rules.of`.
+A3, B1, B2, B3 = 0, 2, 4, 5
+LENGTH_LOWS, LENGTH_HIGHS = 6, 10
+GUIDE_LOW, GUIDE_HIGH, GAP = 14, 15, 16
+BOX_LOWS, BOX_HIGHS = 17, 20
+MARGIN, SIGNS, ORDER = 23, 24, 27
+RADII = 28
+COUNT = 34
+
+
+@dataclass(frozen=True)
+class Rules:
+    """What a design demands of a pose, as the kernels take it.
+
+    Attributes:
+        row: Design variables, limits with their tolerance, signs of the home, the order of
+            the carriages and radii, shape (COUNT,); what is not demanded is infinite, the
+            order then 0.
+        cones: Of the joints, as rows (leg, axis, cosine and sine of the half-angle, whether
+            the axis turns with the platform), shape (n, 7). A row of leg 0 is never kept.
+    """
+
+    row: FloatArray
+    cones: FloatArray
+
+    @staticmethod
+    def of(
+        design: Design, signs: tuple[int, int, int] | None = None, order: int | None = None
+    ) -> Rules:
+        """Return the rules of a design.
+
+        Args:
+            design: The manipulator.
+            signs: The sign triple to demand instead of the home's, and at all events.
+            order: The sign of d3 − d1 to demand, 0 for either; the one that the design
+                demands if None.
+        """
+        limits, slack = design.limits, design.tolerance
+        row = np.empty(COUNT)
+        row[:LENGTH_LOWS] = design.variables
+        for index, name in enumerate(LENGTHS):
+            low, high = design.length_range(name)
+            row[LENGTH_LOWS + index], row[LENGTH_HIGHS + index] = low - slack, high + slack
+        low, high = limits.guide or (-math.inf, math.inf)
+        row[GUIDE_LOW], row[GUIDE_HIGH] = low - slack, high + slack
+        row[GAP] = limits.gap - slack
+        lows, highs = limits.box or ((-math.inf,) * 3, (math.inf,) * 3)
+        row[BOX_LOWS:BOX_HIGHS] = np.array(lows) - slack
+        row[BOX_HIGHS:MARGIN] = np.array(highs) + slack
+        row[MARGIN] = -math.inf if limits.margin is None else limits.margin - slack
+        if signs is not None:
+            row[MARGIN] = (limits.margin or 0.0) - slack
+        row[SIGNS:ORDER] = signs or home_signs(design)
+        row[ORDER] = demanded_order(design) if order is None else order
+        # A pair that shares a joint has no clearance to keep.
+        row[RADII:] = np.where(joined_pairs(design), -1.0, radii_of_pairs(design))
+        cones = [
+            (0.0,) * 7
+            if each.axis is None
+            else (
+                float(each.leg),
+                *each.axis.tolist(),
+                # As the limits count it; half a turn is no bound.
+                math.cos(min(math.pi, each.half_angle + TOLERANCE)),
+                math.sin(min(math.pi, each.half_angle + TOLERANCE)),
+                float(each.in_platform),
+            )
+            for each in joint_cones(design)
+        ]
+        return Rules(row, np.array(cones, dtype=np.float64).reshape(-1, 7))
+
+    def with_room(self, margin: float, clearance: float) -> Rules:
+        """Return the rules with margins and clearances of at least so much, or what they were.
+
+        Args:
+            margin: In design units; where no margin is demanded, none is.
+            clearance: In design units, beyond the radii.
+        """
+        row = self.row.copy()
+        if row[MARGIN] > -math.inf:
+            row[MARGIN] = max(row[MARGIN], margin)
+        row[RADII:] = np.where(row[RADII:] < 0.0, row[RADII:], row[RADII:] + clearance)
+        return Rules(row, self.cones)
+
+
+def poses_are_valid(
+    design: Design, position: ArrayLike, rotation: ArrayLike, *, rules: Rules | None = None
+) -> BoolArray:
+    """Return whether poses keep all limits and clearances, shape (...).
+
+    A clearance of zero is a collision, as for `explorer.tetrahedra_overlap`.
+
+    Args:
+        design: The manipulator.
+        position: b4 in the base frame, shape (..., 3), in design units.
+        rotation: Platform to base, shape (..., 3, 3).
+        rules: Those of the design, to save making them for each call.
+
+    Raises:
+        InputError: a pose that is not finite or not a rotation.
+    """
+    p, r = finite_array("position", position, (3,)), checked_rotation(rotation)
+    batch = batch_shape((p, 1), (r, 2))
+    p_rows = np.broadcast_to(p, (*batch, 3)).reshape(-1, 3)
+    r_rows = np.broadcast_to(r, (*batch, 3, 3)).reshape(-1, 3, 3)
+    valid = np.empty(len(p_rows), dtype=np.bool_)
+    demanded = rules or Rules.of(design)
+    valid_rows(
+        len(p_rows),
+        demanded.row,
+        demanded.cones,
+        for_kernel(p_rows),
+        for_kernel(r_rows),
+        valid,
+    )
+    return valid.reshape(batch)
+
+
+@helper
+def within(square: float, low: float, high: float) -> bool:
+    """Return whether the root of a square lies within bounds; a low one may be negative."""
+    return square <= high * high and (low <= 0.0 or square >= low * low)
+
+
+@helper
+def carriages_apart(row: FloatArray, d1: float, d3: float) -> float:
+    """Return how far apart the carriages are; negative where they are not in their order."""
+    return row[ORDER] * (d3 - d1) if row[ORDER] != 0.0 else abs(d3 - d1)
+
+
+@helper
+def write_ends(
+    row: FloatArray, p: FloatArray, r: FloatArray, base: FloatArray, ends: FloatArray
+) -> None:
+    """Write the base ends and the platform ends of the four legs, shape (4, 3) each."""
+    for i in range(3):
+        ends[0, i] = p[i] + row[B1] * r[i, 0] + row[B1 + 1] * r[i, 1]
+        ends[1, i] = p[i] + row[B2] * r[i, 0]
+        ends[2, i] = p[i] + row[B3] * r[i, 0]
+        ends[3, i] = p[i]
+        base[0, i] = base[1, i] = base[2, i] = base[3, i] = 0.0
+    base[1, 0], base[2, 0] = ends[1, 0], ends[2, 0]
+    base[3, 0], base[3, 1] = row[A3], row[A3 + 1]
+
+
+@helper
+def keeps_limits(
+    row: FloatArray, p: FloatArray, r: FloatArray, base: FloatArray, ends: FloatArray
+) -> bool:
+    """Return whether a pose keeps lengths, guide, gap, the carriages' order, box and margins."""
+    for i in range(3):
+        if not row[BOX_LOWS + i] <= p[i] <= row[BOX_HIGHS + i]:
+            return False
+    least = row[MARGIN]
+    if least > -math.inf:
+        k1 = -(r[0, 2] * p[0] + r[1, 2] * p[1] + r[2, 2] * p[2])
+        k2 = r[1, 0] * p[2] - r[2, 0] * p[1]
+        if row[SIGNS] * k1 < least or row[SIGNS + 1] * k2 < least or row[SIGNS + 2] * p[2] < least:
+            return False
+    d1, d3 = ends[1, 0], ends[2, 0]
+    if min(d1, d3) < row[GUIDE_LOW] or max(d1, d3) > row[GUIDE_HIGH]:
+        return False
+    if carriages_apart(row, d1, d3) < row[GAP]:
+        return False
+    for leg in range(4):
+        square = 0.0
+        for i in range(3):
+            square += (ends[leg, i] - base[leg, i]) ** 2
+        if not within(square, row[LENGTH_LOWS + leg], row[LENGTH_HIGHS + leg]):
+            return False
+    return True
+
+
+@helper
+def keeps_cones(cones: FloatArray, r: FloatArray, base: FloatArray, ends: FloatArray) -> bool:
+    """Return whether a pose keeps the cones of its joints."""
+    for index in range(cones.shape[0]):
+        leg = int(cones[index, 0]) - 1
+        if leg < 0:
+            return False
+        x, y, z = cones[index, 1], cones[index, 2], cones[index, 3]
+        if cones[index, 6] > 0.0:
+            x, y, z = (
+                r[0, 0] * x + r[0, 1] * y + r[0, 2] * z,
+                r[1, 0] * x + r[1, 1] * y + r[1, 2] * z,
+                r[2, 0] * x + r[2, 1] * y + r[2, 2] * z,
+            )
+        a = ends[leg, 0] - base[leg, 0]
+        b = ends[leg, 1] - base[leg, 1]
+        c = ends[leg, 2] - base[leg, 2]
+        along = a * x + b * y + c * z
+        across = math.sqrt((b * z - c * y) ** 2 + (c * x - a * z) ** 2 + (a * y - b * x) ** 2)
+        # The sine of the cone's angle less the leg's, times the length.
+        if cones[index, 5] * along < cones[index, 4] * across:
+            return False
+    return True
+
+
+@helper
+def vector(points: FloatArray, index: int) -> Vector:
+    """Return a row of an array as three numbers."""
+    return (points[index, 0], points[index, 1], points[index, 2])
+
+
+@helper
+def is_clear(i: int, j: int, radius: float, base: FloatArray, ends: FloatArray) -> bool:
+    """Return whether two legs are farther apart than a sum of radii."""
+    if radius < 0.0:
+        return True
+    # Most pairs are apart on an axis of the base already.
+    for axis in range(3):
+        a, b = base[i, axis], ends[i, axis]
+        c, d = base[j, axis], ends[j, axis]
+        if max(min(a, b) - max(c, d), min(c, d) - max(a, b)) > radius:
+            return True
+    start, other = vector(base, i), vector(base, j)
+    u, v = minus(vector(ends, i), start), minus(vector(ends, j), other)
+    w = minus(start, other)
+    s, t = closest_shares(u, v, w)
+    return square_at(s, t, u, v, w) > radius * radius
+
+
+@helper
+def keeps_all(
+    row: FloatArray,
+    cones: FloatArray,
+    p: FloatArray,
+    r: FloatArray,
+    base: FloatArray,
+    ends: FloatArray,
+) -> bool:
+    """Return whether a pose keeps everything; the ends of the legs are written."""
+    write_ends(row, p, r, base, ends)
+    if not keeps_limits(row, p, r, base, ends):
+        return False
+    if not keeps_cones(cones, r, base, ends):
+        return False
+    pair = RADII
+    for i in range(3):
+        for j in range(i + 1, 4):
+            if not is_clear(i, j, row[pair], base, ends):
+                return False
+            pair += 1
+    return True
+
+
+@kernel("void(f8[::1], f8[:,::1], f8[:,::1], f8[:,:,::1], b1[::1])")
+def valid_rows(
+    row: FloatArray,
+    cones: FloatArray,
+    position: FloatArray,
+    rotation: FloatArray,
+    valid: BoolArray,
+) -> None:
+    """Write for each pose whether it keeps everything.
+
+    Args:
+        row: Of the rules.
+        cones: Of the rules.
+        position: Shape (n, 3).
+        rotation: Shape (n, 3, 3).
+        valid: Written, shape (n,).
+    """
+    base, ends = np.zeros((4, 3)), np.zeros((4, 3))
+    for index in range(position.shape[0]):
+        valid[index] = keeps_all(row, cones, position[index], rotation[index], base, ends)

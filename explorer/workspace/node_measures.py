@@ -1,0 +1,210 @@
+"""What the nodes of a grid over a workspace tell: its extent, margins and clearances.
+
+The nodes are the middles of the cells of a box about the constant-orientation workspace, so
+that none lies in a surface. What is least over them is an upper bound of what is least over
+the workspace: `explorer.least_clearances` looks between them.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from explorer.errors import InputError
+from explorer.legs.clearance import PAIRS, joined_pairs, radii_of_pairs
+from explorer.legs.segments import closest_shares, minus, square_at
+from explorer.mechanism.design import Design
+from explorer.mechanism.pose import checked_rotation
+from explorer.numerics.arrays import BoolArray, FloatArray
+from explorer.numerics.compiled import kernel
+from explorer.workspace.limits.constraints import constraints
+from explorer.workspace.limits.region import region_of
+from explorer.workspace.limits.valid_poses import LENGTH_LOWS, vector, write_ends
+from explorer.workspace.slices.nodes import keeps_all
+from explorer.workspace.slices.volume import bounds, home_rotation
+
+# Nodes on each axis.
+DEFAULT_NODES = 20
+FEWEST_NODES, MOST_NODES = 2, 200
+
+# Where in the row of results what is; see `measure_nodes`.
+COUNT, LOWS, HIGHS, LEAST, MEAN, OFF_PLANES, CLEAR, DISTANCES, RESULTS = (
+    0,
+    1,
+    4,
+    7,
+    10,
+    11,
+    12,
+    13,
+    19,
+)
+
+
+@dataclass(frozen=True)
+class NodeMeasures:
+    """What the nodes of a grid over a workspace tell, in design units.
+
+    Where there is no node to tell of, lengths are NaN and clearances infinite.
+
+    Attributes:
+        positions: The nodes within the limits, shape (n, 3).
+        extent: From the lowest to the highest of them on each axis, shape (3,).
+        margins: Least |κ1|, |κ2|, |κ3| over them, shape (3,).
+        mean_margin: The mean over them of the smallest of |κ1|, |κ2|, |κ3|.
+        clearances: Least over those with every |κ| at least the margin asked for, shape
+            (6,), in the order of `PAIRS`; inf for a pair that shares a joint.
+        clear_share: Which share of all nodes has every clearance above zero; NaN if
+            there are none.
+    """
+
+    positions: FloatArray
+    extent: FloatArray
+    margins: FloatArray
+    mean_margin: float
+    clearances: FloatArray
+    clear_share: float
+
+
+def node_measures(
+    design: Design,
+    rotation: ArrayLike | None = None,
+    *,
+    nodes: int = DEFAULT_NODES,
+    clearance_margin: float = 0.0,
+) -> NodeMeasures:
+    """Return what a grid of nodes tells of the constant-orientation workspace.
+
+    Args:
+        design: The manipulator; the radii are those of its limits.
+        rotation: Platform to base, shape (3, 3); that of the home pose if None.
+        nodes: On each axis of a box about the workspace.
+        clearance_margin: Clearances count only where every |κ| is at least this, in
+            design units; nearer to a singularity legs may have to meet.
+
+    Raises:
+        InputError: not a rotation, or too few or too many nodes.
+    """
+    if not FEWEST_NODES <= nodes <= MOST_NODES:
+        raise InputError(
+            f"the nodes on an axis must be from {FEWEST_NODES} to {MOST_NODES}; got {nodes}"
+        )
+    r = home_rotation(design) if rotation is None else checked_rotation(rotation)
+    region = region_of(constraints(design, r))
+    lows, highs = bounds(region)
+    found, within = np.zeros(RESULTS), np.zeros((nodes, nodes, nodes), dtype=np.bool_)
+    step = (highs - lows) / nodes
+    is_empty = region.is_empty or not (lows < highs).all()
+    if not is_empty:
+        row = np.zeros(LENGTH_LOWS)
+        row[:] = design.variables
+        radii = np.where(joined_pairs(design), -math.inf, radii_of_pairs(design))
+        measure_nodes(
+            nodes**3,
+            region.rounds,
+            region.planes,
+            region.cones,
+            lows + 0.5 * step,
+            step,
+            row,
+            np.array(r),
+            radii,
+            clearance_margin,
+            within,
+            found,
+        )
+    count = float(found[COUNT])
+    return NodeMeasures(
+        positions=lows + (np.argwhere(within) + 0.5) * step if count else np.zeros((0, 3)),
+        extent=(found[HIGHS:LEAST] - found[LOWS:HIGHS]) * step if count else np.full(3, np.nan),
+        margins=found[LEAST:MEAN].copy() if count else np.full(3, np.nan),
+        mean_margin=float(found[MEAN]) / count if count else math.nan,
+        clearances=found[DISTANCES:] if found[OFF_PLANES] else np.full(len(PAIRS), math.inf),
+        clear_share=float(found[CLEAR]) / count if count else math.nan,
+    )
+
+
+@kernel(
+    "void(f8[:,::1], f8[:,::1], f8[:,::1], f8[::1], f8[::1], f8[::1], f8[:,::1], f8[::1], f8, "
+    "b1[:,:,::1], f8[::1])"
+)
+def measure_nodes(  # noqa: PLR0917 - all that it depends on
+    rounds: FloatArray,
+    planes: FloatArray,
+    cones: FloatArray,
+    first: FloatArray,
+    step: FloatArray,
+    row: FloatArray,
+    r: FloatArray,
+    radii: FloatArray,
+    margin: float,
+    within: BoolArray,
+    found: FloatArray,
+) -> None:
+    """Write what the nodes tell.
+
+    Args:
+        rounds: Of the region, shape (n, 6).
+        planes: Of the region, shape (m, 4).
+        cones: Of the region, shape (k, 8).
+        first: The first node, shape (3,).
+        step: Between the nodes, shape (3,).
+        row: Design variables, shape (6,).
+        r: The rotation, shape (3, 3).
+        radii: Sum of both of each pair, shape (6,); -inf for a pair not looked at.
+        margin: From which on clearances count.
+        within: Written: which nodes are in the region.
+        found: Written, shape (RESULTS,): how many those are, their lowest and highest
+            indices, least margins, sum of the smallest margins, how many are off the
+            singular planes, how many have clear legs, least clearances of the pairs.
+    """
+    p, base, ends = np.zeros(3), np.zeros((4, 3)), np.zeros((4, 3))
+    found[:] = 0.0
+    found[LOWS:MEAN] = np.inf
+    found[HIGHS:LEAST] = -1.0
+    found[DISTANCES:] = np.inf
+    for i in range(within.shape[0]):
+        p[0] = first[0] + i * step[0]
+        for j in range(within.shape[1]):
+            p[1] = first[1] + j * step[1]
+            for k in range(within.shape[2]):
+                p[2] = first[2] + k * step[2]
+                within[i, j, k] = keeps_all(p[0], p[1], p[2], rounds, planes, cones, 0.0)
+                if not within[i, j, k]:
+                    continue
+                found[COUNT] += 1.0
+                for axis in range(3):
+                    at = float(i if axis == 0 else (j if axis == 1 else k))
+                    found[LOWS + axis] = min(found[LOWS + axis], at)
+                    found[HIGHS + axis] = max(found[HIGHS + axis], at)
+                k1 = abs(r[0, 2] * p[0] + r[1, 2] * p[1] + r[2, 2] * p[2])
+                k2 = abs(r[1, 0] * p[2] - r[2, 0] * p[1])
+                k3 = abs(p[2])
+                found[LEAST] = min(found[LEAST], k1)
+                found[LEAST + 1] = min(found[LEAST + 1], k2)
+                found[LEAST + 2] = min(found[LEAST + 2], k3)
+                smallest = min(k1, k2, k3)
+                found[MEAN] += smallest
+                counts = smallest >= margin
+                if counts:
+                    found[OFF_PLANES] += 1.0
+                write_ends(row, p, r, base, ends)
+                pair, is_clear = DISTANCES, True
+                for one in range(3):
+                    for other in range(one + 1, 4):
+                        both = radii[pair - DISTANCES]
+                        if both >= 0.0:
+                            start, far = vector(base, one), vector(base, other)
+                            u, v = minus(vector(ends, one), start), minus(vector(ends, other), far)
+                            w = minus(start, far)
+                            s, t = closest_shares(u, v, w)
+                            clearance = math.sqrt(square_at(s, t, u, v, w)) - both
+                            is_clear = is_clear and clearance > 0.0
+                            if counts:
+                                found[pair] = min(found[pair], clearance)
+                        pair += 1
+                if is_clear:
+                    found[CLEAR] += 1.0

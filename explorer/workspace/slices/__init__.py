@@ -1,0 +1,1 @@
+"""Sections of a workspace at constant x: exact areas and volumes, outlines and grids."""

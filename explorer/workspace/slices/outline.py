@@ -1,0 +1,299 @@
+"""The outline of a slice of the workspace, exactly: arcs of circles and straight edges.
+
+At one orientation the limits are balls, cylinders along x and half-spaces, so a plane across
+an axis cuts each in a circle, in a pair of lines or in a line. Each of these curves is split
+where it meets the others; the parts that keep all other limits are joined to closed loops. An
+independent way to the areas that `explorer.workspace.slices.arcs` integrates.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from explorer.errors import InputError
+from explorer.mechanism.design import Design
+from explorer.mechanism.pose import checked_rotation
+from explorer.numerics.arrays import BoolArray, FloatArray
+from explorer.workspace.limits.constraints import Cone, Constraint, HalfSpace, Round, constraints
+from explorer.workspace.limits.region import region_of
+from explorer.workspace.slices.volume import bounds
+
+AXES = "xyz"
+
+# Shares of the size of the region: curves that differ by less are one; ends of edges that are
+# nearer are one corner; edges that are shorter are none.
+SAME = 1e-11
+CORNER = 1e-6
+SHORT = 1e-9
+
+Point: TypeAlias = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Edge:
+    """A part of an outline, with the slice on its left.
+
+    Attributes:
+        start, end: Its ends, on the two axes of the slice.
+        centre: Of the circle that it is an arc of; None for a straight edge.
+        turn: The angle that an arc turns by, in radians: positive counter-clockwise.
+        limit: Which bounds the slice here, such as "l1 maximum".
+    """
+
+    start: Point
+    end: Point
+    centre: Point | None
+    turn: float
+    limit: str
+
+    @property
+    def radius(self) -> float:
+        """Of the arc, 0 for a straight edge."""
+        return 0.0 if self.centre is None else math.dist(self.centre, self.start)
+
+    @property
+    def area(self) -> float:
+        """What the edge contributes to the area by Green's theorem, ½ ∮ (u dv − v du)."""
+        (u0, v0), (u1, v1) = self.start, self.end
+        if self.centre is None:
+            return 0.5 * (u0 * v1 - u1 * v0)
+        u, v = self.centre
+        return 0.5 * (self.radius**2 * self.turn + u * (v1 - v0) - v * (u1 - u0))
+
+
+@dataclass(frozen=True)
+class Outline:
+    """The outline of a slice.
+
+    Attributes:
+        axis: Across which the slice is cut: "x", "y" or "z".
+        level: Where, in design units.
+        loops: Closed loops of edges; those about holes run clockwise. () for an empty slice.
+    """
+
+    axis: str
+    level: float
+    loops: tuple[tuple[Edge, ...], ...]
+
+    @property
+    def area(self) -> float:
+        """That of the slice, in squared design units."""
+        return math.fsum(edge.area for loop in self.loops for edge in loop)
+
+
+@dataclass(frozen=True)
+class _Curve:
+    """A circle, or a line n·q = offset with |n| = 1; what is kept locally lies on one side."""
+
+    centre: Point
+    radius: float
+    normal: Point
+    offset: float
+    side: float
+    limit: str
+    # Of the limit that it belongs to; a cylinder has two lines.
+    owner: int
+
+    @property
+    def is_circle(self) -> bool:
+        return self.radius > 0.0
+
+    def is_same(self, other: _Curve, same: float) -> bool:
+        if self.is_circle != other.is_circle or self.side != other.side:
+            return False
+        if self.is_circle:
+            off = max(math.dist(self.centre, other.centre), abs(self.radius - other.radius))
+            return off <= same
+        turned = math.dist(self.normal, other.normal)
+        return turned <= SAME and abs(self.offset - other.offset) <= same
+
+
+def slice_outline(design: Design, rotation: ArrayLike, axis: str, level: float) -> Outline | None:
+    """Return the outline of a slice of the constant-orientation workspace.
+
+    None where a limit on a swing bounds it, whose cone is cut in no circle, or where edges
+    cannot be told apart in double precision.
+
+    Args:
+        design: The manipulator.
+        rotation: Platform to base, shape (3, 3).
+        axis: "x", "y" or "z": across which to cut. The slice's own axes are the other two.
+        level: Where on this axis, in design units.
+
+    Raises:
+        InputError: no such axis, or not a rotation.
+    """
+    if axis not in AXES or len(axis) != 1:
+        raise InputError(f"a slice is cut across x, y or z; got {axis!r}")
+    limits = constraints(design, checked_rotation(rotation))
+    if any(isinstance(limit, Cone) for limit in limits):
+        return None
+    empty = Outline(axis, level, ())
+    region = region_of(limits)
+    lows, highs = bounds(region)
+    if region.is_empty or not (lows < highs).all():
+        return empty
+    kept = _kept(limits)
+    size = float(max(np.abs(lows).max(), np.abs(highs).max()))
+    curves: list[_Curve] = []
+    for owner, limit in enumerate(kept):
+        found = _curves_of(limit, AXES.index(axis), level, owner)
+        if found is None:
+            return empty
+        for curve in found:
+            if not any(curve.is_same(other, SAME * size) for other in curves):
+                curves.append(curve)
+    edges = [edge for curve in curves for edge in _edges_of(curve, curves, size)]
+    loops = _joined(edges, CORNER * size)
+    return None if loops is None else replace(empty, loops=loops)
+
+
+def _kept(limits: tuple[Constraint, ...]) -> list[Round | HalfSpace]:
+    return [limit for limit in limits if isinstance(limit, Round | HalfSpace)]
+
+
+def _curves_of(limit: Round | HalfSpace, cut: int, level: float, owner: int) -> list[_Curve] | None:
+    """Return the curves that a plane cuts a limit's surface in; None if it keeps nothing of it."""
+    first, second = (each for each in range(3) if each != cut)
+    if isinstance(limit, HalfSpace):
+        n = limit.normal[[first, second]]
+        offset = limit.offset - float(limit.normal[cut]) * level
+        length = float(np.hypot(n[0], n[1]))
+        if length <= SAME * float(np.linalg.norm(limit.normal)):
+            return [] if offset >= 0.0 else None
+        u, v = (n / length).tolist()
+        return [_Curve((0.0, 0.0), 0.0, (u, v), offset / length, 1.0, limit.name, owner)]
+    side = 1.0 if limit.inside else -1.0
+    centre = (float(limit.centre[first]), float(limit.centre[second]))
+    if not limit.is_ball and cut == 0:
+        return [_Curve(centre, limit.radius, (0.0, 0.0), 0.0, side, limit.name, owner)]
+    off = level - float(limit.centre[cut])
+    square = (limit.radius - off) * (limit.radius + off)
+    if square <= 0.0:
+        return None if limit.inside else []
+    half = math.sqrt(square)
+    if limit.is_ball:
+        return [_Curve(centre, half, (0.0, 0.0), 0.0, side, limit.name, owner)]
+    # A cylinder along x is cut in two lines, on either side of its axis.
+    high = _Curve((0.0, 0.0), 0.0, (0.0, side), side * (centre[1] + half), side, limit.name, owner)
+    low = replace(high, normal=(0.0, -side), offset=side * (half - centre[1]))
+    return [high, low]
+
+
+def _edges_of(curve: _Curve, curves: list[_Curve], size: float) -> list[Edge]:
+    """Return the parts of a curve that keep all limits but its own."""
+    others = [other for other in curves if other.owner != curve.owner]
+    # Two lines of a cylinder are parallel, so curves of one limit never meet.
+    stops = sorted(stop for other in others for stop in _meetings(curve, other))
+    if curve.is_circle:
+        if not stops:
+            stops = [0.0, math.pi]
+        stops.append(stops[0] + 2.0 * math.pi)
+    else:
+        stops = [-4.0 * size, *stops, 4.0 * size]
+    low, high = np.array(stops[:-1]), np.array(stops[1:])
+    long = (high - low) * (curve.radius or 1.0) > SHORT * size
+    low, high = low[long], high[long]
+    kept = _keeps(_at(curve, 0.5 * (low + high)), others)
+    starts, ends = _at(curve, low[kept]).tolist(), _at(curve, high[kept]).tolist()
+    turns = (high - low)[kept].tolist() if curve.is_circle else [0.0] * len(starts)
+    centre = curve.centre if curve.is_circle else None
+    edges = [
+        Edge((a[0], a[1]), (b[0], b[1]), centre, turn, curve.limit)
+        for a, b, turn in zip(starts, ends, turns, strict=True)
+    ]
+    if curve.is_circle and curve.side < 0.0:
+        return [replace(e, start=e.end, end=e.start, turn=-e.turn) for e in edges]
+    return edges
+
+
+def _at(curve: _Curve, parameter: FloatArray) -> FloatArray:
+    """Return the points of a curve at angles, or at lengths along a line, shape (n, 2)."""
+    if curve.is_circle:
+        along = np.stack([np.cos(parameter), np.sin(parameter)], axis=-1)
+        return np.array(curve.centre) + curve.radius * along
+    u, v = curve.normal
+    # What is kept lies to the left of this direction.
+    return np.array([u, v]) * curve.offset + parameter[:, None] * np.array([-v, u])
+
+
+def _keeps(points: FloatArray, others: list[_Curve]) -> BoolArray:
+    """Return which points (n, 2) keep the limits of some curves."""
+    keeps = np.ones(len(points), dtype=np.bool_)
+    for owner in {other.owner for other in others}:
+        own = [other for other in others if other.owner == owner]
+        within = np.stack([_slack(other, points) > 0.0 for other in own])
+        # Outside a cylinder is above the one line or below the other.
+        keeps &= within.any(axis=0) if own[0].side < 0.0 else within.all(axis=0)
+    return keeps
+
+
+def _slack(curve: _Curve, points: FloatArray) -> FloatArray:
+    if curve.is_circle:
+        off = points - np.array(curve.centre)
+        return curve.side * (curve.radius - np.hypot(off[:, 0], off[:, 1]))
+    return curve.offset - points @ np.array(curve.normal)
+
+
+def _meetings(curve: _Curve, other: _Curve) -> list[float]:
+    """Return where a curve meets another, by its own parameter."""
+    if not curve.is_circle:
+        return _on_line(curve, other)
+    if other.is_circle:
+        du, dv = other.centre[0] - curve.centre[0], other.centre[1] - curve.centre[1]
+        distance = math.hypot(du, dv)
+        over = curve.radius**2 + distance**2 - other.radius**2
+        under = 2.0 * curve.radius * distance
+    else:
+        du, dv = other.normal
+        over = other.offset - du * curve.centre[0] - dv * curve.centre[1]
+        under = curve.radius
+    if abs(over) >= under:
+        return []
+    bearing, half = math.atan2(dv, du), math.acos(over / under)
+    return [(bearing + sign * half) % (2.0 * math.pi) for sign in (-1.0, 1.0)]
+
+
+def _on_line(line: _Curve, other: _Curve) -> list[float]:
+    (u, v), offset = line.normal, line.offset
+    if other.is_circle:
+        cu, cv = other.centre
+        off = offset - u * cu - v * cv
+        square = (other.radius - off) * (other.radius + off)
+        if square <= 0.0:
+            return []
+        middle, half = -v * cu + u * cv, math.sqrt(square)
+        return [middle - half, middle + half]
+    slope = other.normal[1] * u - other.normal[0] * v
+    if abs(slope) <= SAME:
+        return []
+    along = other.normal[0] * u + other.normal[1] * v
+    return [(other.offset - along * offset) / slope]
+
+
+def _joined(edges: list[Edge], corner: float) -> tuple[tuple[Edge, ...], ...] | None:
+    """Return edges as closed loops; None if some end has no start beside it."""
+    left, loops = list(edges), list[tuple[Edge, ...]]()
+    while left:
+        loop = [left.pop()]
+        while True:
+            end = loop[-1].end
+            closing = math.dist(end, loop[0].start)
+            nearest = min(
+                range(len(left)), key=lambda k: math.dist(end, left[k].start), default=None
+            )
+            if nearest is not None and math.dist(end, left[nearest].start) < closing:
+                if math.dist(end, left[nearest].start) > corner:
+                    return None
+                loop.append(left.pop(nearest))
+            elif closing <= corner:
+                break
+            else:
+                return None
+        loops.append(tuple(loop))
+    return tuple(loops)

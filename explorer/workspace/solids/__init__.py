@@ -1,0 +1,1 @@
+"""Workspaces as closed meshes; the only room that imports manifold3d."""

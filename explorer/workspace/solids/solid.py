@@ -1,0 +1,81 @@
+"""A closed mesh, such as of a workspace, whose faces remember what they come from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from explorer.numerics.arrays import FloatArray, IntArray, dot
+
+
+@dataclass(frozen=True)
+class Solid:
+    """A closed mesh, in design units.
+
+    Attributes:
+        vertices: Shape (n, 3).
+        faces: Indices of vertices, counter-clockwise from outside, shape (m, 3).
+        limit_of_face: Which of the limits each face comes from, shape (m,); -1 for none, of which
+            there are only in a mesh that does not agree.
+        limits: Names of limits, such as "l1 maximum".
+        tolerance: Largest distance of the faces from the true surface.
+        empty_because: The limits that empty it, see `explorer.workspace.slices.volume.Volume`; ()
+            if it is not empty.
+        agrees: Whether its volume agrees with the exact one, see
+            `explorer.workspace.solids.agreement`; of a part or hull whether that of the whole
+            does. None where no exact volume is known.
+    """
+
+    vertices: FloatArray
+    faces: NDArray[np.int32]
+    limit_of_face: IntArray
+    limits: tuple[str, ...]
+    tolerance: float
+    empty_because: tuple[str, ...] = ()
+    agrees: bool | None = None
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether it has no face; a workspace thinner than the tolerance may have none."""
+        return len(self.faces) == 0
+
+    @cached_property
+    def volume(self) -> float:
+        """The volume within the mesh, in cubed design units."""
+        if self.is_empty:
+            return 0.0
+        middle = 0.5 * (self.vertices.min(axis=0) + self.vertices.max(axis=0))
+        a, b, c = ((self.vertices - middle)[self.faces[:, k]] for k in range(3))
+        return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6.0
+
+    @cached_property
+    def area(self) -> float:
+        """The area of the faces, in squared design units."""
+        a, b, c = (self.vertices[self.faces[:, k]] for k in range(3))
+        return 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+
+    @cached_property
+    def is_watertight(self) -> bool:
+        """Whether each edge is used exactly twice, in opposite directions."""
+        if self.is_empty:
+            return False
+        edges = self.faces.astype(np.int64)[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+        many = len(self.vertices)
+        there, back = np.sort(edges @ [many, 1]), np.sort(edges @ [1, many])
+        return bool((np.diff(there) > 0).all() and (there == back).all())
+
+    def winding(self, point: FloatArray) -> float:
+        """Return how often the faces go around a point (3,): 1 within, 0 outside.
+
+        By the solid angles of the faces: A. Van Oosterom and J. Strackee (1983).
+        """
+        if self.is_empty:
+            return 0.0
+        a, b, c = ((self.vertices - point)[self.faces[:, k]] for k in range(3))
+        x, y, z = (np.linalg.norm(v, axis=1) for v in (a, b, c))
+        over = np.einsum("ij,ij->i", a, np.cross(b, c))
+        under = x * y * z + dot(a, b) * z + dot(b, c) * x + dot(c, a) * y
+        return float(np.arctan2(over, under).sum()) / (2.0 * np.pi)

@@ -1,0 +1,242 @@
+"""Mesh files are read back by other programs' readers: unit, names, closedness and volume."""
+
+from __future__ import annotations
+
+import io
+import json
+import struct
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import lib3mf  # pyright: ignore[reportMissingTypeStubs]
+import msgspec
+import numpy as np
+import pytest
+import trimesh
+
+from explorer import PRESETS, Design, ExplorerError, InputError, NoAnswerError, decode_design
+from explorer.export.mesh import FORMATS, colour_of, mesh_bytes, write_mesh
+from explorer.files.writing import check_writable
+from explorer.workspace.solids.solid import Solid
+from explorer.workspace.solids.solids import HULL, convex_hull, workspace_solid
+
+OPTIMAL = msgspec.structs.replace(PRESETS["paper-optimal"], unit_mm=7.5)
+SOLID = workspace_solid(OPTIMAL)
+NAME = "Räume of κ\n2"
+PRINTED = "Räume of κ 2"
+SINGLE_PRECISION = 1e-5
+
+untyped: Any = trimesh
+library: Any = lib3mf
+
+
+def cubic_mm(solid: Solid, design: Design) -> float:
+    return solid.volume * design.unit_mm**3
+
+
+def limits_of_faces(solid: Solid) -> list[str]:
+    return [solid.limits[index] for index in solid.limit_of_face.tolist()]
+
+
+def read(data: bytes, file_format: str) -> Any:
+    """Return the one mesh in a file as trimesh reads it, in the file's own unit."""
+    found = untyped.load(io.BytesIO(data), file_type=file_format, process=False)
+    if isinstance(found, trimesh.Scene):
+        (found,) = found.dump()  # pyright: ignore
+    return found
+
+
+def model_of(data: bytes) -> Any:
+    model = library.get_wrapper().CreateModel()
+    reader = model.QueryReader("3mf")
+    reader.SetStrictModeActive(True)
+    reader.ReadFromBuffer(data)
+    assert reader.GetWarningCount() == 0
+    return model
+
+
+def mesh_of(model: Any) -> tuple[Any, Any]:
+    objects = model.GetMeshObjects()
+    assert objects.MoveNext()
+    mesh = objects.GetCurrentMeshObject()
+    assert not objects.MoveNext()
+    corners = np.array([list(v.Coordinates) for v in mesh.GetVertices()])
+    faces = np.array([list(t.Indices) for t in mesh.GetTriangleIndices()])
+    return mesh, trimesh.Trimesh(corners, faces, process=False)
+
+
+@pytest.mark.parametrize("solid", [SOLID, convex_hull(SOLID)], ids=["workspace", "hull"])
+def test_3mf_has_unit_names_colours_and_the_design(solid: Solid) -> None:
+    model = model_of(mesh_bytes(solid, "3mf", OPTIMAL, NAME))
+    assert model.GetUnit() == library.ModelUnit.MilliMeter
+    mesh, shape = mesh_of(model)
+    assert mesh.GetName() == PRINTED
+    assert mesh.IsManifoldAndOriented()
+    assert shape.is_watertight
+    assert shape.volume == pytest.approx(cubic_mm(solid, OPTIMAL), rel=SINGLE_PRECISION)
+    about = model.GetMetaDataGroup()
+    entries = {about.GetMetaData(k).GetName(): about.GetMetaData(k).GetValue() for k in range(4)}
+    assert entries["Title"] == PRINTED
+    assert entries["Application"].startswith("flagged-explorer")
+    assert decode_design(entries["design"].encode(), "3mf") == OPTIMAL
+    groups = model.GetBaseMaterialGroups()
+    assert groups.MoveNext()
+    materials = groups.GetCurrentBaseMaterialGroup()
+    names = [materials.GetName(each) for each in materials.GetAllPropertyIDs()]
+    assert names == list(solid.limits)
+    for index in (0, len(solid.faces) // 2, len(solid.faces) - 1):
+        limit = limits_of_faces(solid)[index]
+        own = mesh.GetTriangleProperties(index).PropertyIDs[0]
+        colour = materials.GetDisplayColor(own)
+        assert materials.GetName(own) == limit
+        assert (colour.Red, colour.Green, colour.Blue, colour.Alpha) == (*colour_of(limit), 255)
+
+
+def test_stl_says_millimetres_and_is_binary() -> None:
+    data = mesh_bytes(SOLID, "stl", OPTIMAL, NAME)
+    assert b"millimetres" in data[:80]
+    assert not data.lower().startswith(b"solid")
+    assert struct.unpack("<I", data[80:84]) == (len(SOLID.faces),)
+    assert len(data) == 84 + 50 * len(SOLID.faces)
+    shape = read(data, "stl")
+    shape.merge_vertices()
+    assert shape.is_watertight
+    assert shape.volume == pytest.approx(cubic_mm(SOLID, OPTIMAL), rel=SINGLE_PRECISION)
+    own = np.frombuffer(data[84:], dtype=[("normal", "<f4", 3), ("rest", "u1", 38)])["normal"]
+    np.testing.assert_allclose(np.linalg.norm(own, axis=1), 1.0, atol=1e-5)
+
+
+def test_glb_is_in_metres_with_y_up_and_says_so() -> None:
+    data = mesh_bytes(SOLID, "glb", OPTIMAL, NAME)
+    shape = read(data, "glb")
+    assert shape.is_watertight
+    assert shape.volume == pytest.approx(1e-9 * cubic_mm(SOLID, OPTIMAL), rel=SINGLE_PRECISION)
+    lows, highs = 1e-3 * OPTIMAL.unit_mm * np.array([SOLID.vertices.min(0), SOLID.vertices.max(0)])
+    # The base frame's z is up, and up is y.
+    np.testing.assert_allclose(shape.bounds[:, 1], [lows[2], highs[2]], atol=1e-6)
+    np.testing.assert_allclose(shape.bounds[:, 2], [-highs[1], -lows[1]], atol=1e-6)
+    length = struct.unpack("<I", data[12:16])[0]
+    scene = json.loads(data[20 : 20 + length])
+    assert struct.unpack("<I", data[8:12]) == (len(data),)
+    extras = scene["asset"]["extras"]
+    assert extras["unit"].startswith("metre")
+    assert decode_design(json.dumps(extras["design"]).encode(), "glb") == OPTIMAL
+    assert scene["nodes"][0]["name"] == scene["meshes"][0]["name"] == PRINTED
+    for view in scene["bufferViews"]:
+        assert view["byteOffset"] % 4 == 0
+
+
+@pytest.mark.parametrize("file_format", ["ply", "obj"])
+def test_ply_and_obj_hold_double_precision_and_the_design(file_format: str) -> None:
+    data = mesh_bytes(SOLID, file_format, OPTIMAL, NAME)
+    shape = read(data, file_format)
+    assert shape.is_watertight
+    assert shape.volume == pytest.approx(cubic_mm(SOLID, OPTIMAL), rel=1e-12)
+    comments = [
+        line.partition("design ")[2]
+        for line in data.decode("latin-1").splitlines()
+        if "design " in line and line.startswith(("#", "comment"))
+    ]
+    assert decode_design(comments[0].encode(), file_format) == OPTIMAL
+    assert b"unit millimetre" in data
+
+
+def test_ply_has_the_corners_and_a_colour_for_each_face() -> None:
+    data = mesh_bytes(SOLID, "ply", OPTIMAL, NAME)
+    start = data.index(b"end_header\n") + len(b"end_header\n")
+    corners = np.frombuffer(data[start:], "<f8", SOLID.vertices.size).reshape(-1, 3)
+    np.testing.assert_array_equal(corners, SOLID.vertices * OPTIMAL.unit_mm)
+    colours = read(data, "ply").visual.face_colors[:, :3]
+    expected = [colour_of(limit) for limit in limits_of_faces(SOLID)]
+    np.testing.assert_array_equal(colours, expected)
+
+
+def test_obj_has_the_corners_and_a_group_for_each_limit() -> None:
+    lines = mesh_bytes(SOLID, "obj", OPTIMAL, NAME).decode("ascii").splitlines()
+    corners = [[float(x) for x in line.split()[1:]] for line in lines if line.startswith("v ")]
+    np.testing.assert_array_equal(corners, SOLID.vertices * OPTIMAL.unit_mm)
+    groups = [line[2:] for line in lines if line.startswith("g ")]
+    used = {limit.replace(" ", "_") for limit in limits_of_faces(SOLID)}
+    assert set(groups) == used
+    assert len(groups) == len(used)
+
+
+def test_limits_of_a_kind_share_a_colour_and_kinds_do_not() -> None:
+    assert colour_of("l1 minimum") == colour_of("l1 maximum") != colour_of("l4 maximum")
+    assert len({colour_of(limit) for limit in ("l1", "d2", "d4", "l4", "box x", "swing a1")}) == 6
+    assert colour_of(HULL) == colour_of("anything else")
+
+
+@pytest.mark.parametrize("file_format", FORMATS)
+def test_an_empty_or_torn_mesh_is_refused_with_the_reason(file_format: str) -> None:
+    empty = workspace_solid(OPTIMAL, np.eye(3))
+    with pytest.raises(NoAnswerError, match="empty: margin κ2"):
+        mesh_bytes(empty, file_format, OPTIMAL, NAME)
+    with pytest.raises(ExplorerError, match="not watertight"):
+        mesh_bytes(replace(SOLID, faces=SOLID.faces[1:]), file_format, OPTIMAL, NAME)
+
+
+@pytest.mark.parametrize("file_format", FORMATS)
+@pytest.mark.parametrize("s", [1e-6, 1e-3, 1e3, 1e6])
+def test_meshes_of_any_size_keep_their_volume_or_are_refused(file_format: str, s: float) -> None:
+    solid = replace(SOLID, vertices=s * SOLID.vertices)
+    try:
+        data = mesh_bytes(solid, file_format, OPTIMAL, NAME)
+    except InputError:
+        assert file_format == "3mf"
+        assert s == 1e6
+        return
+    shape = mesh_of(model_of(data))[1] if file_format == "3mf" else read(data, file_format)
+    unit = 1e-9 if file_format == "glb" else 1.0
+    assert shape.volume == pytest.approx(unit * cubic_mm(solid, OPTIMAL), rel=SINGLE_PRECISION)
+
+
+@pytest.mark.parametrize("file_format", ["stl", "glb", "3mf"])
+def test_a_mesh_too_far_off_for_single_precision_is_refused(file_format: str) -> None:
+    far = replace(SOLID, vertices=SOLID.vertices + [1e7, 0.0, 0.0])
+    with pytest.raises(InputError, match="ply and obj hold double"):
+        mesh_bytes(far, file_format, OPTIMAL, NAME)
+    shape = read(mesh_bytes(far, "ply", OPTIMAL, NAME), "ply")
+    assert shape.is_watertight
+
+
+def test_coordinates_that_3mf_cannot_hold_are_refused() -> None:
+    huge = replace(SOLID, vertices=1e9 * SOLID.vertices)
+    with pytest.raises(InputError, match="mm"):
+        mesh_bytes(huge, "3mf", OPTIMAL, NAME)
+    vast = replace(SOLID, vertices=1e40 * SOLID.vertices)
+    with pytest.raises(InputError, match="double"):
+        mesh_bytes(vast, "stl", OPTIMAL, NAME)
+
+
+def test_an_unknown_format_is_told_the_formats() -> None:
+    with pytest.raises(InputError, match="3mf, stl, glb, obj, ply"):
+        mesh_bytes(SOLID, "step", OPTIMAL, NAME)
+
+
+@pytest.mark.parametrize("file_format", FORMATS)
+def test_files_hold_what_the_bytes_hold(tmp_path: Path, file_format: str) -> None:
+    path = tmp_path / f"a file.{file_format}"
+    path.write_bytes(b"old")
+    write_mesh(SOLID, path, file_format, OPTIMAL, NAME)
+    if file_format != "3mf":
+        assert path.read_bytes() == mesh_bytes(SOLID, file_format, OPTIMAL, NAME)
+    assert [each.name for each in tmp_path.iterdir()] == [path.name]
+
+
+def test_what_cannot_be_written_is_refused_before_and_after(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    for path, reason in (
+        (tmp_path, "folder"),
+        (tmp_path / "missing" / "file.stl", "no folder"),
+        (tmp_path / "file" / "file.stl", "no folder"),
+        (Path("/dev/null"), "no plain file"),
+    ):
+        with pytest.raises(InputError, match=reason):
+            check_writable(path)
+        with pytest.raises(InputError, match=reason):
+            write_mesh(SOLID, path, "stl", OPTIMAL, NAME)
+    check_writable(tmp_path / "new.stl")
+    check_writable(tmp_path / "file")
+    assert [each.name for each in tmp_path.iterdir()] == ["file"]

@@ -1,0 +1,436 @@
+"""The report: well-formed, alone, true to the functions that everything else uses."""
+
+from __future__ import annotations
+
+import datetime as dt
+import hashlib
+import math
+import re
+import subprocess
+import sys
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+from hypothesis import given, strategies as st
+from limited_designs import limited, ordinary_case, troubled_case
+from report_page import Node, read, table_of
+
+import explorer
+from explorer import Design, Pose
+from explorer.app.features.sharing.reporting import make_report
+from explorer.export.report.document import report_html
+from explorer.export.report.drawings.projection import ViewName, fitted
+from explorer.export.report.drawings.slices import Slices
+from explorer.export.report.findings import Missing, find
+from explorer.export.report.markup import as_html, element, figure, written
+from explorer.mechanism.design import JOINTS, VARIABLES, Swing
+from explorer.mechanism.design_file import decode_design, encode_design
+from explorer.optimise.findings import paper_problem
+from explorer.optimise.record import Record, Settings, record_of
+from explorer.optimise.solver import optimise_design
+from explorer.prototype.assembly import make_prototype
+from explorer.prototype.bill import bill_of_materials
+from explorer.singularity.ellipsoids import certified_radius, performance, singularity_free_ball
+from explorer.workspace.accessible.radii import with_radius
+from explorer.workspace.accessible.workspace import reachable_workspace
+from explorer.workspace.least_clearance import least_clearances
+from explorer.workspace.slices.outline import slice_outline
+from explorer.workspace.solids.solids import convex_hull, workspace_solid
+
+OPTIMAL = explorer.PRESETS["paper-optimal"]
+DAY = dt.date(2026, 3, 9)
+HOSTILE = (
+    '<script>alert(1)</script><img src=x onerror="alert(2)">',
+    "</title></style></pre>--> & &lt; ' \" ]]> <!--",
+    'x" onload="alert(1)" y=\'',
+)
+
+
+def page_of(design: Design, pose: Pose | None = None, record: Record | None = None) -> Node:
+    """Return a report as it is read, once it is known to be in order."""
+    return in_order(make_report(design, pose, record=record, date=DAY).decode())
+
+
+def in_order(html: str) -> Node:
+    """Return a report that is read, and that needs nothing else and says only what is finite."""
+    page = read(html)
+    names = {each.tag for each in page.all()}
+    assert names.isdisjoint({"script", "link", "iframe", "object", "embed", "form", "base", "img"})
+    ids = [each.attributes["id"] for each in page.all() if "id" in each.attributes]
+    assert len(set(ids)) == len(ids)
+    for each in page.all():
+        for name, value in each.attributes.items():
+            assert not name.startswith("on")
+            assert name not in {"src", "href", "action", "style"}
+            for target in re.findall(r"url\(([^)]*)\)", value):
+                assert target.removeprefix("#") in ids
+            if each.tag in {"path", "line", "rect", "circle", "text", "g", "svg"}:
+                assert "nan" not in value
+                assert not re.search(r"\binf", value)
+    (style,) = page.all("style")
+    assert "url(" not in style.text
+    assert "@import" not in style.text
+    assert set(re.findall(r"https?://[^\s\"<]*", html)) <= {"http://www.w3.org/2000/svg"}
+    return page
+
+
+@cache
+def paper_page() -> Node:
+    return page_of(OPTIMAL)
+
+
+@cache
+def ordinary_page(seed: int) -> Node:
+    return page_of(ordinary_case(seed)[0])
+
+
+@cache
+def paper_record() -> Record:
+    """The record of the paper's problem; a search is the same each time."""
+    return record_of(optimise_design(paper_problem()), Settings())
+
+
+def test_the_title_block_says_what_it_is_about() -> None:
+    page = paper_page()
+    assert [each.text for each in page.all("h1")] == ["paper-optimal"]
+    assert next(page.all("title")).text == "paper-optimal – design report"
+    assert next(page.all("time")).text == "2026-03-09"
+    block = page.one(**{"class": "particulars"})
+    assert "1 unit = 10 mm" in block.text
+    assert explorer.__version__ in block.text
+    assert hashlib.sha256(encode_design(OPTIMAL)).hexdigest()[:16] in block.text
+    sections = ["Mechanism", "Workspace", "Singularities", "Legs", "Prototype"]
+    assert [each.text for each in page.all("h2")] == [*sections, "How to reproduce it"]
+
+
+def test_the_report_carries_its_own_design_and_the_hash_of_its_file() -> None:
+    page = paper_page()
+    data = page.one(id="design").text.encode()
+    assert data == encode_design(OPTIMAL)
+    assert decode_design(data, "report") == OPTIMAL
+    assert page.one(id="design-hash").text == hashlib.sha256(data).hexdigest()
+
+
+def test_the_same_input_makes_the_same_report_but_for_the_date() -> None:
+    first, again = (make_report(OPTIMAL, date=DAY) for _ in range(2))
+    assert first == again
+    later = make_report(OPTIMAL, date=DAY + dt.timedelta(days=1))
+    assert later != first
+    assert later.replace(b"2026-03-10", b"2026-03-09") == first
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_tables_of_the_mechanism_are_the_design_and_its_joints(seed: int) -> None:
+    design, _ = ordinary_case(seed)
+    page, unit = ordinary_page(seed), design.unit_mm
+    home = explorer.home_pose(design)
+    variables = table_of(page, "Design variables")
+    for row, name, value in zip(variables.values(), VARIABLES, design.variables, strict=False):
+        assert row.text.startswith(name)
+        assert row.values == [value, value * unit]
+    assert variables["|a3| reach"].values == [design.reach, design.reach * unit]
+    pose = table_of(page, "Home pose")
+    for axis, value in zip("xyz", home.position, strict=True):
+        assert pose[f"{axis} of b4"].values == [value, value * unit]
+    for axis, value in zip("wxyz", home.quaternion, strict=True):
+        assert pose[f"quaternion {axis}"].values == [value]
+    joints = explorer.inverse(design, home.position, home.rotation).tolist()
+    for row, name, value in zip(table_of(page, "Joints in").values(), JOINTS, joints, strict=True):
+        ends = design.limits.guide if name in ("d1", "d3") else design.length_range(name)
+        assert ends is not None
+        assert row.text.startswith(name)
+        assert row.values == [value, value * unit, ends[0] * unit, ends[1] * unit]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_tables_of_the_workspace_are_its_public_measures(seed: int) -> None:
+    design, _ = ordinary_case(seed)
+    rotation = explorer.home_pose(design).rotation
+    page, cubic = ordinary_page(seed), (0.1 * design.unit_mm) ** 3
+    volume = explorer.workspace_volume(design, rotation)
+    nodes = explorer.workspace_nodes(design, rotation)
+    solid = workspace_solid(design, rotation)
+    rows = table_of(page, "Volumes")
+    assert rows["exact volume"].values == [volume.volume, volume.volume * cubic]
+    expected = [nodes.volume, nodes.volume * cubic, nodes.count, nodes.step]
+    assert rows["node volume"].values == expected
+    hull = convex_hull(solid).volume
+    assert rows["convex hull"].values == [hull, hull * cubic]
+    gradient = {name: row.values for name, row in table_of(page, "How the volume moves").items()}
+    assert gradient == {name: [rate] for name, rate in volume.gradient.items()}
+    assert nodes.extent is not None
+    extent, unit = table_of(page, "Extent of"), design.unit_mm
+    for axis, low, high in zip("xyz", *nodes.extent, strict=True):
+        assert extent[axis].values == [low, high, low * unit, high * unit]
+    shares = [row.values[0] for row in table_of(page, "What bounds it").values()]
+    assert sum(shares) == pytest.approx(100.0)
+    assert shares == sorted(shares, reverse=True)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_tables_of_singularities_and_legs_are_those_of_the_snapshot(seed: int) -> None:
+    design, _ = ordinary_case(seed)
+    home = explorer.home_pose(design)
+    page, unit, snapshot = ordinary_page(seed), design.unit_mm, explorer.evaluate(design, home)
+    margins = table_of(page, "Margins in")
+    for k in range(3):
+        kappa, volume = float(snapshot.margins[k]), float(snapshot.volumes[k])
+        assert margins[f"κ{k + 1}"].values == [kappa, kappa * unit, volume]
+    measures = table_of(page, "Measures")
+    assert measures["determinant of the Jacobian"].values == [snapshot.determinant]
+    condition = measures["inverse condition number, with the reach"]
+    assert condition.values == [snapshot.inverse_condition]
+    assert measures["proximity: smallest |κ| over the reach"].values == [snapshot.proximity]
+    assert measures["assembly mode"].values == [snapshot.mode]
+    radius = singularity_free_ball(home).radius
+    ball = measures["ball of positions without a singular one"]
+    assert ball.values == [radius, radius * unit]
+    certified = certified_radius(design, home)
+    regular = measures["all poses nearer than this are regular"]
+    assert regular.values == [certified, certified * unit]
+    nearest = table_of(page, "Nearest singular poses")
+    for each in snapshot.nearest:
+        found = nearest[f"κ{each.incidence} = 0"].values
+        assert found[:5] == [each.distance, each.distance * unit, *each.pose.position]
+    gains = performance(design, home).translation.gain.tolist()
+    speeds = table_of(page, "Speed of b4")
+    assert [row.values[0] for row in speeds.values()] == gains
+    least = least_clearances(design, home.rotation).clearance
+    (legs,) = (each for each in page.all("section") if next(each.all("h2")).text == "Legs")
+    for row, here, low in zip(
+        list(legs.all("tr"))[1:],
+        snapshot.clearances.clearance.tolist(),
+        least.tolist(),
+        strict=True,
+    ):
+        assert row.values == [here, here * unit, low, low * unit]
+
+
+def test_legs_with_radii_tell_what_can_be_reached() -> None:
+    design = with_radius(OPTIMAL, 0.2)
+    page, found = page_of(design), reachable_workspace(design)
+    row = table_of(page, "Volumes")["reachable"].values
+    assert row[0] == found.reachable_volume
+    assert row[2:] == [found.reachable_node_count, found.node_count]
+    assert "legs collide" in page.text
+    assert "--interference" in page.one(id="commands").text
+
+
+def test_a_home_in_collision_is_told_where_the_reachable_volume_would_stand() -> None:
+    design = with_radius(OPTIMAL, 0.4)
+    page = page_of(design)
+    assert "reachable" not in table_of(page, "Volumes")
+    assert "nothing can be reached from (10, 5, 9): legs 2 and 3 overlap" in page.text
+
+
+def test_the_bill_is_that_of_the_prototype() -> None:
+    bill = bill_of_materials(make_prototype(OPTIMAL), 1240.0)
+    rows = table_of(paper_page(), "Bill of parts")
+    assert list(rows) == [item.name for item in bill.items]
+    for row, item in zip(rows.values(), bill.items, strict=True):
+        assert row.values == [*item.size, item.volume / 1000.0, item.mass * 1000.0]
+    for row, each in zip(table_of(paper_page(), "Actuators").values(), bill.actuators, strict=True):
+        assert row.values == [*each.stroke, *each.asked, each.diameter, each.mass * 1000.0]
+
+
+def test_areas_of_slices_are_exact() -> None:
+    rotation = explorer.home_pose(OPTIMAL).rotation
+    tables = [each for each in paper_page().all("table") if "slice at" in each.text]
+    (areas,) = (row.values for row in tables[0].all("tr") if "units²" in row.text)
+    solid = workspace_solid(OPTIMAL, rotation)
+    low, high = float(solid.vertices[:, 0].min()), float(solid.vertices[:, 0].max())
+    for index, area in enumerate(areas):
+        level = low + (high - low) * (index + 0.5) / len(areas)
+        outline = slice_outline(OPTIMAL, rotation, "x", level)
+        assert outline is not None
+        assert area == pytest.approx(outline.area, rel=1e-6)
+
+
+def test_the_search_is_told_as_its_record_has_it() -> None:
+    record = paper_record()
+    page = page_of(record.design, record=record)
+    rows = table_of(page, "The search")
+    run = record.runs[record.chosen]
+    assert rows["iterations"].values == [run.iterations]
+    assert rows["seed"].values == [record.settings.seed]
+    assert rows["volume asked for, units³"].values == [record.problem.demands.volume]
+    best = next(step for step in record.history if step.number == run.best)
+    assert rows["F"].values == [best.objective]
+    assert rows["volume, units³"].values == [best.volume]
+    changes = table_of(page, "The design")
+    start, end = record.problem.start.variables, record.design.variables
+    for name, before, after in zip(VARIABLES, start, end, strict=True):
+        assert changes[name].values == [before, after, after - before]
+    curves = [each for each in page.all("path") if each.attributes.get("class") == "curve"]
+    steps = [step for step in record.history if step.run == record.chosen]
+    assert len(curves) == 3
+    for curve in curves:
+        assert len(re.findall(r"[ML]", curve.attributes["d"])) == len(steps)
+    assert "not the one" not in page.text
+    assert "explorer optimise --repeat record.json" in page.one(id="commands").text
+    other = page_of(OPTIMAL, record=record)
+    assert "not the one that this search found" in " ".join(other.text.split())
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_a_hostile_name_stays_a_name(name: str) -> None:
+    design = msgspec.structs.replace(OPTIMAL, name=name)
+    page = page_of(design)
+    plain = paper_page()
+    assert next(page.all("h1")).text == name
+    assert next(page.all("title")).text == f"{name} – design report"
+    assert decode_design(page.one(id="design").text.encode(), "report") == design
+    # The elements are those of any other name, but that it is no preset.
+    tags = [each.tag for each in page.all() if each.tag != "code"]
+    assert tags == [each.tag for each in plain.all() if each.tag != "code"]
+
+
+def test_hostile_words_of_a_record_stay_words() -> None:
+    record = paper_record()
+    bad = "</style><script>alert(1)</script>\x00\x1b[2J\u202e\ud800"
+    run = msgspec.structs.replace(record.runs[0], message=bad, holding=bad)
+    versions = {"python": bad, bad: "1"}
+    hostile = msgspec.structs.replace(record, runs=(run,), versions=versions)
+    html = report_html(find(record.design, record=hostile), DAY)
+    page = in_order(html)
+    assert "<script>alert(1)</script>" in page.text
+    assert "\x00" not in html
+    assert "\x1b" not in html
+    assert html.encode()
+
+
+@given(st.text(), st.text())
+def test_whatever_text_is_given_comes_back_as_text(inside: str, attribute: str) -> None:
+    made = element("p", inside, element("b", inside), inside, title=attribute)
+    root = read(f"<!DOCTYPE html>\n{as_html(element('html', made))}")
+    (p,) = root.all("p")
+    (b,) = root.all("b")
+    assert len(list(root.all())) == 3
+    if inside.isprintable():
+        assert (p.text, b.text) == (3 * inside, inside)
+    if attribute.isprintable():
+        assert p.attributes["title"] == attribute
+
+
+@given(st.floats(allow_nan=False, allow_infinity=False))
+def test_a_figure_is_read_back_to_its_digits_and_in_full(value: float) -> None:
+    made = figure(value)
+    assert float(made.attrib["value"]) == value
+    text = (made.text or "").replace("−", "-")
+    mantissa, _, power = text.partition(" × 10")
+    digits = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
+    exponent = power.translate(digits) or "0"
+    assert float(f"{mantissa}e{exponent}") == pytest.approx(value, rel=5.1e-6)
+    assert "e" not in text
+
+
+def test_what_is_no_number_is_written_as_people_do() -> None:
+    assert written(math.inf) == "∞"
+    assert written(-math.inf) == "−∞"
+    assert written(-0.0) == "0"
+    assert written(1234567.0) == "1234570"
+    assert written(-1.5e-7) == "−1.5 × 10⁻⁷"
+
+
+def test_an_empty_workspace_has_a_report_that_says_why() -> None:
+    level = Pose((10.0, 5.0, 9.0), (1.0, 0.0, 0.0, 0.0))
+    page = page_of(OPTIMAL, level)
+    assert "The workspace is empty at this orientation because of margin κ2" in page.text
+    assert "The pose is singular: lines a1a2 and b2b3 meeting" in page.text
+    assert "∞" in page.text
+    commands = page.one(id="commands").text
+    assert "--position 10.0 5.0 9.0 --quaternion 1.0 0.0 0.0 0.0" in commands
+
+
+def test_a_singular_home_has_a_report() -> None:
+    home = Pose.of_yaw_pitch_roll((10.0, 5.0, 0.0), (-73.1, 0.0, 0.0))
+    page = page_of(msgspec.structs.replace(OPTIMAL, home=home))
+    assert "The pose is singular: a1 on the platform plane" in page.text
+    assert table_of(page, "Measures")["determinant of the Jacobian"].values == [0.0]
+
+
+def test_what_cannot_be_found_is_told_in_its_place() -> None:
+    fine = page_of(msgspec.structs.replace(OPTIMAL, node_step=1e-6))
+    assert "are counted" in table_of(fine, "Volumes")["node volume"].text
+    tight = find(limited(OPTIMAL, leg_radii=(0.5, 0.5, 0.5, 0.5)))
+    assert isinstance(tight.bill, Missing)
+    page = in_order(report_html(tight, DAY))
+    assert "Its parts cannot be made" in page.text
+    # Nor are there commands that would only tell so again.
+    assert isinstance(tight.reachable, Missing)
+    commands = page.one(id="commands").text
+    assert "export mechanism" not in commands
+    assert "--interference" not in commands
+
+
+def test_limits_on_swings_are_drawn_from_a_grid_and_said_so() -> None:
+    page = page_of(limited(OPTIMAL, swing=Swing(a1=30.0, b4=50.0)))
+    assert "the outlines are those of a fine grid" in page.text
+    limits = table_of(page, "Further limits")
+    assert "30°" in limits["swing at a1, at most"].text
+    assert any("clip-path" in each.attributes for each in page.all("g"))
+
+
+@pytest.mark.parametrize("seed", [3, 5, 8, 11, 14])
+def test_designs_of_any_size_and_in_any_trouble_have_a_report(seed: int) -> None:
+    design, _ = troubled_case(seed)
+    page = page_of(design)
+    assert decode_design(page.one(id="design").text.encode(), "report") == design
+
+
+@pytest.mark.parametrize("name", ["top", "front", "side", "isometric"])
+def test_a_view_holds_all_points_right_way_round(name: ViewName) -> None:
+    rng = np.random.default_rng(4)
+    points = rng.normal(size=(40, 3)) * rng.uniform(0.1, 10.0, 3)
+    view = fitted(name, points, (10.0, 20.0, 300.0, 200.0))
+    flat = view.to(points)
+    assert (flat.min(axis=0) >= [10.0 - 1e-9, 20.0 - 1e-9]).all()
+    assert (flat.max(axis=0) <= [310.0 + 1e-9, 220.0 + 1e-9]).all()
+    assert np.allclose(view.axes @ view.axes.T, np.eye(3))
+    assert np.linalg.det(view.axes) == pytest.approx(1.0)
+    up = {"top": 1, "front": 2, "side": 2, "isometric": 2}[name]
+    off = view.to(np.eye(3)[up]) - view.to(np.zeros(3))
+    assert off[1] < 0.0
+    assert abs(off[0]) < 1e-9
+
+
+def test_bands_are_as_dark_as_the_margins_are_small() -> None:
+    """Each polygon of a band holds the positions with such margins, and no others."""
+    home = explorer.home_pose(OPTIMAL)
+    solid = workspace_solid(OPTIMAL, home.rotation)
+    extent = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
+    slices = Slices.of(OPTIMAL, home.rotation, extent)
+    rng = np.random.default_rng(1)
+    level, share = 5.0, 1.5
+    points = rng.uniform(slices.lows, slices.highs, (400, 3))
+    points[:, 1] = level
+    untyped: Any = slices
+    polygons = list(untyped._beyond("y", level, share))
+    least = np.abs(explorer.margins(points, home.rotation)).min(axis=-1)
+    for point, margin in zip(points[:, [0, 2]], least.tolist(), strict=True):
+        within = any(_holds(polygon, point) for polygon in polygons)
+        assert within == (margin >= share * slices.warn_below)
+
+
+def _holds(polygon: Any, point: Any) -> bool:
+    off, along = point - polygon, np.roll(polygon, -1, axis=0) - polygon
+    turn = along[:, 0] * off[:, 1] - along[:, 1] * off[:, 0]
+    return bool((turn >= 0.0).all() or (turn <= 0.0).all())
+
+
+def test_it_is_made_without_viser_or_a_browser() -> None:
+    code = (
+        "import sys; from explorer import PRESETS; "
+        "from explorer.app.features.sharing.reporting import make_report; "
+        "make_report(PRESETS['paper-initial']); "
+        "print(sorted({n.partition('.')[0] for n in sys.modules} & {'viser', 'playwright'}))"
+    )
+    folder = Path(explorer.__file__).parents[1]
+    done = subprocess.run(
+        [sys.executable, "-c", code], check=True, capture_output=True, text=True, cwd=folder
+    )
+    assert done.stdout.strip() == "[]"

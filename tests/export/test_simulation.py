@@ -1,0 +1,393 @@
+"""The simulation model, judged by MuJoCo: loops, servos, singularities."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import msgspec
+import mujoco  # pyright: ignore[reportMissingTypeStubs]
+import numpy as np
+import pytest
+from limited_designs import limited
+from scipy.spatial.transform import Rotation
+from strategies import WAYS
+
+from explorer import (
+    JOINTS,
+    PRESETS,
+    Design,
+    InputError,
+    Pose,
+    evaluate,
+    forward,
+    home_pose,
+    inverse,
+    jacobian,
+    margins,
+)
+from explorer.export.simulation import simulation_joints, simulation_mjcf
+from explorer.mechanism.design import Swing
+from explorer.mechanism.margins import mode_of
+from explorer.numerics.arrays import FloatArray
+from explorer.prototype.assembly import make_prototype
+from explorer.prototype.chains import ACTUATED, BODIES, CHAIN_JOINTS, Chains
+from explorer.prototype.mass import ball, bar, mesh_mass, together
+
+engine: Any = mujoco
+OPTIMAL = PRESETS["paper-optimal"]
+POSES = 200
+
+
+def random_design(seed: int) -> Design:
+    """Return a design of any proportions, size and unit, its home of any orientation."""
+    rng = np.random.default_rng(seed)
+    x = rng.uniform(0.3, 1.0, 6) * rng.choice([-1.0, 1.0], 6) * 10.0 ** rng.uniform(0.5, 2.5)
+    a3x, a3y, b1x, b1y, b2, b3 = x.tolist()
+    rotation = Rotation.random(random_state=rng).as_matrix()
+    pose = Pose.of(rng.uniform(-1.0, 1.0, 3) * abs(a3x), rotation)
+    return Design(
+        a3=(a3x, a3y),
+        b1=(b1x, b1y),
+        b2=b2,
+        b3=b3 if abs(b3 - b2) > 0.2 * abs(b3) else -b3,
+        unit_mm=10.0 ** rng.uniform(1.0, 2.0),
+        home=pose,
+    )
+
+
+DESIGNS = [OPTIMAL, PRESETS["paper-initial"], *map(random_design, range(8))]
+
+
+def random_poses(design: Design, many: int, seed: int = 0) -> tuple[FloatArray, FloatArray]:
+    rng = np.random.default_rng(seed)
+    positions = rng.uniform(-1.5, 1.5, (many, 3)) * design.reach
+    return positions, Rotation.random(many, random_state=rng).as_matrix()
+
+
+def model_of(design: Design) -> Any:
+    return engine.MjModel.from_xml_string(simulation_mjcf(design))
+
+
+def set_pose(design: Design, data: Any, position: FloatArray, rotation: FloatArray) -> None:
+    data.qpos[:] = simulation_joints(design, position, rotation)
+
+
+def equality_rows(model: Any, data: Any) -> tuple[FloatArray, FloatArray]:
+    """Return the residuals (12,) of the four ball joints, and their Jacobian (12, 18)."""
+    own = np.array(data.efc_type) == int(engine.mjtConstraint.mjCNSTR_EQUALITY)
+    assert own.sum() == 12
+    if engine.mj_isSparse(model):
+        dense = np.zeros((data.nefc, model.nv))
+        engine.mju_sparse2dense(
+            dense, data.efc_J, data.efc_J_rownnz, data.efc_J_rowadr, data.efc_J_colind
+        )
+    else:
+        dense = np.array(data.efc_J).reshape(data.nefc, model.nv)
+    return np.array(data.efc_pos)[own], dense[own]
+
+
+def test_the_model_has_every_joint_and_six_servos() -> None:
+    model = model_of(OPTIMAL)
+    assert (model.nq, model.nv, model.nu, model.neq) == (19, 18, 6, 4)
+    names = [model.joint(k).name for k in range(model.njnt)]
+    assert names == [*CHAIN_JOINTS, "platform"]
+    assert [model.actuator(k).name for k in range(6)] == list(JOINTS)
+    assert [names.index(name) for name in JOINTS] == list(ACTUATED)
+    assert [model.body(k).name for k in range(1, model.nbody)] == list(BODIES[1:])
+    assert (model.body_mass[1:] > 0.0).all()
+    assert (model.body_inertia[1:] > 0.0).all()
+
+
+@pytest.mark.parametrize("design", DESIGNS)
+def test_the_reference_configuration_is_the_home_pose(design: Design) -> None:
+    model = model_of(design)
+    home = home_pose(design)
+    expected = simulation_joints(design, np.array(home.position), home.rotation)
+    joints = slice(0, 15)
+    np.testing.assert_allclose(model.qpos0[joints], expected[joints], rtol=1e-12, atol=1e-15)
+    assert abs(model.qpos0[15:] @ expected[15:]) == pytest.approx(1.0, rel=1e-12)
+    np.testing.assert_allclose(model.key_qpos[0], expected, rtol=1e-12, atol=1e-15)
+    lengths = inverse(design, home.position, home.rotation) * design.unit_mm * 1e-3
+    np.testing.assert_allclose(model.key_ctrl[0], lengths, rtol=1e-12)
+
+
+@pytest.mark.parametrize("design", DESIGNS)
+def test_the_loops_close_at_our_joint_values(design: Design) -> None:
+    model = model_of(design)
+    data = engine.MjData(model)
+    metres = design.unit_mm * 1e-3
+    size = metres * max(design.reach, *map(abs, design.variables))
+    positions, rotations = random_poses(design, POSES)
+    for position, rotation in zip(positions, rotations, strict=True):
+        set_pose(design, data, position, rotation)
+        engine.mj_forward(model, data)
+        residual, _ = equality_rows(model, data)
+        assert np.abs(residual).max() < 1e-8 * size
+        # The values are not merely consistent: they are the joints of the pose.
+        actuated = data.qpos[list(ACTUATED)] / metres
+        np.testing.assert_allclose(actuated, inverse(design, position, rotation), rtol=1e-12)
+    # And a wrong length opens its loop.
+    data.qpos[ACTUATED[0]] += 1e-6 * size
+    engine.mj_forward(model, data)
+    assert np.abs(equality_rows(model, data)[0]).max() > 1e-7 * size
+
+
+@pytest.mark.parametrize("design", DESIGNS[:6])
+def test_bodies_are_where_the_chains_say(design: Design) -> None:
+    model = model_of(design)
+    data = engine.MjData(model)
+    chains = Chains.of(design)
+    metres = design.unit_mm * 1e-3
+    positions, rotations = random_poses(design, 20, seed=3)
+    places = chains.places_at(positions, rotations)
+    for index, (position, rotation) in enumerate(zip(positions, rotations, strict=True)):
+        set_pose(design, data, position, rotation)
+        engine.mj_kinematics(model, data)
+        atol = 1e-12 * metres * design.reach
+        np.testing.assert_allclose(data.xpos, metres * places.origin[index], atol=atol)
+        turns = np.array(data.xmat).reshape(-1, 3, 3)
+        np.testing.assert_allclose(turns, places.rotation[index], atol=1e-12)
+
+
+def locked_jacobian(design: Design, position: FloatArray, rotation: FloatArray) -> FloatArray:
+    """Return the loops' Jacobian with the actuated joints locked, made homogeneous, (18, 18)."""
+    model = model_of(design)
+    data = engine.MjData(model)
+    set_pose(design, data, position, rotation)
+    engine.mj_forward(model, data)
+    _, loops = equality_rows(model, data)
+    locks = np.eye(model.nv)[list(ACTUATED)]
+    # Slides and the platform's velocity are lengths over time, the others angles.
+    is_length = np.append(np.isin(CHAIN_JOINTS, JOINTS), [True] * 3 + [False] * 3)
+    size = design.reach * design.unit_mm * 1e-3
+    columns = np.where(is_length, size, 1.0)
+    return np.vstack([loops / size, locks / size]) * columns
+
+
+def singular_pose(
+    design: Design, way: tuple[int, ...], rng: np.random.Generator
+) -> tuple[FloatArray, FloatArray]:
+    """Return a random pose at which the margins of a way vanish."""
+    rotation = Rotation.random(random_state=rng).as_matrix()
+    normals = {
+        1: rotation[:, 2],
+        2: np.array([0.0, -rotation[2, 0], rotation[1, 0]]),
+        3: np.array([0.0, 0.0, 1.0]),
+    }
+    rows = np.array([normals[each] for each in way])
+    position = rng.uniform(-1.0, 1.0, 3) * design.reach
+    return position - np.linalg.pinv(rows) @ (rows @ position), rotation
+
+
+@pytest.mark.parametrize("design", DESIGNS[:5])
+@pytest.mark.parametrize("way", [way for way in WAYS if len(way) < 3])
+def test_the_locked_mechanism_can_move_at_singular_poses(
+    design: Design, way: tuple[int, ...]
+) -> None:
+    rng = np.random.default_rng(7)
+    for _ in range(4):
+        position, rotation = singular_pose(design, way, rng)
+        values = np.linalg.svd(locked_jacobian(design, position, rotation), compute_uv=False)
+        assert values[-1] < 1e-12 * values[0]
+
+
+@pytest.mark.parametrize("design", DESIGNS[:5])
+def test_and_only_there(design: Design) -> None:
+    positions, rotations = random_poses(design, 30, seed=11)
+    for position, rotation in zip(positions, rotations, strict=True):
+        kappa = margins(position, rotation) / design.reach
+        locked = locked_jacobian(design, position, rotation)
+        values = np.linalg.svd(locked, compute_uv=False)
+        assert values[-1] > 1e-6 * np.abs(kappa).min() * values[0]
+
+
+@pytest.mark.parametrize("design", DESIGNS[:5])
+def test_platform_velocities_are_those_of_our_jacobian(design: Design) -> None:
+    model = model_of(design)
+    data = engine.MjData(model)
+    metres = design.unit_mm * 1e-3
+    positions, rotations = random_poses(design, 10, seed=5)
+    rng = np.random.default_rng(5)
+    for position, rotation in zip(positions, rotations, strict=True):
+        set_pose(design, data, position, rotation)
+        engine.mj_forward(model, data)
+        _, loops = equality_rows(model, data)
+        velocity, spin = rng.normal(size=3), rng.normal(size=3)
+        # MuJoCo's free joints turn about their own axes.
+        platform = np.concatenate([velocity * metres, rotation.T @ spin])
+        chains = np.linalg.lstsq(loops[:, :12], -loops[:, 12:] @ platform, rcond=None)[0]
+        rates = jacobian(design, position, rotation) @ np.concatenate([velocity, spin])
+        scale = np.abs(rates).max() * metres
+        np.testing.assert_allclose(chains[list(ACTUATED)], rates * metres, atol=1e-9 * scale)
+
+
+@pytest.mark.parametrize("name", ["paper-optimal", "paper-initial"])
+def test_servos_lead_the_platform_where_the_forward_kinematics_says(name: str) -> None:
+    design = PRESETS[name]
+    model = model_of(design)
+    data = engine.MjData(model)
+    engine.mj_resetDataKeyframe(model, data, 0)
+    home = home_pose(design)
+    mode = int(mode_of(margins(home.position, home.rotation)))
+    metres = design.unit_mm * 1e-3
+    turn = Rotation.from_euler("ZYX", [8.0, -5.0, 6.0], degrees=True).as_matrix()
+    start = inverse(design, home.position, home.rotation)
+    shift = 0.08 * design.reach * np.array([1.0, -0.5, 0.7])
+    end = inverse(design, home.position + shift, home.rotation @ turn)
+    steps = 3000
+    for step in range(steps):
+        share = min(1.0, 1.5 * step / steps)
+        smooth = share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
+        command = start + smooth * (end - start)
+        data.ctrl[:] = metres * command
+        engine.mj_step(model, data)
+        if step % 300 == 299:
+            found = forward(design, command)
+            assert bool(found.feasible)
+            off = np.linalg.norm(data.body("platform").xpos / metres - found.position[mode])
+            assert off < 2e-2 * design.reach
+    # At rest nothing is left but what the weight and the soft constraints give.
+    reached = data.qpos[list(ACTUATED)] / metres
+    np.testing.assert_allclose(reached, end, atol=1e-3 * design.reach)
+    found = forward(design, reached)
+    platform = data.body("platform")
+    off = np.linalg.norm(platform.xpos / metres - found.position[mode])
+    assert off < 1e-4 * design.reach
+    relative = platform.xmat.reshape(3, 3).T @ found.rotation[mode]
+    assert Rotation.from_matrix(relative).magnitude() < 1e-4
+    moved = np.linalg.norm(platform.xpos / metres - home.position)
+    assert moved > 0.9 * np.linalg.norm(shift)
+
+
+def test_limits_become_ranges_in_metres() -> None:
+    limits: dict[str, Any] = {
+        "l1": (3.0, 15.0),
+        "d2": (2.0, None),
+        "guide": (-1.0, 22.0),
+        "gap": 0.25,
+        "swing": Swing(a1=30.0, a3=100.0, b1=40.0),
+    }
+    design = limited(OPTIMAL, **limits)
+    model = model_of(design)
+    assert model.joint("l1").range.tolist() == pytest.approx([0.03, 0.15])
+    assert model.joint("d2").range.tolist() == pytest.approx([0.02, 0.01 * design.reach])
+    for name in ("d1", "d3"):
+        assert model.joint(name).range.tolist() == pytest.approx([-0.01, 0.22])
+        assert model.actuator(name).ctrlrange.tolist() == pytest.approx([-0.01, 0.22])
+    first = model.joint("a1 first")
+    half = 0.5 * (first.range[1] - first.range[0])
+    assert half == pytest.approx(math.radians(30.0))
+    assert first.range.mean() == pytest.approx(model.qpos0[0])
+    assert model.joint("a1 second").range.tolist() == pytest.approx([-half, half])
+    for free in ("a3 first", "a3 second", "guide 2"):
+        assert not model.joint(free).limited
+    data = engine.MjData(model)
+    engine.mj_forward(model, data)
+    assert model.tendon_range[0, 0] == pytest.approx(0.0025)
+    home = home_pose(design)
+    q = inverse(design, home.position, home.rotation)
+    assert data.ten_length[0] == pytest.approx(0.01 * abs(q[1] - q[3]))
+
+
+@pytest.mark.parametrize("yaw", [-73.1, -106.9])
+def test_carriages_keep_the_order_of_home_unless_the_design_says_otherwise(yaw: float) -> None:
+    home = Pose.of_yaw_pitch_roll(home_pose(OPTIMAL).position, (yaw, 0.0, 0.0))
+    design = msgspec.structs.replace(OPTIMAL, home=home)
+    model = model_of(design)
+    data = engine.MjData(model)
+    engine.mj_forward(model, data)
+    low, high = model.tendon_range[0].tolist()
+    assert low == 0.0 < data.ten_length[0] < high
+    assert model_of(limited(design, carriage_order="any")).ntendon == 0
+
+
+@pytest.mark.parametrize("half_angle", [20.0, 60.0, 89.0])
+def test_the_hinges_of_a_swing_hold_its_whole_cone(half_angle: float) -> None:
+    design = limited(OPTIMAL, margin=None, swing=Swing(a1=half_angle, a3=half_angle))
+    model = model_of(design)
+    rng = np.random.default_rng(2)
+    home = home_pose(design)
+    shifts = rng.uniform(-1.0, 1.0, (400, 3)) * rng.uniform(0.0, design.reach, (400, 1))
+    positions = np.array(home.position) + shifts
+    rotations = np.broadcast_to(home.rotation, (400, 3, 3))
+    values = simulation_joints(design, positions, rotations)
+    kept = 0
+    for position, rotation, joints in zip(positions, rotations, values, strict=True):
+        snapshot = evaluate(design, Pose.of(position, rotation))
+        if any(each.limit.startswith("swing") for each in snapshot.violations):
+            continue
+        kept += 1
+        for name in ("a1 first", "a1 second", "a3 first", "a3 second"):
+            low, high = model.joint(name).range
+            assert low <= joints[CHAIN_JOINTS.index(name)] <= high
+    assert kept > 20
+
+
+def test_masses_grow_with_density_and_the_unit() -> None:
+    one, twice = (model_of(msgspec.structs.replace(OPTIMAL, unit_mm=u)) for u in (10.0, 20.0))
+    np.testing.assert_allclose(twice.body_mass, 8.0 * one.body_mass, rtol=1e-9)
+    np.testing.assert_allclose(twice.body_inertia, 32.0 * one.body_inertia, rtol=1e-9)
+    dense = engine.MjModel.from_xml_string(simulation_mjcf(OPTIMAL, 2480.0))
+    np.testing.assert_allclose(dense.body_mass, 2.0 * one.body_mass, rtol=1e-9)
+
+
+def test_masses_can_be_those_of_the_parts() -> None:
+    prototype = make_prototype(OPTIMAL)
+    masses = prototype.masses(2700.0)
+    model = engine.MjModel.from_xml_string(simulation_mjcf(OPTIMAL, masses=masses))
+    for name, mass in masses.items():
+        body = model.body(name)
+        assert body.mass[0] == pytest.approx(mass.mass, rel=1e-9)
+        np.testing.assert_allclose(body.ipos, mass.centre, atol=1e-12)
+        turn = np.empty(9)
+        engine.mju_quat2Mat(turn, body.iquat)
+        axes = turn.reshape(3, 3)
+        inertia = axes @ np.diag(body.inertia) @ axes.T
+        np.testing.assert_allclose(inertia, mass.inertia, atol=1e-6 * mass.inertia.max())
+    # All but the base: what moves weighs what its parts weigh.
+    volume = sum(part.solid.volume for part in prototype.parts[1:]) * 1e-6
+    assert float(model.body_mass.sum()) == pytest.approx(2700.0 * volume, rel=1e-9)
+
+
+def test_what_cannot_be_simulated_is_refused_with_what_would_work() -> None:
+    for density in (0.0, -1.0, math.nan, math.inf):
+        with pytest.raises(InputError, match="density must be positive"):
+            simulation_mjcf(OPTIMAL, density)
+    light = msgspec.structs.replace(OPTIMAL, unit_mm=1e-3)
+    with pytest.raises(InputError, match="the unit must be at least") as refusal:
+        simulation_mjcf(light)
+    least = float(str(refusal.value).partition("the unit must be at least ")[2].split(" ")[0])
+    model_of(msgspec.structs.replace(OPTIMAL, unit_mm=least))
+    collapsed = Pose((*OPTIMAL.a3, 0.0), (0.8, 0.0, 0.0, 0.6))
+    with pytest.raises(InputError, match="leg 4 has no length"):
+        simulation_mjcf(msgspec.structs.replace(OPTIMAL, home=collapsed))
+
+
+def test_a_name_of_any_letters_is_carried() -> None:
+    design = msgspec.structs.replace(OPTIMAL, name='κ < "two" & -- three')
+    assert model_of(design).names.startswith('κ < "two" & -- three'.encode())
+
+
+def test_masses_of_bars_balls_and_meshes_agree() -> None:
+    import trimesh
+
+    shapes: Any = trimesh.creation
+    start, end = np.array([1.0, 2.0, 3.0]), np.array([2.0, 0.0, 5.0])
+    rod = shapes.cylinder(0.5, segment=[start, end], sections=400)
+    sphere = shapes.icosphere(5, 0.7)
+    sphere.apply_translation([3.0, 1.0, 0.0])
+    found = bar(0.5, start, end, 2.0), ball(0.7, np.array([3.0, 1.0, 0.0]), 2.0)
+    meshes = [mesh_mass(each.vertices, each.faces, 2.0) for each in (rod, sphere)]
+    for exact, mesh in zip((*found, together(found)), (*meshes, together(meshes)), strict=True):
+        assert mesh.mass == pytest.approx(exact.mass, rel=2e-3)
+        np.testing.assert_allclose(mesh.centre, exact.centre, atol=1e-3)
+        np.testing.assert_allclose(mesh.inertia, exact.inertia, atol=5e-3 * exact.inertia.max())
+    # A mesh has an exact answer of its own, which trimesh has too.
+    util: Any = trimesh.util
+    both = util.concatenate([rod, sphere])
+    own = mesh_mass(np.asarray(both.vertices), np.asarray(both.faces), 2.0)
+    both.density = 2.0
+    np.testing.assert_allclose(own.centre, both.center_mass, rtol=1e-9)
+    np.testing.assert_allclose(own.inertia, both.moment_inertia, rtol=1e-6, atol=1e-9)
+    assert own.mass == pytest.approx(float(both.mass), rel=1e-9)

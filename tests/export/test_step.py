@@ -1,0 +1,174 @@
+"""The workspace as STEP: exact faces and volume, and a file that OpenCASCADE reads back."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+from limited_designs import limited, reference_case
+
+from explorer import (
+    PRESETS,
+    Design,
+    ExplorerError,
+    InputError,
+    NoAnswerError,
+    Pose,
+    home_pose,
+    make_prototype,
+    workspace_volume,
+)
+from explorer.export.mesh import colour_of
+from explorer.export.opencascade import coordinates, faces_of, occ, volume_of
+from explorer.export.step import exact_workspace, step_bytes, workspace_step
+from explorer.export.step_assembly import exact_parts, write_assembly_step
+from explorer.mechanism.design import Swing
+
+OPTIMAL, INITIAL = PRESETS["paper-optimal"], PRESETS["paper-initial"]
+
+
+def cubic_mm(design: Design, volume: float) -> float:
+    return volume * design.unit_mm**3
+
+
+@pytest.mark.parametrize("design", [OPTIMAL, INITIAL])
+def test_the_volume_is_the_exact_one(design: Design) -> None:
+    for unit in (1.0, 250.0):
+        scaled = msgspec.structs.replace(design, unit_mm=unit)
+        expected = cubic_mm(scaled, workspace_volume(design).volume)
+        assert exact_workspace(scaled).volume == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize("index", [*range(0, 24, 3), 5, 17, 19])
+def test_shells_slabs_and_tilted_planes_have_their_exact_volume(index: int) -> None:
+    design, rotation, _ = reference_case(index)
+    solid = exact_workspace(design, rotation)
+    expected = cubic_mm(design, workspace_volume(design, rotation).volume)
+    assert solid.volume == pytest.approx(expected, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    "swing",
+    [
+        Swing(a1=30.0),
+        Swing(a3=90.0),
+        Swing(b1=50.0, b4=70.0),
+        Swing(b2=20.0),
+        Swing(b2=120.0),
+        Swing(a1=100.0, b3=30.0),
+    ],
+)
+def test_cones_and_wedges_are_cut_exactly(swing: Swing) -> None:
+    design = limited(OPTIMAL, swing=swing)
+    solid, expected = exact_workspace(design), workspace_volume(design)
+    off = abs(solid.volume - cubic_mm(design, expected.volume))
+    assert off <= cubic_mm(design, 1e-6 * expected.volume + expected.error)
+
+
+def face_kinds(shape: Any) -> list[str]:
+    kinds = (str(occ("BRepAdaptor_Surface")(face).GetType()) for face in faces_of(shape))
+    return [kind.rpartition("_")[2] for kind in kinds]
+
+
+def test_faces_are_spheres_cylinders_and_planes_of_their_limits() -> None:
+    solid = exact_workspace(OPTIMAL)
+    kinds = dict(zip(solid.limit_of_face, face_kinds(solid.shape), strict=True))
+    assert kinds["l1 maximum"] == kinds["l4 maximum"] == "Sphere"
+    assert kinds["d2 maximum"] == "Cylinder"
+    assert {kind for limit, kind in kinds.items() if limit.startswith("box")} == {"Plane"}
+    assert len(kinds) >= 9
+    cone = exact_workspace(limited(OPTIMAL, swing=Swing(a1=30.0)))
+    kinds = dict(zip(cone.limit_of_face, face_kinds(cone.shape), strict=True))
+    assert kinds["swing a1"] == "Cone"
+
+
+def read(path: Path) -> Any:
+    reader = occ("STEPControl_Reader")()
+    assert int(reader.ReadFile(str(path))) == 1
+    reader.TransferRoots()
+    return reader.OneShape()
+
+
+def test_the_file_is_read_back_with_names_colours_and_volume(tmp_path: Path) -> None:
+    design = msgspec.structs.replace(OPTIMAL, unit_mm=12.5, name="Räume")
+    solid = exact_workspace(design)
+    data = step_bytes(solid, f"workspace of {design.name}")
+    assert b"AP242" in data[:600]
+    assert b"SI_UNIT(.MILLI.,.METRE.)" in data
+    assert len(data) < 200_000
+    path = tmp_path / "a.step"
+    path.write_bytes(data)
+    shape = read(path)
+    assert occ("BRepCheck_Analyzer")(shape).IsValid()
+    expected = cubic_mm(design, workspace_volume(design).volume)
+    assert volume_of(shape) == pytest.approx(expected, rel=1e-6)
+    for limit in set(solid.limit_of_face):
+        assert f"ADVANCED_FACE('{limit}'".encode() in data
+    reds = {colour_of(limit)[0] for limit in solid.limit_of_face}
+    written = {
+        round(255 * float(line.partition("COLOUR_RGB('',")[2].split(",")[0]))
+        for line in data.decode("latin-1").splitlines()
+        if "COLOUR_RGB('',0." in line
+    }
+    assert reds <= written | {0, 255}
+
+
+def test_an_empty_workspace_or_one_beyond_the_tolerance_is_refused() -> None:
+    with pytest.raises(NoAnswerError, match="empty: margin κ2"):
+        workspace_step(OPTIMAL, np.eye(3))
+    for unit in (1e-4, 1e7):
+        with pytest.raises(InputError, match="choose another unit"):
+            workspace_step(msgspec.structs.replace(OPTIMAL, unit_mm=unit))
+    thin: Any = {"box": ((0.0, -12.0, 5.0), (20.0, 22.0, 5.0 + 1e-7))}
+    with pytest.raises(ExplorerError, match=r"too thin|cannot combine"):
+        workspace_step(limited(OPTIMAL, **thin))
+
+
+@pytest.mark.parametrize("below", [False, True])
+def test_the_parts_are_exact_solids_of_the_meshes_volumes(below: bool) -> None:
+    design = OPTIMAL
+    if below:
+        home = home_pose(OPTIMAL)
+        x, y, z = home.position
+        pose = Pose.of((x, -y, -z), np.diag([1.0, -1.0, -1.0]) @ home.rotation)
+        a3 = (OPTIMAL.a3[0], -OPTIMAL.a3[1])
+        design = msgspec.structs.replace(limited(OPTIMAL, box=None), a3=a3, home=pose)
+    prototype = make_prototype(design)
+    exact = exact_parts(prototype.sizes)
+    assert list(exact) == [part.name for part in prototype.parts]
+    for part in prototype.parts:
+        shape = exact[part.name].shape
+        assert occ("BRepCheck_Analyzer")(shape).IsValid(), part.name
+        # Chords take of what is round, outside and inside.
+        mesh = cubic_mm(design, part.solid.volume)
+        assert volume_of(shape) == pytest.approx(mesh, rel=1e-2), part.name
+
+
+def test_the_assembly_is_read_back_where_its_parts_are(tmp_path: Path) -> None:
+    prototype = make_prototype(OPTIMAL)
+    path = tmp_path / "mechanism.step"
+    write_assembly_step(prototype.sizes, path)
+    data = path.read_bytes()
+    assert b"AP242" in data[:600]
+    for part in prototype.parts:
+        assert f"PRODUCT('{part.name}'".encode() in data
+    for group in ("base", "leg 1", "leg 4", "platform with balls"):
+        assert f"PRODUCT('{group}'".encode() in data
+    # Every part is in a group, every group in the whole.
+    assert data.count(b"NEXT_ASSEMBLY_USAGE_OCCURRENCE(") == len(prototype.parts) + 6
+    assert data.count(b"COLOUR_RGB") >= 7
+    shape = read(path)
+    home = home_pose(OPTIMAL)
+    points = np.concatenate(prototype.at(home.position, home.rotation)) * OPTIMAL.unit_mm
+    box = occ("Bnd_Box")()
+    occ("BRepBndLib").AddOptimal_s(shape, box, False, False)
+    for corner, expected in (
+        (box.CornerMin(), points.min(axis=0)),
+        (box.CornerMax(), points.max(axis=0)),
+    ):
+        np.testing.assert_allclose(coordinates(corner), expected, atol=0.05)
+    total = sum(cubic_mm(OPTIMAL, part.solid.volume) for part in prototype.parts)
+    assert volume_of(shape) == pytest.approx(total, rel=1e-2)

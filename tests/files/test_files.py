@@ -1,0 +1,165 @@
+"""Files written whole or not at all: what is forced to the disk, and what is said when it fails."""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+import sys
+import threading
+from pathlib import Path
+
+import pytest
+
+from explorer.errors import StorageError
+from explorer.files.writing import check_writable, make_folder, move, read_at_most, write_whole
+
+REMEDIES = {
+    errno.ENOSPC: "make room",
+    errno.EDQUOT: "quota",
+    errno.EFBIG: "larger files",
+    errno.EACCES: "may write",
+    errno.EPERM: "may write",
+    errno.EROFS: "can be written",
+    errno.EIO: "cannot write",
+}
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+@pytest.mark.parametrize("code", REMEDIES)
+@pytest.mark.parametrize("step", ["open", "fsync", "replace"])
+def test_what_fails_leaves_what_was_there_and_says_what_would_work(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: int, step: str
+) -> None:
+    path = tmp_path / "file"
+    path.write_bytes(b"old")
+
+    def fail(*_: object, **__: object) -> None:
+        raise OSError(code, os.strerror(code))
+
+    with monkeypatch.context() as patch:
+        if step == "fsync":
+            patch.setattr(os, "fsync", fail)
+        else:
+            patch.setattr(Path, step, fail)
+        with pytest.raises(StorageError, match=REMEDIES[code]) as refusal:
+            write_whole(path, b"new")
+    assert os.strerror(code) in str(refusal.value)
+    assert repr(str(path)) in str(refusal.value)
+    assert len(str(refusal.value).splitlines()) == 1
+    assert contents(tmp_path) == {"file": b"old"}
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="folders cannot be forced to the disk there")
+def test_file_and_folder_are_forced_to_the_disk_in_this_order(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, forced = tmp_path / "file", list[tuple[bool, bool]]()
+    usual = os.fsync
+
+    def fsync(descriptor: int) -> None:
+        is_folder = stat.S_ISDIR(os.fstat(descriptor).st_mode)
+        # The file has its contents but not its name yet; the folder has the name.
+        forced.append((is_folder, path.exists()))
+        if not is_folder:
+            assert os.fstat(descriptor).st_size == 3
+        usual(descriptor)
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    write_whole(path, b"new")
+    assert forced == [(False, False), (True, True)]
+
+
+def test_readers_see_the_old_file_or_the_new_one(tmp_path: Path) -> None:
+    path = tmp_path / "file"
+    whole = [bytes([number]) * (10_000 + number) for number in range(50)]
+    write_whole(path, whole[0])
+    seen, is_done = set[bytes](), threading.Event()
+
+    def read() -> None:
+        # Also where its turn comes only when all is written.
+        seen.add(path.read_bytes())
+        while not is_done.is_set():
+            seen.add(path.read_bytes())
+
+    thread = threading.Thread(target=read)
+    thread.start()
+    for data in whole:
+        write_whole(path, data)
+    is_done.set()
+    thread.join()
+    assert seen
+    assert seen <= {*whole}
+
+
+@pytest.mark.parametrize("name", ["x" * 300, "nul\0", "é" * 200])
+def test_names_that_no_system_takes_are_refused(tmp_path: Path, name: str) -> None:
+    path = tmp_path / name
+    for attempt in (
+        lambda: write_whole(path, b""),
+        lambda: check_writable(path),
+        lambda: read_at_most(path, 3),
+        lambda: make_folder(path),
+    ):
+        with pytest.raises(StorageError) as refusal:
+            attempt()
+        assert str(refusal.value).isprintable()
+    assert contents(tmp_path) == {}
+
+
+@pytest.mark.parametrize("name", ["x" * 255, "é" * 127, "🦾" * 63])
+def test_the_longest_names_are_written(tmp_path: Path, name: str) -> None:
+    write_whole(tmp_path / name, b"new")
+    assert contents(tmp_path) == {name: b"new"}
+
+
+def test_files_are_read_up_to_a_size(tmp_path: Path) -> None:
+    path = tmp_path / "file"
+    path.write_bytes(b"1234")
+    assert read_at_most(path, 4) == b"1234"
+    with pytest.raises(StorageError, match="larger than 3 bytes"):
+        read_at_most(path, 3)
+    with pytest.raises(StorageError, match="No such file"):
+        read_at_most(tmp_path / "missing", 3)
+    odd = [tmp_path, Path(os.devnull)]
+    if hasattr(os, "mkfifo"):
+        os.mkfifo(tmp_path / "pipe")
+        odd.append(tmp_path / "pipe")
+    for each in odd:
+        with pytest.raises(StorageError, match="no plain file"):
+            read_at_most(each, 3)
+
+
+def test_folders_are_made_for_their_owner_alone(tmp_path: Path) -> None:
+    folder = tmp_path / "one" / "two"
+    make_folder(folder)
+    make_folder(folder)
+    assert folder.is_dir()
+    if sys.platform != "win32":
+        assert folder.stat().st_mode & 0o077 == 0
+    (tmp_path / "file").write_bytes(b"")
+    for path in (tmp_path / "file", tmp_path / "file" / "folder"):
+        with pytest.raises(StorageError, match="a file lies where"):
+            make_folder(path)
+
+
+def test_a_file_is_moved_with_all_that_is_in_it(tmp_path: Path) -> None:
+    (tmp_path / "one").write_bytes(b"1")
+    (tmp_path / "two").write_bytes(b"2")
+    move(tmp_path / "one", tmp_path / "two")
+    assert contents(tmp_path) == {"two": b"1"}
+    with pytest.raises(StorageError, match="No such file"):
+        move(tmp_path / "one", tmp_path / "two")
+    assert contents(tmp_path) == {"two": b"1"}
+
+
+def test_a_link_stays_a_link(tmp_path: Path) -> None:
+    target, link = tmp_path / "target", tmp_path / "link"
+    target.write_bytes(b"old")
+    link.symlink_to(target)
+    write_whole(link, b"new")
+    assert link.is_symlink()
+    assert target.read_bytes() == b"new"

@@ -1,0 +1,193 @@
+"""Distances between segments and clearances of the legs in a pose."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, strategies as st
+from strategies import Case, ordinary_cases, uniform_rotations
+
+from explorer import PAIRS, PRESETS, Design, InputError, Limits, home_pose, leg_clearances
+from explorer.legs.clearance import joined_pairs, leg_axes
+from explorer.legs.segments import segment_distances
+from explorer.numerics.arrays import FloatArray
+from explorer.numerics.compiled import MANY_ROWS
+
+REFERENCE: dict[str, list[dict[str, Any]]] = json.loads(
+    (Path(__file__).parents[1] / "data" / "interference.json").read_text(encoding="utf-8")
+)
+OPTIMAL = PRESETS["paper-optimal"]
+SCALES = (1e-30, 1e-3, 1.0, 1e5, 1e30)
+
+
+def random_segments(seed: int, count: int = 2000) -> tuple[FloatArray, FloatArray]:
+    """Return pairs of segments: general, parallel, of no length, collinear, flat, meeting."""
+    rng = np.random.default_rng(seed)
+    a, b = rng.uniform(-1.0, 1.0, (2, count, 2, 3))
+    kind = np.arange(count) % 8
+    along = a[:, 1] - a[:, 0]
+    share = rng.uniform(-1.0, 2.0, (count, 1))
+    parallel = b[:, 0] + share * along
+    b[kind == 1, 1] = parallel[kind == 1]
+    b[kind == 2, 1] = b[kind == 2, 0]
+    both = kind == 3
+    a[both, 1], b[both, 1] = a[both, 0], b[both, 0]
+    collinear = a[:, :1] + rng.uniform(-2.0, 2.0, (count, 2, 1)) * along[:, None, :]
+    b[kind == 4] = collinear[kind == 4]
+    a[kind == 5, :, 2] = b[kind == 5, :, 2] = 0.0
+    # Nearly parallel: an angle of 1e-1 to 1e-12.
+    tilt = 10.0 ** -rng.integers(1, 13, (count, 1)) * rng.uniform(-1.0, 1.0, (count, 3))
+    b[kind == 6, 1] = (parallel + tilt)[kind == 6]
+    on_a = a[:, 0] + rng.uniform(0.0, 1.0, (count, 1)) * along
+    b[kind == 7, 0] = on_a[kind == 7]
+    return a, b
+
+
+def searched_distance(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Return the distance by ternary search over the first: to the second it is convex."""
+    u, v = a[:, 1] - a[:, 0], b[:, 1] - b[:, 0]
+    square = np.maximum(np.einsum("ni,ni->n", v, v), 1e-300)
+
+    def to_second(s: FloatArray) -> FloatArray:
+        point = a[:, 0] + s[:, None] * u
+        share = np.clip(np.einsum("ni,ni->n", point - b[:, 0], v) / square, 0.0, 1.0)
+        return np.asarray(np.linalg.norm(point - b[:, 0] - share[:, None] * v, axis=-1))
+
+    low, high = np.zeros(len(a)), np.ones(len(a))
+    for _ in range(100):
+        third = (high - low) / 3.0
+        rises = to_second(low + third) < to_second(high - third)
+        high = np.where(rises, high - third, high)
+        low = np.where(rises, low, low + third)
+    ends = np.minimum(to_second(np.zeros(len(a))), to_second(np.ones(len(a))))
+    return np.minimum(ends, to_second(0.5 * (low + high)))
+
+
+def test_distances_are_those_of_the_reference() -> None:
+    cases = REFERENCE["segments"]
+    assert len(cases) == 200
+    a, b = (np.array([case[key] for case in cases]) for key in "ab")
+    expected = np.array([case["distance"] for case in cases])
+    np.testing.assert_allclose(segment_distances(a, b).distance, expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize("scale", SCALES)
+def test_distances_are_those_of_a_search_over_both_segments(scale: float) -> None:
+    a, b = random_segments(1)
+    found = segment_distances(scale * a, scale * b).distance / scale
+    np.testing.assert_allclose(found, searched_distance(a, b), atol=1e-9)
+
+
+def test_nothing_is_closer_than_the_closest_points() -> None:
+    a, b = random_segments(2)
+    found = segment_distances(a, b)
+    x, y = found.points[:, 0], found.points[:, 1]
+    np.testing.assert_allclose(np.linalg.norm(x - y, axis=-1), found.distance, atol=1e-14)
+    # The points lie on the segments, and no end lies farther towards the other point.
+    for point, ends in ((x, a), (y, b)):
+        np.testing.assert_allclose(
+            segment_distances(np.stack([point, point], axis=1), ends).distance, 0.0, atol=1e-14
+        )
+    off = y - x
+    for ends, point, sign in ((a, x, 1.0), (b, y, -1.0)):
+        nearer = sign * np.einsum("ni,nki->nk", off, ends - point[:, None])
+        assert nearer.max() < 1e-9
+
+
+@pytest.mark.parametrize("size", [1e-8, 1e-5])
+def test_nearly_parallel_segments_that_cross_are_seen_to_cross(size: float) -> None:
+    a = np.array([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
+    for share in np.linspace(-0.9, 0.9, 7):
+        b = np.array([[-1.0, size * (-1.0 - share), 0.0], [1.0, size * (1.0 - share), 0.0]])
+        assert segment_distances(a, b).distance < 1e-15
+
+
+def test_distances_are_symmetric_and_move_with_the_segments() -> None:
+    a, b = random_segments(3)
+    found = segment_distances(a, b)
+    swapped = segment_distances(b, a[:, ::-1])
+    np.testing.assert_allclose(found.distance, swapped.distance, atol=1e-14)
+    turn = home_pose(OPTIMAL).rotation
+    moved = segment_distances(a @ turn.T + [1.0, -2.0, 3.0], b @ turn.T + [1.0, -2.0, 3.0])
+    np.testing.assert_allclose(found.distance, moved.distance, atol=1e-14)
+
+
+def test_few_and_many_pairs_have_the_same_distances_over_broadcast_axes() -> None:
+    a, b = random_segments(4, 40)
+    table = segment_distances(a[:, None], b)
+    assert table.distance.shape == (40, 40)
+    assert MANY_ROWS < 1600
+    for row in range(0, 40, 7):
+        alone = segment_distances(a[row], b[row])
+        assert alone.points.shape == (2, 3)
+        np.testing.assert_allclose(alone.distance, table.distance[row, row], atol=1e-15)
+
+
+@pytest.mark.parametrize("bad", [np.zeros((3, 3)), np.full((2, 3), np.nan), "legs"])
+def test_segments_that_are_none_are_refused(bad: Any) -> None:
+    with pytest.raises(InputError, match="second segment"):
+        segment_distances(np.zeros((2, 3)), bad)
+
+
+@given(ordinary_cases())
+def test_legs_reach_from_their_base_ends_to_their_platform_ends(case: Case) -> None:
+    axes = leg_axes(case.design, case.position, case.rotation)
+    d = case.design
+    platform = np.array([[*d.b1, 0.0], [d.b2, 0.0, 0.0], [d.b3, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    ends = case.position + platform @ case.rotation.T
+    np.testing.assert_allclose(axes[:, 1], ends, atol=1e-12 * case.size)
+    base = [[0.0, 0.0, 0.0], [ends[1, 0], 0.0, 0.0], [ends[2, 0], 0.0, 0.0], [*d.a3, 0.0]]
+    np.testing.assert_allclose(axes[:, 0], base, atol=1e-12 * case.size)
+
+
+@given(ordinary_cases())
+def test_clearances_are_the_distances_of_the_axes_less_the_radii(case: Case) -> None:
+    radii = (0.1, 0.2, 0.4, 0.8)
+    design = Design(
+        a3=case.design.a3,
+        b1=case.design.b1,
+        b2=case.design.b2,
+        b3=case.design.b3,
+        limits=Limits(leg_radii=radii),
+    )
+    axes = leg_axes(design, case.position, case.rotation)
+    found = leg_clearances(design, case.position, case.rotation)
+    for index, (i, j) in enumerate(PAIRS):
+        if joined_pairs(design)[index]:
+            continue
+        alone = segment_distances(axes[i - 1], axes[j - 1])
+        assert found.distance[index] == pytest.approx(alone.distance, abs=1e-12)
+        np.testing.assert_allclose(found.points[index], alone.points, atol=1e-12)
+        expected = alone.distance - radii[i - 1] - radii[j - 1]
+        assert found.clearance[index] == pytest.approx(expected, abs=1e-12)
+    assert found.clearance[found.closest] == found.clearance.min()
+
+
+@given(uniform_rotations(), st.sampled_from((0.0, 1e-14)))
+def test_a_pair_that_shares_a_joint_has_no_clearance(rotation: FloatArray, least: float) -> None:
+    position = np.array([1.0, 2.0, 3.0])
+    second = leg_clearances(Design(a3=(10, 4), b1=(4, -1), b2=least, b3=2), position, rotation)
+    third = leg_clearances(Design(a3=(10, 4), b1=(4, -1), b2=2, b3=-least), position, rotation)
+    for found, pair in ((second, (2, 4)), (third, (3, 4))):
+        infinite = [PAIRS[k] for k in range(6) if math.isinf(found.clearance[k])]
+        assert infinite == [pair]
+        np.testing.assert_allclose(found.points[PAIRS.index(pair)], [position] * 2)
+        assert PAIRS[int(found.closest)] != pair
+
+
+def test_clearances_of_a_batch_are_those_of_its_poses() -> None:
+    home = home_pose(OPTIMAL)
+    positions = np.array(home.position) + np.random.default_rng(5).uniform(-2, 2, (20, 20, 3))
+    batch = leg_clearances(OPTIMAL, positions, home.rotation)
+    assert batch.clearance.shape == (20, 20, 6)
+    assert batch.points.shape == (20, 20, 6, 2, 3)
+    assert batch.closest.shape == (20, 20)
+    alone = leg_clearances(OPTIMAL, positions[3, 4], home.rotation)
+    np.testing.assert_allclose(batch.clearance[3, 4], alone.clearance, atol=1e-14)
+    with pytest.raises(InputError, match="position"):
+        leg_clearances(OPTIMAL, [1.0, 2.0, math.nan], home.rotation)

@@ -1,0 +1,263 @@
+"""Leg interference over steps and moves: the paper's test, and the exact one."""
+
+from __future__ import annotations
+
+import math
+
+import msgspec
+import numpy as np
+import pytest
+from hypothesis import given, strategies as st
+from strategies import ordinary_designs, positions, rotations
+
+from explorer import (
+    PAIRS,
+    PRESETS,
+    Design,
+    InputError,
+    Limits,
+    Pose,
+    home_pose,
+    leg_clearances,
+    move_clearance,
+    move_clearances,
+    moves_are_clear,
+    poses_between,
+    rotation_from_quaternion,
+    rotation_from_yaw_pitch_roll,
+    step_is_free,
+    step_overlaps,
+    swept_tetrahedra,
+    tetrahedra_overlap,
+)
+from explorer.legs.clearance import joined_pairs, leg_axes
+from explorer.numerics.arrays import FloatArray
+
+OPTIMAL = PRESETS["paper-optimal"]
+HOME = home_pose(OPTIMAL)
+JOINED = Design(a3=(10, 4), b1=(4, -1), b2=0.0, b3=2.0)
+
+
+def with_radii(design: Design, radii: tuple[float, float, float, float]) -> Design:
+    return msgspec.structs.replace(design, limits=Limits(leg_radii=radii))
+
+
+@st.composite
+def moves(draw: st.DrawFn) -> tuple[Design, Pose, Pose]:
+    """Draw a design and two poses, of one orientation in a third of the cases."""
+    design = draw(ordinary_designs())
+    first = draw(rotations())
+    second = first if draw(st.integers(0, 2)) == 0 else draw(rotations())
+    size = design.reach
+    start = Pose.of(size * draw(positions()), first)
+    end = Pose.of(size * draw(positions()) + [0.01, 0.0, 0.0], second)
+    return design, start, end
+
+
+def random_moves(seed: int, count: int) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return moves about the optimal design's home: some keep the orientation."""
+    rng = np.random.default_rng(seed)
+    first = np.array(HOME.position) + rng.uniform(-8.0, 8.0, (count, 3))
+    last = first + rng.uniform(-5.0, 5.0, (count, 3))
+    turn = rotation_from_quaternion(rng.normal(size=(count, 4)))
+    turned = rotation_from_quaternion(rng.normal(size=(count, 4)))
+    kept = np.arange(count) % 3 == 0
+    turned[kept] = turn[kept]
+    return first, turn, last, turned
+
+
+def sampled(design: Design, start: Pose, end: Pose, count: int = 1001) -> FloatArray:
+    """Return the least clearance of each pair among many poses of a move, shape (6,)."""
+    poses = poses_between(start, end, np.linspace(0.0, 1.0, count))
+    return leg_clearances(design, *poses).clearance.min(axis=0)
+
+
+@given(moves(), st.floats(0.0, 1.0), st.floats(0.0, 1.0), st.integers(0, 3))
+def test_ends_of_a_leg_stay_on_the_edges_of_its_tetrahedron(
+    move: tuple[Design, Pose, Pose], share: float, along: float, leg: int
+) -> None:
+    design, start, end = move
+    end = Pose(end.position, start.quaternion)
+    swept = swept_tetrahedra(design, start.position, start.rotation, end.position, end.rotation)
+    assert swept.shape == (4, 4, 3)
+    axis = leg_axes(design, *poses_between(start, end, share))[leg]
+    point = axis[0] + along * (axis[1] - axis[0])
+    assert tetrahedra_overlap(swept[leg], np.tile(point, (4, 1)))
+
+
+def test_tetrahedra_of_legs_with_a_fixed_base_end_are_flat() -> None:
+    swept = swept_tetrahedra(OPTIMAL, *random_moves(1, 10))
+    for leg in (0, 3):
+        np.testing.assert_array_equal(swept[:, leg, 0], swept[:, leg, 1])
+
+
+@given(moves())
+def test_a_free_step_has_no_crossing_at_constant_orientation(
+    move: tuple[Design, Pose, Pose],
+) -> None:
+    design, start, end = move
+    end = Pose(end.position, start.quaternion)
+    overlaps = step_overlaps(design, start.position, start.rotation, end.position, end.rotation)
+    free = step_is_free(design, start.position, start.rotation, end.position, end.rotation)
+    assert bool(free) is not bool(overlaps.any())
+    least = sampled(design, start, end, 101)
+    # What the tetrahedra keep apart, the legs within them keep apart.
+    assert (least[~overlaps] > 0.0).all()
+
+
+def test_steps_of_a_batch_are_those_of_its_moves() -> None:
+    many = random_moves(2, 300)
+    found = step_overlaps(OPTIMAL, *many)
+    assert found.shape == (300, 6)
+    assert 0.05 < found.mean() < 0.95
+    np.testing.assert_array_equal(step_is_free(OPTIMAL, *many), ~found.any(axis=-1))
+    for row in range(0, 300, 50):
+        np.testing.assert_array_equal(step_overlaps(OPTIMAL, *(x[row] for x in many)), found[row])
+    table = step_is_free(OPTIMAL, many[0][:4, None], HOME.rotation, many[2][:5], HOME.rotation)
+    assert table.shape == (4, 5)
+
+
+def test_pairs_that_share_a_joint_are_left_out_of_every_answer() -> None:
+    start, end = Pose((3, 2, 4), (1, 0.2, 0.1, -0.4)), Pose((4, 3, 5), (1, 0.2, 0.3, -0.4))
+    joined = int(joined_pairs(JOINED).argmax())
+    assert PAIRS[joined] == (2, 4)
+    found = move_clearance(JOINED, start, end, steps=3)
+    assert not found.overlaps[joined]
+    assert math.isinf(found.bound[joined])
+    assert math.isinf(found.clearance[joined])
+    assert found.closest != joined
+    others = np.arange(6) != joined
+    assert np.isfinite(found.bound[others]).all()
+    arrays = (start.position, start.rotation, end.position, end.rotation)
+    assert bool(moves_are_clear(JOINED, *arrays)) is found.is_clear
+
+
+def crossing() -> tuple[Design, Pose, Pose]:
+    """Return a move in which b1 passes through leg 4, and so leg 1 does."""
+    design = Design(a3=(10.0, 4.0), b1=(4.0, -1.0), b2=3.0, b3=1.5)
+    rotation = rotation_from_yaw_pitch_roll([-40.0, 10.0, 5.0])
+    # Half way b1 is in the middle of leg 4, from a3 to b4.
+    arm = rotation @ [*design.b1, 0.0]
+    position = np.array([*design.a3, 0.0]) - 2.0 * arm
+    side = np.cross(arm, [0.3, 0.5, 0.8])
+    side /= np.linalg.norm(side)
+    return design, Pose.of(position - side, rotation), Pose.of(position + side, rotation)
+
+
+def test_legs_that_cross_on_the_way_are_found_by_both_tests() -> None:
+    design, start, end = crossing()
+    found = move_clearance(design, start, end, steps=7)
+    pair = PAIRS.index((1, 4))
+    assert found.overlaps[pair]
+    assert not found.is_free
+    assert not found.is_clear
+    assert found.clearance[pair] <= found.tolerance
+    assert found.bound[pair] == pytest.approx(0.0, abs=1e-15)
+    assert found.share[pair] == pytest.approx(0.5, abs=1e-4)
+    arrays = (start.position, start.rotation, end.position, end.rotation)
+    assert not moves_are_clear(design, *arrays)
+    assert not step_is_free(design, *arrays)
+
+
+@given(moves(), st.sampled_from((None, 1e-2, 1e-6)))
+def test_the_bound_of_a_move_holds_and_is_nearly_attained(
+    move: tuple[Design, Pose, Pose], share: float | None
+) -> None:
+    design, start, end = move
+    radii = (0.1, 0.2, 0.3, 0.4)
+    design = with_radii(design, radii)
+    longest = 10.0 * design.reach
+    tolerance = None if share is None else share * longest
+    found = move_clearance(design, start, end, tolerance=tolerance)
+    pairs = ~joined_pairs(design)
+    least = sampled(design, start, end)[pairs]
+    rounding = 1e-12 * longest
+    bound, clearance = found.bound[pairs], found.clearance[pairs]
+    assert (bound <= least + rounding).all()
+    assert (bound <= clearance).all()
+    assert (clearance <= bound + found.tolerance * (1.0 + 1e-9)).all()
+    assert (clearance <= least + found.tolerance).all()
+    at = leg_clearances(design, *poses_between(start, end, found.share))
+    attained = at.clearance[np.arange(6), np.arange(6)][pairs]
+    np.testing.assert_allclose(attained, clearance, atol=rounding)
+    apart = np.linalg.norm(found.points[:, 0] - found.points[:, 1], axis=-1)[pairs]
+    sums = np.array([radii[i - 1] + radii[j - 1] for i, j in PAIRS])[pairs]
+    np.testing.assert_allclose(apart - sums, clearance, atol=rounding)
+
+
+def test_many_moves_at_once_are_bounded_as_tightly_as_asked() -> None:
+    many = random_moves(3, 2000)
+    first, turn, last, turned = many
+    for tolerance in (1e-2, 1e-4, 1e-6):
+        found = move_clearances(OPTIMAL, *many, tolerance=tolerance)
+        assert found.bound.shape == (2000, 6)
+        assert float((found.clearance - found.bound).max()) <= tolerance
+        assert float((found.clearance - found.bound).min()) >= 0.0
+        for row in range(0, 2000, 100):
+            start, end = Pose.of(first[row], turn[row]), Pose.of(last[row], turned[row])
+            least = sampled(OPTIMAL, start, end)
+            assert (found.bound[row] <= least + 1e-12).all()
+            assert (found.clearance[row] <= least + tolerance).all()
+
+
+def test_whether_moves_are_clear_agrees_with_the_least_clearance() -> None:
+    design = with_radii(OPTIMAL, (0.1, 0.2, 0.2, 0.3))
+    many = random_moves(4, 2000)
+    least = move_clearances(design, *many).bound.min(axis=-1)
+    for asked in (-0.2, 0.0, 0.5):
+        clear = moves_are_clear(design, *many, clearance=asked)
+        decided = np.abs(least - asked) > 1e-4
+        np.testing.assert_array_equal(clear[decided], least[decided] > asked)
+        assert 0.02 < clear.mean() < 0.98
+
+
+def test_what_is_clear_without_radii_is_free_at_some_number_of_steps() -> None:
+    start = HOME
+    end = Pose((13.0, 2.0, 5.0), (0.7, 0.2, -0.3, -0.5))
+    coarse = move_clearance(OPTIMAL, start, end, steps=1)
+    fine = move_clearance(OPTIMAL, start, end, steps=200)
+    # One step sees a crossing of legs 2 and 3 that there is none of.
+    assert coarse.is_clear
+    assert not coarse.is_free
+    assert [PAIRS[k] for k in np.flatnonzero(coarse.overlaps)] == [(2, 3)]
+    assert fine.is_free
+    np.testing.assert_allclose(coarse.bound, fine.bound)
+
+
+def test_a_move_and_its_way_back_have_the_same_least_clearances() -> None:
+    first, turn, last, turned = random_moves(5, 300)
+    there = move_clearances(OPTIMAL, first, turn, last, turned, tolerance=1e-6)
+    back = move_clearances(OPTIMAL, last, turned, first, turn, tolerance=1e-6)
+    np.testing.assert_allclose(there.clearance, back.clearance, atol=2e-6)
+
+
+def test_poses_between_start_at_the_start_and_end_at_the_end() -> None:
+    end = Pose((1.0, 2.0, 3.0), (0.1, 0.7, -0.2, 0.4))
+    position, rotation = poses_between(HOME, end, [[0.0, 0.5, 1.0]])
+    assert position.shape == (1, 3, 3)
+    assert rotation.shape == (1, 3, 3, 3)
+    np.testing.assert_allclose(position[0, [0, 2]], [HOME.position, end.position])
+    np.testing.assert_allclose(rotation[0, [0, 2]], [HOME.rotation, end.rotation], atol=1e-14)
+    half = rotation[0, 1] @ HOME.rotation.T
+    np.testing.assert_allclose(half @ half @ HOME.rotation, end.rotation, atol=1e-14)
+
+
+def test_a_move_of_no_length_is_refused() -> None:
+    with pytest.raises(InputError, match="two poses that differ"):
+        move_clearance(OPTIMAL, HOME, HOME)
+    turned = Pose(HOME.position, (1.0, 0.0, 0.0, 0.0))
+    moved = Pose((10.0, 5.0, 9.0 + 1e-6), HOME.quaternion)
+    for end in (turned, moved):
+        assert move_clearance(OPTIMAL, HOME, end).is_clear
+
+
+@pytest.mark.parametrize("steps", [0, -3])
+def test_a_move_without_steps_is_refused(steps: int) -> None:
+    with pytest.raises(InputError, match=f"at least one step; got {steps}"):
+        move_clearance(OPTIMAL, HOME, Pose((9, 5, 9), HOME.quaternion), steps=steps)
+
+
+@pytest.mark.parametrize("tolerance", [0.0, -1.0, 1e-12, math.nan])
+def test_a_tolerance_that_cannot_be_met_is_refused(tolerance: float) -> None:
+    with pytest.raises(InputError, match="tolerance must be at least"):
+        move_clearance(OPTIMAL, HOME, Pose((9, 5, 9), HOME.quaternion), tolerance=tolerance)

@@ -1,0 +1,301 @@
+"""Whether tetrahedra overlap: solid, flat, touching, contained, of every size and anywhere."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+
+from explorer import InputError, rotation_from_quaternion, tetrahedra_overlap
+from explorer.numerics.arrays import BoolArray, FloatArray
+from explorer.numerics.compiled import MANY_ROWS
+
+REFERENCE: list[dict[str, Any]] = json.loads(
+    (Path(__file__).parents[1] / "data" / "interference.json").read_text(encoding="utf-8")
+)["tetrahedra"]
+P, Q = (np.array([case[key] for case in REFERENCE]) for key in "pq")
+OVERLAP = np.array([case["overlap"] for case in REFERENCE])
+SCALES = (1e-300, 1e-60, 1e-3, 1.0, 1e5, 1e60, 1e300)
+
+CORNER = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+RANKS = ("solid", "quadrilateral", "triangle", "segment", "point", "sliver")
+
+
+def turns(rng: np.random.Generator, count: int) -> FloatArray:
+    return rotation_from_quaternion(rng.normal(size=(count, 4)))
+
+
+def bodies(rng: np.random.Generator, rank: str, count: int) -> FloatArray:
+    """Return tetrahedra of a kind within a cube of side two."""
+    body = rng.uniform(-1.0, 1.0, (count, 4, 3))
+    if rank == "quadrilateral":
+        shares = rng.uniform(-0.5, 1.0, (count, 2, 1))
+        body[:, 3] = body[:, 0] + (shares * (body[:, 1:3] - body[:, :1])).sum(axis=1)
+    elif rank == "triangle":
+        body[:, 3] = body[:, 1]
+    elif rank == "segment":
+        body[:, 2:] = (
+            body[:, :1] + rng.uniform(0, 1, (count, 2, 1)) * (body[:, 1] - body[:, 0])[:, None]
+        )
+    elif rank == "point":
+        body[:, 1:] = body[:, :1]
+    elif rank == "sliver":
+        height = 10.0 ** rng.uniform(-14.0, -1.0, (count, 1))
+        body[:, 3] = body[:, :3].mean(axis=1) + height * rng.normal(size=(count, 3))
+    return body
+
+
+def all_kinds(seed: int, count: int) -> tuple[FloatArray, FloatArray]:
+    """Return pairs of all kinds of bodies, near enough for about half of the solid to overlap."""
+    rng = np.random.default_rng(seed)
+    pairs = [(bodies(rng, a, count), bodies(rng, b, count)) for a in RANKS for b in RANKS]
+    p, q = (np.concatenate(side) for side in zip(*pairs, strict=True))
+    return p, q + rng.uniform(-0.6, 0.6, (len(q), 1, 3))
+
+
+def in_a_plane(seed: int, count: int) -> tuple[FloatArray, FloatArray]:
+    """Return coplanar pairs of flat bodies, turned at random."""
+    rng = np.random.default_rng(seed)
+    kinds = RANKS[1:5]
+    pairs: list[tuple[FloatArray, FloatArray]] = []
+    for a in kinds:
+        for b in kinds:
+            p, q = bodies(rng, a, count), bodies(rng, b, count)
+            p[..., 2] = q[..., 2] = 0.0
+            pairs.append((p, q + rng.uniform(-0.7, 0.7, (count, 1, 3)) * [1.0, 1.0, 0.0]))
+    p, q = (np.concatenate(side) for side in zip(*pairs, strict=True))
+    turn = np.swapaxes(turns(rng, len(p)), -1, -2)
+    return p @ turn, q @ turn
+
+
+def separation(p: FloatArray, q: FloatArray) -> float:
+    """Return how far apart two bodies are by a linear programme, zero if they overlap.
+
+    It finds the axis n, |n_i| at most 1, with the widest gap between the projections.
+    """
+    # max t such that n·p_i ≥ m + t and n·q_j ≤ m.
+    rows = [[*(-x), 1.0, 1.0] for x in p] + [[*x, -1.0, 0.0] for x in q]
+    bounds = [(-1.0, 1.0)] * 3 + [(None, None), (0.0, None)]
+    found = linprog([0, 0, 0, 0, -1], A_ub=rows, b_ub=np.zeros(8), bounds=bounds, method="highs")
+    assert found.status == 0
+    return -float(found.fun or 0.0)
+
+
+def plain_sat(p: FloatArray, q: FloatArray) -> BoolArray:
+    """Return whether no face normal and no axis edge × edge separates, for solid bodies."""
+    pairs = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)]
+    u = np.stack([p[:, j] - p[:, i] for i, j in pairs], axis=1)
+    v = np.stack([q[:, j] - q[:, i] for i, j in pairs], axis=1)
+    crosses = [
+        np.cross(a[:, :, None], b[:, None]).reshape(len(p), 36, 3)
+        for a, b in ((u, u), (v, v), (u, v))
+    ]
+    axes = np.concatenate(crosses, axis=1)
+    on_p, on_q = (np.einsum("nai,nki->nak", axes, x) for x in (p, q))
+    gaps = np.maximum(on_q.min(-1) - on_p.max(-1), on_p.min(-1) - on_q.max(-1))
+    return np.asarray((gaps <= 0.0).all(axis=1))
+
+
+@pytest.mark.parametrize("scale", SCALES)
+def test_answers_are_those_of_the_reference(scale: float) -> None:
+    assert len(REFERENCE) == 400
+    np.testing.assert_array_equal(tetrahedra_overlap(scale * P, scale * Q), OVERLAP)
+    np.testing.assert_array_equal(tetrahedra_overlap(scale * Q, scale * P), OVERLAP)
+
+
+def test_answers_hold_for_turned_moved_and_renumbered_bodies() -> None:
+    rng = np.random.default_rng(1)
+    turn = np.swapaxes(turns(rng, 400), -1, -2)
+    for distance in (1.0, 1e3, 1e6):
+        shift = distance * rng.normal(size=(400, 1, 3))
+        order = rng.permutation(4)
+        p, q = (P @ turn + shift)[:, order], (Q @ turn + shift)[:, order[::-1]]
+        np.testing.assert_array_equal(tetrahedra_overlap(p, q), OVERLAP)
+
+
+def test_single_pairs_are_answered_as_in_a_batch() -> None:
+    for p, q, expected in list(zip(P, Q, OVERLAP, strict=True))[::5]:
+        assert tetrahedra_overlap(p, q).shape == ()
+        assert bool(tetrahedra_overlap(p, q)) is bool(expected)
+    kinds = all_kinds(2, 8)
+    batch = tetrahedra_overlap(*kinds)
+    assert len(batch) >= MANY_ROWS
+    few = np.concatenate([tetrahedra_overlap(kinds[0][k::6], kinds[1][k::6]) for k in range(6)])
+    again = np.concatenate([batch[k::6] for k in range(6)])
+    np.testing.assert_array_equal(few, again)
+
+
+def test_batch_axes_broadcast_and_arrays_may_be_read_only_or_strided() -> None:
+    table = tetrahedra_overlap(P[:, None], Q)
+    assert table.shape == (400, 400)
+    np.testing.assert_array_equal(table.diagonal(), OVERLAP)
+    p = P.copy()
+    p.flags.writeable = False
+    np.testing.assert_array_equal(tetrahedra_overlap(p, Q), OVERLAP)
+    np.testing.assert_array_equal(tetrahedra_overlap(P[::-1], Q[::-1]), OVERLAP[::-1])
+    np.testing.assert_array_equal(tetrahedra_overlap(P.tolist(), Q.tolist()), OVERLAP)
+    assert tetrahedra_overlap(np.zeros((0, 4, 3)), Q[0]).shape == (0,)
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+def test_answers_agree_with_a_linear_programme(seed: int) -> None:
+    for p, q in (all_kinds(seed, 12), in_a_plane(seed, 12)):
+        found = tetrahedra_overlap(p, q)
+        gaps = np.array([separation(a, b) for a, b in zip(p, q, strict=True)])
+        clear = (gaps < 1e-12) | (gaps > 1e-8)
+        assert clear.mean() > 0.98
+        np.testing.assert_array_equal(found[clear], gaps[clear] < 1e-12)
+        assert 0.05 < found.mean() < 0.9
+
+
+def test_solid_bodies_agree_with_all_44_axes() -> None:
+    rng = np.random.default_rng(5)
+    p = bodies(rng, "solid", 20_000)
+    q = bodies(rng, "solid", 20_000) + rng.uniform(-0.6, 0.6, (20_000, 1, 3))
+    found = tetrahedra_overlap(p, q)
+    np.testing.assert_array_equal(found, plain_sat(p, q))
+    assert 0.2 < found.mean() < 0.8
+
+
+def test_the_order_of_the_two_does_not_matter() -> None:
+    for p, q in (all_kinds(6, 200), in_a_plane(6, 100)):
+        np.testing.assert_array_equal(tetrahedra_overlap(p, q), tetrahedra_overlap(q, p))
+
+
+def test_a_body_overlaps_itself_and_what_it_contains() -> None:
+    p, _ = all_kinds(7, 50)
+    assert tetrahedra_overlap(p, p).all()
+    shares = np.random.default_rng(8).dirichlet(np.ones(4), (len(p), 4))
+    inside = shares @ p
+    assert tetrahedra_overlap(p, inside).all()
+    assert tetrahedra_overlap(inside, p).all()
+
+
+def test_enlarging_a_body_keeps_its_overlaps() -> None:
+    p, q = all_kinds(9, 200)
+    before = tetrahedra_overlap(p, q)
+    middle = p.mean(axis=1, keepdims=True)
+    after = tetrahedra_overlap(middle + 1.5 * (p - middle), q)
+    assert after[before].all()
+    assert after.sum() > before.sum()
+
+
+@pytest.mark.parametrize("shared", [1, 2, 3])
+@pytest.mark.parametrize("kind", RANKS)
+def test_bodies_that_share_vertices_touch(shared: int, kind: str) -> None:
+    rng = np.random.default_rng(10)
+    p, q = bodies(rng, kind, 500), bodies(rng, "solid", 500)
+    # The second lies beyond the plane x = 0 of what both share.
+    p[..., 0], q[..., 0] = -np.abs(p[..., 0]), np.abs(q[..., 0])
+    p[:, :shared, 0] = 0.0
+    q[:, :shared] = p[:, :shared]
+    turn = np.swapaxes(turns(rng, 500), -1, -2)
+    for scale in (1e-3, 1.0, 1e5):
+        assert tetrahedra_overlap(scale * p @ turn, scale * q @ turn).all()
+
+
+def touching(rng: np.random.Generator, count: int) -> tuple[FloatArray, FloatArray]:
+    """Return pairs of which a vertex, an edge or a face meet in the plane x = 0."""
+    p, q = bodies(rng, "solid", count), bodies(rng, "solid", count)
+    p[..., 0], q[..., 0] = -np.abs(p[..., 0]) - 0.1, np.abs(q[..., 0]) + 0.1
+    kind = np.arange(count) % 3
+    # A vertex of q inside a face of p.
+    p[:, :3, 0] = np.where(kind == 0, 0.0, p[:, :3, 0].T).T
+    shares = rng.dirichlet(np.ones(3), count)
+    inside = np.einsum("nk,nki->ni", shares, p[:, :3])
+    q[kind == 0, 0] = inside[kind == 0]
+    # Two edges that cross.
+    edges = kind == 1
+    p[edges, :2, 0] = q[edges, :2, 0] = 0.0
+    middle = 0.3 * p[edges, 0] + 0.7 * p[edges, 1]
+    q[edges, 1] = middle - 0.5 * (q[edges, 0] - middle)
+    # A vertex of q on an edge of p.
+    p[kind == 2, :2, 0] = 0.0
+    on_edge = 0.4 * p[:, 0] + 0.6 * p[:, 1]
+    q[kind == 2, 0] = on_edge[kind == 2]
+    return p, q
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e5])
+def test_touching_counts_and_a_little_more_or_less_decides(scale: float) -> None:
+    rng = np.random.default_rng(11)
+    p, q = touching(rng, 900)
+    turn = np.swapaxes(turns(rng, 900), -1, -2)
+    for shift in (0.0, 3.0):
+        offset = np.array([shift, -shift, 0.0])
+        for step, expected in ((0.0, True), (-1e-9, True), (1e-9, False), (1e-12, False)):
+            moved = q + [step, 0.0, 0.0]
+            found = tetrahedra_overlap(scale * (p @ turn + offset), scale * (moved @ turn + offset))
+            # What lies beyond an edge need not be inside.
+            sure = slice(None) if step >= 0.0 else np.arange(900) % 3 < 2
+            np.testing.assert_array_equal(found[sure], expected)
+
+
+def test_flat_bodies_in_one_plane_touch_and_part() -> None:
+    rng = np.random.default_rng(12)
+    p, q = bodies(rng, "triangle", 600), bodies(rng, "quadrilateral", 600)
+    for each in (p, q):
+        each[..., 2] = 0.0
+    p[..., 0], q[..., 0] = -np.abs(p[..., 0]), np.abs(q[..., 0])
+    p[:, [1, 3], 0] = 0.0
+    low = q[..., 0].argmin(axis=1)
+    q[..., 0] -= q[..., 0].min(axis=1, keepdims=True)
+    meeting = p[:, 1] - q[np.arange(600), low]
+    q += meeting[:, None]
+    turn = np.swapaxes(turns(rng, 600), -1, -2)
+    for step, expected in ((0.0, True), (1e-9, False), (1e-12, False)):
+        found = tetrahedra_overlap(p @ turn, (q + [step, 0.0, 0.0]) @ turn)
+        np.testing.assert_array_equal(found, expected)
+        above = tetrahedra_overlap(p @ turn, (q + [0.0, 0.0, step]) @ turn)
+        np.testing.assert_array_equal(above, expected)
+
+
+@pytest.mark.parametrize("gap", [1e-12, 1e-9, 1e-3])
+def test_segments_and_points_part_however_close(gap: float) -> None:
+    rng = np.random.default_rng(13)
+    turn = np.swapaxes(turns(rng, 300), -1, -2)
+    o, (x, y, z) = np.zeros(3), np.eye(3)
+    segment, point, triangle = np.array([o, x, x, o]), np.array([o] * 4), np.array([o, x, y, y])
+    cases = {
+        "collinear": (segment, segment + x, x),
+        "crossing": (segment, np.array([0.3 * x - y, 0.3 * x + y] * 2), z),
+        "end on segment": (segment, np.array([0.3 * x, 0.3 * x + y] * 2), y),
+        "parallel": (segment, segment + 0.2 * x, y),
+        "points": (point, point, y),
+        "point on segment": (segment, point + 0.6 * x, y),
+        "point on triangle": (triangle, point + 0.2 * x + 0.3 * y, z),
+    }
+    for name, (p, q, away) in cases.items():
+        assert tetrahedra_overlap(p @ turn, q @ turn).all(), name
+        assert not tetrahedra_overlap(p @ turn, (q + gap * away) @ turn).any(), name
+
+
+def test_a_body_at_the_end_of_a_long_one_is_seen() -> None:
+    needle = np.array([[0, 0, 0], [1e6, 0, 0], [0, 1e-3, 0], [0, 0, 1e-3]])
+    at_the_end = 1e-4 * CORNER + [1e6 - 1e-5, 0.0, 0.0]
+    assert tetrahedra_overlap(needle, at_the_end)
+    assert not tetrahedra_overlap(needle, at_the_end + [1e-4, 0.0, 0.0])
+
+
+@pytest.mark.parametrize("odd", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("count", [1, 3 * MANY_ROWS])
+def test_numbers_that_are_not_finite_are_refused(odd: float, count: int) -> None:
+    q = np.tile(CORNER, (count, 1, 1))
+    q[count // 2, 3, 1] = odd
+    with pytest.raises(InputError, match="q must be finite"):
+        tetrahedra_overlap(CORNER, q)
+    with pytest.raises(InputError, match="p must be finite"):
+        tetrahedra_overlap(q, np.tile(CORNER, (count, 1, 1)))
+
+
+@pytest.mark.parametrize("bad", [np.zeros((3, 3)), np.zeros(12), "four corners", [[1, 2, 3]]])
+def test_what_are_no_tetrahedra_is_refused(bad: Any) -> None:
+    with pytest.raises(InputError, match="p must"):
+        tetrahedra_overlap(bad, CORNER)
+    with pytest.raises(InputError, match="do not broadcast"):
+        tetrahedra_overlap(P[:2], Q[:3])

@@ -1,0 +1,213 @@
+"""All figures of a design, against the functions that tell them one by one, samples and laws."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, cast
+
+import msgspec
+import numpy as np
+import pytest
+from limited_designs import limited, ordinary_case, reference_case, troubled_case
+
+from explorer.legs.clearance import PAIRS, leg_clearances
+from explorer.measures.snapshot import evaluate
+from explorer.mechanism.design import Design, Limits
+from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.home import home_pose
+from explorer.mechanism.margins import margins
+from explorer.mechanism.pose import Pose
+from explorer.numerics.arrays import FloatArray
+from explorer.optimise.facts import clearance_beyond, clearance_margin_of, facts_of
+from explorer.optimise.figures import FIGURES, figures_of
+from explorer.workspace.extremes import extent_of, farthest, least_margins
+from explorer.workspace.least_clearance import least_clearances
+from explorer.workspace.limits.constraints import constraints, slacks
+from explorer.workspace.slices.volume import workspace_nodes, workspace_volume
+from explorer.workspace.solids.solid import Solid
+from explorer.workspace.solids.solids import workspace_solid
+
+OPTIMAL = PRESETS["paper-optimal"]
+CASES = (*PRESETS.values(), *(ordinary_case(seed)[0] for seed in range(8)))
+
+
+def samples(design: Design, rotation: FloatArray, about: Solid, count: int = 8000) -> FloatArray:
+    """Return random positions in a workspace, shape (n, 3), from a box larger than a mesh of it."""
+    lows, highs = about.vertices.min(axis=0), about.vertices.max(axis=0)
+    room = 0.05 * (highs - lows)
+    points = np.random.default_rng(5).uniform(lows - room, highs + room, (count, 3))
+    return points[(slacks(constraints(design, rotation), points) >= 0.0).all(axis=-1)]
+
+
+def scaled(design: Design, factor: float) -> Design:
+    """Return a design so many times as large."""
+
+    def times(value: Any) -> Any:
+        if isinstance(value, tuple):
+            return tuple(times(each) for each in cast("tuple[Any, ...]", value))
+        return value * factor if isinstance(value, float) else value
+
+    limits = {
+        name: times(getattr(design.limits, name))
+        for name in Limits.__struct_fields__
+        if name != "swing"
+    }
+    home = home_pose(design)
+    x, y, z = (value * factor for value in home.position)
+    return msgspec.structs.replace(
+        design,
+        a3=times(design.a3),
+        b1=times(design.b1),
+        b2=design.b2 * factor,
+        b3=design.b3 * factor,
+        node_step=times(design.node_step),
+        limits=msgspec.structs.replace(design.limits, **limits),
+        home=Pose((x, y, z), home.quaternion),
+    )
+
+
+@pytest.mark.parametrize("design", CASES, ids=lambda d: d.name)
+def test_figures_are_those_that_the_functions_tell_one_by_one(design: Design) -> None:
+    found, home = figures_of(design), home_pose(design)
+    snapshot, facts = evaluate(design, home), facts_of(design)
+    assert found.volume == workspace_volume(design).volume == facts.volume
+    assert found.nodes == workspace_nodes(design)
+    assert found.reach == facts.reach
+    assert found.home_condition == pytest.approx(snapshot.inverse_condition, rel=1e-9)
+    assert found.home_margin == pytest.approx(np.abs(snapshot.margins).min(), rel=1e-12)
+    assert (found.clearance, found.nearest) == (facts.clearance, facts.nearest)
+    assert found.yaw == facts.yaw
+    assert found.empty_because == ()
+
+
+@pytest.mark.parametrize("design", CASES, ids=lambda d: d.name)
+def test_extents_and_least_margins_hold_for_all_positions_and_are_reached(design: Design) -> None:
+    r, reach = home_pose(design).rotation, design.reach
+    rough = workspace_solid(design, r, 0.01 * reach)
+    fine = workspace_solid(design, r, 0.0005 * reach)
+    lows, highs = extent_of(design, r, rough)
+    least = least_margins(design, r, rough)
+    points = samples(design, r, fine)
+    assert len(points) > 100
+    assert (points >= lows - 1e-9 * reach).all()
+    assert (points <= highs + 1e-9 * reach).all()
+    assert (np.abs(margins(points, r)) >= least - 1e-9 * reach).all()
+    # The fine mesh lies within its tolerance, and far better than the rough one.
+    assert np.abs(fine.vertices.min(axis=0) - lows).max() < 0.001 * reach
+    assert np.abs(fine.vertices.max(axis=0) - highs).max() < 0.001 * reach
+    on_mesh = np.abs(margins(fine.vertices, r)).min(axis=0)
+    assert (on_mesh - least).max() < 0.001 * reach
+
+
+def test_the_extent_of_the_papers_optimum_is_that_of_its_box() -> None:
+    (lows, highs), box = (
+        extent_of(OPTIMAL, home_pose(OPTIMAL).rotation, workspace_solid(OPTIMAL)),
+        OPTIMAL.limits.box,
+    )
+    assert box is not None
+    assert np.array([lows, highs]) == pytest.approx(np.array(box), abs=1e-9)
+
+
+def test_a_direction_may_have_any_length() -> None:
+    r, solid = home_pose(OPTIMAL).rotation, workspace_solid(OPTIMAL)
+    one, two = farthest(OPTIMAL, r, solid, [(1.0, 2.0, -1.0), (3.0, 6.0, -3.0)])
+    assert two == pytest.approx(3.0 * one, rel=1e-9)
+
+
+def test_parts_on_either_side_of_a_singular_plane_are_looked_at_one_by_one() -> None:
+    design = limited(OPTIMAL, margin=None, box=((0.0, -12.0, -3.0), (20.0, 22.0, 18.0)))
+    r = home_pose(design).rotation
+    assert least_margins(design, r, workspace_solid(design)).tolist() == [0.0, 0.0, 0.0]
+    solid = workspace_solid(limited(design, margin=0.5))
+    assert least_margins(limited(design, margin=0.5), r, solid) == pytest.approx(
+        np.array([0.5, 0.5 * abs(r[1, 0]), 0.5]), abs=0.1
+    )
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_the_least_of_all_clearances_is_the_same_without_the_others(seed: int) -> None:
+    design, rotation = ordinary_case(seed) if seed % 2 else troubled_case(seed)
+    radii = np.random.default_rng(seed).uniform(0.0, 0.05, 4) * design.reach
+    design, tolerance = limited(design, leg_radii=tuple(radii.tolist())), 1e-3 * design.reach
+    full = least_clearances(design, rotation, tolerance)
+    least = least_clearances(design, rotation, tolerance, only_least=True)
+    one, other = float(full.clearance.min()), float(least.clearance.min())
+    if math.isinf(one):
+        assert math.isinf(other)
+        return
+    assert other == pytest.approx(one, abs=1.001 * tolerance)
+    assert (least.bound <= full.clearance + 1e-12 * design.reach).all()
+    pair = int(least.clearance.argmin())
+    r = home_pose(design).rotation if rotation is None else rotation
+    own = leg_clearances(design, least.position[pair], r)
+    assert own.clearance[pair] == pytest.approx(other, abs=2e-9 * design.reach)
+
+
+def test_clearances_count_off_the_singular_planes_only() -> None:
+    margin = clearance_margin_of(OPTIMAL)
+    clearance, pair = clearance_beyond(OPTIMAL, margin)
+    full = least_clearances(limited(OPTIMAL, margin=margin))
+    assert clearance == pytest.approx(full.clearance.min(), abs=1e-3 * OPTIMAL.reach)
+    assert pair == PAIRS[int(full.clearance.argmin())]
+    assert clearance_beyond(OPTIMAL, 100.0) == (None, None)
+
+
+@pytest.mark.parametrize("factor", [1e-15, 0.1, 1e12])
+@pytest.mark.parametrize("seed", range(3))
+def test_figures_grow_with_the_power_of_a_length_that_they_are(seed: int, factor: float) -> None:
+    design = ordinary_case(seed)[0]
+    one, other = figures_of(design), figures_of(scaled(design, factor))
+    for figure in FIGURES:
+        small, large = figure.of(one), figure.of(other)
+        assert small is not None
+        # A grid may have a node more or less where one lies on the surface.
+        near = 1e-6 if figure.name not in ("nodes", "node volume") else 0.02
+        expected = small * factor**figure.power
+        tiny = 1e-9 * one.reach * factor**figure.power
+        assert large == pytest.approx(expected, rel=near, abs=tiny), figure.name
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_designs_in_trouble_have_figures_or_none(seed: int) -> None:
+    design = troubled_case(seed)[0]
+    found = figures_of(design)
+    assert (found.volume > 0.0) != bool(found.empty_because)
+    for figure in FIGURES:
+        value = figure.of(found)
+        assert value is None or math.isfinite(value), figure.name
+        if found.volume == 0.0 and value is not None and figure.power == 0:
+            assert figure.name not in ("mean 1 / cond J", "clear of collisions")
+
+
+def test_an_empty_workspace_has_no_more_than_its_reasons() -> None:
+    found = figures_of(limited(OPTIMAL, l1=(1.0, 2.0), l4=(1.0, 2.0)))
+    assert found.volume == 0.0
+    assert {"l1 maximum", "l4 maximum"} & {*found.empty_because}
+    assert found.extent is found.worst_margin is found.mean_margin is found.clearance is None
+
+
+def test_a_home_at_which_the_lines_are_parallel_has_no_margin() -> None:
+    home = Pose(home_pose(OPTIMAL).position, (1.0, 0.0, 0.0, 0.0))
+    found = figures_of(msgspec.structs.replace(limited(OPTIMAL, margin=None), home=home))
+    assert found.home_margin == found.worst_margin == found.mean_margin == 0.0
+    assert found.home_condition == pytest.approx(0.0, abs=1e-12)
+    assert found.volume > 0.0
+
+
+def test_too_fine_a_grid_leaves_out_the_nodes_and_nothing_else() -> None:
+    found = figures_of(msgspec.structs.replace(OPTIMAL, node_step=1e-4))
+    assert found.nodes is None
+    assert found.volume == workspace_volume(OPTIMAL).volume
+    assert found.extent is not None
+
+
+@pytest.mark.parametrize("index", range(0, 24, 5))
+def test_the_mesh_that_is_there_already_tells_the_same(index: int) -> None:
+    design, rotation, _ = reference_case(index)
+    design = msgspec.structs.replace(design, home=Pose.of((1.0, 2.0, 3.0), rotation))
+    solid = workspace_solid(design, rotation, 0.002 * design.reach)
+    if solid.is_empty:
+        pytest.skip("nothing to measure")
+    one, other = figures_of(design), figures_of(design, solid)
+    assert one.extent == pytest.approx(other.extent, abs=1e-6 * design.reach)
+    assert one.worst_margin == pytest.approx(other.worst_margin, abs=1e-6 * design.reach)

@@ -1,0 +1,114 @@
+"""One measure has one value: what two places call by the same name is the same there."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from explorer.app.features.optimise.tasks import compare
+from explorer.app.features.optimise.words import measure_rows
+from explorer.app.state.studies import spoken
+from explorer.cli import run
+from explorer.cli.found import fact_rows
+from explorer.mechanism.design import Design
+from explorer.mechanism.design_file import PRESETS, encode_design
+from explorer.numerics.compiled import warm
+from explorer.optimise.defaults import make_problem
+from explorer.optimise.figures import FIGURES, figures_of
+from explorer.optimise.findings import paper_start
+from explorer.optimise.problem import Problem
+from explorer.sweep.measures import MEASURES, Case
+
+Told = dict[str, dict[str, float | None]]
+
+BOX = ((9.0, 4.0, 8.0), (11.0, 6.0, 10.0))
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _warm_kernels() -> None:  # pyright: ignore[reportUnusedFunction]
+    warm()
+
+
+def problem() -> Problem:
+    """Return the paper's problem, with a required box."""
+    return make_problem(
+        paper_start(), "match-volume", volume=8000.0, clearance=0.2, required_box=BOX
+    )
+
+
+def found() -> Design:
+    """Return a design that solves it: of twice the reach of the start, on whose grid it is not."""
+    values = [19.056, 9.5175, 2.027, -4.7727, 5.5619, 4.7706]
+    return msgspec.structs.replace(paper_start().with_variables(values), name="found")
+
+
+def told(design: Design, folder: Path, capsys: pytest.CaptureFixture[str]) -> Told:
+    """Return what each place tells of a design, by place and name."""
+    asked = problem()
+    margin = asked.demands.clearance_margin
+    both = compare(asked.start, design, margin, (BOX, BOX))
+    figures, case = figures_of(design), Case(design)
+    path = folder / "design.json"
+    path.write_bytes(encode_design(design))
+    assert run(["workspace", "--design", str(path), "--json"]) == 0
+    measured = json.loads(capsys.readouterr().out)
+    return {
+        "Compare": {each.name: each.of(figures) for each in FIGURES},
+        "Optimise": {
+            row.name.removesuffix(", units³").removesuffix(", units"): row.after
+            for row in measure_rows(asked, both.before, both.after)
+        },
+        "explorer optimise": {
+            name: after for name, (_, after) in fact_rows((both.before, both.after))
+        },
+        "Studies": {
+            spoken(name): each.of(case) for name, each in MEASURES.items() if not each.is_slow
+        },
+        "explorer workspace": {
+            name.replace("_", " "): measured[name]
+            for name in ("volume", "node_step", "node_volume")
+        },
+    }
+
+
+def values_by_name(places: Told) -> dict[str, dict[str, float]]:
+    by_name: dict[str, dict[str, float]] = {}
+    for place, values in places.items():
+        for name, value in values.items():
+            if value is not None and math.isfinite(value):
+                by_name.setdefault(name, {})[place] = value
+    return by_name
+
+
+@pytest.mark.parametrize("design", [found(), *PRESETS.values()], ids=lambda each: each.name)
+def test_what_two_places_call_by_one_name_has_one_value(
+    design: Design, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    by_name = values_by_name(told(design, tmp_path, capsys))
+    shared = {name: values for name, values in by_name.items() if len(values) > 1}
+    assert {"volume", "reach", "nodes", "node volume", "clearance"} <= {*shared}
+    for name, values in shared.items():
+        first, *others = values.values()
+        assert others == pytest.approx([first] * len(others), rel=1e-9), (name, values)
+
+
+def test_a_clearance_as_it_was_demanded_is_told_beside_the_designs_own() -> None:
+    asked = problem()
+    both = compare(asked.start, found(), asked.demands.clearance_margin, (None, None))
+    rows = {row.name: row for row in measure_rows(asked, both.before, both.after)}
+    demanded, own = rows["clearance, |κ| ≥ 0.539"], rows["clearance, units"]
+    assert demanded.after == both.after.demanded_clearance
+    assert own.after == both.after.clearance
+    # It was demanded nearer to the singular planes than where the design's own counts.
+    assert demanded.after is not None
+    assert own.after is not None
+    assert own.after > demanded.after
+    free = msgspec.structs.replace(
+        asked, demands=msgspec.structs.replace(asked.demands, clearance=None)
+    )
+    names = [row.name for row in measure_rows(free, both.before, both.after)]
+    assert [name for name in names if name.startswith("clearance")] == ["clearance, units"]

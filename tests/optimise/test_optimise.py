@@ -1,0 +1,610 @@
+"""The optimiser finds what it claims, proves it, and says so plainly when it does not."""
+
+from __future__ import annotations
+
+import math
+import pickle
+from collections.abc import Callable
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+
+from explorer import (
+    PRESETS,
+    Design,
+    DesignError,
+    InputError,
+    Iterate,
+    Outcome,
+    Problem,
+    Variable,
+    home_pose,
+    leg_clearances,
+    make_problem,
+    margins,
+    optimise_design,
+    workspace_volume,
+)
+from explorer.optimise.facts import facts_of
+from explorer.optimise.findings import paper_problem, paper_start, reach_problem
+from explorer.optimise.problem import DISTANCES, distance_of
+from explorer.optimise.record import (
+    Settings,
+    decode_record,
+    encode_record,
+    load_record,
+    record_of,
+)
+from explorer.optimise.search.crossings import crossings
+from explorer.optimise.search.model import Model
+from explorer.optimise.search.opening import opened, room
+from explorer.optimise.search.optimality import optimality
+from explorer.optimise.search.starts import more_starts
+from explorer.optimise.search.state import State
+from explorer.workspace.limits.constraints import constraints, slacks
+
+OPTIMAL = PRESETS["paper-optimal"]
+
+
+def with_limits(design: Design, **limits: object) -> Design:
+    return msgspec.structs.replace(design, limits=msgspec.structs.replace(design.limits, **limits))
+
+
+def started_at(problem: Problem, values: tuple[float, ...]) -> Problem:
+    return msgspec.structs.replace(problem, start=problem.design_at(values))
+
+
+def least_clearance_by_sampling(design: Design, margin: float, count: int) -> float:
+    """Return the least clearance over random positions, those at the lowest height among them."""
+    random = np.random.default_rng(0)
+    rotation = home_pose(design).rotation
+    lows, highs = np.array(design.limits.box)
+    p = lows + (highs - lows) * random.random((count, 3))
+    p[: count // 2, 2] = margin * (1.0 + 0.05 * random.random(count // 2))
+    inside = slacks(constraints(design, rotation), p).min(axis=-1) >= 0.0
+    inside &= np.abs(margins(p, rotation)).min(axis=-1) >= margin
+    return float(leg_clearances(design, p[inside], rotation).clearance.min())
+
+
+def assert_is_sound(outcome: Outcome) -> None:
+    """Check what holds of every outcome, whatever became of it."""
+    problem, best = outcome.problem, outcome.best
+    assert outcome.history[best.number] == best
+    assert [each.number for each in outcome.history] == list(range(len(outcome.history)))
+    assert outcome.design == problem.design_at(best.values)
+    assert best.volume == workspace_volume(outcome.design).volume
+    for value, variable in zip(best.values, problem.variables, strict=True):
+        slack = 1e-12 * problem.size
+        assert variable.low - slack <= value <= variable.high + slack
+    for name in DISTANCES:
+        least = problem.demands.least - 1e-6 * problem.size
+        assert abs(distance_of(outcome.design, name)) >= least
+    assert math.isfinite(best.objective)
+    assert outcome.run.message
+    assert "\n" not in outcome.run.message
+
+
+# Matching a volume
+
+
+@pytest.mark.parametrize("clearance", [None, 0.1, 0.2, 0.5])
+def test_the_papers_problem_is_solved_to_machine_precision(clearance: float | None) -> None:
+    outcome = optimise_design(paper_problem(clearance))
+    assert_is_sound(outcome)
+    assert outcome.converged
+    assert outcome.iterations <= 15
+    assert abs(1.0 - workspace_volume(outcome.design).volume / 8000.0) <= 1e-9
+    assert outcome.design.limits == OPTIMAL.limits
+    assert home_pose(outcome.design).quaternion == home_pose(OPTIMAL).quaternion
+
+
+@pytest.mark.parametrize("clearance", [0.2, 0.5])
+def test_a_clearance_is_kept_between_the_positions_that_the_solver_looks_at(
+    clearance: float,
+) -> None:
+    problem = paper_problem(clearance)
+    outcome = optimise_design(problem)
+    margin = problem.demands.clearance_margin
+    assert least_clearance_by_sampling(problem.start, margin, 100_000) < clearance
+    assert least_clearance_by_sampling(outcome.design, margin, 100_000) >= 0.999 * clearance
+    found = facts_of(outcome.design, demanded_margin=margin).demanded_clearance
+    assert found is not None
+    assert found >= 0.98 * clearance
+
+
+def test_random_starts_converge() -> None:
+    problem = paper_problem(0.2)
+    for values in more_starts(problem, 3, seed=3):
+        outcome = optimise_design(started_at(problem, values))
+        assert_is_sound(outcome)
+        assert outcome.converged
+        assert outcome.best.objective <= 1e-6
+
+
+def test_a_search_that_legs_wall_in_goes_on_elsewhere() -> None:
+    problem = paper_problem(0.2)
+    tried = [optimise_design(started_at(problem, v)) for v in more_starts(problem, 2, seed=1)]
+    assert any(outcome.run.attempts > 1 for outcome in tried)
+    assert all(outcome.converged for outcome in tried)
+
+
+def test_a_volume_that_is_there_already_takes_no_step() -> None:
+    problem = make_problem(OPTIMAL, "match-volume", volume=workspace_volume(OPTIMAL).volume)
+    outcome = optimise_design(problem)
+    assert outcome.converged
+    assert outcome.iterations == 0
+    assert outcome.design.variables == OPTIMAL.variables
+
+
+@pytest.mark.parametrize("objective", ["match-volume", "smallest-reach"])
+def test_a_volume_out_of_reach_is_told_with_the_largest_found(objective: Any) -> None:
+    bounds = [Variable("a3x", 5.0, 12.0), Variable("a3y", 1.0, 6.0)]
+    problem = make_problem(paper_start(), objective, volume=8000.0, bounds=bounds)
+    outcome = optimise_design(problem)
+    assert_is_sound(outcome)
+    assert outcome.status == "infeasible"
+    assert "no design within the bounds was found with a volume of 8000" in outcome.run.message
+    told = float(outcome.run.message.rsplit(" ", 1)[1])
+    # More than the paper's designs have, and than random ones within the bounds.
+    largest = max(
+        workspace_volume(problem.design_at(values)).volume
+        for values in more_starts(problem, 100, seed=0)
+    )
+    assert largest < told < 8000.0
+    assert outcome.best.volume == pytest.approx(told, rel=1e-3)
+
+
+# Optima
+
+
+def test_the_smallest_reach_for_the_volume_of_the_papers_optimum() -> None:
+    outcome = optimise_design(reach_problem())
+    assert_is_sound(outcome)
+    assert outcome.converged
+    assert outcome.design.reach <= 17.90
+    assert workspace_volume(outcome.design).volume == pytest.approx(7053.044190625, rel=1e-8)
+
+
+def test_several_starts_find_an_optimum_that_one_misses() -> None:
+    problem = reach_problem()
+    # The second start of the sequence ends in the worse optimum near 22.9.
+    worse = started_at(problem, next(more_starts(problem, 1, seed=0)))
+    alone = optimise_design(worse)
+    assert alone.converged
+    assert alone.design.reach == pytest.approx(22.87, abs=0.01)
+    several = optimise_design(worse, starts=4)
+    assert several.converged
+    assert several.design.reach <= 17.90
+    assert len(several.runs) == 4
+    assert several.best.objective <= min(run.best.objective for run in several.runs) + 1e-6
+    assert {each.run for each in several.history} == set(range(4))
+
+
+def test_an_optimum_in_a_kink_of_the_volume_is_seen_as_one() -> None:
+    # With more room for b1 the balls of legs 1 and 4 become one: −R b1 = a3.
+    outcome = optimise_design(make_problem(OPTIMAL, "smallest-reach"))
+    assert outcome.converged
+    design = outcome.design
+    arm = home_pose(design).rotation @ np.array([*design.b1, 0.0])
+    assert -arm[:2] == pytest.approx(design.a3, abs=1e-3)
+    assert design.reach < 17.1
+
+
+def test_the_conditions_of_an_optimum_fail_off_it() -> None:
+    problem = reach_problem()
+    outcome = optimise_design(problem)
+    best = Model(problem, outcome.best.values)
+    assert optimality(best, best.at(best.start)).is_optimal
+    start = Model(problem, problem.start_values)
+    assert optimality(start, start.at(start.start)).residual > 0.01
+
+
+@pytest.mark.parametrize(
+    "problem",
+    [
+        make_problem(OPTIMAL, "largest-volume"),
+        make_problem(OPTIMAL, "largest-volume", reach=15.0, free=["yaw"]),
+        make_problem(
+            OPTIMAL,
+            "smallest-reach",
+            volume=100.0,
+            required_box=((8.0, 4.0, 6.0), (12.0, 8.0, 10.0)),
+        ),
+    ],
+)
+def test_no_design_near_an_optimum_is_better(problem: Problem) -> None:
+    outcome = optimise_design(problem)
+    assert_is_sound(outcome)
+    assert outcome.converged
+    model = Model(problem, outcome.best.values)
+    best = model.at(model.start)
+    lows, highs = model.bounds.T
+    random = np.random.default_rng(0)
+    compared = 0
+    for _ in range(300):
+        step = 10.0 ** random.uniform(-4.0, -1.5) * random.normal(size=len(model.start))
+        try:
+            near = model.at(np.clip(model.start + step, lows, highs))
+        except DesignError:
+            continue
+        # What misses a demand a little may be better by as little.
+        if model.worst(near)[0] >= -1e-9:
+            assert near.objective >= best.objective - 1e-7
+            compared += 1
+    assert compared > 5
+
+
+def test_margins_over_a_required_box_grow_with_yaw_and_height() -> None:
+    box = ((8.0, 4.0, 6.0), (12.0, 8.0, 10.0))
+    turned = optimise_design(
+        make_problem(OPTIMAL, "largest-margin", required_box=box, free=["yaw"])
+    )
+    assert turned.converged
+    # Square lines are farthest from meeting, and then the height is the least margin.
+    assert turned.best.objective == pytest.approx(6.0, abs=1e-8)
+    assert turned.best.values[-1] == pytest.approx(-90.0, abs=0.1)
+    raised = optimise_design(
+        make_problem(
+            OPTIMAL,
+            "largest-margin",
+            reach=20.4,
+            required_box=box,
+            free=["yaw", "shift-x", "shift-y", "shift-z"],
+        )
+    )
+    assert_is_sound(raised)
+    assert raised.converged
+    # The box of the design ends at a height of 18, that of the required one is 4.
+    assert raised.best.objective == pytest.approx(14.0, abs=1e-7)
+    moved = raised.problem.required_box_at(raised.best.values)
+    rotation = home_pose(raised.design).rotation
+    corners = np.array(
+        [[moved[i][0], moved[j][1], moved[k][2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)]
+    )
+    assert slacks(constraints(raised.design, rotation), corners).min() >= -1e-6
+    assert np.abs(margins(corners, rotation)).min() == pytest.approx(14.0, abs=1e-6)
+
+
+def test_a_reach_of_its_own_is_the_maximum_of_all_lengths() -> None:
+    lengths = dict.fromkeys(("l1", "d2", "d4", "l4"), (0.0, 15.0))
+    problem = make_problem(
+        with_limits(OPTIMAL, **lengths), "smallest-reach", volume=3000.0, free=["reach"]
+    )
+    outcome = optimise_design(problem)
+    assert_is_sound(outcome)
+    assert outcome.converged
+    found = {outcome.design.length_range(name) for name in lengths}
+    assert found == {(0.0, outcome.best.objective)}
+    assert outcome.best.objective < 15.0
+
+
+def test_a_stroke_ratio_is_that_of_the_actuators() -> None:
+    problem = make_problem(OPTIMAL, "match-volume", volume=5000.0, stroke_ratio=2.0)
+    outcome = optimise_design(problem)
+    assert_is_sound(outcome)
+    assert outcome.converged
+    for name in ("l1", "d2", "d4", "l4"):
+        low, high = outcome.design.length_range(name)
+        assert high / low == pytest.approx(2.0)
+
+
+# Empty workspaces
+
+
+def test_an_empty_workspace_is_opened_first() -> None:
+    box = ((14.0, 14.0, 14.0), (20.0, 20.0, 20.0))
+    start = with_limits(PRESETS["paper-initial"], box=box)
+    assert workspace_volume(start).volume == 0.0
+    problem = make_problem(start, "match-volume", volume=100.0)
+    model = Model(problem, problem.start_values)
+
+    def see(_: State, worst: str) -> None:
+        assert worst in model.names or worst in {limit.name for limit in limits}
+
+    limits = State(problem, model.start).limits
+    u = opened(problem, model.start, see=see)
+    assert u is not None
+    radius = room(problem)
+    assert State(problem, u).volume >= 4.0 / 3.0 * math.pi * radius**3 * (1.0 - 1e-6)
+    outcome = optimise_design(problem)
+    assert_is_sound(outcome)
+    assert outcome.converged
+    assert {each.phase for each in outcome.history} == {"opening", "solving"}
+    assert outcome.history[0].worst
+
+
+def test_a_workspace_that_nothing_opens_names_what_empties_it() -> None:
+    start = with_limits(OPTIMAL, guide=(100.0, 101.0))
+    outcome = optimise_design(make_problem(start, "match-volume", volume=10.0))
+    assert outcome.status == "infeasible"
+    assert "empty because of" in outcome.run.message
+    assert outcome.run.holding in outcome.run.message
+    assert outcome.design == outcome.problem.design_at(outcome.best.values)
+
+
+# Ends other than convergence
+
+
+def test_too_few_iterations_are_told_with_the_best_so_far() -> None:
+    outcome = optimise_design(reach_problem(), iterations=4)
+    assert_is_sound(outcome)
+    assert outcome.status == "not converged"
+    assert outcome.iterations <= 5
+    assert outcome.run.holding
+    assert "allow more iterations" in outcome.run.message
+
+
+@pytest.mark.parametrize("after", [0, 1, 7, 40])
+def test_a_search_ends_when_it_is_told_to(after: int) -> None:
+    asked = 0
+
+    def stop() -> bool:
+        nonlocal asked
+        asked += 1
+        return asked > after
+
+    problem = started_at(paper_problem(0.2), next(more_starts(paper_problem(), 1, seed=1)))
+    outcome = optimise_design(problem, starts=3, stop=stop)
+    assert_is_sound(outcome)
+    assert outcome.status == "cancelled"
+    assert len(outcome.runs) == 1
+    # Not asked again once it has said so, but on the ways out.
+    assert asked == after + 1
+    sound = [each for each in outcome.history if each.spare >= -1e-8]
+    if sound and sound[0].phase == "solving":
+        assert outcome.best.spare >= -1e-8
+
+
+def test_what_watches_sees_each_iterate_as_it_is_found() -> None:
+    seen: list[Iterate] = []
+    outcome = optimise_design(reach_problem(), starts=2, watch=seen.append)
+    assert tuple(seen) == outcome.history
+    for each in seen:
+        assert each.volume == workspace_volume(each.design).volume
+
+
+def test_an_error_of_what_watches_is_not_swallowed() -> None:
+    def watch(_: Iterate) -> None:
+        raise RuntimeError("the pipe is gone")
+
+    with pytest.raises(RuntimeError, match="the pipe is gone"):
+        optimise_design(paper_problem(), watch=watch)
+
+
+def test_the_same_search_finds_the_same() -> None:
+    first, second = (optimise_design(paper_problem(0.2), starts=2, seed=5) for _ in range(2))
+    assert first.history == second.history
+    assert first.runs == second.runs
+
+
+def test_problems_and_outcomes_go_to_another_process_and_back() -> None:
+    outcome = optimise_design(paper_problem(0.2))
+    assert pickle.loads(pickle.dumps(outcome)) == outcome
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_searches_from_random_designs_of_any_size_end_with_a_word(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    size = float(random.choice([1e-20, 1e-6, 1.0, 1e6, 1e20]))
+    a3x, a3y, b1x, b1y, b2, b3 = (size * random.uniform(-1.0, 1.0, 6)).tolist()
+    limits: dict[str, Any] = {
+        "l1": (float(random.choice([0.0, 0.3])) * size, None),
+        "d4": (0.0, None if seed % 3 else size),
+        "guide": None if seed % 2 else (-size, size),
+        "gap": float(random.choice([0.0, 0.02])) * size,
+        "margin": None if seed % 5 == 0 else 0.01 * size,
+        "leg_radii": [0.01 * size] * 4,
+    }
+    design = Design(a3=(a3x, a3y), b1=(b1x, b1y), b2=b2, b3=b3)
+    problem = make_problem(
+        with_limits(design, **limits),
+        "match-volume" if seed % 4 else "largest-volume",
+        volume=0.1 * size**3,
+        clearance=0.02 * size if seed % 2 else None,
+        free=["yaw"] if seed % 3 else [],
+    )
+    outcome = optimise_design(problem, iterations=25)
+    assert_is_sound(outcome)
+    record = record_of(outcome, Settings())
+    assert decode_record(encode_record(record), "here") == record
+
+
+# Where a clearance is not kept
+
+
+def test_crossings_are_found_where_there_are_any_and_nowhere_else() -> None:
+    random = np.random.default_rng(2)
+    verdicts: set[bool] = set()
+    for _ in range(12):
+        design = OPTIMAL.with_variables((OPTIMAL.variables + 2.0 * random.normal(size=6)).tolist())
+        rotation = home_pose(design).rotation
+        sampled = least_clearance_by_sampling(design, 1.0, 40_000)
+        found = crossings(design, rotation, 0.25, 1.0, lambda: None)
+        if not 0.24 < sampled < 0.25:
+            assert (len(found) > 0) == (sampled < 0.25)
+            verdicts.add(len(found) > 0)
+        for p in found:
+            assert leg_clearances(design, p, rotation).clearance.min() < 0.25
+            assert slacks(constraints(design, rotation), p).min() >= 0.0
+            assert np.abs(margins(p, rotation)).min() >= 1.0
+    assert verdicts == {True, False}
+
+
+# Records
+
+
+def test_a_record_reads_back_and_repeats_the_search() -> None:
+    settings = Settings(starts=2, seed=7)
+    outcome = optimise_design(paper_problem(0.2), starts=settings.starts, seed=settings.seed)
+    record = decode_record(encode_record(record_of(outcome, settings)), "here")
+    assert record == record_of(outcome, settings)
+    again = optimise_design(
+        record.problem, starts=record.settings.starts, seed=record.settings.seed
+    )
+    assert again.design == outcome.design == record.design
+    assert [step.values for step in record.history] == [each.values for each in again.history]
+    assert {"python", "numpy", "scipy", "numba", "flagged-explorer"} == set(record.versions)
+
+
+@pytest.mark.parametrize("data", [b"", b"{}", b"[1]", b'{"schema": 2}', b"\xff\xfe", b"[" * 10_000])
+def test_what_is_no_record_is_refused(data: bytes) -> None:
+    with pytest.raises(InputError, match="elsewhere"):
+        decode_record(data, "elsewhere")
+
+
+def test_a_record_that_is_not_there_is_told(tmp_path: Any) -> None:
+    with pytest.raises(InputError, match="cannot read"):
+        load_record(tmp_path / "nothing.json")
+
+
+# Bad input
+
+
+Change = Callable[[], Problem]
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (
+            lambda: make_problem(
+                OPTIMAL, "match-volume", volume=9.0, bounds=[Variable("b2", 5.0, 3.0)]
+            ),
+            "bounds of b2 cross: low 5, high 3",
+        ),
+        (
+            lambda: make_problem(
+                OPTIMAL, "match-volume", volume=9.0, bounds=[Variable("b2", 5.0, 9.0)]
+            ),
+            "b2 = 2.6067, outside its bounds 5 to 9",
+        ),
+        (
+            lambda: make_problem(
+                OPTIMAL, "match-volume", volume=9.0, bounds=[Variable("b2", math.nan, 9.0)]
+            ),
+            "bound of b2 must be a finite number",
+        ),
+        (
+            lambda: make_problem(
+                OPTIMAL, "match-volume", volume=9.0, bounds=[Variable("b2", 0.0, math.inf)]
+            ),
+            "bound of b2 must be a finite number",
+        ),
+        (
+            lambda: make_problem(
+                OPTIMAL, "match-volume", volume=9.0, bounds=[Variable("b4", 0.0, 1.0)]
+            ),
+            "no variable 'b4'",
+        ),
+        (lambda: make_problem(OPTIMAL, "match-volume", volume=9.0, free=["b5"]), "no variable"),
+        (lambda: make_problem(OPTIMAL, "match-volume"), "match-volume needs a volume"),
+        (
+            lambda: make_problem(OPTIMAL, "match-volume", volume=math.nan),
+            "volume demanded must be a positive, finite number; got nan",
+        ),
+        (
+            lambda: make_problem(OPTIMAL, "match-volume", volume=-1.0),
+            "volume demanded must be a positive, finite number; got -1",
+        ),
+        (
+            lambda: make_problem(OPTIMAL, "match-volume", volume=9.0, clearance=math.nan),
+            "clearance demanded must be a finite number",
+        ),
+        (
+            lambda: make_problem(
+                OPTIMAL, "match-volume", volume=9.0, clearance=0.1, clearance_margin=0.0
+            ),
+            "positive clearance margin",
+        ),
+        (
+            lambda: make_problem(OPTIMAL, "match-volume", volume=9.0, least=math.nan),
+            "least must be a finite number",
+        ),
+        (
+            lambda: make_problem(OPTIMAL, "match-volume", volume=9.0, least=5.0),
+            "below the least allowed 5",
+        ),
+        (
+            lambda: make_problem(OPTIMAL, "match-volume", volume=9.0, stroke_ratio=1.0),
+            "stroke ratio is longest over shortest",
+        ),
+        (lambda: make_problem(OPTIMAL, "largest-margin", free=["yaw"]), "needs a required box"),
+        (
+            lambda: make_problem(
+                OPTIMAL, "largest-margin", required_box=((0.0, 0.0, 5.0), (1.0, 1.0, 6.0))
+            ),
+            "margins do not depend on the design variables",
+        ),
+        (
+            lambda: make_problem(
+                OPTIMAL,
+                "match-volume",
+                volume=9.0,
+                required_box=((0.0, 0.0, 5.0), (1.0, -1.0, 6.0)),
+            ),
+            "required box y: the low end 0 exceeds the high end -1",
+        ),
+        (
+            lambda: make_problem(OPTIMAL, "match-volume", volume=9.0, free=["shift-x"]),
+            "shift-x shifts the required box, and none is given",
+        ),
+        (
+            lambda: make_problem(with_limits(OPTIMAL, l1=(0.0, 20.0)), "smallest-reach"),
+            "let the reach change",
+        ),
+        (
+            lambda: make_problem(
+                with_limits(
+                    OPTIMAL, swing=msgspec.convert({"a1": 40.0}, type(OPTIMAL.limits.swing))
+                ),
+                "largest-volume",
+            ),
+            "swing",
+        ),
+        (
+            lambda: make_problem(
+                with_limits(OPTIMAL, guide=(100.0, 101.0)), "smallest-reach", free=["yaw"]
+            ),
+            "the start has an empty workspace",
+        ),
+    ],
+)
+def test_bad_problems_are_refused_with_what_would_work(make: Change, words: str) -> None:
+    with pytest.raises(InputError) as caught:
+        make()
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(("option", "value"), [("starts", 0), ("starts", 10**6), ("iterations", 0)])
+def test_bad_settings_are_refused(option: str, value: int) -> None:
+    options: dict[str, Any] = {option: value}
+    with pytest.raises(InputError, match=option):
+        optimise_design(paper_problem(), **options)
+
+
+def test_default_bounds_hold_every_start_and_keep_lines_apart() -> None:
+    for values in more_starts(paper_problem(), 40, seed=2):
+        design = paper_problem().design_at(values)
+        problem = make_problem(design, "match-volume", volume=9.0, free=["yaw", "reach"])
+        yaw = problem.variables[problem.names.index("yaw")]
+        assert math.sin(math.radians(yaw.low)) * math.sin(math.radians(yaw.high)) > 0.0
+
+
+def test_a_problem_that_demands_nothing_is_solved_within_its_bounds() -> None:
+    problem = Problem(
+        start=OPTIMAL,
+        objective="largest-volume",
+        variables=(Variable("b1y", -5.0, -2.0), Variable("b2", 1.0, 4.0)),
+    )
+    outcome = optimise_design(problem, iterations=60)
+    assert outcome.converged
+    assert outcome.best.volume > workspace_volume(OPTIMAL).volume
+    grid = [
+        workspace_volume(problem.design_at((b1y, b2))).volume
+        for b1y in np.linspace(-5.0, -2.0, 13).tolist()
+        for b2 in np.linspace(1.0, 4.0, 13).tolist()
+    ]
+    assert outcome.best.volume >= max(grid) - 1e-6

@@ -1,0 +1,175 @@
+"""Every objective and every demand has the gradient that central differences show."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+
+import msgspec
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from explorer import PRESETS, Design, Limits, make_problem, workspace_volume
+from explorer.errors import DesignError
+from explorer.mechanism.design import Range
+from explorer.mechanism.pose import Pose
+from explorer.numerics.arrays import FloatArray
+from explorer.numerics.compiled import warm
+from explorer.optimise.problem import OBJECTIVES, ObjectiveName, Problem
+from explorer.optimise.search.model import Evaluation, Model
+from explorer.workspace.limits.constraints import HalfSpace, Round
+
+POINTS = 50
+STEP = 1e-6
+# Of a gradient's largest entry, or of one if that is less.
+TOLERANCE = 1e-5
+
+OPTIMAL = PRESETS["paper-optimal"]
+REQUIRED = ((8.0, 4.0, 6.0), (12.0, 8.0, 10.0))
+
+
+def with_limits(design: Design, **limits: object) -> Design:
+    return msgspec.structs.replace(design, limits=msgspec.structs.replace(design.limits, **limits))
+
+
+def many_limits() -> Design:
+    """Return a design with every limit there is a gradient for."""
+    lengths: dict[str, Range] = {"l1": (6.0, None), "d2": (2.0, None), "l4": (3.0, None)}
+    return with_limits(
+        OPTIMAL, **lengths, guide=(-5.0, 25.0), gap=0.2, margin=0.5, leg_radii=(0.1, 0.2, 0.1, 0.3)
+    )
+
+
+def tilted() -> Design:
+    """Return a design whose platform is not level."""
+    return msgspec.structs.replace(
+        OPTIMAL, home=Pose.of_yaw_pitch_roll((10.0, 5.0, 9.0), (-70.0, 12.0, 8.0))
+    )
+
+
+DESIGNS = {"paper-optimal": OPTIMAL, "many limits": many_limits(), "tilted": tilted()}
+FREE = (("yaw", "shift-x", "shift-y", "shift-z"), ("yaw", "reach", "shift-z"))
+
+
+def problems(name: str) -> Iterator[Problem]:
+    """Yield problems with every demand there is."""
+    for free, ratio in itertools.product(FREE, (None, 6.0)):
+        yield make_problem(
+            DESIGNS[name],
+            "largest-margin",
+            volume=7000.0,
+            reach=20.0,
+            clearance=0.2,
+            stroke_ratio=ratio,
+            required_box=REQUIRED,
+            free=free,
+        )
+
+
+def points(model: Model, count: int, seed: int) -> Iterator[FloatArray]:
+    """Yield random places around the start, none of them degenerate."""
+    random = np.random.default_rng(seed)
+    while count:
+        u = model.start + 0.06 * random.normal(size=len(model.start))
+        try:
+            model.at(u)
+        except DesignError:
+            continue
+        yield u
+        count -= 1
+
+
+def around(model: Model, u: FloatArray) -> list[tuple[Evaluation, Evaluation]]:
+    """Return the evaluations one step ahead and behind of each variable."""
+    return [(model.at(u + STEP * unit), model.at(u - STEP * unit)) for unit in np.eye(len(u))]
+
+
+@pytest.mark.parametrize("name", list(DESIGNS))
+def test_gradients_of_demands_are_those_of_central_differences(name: str) -> None:
+    warm()
+    for seed, problem in enumerate(problems(name)):
+        model = Model(problem, problem.start_values)
+        for u in points(model, POINTS // 12 + 1, seed):
+            rows = [(a.values - b.values) / (2.0 * STEP) for a, b in around(model, u)]
+            found = np.column_stack(rows)
+            size = np.maximum(1.0, np.abs(found).max(axis=1, keepdims=True))
+            assert_allclose(model.at(u).gradients / size, found / size, rtol=0, atol=TOLERANCE)
+
+
+@pytest.mark.parametrize("name", list(DESIGNS))
+@pytest.mark.parametrize("objective", OBJECTIVES)
+def test_slopes_of_objectives_are_those_of_central_differences(
+    objective: ObjectiveName, name: str
+) -> None:
+    problem = make_problem(
+        DESIGNS[name],
+        objective,
+        volume=7000.0,
+        required_box=REQUIRED if objective == "largest-margin" else None,
+        free=["yaw"],
+    )
+    model = Model(problem, problem.start_values)
+    for u in points(model, POINTS // 3 + 1, 5):
+        slope = [(a.objective - b.objective) / (2.0 * STEP) for a, b in around(model, u)]
+        assert_allclose(model.at(u).slope, slope, rtol=0, atol=TOLERANCE)
+
+
+def test_what_a_volume_is_matched_by_vanishes_with_the_slope_of_its_cube_root() -> None:
+    problem = make_problem(OPTIMAL, "match-volume", volume=workspace_volume(OPTIMAL).volume)
+    model = Model(problem, problem.start_values)
+    at = model.at(model.start)
+    assert model.reported(at) == 0.0
+    assert at.values[0] == pytest.approx(0.0, abs=1e-15)
+    assert model.equalities.tolist() == [True, False, False, False]
+
+
+def test_all_kinds_of_demands_have_been_looked_at() -> None:
+    problem = next(problems("many limits"))
+    model = Model(problem, problem.start_values)
+    kinds = {name.split(" ")[0] for name in model.names}
+    assert kinds == {"volume", "reach", "distance", "gap", "required", "margin", "clearance"}
+
+
+def test_a_slack_is_that_of_its_limit() -> None:
+    problem = next(problems("many limits"))
+    model = Model(problem, problem.start_values)
+    state = model.at(model.start).state
+    p = np.random.default_rng(0).normal(size=(20, 3)) * 10.0
+    for limit in state.limits:
+        assert isinstance(limit, Round | HalfSpace)
+        slack, _, by_p = state.slack(limit, p)
+        assert_allclose(slack, limit.slack(p), rtol=0, atol=1e-12)
+        for axis, unit in enumerate(np.eye(3)):
+            ahead, behind = (limit.slack(p + h * unit) for h in (1e-5, -1e-5))
+            assert_allclose(by_p[:, axis], (ahead - behind) / 2e-5, rtol=0, atol=1e-7)
+
+
+def test_a_required_box_is_within_when_all_of_its_positions_are() -> None:
+    random = np.random.default_rng(3)
+    design = with_limits(OPTIMAL, l1=(8.0, None), d4=(3.0, None), box=None)
+    verdicts: set[bool] = set()
+    for _ in range(40):
+        middle = np.array([8.0, 4.0, 8.0]) + 5.0 * random.normal(size=3)
+        half = random.uniform(0.5, 3.0, size=3)
+        box = (tuple((middle - half).tolist()), tuple((middle + half).tolist()))
+        problem = make_problem(design, "smallest-reach", volume=1.0, required_box=box)
+        model = Model(problem, problem.start_values)
+        at = model.at(model.start)
+        boxed = np.array([name.startswith("required box") for name in model.names])
+        shares = np.indices((13, 13, 13)).reshape(3, -1).T / 12.0
+        inside = middle - half + 2.0 * half * shares
+        least = min(float(limit.slack(inside).min()) for limit in at.state.limits)
+        if abs(least) < 0.05:
+            # Between the positions that are looked at here the box may come nearer.
+            continue
+        verdicts.add(least > 0.0)
+        assert bool((at.values[boxed] >= 0.0).all()) == (least > 0.0)
+    assert verdicts == {True, False}
+
+
+def test_limits_of_a_design_are_kept_as_they_are() -> None:
+    assert isinstance(many_limits().limits, Limits)
+    problem = next(problems("many limits"))
+    design = problem.design_at(problem.start_values)
+    assert design.limits == many_limits().limits

@@ -1,0 +1,297 @@
+"""What limits cannot give is known before a search: no design within the bounds proves it wrong."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from explorer import InputError, workspace_volume
+from explorer.mechanism.design import Design, DesignError, Limits
+from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.pose import Pose
+from explorer.numerics.compiled import warm
+from explorer.optimise.defaults import make_problem
+from explorer.optimise.facts import CERTAIN, clearance_beyond
+from explorer.optimise.problem import Problem, Variable
+from explorer.optimise.refutation.binding import binding
+from explorer.optimise.refutation.cut_box import cut_volume
+from explorer.optimise.refutation.most_volume import ball_above, ceilings, disc_above
+from explorer.optimise.refutation.ranges import Ranges
+from explorer.optimise.refutation.refutation import (
+    PAPER_BOX,
+    paper_box,
+    refutations,
+    with_box,
+    words_of,
+)
+from explorer.optimise.search.model import Model
+from explorer.optimise.search.trail import MET
+from explorer.optimise.solver import optimise_design
+
+INITIAL, OPTIMAL = PRESETS["paper-initial"], PRESETS["paper-optimal"]
+PROBLEMS, DESIGNS = 100, 4
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _warm_kernels() -> None:  # pyright: ignore[reportUnusedFunction]
+    warm()
+
+
+def limited(design: Design, **limits: Any) -> Design:
+    return msgspec.structs.replace(design, limits=msgspec.structs.replace(design.limits, **limits))
+
+
+def random_problem(rng: np.random.Generator) -> Problem:
+    """Return a problem with limits, bounds and demands that are met, just so, or never."""
+
+    def maybe(value: Any, share: float = 0.4) -> Any:
+        return value if rng.random() < share else None
+
+    def box(middle: tuple[float, float, float], most: float) -> Any:
+        half = rng.uniform(0.1, most, 3)
+        return tuple((middle - half).tolist()), tuple((middle + half).tolist())
+
+    level = rng.random() < 0.5
+    tilt = (0.0, 0.0) if level else rng.uniform(-25.0, 25.0, 2).tolist()
+    home = Pose.of_yaw_pitch_roll(rng.uniform((5, 0, 4), (12, 6, 10)), (-73.0, *tilt))
+    lengths: dict[str, Any] = {
+        name: (float(maybe(rng.uniform(1.0, 8.0)) or 0.0), maybe(float(rng.uniform(9.0, 25.0))))
+        for name in ("l1", "d2", "d4", "l4")
+    }
+    limits = Limits(
+        **lengths,
+        guide=maybe((float(rng.uniform(-20.0, 5.0)), float(rng.uniform(5.0, 30.0)))),
+        gap=maybe(float(rng.uniform(0.0, 4.0))) or 0.0,
+        box=maybe(box((9.0, 3.0, 7.0), 14.0), 0.6),
+        margin=maybe(float(rng.choice([0.0, 1.0, 4.0])), 0.8),
+        leg_radii=(0.1, 0.2, 0.3, 0.0),
+    )
+    start = msgspec.structs.replace(OPTIMAL, limits=limits, home=home)
+    names = ["a3x", "a3y", "b1x", "b1y", "b2", "b3"]
+    width = float(rng.choice([0.0, 0.5, 3.0]))
+    values = dict(zip(names, start.variables, strict=True))
+    bounds = [Variable(name, values[name] - width, values[name] + width) for name in names]
+    required = maybe(box((9.0, 3.0, 7.0), 5.0))
+    free = ["yaw"] if rng.random() < 0.3 else []
+    if required is not None and rng.random() < 0.5:
+        free.append("shift-x")
+    if rng.random() < 0.2:
+        free.append("reach")
+    return make_problem(
+        start,
+        "match-volume" if free or rng.random() < 0.7 else "largest-margin",
+        volume=float(10.0 ** rng.uniform(1.5, 4.3)),
+        reach=maybe(float(rng.uniform(12.0, 30.0))),
+        clearance=maybe(float(rng.uniform(0.05, 3.0))),
+        least=0.1,
+        stroke_ratio=maybe(float(rng.uniform(1.5, 4.0)), 0.2),
+        required_box=required,
+        free=free,
+        bounds=bounds,
+    )
+
+
+def random_designs(rng: np.random.Generator, problem: Problem) -> list[tuple[float, ...]]:
+    lows = np.array([each.low for each in problem.variables])
+    highs = np.array([each.high for each in problem.variables])
+    shares = rng.random((DESIGNS, len(lows)))
+    # Bounds are where the largest of all lie.
+    shares[1::2] = np.round(shares[1::2])
+    return [tuple(each) for each in (lows + (highs - lows) * shares).tolist()]
+
+
+def meets(problem: Problem, values: tuple[float, ...]) -> bool:
+    """Whether a design meets all demands, by the optimiser's own measure of them."""
+    demands = problem.demands
+    model = Model(problem, values)
+    at = model.at(model.start)
+    if np.abs(at.values[model.equalities]).max(initial=0.0) > MET:
+        return False
+    if not (at.state.volume > 0.0 and model.worst(at)[0] >= -MET):
+        return False
+    # The optimiser measures clearances at some positions first, and in between at its end.
+    clearance, _ = clearance_beyond(at.state.design, demands.clearance_margin)
+    wanted = demands.clearance or 0.0
+    return clearance is None or clearance >= wanted - CERTAIN * at.state.design.reach
+
+
+def test_no_workspace_is_larger_than_any_ceiling_and_what_is_refuted_is_never_met() -> None:
+    rng = np.random.default_rng(15)
+    refuted, nearest = Counter[str](), 0.0
+    for _ in range(PROBLEMS):
+        try:
+            problem = random_problem(rng)
+        except InputError:
+            continue
+        found = refutations(problem)
+        refuted.update(each.limit for each in found)
+        bounds = list(ceilings(Ranges(problem)))
+        demanded = problem.demands.reach
+        for values in random_designs(rng, problem):
+            try:
+                design = problem.design_at(values)
+            except DesignError:
+                continue
+            is_long = demanded is not None and problem.objective == "match-volume"
+            reach = dict(zip(problem.names, values, strict=True)).get("reach", design.reach)
+            if not (is_long and demanded is not None and reach > demanded):
+                volume = workspace_volume(design, explain=False).volume
+                for bound in bounds:
+                    assert volume <= bound.volume * (1.0 + 1e-9), (problem, values, bound)
+                    nearest = max(nearest, volume / bound.volume if bound.volume else 0.0)
+            # A volume is matched by none of them: any would do that the limits leave room for.
+            larger = replace_volume(problem, workspace_volume(design, explain=False).volume)
+            if larger is not None and refutations(larger):
+                assert not meets(larger, values), (larger, values, refutations(larger))
+    # The bounds are worth something, and every kind of limit had its turn.
+    assert nearest > 0.99
+    kinds = {"box", "reach", "l1 maximum", "guide", "required box", "margin", "gap |d1 − d3|"}
+    assert kinds <= {*refuted}
+    assert any(each.startswith("clearance") for each in refuted)
+
+
+def replace_volume(problem: Problem, volume: float) -> Problem | None:
+    if volume <= 0.0:
+        return None
+    demands = msgspec.structs.replace(problem.demands, volume=volume)
+    return msgspec.structs.replace(problem, demands=demands)
+
+
+def paper_problem(start: Design = INITIAL, volume: float = 8000.0, **demands: Any) -> Problem:
+    return make_problem(start, "match-volume", volume=volume, **demands)
+
+
+def limits_of(problem: Problem) -> list[str]:
+    return [each.limit for each in refutations(problem)]
+
+
+def test_the_papers_start_is_told_what_its_box_holds_and_the_papers_box_is_enough() -> None:
+    problem = paper_problem(clearance=0.2)
+    assert words_of(refutations(problem)) == "the box holds at most 2,499 of the 8,000 asked for"
+    assert paper_box(problem) == PAPER_BOX == OPTIMAL.limits.box
+    for box in (None, PAPER_BOX):
+        lifted = with_box(INITIAL, box)
+        assert lifted.home == INITIAL.home
+        outcome = optimise_design(paper_problem(lifted, clearance=0.2))
+        assert outcome.converged
+        assert outcome.best.objective <= 1e-9
+    # Of what the paper's box does not hold either nobody is told to take it.
+    assert paper_box(paper_problem(volume=12_300.0)) is None
+    assert paper_box(paper_problem(volume=12_200.0)) == PAPER_BOX
+    assert refutations(paper_problem(volume=2400.0)) == ()
+    assert refutations(paper_problem(OPTIMAL)) == ()
+
+
+@pytest.mark.parametrize(
+    ("start", "demands", "words"),
+    [
+        (OPTIMAL, {"reach": 14.0}, "a reach of at most 14 leaves room for at most 5,747"),
+        (limited(OPTIMAL, l1=(0.0, 12.0)), {}, "l1 of at most 12 leaves room for at most 3,619"),
+        (limited(OPTIMAL, l4=(11.0, 12.0)), {}, "leaves room for at most 831.5 of the 8,000"),
+        (limited(OPTIMAL, guide=(0.0, 5.0)), {}, "the box holds at most 6,473 of the 8,000 asked"),
+        (
+            limited(OPTIMAL, guide=(0.0, 5.0), box=None),
+            {"reach": 25.0},
+            "a guide from 0 to 5 leaves room for at most 4,909 of the 8,000 asked for",
+        ),
+        (
+            limited(OPTIMAL, margin=9.0),
+            {},
+            "the box holds at most 5,844 of the 8,000 asked for, wh",
+        ),
+        (limited(OPTIMAL, margin=30.0), {}, "the box holds at most 0 of the 8,000 asked for, wh"),
+        (limited(OPTIMAL, gap=30.0), {}, "the carriages are at most 11.15 apart within the boun"),
+        (OPTIMAL, {"clearance": 12.0}, "legs 2 and 3 keep at most 11.15 of the clearance of 12"),
+        (
+            OPTIMAL,
+            {"required_box": ((8.0, 3.0, 7.0), (12.0, 7.0, 19.0))},
+            "the required box lies beyond the box along z: from 7 to 19, and the box from 0 to 18",
+        ),
+        (
+            OPTIMAL,
+            {"required_box": ((0.0, -11.0, 0.0), (20.0, 11.0, 18.5))},
+            "the required box has a volume of 8,140 and 8,000 is to be matched",
+        ),
+        (
+            limited(OPTIMAL, box=None),
+            {"required_box": ((8.0, 3.0, -7.0), (12.0, 7.0, 9.0))},
+            "a margin of at most −7 on the home's side, and the limits demand 0",
+        ),
+        (
+            limited(OPTIMAL, l4=(0.0, 22.0)),
+            {"required_box": ((0.0, -12.0, 0.0), (1.0, 22.0, 1.0)), "least": 1.0},
+            "",
+        ),
+        (
+            limited(OPTIMAL, l4=(0.0, 16.0)),
+            {"required_box": ((0.0, -12.0, 0.0), (1.0, 22.0, 1.0))},
+            "l4 must be 17.01 at the least to get to all of the required box, and at most 16",
+        ),
+    ],
+)
+def test_the_limit_that_binds_is_told_with_what_it_gives(
+    start: Design, demands: dict[str, Any], words: str
+) -> None:
+    told = words_of(refutations(paper_problem(start, **demands)))
+    assert (words in told) if words else told == ""
+
+
+def test_reasons_that_do_not_exclude_each_other_are_all_told() -> None:
+    start = limited(INITIAL, l1=(0.0, 12.0))
+    assert limits_of(paper_problem(start)) == ["box", "l1 maximum"]
+    assert limits_of(paper_problem(with_box(start, None))) == ["l1 maximum"]
+
+
+def test_volumes_that_nearly_agree_are_told_with_the_digits_in_which_they_differ() -> None:
+    (found,) = refutations(paper_problem(volume=2499.0))
+    assert found.message == "the box holds at most 2,498.7 of the 2,499.0 asked for"
+
+
+def test_a_free_yaw_refutes_nothing_that_another_yaw_gives() -> None:
+    # The margins of a tilted platform turn with it: those of one yaw cut off most of the box.
+    tilted = Pose.of_yaw_pitch_roll((10.0, 5.0, 9.0), (-73.0, 60.0, 0.0))
+    start = msgspec.structs.replace(limited(OPTIMAL, margin=7.0), home=tilted)
+    assert "box" in limits_of(paper_problem(start, 5000.0))
+    assert limits_of(paper_problem(start, 5000.0, free=("yaw",))) == []
+
+
+def test_a_box_cut_by_planes_has_the_volume_of_what_is_left() -> None:
+    box = ((-1.0, 0.0, 2.0), (3.0, 2.0, 5.0))
+    x, z = np.eye(3)[[0, 2]]
+    assert_allclose(cut_volume(box, []), 24.0)
+    assert_allclose(cut_volume(box, [(z, 3.0), (z, 2.0)]), 16.0)
+    assert_allclose(cut_volume(box, [(-x, -0.0), (2.0 * z, 7.0)]), 3.0)
+    corner = np.array([1.0, 1.0, 1.0])
+    assert_allclose(cut_volume(box, [(-corner, -2.0)]), 1.0 / 6.0)
+    assert cut_volume(box, [(z, 5.0)]) == cut_volume(box, [(z, 9.0)]) == 0.0
+    assert cut_volume(((0.0, 0.0, 0.0), (1.0, 0.0, 1.0)), []) == 0.0
+
+
+@pytest.mark.parametrize("foot", [-9.0, -0.7, 0.0, 0.4, 1.5, 9.0])
+def test_what_lies_over_a_height_of_a_ball_and_of_a_disc(foot: float) -> None:
+    middles = (np.arange(4000) + 0.5) / 1000.0 - 2.0
+    middles = middles[middles >= foot]
+    wide, narrow = (np.maximum(0.0, r * r - middles**2) for r in (2.0, 0.5))
+    slices = [float(np.pi * (wide - narrow).sum()) / 1000.0]
+    slices.append(float(2.0 * (np.sqrt(wide) - np.sqrt(narrow)).sum()) / 1000.0)
+    assert_allclose([ball_above(2.0, 0.5, foot), disc_above(2.0, 0.5, foot)], slices, atol=2e-3)
+
+
+def test_a_limit_that_is_in_the_way_of_a_volume_is_the_one_without_which_it_is_there() -> None:
+    grown = OPTIMAL.with_variables([25.0, 12.0, 4.0, -4.0, 2.6, 4.9])
+    assert workspace_volume(grown).volume < 11_000.0
+    found = binding(grown, 11_000.0)
+    assert found is not None
+    assert found.limit == "box"
+    assert found.volume == workspace_volume(with_box(grown, None)).volume >= 11_000.0
+    assert binding(grown, 1e6) is None
+    assert binding(with_box(grown, None), 1e5) is None
+    held = limited(with_box(grown, None), l1=(3.0, 12.0))
+    most = binding(held, 8000.0)
+    assert most is not None
+    assert most.limit == "l1 maximum"

@@ -1,0 +1,207 @@
+"""Where paths cross singularities, and that paths between two modes always do."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, strategies as st
+from scipy.spatial.transform import Rotation
+from strategies import (
+    WAYS,
+    Case,
+    cases,
+    ordinary_cases,
+    singular_cases,
+)
+
+from explorer import PRESETS, InputError, Pose, forward, home_pose, inverse, margins, poses_between
+from explorer.mechanism.margins import mode_of
+from explorer.numerics.arrays import FloatArray
+from explorer.paths.crossings import modes_differ, path_between_modes, path_margins
+
+OPTIMAL = PRESETS["paper-optimal"]
+HOME = home_pose(OPTIMAL)
+
+
+def random_pose(rng: np.random.Generator, size: float = 5.0) -> Pose:
+    return Pose.of(size * rng.uniform(-1, 1, 3), Rotation.random(random_state=rng).as_matrix())
+
+
+def sign_changes(start: Pose, end: Pose, samples: int = 4001) -> FloatArray:
+    """Return how often each margin is seen to change its sign, shape (3,)."""
+    shares = np.linspace(0.0, 1.0, samples)
+    signs = margins(*poses_between(start, end, shares)) > 0.0
+    return (signs[1:] != signs[:-1]).sum(axis=0).astype(np.float64)
+
+
+@given(st.integers(0, 2**32))
+def test_crossings_are_singular_and_none_that_samples_see_is_missing(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    start, end = random_pose(rng), random_pose(rng)
+    found = path_margins([start, end])
+    assert found.lies_in == ()
+    shares = [each.share for each in found.crossings]
+    assert shares == sorted(shares)
+    for each in found.crossings:
+        position, rotation = poses_between(start, end, each.share)
+        assert abs(margins(position, rotation)[each.incidence - 1]) < 1e-13
+        np.testing.assert_allclose(each.pose.rotation, rotation, atol=1e-12)
+    crossed = [sum(c.incidence == k for c in found.crossings) for k in (1, 2, 3)]
+    assert crossed == sign_changes(start, end).tolist()
+
+
+def test_a_margin_can_be_crossed_several_times_in_one_move() -> None:
+    rng = np.random.default_rng(1)
+    paths = [path_margins([random_pose(rng), random_pose(rng)], samples=2) for _ in range(100)]
+    crossings = [[c.incidence for c in path.crossings] for path in paths]
+    assert max(own.count(1) for own in crossings) >= 2
+    assert max(own.count(2) for own in crossings) >= 2
+    assert max(own.count(3) for own in crossings) == 1
+
+
+@given(cases(), st.integers(0, 4), st.integers(0, 2**32))
+def test_any_path_between_two_modes_crosses_each_margin_that_they_differ_in(
+    case: Case, corners: int, seed: int
+) -> None:
+    """The claim: modes are the sign triples, so a path to another crosses what differs."""
+    modes = forward(case.design, inverse(case.design, case.position, case.rotation))
+    assume(bool(modes.feasible))
+    # All eight have the same |κ| but for the rounding of the joints, which a platform of a
+    # millionth of the size blows up until an end may lie on the singular set.
+    found_margins = margins(modes.position, modes.rotation)
+    assume(bool(np.abs(found_margins).min() > 1e-6 * case.size))
+    assume(bool((mode_of(found_margins) == np.arange(8)).all()))
+    rng = np.random.default_rng(seed)
+    first, last = rng.choice(8, 2, replace=False).tolist()
+    ends = [Pose.of(modes.position[k], modes.rotation[k]) for k in (first, last)]
+    path = [ends[0], *(random_pose(rng, case.size) for _ in range(corners)), ends[1]]
+    found = path_margins(path, samples=2)
+    signs = np.sign([margins(each.position, each.rotation) for each in ends])
+    expected = {k + 1 for k in range(3) if signs[0][k] != signs[1][k]}
+    assert expected
+    assert expected == set(modes_differ(path))
+    for incidence in (1, 2, 3):
+        crossed = sum(c.incidence == incidence and c.changes_sign for c in found.crossings)
+        # An odd number where the signs differ, else an even one.
+        assert crossed % 2 == int(incidence in expected)
+
+
+@given(ordinary_cases(), st.integers(0, 2**32))
+def test_smooth_random_paths_between_modes_cross_too(case: Case, seed: int) -> None:
+    modes = forward(case.design, inverse(case.design, case.position, case.rotation))
+    assume(bool(np.abs(margins(case.position, case.rotation)).min() > 1e-6 * case.size))
+    rng = np.random.default_rng(seed)
+    first, last = rng.choice(8, 2, replace=False).tolist()
+    t = np.linspace(0.0, 1.0, 2001)
+    quaternions = Rotation.from_matrix(modes.rotation[[first, last]]).as_quat()
+    waves = np.sin(np.pi * t[:, None] * np.arange(1.0, 6.0))
+    share = t[:, None]
+    p = (1.0 - share) * modes.position[first] + share * modes.position[last]
+    q = (1.0 - share) * quaternions[0] + share * quaternions[1]
+    p += case.size * waves @ rng.normal(size=(5, 3))
+    q += waves @ rng.normal(size=(5, 4))
+    signs = margins(p, Rotation.from_quat(q).as_matrix()) > 0.0
+    changes = (signs[1:] != signs[:-1]).sum(axis=0)
+    assert (changes % 2 == (signs[0] != signs[-1])).all()
+    assert changes.sum() >= 1
+
+
+@pytest.mark.parametrize("last", range(8))
+def test_the_straight_move_between_modes_is_marked_where_it_crosses(last: int) -> None:
+    joints = inverse(OPTIMAL, HOME.position, HOME.rotation)
+    first = 3
+    found = path_between_modes(OPTIMAL, joints, first, last)
+    assert found.margins.shape == (len(found.at), 3)
+    differ = {k for k, bit in ((1, 4), (2, 2), (3, 1)) if (first ^ last) & bit}
+    assert {c.incidence for c in found.crossings if c.changes_sign} >= differ
+    assert set(modes_differ(found.poses)) == differ
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_a_move_from_a_singular_pose_starts_with_a_crossing(way: tuple[int, ...]) -> None:
+    @given(singular_cases(way, st.just(OPTIMAL)))
+    def law(case: Case) -> None:
+        start = Pose.of(case.position, case.rotation)
+        found = path_margins([start, HOME])
+        for incidence in way:
+            own = [c for c in found.crossings if c.incidence == incidence]
+            assert incidence in found.lies_in or (own and own[0].share < 1e-6)
+
+    law()
+
+
+def test_a_move_in_the_base_plane_lies_in_the_singular_set() -> None:
+    start = Pose((1.0, 2.0, 0.0), HOME.quaternion)
+    end = Pose((3.0, -2.0, 0.0), (0.8, 0.3, -0.4, 0.2))
+    assert path_margins([start, end]).lies_in == (3,)
+    # Level in the base plane, every margin vanishes throughout.
+    level = Pose((3.0, -2.0, 0.0), HOME.quaternion)
+    assert path_margins([start, level]).lies_in == (1, 2, 3)
+    # A pose that stays, on the set and off it.
+    assert path_margins([start, start]).lies_in == (1, 2, 3)
+    still = path_margins([HOME, HOME])
+    assert still.lies_in == still.crossings == ()
+
+
+def test_a_margin_that_touches_zero_is_no_change_of_mode() -> None:
+    # κ3 is linear, so it touches at a corner: down to the base plane and up again.
+    x, y, z = HOME.position
+    down = Pose((x, y, 0.0), (0.8, 0.3, -0.4, 0.2))
+    start, end = Pose((x - 1, y, z), down.quaternion), Pose((x + 1, y, z), down.quaternion)
+    (touch,) = [c for c in path_margins([start, down, end]).crossings if c.incidence == 3]
+    assert (touch.move, touch.share, touch.changes_sign) == (0, 1.0, False)
+    below = Pose((x + 1, y, -z), down.quaternion)
+    (through,) = [c for c in path_margins([start, down, below]).crossings if c.incidence == 3]
+    assert (through.move, through.share, through.changes_sign) == (0, 1.0, True)
+    # κ1 = −n·p of a platform that nods to where it just points at a1, and back.
+    nod = 2.0 * math.atan2(1.0, 2.0)
+    first = Rotation.from_euler("y", 0.0).as_matrix()
+    last = Rotation.from_euler("y", nod).as_matrix()
+    position = (-2.0, 0.5, 1.0)
+    found = path_margins([Pose.of(position, first), Pose.of(position, last)])
+    assert [c.share for c in found.crossings if c.incidence == 1] == pytest.approx([0.5])
+
+
+@pytest.mark.parametrize("gap", [1e-2, 1e-5])
+def test_two_crossings_close_together_are_both_found(gap: float) -> None:
+    # The platform turns about y by θ at b4 = (x, y, z): κ1 = −(x sin θ + z cos θ), which has
+    # its extreme −|(x, z)| where the normal points away from a1. Taking b4 along keeps
+    # that extreme at the middle and lets it come as close to zero as one likes.
+    turn = Rotation.from_rotvec([0.0, 1.0, 0.0]).as_matrix()
+    span = np.array([math.sin(0.5), 0.0, math.cos(0.5)])
+
+    def path(lift: float) -> list[Pose]:
+        # b4 crosses the platform plane through a1 twice, or not at all.
+        across = np.array([math.cos(0.5), 0.0, -math.sin(0.5)])
+        return [
+            Pose.of(4.0 * across * s + lift * span + [0.0, 0.3, 0.0], r)
+            for s, r in ((-1.0, np.eye(3)), (1.0, turn))
+        ]
+
+    def least(lift: float) -> float:
+        shares = np.linspace(0.45, 0.55, 2001)
+        start, end = path(lift)
+        return float(margins(*poses_between(start, end, shares))[:, 0].max())
+
+    low, high = -4.0, 4.0
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if least(middle) < 0.0 else (middle, high)
+    counts = [
+        [c.share for c in path_margins(path(low + d)).crossings if c.incidence == 1]
+        for d in (gap**2, -(gap**2))
+    ]
+    lone, pair = sorted(counts, key=len)
+    assert len(pair) - len(lone) == 2
+    assert float(np.diff(pair).min()) < 20.0 * gap
+
+
+def test_what_is_no_path_is_refused() -> None:
+    with pytest.raises(InputError, match="two poses"):
+        path_margins([HOME])
+    with pytest.raises(InputError, match="0 to 7"):
+        path_between_modes(OPTIMAL, inverse(OPTIMAL, HOME.position, HOME.rotation), 0, 8)
+    with pytest.raises(InputError, match="do not close"):
+        path_between_modes(OPTIMAL, np.array([0.1, 1.0, 9.0, 2.0, 9.0, 1.0]), 0, 1)

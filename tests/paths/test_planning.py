@@ -1,0 +1,255 @@
+"""Planned paths keep everything all along; where there is none, the reason is told."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import sys
+from functools import cache
+from importlib.util import find_spec
+
+import numpy as np
+import pytest
+from limited_designs import limited
+from scipy.spatial.transform import Rotation
+
+from explorer import (
+    PRESETS,
+    Design,
+    InputError,
+    MissingExtraError,
+    NoAnswerError,
+    Pose,
+    evaluate,
+    forward,
+    home_pose,
+    inverse,
+    move_clearances,
+    moves_are_clear,
+    poses_between,
+)
+from explorer.mechanism.displacement import displacement
+from explorer.paths.crossings import path_margins
+from explorer.paths.planning import EndError, NoPathError, PlannedPath, plan_path
+from explorer.paths.smoothing import Smoother
+from explorer.workspace.limits.valid_poses import Rules, poses_are_valid
+
+DESIGN = limited(PRESETS["paper-optimal"], leg_radii=(0.2,) * 4)
+HOME = home_pose(DESIGN)
+needs_ompl = pytest.mark.skipif(find_spec("ompl") is None, reason="OMPL is not installed")
+
+
+@cache
+def valid_poses(design: Design = DESIGN) -> tuple[Pose, ...]:
+    rng = np.random.default_rng(3)
+    positions = rng.uniform([0, -12, 0], [20, 22, 18], (4000, 3))
+    rotations = Rotation.random(4000, random_state=rng).as_matrix()
+    valid = poses_are_valid(design, positions, rotations)
+    pairs = zip(positions[valid], rotations[valid], strict=True)
+    return tuple(Pose.of(p, r) for p, r in pairs)
+
+
+def order(pose: Pose) -> list[int]:
+    _, d1, _, d3, _, _ = inverse(DESIGN, pose.position, pose.rotation).tolist()
+    return np.argsort([0.0, d1, d3]).tolist()
+
+
+@cache
+def pairs() -> tuple[tuple[Pose, Pose], ...]:
+    """Return pairs of poses of one order that no straight valid move joins."""
+    smoother = Smoother(DESIGN, Rules.of(DESIGN))
+    found = [
+        (a, b)
+        for a, b in itertools.pairwise(valid_poses())
+        if order(a) == order(b) and not smoother.is_valid(a, b)
+    ]
+    return tuple(found[:12])
+
+
+def assert_keeps_everything(path: PlannedPath, poses: tuple[Pose, ...]) -> None:
+    room = (path.margin - 2e-4 * DESIGN.reach, path.clearance - 1e-4 * DESIGN.reach)
+    for start, end in itertools.pairwise(poses):
+        positions, rotations = poses_between(start, end, np.linspace(0.0, 1.0, 50))
+        assert poses_are_valid(DESIGN, positions, rotations).all()
+        ends = (positions[0], rotations[0], positions[-1], rotations[-1])
+        assert moves_are_clear(DESIGN, *ends)
+        assert moves_are_clear(DESIGN, *ends, clearance=room[1]) or room[1] < 0.0
+    margins = path_margins(poses)
+    assert margins.crossings == ()
+    assert margins.lies_in == ()
+    assert np.abs(margins.margins).min() >= room[0]
+
+
+@needs_ompl
+@pytest.mark.parametrize("index", range(12))
+def test_a_path_keeps_limits_margins_and_clearances_from_start_to_goal(index: int) -> None:
+    start, goal = pairs()[index]
+    path = plan_path(DESIGN, start, goal, seconds=20.0)
+    assert path.poses[0] is start
+    assert path.poses[-1] is goal
+    assert path.found[0] is start
+    assert path.found[-1] is goal
+    assert len(path.found) > 2
+    assert path.checked >= 2
+    assert_keeps_everything(path, path.poses)
+    assert_keeps_everything(path, path.found)
+
+
+@needs_ompl
+def test_smoothing_makes_a_path_shorter_and_rounder() -> None:
+    smoother = Smoother(DESIGN, Rules.of(DESIGN))
+    smooth = rough = 0.0
+    for start, goal in pairs()[:6]:
+        path = plan_path(DESIGN, start, goal, seconds=20.0)
+        straight = displacement(
+            DESIGN, start.position, start.rotation, goal.position, goal.rotation
+        )
+        assert path.length == pytest.approx(float(smoother.lengths(path.poses).sum()))
+        assert straight <= path.length + 1e-9
+        found = float(smoother.lengths(path.found).sum())
+        assert path.length <= found + 1e-9
+        smooth, rough = smooth + path.length, rough + found
+    assert smooth < 0.95 * rough
+
+
+def test_the_sharpest_corners_are_cut() -> None:
+    """In free space a detour becomes the straight way, or nearly."""
+    x, y, z = HOME.position
+    corner = Pose((x, y + 2.0, z), HOME.quaternion)
+    end = Pose((x + 2.0, y + 2.0, z), HOME.quaternion)
+    smoother = Smoother(DESIGN, Rules.of(DESIGN))
+    assert smoother.is_valid(HOME, end)
+    assert smoother.smoothed([HOME, corner, end]) == (HOME, end)
+
+
+def test_a_straight_way_that_is_valid_is_taken_without_any_search(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setitem(sys.modules, "ompl.base", None)
+    x, y, z = HOME.position
+    goal = Pose((x + 1.0, y, z - 1.0), HOME.quaternion)
+    path = plan_path(DESIGN, HOME, goal)
+    assert path.poses == (HOME, goal)
+    assert path.length == pytest.approx(math.sqrt(2.0))
+    # To stay is a path as well.
+    assert plan_path(DESIGN, HOME, HOME).length == 0.0
+
+
+def test_without_ompl_it_is_told_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "ompl.util", None)
+    with pytest.raises(MissingExtraError, match=r"flagged-explorer\[planning\]"):
+        plan_path(DESIGN, *pairs()[0])
+
+
+@pytest.mark.parametrize("mode", [0, 2, 3, 4, 5, 6, 7])
+def test_poses_of_two_modes_have_no_path(mode: int) -> None:
+    modes = forward(DESIGN, inverse(DESIGN, HOME.position, HOME.rotation))
+    goal = Pose.of(modes.position[mode], modes.rotation[mode])
+    with pytest.raises(NoPathError, match="is in mode") as caught:
+        plan_path(DESIGN, HOME, goal)
+    assert caught.value.reason == "other mode"
+    assert isinstance(caught.value, NoAnswerError)
+    differ = {k for k, bit in ((1, 4), (2, 2), (3, 1)) if (1 ^ mode) & bit}
+    named = {k for k in (1, 2, 3) if f"κ{k}" in str(caught.value)}
+    assert named == differ
+
+
+@pytest.mark.parametrize("demanded", ["home", "any"])
+def test_poses_with_the_carriages_in_another_order_have_no_path(demanded: str) -> None:
+    plain = limited(DESIGN, carriage_order="any")
+    start = next(each for each in valid_poses(plain) if order(each) == [0, 1, 2])
+    goal = next(each for each in valid_poses(plain) if order(each) == [0, 2, 1])
+    with pytest.raises(NoPathError, match="order a1, d1, d3, the goal a1, d3, d1") as caught:
+        plan_path(limited(DESIGN, carriage_order=demanded), start, goal)
+    assert caught.value.reason == "other order"
+    # On the straight move, too, the legs 2 and 3 meet.
+    least = move_clearances(
+        DESIGN, start.position, start.rotation, goal.position, goal.rotation
+    ).clearance[3]
+    assert least < -0.39
+
+
+@needs_ompl
+def test_paths_stay_off_singularities_and_collisions_as_far_as_their_ends_do() -> None:
+    kept: list[bool] = []
+    for start, goal in pairs():
+        path = plan_path(DESIGN, start, goal, seconds=20.0)
+        ends = [evaluate(DESIGN, each) for each in (start, goal)]
+        margin = min(0.02 * DESIGN.reach, *(0.5 * float(abs(e.margins).min()) for e in ends))
+        kept.append(path.margin == pytest.approx(margin))
+        assert kept[-1] or path.margin == 0.0
+        assert (path.clearance > 0.0) == (path.margin > 0.0)
+    assert np.mean(kept) > 0.7
+
+
+def test_room_is_added_to_what_rules_demand() -> None:
+    rules = Rules.of(DESIGN)
+    position, rotation = HOME.position, HOME.rotation
+    snapshot = evaluate(DESIGN, HOME)
+    margin = float(abs(snapshot.margins).min())
+    clearance = float(snapshot.clearances.clearance.min())
+    for room, valid in (
+        ((0.99 * margin, 0.99 * clearance), True),
+        ((1.01 * margin, 0.0), False),
+        ((0.0, 1.01 * clearance), False),
+    ):
+        demanding = rules.with_room(*room)
+        assert poses_are_valid(DESIGN, position, rotation, rules=demanding) == valid
+    free = Rules.of(limited(DESIGN, margin=None))
+    assert poses_are_valid(DESIGN, position, rotation, rules=free.with_room(2.0 * margin, 0.0))
+
+
+@needs_ompl
+def test_too_little_time_is_told() -> None:
+    with pytest.raises(NoPathError, match="1e-09 s") as caught:
+        plan_path(DESIGN, *pairs()[0], seconds=1e-9)
+    assert caught.value.reason == "out of time"
+
+
+def test_a_start_or_goal_outside_the_limits_is_told_with_each_limit() -> None:
+    x, y, z = HOME.position
+    far = Pose((40.0, y, z), HOME.quaternion)
+    broken = [str(each) for each in evaluate(DESIGN, far).violations]
+    with pytest.raises(EndError, match="the goal is outside the limits") as caught:
+        plan_path(DESIGN, HOME, far)
+    assert isinstance(caught.value, InputError)
+    assert caught.value.reason == "outside limits"
+    assert len(broken) >= 2
+    assert all(each in str(caught.value) for each in broken)
+    with pytest.raises(InputError, match="the start is outside the limits"):
+        plan_path(DESIGN, far, HOME)
+    thick = limited(DESIGN, leg_radii=(3.0,) * 4)
+    with pytest.raises(InputError, match=r"legs 2 and 3 collide \(clearance −"):
+        plan_path(thick, HOME, Pose((x, y + 1, z), HOME.quaternion))
+
+
+@pytest.mark.parametrize(("height", "words"), [(0.0, "b4 on the base plane")])
+def test_a_singular_start_or_goal_is_told_with_its_incidence(height: float, words: str) -> None:
+    x, y, _ = HOME.position
+    singular = Pose.of_yaw_pitch_roll((x, y, height), (-70.0, 20.0, 30.0))
+    for ends in ((singular, HOME), (HOME, singular)):
+        with pytest.raises(EndError, match=words) as caught:
+            plan_path(DESIGN, *ends)
+        assert caught.value.reason == "singular"
+
+
+def test_margins_of_the_limits_are_kept() -> None:
+    demanding = limited(DESIGN, margin=2.0)
+    low = Pose((10.0, 5.0, 1.5), HOME.quaternion)
+    with pytest.raises(InputError, match="margin κ1"):
+        plan_path(demanding, HOME, low)
+
+
+def test_paths_can_be_of_another_mode_than_the_home() -> None:
+    modes = forward(DESIGN, inverse(DESIGN, HOME.position, HOME.rotation))
+    free = limited(PRESETS["paper-optimal"], box=None)
+    start = Pose.of(modes.position[6], modes.rotation[6])
+    x, y, z = start.position
+    goal = Pose((x + 0.1, y, z + 0.1), start.quaternion)
+    assert plan_path(free, start, goal).poses == (start, goal)
+
+
+@pytest.mark.parametrize("seconds", [0.0, -1.0, math.nan, math.inf])
+def test_a_time_that_is_none_is_refused(seconds: float) -> None:
+    with pytest.raises(InputError, match="time above zero"):
+        plan_path(DESIGN, HOME, HOME, seconds=seconds)

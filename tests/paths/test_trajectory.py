@@ -1,0 +1,115 @@
+"""Paths over time: on the path, no actuator too fast, and the same read back from a table."""
+
+from __future__ import annotations
+
+import csv
+import itertools
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, strategies as st
+from numpy.testing import assert_allclose
+from scipy.spatial.transform import Rotation
+
+from explorer import (
+    PRESETS,
+    InputError,
+    Pose,
+    home_pose,
+    inverse,
+    poses_between,
+    rotation_from_quaternion as rotation_of,
+)
+from explorer.export.trajectory import COLUMNS, trajectory_csv, write_trajectory
+from explorer.paths.trajectory import trajectory
+
+DESIGN = PRESETS["paper-optimal"]
+HOME = home_pose(DESIGN)
+
+
+def random_path(seed: int, corners: int) -> list[Pose]:
+    rng = np.random.default_rng(seed)
+    return [
+        Pose.of(rng.uniform(-10.0, 10.0, 3), Rotation.random(random_state=rng).as_matrix())
+        for _ in range(corners)
+    ]
+
+
+@given(st.integers(0, 2**32), st.integers(2, 6), st.sampled_from((0.1, 2.0, 50.0)))
+def test_samples_lie_on_the_path_at_even_times(seed: int, corners: int, speed: float) -> None:
+    path = random_path(seed, corners)
+    found = trajectory(DESIGN, path, speed=speed, samples=301)
+    assert found.time.shape == (301,)
+    assert_allclose(np.diff(found.time), found.duration / 300.0, rtol=1e-9)
+    assert (np.diff(found.at) > 0.0).all()
+    assert (found.at[0], found.at[-1]) == (0.0, corners - 1.0)
+    for index in range(0, 301, 25):
+        move = min(int(found.at[index]), corners - 2)
+        p, r = poses_between(path[move], path[move + 1], found.at[index] - move)
+        assert_allclose(found.position[index], p, atol=1e-12)
+        assert_allclose(rotation_of(found.quaternion[index]), r, atol=1e-12)
+    joints = inverse(DESIGN, found.position, rotation_of(found.quaternion))
+    assert_allclose(found.joints, joints, atol=1e-9)
+    # No sudden change of sign.
+    assert ((found.quaternion[1:] * found.quaternion[:-1]).sum(axis=-1) >= 0.0).all()
+
+
+@given(st.integers(0, 2**32), st.sampled_from((0.1, 2.0)))
+def test_no_actuator_is_faster_than_the_speed_and_one_is_as_fast(seed: int, speed: float) -> None:
+    found = trajectory(DESIGN, random_path(seed, 3), speed=speed, samples=2001)
+    rates = np.abs(np.diff(found.joints, axis=0)).max(axis=-1) / np.diff(found.time)
+    # Speeds are even over a thirty-second part of a move, and corners come between samples.
+    assert np.median(rates) == pytest.approx(speed, rel=0.1)
+    assert rates.mean() <= 1.02 * speed
+
+
+def test_a_speed_is_in_units_a_second() -> None:
+    x, y, z = HOME.position
+    # Along the guide both carriages go as far as the platform, and no leg goes farther.
+    path = [HOME, Pose((x + 3.0, y, z), HOME.quaternion)]
+    assert trajectory(DESIGN, path, speed=1.5).duration == pytest.approx(2.0)
+    assert trajectory(DESIGN, path).duration == pytest.approx(3.0 / (0.1 * DESIGN.reach))
+
+
+def test_a_path_that_stays_takes_no_time() -> None:
+    found = trajectory(DESIGN, [HOME, HOME], samples=5)
+    assert found.duration == 0.0
+    assert_allclose(found.position, [HOME.position] * 5)
+    assert np.isfinite(found.joints).all()
+
+
+def test_the_pose_at_a_time_is_that_of_the_nearest_sample() -> None:
+    found = trajectory(DESIGN, random_path(1, 4), samples=11)
+    for index in (0, 4, 10):
+        pose = found.pose(float(found.time[index]) + 0.01 * found.duration)
+        assert pose.position == tuple(found.position[index].tolist())
+    assert found.pose(-1.0).position == tuple(found.position[0].tolist())
+    assert found.pose(1e9).position == tuple(found.position[-1].tolist())
+
+
+def test_a_table_reads_back_to_the_last_bit(tmp_path: Path) -> None:
+    found = trajectory(DESIGN, random_path(2, 3), samples=50)
+    file = tmp_path / "path.csv"
+    write_trajectory(found, file)
+    text = file.read_text(encoding="utf-8")
+    assert text == trajectory_csv(found)
+    head, *rows = csv.reader(text.splitlines())
+    assert tuple(head) == COLUMNS
+    assert head[:7] == ["time_s", "l1", "d1", "d2", "d3", "d4", "l4"]
+    values = np.array([[float(word) for word in row] for row in rows])
+    expected = (found.time[:, None], found.joints, found.position, found.quaternion)
+    assert (values == np.concatenate(expected, axis=1)).all()
+    for earlier, later in itertools.pairwise(values[:, 0].tolist()):
+        assert earlier < later
+
+
+def test_trajectories_that_cannot_be_are_refused() -> None:
+    with pytest.raises(InputError, match="two poses"):
+        trajectory(DESIGN, [HOME])
+    with pytest.raises(InputError, match="samples"):
+        trajectory(DESIGN, [HOME, HOME], samples=1)
+    for speed in (0.0, -1.0, math.nan, math.inf):
+        with pytest.raises(InputError, match="speed"):
+            trajectory(DESIGN, [HOME, HOME], speed=speed)

@@ -1,0 +1,415 @@
+"""The parts of the prototype: closed, of one piece, clear of each other wherever they move."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, strategies as st
+from limited_designs import limited
+from scipy.spatial.transform import Rotation
+
+from explorer import PRESETS, Design, InputError, Pose, home_pose, leg_clearances
+from explorer.numerics.arrays import FloatArray
+from explorer.prototype.assembly import Prototype, make_prototype
+from explorer.prototype.bill import bill_of_materials
+from explorer.prototype.chains import BODIES, LEGS, ON_GUIDE, Places
+from explorer.prototype.dimensions import (
+    CLEARANCE,
+    FIRST_SWING,
+    SECOND_SWING,
+    LegSizes,
+    Stroke,
+)
+from explorer.prototype.shapes import least_gap, overlaps
+
+untyped: Any = trimesh
+OPTIMAL, INITIAL = PRESETS["paper-optimal"], PRESETS["paper-initial"]
+HALF_TURN_X, HALF_TURN_Z = np.diag([1.0, -1.0, -1.0]), np.diag([-1.0, -1.0, 1.0])
+
+
+def turned(design: Design, base: FloatArray, platform: FloatArray, name: str) -> Design:
+    """Return the same mechanism with frames of base and platform that are turned in place."""
+    home = home_pose(design)
+    a3, b1, b2, b3 = (
+        turn @ [*point, 0.0]
+        for turn, point in (
+            (base, design.a3),
+            (platform, design.b1),
+            (platform, (design.b2, 0.0)),
+            (platform, (design.b3, 0.0)),
+        )
+    )
+    rotation = base @ home.rotation @ platform.T
+    return msgspec.structs.replace(
+        limited(design, box=None),
+        name=name,
+        a3=(float(a3[0]), float(a3[1])),
+        b1=(float(b1[0]), float(b1[1])),
+        b2=float(b2[0]),
+        b3=float(b3[0]),
+        home=Pose.of(base @ home.position, rotation),
+    )
+
+
+UNBOXED = turned(OPTIMAL, np.eye(3), np.eye(3), "unboxed")
+BELOW = turned(OPTIMAL, HALF_TURN_X, np.eye(3), "below the base")
+UPSIDE_DOWN = turned(OPTIMAL, np.eye(3), HALF_TURN_X, "platform upside down")
+BACKWARDS = turned(OPTIMAL, HALF_TURN_Z, np.eye(3), "backwards along the guide")
+LARGE = msgspec.structs.replace(
+    limited(OPTIMAL, leg_radii=(0.3, 0.12, 0.2, 0.25), l1=(7.5, 12.0), l4=(9.0, 16.0)),
+    name="large, each leg of its own",
+    unit_mm=40.0,
+)
+DESIGNS = (OPTIMAL, INITIAL, BELOW, UPSIDE_DOWN, BACKWARDS, LARGE)
+PROTOTYPES = {design.name: make_prototype(design) for design in (*DESIGNS, UNBOXED)}
+NAMES = [design.name for design in DESIGNS]
+
+
+def pose_overlaps(prototype: Prototype, position: FloatArray, rotation: FloatArray) -> list[Any]:
+    places = prototype.chains.places_at(position, rotation)
+    return list(overlaps(prototype.parts, places))
+
+
+def at_home(prototype: Prototype) -> Places:
+    home = home_pose(prototype.design)
+    return prototype.chains.places_at(home.position, home.rotation)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_parts_are_closed_and_of_one_piece(name: str) -> None:
+    parts = PROTOTYPES[name].parts
+    assert [part.name for part in parts] == [*BODIES, "ball 1", "ball 2", "ball 3", "ball 4"]
+    for part in parts:
+        assert part.solid.is_watertight, part.name
+        assert part.solid.volume > 0.0
+        shape = trimesh.Trimesh(part.vertices, part.faces, process=False)
+        assert shape.is_watertight
+        assert shape.is_winding_consistent
+        assert shape.body_count == 1, part.name
+        assert part.body in BODIES
+
+
+@pytest.mark.parametrize("name", [OPTIMAL.name, LARGE.name])
+def test_masses_are_those_that_trimesh_finds(name: str) -> None:
+    prototype = PROTOTYPES[name]
+    metres = 1e-3 * prototype.design.unit_mm
+    for part in prototype.parts:
+        shape: Any = trimesh.Trimesh(part.vertices * metres, part.faces, process=False)
+        shape.density = 2700.0
+        mass = part.mass(2700.0, prototype.design.unit_mm)
+        assert mass.mass == pytest.approx(float(shape.mass), rel=1e-9)
+        np.testing.assert_allclose(mass.centre, shape.center_mass, atol=1e-9 * shape.scale)
+        size = np.abs(mass.inertia).max()
+        np.testing.assert_allclose(mass.inertia, shape.moment_inertia, atol=1e-6 * size)
+    bodies = prototype.masses(2700.0)
+    assert list(bodies) == list(BODIES[1:])
+    total = sum(part.mass(2700.0, prototype.design.unit_mm).mass for part in prototype.parts[1:])
+    assert sum(mass.mass for mass in bodies.values()) == pytest.approx(total, rel=1e-12)
+
+
+@pytest.mark.parametrize("design", [BELOW, UPSIDE_DOWN, BACKWARDS])
+def test_turned_frames_make_the_same_mechanism(design: Design) -> None:
+    plain, other = PROTOTYPES[UNBOXED.name], PROTOTYPES[design.name]
+    assert other.sizes.radii == pytest.approx(plain.sizes.radii, rel=1e-9)
+    for one, two in zip(plain.parts, other.parts, strict=True):
+        assert two.solid.volume == pytest.approx(one.solid.volume, rel=1e-6), one.name
+    turn = {BELOW: HALF_TURN_X, UPSIDE_DOWN: np.eye(3), BACKWARDS: HALF_TURN_Z}[design]
+    one, two = (
+        np.array([[each.min(axis=0), each.max(axis=0)] for each in p.at(*pose_of(p))])
+        for p in (plain, other)
+    )
+    np.testing.assert_allclose(np.sort(one @ turn.T, axis=1), np.sort(two, axis=1), atol=0.02)
+
+
+def pose_of(prototype: Prototype) -> tuple[FloatArray, FloatArray]:
+    home = home_pose(prototype.design)
+    return np.array(home.position), home.rotation
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_parts_keep_their_clearance_at_home(name: str) -> None:
+    prototype = PROTOTYPES[name]
+    assert prototype.hindrances(*pose_of(prototype)) == ()
+    places = at_home(prototype)
+    assert list(overlaps(prototype.parts, places)) == []
+    unit = prototype.design.unit_mm
+    gap, one, two = least_gap(prototype.parts, places, 2.0 * CLEARANCE / unit)
+    assert gap * unit > 0.99 * CLEARANCE, (one, two)
+    assert gap * unit < 1.1 * CLEARANCE
+
+
+def motion(prototype: Prototype, many: int) -> Iterator[tuple[FloatArray, FloatArray]]:
+    """Yield poses along a closed way about home, as wide as actuators and joints take it."""
+    position, rotation = pose_of(prototype)
+    reach = prototype.design.reach
+
+    def pose(phase: float, width: float) -> tuple[FloatArray, FloatArray]:
+        shift = np.sin(phase * np.array([1.0, 2.0, 3.0]) + [0.0, 0.4, 0.8])
+        # Yaw goes the way in which the carriages part.
+        angles = np.sin(phase * np.array([2.0, 3.0, 1.0]) + [0.1, 0.2, 0.3]) * [0.2, 0.4, 0.4]
+        turn = Rotation.from_euler("ZYX", width * angles).as_matrix()
+        return position + width * 0.5 * reach * shift, rotation @ turn
+
+    for phase in np.linspace(0.0, 2.0 * math.pi, many, endpoint=False).tolist():
+        width = 1.0
+        while prototype.hindrances(*pose(phase, width)) or not clear(
+            prototype, *pose(phase, width)
+        ):
+            width *= 0.85
+        assert width > 0.01
+        yield pose(phase, width)
+
+
+def clear(prototype: Prototype, position: FloatArray, rotation: FloatArray) -> bool:
+    """Return whether the legs as capsules, as thick as cups and forks, keep apart."""
+    unit = prototype.design.unit_mm
+    wide = tuple(own.cup / unit for own in prototype.sizes.legs)
+    wide = (wide[0], prototype.sizes.radii[1] / unit, prototype.sizes.radii[2] / unit, wide[3])
+    design = limited(prototype.design, leg_radii=wide)
+    return bool((leg_clearances(design, position, rotation).clearance > 0.0).all())
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_parts_stay_clear_along_a_motion(name: str) -> None:
+    prototype = PROTOTYPES[name]
+    far = 0.0
+    for position, rotation in motion(prototype, 12):
+        assert pose_overlaps(prototype, position, rotation) == []
+        far = max(far, float(np.linalg.norm(position - pose_of(prototype)[0])))
+    assert far > 0.03 * prototype.design.reach
+
+
+@pytest.mark.parametrize("name", [OPTIMAL.name, BELOW.name, LARGE.name])
+def test_universal_joints_swing_as_far_as_they_say(name: str) -> None:
+    prototype = PROTOTYPES[name]
+    chains, (position, rotation) = prototype.chains, pose_of(prototype)
+    home = chains.joints(position, rotation)
+    for leg in (1, 4):
+        own = [
+            part
+            for part in prototype.parts
+            if part.name in ("base", f"cross {leg}", f"cylinder {leg}")
+        ]
+        for first in np.linspace(-FIRST_SWING, FIRST_SWING, 5):
+            for second in np.linspace(-SECOND_SWING, SECOND_SWING, 5):
+                joints = home.copy()
+                joints[3 * leg - 3 : 3 * leg - 1] = first, second
+                places = chains.places(joints, position, rotation)
+                assert list(overlaps(own, places)) == [], (leg, first, second)
+
+
+@pytest.mark.parametrize("name", [OPTIMAL.name, UPSIDE_DOWN.name, LARGE.name])
+def test_ball_joints_swing_to_nearly_a_right_angle(name: str) -> None:
+    prototype = PROTOTYPES[name]
+    places = at_home(prototype)
+    for leg in LEGS:
+        own = [
+            part
+            for part in prototype.parts
+            if part.name in ("platform", f"ball {leg}", f"rod {leg}")
+        ]
+        index = BODIES.index(f"rod {leg}")
+        normal = -prototype.chains.platform_side * places.rotation[-1][:, 2]
+        for azimuth in np.linspace(0.0, 2.0 * math.pi, 6):
+            tangent = places.rotation[-1] @ [math.cos(azimuth), math.sin(azimuth), 0.0]
+            for lean, fits in ((math.radians(85.0), True), (math.radians(130.0), False)):
+                along = math.cos(lean) * normal + math.sin(lean) * tangent
+                turn = places.rotation.copy()
+                turn[index] = Rotation.align_vectors([along], [[0.0, 0.0, 1.0]])[0].as_matrix()
+                found = list(overlaps(own, Places(places.origin, turn)))
+                assert (found == []) is fits
+
+
+@pytest.mark.parametrize("name", [OPTIMAL.name, LARGE.name])
+def test_rods_stay_within_their_cylinders_over_the_whole_stroke(name: str) -> None:
+    prototype = PROTOTYPES[name]
+    chains, (position, rotation) = prototype.chains, pose_of(prototype)
+    unit = prototype.design.unit_mm
+    for leg, (low, high) in zip(LEGS, prototype.sizes.strokes, strict=True):
+        cylinder, rod = (
+            next(part for part in prototype.parts if part.name == f"{kind} {leg}")
+            for kind in ("cylinder", "rod")
+        )
+        radius = prototype.sizes.radii[leg - 1]
+
+        def placed(length: float, leg: int = leg) -> Places:
+            joints = chains.joints(position, rotation)
+            joints[3 * leg - 1] = length / unit
+            return chains.places(joints, position, rotation)
+
+        for length in (low, 0.5 * (low + high), high):
+            assert list(overlaps([cylinder, rod], placed(length))) == []
+            # What of the rod is still in the bore guides it.
+            top, foot = cylinder.vertices[:, 2].max(), length / unit + rod.vertices[:, 2].min()
+            assert (top - foot) * unit > 2.9 * radius
+        shorter = list(overlaps([cylinder, rod], placed(low - 2.0 * CLEARANCE)))
+        assert len(shorter) == 1
+
+
+@given(
+    radius=st.floats(1.2, 100.0),
+    floor=st.floats(0.5, 8.0),
+    home=st.floats(1.1, 50.0),
+    ends=st.tuples(st.floats(0.0, 1.0), st.floats(1.0, 5.0)),
+)
+def test_strokes_hold_home_and_what_one_rod_can_do(
+    radius: float, floor: float, home: float, ends: tuple[float, float]
+) -> None:
+    own = LegSizes(radius, floor * radius)
+    at_home = home * own.dead
+    asked = Stroke(ends[0] * at_home, ends[1] * at_home)
+    found = own.stroke(asked, at_home)
+    slack = 1e-9 * at_home
+    assert asked.shortest - slack <= found.shortest <= at_home + slack
+    assert at_home - slack <= found.longest <= asked.longest + slack
+    assert found.longest <= 2.0 * found.shortest - own.dead + slack
+    if asked.longest <= 2.0 * asked.shortest - own.dead:
+        assert found == pytest.approx(asked, rel=1e-9)
+
+
+def test_a_stroke_that_one_rod_can_do_is_the_one_asked_for() -> None:
+    sizes = PROTOTYPES[LARGE.name].sizes
+    assert sizes.strokes[0] == pytest.approx((7.5 * 40.0, 12.0 * 40.0))
+    assert sizes.strokes[3] == pytest.approx((9.0 * 40.0, 16.0 * 40.0))
+
+
+def test_carriages_that_come_too_close_do_overlap_and_are_told() -> None:
+    prototype = PROTOTYPES[OPTIMAL.name]
+    position, rotation = pose_of(prototype)
+    # At a yaw of −90° both legs are at the same place of the guide.
+    turn = Rotation.from_euler("Z", -15.0, degrees=True).as_matrix() @ rotation
+    assert "carriages 2 and 3 are" in " ".join(prototype.hindrances(position, turn))
+    pairs = {frozenset(pair[:2]) for pair in pose_overlaps(prototype, position, turn)}
+    assert frozenset(("carriage 2", "carriage 3")) in pairs
+
+
+@pytest.mark.parametrize(
+    ("shift", "words"),
+    [
+        ((0.0, 0.0, 8.0), "mm long, its stroke is"),
+        ((-9.5, 0.0, 0.0), "its rail is"),
+        ((-8.0, 12.0, -7.0), "the universal joint at a3 leans"),
+        ((9.0, 9.0, -8.5), "the ball joint at b4 leans"),
+        ((0.0, 0.0, -12.0), "about the guide"),
+    ],
+)
+def test_what_hinders_a_pose_is_told(shift: tuple[float, float, float], words: str) -> None:
+    prototype = PROTOTYPES[OPTIMAL.name]
+    position, rotation = pose_of(prototype)
+    assert words in " ".join(prototype.hindrances(position + np.array(shift), rotation))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_places_are_those_of_the_legs(name: str) -> None:
+    prototype = PROTOTYPES[name]
+    design = prototype.design
+    rng = np.random.default_rng(4)
+    positions = rng.uniform(-1.0, 1.0, (50, 3)) * design.reach
+    rotations = Rotation.random(50, random_state=rng).as_matrix()
+    places = prototype.places(positions, rotations)
+    assert places.origin.shape == (50, len(prototype.parts), 3)
+    turns = places.rotation
+    np.testing.assert_allclose(
+        turns @ np.swapaxes(turns, -1, -2), np.broadcast_to(np.eye(3), turns.shape), atol=1e-12
+    )
+    np.testing.assert_allclose(np.linalg.det(turns), 1.0, rtol=1e-12)
+    by_name = {part.name: k for k, part in enumerate(prototype.parts)}
+    points = np.array([[*design.b1, 0], [design.b2, 0, 0], [design.b3, 0, 0], [0, 0, 0]])
+    for leg, point in zip(LEGS, points, strict=True):
+        rod, cylinder = by_name[f"rod {leg}"], by_name[f"cylinder {leg}"]
+        end = positions + rotations @ point
+        np.testing.assert_allclose(places.origin[:, rod], end, atol=1e-12 * design.reach)
+        along = places.origin[:, rod] - places.origin[:, cylinder]
+        across = np.cross(along, turns[:, cylinder, :, 2])
+        np.testing.assert_allclose(across, 0.0, atol=1e-12 * design.reach)
+        if leg in ON_GUIDE:
+            np.testing.assert_allclose(along[:, 0], 0.0, atol=1e-12 * design.reach)
+
+
+def least_named(message: str, words: str) -> float:
+    return float(message.partition(words)[2].split()[0].rstrip(";,"))
+
+
+TIGHT = (
+    (limited(OPTIMAL, leg_radii=(0.4,) * 4), "carriages 2 and 3 at home are 6.69 mm apart"),
+    (limited(OPTIMAL, leg_radii=(0.05,) * 4), "the radius of leg 1 is 0.5 mm"),
+    (msgspec.structs.replace(OPTIMAL, unit_mm=2.0), "too thin: the radius of leg 1"),
+    (
+        msgspec.structs.replace(
+            limited(UNBOXED, leg_radii=(0.15,) * 4), b1=(0.2, -0.25), b2=1.0, b3=4.9
+        ),
+        "the ball joints at b1 and b4 are 3.2 mm apart",
+    ),
+    (
+        limited(turned(OPTIMAL, np.eye(3), np.eye(3), "low"), leg_radii=(0.2, 0.2, 0.2, 3.0)),
+        "too tight",
+    ),
+)
+
+
+@pytest.mark.parametrize(("design", "words"), TIGHT)
+def test_what_is_too_tight_is_named_with_what_would_fit(design: Design, words: str) -> None:
+    with pytest.raises(InputError) as refusal:
+        make_prototype(design)
+    message = str(refusal.value)
+    assert words in message
+    assert "\n" not in message
+    unit, offers = "unit of at least ", ("radius at most ", "radius at least ")
+    offered = [phrase for phrase in (unit, *offers) if phrase in message]
+    assert offered or "no unit makes that fit" in message
+    for phrase in offered:
+        value = least_named(message, phrase)
+        if phrase != unit:
+            make_prototype(scaled_radii(design, value))
+            continue
+        make_prototype(msgspec.structs.replace(design, unit_mm=value))
+        with pytest.raises(InputError):
+            make_prototype(msgspec.structs.replace(design, unit_mm=0.98 * value))
+
+
+def scaled_radii(design: Design, largest: float) -> Design:
+    factor = largest / max(design.limits.leg_radii)
+    return limited(design, leg_radii=tuple(factor * r for r in design.limits.leg_radii))
+
+
+def test_homes_that_legs_cannot_have_are_refused() -> None:
+    with pytest.raises(InputError, match=r"leg 1 is 117\.4 mm long at home, but its limits"):
+        make_prototype(limited(OPTIMAL, l1=(0.0, 11.0)))
+    leaning = msgspec.structs.replace(
+        OPTIMAL, home=Pose((12.0, 5.0, 4.0), home_pose(OPTIMAL).quaternion)
+    )
+    with pytest.raises(
+        InputError, match=r"at home the universal joint at a\d leans .* choose another"
+    ):
+        make_prototype(leaning)
+    parallel = msgspec.structs.replace(OPTIMAL, home=Pose.of_yaw_pitch_roll((10, 5, 9), (90, 0, 0)))
+    with pytest.raises(InputError, match="no unit makes that fit"):
+        make_prototype(parallel)
+
+
+@pytest.mark.parametrize("name", [OPTIMAL.name, LARGE.name])
+def test_the_bill_has_every_part_and_every_actuator(name: str) -> None:
+    prototype = PROTOTYPES[name]
+    bill = bill_of_materials(prototype, 2700.0)
+    assert [item.name for item in bill.items] == [part.name for part in prototype.parts]
+    for item in bill.items:
+        # Grams of aluminium, 2.7 to the cubic centimetre.
+        assert item.mass * 1e3 == pytest.approx(2.7e-3 * item.volume, rel=1e-9)
+        assert 0.0 < item.volume < math.prod(item.size)
+    assert bill.mass == pytest.approx(sum(item.mass for item in bill.items), rel=1e-12)
+    by_name = {item.name: item for item in bill.items}
+    for actuator in bill.actuators:
+        low, high = actuator.stroke
+        cylinder, rod = (by_name[f"{kind} {actuator.leg}"] for kind in ("cylinder", "rod"))
+        assert actuator.mass == pytest.approx(cylinder.mass + rod.mass, rel=1e-12)
+        # Together they span the longest length, and neither exceeds the shortest.
+        assert rod.size[2] < low < high < cylinder.size[2] + rod.size[2]
+        assert actuator.asked.shortest <= low
+        assert high <= actuator.asked.longest
+        assert actuator.diameter == pytest.approx(2.0 * prototype.sizes.radii[actuator.leg - 1])

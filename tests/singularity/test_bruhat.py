@@ -1,0 +1,86 @@
+"""The order of the strata, by other definitions of it, and what they are in words."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+from incidence import permutation_of_flags
+from test_strata import REPRESENTATIVES, is_below as is_below_by_tableaux
+
+from explorer import margins
+from explorer.singularity.bruhat import (
+    COVERED,
+    COVERING,
+    OF_INCIDENCES,
+    WORDS,
+    Stratum,
+    codimension,
+    conditions,
+    incidences,
+    is_below,
+    words,
+)
+from explorer.singularity.strata import GENERIC, STRATA, inversions
+
+
+def swaps(w: Stratum) -> set[Stratum]:
+    """Return what a swap of two entries makes of a permutation with one inversion less."""
+    found: set[Stratum] = set()
+    for i, j in itertools.combinations(range(4), 2):
+        entries = list(w)
+        entries[i], entries[j] = entries[j], entries[i]
+        if inversions(tuple(entries)) == inversions(w) - 1:
+            found.add(tuple(entries))
+    return found
+
+
+def test_the_order_is_that_of_the_tableau_criterion() -> None:
+    for lower, upper in itertools.product(STRATA, STRATA):
+        assert is_below(lower, upper) == is_below_by_tableaux(lower, upper)
+
+
+def test_the_edges_are_the_swaps_that_lower_the_dimension_by_one() -> None:
+    assert {w: set(COVERED[w]) for w in STRATA} == {w: swaps(w) for w in STRATA}
+    assert sum(map(len, COVERED.values())) == 58
+    for lower, upper in itertools.product(STRATA, STRATA):
+        assert (lower in COVERED[upper]) == (upper in COVERING[lower])
+
+
+def test_the_order_is_what_the_edges_lead_to() -> None:
+    def reached(w: Stratum) -> set[Stratum]:
+        return {w}.union(*(reached(each) for each in COVERED[w]))
+
+    for upper in STRATA:
+        assert reached(upper) == {lower for lower in STRATA if is_below(lower, upper)}
+
+
+def test_codimensions_count_from_the_generic_stratum() -> None:
+    assert codimension(GENERIC) == 0
+    assert COVERED[GENERIC] == tuple(sorted(OF_INCIDENCES))
+    assert max(map(codimension, STRATA)) == codimension((1, 2, 3, 4)) == 6
+
+
+@pytest.mark.parametrize("w", STRATA)
+def test_the_essential_conditions_hold_in_the_closure_and_nowhere_else(w: Stratum) -> None:
+    def holds(stratum: Stratum) -> bool:
+        ranks = [[sum(v <= j for v in stratum[:i]) for j in range(5)] for i in range(5)]
+        return all(ranks[i][j] >= least for i, j, least in conditions(w))
+
+    assert {v for v in STRATA if holds(v)} == {v for v in STRATA if is_below(v, w)}
+    assert all(each in WORDS for each in conditions(w))
+
+
+def test_every_stratum_has_words_of_its_own() -> None:
+    assert words(GENERIC) == "generic"
+    assert len({words(w) for w in STRATA}) == 24
+    assert words((3, 4, 1, 2)) == "a1 on the platform plane, b4 on the base plane"
+
+
+@pytest.mark.parametrize("w", STRATA)
+def test_the_incidences_are_the_margins_that_vanish(w: Stratum) -> None:
+    position, rotation = REPRESENTATIVES[w]
+    assert permutation_of_flags(position, rotation) == w
+    zero = np.flatnonzero(np.abs(margins(position, rotation)) < 1e-12) + 1
+    assert incidences(w) == tuple(zero.tolist())

@@ -1,0 +1,622 @@
+"""Studies: read strictly, sampled as a function of the index, measured as the explorer measures."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+from hypothesis import given, settings, strategies as st
+from hypothesis.extra.numpy import arrays
+from limited_designs import ordinary_case, troubled_case
+
+from explorer import (
+    PRESETS,
+    InputError,
+    Limits,
+    home_pose,
+    inverse,
+    leg_clearances,
+    margins,
+    reachable_workspace,
+    workspace_nodes,
+    workspace_volume,
+)
+from explorer.files.json_text import LONGEST_LINE
+from explorer.mechanism.design import VARIABLES
+from explorer.mechanism.pose import Pose
+from explorer.singularity.jacobian import inverse_condition, jacobian
+from explorer.sweep.front import front, undominated
+from explorer.sweep.labels import unit_of, words_of
+from explorer.sweep.measures import MEASURES, Case, measured
+from explorer.sweep.rows import (
+    check_study,
+    columns_of,
+    design_of,
+    evaluate,
+    found_values,
+    lost,
+    problem_of,
+)
+from explorer.sweep.sampling import ROUNDS, permuted, samples
+from explorer.sweep.study import (
+    NAMES,
+    STUDIES,
+    Method,
+    Objective,
+    Polish,
+    Sampling,
+    Study,
+    decode_study,
+    encode_study,
+    load_study,
+    study_hash,
+)
+from explorer.workspace.limits.broken import violations
+from explorer.workspace.limits.constraints import home_signs
+from explorer.workspace.node_measures import node_measures
+
+OPTIMAL = PRESETS["paper-optimal"]
+PLAIN: dict[str, Any] = {
+    "schema": 1,
+    "design": "paper-optimal",
+    "variables": {"a3y": [4, 8], "yaw": [-80, -60], "radius": [0, 0.3]},
+    "sampling": {"method": "sobol", "count": 40, "seed": 2},
+    "measures": ["volume", "reach", "clearance"],
+}
+
+
+def decoded(**changes: Any) -> Study:
+    return decode_study(json.dumps({**PLAIN, **changes}).encode(), "study.json")
+
+
+def sampled(method: Method, count: Any, seed: int = 0, **changes: Any) -> Study:
+    return decoded(sampling={"method": method, "count": count, "seed": seed}, **changes)
+
+
+def test_a_study_survives_its_file() -> None:
+    study = decoded(polish={"objective": "largest-volume"}, clearance_margin=0.5)
+    again = decode_study(encode_study(study), "again")
+    assert again == study
+    assert study_hash(again) == study_hash(study)
+    assert study.base.home == home_pose(OPTIMAL)
+    assert study.varied == ("a3y", "yaw", "radius")
+
+
+def test_every_change_makes_another_study() -> None:
+    changes: list[dict[str, Any]] = [
+        {},
+        {"design": "paper-initial"},
+        {"variables": {"a3y": [4, 8.5], "yaw": [-80, -60], "radius": [0, 0.3]}},
+        {"sampling": {"method": "sobol", "count": 40, "seed": 3}},
+        {"measures": ["volume", "clearance", "reach"]},
+        {"nodes": 21},
+        {"chunk": 65},
+    ]
+    assert len({study_hash(decoded(**each)) for each in changes}) == len(changes)
+
+
+def test_the_studies_that_come_along_can_be_run() -> None:
+    for name, study in STUDIES.items():
+        assert load_study(name) is study
+        check_study(study)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"variables": {"a4": [1, 2]}}, "no variable 'a4'; there are a3x"),
+        ({"variables": {}}, "must name at least one of"),
+        ({"variables": {"a3y": [4, 4]}}, "the range of a3y is empty: 4 to 4"),
+        ({"variables": {"a3y": [8, 4]}}, "the range of a3y is empty"),
+        ({"variables": {"a3y": [4]}}, "variables"),
+        ({"variables": {"a3y": [4, 1e99]}}, "must not exceed 1e+40"),
+        ({"variables": {"radius": [-1, 1]}}, "must not be negative"),
+        ({"variables": {"reach": [0, 1]}}, "above every minimum length"),
+        ({"sampling": {"method": "sobol", "count": 0}}, "sampling.count must lie within 1 to"),
+        ({"sampling": {"method": "sobol", "count": 2**31}}, "sampling.count must lie within"),
+        ({"sampling": {"method": "sobol", "count": 8, "seed": -1}}, "sampling.seed"),
+        ({"sampling": {"method": "sobol", "count": {"a3y": 2}}}, "only a grid takes one for each"),
+        ({"sampling": {"method": "grid", "count": {"a3y": 2}}}, "must name the variables"),
+        ({"sampling": {"method": "grid", "count": 10_000_000}}, "the grid has 1e+21 designs"),
+        ({"sampling": {"method": "random", "count": 8}}, "Invalid enum value 'random'"),
+        ({"measures": ["mass"]}, "no measure 'mass'; there are volume"),
+        ({"measures": []}, "measure something"),
+        ({"measures": ["volume", "volume"]}, "may name each once"),
+        ({"objectives": [{"measure": "mass", "sense": "min"}]}, "neither measured nor a variable"),
+        ({"objectives": [{"measure": "volume", "sense": "best"}]}, "Invalid enum value 'best'"),
+        ({"variables": {"reach": [9, 12]}, "measures": ["reach"]}, "leave it out of the measures"),
+        ({"polish": {"objective": "cheapest"}}, "Invalid enum value"),
+        (
+            {"polish": {"objective": "largest-volume", "variables": {"radius": [0, 1]}}},
+            "no variable 'radius'",
+        ),
+        ({"nodes": 1}, "nodes must lie within 2"),
+        ({"chunk": 0}, "chunk must lie within 1"),
+        ({"clearance_margin": -1}, "clearance_margin must be positive"),
+        ({"design": "paper"}, "no preset 'paper'"),
+        ({"name": "two\nlines"}, "one printable line"),
+        ({"schema": 2}, "schema"),
+        ({"colour": "red"}, "unknown field `colour`"),
+    ],
+)
+def test_a_study_that_cannot_be_meant_is_one_line(changes: dict[str, Any], words: str) -> None:
+    with pytest.raises(InputError) as caught:
+        decoded(**changes)
+    message = str(caught.value)
+    assert words in message
+    assert message.startswith("study.json: ")
+    assert "\n" not in message
+
+
+@pytest.mark.parametrize(
+    "data", [b"", b"[]", b'{"a": NaN}', b"\xff", b"[" * 100_000, b"{}", b" " * 2_000_000]
+)
+def test_what_is_no_study_is_one_line(data: bytes) -> None:
+    with pytest.raises(InputError, match=r"^study: [^\n]+$"):
+        decode_study(data, "study")
+
+
+@pytest.mark.parametrize(
+    ("inserted", "words"),
+    [
+        ('"name": "again",', "the field 'name' is given twice"),
+        ('"\\u001b]0;owned\\u0007": 1,', "unknown field"),
+        (f'"{900_000 * "a"}": 1,', "unknown field"),
+        (f'"chunk": {5000 * "9"},', "chunk"),
+    ],
+)
+def test_what_a_refusal_quotes_can_be_shown(inserted: str, words: str) -> None:
+    data = b"{" + inserted.encode() + encode_study(STUDIES["trade-off"]).lstrip()[1:]
+    with pytest.raises(InputError) as caught:
+        decode_study(data, "study.json")
+    message = str(caught.value)
+    assert words in message
+    assert message.isprintable()
+    assert len(message) <= LONGEST_LINE + 1
+
+
+def test_a_study_none_of_whose_designs_can_be_made_is_told_at_once() -> None:
+    demands = {"volume": 7000, "clearance": 0.1}
+    study = decoded(polish={"objective": "match-volume", "demands": demands})
+    with pytest.raises(InputError, match=r"none of the designs all over.*clearance margin"):
+        check_study(study)
+    study = decoded(variables={"a3y": [4, 8]}, sampling={"method": "sobol", "count": 2**30})
+    study = msgspec.structs.replace(study, polish=Polish(objective="match-volume"))
+    with pytest.raises(InputError, match=r"none of 256 designs all over.*needs a volume"):
+        check_study(study)
+
+
+@pytest.mark.parametrize("method", ["grid", "sobol", "latin-hypercube"])
+@pytest.mark.parametrize("order", [1, -1])
+@pytest.mark.parametrize("many", [2, 3, 8, 16])
+def test_a_study_some_of_whose_designs_can_be_made_is_none_to_refuse(
+    method: Method, order: int, many: int
+) -> None:
+    # Only near its upper end is a3y not below the least allowed.
+    variables = [("a3y", [0.01, 1.0]), ("a3x", [12, 20])][::order]
+    study = sampled(
+        method,
+        {"a3y": many, "a3x": 256} if method == "grid" else 256 * many,
+        variables=dict(variables),
+        measures=["volume"],
+        polish={"objective": "largest-volume", "demands": {"least": 1.0 - 0.5 / many}},
+    )
+    check_study(study)
+
+
+@pytest.mark.parametrize("method", ["sobol", "latin-hypercube", "grid"])
+@settings(max_examples=25)
+@given(seed=st.integers(0, 2**31 - 1), size=st.integers(5, 40), count=st.integers(1, 200))
+def test_a_sample_depends_on_the_study_and_its_index_alone(
+    method: Method, seed: int, size: int, count: int
+) -> None:
+    shape = {"a3y": 7, "yaw": 1, "radius": 5} if method == "grid" else count
+    study = sampled(method, shape, seed, chunk=size)
+    whole = samples(study, range(study.count))
+    parts = [samples(study, study.rows_of(chunk)) for chunk in range(study.chunks)]
+    assert np.array_equal(np.vstack(parts), whole)
+    ends = np.array(list(study.variables.values()))
+    assert (whole >= ends[:, 0]).all()
+    assert (whole <= ends[:, 1]).all()
+
+
+@given(count=st.integers(1, 2000), seed=st.integers(0, 2**31 - 1))
+def test_a_latin_hypercube_has_one_design_in_every_slice_of_every_variable(
+    count: int, seed: int
+) -> None:
+    study = sampled("latin-hypercube", count, seed)
+    ends = np.array(list(study.variables.values()))
+    shares = (samples(study, range(count)) - ends[:, 0]) / (ends[:, 1] - ends[:, 0])
+    slices = np.sort(np.minimum(np.floor(shares * count + 1e-9), count - 1.0), axis=0)
+    assert np.abs(slices - np.arange(count)[:, None]).max() <= 1.0
+    # One slice may seem to be its neighbour by rounding, but not many.
+    assert (slices == np.arange(count)[:, None]).mean() > 0.99
+
+
+@given(st.integers(1, 5000), st.lists(st.integers(0, 2**64 - 1), min_size=ROUNDS, max_size=ROUNDS))
+def test_the_permutation_is_one(count: int, keys: list[int]) -> None:
+    found = permuted(np.arange(count, dtype=np.uint64), count, np.array(keys, dtype=np.uint64))
+    assert np.array_equal(np.sort(found), np.arange(count))
+
+
+def test_variables_of_a_latin_hypercube_are_independent() -> None:
+    study = sampled("latin-hypercube", 4000, 5)
+    found = np.corrcoef(samples(study, range(4000)).T) - np.eye(3)
+    # Five standard deviations.
+    assert np.abs(found).max() < 5.0 / math.sqrt(4000.0)
+
+
+def test_sobol_samples_are_those_of_scipy() -> None:
+    from scipy.stats import qmc
+
+    study = sampled("sobol", 64, 9)
+    ends = np.array(list(study.variables.values()))
+    expected = qmc.scale(qmc.Sobol(3, rng=9).random(64), ends[:, 0], ends[:, 1])
+    assert samples(study, range(64)) == pytest.approx(expected, rel=1e-15)
+
+
+def test_a_grid_has_every_combination_once_ends_included() -> None:
+    study = sampled("grid", {"radius": 3, "a3y": 5, "yaw": 1})
+    found = samples(study, range(study.count))
+    assert study.count == 15
+    expected = {
+        (a3y, -70.0, radius) for a3y in (4.0, 5.0, 6.0, 7.0, 8.0) for radius in (0.0, 0.15, 0.3)
+    }
+    assert {tuple(row) for row in found.tolist()} == expected
+
+
+def test_memory_of_late_chunks_is_that_of_early_ones() -> None:
+    for method in ("sobol", "latin-hypercube"):
+        study = sampled(method, 2**26 - 1)
+        assert samples(study, study.rows_of(study.chunks - 1)).shape == (63, 3)
+
+
+def test_variables_make_the_design_that_they_name() -> None:
+    values = {"a3x": 17.0, "b2": 2.0, "yaw": -65.0, "reach": 15.0, "radius": 0.2}
+    study = decoded(
+        variables={
+            name: [value - 1, value + 1] for name, value in values.items() if name != "radius"
+        }
+        | {"radius": [0, 1]},
+        measures=["volume"],
+    )
+    design = design_of(study, values, "it")
+    assert design.name == "it"
+    assert dict(zip(VARIABLES, design.variables, strict=True)) == {
+        **dict(zip(VARIABLES, OPTIMAL.variables, strict=True)),
+        "a3x": 17.0,
+        "b2": 2.0,
+    }
+    home = home_pose(design)
+    assert home.position == home_pose(OPTIMAL).position
+    assert math.degrees(math.atan2(home.rotation[1, 0], home.rotation[0, 0])) == pytest.approx(-65)
+    assert design.limits.leg_radii == (0.2,) * 4
+    assert all(design.length_range(name)[1] == 15.0 for name in ("l1", "d2", "d4", "l4"))
+
+
+def nodes_of(design: Any, rotation: Any, count: int) -> Any:
+    """Return the middles of the cells of a box that is measured by sampling, not asked for."""
+    from explorer.workspace.limits.constraints import constraints
+    from explorer.workspace.limits.region import region_of
+    from explorer.workspace.slices.volume import bounds
+
+    lows, highs = bounds(region_of(constraints(design, rotation)))
+    axes = [
+        low + (high - low) * (np.arange(count) + 0.5) / count
+        for low, high in zip(lows, highs, strict=True)
+    ]
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_what_the_nodes_tell_is_what_each_position_tells(seed: int) -> None:
+    design, rotation = ordinary_case(seed)
+    design = msgspec.structs.replace(
+        design, limits=msgspec.structs.replace(design.limits, leg_radii=(0.3, 0.2, 0.1, 0.4))
+    )
+    margin = 0.5
+    found = node_measures(design, rotation, nodes=9, clearance_margin=margin)
+    signs = home_signs(design)
+    kept = np.array(
+        [
+            p
+            for p in nodes_of(design, rotation, 9)
+            if not violations(
+                design, p, rotation, inverse(design, p, rotation), margins(p, rotation), signs
+            )
+        ]
+    )
+    assert len(kept)
+    assert found.positions == pytest.approx(kept, rel=1e-12)
+    kappa = np.abs(margins(kept, rotation))
+    clear = leg_clearances(design, kept, rotation).clearance
+    assert found.extent == pytest.approx(np.ptp(kept, axis=0), abs=1e-12)
+    assert found.margins == pytest.approx(kappa.min(axis=0), rel=1e-12)
+    assert found.mean_margin == pytest.approx(kappa.min(axis=1).mean(), rel=1e-12)
+    assert found.clear_share == (clear > 0.0).all(axis=1).mean()
+    off = (kappa >= margin).all(axis=1)
+    expected = clear[off].min(axis=0) if off.any() else np.full(6, math.inf)
+    assert found.clearances == pytest.approx(expected, rel=1e-9, abs=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_the_nodes_of_any_design_fill_about_its_volume(seed: int) -> None:
+    design, rotation = troubled_case(seed)
+    found = node_measures(design, rotation, nodes=12)
+    volume = workspace_volume(design, rotation, explain=False).volume
+    assert np.isnan(found.extent).all() == (len(found.positions) == 0)
+    if len(found.positions):
+        # A node within is a position within.
+        assert volume > 0.0
+        assert not math.isnan(found.mean_margin)
+
+
+def test_measures_are_those_of_the_explorers_own_functions() -> None:
+    study = decoded(
+        measures=list(MEASURES), variables={"a3y": [5, 8], "b3": [4, 6], "radius": [0, 0.05]}
+    )
+    rows = evaluate(encode_study(study), 3, 4).columns
+    values = {name: rows[name][0] for name in study.variables}
+    design = design_of(study, values)  # pyright: ignore[reportArgumentType]
+    found = {name: rows[name][0] for name in MEASURES}
+    home = home_pose(design)
+    assert rows["status"][0] == "done"
+    assert found["volume"] == workspace_volume(design).volume
+    assert found["reach"] == design.reach
+    nodes = node_measures(design, clearance_margin=0.05 * design.reach)
+    assert found["clearance"] == min(nodes.clearances)
+    assert found["clearance_24"] == nodes.clearances[4]
+    assert found["margin_2"] == nodes.margins[1]
+    assert found["worst_margin"] == min(nodes.margins)
+    assert found["extent_z"] == nodes.extent[2]
+    at_nodes = inverse_condition(jacobian(design, nodes.positions, home.rotation), design.reach)
+    assert found["worst_inverse_condition"] == pytest.approx(at_nodes.min())
+    assert found["mean_inverse_condition"] == pytest.approx(at_nodes.mean())
+    at_home = inverse_condition(jacobian(design, home.position, home.rotation), design.reach)
+    assert found["inverse_condition"] == pytest.approx(float(at_home))
+    assert found["reachable_volume"] == reachable_workspace(design).reachable_volume
+    # The nodes see no less than there is.
+    assert isinstance(found["least_clearance"], float)
+    assert found["least_clearance"] <= min(nodes.clearances) + 1e-3 * design.reach
+
+
+def test_extents_agree_with_the_papers_nodes_to_a_cell() -> None:
+    case = Case(OPTIMAL, nodes=40)
+    paper = workspace_nodes(OPTIMAL, step=0.5).extent
+    assert paper is not None
+    for axis, low, high in zip("xyz", *paper, strict=True):
+        own = measured(case, [f"extent_{axis}"])[f"extent_{axis}"]
+        assert own == pytest.approx(high - low, abs=2.0 * (high - low) / 40.0 + 1.0)
+
+
+def test_an_empty_workspace_is_a_row_that_says_why() -> None:
+    limits = Limits(box=((100.0, 100.0, 100.0), (101.0, 101.0, 101.0)))
+    study = decoded(measures=list(MEASURES))
+    study = msgspec.structs.replace(
+        study, design=msgspec.structs.replace(study.base, limits=limits)
+    )
+    rows = evaluate(encode_study(study), 0, 2).columns
+    assert rows["status"] == ["empty workspace"] * 2
+    assert "box" in str(rows["reason"][0])
+    assert rows["volume"] == [0.0, 0.0]
+    assert rows["reachable_volume"] == [0.0, 0.0]
+    assert isinstance(rows["reach"][0], float)
+    assert rows["clearance"] == rows["mean_margin"] == rows["least_clearance"] == [None, None]
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"clearance_margin": 50}, "no node is so far from the singular planes"),
+        ({"measures": ["least_clearance"], "clearance_margin": 50}, "no position is so far"),
+        ({"measures": ["clearance_24"], "design": "joined"}, "legs 2 and 4 share a joint"),
+        ({"nodes": 2, "design": "slit"}, "none of 2 nodes an axis lies in the workspace"),
+    ],
+)
+def test_a_design_that_is_done_but_not_whole_says_why(changes: dict[str, Any], words: str) -> None:
+    designs = {
+        "slit": msgspec.structs.replace(OPTIMAL, limits=Limits(margin=14.0)),
+        "joined": OPTIMAL.with_variables([*OPTIMAL.variables[:4], 0.0, OPTIMAL.b3]),
+    }
+    base = designs.get(changes.pop("design", ""), OPTIMAL)
+    study = decoded(variables={"a3y": [6.9, 7.1]}, **changes)
+    study = msgspec.structs.replace(study, design=base)
+    rows = evaluate(encode_study(study), 0, 1).columns
+    assert rows["status"] == ["done"]
+    assert words in str(rows["reason"][0])
+    assert any(rows[name] == [None] for name in study.measures)
+
+
+def test_an_invalid_design_is_a_row_that_says_why() -> None:
+    study = sampled("grid", 3, variables={"a3y": [-2, 2]}, measures=["volume"])
+    rows = evaluate(encode_study(study), 0, 3).columns
+    assert rows["status"] == ["done", "invalid design", "done"]
+    assert "degenerate design: a3y = 0" in str(rows["reason"][1])
+    assert rows["a3y"] == [-2.0, 0.0, 2.0]
+    assert rows["volume"][1] is None
+
+
+def test_a_home_that_collides_leaves_the_reachable_volume_out_and_says_why() -> None:
+    study = sampled("grid", 2, variables={"radius": [0, 3]}, measures=["reachable_volume"])
+    rows = evaluate(encode_study(study), 0, 2).columns
+    assert rows["reachable_volume"][1] is None
+    assert rows["reason"][0] == ""
+    assert "legs" in str(rows["reason"][1])
+
+
+def test_designs_whose_workers_died_are_rows_too() -> None:
+    study = decoded(polish={"objective": "largest-volume"})
+    rows = lost(study, range(7, 9), "2 workers died")
+    assert list(rows.columns) == list(columns_of(study))
+    assert rows.columns["index"] == [7, 8]
+    assert rows.columns["status"] == ["worker died"] * 2
+    assert rows.columns["sample_a3y"] == samples(study, range(7, 9))[:, 0].tolist()
+    assert rows.columns["volume"] == [None, None]
+
+
+def test_polished_designs_meet_the_demand_and_keep_the_ranges() -> None:
+    study = sampled(
+        "sobol",
+        6,
+        3,
+        variables={"a3x": [12, 20], "a3y": [3, 9], "b1y": [-6, -2], "radius": [0, 0.1]},
+        measures=["volume"],
+        polish={"objective": "match-volume", "demands": {"volume": 5000}},
+    )
+    rows = evaluate(encode_study(study), 0, 6).columns
+    done = [row for row in range(6) if rows["status"][row] == "done"]
+    assert len(done) >= 3
+    for row in range(6):
+        assert rows["converged"][row] == (rows["status"][row] == "done")
+        assert (rows["reason"][row] == "") == (rows["status"][row] == "done")
+        # The radius is sampled, not searched.
+        assert rows["radius"][row] == rows["sample_radius"][row]
+    for row in done:
+        assert rows["volume"][row] == pytest.approx(5000.0, rel=1e-9)
+        for name, (low, high) in study.variables.items():
+            assert low <= float(rows[name][row] or 0.0) <= high
+    assert any(rows["a3x"][row] != rows["sample_a3x"][row] for row in done)
+
+
+@pytest.mark.parametrize("ends", [(170.0, 190.0), (270.0, 300.0), (-460.0, -400.0), (-85.0, -60.0)])
+@pytest.mark.parametrize("is_sampled", [True, False])
+def test_a_polished_yaw_stays_in_its_range_whatever_turn_that_lies_in(
+    ends: tuple[float, float], is_sampled: bool
+) -> None:
+    middle = (ends[0] + ends[1]) / 2.0
+    home = Pose.of_yaw_pitch_roll(home_pose(OPTIMAL).position, (middle, 0.0, 0.0))
+    study = sampled(
+        "grid",
+        {"b2": 1, "yaw": 5} if is_sampled else 2,
+        variables={"b2": [1, 2], **({"yaw": [*ends]} if is_sampled else {})},
+        measures=["volume"],
+        polish={
+            "objective": "largest-volume",
+            "variables": {"yaw": [*ends], "a3y": [6, 9]},
+            "iterations": 4,
+        },
+    )
+    study = msgspec.structs.replace(study, design=msgspec.structs.replace(study.base, home=home))
+    check_study(study)
+    rows = evaluate(encode_study(study), 0, study.count).columns
+    starts = rows["sample_yaw"] if is_sampled else [middle] * 2
+    for row, start in enumerate(starts):
+        assert rows["status"][row] in {"done", "not converged"}
+        yaw = rows["yaw"][row]
+        assert isinstance(yaw, float)
+        assert ends[0] <= yaw <= ends[1]
+        values = {name: float(rows[name][row] or 0.0) for name in study.varied}
+        assert workspace_volume(design_of(study, values)).volume == rows["volume"][row]
+        # The search has the same room on both sides as the range has.
+        sample = {"b2": 1.5, "yaw": start} if is_sampled else {"b2": 1.5}
+        problem = problem_of(study, sample)  # pyright: ignore[reportArgumentType]
+        at = problem.start_values[0]
+        bounds = problem.variables[0]
+        assert (bounds.low - at, bounds.high - at) == pytest.approx(
+            (ends[0] - float(start or 0.0), ends[1] - float(start or 0.0)), abs=1e-9
+        )
+        assert found_values(study, {"yaw": float(start or 0.0)}, problem, problem.start_values)[
+            "yaw"
+        ] == pytest.approx(start, abs=1e-9)
+
+
+def test_a_polish_that_cannot_get_there_says_so() -> None:
+    study = sampled(
+        "grid",
+        2,
+        variables={"b2": [1, 2]},
+        measures=["volume"],
+        polish={"objective": "match-volume", "demands": {"volume": 1e6}, "iterations": 5},
+    )
+    rows = evaluate(encode_study(study), 0, 2).columns
+    assert rows["status"] == ["not converged"] * 2
+    assert rows["converged"] == [False, False]
+    assert all(rows["reason"])
+    # What the status says the reason does not say again.
+    assert not any("not converged" in str(reason) for reason in rows["reason"])
+    assert all(isinstance(value, float) for value in rows["volume"])
+
+
+def test_what_a_search_may_change_beyond_the_samples_is_a_column() -> None:
+    study = sampled(
+        "grid",
+        2,
+        variables={"b2": [1, 2]},
+        measures=["volume"],
+        polish={
+            "objective": "match-volume",
+            "demands": {"volume": 6500, "stroke_ratio": 8},
+            "variables": {"a3x": [10, 25], "yaw": [-90, -50]},
+        },
+    )
+    rows = evaluate(encode_study(study), 0, 2).columns
+    assert study.varied == ("b2", "a3x", "yaw")
+    assert rows["status"] == ["done", "done"]
+    assert rows["b2"] == rows["sample_b2"] == [1.0, 2.0]
+    values = {name: float(rows[name][0] or 0.0) for name in study.varied}
+    # The row is measured with the minimum lengths that the strokes imply.
+    design = design_of(study, values)
+    assert design.length_range("l1")[0] == pytest.approx(design.reach / 8.0)
+    assert workspace_volume(design).volume == rows["volume"][0]
+
+
+@given(
+    arrays(
+        np.float64,
+        st.tuples(st.integers(0, 40), st.integers(1, 4)),
+        elements=st.integers(0, 4).map(float),
+    )
+)
+def test_the_front_is_what_its_definition_says(cost: Any) -> None:
+    expected = [
+        row
+        for row in range(len(cost))
+        if not any((other <= cost[row]).all() and (other < cost[row]).any() for other in cost)
+    ]
+    assert undominated(cost).tolist() == expected
+
+
+def test_only_rows_that_are_done_and_complete_are_on_the_front() -> None:
+    columns = {
+        "volume": np.array([5.0, 9.0, np.nan, 5.0, 4.0]),
+        "reach": np.array([2.0, 1.0, 0.0, 2.0, 3.0]),
+        "status": np.array(["done", "not converged", "done", "done", "done"], dtype=object),
+    }
+    objectives = (Objective("volume", "max"), Objective("reach", "min"))
+    assert front(columns, objectives).tolist() == [True, False, False, True, False]
+    assert front(columns, (Objective("reach", "max"),)).tolist() == [False] * 4 + [True]
+
+
+def test_every_variable_has_a_column_of_its_own() -> None:
+    assert not {*NAMES} & ({*MEASURES} - {"reach"})
+
+
+def test_studies_can_be_made_in_python() -> None:
+    study = Study(
+        design=OPTIMAL,
+        variables={"b2": (1.0, 2.0)},
+        sampling=Sampling(count=4),
+        polish=Polish(objective="largest-volume"),
+    )
+    assert decode_study(encode_study(study), "it") == study
+    with pytest.raises(InputError, match="no preset"):
+        Study(design="nothing", variables={"b2": (1.0, 2.0)}, sampling=Sampling(count=4))
+
+
+def test_every_column_has_words_and_a_unit() -> None:
+    study = decoded(
+        variables={"a3y": [4, 8], "yaw": [-80, -60], "radius": [0, 1]},
+        polish={"objective": "largest-volume"},
+        measures=list(MEASURES),
+    )
+    words = {name: words_of(name) for name in columns_of(study)}
+    assert len(set(words.values())) == len(words)
+    units = {name: unit_of(name) for name in columns_of(study)}
+    assert units["volume"] == "u³"
+    assert units["sample_yaw"] == units["yaw"] == "°"
+    assert units["a3y"] == units["radius"] == units["clearance_12"] == "u"
+    assert units["status"] == units["iterations"] == units["clear_share"] == ""

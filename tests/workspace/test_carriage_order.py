@@ -1,0 +1,203 @@
+"""The carriages keep the order that they have at home, wherever limits are looked at.
+
+Shares of orientations are compared with those of an independent count over 400,000 random
+orientations; of single poses every part of the explorer has to say the same.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+from limited_designs import limited, ordinary_case
+from scipy.spatial.transform import Rotation
+
+import explorer
+from explorer import (
+    PRESETS,
+    Design,
+    DesignError,
+    Limits,
+    Pose,
+    decode_design,
+    encode_design,
+    evaluate,
+    home_pose,
+    inverse,
+    margins,
+    orientation_capability,
+    poses_are_valid,
+    workspace_nodes,
+    workspace_volume,
+)
+from explorer.mechanism.design import LENGTHS
+from explorer.numerics.compiled import warm
+from explorer.workspace.limits.constraints import CARRIAGE_ORDER, Never, constraints, demanded_order
+from explorer.workspace.orientations import orientations_within, uniform_rotations
+from explorer.workspace.solids.solids import dexterous_solid, reachable_solid, workspace_solid
+
+OPTIMAL = PRESETS["paper-optimal"]
+CASES: list[dict[str, Any]] = json.loads(
+    (Path(__file__).parents[1] / "data" / "orientation.json").read_text(encoding="utf-8")
+)["cases"]
+# The platform turned by half a turn about the base's z-axis has the carriages the other way round.
+MIRRORED = np.diag([-1.0, -1.0, 1.0]) @ home_pose(OPTIMAL).rotation
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _warm_kernels() -> None:  # pyright: ignore[reportUnusedFunction]
+    warm()
+
+
+def case_design(case: dict[str, Any]) -> Design:
+    """Return the design of a case, with a home of the signs and the order that it demands."""
+    lengths: dict[str, Any] = {
+        name: (low, high)
+        for name, low, high in zip(LENGTHS, case["least"], case["most"], strict=True)
+    }
+    x = case["design"]
+    free = Design(a3=tuple(x["a3"]), b1=tuple(x["b1"]), b2=x["b2"], b3=x["b3"])
+    rotations = uniform_rotations(1000)
+    signs = np.sign(margins(case["position"], rotations)) == case["signs"]
+    order = np.sign((free.b3 - free.b2) * rotations[:, 0, 0]) == case["order"]
+    home = Pose.of(case["position"], rotations[signs.all(axis=1) & order][0])
+    return msgspec.structs.replace(free, limits=Limits(**lengths), home=home)
+
+
+@pytest.mark.parametrize("index", range(len(CASES)))
+def test_orientation_shares_are_those_of_an_independent_count(index: int) -> None:
+    case = CASES[index]
+    design, position = case_design(case), case["position"]
+    for name, limits in (
+        ("share_with_signs_and_order", {}),
+        ("share_with_signs", {"carriage_order": "any"}),
+        ("share_of_lengths", {"carriage_order": "any", "margin": None}),
+    ):
+        share = orientation_capability(limited(design, **limits), position)
+        assert share == pytest.approx(case[name], abs=0.004), name
+
+
+def test_orientation_capability_is_a_public_name() -> None:
+    assert explorer.orientation_capability is orientation_capability
+    assert "orientation_capability" in explorer.__all__
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_order_is_broken_exactly_where_d3_less_d1_has_the_other_sign_than_at_home(
+    seed: int,
+) -> None:
+    design, _ = ordinary_case(seed)
+    home = home_pose(design)
+    rotations = Rotation.random(40, random_state=np.random.default_rng(seed)).as_matrix()
+    joints = inverse(design, home.position, rotations)
+    at_home = evaluate(design, home).joints
+    other = (joints[:, 3] - joints[:, 1]) * (at_home[3] - at_home[1]) < 0.0
+    assert 0 < other.sum() < len(other)
+    only = limited(
+        design,
+        **dict.fromkeys(LENGTHS, (0.0, 1e3)),
+        guide=None,
+        box=None,
+        margin=None,
+    )
+    plain = limited(only, carriage_order="any")
+    within = orientations_within(only, home.position, rotations)
+    np.testing.assert_array_equal(within, ~other)
+    assert orientations_within(plain, home.position, rotations).all()
+    clear = poses_are_valid(plain, home.position, rotations)
+    np.testing.assert_array_equal(poses_are_valid(only, home.position, rotations), clear & ~other)
+    for rotation, broken in zip(rotations, other.tolist(), strict=True):
+        pose = Pose.of(home.position, rotation)
+        names = [each.limit for each in evaluate(only, pose).violations]
+        assert names == ([CARRIAGE_ORDER] if broken else [])
+        assert not evaluate(plain, pose).violations
+        never = [each.name for each in constraints(only, rotation) if isinstance(each, Never)]
+        assert never == names
+
+
+def test_workspace_with_the_carriages_the_other_way_round_is_empty() -> None:
+    design = limited(OPTIMAL, margin=None)
+    found = workspace_volume(design, MIRRORED)
+    assert (found.volume, found.empty_because) == (0.0, (CARRIAGE_ORDER,))
+    assert workspace_nodes(design, MIRRORED).count == 0
+    assert workspace_solid(design, MIRRORED).empty_because == (CARRIAGE_ORDER,)
+    plain = limited(design, carriage_order="any")
+    assert workspace_volume(plain, MIRRORED).volume > 1000.0
+    assert workspace_nodes(plain, MIRRORED).count > 100
+
+
+def test_workspaces_over_orientations_keep_the_order() -> None:
+    design = limited(OPTIMAL, margin=None)
+    both = np.stack([home_pose(design).rotation, MIRRORED])
+    alone = workspace_solid(design).volume
+    assert reachable_solid(design, both).volume == pytest.approx(alone, rel=1e-3)
+    assert dexterous_solid(design, both).empty_because == (CARRIAGE_ORDER,)
+    plain = limited(design, carriage_order="any")
+    assert reachable_solid(plain, both).volume > 1.005 * alone
+    assert not dexterous_solid(plain, both).is_empty
+
+
+def test_broken_order_is_told_in_words() -> None:
+    pose = Pose.of(home_pose(OPTIMAL).position, MIRRORED)
+    (broken,) = evaluate(limited(OPTIMAL, margin=None), pose).violations
+    assert str(broken) == ("carriage order: d3 − d1 = −0.6694, but it is positive in the home pose")
+
+
+def yawed(yaw: float) -> Pose:
+    return Pose.of_yaw_pitch_roll(home_pose(OPTIMAL).position, (yaw, 0.0, 0.0))
+
+
+def with_home_at(yaw: float) -> Design:
+    return limited(msgspec.structs.replace(OPTIMAL, home=yawed(yaw)), margin=None)
+
+
+def test_a_home_with_both_carriages_at_one_place_has_no_order_to_keep() -> None:
+    design = with_home_at(-90.0)
+    assert demanded_order(design) == 0
+    for yaw in (-60.0, -90.0, -120.0):
+        assert not evaluate(design, yawed(yaw)).violations
+    assert demanded_order(with_home_at(-89.0)) == 1
+    assert demanded_order(with_home_at(-91.0)) == -1
+
+
+@pytest.mark.parametrize(("beyond", "kept"), [(0.0, True), (1e-12, True), (1e-7, False)])
+def test_carriages_that_meet_keep_their_order_but_for_the_tolerance(
+    beyond: float, kept: bool
+) -> None:
+    design = with_home_at(-73.1)
+    pose = yawed(-90.0 - float(np.degrees(beyond)))
+    assert (not evaluate(design, pose).violations) == kept
+    assert orientations_within(design, pose.position, pose.rotation[None]).all() == kept
+    assert (workspace_volume(design, pose.rotation).volume > 0.0) == kept
+
+
+def test_a_design_file_without_the_order_keeps_it_and_one_that_says_so_does_not() -> None:
+    fields: dict[str, Any] = msgspec.json.decode(encode_design(OPTIMAL))
+    assert fields["limits"].pop("carriage_order") == "home"
+    assert decode_design(msgspec.json.encode(fields), "older") == OPTIMAL
+    fields["limits"]["carriage_order"] = "any"
+    plain = decode_design(msgspec.json.encode(fields), "plain")
+    assert plain == limited(OPTIMAL, carriage_order="any")
+    assert decode_design(encode_design(plain), "again") == plain
+    for wrong in ("other", None, True, 1):
+        fields["limits"]["carriage_order"] = wrong
+        with pytest.raises(DesignError, match="carriage_order"):
+            decode_design(msgspec.json.encode(fields), "wrong")
+    for word in ("other", None, ["home"]):
+        untyped: Any = word
+        with pytest.raises(DesignError, match='carriage_order must be "home" or "any"'):
+            Limits(carriage_order=untyped)
+
+
+def test_the_share_at_the_paper_s_home_is_half_of_the_plain_one() -> None:
+    home = home_pose(OPTIMAL)
+    kept = orientations_within(OPTIMAL, home.position, uniform_rotations(20_000)).mean()
+    plain = orientations_within(
+        limited(OPTIMAL, carriage_order="any"), home.position, uniform_rotations(20_000)
+    ).mean()
+    assert plain == pytest.approx(0.25, abs=0.005)
+    assert kept == pytest.approx(0.125, abs=0.005)

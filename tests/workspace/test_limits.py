@@ -1,0 +1,221 @@
+"""Limits: what is broken is what a plain comparison says, and a pose on a limit is within."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+from hypothesis import given, strategies as st
+from strategies import Case, ordinary_cases
+
+from explorer import JOINTS, PRESETS, Design, Limits, evaluate, home_pose, inverse, margins
+from explorer.mechanism.margins import mode_of, signs_of
+from explorer.mechanism.pose import Pose
+from explorer.numerics.arrays import FloatArray
+from explorer.workspace.limits.broken import Violation, violations
+
+Signs = tuple[int, int, int]
+ALL_POSITIVE: Signs = (1, 1, 1)
+FREE = Limits(
+    l1=(0.0, 1e6),
+    d2=(0.0, 1e6),
+    d4=(0.0, 1e6),
+    l4=(0.0, 1e6),
+    gap=0.0,
+    carriage_order="any",
+    box=None,
+    margin=None,
+)
+
+
+def limited(design: Design, **limits: Any) -> Design:
+    """Return the design with these limits and no others."""
+    return msgspec.structs.replace(design, limits=msgspec.structs.replace(FREE, **limits))
+
+
+def broken(
+    design: Design, position: FloatArray, rotation: FloatArray, signs: Signs = ALL_POSITIVE
+) -> tuple[Violation, ...]:
+    joints = inverse(design, position, rotation)
+    return violations(design, position, rotation, joints, margins(position, rotation), signs)
+
+
+ranges = st.tuples(st.floats(0.0, 20.0), st.floats(0.0, 20.0)).map(
+    lambda ends: (min(ends), max(ends))
+)
+
+
+@given(ordinary_cases(), st.tuples(*[ranges] * 4))
+def test_a_length_is_broken_exactly_outside_its_range(
+    case: Case, bounds: tuple[tuple[float, float], ...]
+) -> None:
+    names = ("l1", "d2", "d4", "l4")
+    design = limited(case.design, **dict(zip(names, bounds, strict=True)))
+    joints = dict(zip(JOINTS, inverse(design, case.position, case.rotation).tolist(), strict=True))
+    found = {v.limit: v for v in broken(design, case.position, case.rotation)}
+    for name, (low, high) in zip(names, bounds, strict=True):
+        outside = joints[name] < low - 1e-9 or joints[name] > high + 1e-9
+        within = low <= joints[name] <= high
+        if outside:
+            assert found[name].value == joints[name]
+            assert found[name].bound == (high if found[name].above else low)
+            assert found[name].above == (joints[name] > high)
+        if within:
+            assert name not in found
+
+
+@given(ordinary_cases())
+def test_a_maximum_of_none_is_the_reach(case: Case) -> None:
+    design = limited(case.design, l1=(0.0, None))
+    reach = math.hypot(*case.design.a3)
+    l1 = float(inverse(design, case.position, case.rotation)[0])
+    found = broken(design, case.position, case.rotation)
+    assert [v.limit for v in found] == (["l1"] if l1 > reach * (1.0 + 1e-12) else [])
+    assert all(v.bound == reach for v in found)
+
+
+@given(ordinary_cases(), st.floats(-20.0, 20.0), st.floats(0.0, 30.0))
+def test_the_guide_bounds_each_carriage(case: Case, low: float, width: float) -> None:
+    design = limited(case.design, guide=(low, low + width))
+    joints = inverse(design, case.position, case.rotation)
+    found = {v.limit for v in broken(design, case.position, case.rotation)}
+    assert found <= {"d1", "d3"}
+    for name, value in (("d1", float(joints[1])), ("d3", float(joints[3]))):
+        if not low - 1e-9 <= value <= low + width + 1e-9:
+            assert name in found
+        elif low <= value <= low + width:
+            assert name not in found
+
+
+@given(ordinary_cases(), st.floats(0.0, 20.0))
+def test_the_gap_is_the_least_distance_of_the_carriages(case: Case, gap: float) -> None:
+    design = limited(case.design, gap=gap)
+    joints = inverse(design, case.position, case.rotation)
+    apart = abs(float(joints[1]) - float(joints[3]))
+    found = broken(design, case.position, case.rotation)
+    if apart < gap - 1e-9:
+        (violation,) = found
+        assert violation.limit.startswith("gap")
+        assert not violation.above
+    elif apart >= gap:
+        assert found == ()
+
+
+@given(ordinary_cases(), st.tuples(*[st.tuples(st.floats(-30, 30), st.floats(-30, 30))] * 3))
+def test_the_box_bounds_each_coordinate(case: Case, sides: tuple[tuple[float, float], ...]) -> None:
+    lows = tuple(min(side) for side in sides)
+    highs = tuple(max(side) for side in sides)
+    design = limited(case.design, box=(lows, highs))
+    found = {v.limit: v for v in broken(design, case.position, case.rotation)}
+    assert set(found) <= {"box x", "box y", "box z"}
+    for axis, value, low, high in zip("xyz", case.position.tolist(), lows, highs, strict=True):
+        if value < low - 1e-9 or value > high + 1e-9:
+            assert found[f"box {axis}"].above == (value > high)
+        elif low <= value <= high:
+            assert f"box {axis}" not in found
+
+
+@given(ordinary_cases(), st.floats(0.0, 10.0), st.integers(0, 7))
+def test_the_margin_demands_the_sign_triple_of_home_and_a_distance(
+    case: Case, least: float, mode: int
+) -> None:
+    design = limited(case.design, margin=least)
+    signs = signs_of(mode)
+    found = broken(design, case.position, case.rotation, signs)
+    by_name = {v.limit: v for v in found}
+    margin = margins(case.position, case.rotation).tolist()
+    for index, (value, sign) in enumerate(zip(margin, signs, strict=True), 1):
+        name = f"margin κ{index}"
+        if sign * value < least - 1e-9:
+            assert by_name[name].value == value
+            assert by_name[name].bound == sign * least
+            assert by_name[name].above == (sign < 0)
+        elif sign * value >= least:
+            assert name not in by_name
+
+
+@given(ordinary_cases())
+def test_a_margin_of_none_demands_nothing(case: Case) -> None:
+    design = limited(case.design, margin=None)
+    for mode in range(8):
+        assert broken(design, case.position, case.rotation, signs_of(mode)) == ()
+
+
+@given(ordinary_cases())
+def test_a_pose_on_every_limit_at_once_is_within(case: Case) -> None:
+    joints = inverse(case.design, case.position, case.rotation)
+    l1, d1, d2, d3, d4, l4 = joints.tolist()
+    position = tuple(case.position.tolist())
+    margin = margins(case.position, case.rotation)
+    signs = signs_of(int(mode_of(margin)))
+    design = limited(
+        case.design,
+        l1=(l1, l1),
+        d2=(d2, d2),
+        d4=(d4, d4),
+        l4=(l4, l4),
+        guide=(min(d1, d3), max(d1, d3)),
+        gap=abs(d1 - d3),
+        box=(position, position),
+        margin=float(np.abs(margin).min()),
+    )
+    assert broken(design, case.position, case.rotation, signs) == ()
+
+
+@pytest.mark.parametrize("beyond", [1e-9, 1.0])
+def test_a_pose_just_beyond_a_limit_is_not_within(beyond: float) -> None:
+    base = PRESETS["paper-initial"]
+    position, rotation = np.array([3.0, 4.0, 5.0]), np.eye(3)
+    l4 = float(inverse(base, position, rotation)[5])
+    (above,) = broken(limited(base, l4=(0.0, l4 - beyond)), position, rotation)
+    (below,) = broken(limited(base, l4=(l4 + beyond, 1e3)), position, rotation)
+    assert (above.limit, above.above) == ("l4", True)
+    assert (below.limit, below.above) == ("l4", False)
+    assert "above its maximum" in str(above)
+    assert "below its minimum" in str(below)
+
+
+def test_violations_come_in_the_order_of_the_design_file() -> None:
+    design = limited(
+        PRESETS["paper-initial"],
+        l1=(0.0, 0.0),
+        d2=(0.0, 0.0),
+        d4=(0.0, 0.0),
+        l4=(0.0, 0.0),
+        guide=(100.0, 101.0),
+        gap=50.0,
+        box=((100.0, 100.0, 100.0), (101.0, 101.0, 101.0)),
+        margin=100.0,
+    )
+    found = broken(design, np.array([3.0, 4.0, 5.0]), np.eye(3), (1, -1, 1))
+    assert [v.limit for v in found] == [
+        "l1",
+        "d2",
+        "d4",
+        "l4",
+        "d1",
+        "d3",
+        "gap |d1 − d3|",
+        "box x",
+        "box y",
+        "box z",
+        "margin κ1",
+        "margin κ2",
+        "margin κ3",
+    ]
+
+
+@pytest.mark.parametrize("name", list(PRESETS))
+def test_the_snapshot_judges_by_the_sign_triple_of_home(name: str) -> None:
+    design = PRESETS[name]
+    home = home_pose(design)
+    assert evaluate(design, home).violations == ()
+    x, y, z = home.position
+    below = Pose((x, y, -z), home.quaternion)
+    found = [v.limit for v in evaluate(design, below).violations]
+    # Mirrored in the base plane only b4 has changed sides, and left the box.
+    assert "box z" in found
+    assert "margin κ3" in found

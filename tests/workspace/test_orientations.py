@@ -1,0 +1,216 @@
+"""Sets of orientations are even and where they should be; capabilities are what poses say."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from limited_designs import limited, ordinary_case
+from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
+
+from explorer import PRESETS, InputError, Pose, evaluate, home_pose
+from explorer.mechanism.design import Swing
+from explorer.mechanism.pose import checked_rotation, yaw_pitch_roll_from_rotation
+from explorer.numerics.arrays import FloatArray
+from explorer.numerics.compiled import warm
+from explorer.workspace.orientations import (
+    cone_of_directions,
+    keep_limits,
+    orientation_capability,
+    orientations_within,
+    uniform_rotations,
+    yaw_pitch_roll_range,
+)
+
+OPTIMAL = PRESETS["paper-optimal"]
+HOME = home_pose(OPTIMAL)
+EVERY_LIMIT: dict[str, Any] = {
+    "gap": 0.5,
+    "guide": (-5.0, 20.0),
+    "margin": 0.3,
+    "l4": (4.0, 19.0),
+    "swing": Swing(a1=70.0, a3=50.0, b1=80.0, b2=100.0, b3=95.0, b4=60.0),
+}
+
+
+@pytest.mark.parametrize("count", [1, 2, 50, 3000])
+def test_uniform_rotations_are_rotations_and_always_the_same(count: int) -> None:
+    found = uniform_rotations(count)
+    assert found.shape == (count, 3, 3)
+    np.testing.assert_array_equal(checked_rotation(found), uniform_rotations(count))
+
+
+def test_uniform_rotations_have_no_preferred_direction() -> None:
+    r = uniform_rotations(20_000)
+    # Of all rotations the mean is zero, and of entries' products only equal ones are left.
+    np.testing.assert_allclose(r.mean(axis=0), 0.0, atol=1e-3)
+    products = np.einsum("nij,nkl->ijkl", r, r) / len(r)
+    expected = np.einsum("ik,jl->ijkl", np.eye(3), np.eye(3)) / 3.0
+    np.testing.assert_allclose(products, expected, atol=2e-3)
+
+
+def test_uniform_rotations_turn_by_angles_as_they_should() -> None:
+    """The share of rotations by at most an angle is (angle - sin angle) / π."""
+    r = uniform_rotations(20_000)
+    angles = np.sort(Rotation.from_matrix(r).magnitude())
+    expected = (angles - np.sin(angles)) / math.pi
+    share = (np.arange(len(r)) + 0.5) / len(r)
+    # Random ones would be off by about 0.006.
+    assert float(np.abs(share - expected).max()) < 2e-3
+
+
+def test_uniform_rotations_leave_no_gaps_and_no_clusters() -> None:
+    count = 4000
+    quaternions = Rotation.from_matrix(uniform_rotations(count)).as_quat()
+    tree: Any = cKDTree(np.concatenate([quaternions, -quaternions]))
+    nearest: FloatArray = tree.query(quaternions, k=2)[0][:, 1]
+    probes = Rotation.random(20_000, random_state=np.random.default_rng(0)).as_quat()
+    farthest = float(tree.query(probes)[0].max())
+    # Side of a cube of the volume that each point of the half sphere in 4D has.
+    spacing = (math.pi**2 / count) ** (1.0 / 3.0)
+    assert float(nearest.min()) > 0.5 * spacing
+    assert farthest < 1.2 * spacing
+
+
+def test_a_range_is_a_grid_with_its_ends() -> None:
+    found = yaw_pitch_roll_range([-80.0, 0.0, -5.0], [-60.0, 10.0, -5.0], [3, 2, 1])
+    angles = yaw_pitch_roll_from_rotation(found)
+    expected = [(yaw, pitch, -5.0) for yaw in (-80.0, -70.0, -60.0) for pitch in (0.0, 10.0)]
+    np.testing.assert_allclose(angles, expected, atol=1e-9)
+
+
+def test_one_value_of_a_range_is_its_middle() -> None:
+    found = yaw_pitch_roll_range([-80.0, 0.0, 0.0], [-60.0, 10.0, 0.0], [1, 1, 1])
+    np.testing.assert_allclose(yaw_pitch_roll_from_rotation(found), [(-70.0, 5.0, 0.0)], atol=1e-9)
+
+
+@pytest.mark.parametrize("half_angle", [0.0, 5.0, 60.0, 180.0])
+def test_tilts_fill_a_cone_evenly_without_a_twist(half_angle: float) -> None:
+    count = 2000
+    found = cone_of_directions(HOME.rotation, half_angle, count)
+    checked_rotation(found)
+    np.testing.assert_allclose(found[0], HOME.rotation, atol=1e-12)
+    turn = Rotation.from_matrix(HOME.rotation.T @ found).as_rotvec()
+    np.testing.assert_allclose(turn[:, 2], 0.0, atol=1e-9)
+    tilts = np.linalg.norm(turn, axis=1)
+    assert float(tilts.max()) == pytest.approx(math.radians(half_angle), abs=1e-9)
+    if half_angle:
+        # Areas of caps grow with 1 - cos.
+        share = (1.0 - np.cos(tilts)) / (1.0 - math.cos(math.radians(half_angle)))
+        np.testing.assert_allclose(share, np.arange(count) / (count - 1.0), atol=1e-9)
+        towards = np.exp(1j * np.arctan2(turn[:, 1], turn[:, 0]))
+        assert abs(complex(towards.mean())) < 2e-3
+
+
+def within_one_by_one(position: FloatArray, rotations: FloatArray, **limits: Any) -> list[bool]:
+    design = limited(OPTIMAL, **limits)
+    return [not evaluate(design, Pose.of(position, r)).violations for r in rotations]
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_capability_is_what_poses_say_one_by_one(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    position = np.array(HOME.position) + rng.normal(scale=2.0, size=3)
+    turns = Rotation.from_rotvec(rng.normal(scale=0.5, size=(300, 3))).as_matrix()
+    rotations = turns @ HOME.rotation
+    for limits in ({}, EVERY_LIMIT, {"margin": None, "box": None}):
+        expected = within_one_by_one(position, rotations, **limits)
+        design = limited(OPTIMAL, **limits)
+        np.testing.assert_array_equal(orientations_within(design, position, rotations), expected)
+        share = orientation_capability(design, position, rotations)
+        assert share == pytest.approx(np.mean(expected), abs=1e-12)
+    assert 0 < sum(within_one_by_one(position, rotations, **EVERY_LIMIT)) < len(rotations)
+
+
+def test_the_swing_of_a_leg_is_its_angle_to_the_home_s_direction() -> None:
+    design = limited(OPTIMAL, swing=Swing(a1=20.0))
+    home = evaluate(OPTIMAL, HOME)
+    turned = Pose.of([14.0, 5.0, 9.0], HOME.rotation)
+    one, other = home.points.b1, evaluate(OPTIMAL, turned).points.b1
+    angle = math.degrees(
+        math.acos(float(one @ other) / float(np.linalg.norm(one) * np.linalg.norm(other)))
+    )
+    assert evaluate(design, HOME).violations == ()
+    for bound in (angle - 0.01, angle + 0.01):
+        found = evaluate(limited(OPTIMAL, swing=Swing(a1=bound)), turned).violations
+        if bound > angle:
+            assert found == ()
+            continue
+        (violation,) = found
+        assert violation.limit == "swing a1"
+        assert violation.value == pytest.approx(angle, rel=1e-9)
+        assert violation.bound == pytest.approx(bound, rel=1e-12)
+        assert violation.above
+        assert "°" in str(violation)
+
+
+@pytest.mark.parametrize("joint", ["b1", "b2", "b3", "b4"])
+def test_the_swing_of_a_ball_joint_turns_with_the_platform(joint: str) -> None:
+    design = limited(OPTIMAL, box=None, swing=Swing(**{joint: 1.0}), margin=None)
+    turn = Rotation.from_rotvec([math.radians(25.0), 0.0, 0.0]).as_matrix()
+    # About the guide the whole mechanism turns, but for l4, which starts off the guide.
+    pose = Pose.of(turn @ HOME.position, turn @ HOME.rotation)
+    broken = {each.limit for each in evaluate(design, pose).violations}
+    assert (f"swing {joint}" in broken) == (joint == "b4")
+
+
+def test_a_margin_of_none_demands_no_mode() -> None:
+    level = np.eye(3)[None]
+    anywhere = limited(OPTIMAL, margin=None)
+    assert orientations_within(anywhere, HOME.position, level).all()
+    # Turned upside down κ1 changes its sign.
+    over = np.diag([1.0, -1.0, -1.0]) @ HOME.rotation
+    assert not orientations_within(OPTIMAL, HOME.position, over[None]).any()
+
+
+def test_a_position_out_of_the_box_has_no_orientation() -> None:
+    assert orientation_capability(OPTIMAL, [30.0, 5.0, 9.0], 100) == 0.0
+
+
+def test_the_share_of_all_orientations_tends_to_a_limit() -> None:
+    shares = [orientation_capability(OPTIMAL, HOME.position, n) for n in (1000, 10_000, 100_000)]
+    assert shares[0] == pytest.approx(shares[2], abs=0.01)
+    assert shares[1] == pytest.approx(shares[2], abs=0.003)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_kernel_says_the_same_interpreted_and_compiled(seed: int) -> None:
+    warm()
+    untyped: Any = keep_limits
+    assert untyped.ready
+    design, rotation = ordinary_case(seed)
+    design = limited(design, swing=Swing(a1=40.0, b3=70.0))
+    turns = Rotation.from_rotvec(np.random.default_rng(seed).normal(scale=0.2, size=(400, 3)))
+    rotations = turns.as_matrix() @ rotation
+    position = home_pose(design).position
+    compiled = orientations_within(design, position, rotations)
+    kept = untyped._compiled
+    try:
+        untyped._compiled = untyped.__wrapped__
+        np.testing.assert_array_equal(orientations_within(design, position, rotations), compiled)
+    finally:
+        untyped._compiled = kept
+    assert 0 < compiled.sum() < len(rotations)
+
+
+def test_reversed_ranges_and_unusable_counts_are_refused() -> None:
+    with pytest.raises(InputError, match="yaw: the low end 5° exceeds the high end -5°"):
+        yaw_pitch_roll_range([5.0, 0.0, 0.0], [-5.0, 0.0, 0.0], [2, 1, 1])
+    for counts in ([0, 1, 1], [1, 1], [1000, 1000, 1000]):
+        with pytest.raises(InputError):
+            yaw_pitch_roll_range([0.0] * 3, [1.0] * 3, counts)
+    for half_angle in (-1.0, 181.0, math.nan):
+        with pytest.raises(InputError, match="half-angle"):
+            cone_of_directions(HOME.rotation, half_angle, 5)
+    for count in (0, -1, 10**9):
+        with pytest.raises(InputError, match="number of orientations"):
+            uniform_rotations(count)
+        with pytest.raises(InputError, match="number of orientations"):
+            orientation_capability(OPTIMAL, HOME.position, count)
+    with pytest.raises(InputError, match="shape"):
+        orientations_within(OPTIMAL, HOME.position, np.eye(3))
+    with pytest.raises(InputError, match="one position"):
+        orientations_within(OPTIMAL, [HOME.position], np.eye(3)[None])

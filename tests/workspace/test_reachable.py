@@ -1,0 +1,360 @@
+"""The workspace that can be reached: against legs that move, grids and other radii."""
+
+from __future__ import annotations
+
+import math
+
+import msgspec
+import numpy as np
+import pytest
+from limited_designs import limited
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import breadth_first_order
+
+from explorer import (
+    PAIRS,
+    PRESETS,
+    Design,
+    DesignError,
+    InputError,
+    Limits,
+    Pose,
+    home_pose,
+    leg_clearances,
+    moves_are_clear,
+    radius_curve,
+    reachable_workspace,
+    rotation_from_yaw_pitch_roll,
+    workspace_nodes,
+    workspace_solid,
+    workspace_volume,
+)
+from explorer.legs.clearance import distance_gradients
+from explorer.numerics.arrays import FloatArray
+from explorer.workspace.accessible.nodes import Grid, grid_over, survey
+from explorer.workspace.accessible.radii import with_radius
+from explorer.workspace.accessible.start import check_start, nearest_clear_position
+from explorer.workspace.least_clearance import least_clearances
+from explorer.workspace.limits.constraints import constraints, slacks
+from explorer.workspace.slices.volume import home_rotation
+
+OPTIMAL, INITIAL = PRESETS["paper-optimal"], PRESETS["paper-initial"]
+ROWS = (OPTIMAL, INITIAL)
+
+
+def thick(design: Design, radius: float) -> Design:
+    return with_radius(design, radius * design.reach)
+
+
+def scaled(design: Design, by: float) -> Design:
+    """Return a design of another size, with its limits and home."""
+    limits, home = design.limits, home_pose(design)
+    box = limits.box and tuple(tuple(by * x for x in ends) for ends in limits.box)
+    one, two, three, four = (by * x for x in limits.leg_radii)
+    return msgspec.structs.replace(
+        design,
+        a3=(by * design.a3[0], by * design.a3[1]),
+        b1=(by * design.b1[0], by * design.b1[1]),
+        b2=by * design.b2,
+        b3=by * design.b3,
+        node_step=design.node_step and by * design.node_step,
+        limits=msgspec.structs.replace(limits, box=box, leg_radii=(one, two, three, four)),
+        home=Pose.of([by * x for x in home.position], home.rotation),
+    )
+
+
+def random_design(seed: int) -> Design | None:
+    """Return a design with radii in a random orientation, None if its home is in trouble."""
+    rng = np.random.default_rng(seed)
+    size = 10.0 ** int(rng.integers(-3, 4))
+    b1x, b1y, b2, b3 = size * rng.uniform(-0.6, 0.6, 4)
+    r = rotation_from_yaw_pitch_roll(rng.uniform(-180.0, 180.0, 3))
+    try:
+        design = Design(a3=tuple(size * rng.uniform(0.2, 1.0, 2)), b1=(b1x, b1y), b2=b2, b3=b3)
+    except DesignError:
+        return None
+    position = design.reach * rng.uniform(-0.5, 0.5, 3)
+    margin = float(rng.choice([0.0, 0.02])) * design.reach
+    design = msgspec.structs.replace(
+        thick(limited(design, margin=margin), float(rng.choice([0.0, 0.005, 0.02, 0.05]))),
+        home=Pose.of(position, r),
+    )
+    try:
+        check_start(design, r, position)
+    except InputError:
+        return None
+    return design
+
+
+@pytest.mark.parametrize("design", ROWS, ids=lambda d: d.name)
+def test_thin_legs_of_table_1_cross_nowhere_but_on_the_base_plane(design: Design) -> None:
+    found = reachable_workspace(design)
+    assert found.reachable_volume == found.volume == workspace_volume(design).volume
+    assert found.solid.volume == pytest.approx(workspace_solid(design).volume, rel=1e-12)
+    assert all(pair.blocked_volume == 0.0 for pair in found.pairs)
+    nodes = workspace_nodes(design)
+    assert found.node_count == nodes.count
+    # What the paper's grid loses are the nodes of z = 0 where axes cross.
+    r, step = home_rotation(design), nodes.step
+    flat = np.stack(np.meshgrid(*[np.arange(-20, 21)] * 2, [0], indexing="ij"), -1) * step
+    within = (slacks(constraints(design, r), flat) >= -1e-9 * design.reach).all(axis=-1)
+    near = 1e-9 * design.reach
+    crossing = (leg_clearances(design, flat, r).clearance <= near).any(axis=-1)
+    assert found.node_count is not None
+    assert found.reachable_node_count is not None
+    assert found.node_count - found.reachable_node_count == int((within & crossing).sum()) > 0
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_the_solid_holds_what_can_be_reached_and_nothing_else(seed: int) -> None:
+    design = random_design(seed)
+    if design is None:
+        return
+    found, r = reachable_workspace(design, nodes=24), home_rotation(design)
+    solid = found.solid
+    assert solid.is_watertight
+    assert 0.0 < found.reachable_volume <= found.volume
+    lows, highs = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
+    step = float(((highs - lows) / 23.0).max())
+    rng = np.random.default_rng(seed)
+    points = rng.uniform(lows, highs, (150, 3))
+    inside = np.array([solid.winding(p) > 0.5 for p in points])
+    limits = constraints(design, r)
+    slack = slacks(limits, points).min(axis=-1)
+    clearance = leg_clearances(design, points, r).clearance.min(axis=-1)
+    assert (slack[inside] > -2.0 * solid.tolerance).all()
+    # A rim of a wall thinner than the grid's step may be missed.
+    assert (clearance[inside] < -0.25 * step).sum() <= 0.02 * len(points)
+    home = np.array(home_pose(design).position)
+    way = home + np.linspace(0.0, 1.0, 30)[:, None, None] * (points - home)
+    led_to = (slacks(limits, way) >= solid.tolerance).all(axis=(0, 2)) & moves_are_clear(
+        design, home, r, points, r, clearance=0.2 * step
+    )
+    assert (led_to & ~inside).sum() <= 0.02 * len(points)
+
+
+def test_random_designs_are_thick_thin_cut_and_whole() -> None:
+    kinds: set[tuple[bool, bool]] = set()
+    for seed in range(40):
+        design = random_design(seed)
+        if design is not None:
+            found = reachable_workspace(design, nodes=12)
+            whole = found.reachable_volume > (1.0 - 1e-6) * found.volume
+            kinds.add((design.limits.leg_radii[0] > 0.0, whole))
+    assert {(True, False), (False, False)} <= kinds
+
+
+@pytest.mark.parametrize("design", ROWS, ids=lambda d: d.name)
+@pytest.mark.parametrize("radius", [0.0025, 0.01])
+def test_the_volume_is_what_many_random_positions_say(design: Design, radius: float) -> None:
+    design, r = thick(design, radius), home_rotation(design)
+    found = reachable_workspace(design)
+    rng = np.random.default_rng(5)
+    lows, highs = np.array(design.limits.box) if design.limits.box else (-1.0, 1.0)
+    lows, highs = (np.full(3, x) * design.reach if np.ndim(x) == 0 else x for x in (lows, highs))
+    points = rng.uniform(lows, highs, (400_000, 3))
+    kept = (slacks(constraints(design, r), points) >= 0.0).all(axis=-1)
+    points = points[kept]
+    clear = (leg_clearances(design, points, r).clearance > 0.0).all(axis=-1)
+    # In these designs everything that is clear hangs together.
+    share, error = clear.mean(), clear.std() / math.sqrt(len(points))
+    assert found.reachable_volume / found.volume == pytest.approx(share, abs=4.0 * error + 5e-4)
+
+
+def test_faces_say_what_they_come_from() -> None:
+    design = thick(OPTIMAL, 0.01)
+    solid = reachable_workspace(design).solid
+    centres = solid.vertices[solid.faces].mean(axis=1)
+    clearance = leg_clearances(design, centres, home_rotation(design)).clearance
+    seen: set[str] = set()
+    offs: FloatArray = np.zeros(0)
+    for index, name in enumerate(solid.limits):
+        own = solid.limit_of_face == index
+        if not own.any():
+            continue
+        seen.add(name)
+        if name.startswith("legs"):
+            pair = [f"legs {i}–{j}" for i, j in PAIRS].index(name)
+            offs = np.append(offs, np.abs(clearance[own, pair]))
+    # Where legs 3 and 4 collide in these orientations 2 and 4 do too.
+    assert {"legs 2–4", "l4 maximum"} <= seen
+    # A quarter of a cell at the most where two walls meet.
+    assert offs.max() < 0.25
+    assert np.quantile(offs, 0.95) < 0.05
+
+
+def test_a_pair_is_told_what_it_costs_alone() -> None:
+    design = limited(OPTIMAL, leg_radii=(0.0, 0.2, 0.0, 0.2))
+    found = reachable_workspace(design)
+    blocked = {pair.legs: pair.blocked_volume for pair in found.pairs}
+    alone = reachable_workspace(limited(OPTIMAL, leg_radii=(0.0, 0.0, 0.0, 0.4)))
+    assert blocked[(2, 4)] > blocked[(3, 4)] > 0.0
+    assert blocked[(1, 2)] == blocked[(1, 3)] == blocked[(2, 3)] == 0.0
+    lost = found.volume - found.reachable_volume
+    assert max(blocked.values()) <= lost <= sum(blocked.values())
+    # The pair (2, 4) has the sum of radii 0.4 in both designs.
+    again = {pair.legs: pair.blocked_volume for pair in alone.pairs}
+    assert again[(2, 4)] == pytest.approx(blocked[(2, 4)], rel=1e-3)
+
+
+@pytest.mark.parametrize("by", [1e-6, 1e6])
+def test_size_changes_nothing(by: float) -> None:
+    small, large = thick(OPTIMAL, 0.01), scaled(thick(OPTIMAL, 0.01), by)
+    one, other = reachable_workspace(small, nodes=20), reachable_workspace(large, nodes=20)
+    assert other.reachable_volume / by**3 == pytest.approx(one.reachable_volume, rel=2e-5)
+    assert other.reachable_node_count == one.reachable_node_count
+
+
+def test_a_finer_grid_agrees() -> None:
+    coarse, fine = (reachable_workspace(thick(INITIAL, 0.01), nodes=n) for n in (30, 60))
+    assert coarse.reachable_volume == pytest.approx(fine.reachable_volume, rel=2e-3)
+
+
+def test_an_empty_workspace_has_nothing_to_reach() -> None:
+    found = reachable_workspace(limited(OPTIMAL, l1=(0.0, 1.0), l4=(0.0, 0.1)))
+    assert found.volume == found.reachable_volume == found.reachable_node_count == 0
+    assert found.solid.is_empty
+    assert found.solid.empty_because
+
+
+def test_a_home_out_of_limits_or_in_collision_names_the_cause_and_a_way_out() -> None:
+    far = msgspec.structs.replace(OPTIMAL, home=Pose.of((10.0, 5.0, 19.0), home_rotation(OPTIMAL)))
+    with pytest.raises(InputError, match=r"box z = 19 is above its maximum 18; the nearest pos"):
+        reachable_workspace(far)
+    fat = limited(OPTIMAL, leg_radii=(0.0, 0.4, 0.4, 0.0))
+    with pytest.raises(InputError, match=r"legs 2 and 3 overlap by 0.1306; at this orientation"):
+        reachable_workspace(fat)
+    low = msgspec.structs.replace(
+        thick(OPTIMAL, 0.01), home=Pose.of((10.0, -8.0, 0.3), home_rotation(OPTIMAL))
+    )
+    with pytest.raises(InputError, match=r"legs 3 and 4 overlap by .* the nearest position"):
+        reachable_workspace(low)
+
+
+def test_the_nearest_position_without_trouble_is_the_nearest() -> None:
+    r = home_rotation(OPTIMAL)
+    above = np.array([10.0, 5.0, 19.0])
+    assert nearest_clear_position(OPTIMAL, r, above) == pytest.approx([10.0, 5.0, 18.0], abs=1e-4)
+    design, low = thick(OPTIMAL, 0.01), np.array([10.0, -8.0, 0.3])
+    found = nearest_clear_position(design, r, low)
+    assert found is not None
+    check_start(design, r, found)
+    best = float(np.linalg.norm(found - low))
+    rng = np.random.default_rng(3)
+    others = low + 0.98 * best * rng.uniform(-1.0, 1.0, (20_000, 3))
+    others = others[np.linalg.norm(others - low, axis=1) < 0.98 * best]
+    kept = (slacks(constraints(design, r), others) >= 0.0).all(axis=-1)
+    assert not (kept & (leg_clearances(design, others, r).clearance > 0.0).all(axis=-1)).any()
+
+
+@pytest.mark.parametrize("nodes", [0, 7, 161])
+def test_grids_too_coarse_or_too_fine_are_refused(nodes: int) -> None:
+    with pytest.raises(InputError, match=f"from 8 to 160; got {nodes}"):
+        reachable_workspace(OPTIMAL, nodes=nodes)
+    with pytest.raises(InputError, match="at most"):
+        reachable_workspace(OPTIMAL, node_step=1e-3)
+
+
+def test_what_is_reached_is_a_component_of_clear_steps() -> None:
+    design, r = thick(INITIAL, 0.02), home_rotation(INITIAL)
+    home = np.array(home_pose(design).position)
+    grid = Grid(home - 4.5, np.full(3, 1.5), (7, 7, 7))
+    found = survey(design, r, grid)
+    reached = found.reached(home)
+    nodes = grid.positions.reshape(-1, 3)
+    # All steps again, each by itself, and a search over them from the home's node.
+    first, second = np.nonzero(np.isclose(np.abs(nodes[:, None] - nodes).sum(axis=-1), 1.5))
+    clear = moves_are_clear(design, nodes[first], r, nodes[second], r)
+    kept = clear & found.within.ravel()[first] & found.within.ravel()[second]
+    graph = coo_array((np.ones(int(kept.sum())), (first[kept], second[kept])), (343, 343))
+    order = breadth_first_order(graph.tocsr(), 171, directed=False, return_predecessors=False)
+    assert np.flatnonzero(reached).tolist() == sorted(order.tolist())
+    assert 0 < len(order) < int(found.within.sum())
+
+
+def test_a_grid_begins_and_ends_on_its_box() -> None:
+    grid = grid_over(np.array([0.0, -1.0, 2.0]), np.array([4.0, 1.0, 3.0]), 5, 2)
+    inner = grid.positions[2:-2, 2:-2, 2:-2].reshape(-1, 3)
+    assert inner.min(axis=0) == pytest.approx([0.0, -1.0, 2.0])
+    assert inner.max(axis=0) == pytest.approx([4.0, 1.0, 3.0])
+    cell = grid.positions[grid.cell_around(np.array([1.2, 0.1, 2.9]))].reshape(-1, 3)
+    assert len(cell) == 8
+    assert (cell.min(axis=0) <= [1.2, 0.1, 2.9]).all()
+    assert (cell.max(axis=0) >= [1.2, 0.1, 2.9]).all()
+
+
+@pytest.mark.parametrize("margin", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("design", ROWS, ids=lambda d: d.name)
+def test_least_clearances_are_not_undercut(design: Design, margin: float) -> None:
+    design = limited(design, margin=margin, leg_radii=(0.1, 0.2, 0.3, 0.4))
+    r = home_rotation(design)
+    found = least_clearances(design)
+    assert (found.bound <= found.clearance).all()
+    limits = constraints(design, r)
+    assert (slacks(limits, found.position) >= -1e-8 * design.reach).all()
+    own = leg_clearances(design, found.position, r).clearance
+    # Axes that are as good as crossing are said to cross.
+    assert np.diagonal(own) == pytest.approx(found.clearance, abs=2e-9 * design.reach)
+    rng = np.random.default_rng(8)
+    points = design.reach * rng.uniform(-1.2, 1.2, (200_000, 3))
+    points = points[(slacks(limits, points) >= 0.0).all(axis=-1)]
+    assert len(points) > 1000
+    sampled = leg_clearances(design, points, r).clearance.min(axis=0)
+    assert (found.clearance <= sampled + 1e-12).all()
+
+
+def test_distances_change_with_the_position_as_their_gradients_say() -> None:
+    rng = np.random.default_rng(2)
+    design, r = OPTIMAL, rotation_from_yaw_pitch_roll((-60.0, 20.0, 10.0))
+    p = np.array([10.0, 5.0, 9.0]) + rng.uniform(-4.0, 4.0, (200, 3))
+    gradient = distance_gradients(design, p, r, leg_clearances(design, p, r))
+    step, differences = 1e-5, np.zeros_like(gradient)
+    for axis in range(3):
+        off = step * np.eye(3)[axis]
+        up, down = (leg_clearances(design, p + s * off, r).distance for s in (1.0, -1.0))
+        differences[..., axis] = (up - down) / (2.0 * step)
+    # Where closest points jump from one end to another a difference means nothing.
+    assert np.quantile(np.abs(gradient - differences), 0.98) < 1e-6
+    assert np.linalg.norm(gradient, axis=-1).max() <= 1.0 + 1e-12
+
+
+@pytest.mark.parametrize("design", ROWS, ids=lambda d: d.name)
+def test_the_radius_curve_agrees_with_the_solids(design: Design) -> None:
+    curve = radius_curve(design)
+    exact = workspace_volume(design).volume
+    assert curve.volumes[0] == pytest.approx(exact, rel=5e-3)
+    assert (np.diff(curve.volumes) <= 0.0).all()
+    assert curve.volumes[-1] < curve.volumes[0]
+    assert curve.harmless == curve.harmless_bound == 0.0
+    for share in (0.25, 0.5, 0.9):
+        radius = share * float(curve.radii[-1])
+        solid = reachable_workspace(with_radius(design, radius)).reachable_volume
+        assert np.interp(radius, curve.radii, curve.volumes) == pytest.approx(solid, rel=5e-3)
+    assert curve.radius_at(0.99) < curve.radius_at(0.95)
+
+
+def test_harmless_radii_take_nothing_and_larger_ones_do() -> None:
+    design = limited(OPTIMAL, margin=1.0)
+    curve = radius_curve(design, cells=20)
+    assert 0.0 < curve.harmless_bound <= curve.harmless
+    under, over = (with_radius(design, share * curve.harmless) for share in (0.98, 1.5))
+    untouched = reachable_workspace(under)
+    assert untouched.reachable_volume == pytest.approx(untouched.volume, rel=1e-6)
+    touched = reachable_workspace(over, nodes=60)
+    assert touched.reachable_volume < touched.volume * (1.0 - 1e-6)
+
+
+def test_the_radius_curve_of_nothing_is_nothing() -> None:
+    curve = radius_curve(limited(OPTIMAL, l1=(0.0, 1.0), l4=(0.0, 0.1)))
+    assert curve.volumes.tolist() == [0.0]
+    with pytest.raises(InputError, match="box z"):
+        radius_curve(OPTIMAL, start=(10.0, 5.0, 30.0))
+
+
+def test_limits_of_home_need_not_be_its_own() -> None:
+    # Another orientation than the home's, from a start of one's own.
+    r: FloatArray = rotation_from_yaw_pitch_roll((-60.0, 5.0, 5.0))
+    design = msgspec.structs.replace(OPTIMAL, limits=Limits(leg_radii=(0.1, 0.1, 0.1, 0.1)))
+    found = reachable_workspace(design, r, start=(10.0, 5.0, 9.0), nodes=16)
+    assert 0.0 < found.reachable_volume <= workspace_volume(design, r).volume
+    assert found.solid.winding(np.array([10.0, 5.0, 9.0])) == pytest.approx(1.0)

@@ -1,0 +1,141 @@
+"""Exact outlines of slices: their areas integrate to the volume, their edges lie on the limits."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from limited_designs import limited, ordinary_case, reference_case
+
+import explorer
+from explorer.mechanism.design import Swing
+from explorer.numerics.arrays import FloatArray
+from explorer.workspace.limits.constraints import constraints, slacks
+from explorer.workspace.limits.region import region_of
+from explorer.workspace.slices.outline import Edge, slice_outline
+from explorer.workspace.slices.volume import bounds, workspace_volume
+
+OPTIMAL = explorer.PRESETS["paper-optimal"]
+LEVELS = 120
+
+
+def along(edge: Edge, shares: FloatArray) -> FloatArray:
+    """Return points of an edge, shape (n, 2)."""
+    start, end = np.array(edge.start), np.array(edge.end)
+    if edge.centre is None:
+        return start + shares[:, None] * (end - start)
+    first = math.atan2(*(start - edge.centre)[::-1])
+    angle = first + shares * edge.turn
+    return np.array(edge.centre) + edge.radius * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+
+
+def in_space(axis: str, level: float, points: FloatArray) -> FloatArray:
+    """Return points of a slice as positions, shape (n, 3)."""
+    return np.insert(points, "xyz".index(axis), level, axis=1)
+
+
+def extent(design: explorer.Design, rotation: FloatArray, axis: str) -> tuple[float, float]:
+    lows, highs = bounds(region_of(constraints(design, rotation)))
+    return float(lows["xyz".index(axis)]), float(highs["xyz".index(axis)])
+
+
+@pytest.mark.parametrize("axis", ["x", "y", "z"])
+@pytest.mark.parametrize("seed", range(8))
+def test_areas_over_all_levels_integrate_to_the_exact_volume(seed: int, axis: str) -> None:
+    # Even: reference workspaces with minimum lengths, hence holes; odd: every kind of limit.
+    design, rotation = reference_case(seed)[:2] if seed % 2 == 0 else ordinary_case(seed)
+    low, high = extent(design, rotation, axis)
+    step = (high - low) / LEVELS
+    outlines = [
+        slice_outline(design, rotation, axis, low + (k + 0.5) * step) for k in range(LEVELS)
+    ]
+    areas = [outline.area for outline in outlines if outline is not None]
+    assert len(areas) == LEVELS
+    volume = workspace_volume(design, rotation).volume
+    # The midpoint rule: an area as smooth as a root at its ends is good to step^1.5.
+    assert step * sum(areas) == pytest.approx(volume, rel=5e-3)
+
+
+@pytest.mark.parametrize("axis", ["x", "y", "z"])
+@pytest.mark.parametrize("seed", range(6))
+def test_edges_lie_on_their_limits_within_all_others_and_close(seed: int, axis: str) -> None:
+    design, rotation = ordinary_case(100 + seed)
+    limits = constraints(design, rotation)
+    low, high = extent(design, rotation, axis)
+    shares = np.linspace(0.0, 1.0, 7)
+    seen = 0
+    for level in np.linspace(low, high, 13)[1:-1].tolist():
+        outline = slice_outline(design, rotation, axis, level)
+        assert outline is not None
+        for loop in outline.loops:
+            for edge, after in zip(loop, (*loop[1:], loop[0]), strict=True):
+                seen += 1
+                assert math.dist(edge.end, after.start) <= 1e-6 * design.reach
+                points = in_space(axis, level, along(edge, shares))
+                assert float(slacks(limits, points).min()) >= -1e-8 * design.reach
+                own = [limit for limit in limits if limit.name == edge.limit]
+                off = np.min([limit.distance(points) for limit in own], axis=0)
+                assert float(off.max()) <= 1e-8 * design.reach
+    assert seen > 10
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_slice_lies_to_the_left_of_its_edges(seed: int) -> None:
+    design, rotation = ordinary_case(200 + seed)
+    limits = constraints(design, rotation)
+    level = design.home.position[2] if design.home else 0.0
+    outline = slice_outline(design, rotation, "z", level)
+    assert outline is not None
+    assert outline.loops
+    for edge in (edge for loop in outline.loops for edge in loop):
+        before, middle, after = along(edge, np.array([0.499, 0.5, 0.501]))
+        forward = (after - before) / np.linalg.norm(after - before)
+        left = np.array([-forward[1], forward[0]]) * 1e-6 * design.reach
+        sides = in_space("z", level, np.array([middle + left, middle - left]))
+        inside = (slacks(limits, sides) >= 0.0).all(axis=-1)
+        assert inside.tolist() == [True, False]
+
+
+def test_a_minimum_length_leaves_a_hole() -> None:
+    # b4 within a ball about a3, and outside a small one about it that lies inside all else.
+    design = limited(OPTIMAL, l4=(1.0, 3.0), box=None, margin=None)
+    design = limited(design, l1=(0.0, 1e3), d2=(0.0, 1e3), d4=(0.0, 1e3))
+    rotation = explorer.home_pose(OPTIMAL).rotation
+    outline = slice_outline(design, rotation, "z", 0.0)
+    assert outline is not None
+    assert len(outline.loops) == 2
+    assert outline.area == pytest.approx(math.pi * (9.0 - 1.0), rel=1e-12)
+    limits = {edge.limit for loop in outline.loops for edge in loop}
+    assert limits == {"l4 maximum", "l4 minimum"}
+
+
+@pytest.mark.parametrize("size", [1e-20, 1e-6, 1e6, 1e20])
+def test_the_outline_scales_with_the_design(size: float) -> None:
+    rotation = explorer.home_pose(OPTIMAL).rotation
+    plain = limited(OPTIMAL, box=None)
+    scaled = limited(plain.with_variables([size * x for x in plain.variables]))
+    one = slice_outline(plain, rotation, "y", 3.0)
+    other = slice_outline(scaled, rotation, "y", 3.0 * size)
+    assert one is not None
+    assert other is not None
+    assert [len(loop) for loop in one.loops] == [len(loop) for loop in other.loops]
+    assert other.area == pytest.approx(one.area * size**2, rel=1e-9)
+
+
+def test_beyond_the_workspace_and_in_an_empty_one_there_is_no_outline() -> None:
+    rotation = explorer.home_pose(OPTIMAL).rotation
+    beyond = slice_outline(OPTIMAL, rotation, "z", 30.0)
+    below = slice_outline(OPTIMAL, rotation, "z", -0.1)
+    level = slice_outline(OPTIMAL, np.eye(3), "z", 9.0)
+    assert all(each is not None and each.loops == () for each in (beyond, below, level))
+    assert all(each is not None and each.area == 0.0 for each in (beyond, below, level))
+
+
+def test_cones_have_no_circles_to_outline_and_axes_have_three_names() -> None:
+    swung = limited(OPTIMAL, swing=Swing(a1=60.0))
+    rotation = explorer.home_pose(OPTIMAL).rotation
+    assert slice_outline(swung, rotation, "z", 9.0) is None
+    for axis in ("w", "", "xy"):
+        with pytest.raises(explorer.InputError, match="x, y or z"):
+            slice_outline(OPTIMAL, rotation, axis, 9.0)

@@ -1,0 +1,243 @@
+"""Every limit has one tolerance: what touches a limit keeps it, wherever that is asked.
+
+Limits are set to just what a random pose has, so that rounding alone decides, and to a little
+less. The optimiser ends on limits, too; its outcomes are looked at as their files are read.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+from limited_designs import limited
+from scipy.spatial.transform import Rotation
+
+from explorer import (
+    Design,
+    Limits,
+    Outcome,
+    Pose,
+    decode_design,
+    encode_design,
+    evaluate,
+    home_pose,
+    inverse,
+    make_problem,
+    margins,
+    optimise_design,
+    poses_are_valid,
+    workspace_nodes,
+    workspace_volume,
+)
+from explorer.mechanism.design import LENGTHS, Swing
+from explorer.numerics.arrays import FloatArray
+from explorer.numerics.compiled import warm
+from explorer.optimise.problem import SHIFTS, Box
+from explorer.optimise.search.demands import corners_of
+from explorer.workspace.limits.constraints import angle_between, constraints, legs, slacks
+from explorer.workspace.orientations import orientations_within
+
+DEFECTS: list[dict[str, Any]] = json.loads(
+    (Path(__file__).parents[1] / "data" / "defects_optimise.json").read_text(encoding="utf-8")
+)["optimise"]
+# A share of the reach: far more than rounding, far less than anybody makes.
+LITTLE = 1e-7
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _warm_kernels() -> None:  # pyright: ignore[reportUnusedFunction]
+    warm()
+
+
+def free_case(seed: int) -> tuple[Design, Pose]:
+    """Return a design that a pose on nodes of a grid of step 1 is far within the limits of."""
+    rng = np.random.default_rng(seed)
+    x = (rng.uniform(2.0, 9.0, 6) * rng.choice([-1.0, 1.0], 6)).tolist()
+    lengths: dict[str, Any] = dict.fromkeys(LENGTHS, (0.0, 60.0))
+    design = Design(
+        a3=(x[0], x[1]),
+        b1=(x[2], x[3]),
+        b2=x[4],
+        b3=x[5] + math.copysign(1.0, x[5] - x[4]),
+        limits=Limits(**lengths),
+    )
+    home = Pose.of(rng.uniform(-6.0, 6.0, 3), Rotation.random(random_state=rng).as_matrix())
+    design = msgspec.structs.replace(design, home=home)
+    signs, u = np.sign(margins(home.position, home.rotation)), home.rotation[0, 0]
+    while True:
+        position = rng.integers(-6, 7, 3).astype(float)
+        rotation = Rotation.random(random_state=rng).as_matrix()
+        found = margins(position, rotation) * signs
+        if found.min() > 0.3 and rotation[0, 0] * u > 0.02:
+            pose = Pose.of(position, rotation)
+            if poses_are_valid(design, pose.position, pose.rotation):
+                return design, pose
+
+
+def touching(design: Design, pose: Pose, little: float) -> Iterator[tuple[str, Design]]:
+    """Yield designs with one limit that the pose just touches, or misses by so much."""
+    joints = inverse(design, pose.position, pose.rotation).tolist()
+    q = dict(zip(("l1", "d1", "d2", "d3", "d4", "l4"), joints, strict=True))
+    for name in LENGTHS:
+        at = q[name]
+        yield f"{name} maximum", limited(design, **{name: (0.0, at - little)})
+        yield f"{name} minimum", limited(design, **{name: (at + little, 60.0)})
+        if not little:
+            yield f"{name} range of no width", limited(design, **{name: (at, at)})
+    low, high = sorted((q["d1"], q["d3"]))
+    gap = abs(q["d1"] - q["d3"])
+    yield "gap", limited(design, gap=gap + little)
+    yield "guide minimum", limited(design, guide=(low + little, high + 9.0))
+    yield "guide maximum", limited(design, guide=(low - 9.0, high - little))
+    if not little:
+        yield "guide as wide as the gap", limited(design, guide=(low, high), gap=gap)
+    place = np.array(pose.position)
+    for axis in range(3):
+        off = np.eye(3)[axis] * (9.0 + little)
+        yield f"box {axis} minimum", boxed(design, place - 9.0 + off, place + 9.0)
+        yield f"box {axis} maximum", boxed(design, place - 9.0, place + 9.0 - off)
+        flat = np.eye(3)[axis] * 9.0
+        if not little:
+            yield f"box {axis} of no width", boxed(design, place - 9.0 + flat, place + 9.0 - flat)
+    if not little:
+        yield "box of a point", boxed(design, place, place)
+    least = float(np.abs(margins(pose.position, pose.rotation)).min())
+    yield "margin", limited(design, margin=least + little)
+    home = home_pose(design)
+    at_home, here = (legs(design, np.array(each.position), each.rotation) for each in (home, pose))
+    for leg in range(4):
+        names = [f"b{leg + 1}", *({0: ["a1"], 3: ["a3"]}.get(leg, []))]
+        for name in names:
+            axis = at_home[leg] / np.linalg.norm(at_home[leg])
+            if name[0] == "b":
+                axis = pose.rotation @ home.rotation.T @ axis
+            angle = float(angle_between(here[leg], axis))
+            degrees = math.degrees(angle - little / design.reach)
+            yield f"swing {name}", limited(design, swing=Swing(**{name: degrees}))
+
+
+def boxed(design: Design, lows: FloatArray, highs: FloatArray) -> Design:
+    return limited(design, box=(tuple(lows.tolist()), tuple(highs.tolist())))
+
+
+def says_within(design: Design, pose: Pose) -> dict[str, bool]:
+    """Return what each part of the explorer says of a pose, which lies on nodes of step 1."""
+    place, turn = np.array(pose.position), pose.rotation
+    kept = slacks(constraints(design, turn), place)
+    around = limited(design, box=design.limits.box or both(place - 1.0, place + 1.0))
+    return {
+        "limits of a pose": not evaluate(design, pose).violations,
+        "validity": bool(poses_are_valid(design, place, turn)),
+        "orientations": bool(orientations_within(design, place, turn[None])[0]),
+        "constraints": bool((kept >= -0.1 * LITTLE).all()),
+        "nodes": has_node(around, place, turn),
+    }
+
+
+def both(lows: FloatArray, highs: FloatArray) -> Box:
+    (x, y, z), (u, v, w) = lows.tolist(), highs.tolist()
+    return (x, y, z), (u, v, w)
+
+
+def has_node(design: Design, place: FloatArray, rotation: FloatArray) -> bool:
+    """Return whether the paper's nodes hold a position: taking it out of the box loses one."""
+    lows, highs = (np.array(end) for end in design.limits.box or pytest.fail("no box"))
+    only = boxed(design, np.maximum(lows, place - 0.25), np.minimum(highs, place + 0.25))
+    if (np.array(only.limits.box)[0] > np.array(only.limits.box)[1]).any():
+        return False
+    return workspace_nodes(only, rotation, 1.0).count == 1
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_a_pose_that_touches_a_limit_is_within_it_wherever_that_is_asked(seed: int) -> None:
+    design, pose = free_case(seed)
+    for name, touched in touching(design, pose, 0.0):
+        assert says_within(touched, pose) == dict.fromkeys(PARTS, True), name
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_a_pose_a_little_beyond_a_limit_is_outside_wherever_that_is_asked(seed: int) -> None:
+    design, pose = free_case(seed)
+    for name, touched in touching(design, pose, LITTLE * design.reach):
+        assert says_within(touched, pose) == dict.fromkeys(PARTS, False), name
+
+
+PARTS = ("limits of a pose", "validity", "orientations", "constraints", "nodes")
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_a_gap_that_is_just_kept_empties_no_workspace(seed: int) -> None:
+    design, _ = free_case(seed)
+    rotation = home_pose(design).rotation
+    gap = abs((design.b3 - design.b2) * float(rotation[0, 0]))
+    whole = workspace_volume(design).volume
+    assert whole > 0.0
+    for beyond in (-1e-13, 0.0, 1e-15, 1e-13):
+        just = limited(design, gap=gap + beyond * design.reach)
+        assert workspace_volume(just).volume == whole
+    assert workspace_volume(limited(design, gap=gap + LITTLE * design.reach)).volume == 0.0
+
+
+# Outcomes of the optimiser
+
+
+def assert_is_kept_as_written(outcome: Outcome) -> None:
+    """Check that the design of a converged outcome, read from its file, keeps every demand."""
+    if not outcome.converged:
+        return
+    problem, demands = outcome.problem, outcome.problem.demands
+    design = decode_design(encode_design(outcome.design), "the outcome")
+    found = workspace_volume(design)
+    assert found.volume > 0.0, found.empty_because
+    assert found.volume == pytest.approx(outcome.best.volume, rel=1e-9)
+    if demands.volume is not None:
+        assert found.volume >= demands.volume * (1.0 - 3e-8)
+    if demands.reach is not None:
+        assert design.reach <= demands.reach * (1.0 + 1e-7)
+    if demands.required_box is not None:
+        values = dict(zip(problem.names, outcome.best.values, strict=True))
+        shift = np.array([values.get(name, 0.0) for name in SHIFTS])
+        for corner in corners_of(demands.required_box) + shift:
+            pose = Pose.of(corner, home_pose(design).rotation)
+            assert not evaluate(design, pose).violations
+
+
+@pytest.mark.parametrize("index", range(len(DEFECTS)))
+def test_an_optimum_on_the_limit_of_the_gap_has_a_workspace(index: int) -> None:
+    row = DEFECTS[index]
+    design = decode_design(json.dumps(row["design"]).encode(), "the start")
+    arguments: dict[str, Any] = row["arguments"]
+    problem = make_problem(design, row["objective"], free=row["free"], **arguments)
+    outcome = optimise_design(problem)
+    assert outcome.best.volume > 0.0
+    assert_is_kept_as_written(outcome)
+    assert outcome.converged or index > 0
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_optima_on_limits_keep_them_as_their_files_are_read(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    design = decode_design(json.dumps(DEFECTS[0]["design"]).encode(), "the start")
+    x = np.array(design.variables) * rng.uniform(0.7, 1.4, 6)
+    apart = abs((x[5] - x[4]) * home_pose(design).rotation[0, 0])
+    design = limited(
+        design.with_variables(x.tolist()),
+        gap=float(apart * rng.uniform(0.5, 2.0)),
+        margin=float(rng.choice([0.0, 0.3])),
+    )
+    middle, half = np.array(home_pose(design).position), rng.uniform(0.2, 1.0, 3)
+    problem = make_problem(
+        design,
+        "largest-margin",
+        free=["yaw", *(SHIFTS if seed % 2 else ())],
+        reach=float(1.1 * design.reach) if seed % 3 else None,
+        required_box=both(middle - half, middle + half),
+    )
+    outcome = optimise_design(problem, iterations=150)
+    assert_is_kept_as_written(outcome)

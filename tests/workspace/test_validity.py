@@ -1,0 +1,232 @@
+"""The compiled yes or no over poses and moves, beside what names each limit and clearance."""
+
+from __future__ import annotations
+
+import math
+
+import msgspec
+import numpy as np
+import pytest
+from hypothesis import given, strategies as st
+from limited_designs import limited, ordinary_case, troubled_case
+from scipy.spatial.transform import Rotation
+from strategies import positions, uniform_rotations
+
+from explorer import (
+    JOINTS,
+    PRESETS,
+    Design,
+    InputError,
+    Pose,
+    evaluate,
+    home_pose,
+    moves_are_clear,
+    poses_between,
+)
+from explorer.mechanism.design import Swing
+from explorer.numerics.arrays import FloatArray
+from explorer.numerics.compiled import MANY_ROWS
+from explorer.workspace.limits.valid_moves import moves_are_valid, write_at, write_turn
+from explorer.workspace.limits.valid_poses import Rules, poses_are_valid
+
+OPTIMAL = PRESETS["paper-optimal"]
+RADIUS = 0.2
+THICK = limited(OPTIMAL, leg_radii=(RADIUS,) * 4)
+
+
+def named(design: Design, pose: Pose) -> tuple[bool, float]:
+    """Return what names each limit says, and how far from a change of its mind it is."""
+    snapshot = evaluate(design, pose)
+    keeps = not snapshot.violations and bool((snapshot.clearances.clearance > 0.0).all())
+    return keeps, float(np.abs(snapshot.clearances.clearance).min())
+
+
+def poses_about(design: Design, seed: int, count: int) -> list[Pose]:
+    """Return poses from the home's near neighbourhood to anywhere."""
+    rng = np.random.default_rng(seed)
+    home, size = home_pose(design), design.reach
+    spread = rng.choice([1e-3, 0.1, 0.5], (count, 1))
+    places = np.array(home.position) + size * spread * rng.uniform(-1.0, 1.0, (count, 3))
+    turns = Rotation.from_rotvec(spread * rng.normal(size=(count, 3))).as_matrix()
+    return [Pose.of(p, turn @ home.rotation) for p, turn in zip(places, turns, strict=True)]
+
+
+def with_swing(design: Design, seed: int) -> Design:
+    rng = np.random.default_rng(seed)
+    angles = {name: float(rng.uniform(20.0, 180.0)) for name in ("a1", "a3", "b1", "b2", "b3")}
+    radii = tuple((0.02 * design.reach * rng.uniform(0.0, 1.0, 4)).tolist())
+    return limited(design, swing=Swing(**angles), leg_radii=radii, gap=0.01 * design.reach)
+
+
+@given(st.integers(0, 2**32))
+def test_a_pose_is_valid_where_no_limit_is_named_and_no_legs_collide(seed: int) -> None:
+    kind = seed % 4
+    if kind == 0:
+        design = troubled_case(seed)[0]
+    elif kind == 1:
+        design = ordinary_case(seed)[0]
+    elif kind == 2:
+        design = with_swing(ordinary_case(seed)[0], seed)
+    else:
+        design = THICK
+    poses = poses_about(design, seed, 12)
+    found = poses_are_valid(
+        design, [each.position for each in poses], [each.rotation for each in poses]
+    )
+    for pose, valid in zip(poses, found.tolist(), strict=True):
+        expected, nearness = named(design, pose)
+        if nearness > 1e-12 * design.reach:
+            assert valid == expected, (design, pose)
+
+
+def test_valid_and_invalid_poses_are_both_among_the_random_ones() -> None:
+    poses = poses_about(THICK, 1, 400)
+    found = poses_are_valid(
+        THICK, [each.position for each in poses], [each.rotation for each in poses]
+    )
+    assert 40 < found.sum() < 360
+
+
+@pytest.mark.parametrize("bound", ["l1", "d2", "d4", "l4"])
+def test_a_pose_on_a_limit_is_within_it(bound: str) -> None:
+    home = home_pose(OPTIMAL)
+    length = float(evaluate(OPTIMAL, home).joints[JOINTS.index(bound)])
+    for low, high, expected in (
+        (0.0, length, True),
+        (length, 2.0 * length, True),
+        (0.0, length * (1.0 - 1e-9), False),
+        (length * (1.0 + 1e-9), 2.0 * length, False),
+    ):
+        design = limited(OPTIMAL, **{bound: (low, high)})
+        assert poses_are_valid(design, home.position, home.rotation) == expected
+
+
+def test_a_leg_without_a_direction_at_home_keeps_no_cone() -> None:
+    home = Pose((*OPTIMAL.a3, 0.0), home_pose(OPTIMAL).quaternion)
+    free = limited(OPTIMAL, box=None, margin=None)
+    design = msgspec.structs.replace(limited(free, swing=Swing(a3=90.0)), home=home)
+    pose = home_pose(OPTIMAL)
+    assert poses_are_valid(free, pose.position, pose.rotation)
+    assert not poses_are_valid(design, pose.position, pose.rotation)
+    assert not named(design, pose)[0]
+    assert not moves_are_valid(design, pose.position, pose.rotation, pose.position, pose.rotation)
+
+
+def random_moves(seed: int, count: int, share: float) -> tuple[FloatArray, ...]:
+    """Return moves between valid poses, or a share of each."""
+    rng = np.random.default_rng(seed)
+    places = rng.uniform([0, -12, 0], [20, 22, 18], (60 * count, 3))
+    rotations = Rotation.random(60 * count, random_state=rng).as_matrix()
+    valid = poses_are_valid(THICK, places, rotations)
+    p, r = places[valid][: count + 1], rotations[valid][: count + 1]
+    turn = Rotation.from_matrix(r[1:] @ np.swapaxes(r[:-1], -1, -2)).as_rotvec()
+    end_rotations = Rotation.from_rotvec(share * turn).as_matrix() @ r[:-1]
+    return p[:-1], r[:-1], p[:-1] + share * (p[1:] - p[:-1]), end_rotations
+
+
+@pytest.mark.parametrize("share", [1.0, 0.2, 0.0])
+def test_a_valid_move_keeps_everything_all_along(share: float) -> None:
+    moves = random_moves(7, 300, share)
+    found = moves_are_valid(THICK, *moves)
+    assert moves_are_clear(THICK, *moves)[found].all()
+    agree = 0
+    for index, valid in enumerate(found.tolist()):
+        start, end = (Pose.of(moves[k][index], moves[k + 1][index]) for k in (0, 2))
+        along = poses_are_valid(THICK, *poses_between(start, end, np.linspace(0.0, 1.0, 200)))
+        # Limits have a tolerance on the way, which random moves do not come into.
+        assert along.all() or not valid
+        agree += int(along.all()) == valid
+    # What is refused for being too near to a collision or a singularity is rare.
+    assert agree >= 0.98 * len(found)
+    assert found.any()
+
+
+@given(positions(), uniform_rotations(), st.sampled_from((0.0, 1e-12, 1e-6, 1.0, 3.0, 3.14159265)))
+def test_moves_are_those_of_the_move_model(
+    axis: FloatArray, rotation: FloatArray, angle: float
+) -> None:
+    axis = axis / (float(np.linalg.norm(axis)) or 1.0)
+    end_rotation = Rotation.from_rotvec(angle * axis).as_matrix() @ rotation
+    start, end = Pose.of(np.array([1.0, 2.0, 3.0]), rotation), Pose.of(4.0 * axis, end_rotation)
+    found_axis, p, r = np.zeros(3), np.zeros(3), np.zeros((3, 3))
+    found = write_turn(start.rotation, end.rotation, found_axis)
+    step = np.array(end.position) - np.array(start.position)
+    for share in (0.0, 0.3, 1.0):
+        write_at(share, np.array(start.position), start.rotation, step, found_axis, found, p, r)
+        expected = poses_between(start, end, share)
+        np.testing.assert_allclose(p, expected[0], atol=1e-14)
+        np.testing.assert_allclose(r, expected[1], atol=1e-9)
+
+
+def test_a_move_along_a_limit_is_valid_to_the_tolerance() -> None:
+    home = home_pose(OPTIMAL)
+    top = limited(OPTIMAL, box=((0, -12, 0), (20, 22, home.position[2])))
+    x, y, z = home.position
+    # On the face of the box all the way.
+    assert moves_are_valid(top, (x, y, z), home.rotation, (x + 1, y - 1, z), home.rotation)
+    # About b4 leg 1 turns: on the way it is shorter than at both ends.
+    start, end = (
+        Pose.of_yaw_pitch_roll(home.position, (yaw, 0.0, 0.0)) for yaw in (-100.0, -125.0)
+    )
+    ways = [start.position, start.rotation, end.position, end.rotation]
+    lengths = [
+        float(evaluate(OPTIMAL, Pose.of(home.position, r)).joints[0])
+        for r in poses_between(start, end, np.linspace(0.0, 1.0, 101))[1]
+    ]
+    ends, least = min(lengths[0], lengths[-1]), min(lengths)
+    assert least < ends - 1e-2
+    # The carriages have another order there than at home.
+    turned = limited(OPTIMAL, carriage_order="any")
+    bounded = limited(turned, l1=(ends, 50.0))
+    assert moves_are_valid(limited(turned, l1=(least, 50.0)), *ways)
+    assert not moves_are_valid(bounded, *ways)
+    assert not moves_are_valid(bounded, *ways, tolerance=0.5 * (ends - least))
+    assert moves_are_valid(bounded, *ways, tolerance=2.5 * (ends - least))
+
+
+def test_a_move_to_another_mode_is_not_valid() -> None:
+    home = home_pose(OPTIMAL)
+    free = limited(OPTIMAL, box=None)
+    x, y, z = home.position
+    assert not moves_are_valid(free, (x, y, z), home.rotation, (x, y, -z), home.rotation)
+
+
+def test_rules_are_those_of_the_design() -> None:
+    rules = Rules.of(THICK)
+    moves = random_moves(2, 5, 1.0)
+    assert (moves_are_valid(THICK, *moves, rules=rules) == moves_are_valid(THICK, *moves)).all()
+    assert (
+        poses_are_valid(THICK, *moves[:2], rules=rules) == poses_are_valid(THICK, *moves[:2])
+    ).all()
+
+
+def test_few_and_many_poses_and_moves_have_the_same_answers() -> None:
+    moves = random_moves(11, MANY_ROWS, 0.5)
+    found = moves_are_valid(THICK, *(each.reshape(2, -1, *each.shape[1:]) for each in moves))
+    assert found.shape == (2, MANY_ROWS // 2)
+    for index in range(0, MANY_ROWS, 25):
+        alone = moves_are_valid(THICK, *(each[index] for each in moves))
+        assert alone.shape == ()
+        assert alone == found.ravel()[index]
+        assert poses_are_valid(THICK, moves[0][index], moves[1][index])
+
+
+@pytest.mark.parametrize("count", [3, MANY_ROWS])
+def test_many_positions_may_share_a_rotation_and_many_rotations_a_position(count: int) -> None:
+    poses = poses_about(THICK, 5, count)
+    p, r = (np.array([pose.position for pose in poses]), np.array([q.rotation for q in poses]))
+    one = np.broadcast_to(r[0], r.shape).copy()
+    assert np.array_equal(poses_are_valid(THICK, p, r[0]), poses_are_valid(THICK, p, one))
+    same = np.broadcast_to(p[0], p.shape).copy()
+    assert np.array_equal(poses_are_valid(THICK, p[0], r), poses_are_valid(THICK, same, r))
+    # Nor need they be rows of one block.
+    assert np.array_equal(
+        poses_are_valid(THICK, p.T.copy().T, r[::-1]), poses_are_valid(THICK, p, r[::-1].copy())
+    )
+
+
+def test_poses_that_are_none_are_refused() -> None:
+    with pytest.raises(InputError, match="position"):
+        poses_are_valid(OPTIMAL, [0.0, math.nan, 1.0], np.eye(3))
+    with pytest.raises(InputError, match="end position"):
+        moves_are_valid(OPTIMAL, [0.0, 1.0, 1.0], np.eye(3), [0.0, math.nan, 1.0], np.eye(3))

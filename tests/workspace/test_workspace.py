@@ -1,0 +1,420 @@
+"""The constant-orientation workspace: volumes, gradients and nodes, each by another way too.
+
+Volumes are compared with reference values (good to 1e-4), with a closed form in y under a
+fine quadrature in x for both rows of Table 1 (converged to 1e-9), with columns that another
+kernel adds up (good to about 1e-4), and with themselves on four times the nodes (1e-10).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+from limited_designs import REFERENCE, limited, ordinary_case, reference_case, troubled_case
+from scipy.spatial.transform import Rotation
+
+import explorer.workspace.slices.volume as measures
+from explorer import PRESETS, Design, InputError, Limits, Pose, home_pose
+from explorer.mechanism.design import LENGTHS, VARIABLES, Swing
+from explorer.numerics.arrays import FloatArray
+from explorer.numerics.compiled import warm
+from explorer.workspace.limits.constraints import YAW, constraints
+from explorer.workspace.limits.region import region_of
+from explorer.workspace.slices.integration import integrate_slices
+from explorer.workspace.slices.nodes import column_lengths, count_nodes
+from explorer.workspace.slices.volume import (
+    bounds,
+    home_rotation,
+    workspace_nodes,
+    workspace_volume,
+)
+
+OPTIMAL = PRESETS["paper-optimal"]
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _warm_kernels() -> None:  # pyright: ignore[reportUnusedFunction]
+    warm()
+
+
+@pytest.mark.parametrize("index", range(len(REFERENCE["workspaces"])))
+def test_volumes_are_those_of_the_reference(index: int) -> None:
+    design, rotation, volume = reference_case(index)
+    assert workspace_volume(design, rotation).volume == pytest.approx(volume, rel=1e-4)
+
+
+def height_field_volume(design: Design, panels: int) -> float:
+    """Return the volume of a level workspace above z = 0 without minima, in its own way.
+
+    Level, every ball and cylinder has its centre in the plane z = 0, so that the height over
+    (x, y) is the least of the box and of roots of c - (y - y0)²: in y it has a closed form
+    between the places where two of them are equal, in x it is left to Gauss-Legendre.
+    """
+    u, v = home_rotation(design)[:2, 0], home_rotation(design)[:2, 1]
+    reach, (lows, highs) = design.reach, design.limits.box or pytest.fail("no box")
+    balls = [-(design.b1[0] * u + design.b1[1] * v), np.array(design.a3)]
+    nodes, weights = np.polynomial.legendre.leggauss(4)
+    edges = np.linspace(lows[0], highs[0], panels + 1)
+    width = (highs[0] - lows[0]) / panels
+    x = (edges[:-1, None] + 0.5 * width * (nodes + 1.0)).ravel()
+    rate = np.tile(0.5 * width * weights, panels)
+    # Rows (y0, c) of each root, of shape (rows, x); the box is a root that is level.
+    middles = np.array([*(ball[1] for ball in balls), -design.b2 * u[1], -design.b3 * u[1]])
+    squares = np.stack(
+        [
+            *(reach**2 - (x - ball[0]) ** 2 for ball in balls),
+            np.full_like(x, reach**2),
+            np.full_like(x, reach**2),
+        ]
+    )
+    top = highs[2]
+    ends = [np.full_like(x, lows[1]), np.full_like(x, highs[1])]
+    for i in range(4):
+        for level in (0.0, top * top):
+            root = np.sqrt(np.maximum(0.0, squares[i] - level))
+            ends += [middles[i] - root, middles[i] + root]
+        for j in range(i):
+            apart = middles[i] - middles[j]
+            if apart:
+                # c_i - (y - y_i)² = c_j - (y - y_j)² is linear in y.
+                ends.append(
+                    0.5 * (middles[i] + middles[j]) - 0.5 * (squares[i] - squares[j]) / apart
+                )
+    y = np.sort(np.clip(np.stack(ends), lows[1], highs[1]), axis=0)
+    a, b = y[:-1], y[1:]
+    heights = squares[:, None] - (0.5 * (a + b)[None] - middles[:, None, None]) ** 2
+    lowest = heights.argmin(axis=0)
+    least = np.take_along_axis(heights, lowest[None], axis=0)[0]
+    y0, c = middles[lowest], np.take_along_axis(squares, lowest, axis=0)
+    inner = _root_integral(b - y0, c) - _root_integral(a - y0, c)
+    inner = np.where(least > top * top, top * (b - a), np.where(least > 0.0, inner, 0.0))
+    return float((rate * inner.sum(axis=0)).sum())
+
+
+def _root_integral(t: FloatArray, c: FloatArray) -> FloatArray:
+    """Return the integral of sqrt(c - t²) from 0."""
+    r = np.sqrt(np.maximum(c, 1e-300))
+    t = np.clip(t, -r, r)
+    return 0.5 * (t * np.sqrt(np.maximum(0.0, c - t * t)) + c * np.arcsin(t / r))
+
+
+@pytest.mark.parametrize("row", REFERENCE["table1"], ids=lambda row: str(row["name"]))
+def test_both_rows_of_table_1_have_their_exact_volume(row: dict[str, Any]) -> None:
+    design = PRESETS[row["name"]]
+    independent = height_field_volume(design, 4000)
+    assert height_field_volume(design, 2000) == pytest.approx(independent, rel=1e-8)
+    found = workspace_volume(design).volume
+    assert found == pytest.approx(independent, rel=1e-7)
+    assert found == pytest.approx(row["exact_volume"], rel=1e-6)
+
+
+@pytest.mark.parametrize("row", REFERENCE["table1"], ids=lambda row: str(row["name"]))
+def test_both_rows_of_table_1_have_their_nodes(row: dict[str, Any]) -> None:
+    nodes = workspace_nodes(PRESETS[row["name"]])
+    assert nodes.count == row["node_count"]
+    assert nodes.step == pytest.approx(row["step"], rel=1e-12)
+    assert nodes.volume == pytest.approx(row["node_volume"], rel=1e-12)
+    np.testing.assert_allclose(nodes.extent or (), row["extent"], rtol=1e-12, atol=1e-12)
+
+
+def test_the_node_volume_of_the_optimum_is_the_paper_s() -> None:
+    assert workspace_nodes(OPTIMAL).volume == 7992.0
+    # What the paper prints of the initial row, to its digits.
+    lows, highs = workspace_nodes(PRESETS["paper-initial"]).extent or pytest.fail("empty")
+    assert [round(end, 3) for end in highs] == [10.052, 10.770, 9.334]
+    assert [round(end, 3) for end in lows] == [0.0, -5.026, 0.0]
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_nodes_are_those_that_keep_every_limit(seed: int) -> None:
+    design, rotation = ordinary_case(seed)
+    step = 0.7
+    nodes = workspace_nodes(design, rotation, step)
+    index = np.stack(np.meshgrid(*[np.arange(-45.0, 46.0)] * 3, indexing="ij"), axis=-1)
+    grid = np.asarray(step * index.reshape(-1, 3), dtype=np.float64)
+    kept = np.all([limit.slack(grid) >= 0.0 for limit in constraints(design, rotation)], axis=0)
+    assert nodes.count == int(kept.sum())
+    if nodes.extent is not None:
+        inside = grid[kept]
+        np.testing.assert_allclose(nodes.extent, [inside.min(axis=0), inside.max(axis=0)])
+
+
+def test_node_volumes_tend_to_the_exact_volume() -> None:
+    exact = workspace_volume(OPTIMAL).volume
+    excess = [
+        workspace_nodes(OPTIMAL, step=step).volume / exact - 1.0 for step in (2.0, 0.5, 0.125)
+    ]
+    assert excess[0] == pytest.approx(0.133, abs=1e-3)
+    # First order: by the surface.
+    assert excess[1] == pytest.approx(excess[0] / 4.0, rel=0.3)
+    assert excess[2] == pytest.approx(excess[1] / 4.0, rel=0.1)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_more_nodes_of_the_quadrature_change_nothing(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    design, rotation = ordinary_case(seed)
+    volume = workspace_volume(design, rotation).volume
+    monkeypatch.setattr(measures, "NODES", 2 * measures.NODES)
+    finer = measures.quadrature.__wrapped__()
+    monkeypatch.setattr(measures, "quadrature", lambda: finer)
+    assert workspace_volume(design, rotation).volume == pytest.approx(volume, rel=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_columns_add_up_to_the_volume(seed: int) -> None:
+    design, rotation = ordinary_case(seed)
+    region = region_of(constraints(design, rotation))
+    assert _columns(design, rotation, 500) == pytest.approx(
+        workspace_volume(design, rotation).volume, rel=1e-3
+    )
+    assert len(region.cones) == 0
+
+
+def _columns(design: Design, rotation: FloatArray, many: int) -> float:
+    region = region_of(constraints(design, rotation))
+    lows, highs = bounds(region)
+    total = np.zeros(1)
+    column_lengths(
+        many * many, region.rounds, region.planes, region.cones, lows, highs, many, total
+    )
+    return float(total[0] * (highs[0] - lows[0]) * (highs[1] - lows[1])) / many**2
+
+
+def varied(design: Design, rotation: FloatArray, name: str, by: float) -> tuple[Design, FloatArray]:
+    """Return the design or the rotation with one parameter of a gradient changed."""
+    limits = design.limits
+    if name in VARIABLES:
+        return design.with_variable(name, getattr_of(design, name) + by), rotation
+    if name == YAW:
+        return design, Rotation.from_rotvec([0.0, 0.0, by]).as_matrix() @ rotation
+    if name == "margin":
+        return limited(design, margin=(limits.margin or 0.0) + by), rotation
+    words = name.split()
+    end = 0 if words[-1] == "minimum" else 1
+    if words[0] in LENGTHS or words[0] == "guide":
+        ends = list(getattr(limits, words[0]))
+        ends[end] += by
+        return limited(design, **{words[0]: tuple(ends)}), rotation
+    assert words[0] == "box"
+    box = [list(each) for each in limits.box or pytest.fail("no box")]
+    box[end]["xyz".index(words[1])] += by
+    return limited(design, box=(tuple(box[0]), tuple(box[1]))), rotation
+
+
+def getattr_of(design: Design, variable: str) -> float:
+    return design.variables[VARIABLES.index(variable)]
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_the_gradient_is_that_of_central_differences(seed: int) -> None:
+    design, rotation = ordinary_case(seed)
+    found = workspace_volume(design, rotation)
+    assert {*VARIABLES, YAW, "margin", "l1 maximum", "d2 minimum"} <= set(found.gradient)
+    largest = max(map(abs, found.gradient.values()))
+    for name, rate in found.gradient.items():
+        step = 1e-5
+        ahead = workspace_volume(*varied(design, rotation, name, step)).volume
+        behind = workspace_volume(*varied(design, rotation, name, -step)).volume
+        assert rate == pytest.approx((ahead - behind) / (2.0 * step), abs=1e-5 * largest), name
+
+
+@pytest.mark.parametrize("name", ["a3x", "a3y"])
+def test_the_gradient_knows_maxima_that_are_tied_to_the_reach(name: str) -> None:
+    home = home_pose(OPTIMAL)
+    design = msgspec.structs.replace(OPTIMAL, home=home)
+    rate, step = workspace_volume(design).gradient[name], 1e-4
+    volumes = [
+        workspace_volume(design.with_variable(name, getattr_of(design, name) + by)).volume
+        for by in (step, -step)
+    ]
+    assert rate == pytest.approx((volumes[0] - volumes[1]) / (2.0 * step), rel=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_kernels_say_the_same_interpreted_and_compiled(seed: int) -> None:
+    design, rotation = ordinary_case(seed)
+    region = region_of(constraints(limited(design, swing=Swing(a1=50.0, b2=60.0)), rotation))
+    lows, highs = bounds(region)
+    step = float((highs - lows).max()) / 12.0
+    first = np.ceil(lows / step)
+    counts = (np.floor(highs / step) - first + 1).astype(np.int64)
+
+    def run(*, compiled: bool) -> list[FloatArray]:
+        plain: Any = "__wrapped__"
+        volume, grid, lengths = np.zeros(6), np.zeros(7, dtype=np.int64), np.zeros(1)
+        by_round = np.zeros((len(region.rounds), 4))
+        by_plane = np.zeros((len(region.planes), 4))
+        for kernel, arguments in (
+            (
+                integrate_slices,
+                (
+                    *(region.rounds, region.planes, region.low, region.high),
+                    *(measures.quadrature(), volume, by_round, by_plane),
+                ),
+            ),
+            (
+                count_nodes,
+                (
+                    *(region.rounds, region.planes, region.cones),
+                    *(np.array([region.low, region.high]), 1e-9, first, counts, step, grid),
+                ),
+            ),
+            (
+                column_lengths,
+                (region.rounds, region.planes, region.cones, lows, highs, 12, lengths),
+            ),
+        ):
+            untyped: Any = kernel
+            if compiled:
+                assert untyped.ready
+                untyped(1, *arguments)
+            else:
+                getattr(untyped, plain)(*arguments)
+        return [volume, by_round, by_plane, grid.astype(np.float64), lengths]
+
+    for one, other in zip(run(compiled=True), run(compiled=False), strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-12 * np.abs(one).max())
+
+
+def scaled(design: Design, s: float) -> Design:
+    """Return the design with every length s times as long."""
+    limits = design.limits
+
+    def times(ends: tuple[float, ...]) -> tuple[float, ...]:
+        return tuple(s * end for end in ends)
+
+    box = limits.box
+    changed: dict[str, Any] = {name: times(design.length_range(name)) for name in LENGTHS}
+    changed["guide"] = None if limits.guide is None else times(limits.guide)
+    changed["box"] = None if box is None else (times(box[0]), times(box[1]))
+    changed["margin"] = None if limits.margin is None else s * limits.margin
+    home = home_pose(design)
+    x = [s * value for value in design.variables]
+    larger = msgspec.structs.replace(
+        design.with_variables(x), home=Pose.of(s * np.array(home.position), home.rotation)
+    )
+    return limited(larger, gap=s * limits.gap, **changed)
+
+
+@pytest.mark.parametrize("s", [1e-9, 1e-3, 1e3, 1e9])
+@pytest.mark.parametrize("seed", range(4))
+def test_volumes_scale_with_the_cube_of_lengths(seed: int, s: float) -> None:
+    design, rotation = ordinary_case(seed)
+    found, large = (workspace_volume(each, rotation) for each in (design, scaled(design, s)))
+    assert large.volume == pytest.approx(found.volume * s**3, rel=1e-9)
+    for name, rate in found.gradient.items():
+        power = 3 if name == YAW else 2
+        assert large.gradient[name] == pytest.approx(rate * s**power, rel=1e-6, abs=1e-6 * s**power)
+    nodes, more = (
+        workspace_nodes(design, rotation, 0.5),
+        workspace_nodes(scaled(design, s), rotation, 0.5 * s),
+    )
+    assert more.count == nodes.count
+
+
+@pytest.mark.parametrize(
+    ("limits", "because"),
+    [
+        ({"gap": 50.0}, ("gap |d1 − d3|",)),
+        ({"margin": 19.0}, ("box z maximum", "margin κ3")),
+        ({"l1": (5.0, 5.0)}, ("l1 minimum", "l1 maximum")),
+        ({"l1": (30.0, 40.0)}, ("l1 minimum", "box x maximum")),
+        ({"d4": (0.0, 0.0)}, ("d4 maximum",)),
+        ({"guide": (100.0, 101.0)}, ("d3 minimum", "box x maximum")),
+        ({"box": ((0.0, 0.0, 50.0), (1.0, 1.0, 51.0))}, ("box z minimum",)),
+        ({"box": ((3.0, 3.0, 3.0), (3.0, 9.0, 9.0))}, ("box x minimum", "box x maximum")),
+        ({"swing": Swing(a1=1.0, b4=1.0), "l1": (13.0, None)}, None),
+    ],
+)
+def test_an_empty_workspace_names_what_empties_it(
+    limits: dict[str, Any], because: tuple[str, ...] | None
+) -> None:
+    design = limited(OPTIMAL, **limits)
+    found = workspace_volume(design)
+    assert found.volume == 0.0
+    assert found.empty_because
+    if because is not None:
+        assert found.empty_because == because
+    else:
+        assert any(name.startswith("swing") for name in found.empty_because)
+    # Nodes lie on boundaries too, but never apart from the region.
+    assert workspace_nodes(design).count == 0 or because == ("box x minimum", "box x maximum")
+
+
+def test_parallel_lines_leave_nothing_but_without_a_margin() -> None:
+    level = np.eye(3)
+    assert workspace_volume(OPTIMAL, level).empty_because == ("margin κ2",)
+    assert workspace_volume(limited(OPTIMAL, margin=None), level).volume > 1000.0
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_a_limit_that_is_there_twice_counts_once(seed: int) -> None:
+    design, rotation = ordinary_case(seed)
+    lows, highs = design.limits.box or pytest.fail("no box")
+    # The box may start where κ3 is zero, and then says the same as the margin.
+    upper = limited(design, margin=0.0, box=((lows[0], lows[1], 0.0), highs))
+    sign = 1.0 if design.home is not None and design.home.position[2] > 0.0 else -1.0
+    if sign > 0.0:
+        loose = limited(design, margin=0.0, box=((lows[0], lows[1], -50.0), highs))
+        one, other = (workspace_volume(each, rotation) for each in (upper, loose))
+        assert one.volume == pytest.approx(other.volume, rel=1e-12)
+
+
+def test_equal_balls_count_once() -> None:
+    rotation = home_rotation(OPTIMAL)
+    # The centre of l1 is -R b1: put a3 there, and the balls of l1 and l4 are one.
+    b1x, b1y = (-(rotation.T @ [*OPTIMAL.a3, 0.0]))[:2].tolist()
+    design = msgspec.structs.replace(OPTIMAL, b1=(b1x, b1y), home=home_pose(OPTIMAL))
+    without = limited(design, l4=(0.0, 1e3))
+    assert workspace_volume(design).volume == pytest.approx(
+        workspace_volume(without).volume, rel=1e-12
+    )
+
+
+def test_a_minimum_that_is_its_maximum_leaves_nothing() -> None:
+    for name in LENGTHS:
+        assert workspace_volume(limited(OPTIMAL, **{name: (9.0, 9.0)})).volume == 0.0
+
+
+@pytest.mark.parametrize("seed", range(150))
+def test_a_volume_in_trouble_is_that_of_random_positions(seed: int) -> None:
+    design, rotation = troubled_case(seed)
+    r = home_rotation(design) if rotation is None else rotation
+    limits = constraints(design, r)
+    found = workspace_volume(design, r)
+    assert found.volume >= 0.0
+    assert math.isfinite(found.volume)
+    assert bool(found.empty_because) == (found.volume == 0.0)
+    lows, highs = bounds(region_of(limits))
+    if not (lows < highs).all():
+        assert found.volume == 0.0
+        return
+    many = 20_000
+    p = lows + np.random.default_rng(seed).random((many, 3)) * (highs - lows)
+    share = float(np.all([limit.slack(p) >= 0.0 for limit in limits], axis=0).mean())
+    expected = found.volume / float(np.prod(highs - lows))
+    # Five standard deviations, and what columns may be off.
+    spread = 5.0 * math.sqrt(max(expected * (1.0 - expected), 1.0 / many) / many)
+    assert share == pytest.approx(expected, abs=spread + 1e-3 * expected)
+
+
+@pytest.mark.parametrize("step", [0.0, -1.0, math.nan, math.inf, 1e-3])
+def test_unusable_steps_are_refused(step: float) -> None:
+    with pytest.raises(InputError, match="node"):
+        workspace_nodes(OPTIMAL, step=step)
+
+
+def test_what_is_no_rotation_is_refused() -> None:
+    for measure in (workspace_volume, workspace_nodes):
+        with pytest.raises(InputError, match="rotation"):
+            measure(OPTIMAL, 2.0 * np.eye(3))
+
+
+def test_a_design_without_a_home_has_a_workspace() -> None:
+    design = Design(a3=(10.0, 4.0), b1=(4.0, -1.0), b2=3.0, b3=1.5, limits=Limits())
+    assert workspace_volume(design).volume > 0.0
