@@ -28,7 +28,8 @@ from explorer.app.features.studies.folders import StudyFolders
 from explorer.app.scene.camera import ViewName
 from explorer.app.screenshot import open_page, picture, settle, stable_picture
 from explorer.app.server import Running, start
-from explorer.app.state.actions import Action, Open, SetJoint, SetLimits, SetVariable, SetView
+from explorer.app.state.action import Action
+from explorer.app.state.actions import Open, SetJoint, SetLimits, SetVariable, SetView
 from explorer.app.state.compared import Look
 from explorer.app.state.optimisation import Wish
 from explorer.app.state.studies import Brush, within

@@ -14,7 +14,8 @@ from types import TracebackType
 from typing import Self
 
 from explorer.app.server import Running, start
-from explorer.app.state.actions import Action, Open, SetPose
+from explorer.app.state.action import Action
+from explorer.app.state.actions import Open, SetPose
 from explorer.errors import InputError
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import load_design

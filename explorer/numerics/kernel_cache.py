@@ -127,6 +127,8 @@ def fingerprint_of(
         called = waiting.pop()
         assert isinstance(called, FunctionType)  # noqa: S101 - kernels and helpers are
         code = called.__code__
+        # Compiled code holds the names of the modules that its functions come from.
+        digest.update(called.__module__.encode())
         effort += len(code.co_code)
         digest.update(code.co_code)
         for part in (code.co_consts, code.co_varnames, code.co_names, called.__defaults__):

@@ -31,8 +31,8 @@ from explorer.app.features.paths.actions import (
 from explorer.app.features.singularity.actions import Jog, SetSingularView
 from explorer.app.features.studies.actions import BrushAxis, OpenStudy
 from explorer.app.session.gestures import ByHand
+from explorer.app.state.action import Action
 from explorer.app.state.actions import (
-    Action,
     GoHome,
     Open,
     SetAngle,

@@ -153,7 +153,7 @@ def labelled(palette: Palette) -> dict[str, Command]:
 def actions() -> set[type]:
     """Return every action of the app: what its modules define and can be applied."""
     found: set[type] = set()
-    for module in pkgutil.iter_modules(explorer.app.__path__, "explorer.app."):
+    for module in pkgutil.walk_packages(explorer.app.__path__, "explorer.app."):
         for name, each in inspect.getmembers(importlib.import_module(module.name), inspect.isclass):
             is_action = hasattr(each, "apply") and hasattr(each, "__dataclass_fields__")
             if is_action and each.__module__ == module.name and not name.startswith("_"):

@@ -12,8 +12,8 @@ from desk import Desk
 
 from explorer.app.features.mechanism.design_panel import DesignPanel
 from explorer.app.features.mechanism.pose_panel import MovePanel
+from explorer.app.session.field_words import FIELD_WORDS, message_of
 from explorer.app.session.session import UNDO
-from explorer.app.state.field_words import FIELD_WORDS, message_of
 from explorer.errors import DesignError, InputError
 from explorer.mechanism.design import Design, Limits, Swing
 from explorer.mechanism.design_file import decode_design

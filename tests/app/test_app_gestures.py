@@ -11,8 +11,8 @@ from hypothesis import given, strategies as st
 
 from explorer.app.session.gestures import PAUSE_SECONDS, ByHand
 from explorer.app.session.session import Session
+from explorer.app.state.action import Action
 from explorer.app.state.actions import (
-    Action,
     GoHome,
     Open,
     Reset,

@@ -41,11 +41,10 @@ from explorer.app.features.optimise.scene import FARTHEST, box_shown, edges_of, 
 from explorer.app.features.optimise.tasks import compare, optimise
 from explorer.app.features.optimise.words import comparison_table, verdict_words
 from explorer.app.session.session import UNDO, Session
-from explorer.app.session.step_words import words
 from explorer.app.session.tasks import export_report
 from explorer.app.session.worker import Line
+from explorer.app.state.action import Action
 from explorer.app.state.actions import (
-    Action,
     Open,
     Reset,
     SetAngle,
@@ -499,7 +498,7 @@ def test_what_the_process_refuses_leaves_the_design(bench: Bench) -> None:
     before = stripped(bench.state)
 
     @dataclass(frozen=True)
-    class AskForNoStart:
+    class AskForNoStart(Action):
         """What no hand can ask for."""
 
         def apply(self, state: State) -> State:
@@ -715,7 +714,7 @@ def test_one_press_and_another_solve_the_papers_problem_from_its_initial_row(
     assert not bench.complaints
     assert not bench.panel._lift.visible
     # Undone, it is the design as it was.
-    assert words(remedy, own(), own()) in ("Lift the box", "Take the paper's box")
+    assert remedy.describe(own(), own()) in ("Lift the box", "Take the paper's box")
 
 
 def test_a_design_without_a_home_of_its_own_keeps_its_pose_where_its_box_is_lifted() -> None:

@@ -11,7 +11,8 @@ import pytest
 
 from explorer.app.session.jobs import LatestWins
 from explorer.app.session.session import Session
-from explorer.app.state.actions import Action, SetJoint, SetPosition, SetVariable
+from explorer.app.state.action import Action
+from explorer.app.state.actions import SetJoint, SetPosition, SetVariable
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, opened
 from explorer.mechanism.design_file import PRESETS

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
+from explorer.app.state.action import Action
 from explorer.app.state.actions import (
-    Action,
     GoHome,
     Open,
     Reset,

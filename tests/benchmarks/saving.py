@@ -12,7 +12,8 @@ import msgspec
 from benchmarks.samples import DESIGN
 from benchmarks.table import Row, seconds, times
 from benchmarks.timing import Spread, elapsed
-from explorer.app.state.actions import Action, SetAngle, SetPosition, SetVariable
+from explorer.app.state.action import Action
+from explorer.app.state.actions import SetAngle, SetPosition, SetVariable
 from explorer.app.state.state import opened
 from explorer.app.storage.autosave import Autosave
 from explorer.app.storage.document import MOST_STEPS, Document, Kept

@@ -16,8 +16,8 @@ from benchmarks.table import Row, seconds
 from benchmarks.timing import Spread
 from explorer import PRESETS
 from explorer.app.session.session import REDO, UNDO
+from explorer.app.state.action import Action
 from explorer.app.state.actions import (
-    Action,
     Open,
     SetAngle,
     SetJoint,

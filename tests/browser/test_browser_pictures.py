@@ -20,7 +20,8 @@ from explorer.app.features.mechanism.legs import Telescopes
 from explorer.app.scene.placing import Placed
 from explorer.app.screenshot import SCENE_ALONE, open_page, settle, stable_picture
 from explorer.app.server import Running, start
-from explorer.app.state.actions import Action, SetPose, SetPosition, SetView
+from explorer.app.state.action import Action
+from explorer.app.state.actions import SetPose, SetPosition, SetView
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, opened
 from explorer.app.widgets.assigning import Update

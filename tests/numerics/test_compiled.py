@@ -30,8 +30,8 @@ def empty_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def function_of(source: str) -> Callable[..., Any]:
-    names: dict[str, Any] = {}
+def function_of(source: str, module: str) -> Callable[..., Any]:
+    names: dict[str, Any] = {"__name__": module}
     exec(source, names)
     return names["area"]
 
@@ -48,9 +48,13 @@ def area(x):
 
 
 def fingerprint(
-    scale: str = "2.0", body: str = "x * x", other: str = "x", options: object = "f8(f8)"
+    scale: str = "2.0",
+    body: str = "x * x",
+    other: str = "x",
+    options: object = "f8(f8)",
+    module: str = "areas",
 ) -> str:
-    area = function_of(HELPER.format(scale=scale, body=body, other=other))
+    area = function_of(HELPER.format(scale=scale, body=body, other=other), module)
     assert isinstance(area, FunctionType)
     helpers = {area.__globals__["square"], area.__globals__["unused"]}
     return fingerprint_of(area, helpers, options)[0]
@@ -61,6 +65,8 @@ def test_fingerprint_changes_with_what_the_code_depends_on_and_nothing_else() ->
     assert fingerprint() != fingerprint(body="x * x * x")
     assert fingerprint() != fingerprint(scale="3.0")
     assert fingerprint() != fingerprint(options="f4(f4)")
+    # Compiled code names the modules of its functions: what was moved is compiled again.
+    assert fingerprint() != fingerprint(module="rooms.areas")
 
 
 def test_kernels_have_fingerprints_of_their_own() -> None:

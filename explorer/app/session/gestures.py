@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from explorer.app.state.actions import Action, Open, Reset, SetMode
+from explorer.app.state.action import Action
+from explorer.app.state.actions import Open, Reset, SetMode
 from explorer.app.state.drawable import check_drawable
 from explorer.app.state.presses import Press
 from explorer.app.state.state import Gesture, State

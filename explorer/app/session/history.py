@@ -10,20 +10,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from explorer.app.features.optimise.actions import Advance as ShowIterates, Compare
-from explorer.app.features.paths.actions import Advance as PlayOn, Play, TakePlan
 from explorer.app.session.gestures import ByHand
-from explorer.app.session.step_words import words
-from explorer.app.state.actions import MarkSaved
 from explorer.app.state.presses import Press
 from explorer.app.state.state import State
 from explorer.errors import InputError
 
 # Beyond so many the oldest are forgotten.
 MOST_STEPS = 1000
-
-GO_ON = (ShowIterates, Compare, PlayOn, Play, TakePlan, MarkSaved)
-"""Actions that belong to the step before them."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +77,7 @@ class History:
         here, kept = self.step, document(state)
         if state.optimisation.is_on or kept == here.state:
             return self
-        if isinstance(act.action, GO_ON):
+        if act.action.continues:
             return replace(self, steps=_with(self.steps, self.at, replace(here, state=kept)))
         done = self.steps[: self.at + 1]
         if self._goes_on(act):
@@ -92,10 +85,10 @@ class History:
                 # Back where it began.
                 return History(done[:-1], self.at - 1)
             before = self.steps[max(self.at - 1, 0)].state
-            called, press = words(act.action, before, kept), act.press or here.press
+            called, press = act.action.describe(before, kept), act.press or here.press
             step = Step(here.number, called, kept, here.source, act.time, press)
             return History((*done[:-1], step), self.at, is_open=True)
-        called = words(act.action, here.state, kept)
+        called = act.action.describe(here.state, kept)
         step = Step(here.number + 1, called, kept, act.source, act.time, act.press)
         done = (*done, step)[-MOST_STEPS:]
         return History(done, len(done) - 1, is_open=True)

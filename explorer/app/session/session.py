@@ -10,11 +10,11 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from explorer.app.session.field_words import message_of
 from explorer.app.session.gestures import ByHand
 from explorer.app.session.history import History, begun, restored
 from explorer.app.session.jobs import LatestWins
-from explorer.app.state.actions import Action
-from explorer.app.state.field_words import message_of
+from explorer.app.state.action import Action
 from explorer.app.state.frame import Frame
 from explorer.app.state.presses import Press
 from explorer.app.state.state import State
@@ -173,6 +173,6 @@ class Session:
 
 
 @dataclass(frozen=True)
-class _Nothing:
+class _Nothing(Action):
     def apply(self, state: State) -> State:
         return state

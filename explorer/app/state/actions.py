@@ -6,11 +6,12 @@ An action turns one state into the next, or raises an `ExplorerError` and change
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import ClassVar
 
 import msgspec
 import numpy as np
 
+from explorer.app.state.action import Action, changes
 from explorer.app.state.clear_length import clear_length
 from explorer.app.state.state import (
     Hold,
@@ -25,27 +26,19 @@ from explorer.app.state.state import (
 )
 from explorer.app.state.view import View
 from explorer.errors import InputError
-from explorer.mechanism.design import VARIABLES, Design, Limits
+from explorer.mechanism.design import JOINTS, VARIABLES, Design, Limits
 from explorer.mechanism.feasible_intervals import feasible_intervals, nearest_feasible
 from explorer.mechanism.kinematics import discriminants, forward
+from explorer.mechanism.margins import mode_name
 from explorer.mechanism.pose import Pose, Triple
-
-
-class Action(Protocol):
-    """A change of the state."""
-
-    def apply(self, state: State) -> State:
-        """Return the next state.
-
-        Raises:
-            ExplorerError: the change is not possible; the state stays as it was.
-        """
-        ...
+from explorer.numerics.number_text import significant
 
 
 @dataclass(frozen=True)
-class Open:
+class Open(Action):
     """Open a design in its home pose; the view, comparisons and studies stay."""
+
+    template: ClassVar[str] = "Open {design}"
 
     design: Design
 
@@ -68,8 +61,10 @@ class Open:
 
 
 @dataclass(frozen=True)
-class Reset:
+class Reset(Action):
     """Return to the design as it was opened, in its home pose."""
+
+    template: ClassVar[str] = "Reset to {design} as it was opened"
 
     def apply(self, state: State) -> State:
         """Return the next state."""
@@ -77,8 +72,10 @@ class Reset:
 
 
 @dataclass(frozen=True)
-class GoHome:
+class GoHome(Action):
     """Move to the home pose."""
+
+    template: ClassVar[str] = "Home pose"
 
     def apply(self, state: State) -> State:
         """Return the next state."""
@@ -86,7 +83,7 @@ class GoHome:
 
 
 @dataclass(frozen=True)
-class SetJoint:
+class SetJoint(Action):
     """Set one joint, named by its index in `JOINTS`; the others stay."""
 
     joint: int
@@ -105,10 +102,16 @@ class SetJoint:
             state, pose=pose, yaw_pitch_roll=angles_of(pose), joints=joints, unclosed=None
         )
 
+    def words(self) -> str:
+        """Return what the action does."""
+        return f"{JOINTS[self.joint]} = {significant(self.value, 6)}"
+
 
 @dataclass(frozen=True)
-class UseNearest:
+class UseNearest(Action):
     """Take the nearest length that closes and stays clear, where the one asked for does not."""
+
+    template: ClassVar[str] = "Nearest usable length"
 
     def apply(self, state: State) -> State:
         """Return the next state, with a remark on what was taken."""
@@ -124,7 +127,7 @@ class UseNearest:
 
 
 @dataclass(frozen=True)
-class SetPosition:
+class SetPosition(Action):
     """Set one coordinate of b4, 0 to 2."""
 
     axis: int
@@ -137,9 +140,13 @@ class SetPosition:
         x, y, z = position
         return moved(state, Pose((x, y, z), state.pose.quaternion), state.yaw_pitch_roll)
 
+    def words(self) -> str:
+        """Return what the action does."""
+        return f"{'xyz'[self.axis]} = {significant(self.value, 6)}"
+
 
 @dataclass(frozen=True)
-class SetAngle:
+class SetAngle(Action):
     """Set yaw, pitch or roll, 0 to 2, in degrees."""
 
     axis: int
@@ -153,9 +160,13 @@ class SetAngle:
         pose = Pose.of_yaw_pitch_roll(state.pose.position, angles)
         return moved(state, pose, (yaw, pitch, roll))
 
+    def words(self) -> str:
+        """Return what the action does."""
+        return f"{('yaw', 'pitch', 'roll')[self.axis]} = {significant(self.value, 6)}°"
+
 
 @dataclass(frozen=True)
-class SetPose:
+class SetPose(Action):
     """Set the whole pose, for instance by the drag handle."""
 
     pose: Pose
@@ -164,10 +175,18 @@ class SetPose:
         """Return the next state."""
         return moved(state, self.pose)
 
+    def words(self) -> str:
+        """Return what the action does."""
+        p = self.pose.position
+        size = max(map(abs, p))
+        return f"Move b4 to {', '.join(significant(x, 4, size=size) for x in p)}"
+
 
 @dataclass(frozen=True)
-class StartThere:
+class StartThere(Action):
     """Move to a pose, and let what can be reached be reached from there."""
+
+    template: ClassVar[str] = "Start where nothing is in the way"
 
     pose: Pose
 
@@ -178,7 +197,7 @@ class StartThere:
 
 
 @dataclass(frozen=True)
-class SetMode:
+class SetMode(Action):
     """Jump to another assembly mode of the same joints."""
 
     mode: int
@@ -197,10 +216,16 @@ class SetMode:
             unclosed=None,
         )
 
+    def words(self) -> str:
+        """Return what the action does."""
+        return f"Assembly mode {self.mode} ({mode_name(self.mode)})"
+
 
 @dataclass(frozen=True)
-class SetVariable:
+class SetVariable(Action):
     """Set one design variable, named as in `VARIABLES`; pose or legs are held."""
+
+    template: ClassVar[str] = "{action.name} = {action.value:.6g}"
 
     name: str
     value: float
@@ -231,8 +256,10 @@ class SetVariable:
 
 
 @dataclass(frozen=True)
-class SetName:
+class SetName(Action):
     """Give the design another name."""
+
+    template: ClassVar[str] = "Call it {design}"
 
     name: str
 
@@ -251,8 +278,10 @@ class SetName:
 
 
 @dataclass(frozen=True)
-class MarkSaved:
+class MarkSaved(Action):
     """Take a design that has been saved as the one to which reset returns."""
+
+    continues: ClassVar[bool] = True
 
     design: Design
 
@@ -266,8 +295,10 @@ class MarkSaved:
 
 
 @dataclass(frozen=True)
-class SetUnit:
+class SetUnit(Action):
     """Set the millimetres in one design unit."""
+
+    template: ClassVar[str] = "Design unit = {action.unit_mm:.6g} mm"
 
     unit_mm: float
 
@@ -282,7 +313,7 @@ class SetUnit:
 
 
 @dataclass(frozen=True)
-class SetLimits:
+class SetLimits(Action):
     """Set the limits; the mechanism stays where it is, within them or not."""
 
     limits: Limits
@@ -296,10 +327,16 @@ class SetLimits:
         check_free(state)
         return replace(state, design=msgspec.structs.replace(state.design, limits=self.limits))
 
+    def describe(self, before: State, after: State) -> str:
+        """Return what the step did."""
+        return changes("Limits", before.design.limits, after.design.limits)
+
 
 @dataclass(frozen=True)
-class SetHold:
+class SetHold(Action):
     """Choose what stays when the design changes."""
+
+    template: ClassVar[str] = "Hold the {action.hold}"
 
     hold: Hold
 
@@ -309,7 +346,7 @@ class SetHold:
 
 
 @dataclass(frozen=True)
-class SetView:
+class SetView(Action):
     """Change what is shown."""
 
     view: View
@@ -324,6 +361,10 @@ class SetView:
         if warn is not None and not (np.isfinite(warn) and warn > 0.0):
             raise InputError(f"the warning length must be positive; got {warn:g}")
         return replace(state, view=self.view)
+
+    def describe(self, before: State, after: State) -> str:
+        """Return what the step did."""
+        return changes("View", before.view, after.view)
 
 
 def moved(state: State, pose: Pose, yaw_pitch_roll: Triple | None = None) -> State:

@@ -15,7 +15,7 @@ import viser
 
 from explorer.app.browser.viser_gaps import Mark, MarksOf
 from explorer.app.session.session import Session
-from explorer.app.state.actions import Action
+from explorer.app.state.action import Action
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
+from explorer.app.state.action import Action, changes
 from explorer.app.state.compared import SLOTS, Look, Pinned
 from explorer.app.state.state import State
 from explorer.errors import InputError
@@ -11,8 +13,10 @@ from explorer.mechanism.design import Design
 
 
 @dataclass(frozen=True)
-class Pin:
+class Pin(Action):
     """Keep a copy of a design beside the live one, in the first place that is free."""
+
+    template: ClassVar[str] = "Pin {action.design.name}"
 
     design: Design
 
@@ -36,8 +40,10 @@ class Pin:
 
 
 @dataclass(frozen=True)
-class Unpin:
+class Unpin(Action):
     """Let go of the design in a place, 0 to 2; where there is none, nothing happens."""
+
+    template: ClassVar[str] = "Unpin {action.place}"
 
     slot: int
 
@@ -52,7 +58,7 @@ class Unpin:
 
 
 @dataclass(frozen=True)
-class SetLook:
+class SetLook(Action):
     """Change how designs are compared."""
 
     look: Look
@@ -60,6 +66,10 @@ class SetLook:
     def apply(self, state: State) -> State:
         """Return the next state."""
         return replace(state, compared=replace(state.compared, look=self.look))
+
+    def describe(self, before: State, after: State) -> str:
+        """Return what the step did."""
+        return changes("Compare", before.compared.look, after.compared.look)
 
 
 def _with_pinned(state: State, slot: int, design: Design | None) -> State:

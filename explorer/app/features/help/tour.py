@@ -6,7 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from explorer.app.features.optimise.actions import StartRun
-from explorer.app.state.actions import Action, GoHome, SetPosition, SetVariable, SetView
+from explorer.app.state.action import Action
+from explorer.app.state.actions import GoHome, SetPosition, SetVariable, SetView
 from explorer.app.state.frame import Frame
 
 # What the tour does by itself: how far it moves the platform, in reaches, how near a

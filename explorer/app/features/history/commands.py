@@ -12,7 +12,8 @@ from explorer.app.features.designs.shelf import Shelf
 from explorer.app.features.paths.actions import Play
 from explorer.app.features.singularity.actions import GoToSingularity
 from explorer.app.session.session import Session
-from explorer.app.state.actions import Action, SetMode, SetView
+from explorer.app.state.action import Action
+from explorer.app.state.actions import SetMode, SetView
 from explorer.app.state.state import State
 from explorer.app.widgets.palette import Command
 

@@ -8,9 +8,10 @@ from typing import cast
 import msgspec
 import viser
 
+from explorer.app.session.field_words import SWINGS
 from explorer.app.session.session import Session
-from explorer.app.state.actions import Action, Open, Reset, SetHold, SetLimits, SetUnit, SetVariable
-from explorer.app.state.field_words import SWINGS
+from explorer.app.state.action import Action
+from explorer.app.state.actions import Open, Reset, SetHold, SetLimits, SetUnit, SetVariable
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import Hold, State
 from explorer.app.widgets.assigning import Update

@@ -9,10 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import msgspec
 
 from explorer.app.features.optimise.problem import problem_of, refuted
+from explorer.app.state.action import Action, changes
 from explorer.app.state.actions import check_free, moved
 from explorer.app.state.optimisation import PLACE, Comparison, SearchResult, Wish
 from explorer.app.state.state import Optimisation, Run, State
@@ -29,7 +31,7 @@ LONGEST_NAME = 100
 
 
 @dataclass(frozen=True)
-class SetWish:
+class SetWish(Action):
     """Change what is asked for."""
 
     wish: Wish
@@ -47,9 +49,13 @@ class SetWish:
             wish = replace(wish, free=(*wish.free, YAW, PLACE))
         return replace(state, optimisation=replace(state.optimisation, wish=wish, refusal=None))
 
+    def describe(self, before: State, after: State) -> str:
+        """Return what the step did."""
+        return changes("Wanted", before.optimisation.wish, after.optimisation.wish)
+
 
 @dataclass(frozen=True)
-class StartRun:
+class StartRun(Action):
     """Begin to look for the best design."""
 
     def apply(self, state: State) -> State:
@@ -87,8 +93,10 @@ class StartRun:
 
 
 @dataclass(frozen=True)
-class LiftBox:
+class LiftBox(Action):
     """Take the box out of the design's limits; its home pose stays where it is."""
+
+    template: ClassVar[str] = "Lift the box"
 
     def apply(self, state: State) -> State:
         """Return the next state.
@@ -101,8 +109,10 @@ class LiftBox:
 
 
 @dataclass(frozen=True)
-class TakePaperBox:
+class TakePaperBox(Action):
     """Bound the design by the box of the paper's optimum; its home pose stays where it is."""
+
+    template: ClassVar[str] = "Take the paper's box"
 
     def apply(self, state: State) -> State:
         """Return the next state.
@@ -115,7 +125,7 @@ class TakePaperBox:
 
 
 @dataclass(frozen=True)
-class CancelRun:
+class CancelRun(Action):
     """Ask the run to end."""
 
     def apply(self, state: State) -> State:
@@ -124,8 +134,10 @@ class CancelRun:
 
 
 @dataclass(frozen=True)
-class Advance:
+class Advance(Action):
     """Show iterates of a run, the last of which is drawn."""
+
+    continues: ClassVar[bool] = True
 
     number: int
     iterates: tuple[Iterate, ...]
@@ -140,8 +152,10 @@ class Advance:
 
 
 @dataclass(frozen=True)
-class EndRun:
+class EndRun(Action):
     """End a run: what it found is shown, or if that is nothing, the user's own design."""
+
+    template: ClassVar[str] = "Optimise: {design}"
 
     number: int
     verdict: SearchResult
@@ -160,8 +174,10 @@ class EndRun:
 
 
 @dataclass(frozen=True)
-class Compare:
+class Compare(Action):
     """Put the measures of own and found design side by side."""
+
+    continues: ClassVar[bool] = True
 
     number: int
     comparison: Comparison
@@ -176,8 +192,10 @@ class Compare:
 
 
 @dataclass(frozen=True)
-class Accept:
+class Accept(Action):
     """Make what was found the design of the user."""
+
+    template: ClassVar[str] = "Accept {design}"
 
     def apply(self, state: State) -> State:
         """Return the next state."""
@@ -189,8 +207,10 @@ class Accept:
 
 
 @dataclass(frozen=True)
-class Revert:
+class Revert(Action):
     """Return to the user's own design in its pose, exactly."""
+
+    template: ClassVar[str] = "Revert to {design}"
 
     def apply(self, state: State) -> State:
         """Return the next state."""

@@ -32,7 +32,7 @@ from explorer.app.features.optimise.words import (
     verdict_words,
 )
 from explorer.app.session.session import Session
-from explorer.app.state.actions import Action
+from explorer.app.state.action import Action
 from explorer.app.state.frame import Frame
 from explorer.app.state.optimisation import PLACE, Wish
 from explorer.app.state.state import State

@@ -15,7 +15,7 @@ from explorer.app.features.optimise.actions import Advance, Compare, EndRun
 from explorer.app.session.faults import Faults
 from explorer.app.session.jobs import Worker
 from explorer.app.session.session import Session
-from explorer.app.state.actions import Action
+from explorer.app.state.action import Action
 from explorer.app.state.frame import Frame
 from explorer.app.state.optimisation import SearchResult, cut_short, verdict_of
 from explorer.app.state.state import Run, State

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import ClassVar, Literal
 
+from explorer.app.state.action import Action
 from explorer.app.state.actions import moved
 from explorer.app.state.paths import Journey, Paths
 from explorer.app.state.state import State, joints_of
@@ -16,8 +17,10 @@ from explorer.mechanism.pose import Pose
 
 
 @dataclass(frozen=True)
-class ChooseModes:
+class ChooseModes(Action):
     """Choose from which assembly mode to which to go."""
+
+    template: ClassVar[str] = "Path from mode {action.first} to {action.last}"
 
     first: int
     last: int
@@ -28,8 +31,10 @@ class ChooseModes:
 
 
 @dataclass(frozen=True)
-class WatchModes:
+class WatchModes(Action):
     """Go the straight way from one assembly mode of the present joints to another."""
+
+    template: ClassVar[str] = "Watch the path between modes"
 
     def apply(self, state: State) -> State:
         """Return the next state, at the start of the path, playing.
@@ -65,8 +70,10 @@ def chosen_modes(state: State) -> tuple[int, int]:
 
 
 @dataclass(frozen=True)
-class SetPathTime:
+class SetPathTime(Action):
     """Go to a time on the path, in seconds."""
+
+    template: ClassVar[str] = "Path at {action.seconds:.3g} s"
 
     seconds: float
 
@@ -85,8 +92,10 @@ class SetPathTime:
 
 
 @dataclass(frozen=True)
-class Play:
+class Play(Action):
     """Let time go on along the path, from its start if it is at its end; or stop it."""
+
+    continues: ClassVar[bool] = True
 
     on: bool
 
@@ -105,8 +114,10 @@ class Play:
 
 
 @dataclass(frozen=True)
-class Advance:
+class Advance(Action):
     """Let so many seconds pass on the path, if it is playing; at its end it stops."""
+
+    continues: ClassVar[bool] = True
 
     seconds: float
 
@@ -121,8 +132,10 @@ class Advance:
 
 
 @dataclass(frozen=True)
-class StoreEnd:
+class StoreEnd(Action):
     """Keep the present pose as the start or the goal of a path to plan."""
+
+    template: ClassVar[str] = "Store the {action.end} of a path"
 
     end: Literal["start", "goal"]
 
@@ -134,8 +147,10 @@ class StoreEnd:
 
 
 @dataclass(frozen=True)
-class SetPlanSeconds:
+class SetPlanSeconds(Action):
     """Set how long to look for a path, in seconds."""
+
+    template: ClassVar[str] = "Plan for {action.seconds:.3g} s"
 
     seconds: float
 
@@ -151,8 +166,10 @@ class SetPlanSeconds:
 
 
 @dataclass(frozen=True)
-class Plan:
+class Plan(Action):
     """Ask for a path from the stored start to the stored goal."""
+
+    template: ClassVar[str] = "Plan a path"
 
     def apply(self, state: State) -> State:
         """Return the next state.
@@ -172,8 +189,10 @@ class Plan:
 
 
 @dataclass(frozen=True)
-class CancelPlan:
+class CancelPlan(Action):
     """Do not go on planning."""
+
+    template: ClassVar[str] = "Stop planning"
 
     def apply(self, state: State) -> State:
         """Return the next state."""
@@ -181,7 +200,7 @@ class CancelPlan:
 
 
 @dataclass(frozen=True)
-class TakePlan:
+class TakePlan(Action):
     """Take the path that a request has led to, or why there is none; late answers are dropped.
 
     Attributes:
@@ -189,6 +208,8 @@ class TakePlan:
         journey: The path, None without one.
         problem: Why there is none.
     """
+
+    continues: ClassVar[bool] = True
 
     request: int
     journey: Journey | None

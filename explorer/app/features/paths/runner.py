@@ -10,7 +10,7 @@ from explorer.app.features.paths.actions import Advance, TakePlan
 from explorer.app.session.faults import Faults
 from explorer.app.session.jobs import Worker
 from explorer.app.session.session import Session
-from explorer.app.state.actions import Action
+from explorer.app.state.action import Action
 from explorer.app.state.frame import Frame
 from explorer.app.state.paths import Journey
 from explorer.app.state.state import State

@@ -13,7 +13,8 @@ from explorer.app.features.prototype.feed import PartsFeed
 from explorer.app.features.prototype.parts import Parts
 from explorer.app.features.prototype.parts_list import PartsList
 from explorer.app.session.session import Session
-from explorer.app.state.actions import Action, SetView
+from explorer.app.state.action import Action
+from explorer.app.state.actions import SetView
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from explorer.app.state.action import Action, changes
 from explorer.app.state.actions import moved
 from explorer.app.state.jog import jogged
 from explorer.app.state.state import State
@@ -11,13 +12,15 @@ from explorer.app.state.view import SingularView
 from explorer.errors import InputError
 from explorer.mechanism.margins import INCIDENCES
 from explorer.mechanism.pose import Pose
+from explorer.numerics.number_text import significant
 from explorer.singularity.bruhat import Stratum, codimension, words
 from explorer.singularity.nearest import nearest_singularities
 from explorer.singularity.nearest_stratum import nearest_in_stratum, seen_stratum
+from explorer.singularity.uncoupled import UNCOUPLED
 
 
 @dataclass(frozen=True)
-class SetSingularView:
+class SetSingularView(Action):
     """Change how singularities are shown."""
 
     view: SingularView
@@ -26,9 +29,13 @@ class SetSingularView:
         """Return the next state."""
         return replace(state, view=replace(state.view, singular=self.view))
 
+    def describe(self, before: State, after: State) -> str:
+        """Return what the step did."""
+        return changes("View", before.view.singular, after.view.singular)
+
 
 @dataclass(frozen=True)
-class Jog:
+class Jog(Action):
     """Take one of the six uncoupled motions to an amount from where it began.
 
     Attributes:
@@ -48,6 +55,12 @@ class Jog:
         jog = jogged(self.motion, jog_start(state, self.motion), self.amount)
         return replace(moved(state, jog.pose), jog=jog)
 
+    def words(self) -> str:
+        """Return what the action does."""
+        motion = UNCOUPLED[self.motion]
+        unit = "°" if motion.kind == "rotation" else ""
+        return f"κ{motion.incidence} alone, by {significant(self.amount, 4)}{unit}"
+
 
 def jog_start(state: State, motion: int) -> Pose:
     """Return where a motion begins: where it began if it is in use, else here."""
@@ -56,7 +69,7 @@ def jog_start(state: State, motion: int) -> Pose:
 
 
 @dataclass(frozen=True)
-class GoToStratum:
+class GoToStratum(Action):
     """Move to the nearest pose in a stratum of codimension one or more."""
 
     stratum: Stratum
@@ -85,9 +98,13 @@ class GoToStratum:
             )
         return moved(state, found.pose)
 
+    def words(self) -> str:
+        """Return what the action does."""
+        return f"Go to stratum {name_of(self.stratum)}"
+
 
 @dataclass(frozen=True)
-class GoToSingularity:
+class GoToSingularity(Action):
     """Move to the nearest pose with one of the three incidences, 1 to 3; None: the nearest."""
 
     incidence: int | None
@@ -108,6 +125,12 @@ class GoToSingularity:
             index = nearest.incidence
             raise InputError(f"the pose has κ{index} = 0 already: {INCIDENCES[index - 1]}")
         return moved(state, nearest.pose)
+
+    def words(self) -> str:
+        """Return what the action does."""
+        if self.incidence is None:
+            return "Go to the nearest singular pose"
+        return f"Go to the nearest pose with κ{self.incidence} = 0"
 
 
 def name_of(stratum: Stratum) -> str:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
+from explorer.app.state.action import Action, changes
 from explorer.app.state.actions import Open
 from explorer.app.state.state import State
 from explorer.app.state.studies import Range, Studies, StudyWish, spoken
@@ -15,7 +17,7 @@ MOST_RANGES = 16
 
 
 @dataclass(frozen=True)
-class OpenStudy:
+class OpenStudy(Action):
     """Look at a study by its name, or at none."""
 
     name: str | None
@@ -26,9 +28,13 @@ class OpenStudy:
             return state
         return replace(state, studies=Studies(name=self.name, wish=state.studies.wish))
 
+    def words(self) -> str:
+        """Return what the action does."""
+        return "Close the study" if self.name is None else f"Study {self.name}"
+
 
 @dataclass(frozen=True)
-class BrushAxis:
+class BrushAxis(Action):
     """Ask for designs that lie within ranges of an axis; with none the axis is free."""
 
     axis: str
@@ -42,10 +48,16 @@ class BrushAxis:
         """
         return _with(state, state.studies.brushed(self.axis, _checked(self.axis, self.ranges)))
 
+    def words(self) -> str:
+        """Return what the action does."""
+        return f"{'Brush' if self.ranges else 'Free'} {spoken(self.axis)}"
+
 
 @dataclass(frozen=True)
-class BrushBox:
+class BrushBox(Action):
     """Ask for designs within a box of the scatter plot; without ranges both axes are free."""
+
+    template: ClassVar[str] = "Brush {action.spoken}"
 
     across: str
     up: str
@@ -70,8 +82,10 @@ class BrushBox:
 
 
 @dataclass(frozen=True)
-class ClearBrushes:
+class ClearBrushes(Action):
     """Free all axes."""
+
+    template: ClassVar[str] = "Clear all brushes"
 
     def apply(self, state: State) -> State:
         """Return the next state."""
@@ -79,7 +93,7 @@ class ClearBrushes:
 
 
 @dataclass(frozen=True)
-class SetAxes:
+class SetAxes(Action):
     """Choose what the scatter plot shows and what colours the plots; None for an objective."""
 
     across: str | None
@@ -91,6 +105,10 @@ class SetAxes:
         studies = replace(state.studies, across=self.across, up=self.up, colour=self.colour)
         return _with(state, studies)
 
+    def describe(self, before: State, after: State) -> str:
+        """Return what the step did."""
+        return changes("Plot", before.studies, after.studies)
+
 
 @dataclass(frozen=True)
 class PickDesign(Open):
@@ -100,6 +118,8 @@ class PickDesign(Open):
         index: Of the design in its study.
         study: Its name.
     """
+
+    template: ClassVar[str] = "Pick {design}"
 
     index: int = 0
     study: str = ""
@@ -117,7 +137,7 @@ class PickDesign(Open):
 
 
 @dataclass(frozen=True)
-class SetStudyWish:
+class SetStudyWish(Action):
     """Change the small study that can be started."""
 
     wish: StudyWish
@@ -125,6 +145,10 @@ class SetStudyWish:
     def apply(self, state: State) -> State:
         """Return the next state."""
         return _with(state, replace(state.studies, wish=self.wish))
+
+    def describe(self, before: State, after: State) -> str:
+        """Return what the step did."""
+        return changes("New study", before.studies.wish, after.studies.wish)
 
 
 def _with(state: State, studies: Studies) -> State:

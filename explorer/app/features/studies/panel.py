@@ -23,7 +23,7 @@ from explorer.app.features.studies.runner import Run, StudyRunner
 from explorer.app.features.studies.words import ROWS, chips, legend, run_line, status, table, window
 from explorer.app.session.faults import Faults
 from explorer.app.session.session import Session, Who
-from explorer.app.state.actions import Action
+from explorer.app.state.action import Action
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.state.studies import FEWEST, LEAST_PERCENT, MOST, MOST_PERCENT, StudyWish, spoken

@@ -15,7 +15,8 @@ from explorer.app.features.workspace.feed import WorkspaceFeed
 from explorer.app.features.workspace.slice_map import level_within
 from explorer.app.session.session import Session
 from explorer.app.session.tasks import LIVE_TOLERANCE, STEP, WorkspaceDrawing
-from explorer.app.state.actions import Action, SetView, StartThere
+from explorer.app.state.action import Action
+from explorer.app.state.actions import SetView, StartThere
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
