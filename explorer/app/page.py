@@ -19,6 +19,7 @@ from explorer.app.features.compare.panel import ComparePanel
 from explorer.app.features.designs.panel import DesignsPanel
 from explorer.app.features.designs.shelf import Shelf
 from explorer.app.features.history.panel import HistoryPanel
+from explorer.app.features.legs.feed import RadiusFeed
 from explorer.app.features.legs.panel import LegsPanel
 from explorer.app.features.mechanism.design_panel import DesignPanel
 from explorer.app.features.mechanism.pose_panel import MovePanel
@@ -36,7 +37,7 @@ from explorer.app.features.singularity.jog_panel import JogPanel
 from explorer.app.features.singularity.panel import SingularityPanel
 from explorer.app.features.studies.folders import StudyFolders
 from explorer.app.features.studies.panel import StudiesPanel
-from explorer.app.features.workspace.feed import RadiusFeed, WorkspaceFeed
+from explorer.app.features.workspace.feed import WorkspaceFeed
 from explorer.app.features.workspace.numbers import WorkspaceNumbers
 from explorer.app.features.workspace.panel import WorkspacePanel
 from explorer.app.hands import Hands
@@ -55,6 +56,10 @@ from explorer.app.widgets.assigning import QUIET_SECONDS, Assigner, Update
 from explorer.mechanism.design import Design
 
 TITLE = "Flagged 4-4 explorer"
+# Modules that the worker imports before anything is asked of it.
+TASKS = tuple(
+    f"explorer.app.features.{name}" for name in ("workspace.tasks", "legs.tasks", "compare.drawing")
+)
 # What a notice is called that answers something asked for.
 REFUSAL = "That is not possible"
 # One notice is shown this long, and not again within it.
@@ -109,7 +114,7 @@ class Page:
             state, self._draw, self._complain, self._report, history, press_at=presses.at
         )
         faults = None if keep is None else keep.faults
-        self.worker = Worker(self._tell, faults=faults)
+        self.worker = Worker(self._tell, preload=TASKS, faults=faults)
         self.feed = WorkspaceFeed(self.worker, self.session.redraw)
         self.radius_feed = RadiusFeed(self.worker, self.session.redraw)
         self.strata_feed = StrataFeed(self.worker, self.session.redraw)

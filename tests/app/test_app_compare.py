@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Generator
 from dataclasses import fields, replace
 from html import unescape
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -287,12 +288,12 @@ class Helper:
     def submit(
         self,
         key: object,
-        task: str,
+        task: Callable[..., Any],
         arguments: tuple[ComparedRequest],
         done: Callable[[ComparedDrawing], None],
         failed: Callable[[str], None],
     ) -> None:
-        assert task == "draw_compared"
+        assert task is compared_drawing
         assert callable(failed)
         self.asked.append((key, arguments[0], done))
 

@@ -14,16 +14,17 @@ from typing import Any
 import numpy as np
 import pytest
 
+from explorer.app.features.singularity.tasks import StrataRequest
 from explorer.app.session import faults as module
 from explorer.app.session.faults import Fault, Faults, log_fault, read_fault
 from explorer.app.session.jobs import RESTARTED, Worker
-from explorer.app.session.tasks import StrataRequest
 from explorer.errors import InputError
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.home import home_pose
+from tests.app import telling
 
 ROOT = Path(__file__).resolve().parents[2]
-TASKS = "tests.app.telling"
+TASKS = telling.__name__
 PATIENCE = 120.0
 OPTIMAL = PRESETS["paper-optimal"]
 
@@ -45,7 +46,9 @@ def asked(worker: Worker, task: str, *arguments: Any, tells: bool = True) -> str
     failed: Queue[str] = Queue()
     told: Queue[object] = Queue()
     hear = told.put if tells else None
-    worker.submit("task", task, arguments, lambda _: failed.put("done"), failed.put, hear)
+    worker.submit(
+        "task", getattr(telling, task), arguments, lambda _: failed.put("done"), failed.put, hear
+    )
     return failed.get(timeout=PATIENCE)
 
 
@@ -53,7 +56,7 @@ def test_a_fault_of_a_task_is_kept_whole_and_both_message_and_log_tell_where(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     reports: list[str] = []
-    worker = Worker(reports.append, tasks=TASKS, faults=Faults(tmp_path / "faults"))
+    worker = Worker(reports.append, faults=Faults(tmp_path / "faults"))
     try:
         problem = asked(worker, "fail", 2.5, ("a", "b"))
     finally:
@@ -75,7 +78,7 @@ def test_a_fault_of_a_task_is_kept_whole_and_both_message_and_log_tell_where(
 
 def test_a_request_that_kills_its_process_twice_is_kept(tmp_path: Path) -> None:
     reports: list[str] = []
-    worker = Worker(reports.append, tasks=TASKS, died="it died", faults=Faults(tmp_path))
+    worker = Worker(reports.append, died="it died", faults=Faults(tmp_path))
     try:
         assert asked(worker, "fall", tells=False) == "it died"
     finally:
@@ -87,7 +90,7 @@ def test_a_request_that_kills_its_process_twice_is_kept(tmp_path: Path) -> None:
 
 def test_refusals_and_cancelled_tasks_are_no_faults(tmp_path: Path) -> None:
     reports: list[str] = []
-    worker = Worker(reports.append, tasks=TASKS, faults=Faults(tmp_path))
+    worker = Worker(reports.append, faults=Faults(tmp_path))
     try:
         assert asked(worker, "refuse") == "refused on purpose"
     finally:

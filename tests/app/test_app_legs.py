@@ -13,11 +13,11 @@ import viser
 from desk import Desk, number, rows_of, thick
 
 from explorer.app.features.legs.clearance import ClearanceScene
+from explorer.app.features.legs.feed import RadiusFeed
 from explorer.app.features.legs.panel import LegsPanel, clearance_table, move_table
 from explorer.app.features.legs.swept import SweptTetrahedra
 from explorer.app.features.mechanism.design_panel import DesignPanel
 from explorer.app.features.mechanism.legs import Legs
-from explorer.app.features.workspace.feed import RadiusFeed
 from explorer.app.scene.placing import Placed
 from explorer.app.session.gestures import ByHand
 from explorer.app.session.jobs import Worker

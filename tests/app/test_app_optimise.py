@@ -40,8 +40,8 @@ from explorer.app.features.optimise.runner import Optimiser
 from explorer.app.features.optimise.scene import FARTHEST, box_shown, edges_of, single
 from explorer.app.features.optimise.tasks import compare, optimise
 from explorer.app.features.optimise.words import comparison_table, verdict_words
+from explorer.app.features.sharing.tasks import export_report
 from explorer.app.session.session import UNDO, Session
-from explorer.app.session.tasks import export_report
 from explorer.app.session.worker import Line
 from explorer.app.state.action import Action
 from explorer.app.state.actions import (

@@ -28,12 +28,12 @@ from explorer.app.features.prototype.panel import (
 from explorer.app.features.prototype.parts import Parts, PartsRequest, parts_drawing
 from explorer.app.features.prototype.parts_list import Bar, stock_of
 from explorer.app.features.prototype.scene import PrototypeScene, part_corners, shown_places
+from explorer.app.features.prototype.tasks import export_assembly
 from explorer.app.scene.bodies import Bodies
 from explorer.app.scene.camera import outermost_points
 from explorer.app.scene.creases import creased
 from explorer.app.scene.placing import Placed
 from explorer.app.scene.shapes import cylinder
-from explorer.app.session import tasks
 from explorer.app.session.jobs import Worker
 from explorer.app.state.actions import SetPose, SetPosition, SetUnit, SetVariable, SetView
 from explorer.app.state.frame import Frame
@@ -60,12 +60,12 @@ class AtOnce(Worker):
 
     def __init__(self) -> None:
         super().__init__(lambda _: None)
-        self.done: list[str] = []
+        self.done: list[Callable[..., Any]] = []
 
     def submit(
         self,
         key: object,
-        task: str,
+        task: Callable[..., Any],
         arguments: tuple[Any, ...],
         done: Callable[[Any], None],
         failed: Callable[[str], None],
@@ -76,7 +76,7 @@ class AtOnce(Worker):
         del key, failed, told, is_drawing
         self.done.append(task)
         # As they go to another process and come back.
-        answer = getattr(tasks, task)(*pickle.loads(pickle.dumps(arguments)))
+        answer = task(*pickle.loads(pickle.dumps(arguments)))
         done(pickle.loads(pickle.dumps(answer)))
         return len(self.done)
 
@@ -286,7 +286,7 @@ def test_parts_are_made_anew_when_the_design_changes_and_not_else(
     assert worker.done == []
     for state in (shown(), *states(3), shown(exploded=0.3), shown(density=1.0)):
         feed.follow(Frame(state))
-    assert worker.done == ["draw_parts"]
+    assert worker.done == [parts_drawing]
     for count, state in enumerate(
         (
             SetVariable("a3x", 19.0).apply(shown()),
@@ -424,10 +424,10 @@ def test_files_of_the_assembly_are_those_of_the_library() -> None:
     # In 3MF there are random identities.
     for file_format in set(FORMATS) & {"glb", "stl-zip"}:
         expected = assembly_bytes(make_prototype(OPTIMAL), file_format)
-        assert tasks.export_assembly(OPTIMAL, file_format) == expected
+        assert export_assembly(OPTIMAL, file_format) == expected
     for file_format in ("glb", STEP):
         with pytest.raises(InputError, match="too tight"):
-            tasks.export_assembly(thick(opened(OPTIMAL), 0.4).design, file_format)
+            export_assembly(thick(opened(OPTIMAL), 0.4).design, file_format)
     assert assembly_name("3mf") == "mechanism.3mf"
     assert assembly_name("stl-zip") == "parts-stl.zip"
 
@@ -441,14 +441,14 @@ def test_step_is_exact_faces_or_a_word_on_how_to_get_it(monkeypatch: pytest.Monk
         return b"ISO-10303-21"
 
     monkeypatch.setattr("explorer.export.step_assembly.assembly_step", write)
-    assert tasks.export_assembly(OPTIMAL, STEP) == b"ISO-10303-21"
+    assert export_assembly(OPTIMAL, STEP) == b"ISO-10303-21"
     assert written == [sizes]
     monkeypatch.undo()
     monkeypatch.setitem(sys.modules, "OCP", None)
     for name in [name for name in sys.modules if name.startswith("OCP.")]:
         monkeypatch.delitem(sys.modules, name)
     with pytest.raises(MissingExtraError, match=r"flagged-explorer\[cad\]"):
-        tasks.export_assembly(OPTIMAL, STEP)
+        export_assembly(OPTIMAL, STEP)
 
 
 def test_shares_and_densities_out_of_range_are_refused() -> None:

@@ -16,21 +16,23 @@ from desk import Desk, number, rows_of, thick
 from hypothesis import given, strategies as st
 from PIL import Image
 
+from explorer.app.features.legs.feed import RadiusFeed
 from explorer.app.features.legs.panel import LegsPanel
 from explorer.app.features.legs.radius_plot import chart_of, common_radius, radius_words, volume_at
+from explorer.app.features.legs.tasks import draw_radius_curve
 from explorer.app.features.workspace import reached
-from explorer.app.features.workspace.feed import RadiusFeed, WorkspaceFeed
+from explorer.app.features.workspace.feed import WorkspaceFeed
 from explorer.app.features.workspace.numbers import workspace_summary
 from explorer.app.features.workspace.panel import FORMATS, WorkspacePanel
-from explorer.app.scene.bands import COLLIDING, PLAIN
-from explorer.app.session import tasks
-from explorer.app.session.tasks import (
+from explorer.app.features.workspace.tasks import (
+    LIVE_TOLERANCE,
+    STEP,
     WorkspaceDrawing,
-    draw_radius_curve,
     draw_workspace,
     export_mesh,
     exported_name,
 )
+from explorer.app.scene.bands import COLLIDING, PLAIN
 from explorer.app.state.actions import GoHome, SetLimits, SetPosition, SetVariable, SetView
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, opened
@@ -67,13 +69,13 @@ class Here:
     """Stands for the worker: does what is asked when it is told to, here, and counts."""
 
     def __init__(self) -> None:
-        self.asked: list[tuple[str, Any]] = []
+        self.asked: list[tuple[Callable[..., Any], Any]] = []
         self._waiting: list[Callable[[], None]] = []
 
     def submit(
         self,
         key: object,
-        task: str,
+        task: Callable[..., Any],
         arguments: tuple[Any, ...],
         done: Callable[[Any], None],
         failed: Callable[[str], None],
@@ -83,7 +85,7 @@ class Here:
     ) -> int:
         del key, failed, told, is_drawing
         self.asked.append((task, arguments[0]))
-        self._waiting.append(lambda: done(getattr(tasks, task)(*arguments)))
+        self._waiting.append(lambda: done(task(*arguments)))
         return len(self.asked)
 
     def cancel(self, number: int, patience: float | None) -> None:
@@ -165,7 +167,7 @@ THICK = shown(thick(opened(OPTIMAL), RADIUS))
 
 def test_the_drawing_holds_what_the_library_finds() -> None:
     drawing = drawing_of(THICK)
-    expected = reachable_workspace(THICK.design, tolerance=tasks.LIVE_TOLERANCE * OPTIMAL.reach)
+    expected = reachable_workspace(THICK.design, tolerance=LIVE_TOLERANCE * OPTIMAL.reach)
     assert drawing.reached is not None
     assert drawing.trouble is None
     assert drawing.volume == expected.volume
@@ -189,7 +191,7 @@ def test_faces_where_legs_begin_to_collide_have_a_colour_of_their_own() -> None:
     plain = shells[PLAIN].vertices[shells[PLAIN].faces].mean(axis=1)
     limits = constraints(THICK.design, THICK.pose.rotation)
     on_limits = np.abs(slacks(limits, plain)).min(axis=-1)
-    assert float(on_limits.max()) < 2.0 * tasks.LIVE_TOLERANCE * OPTIMAL.reach
+    assert float(on_limits.max()) < 2.0 * LIVE_TOLERANCE * OPTIMAL.reach
     whole = drawing_of(shown(THICK, region="limits"))
     assert [shell.colour for shell in whole.shells] == [PLAIN]
 
@@ -372,7 +374,7 @@ def test_the_curve_is_computed_on_request_only_and_not_for_other_radii() -> None
     assert feed.drawing is None
     state = curve_shown(opened(OPTIMAL))
     feed.follow(Frame(state))
-    assert [task for task, _ in here.asked] == ["draw_radius_curve"]
+    assert [task for task, _ in here.asked] == [draw_radius_curve]
     for same in (thick(state, 0.3), SetPosition(0, 11.0).apply(state)):
         feed.follow(Frame(same))
     assert len(here.asked) == 1
@@ -527,7 +529,7 @@ def test_the_button_goes_where_ways_can_start(server: viser.ViserServer, desk: D
 def test_what_is_reached_is_exported(what: str) -> None:
     drawing = drawing_of(shown(THICK, hull=True))
     rows = drawing.request.rotation
-    tolerance = tasks.LIVE_TOLERANCE * OPTIMAL.reach
+    tolerance = LIVE_TOLERANCE * OPTIMAL.reach
     data = export_mesh(THICK.design, rows, tolerance, "reachable", None, what, "stl")
     import trimesh
 
@@ -550,13 +552,13 @@ def test_where_nothing_is_reached_nothing_is_exported() -> None:
 def test_step_of_the_workspace_has_its_exact_volume_and_its_faces() -> None:
     state = shown(opened(OPTIMAL), region="limits")
     rows = drawing_of(state).request.rotation
-    data = export_mesh(state.design, rows, 0.1, "limits", None, "workspace", tasks.STEP)
+    data = export_mesh(state.design, rows, 0.1, "limits", None, "workspace", STEP)
     # The head tells the time.
     head, _, body = data.partition(b"DATA;")
     assert body == workspace_step(state.design, np.array(rows)).partition(b"DATA;")[2]
     assert head.startswith(b"ISO-10303-21;")
     assert data.count(b"ADVANCED_FACE") < 20
-    assert tasks.STEP in FORMATS
+    assert STEP in FORMATS
 
 
 @pytest.mark.parametrize(
@@ -568,7 +570,7 @@ def test_step_of_what_has_facets_is_refused_with_what_would_work(
 ) -> None:
     rows = drawing_of(shown(THICK, region="limits")).request.rotation
     with pytest.raises(InputError, match=reason) as refusal:
-        export_mesh(THICK.design, rows, 0.1, region, None, what, tasks.STEP)
+        export_mesh(THICK.design, rows, 0.1, region, None, what, STEP)
     assert "as 3mf, stl, glb, obj or ply it can be exported" in str(refusal.value)
 
 
@@ -576,7 +578,7 @@ def test_step_without_its_extra_says_how_to_get_it(monkeypatch: pytest.MonkeyPat
     monkeypatch.setitem(sys.modules, "OCP.gp", None)
     rows = drawing_of(shown(opened(OPTIMAL), region="limits")).request.rotation
     with pytest.raises(MissingExtraError, match=r"flagged-explorer\[cad\]"):
-        export_mesh(OPTIMAL, rows, 0.1, "limits", None, "workspace", tasks.STEP)
+        export_mesh(OPTIMAL, rows, 0.1, "limits", None, "workspace", STEP)
 
 
 # The radius curve

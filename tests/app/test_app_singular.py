@@ -36,9 +36,9 @@ from explorer.app.features.singularity.panel import SingularityPanel, summary
 from explorer.app.features.singularity.performance import performance_table
 from explorer.app.features.singularity.scene import LONGEST, BallScene, EllipsoidScene, NearestGhost
 from explorer.app.features.singularity.strata import StrataPanel, distances_of, neighbours
+from explorer.app.features.singularity.tasks import StrataRequest, strata_distances
 from explorer.app.scene.placing import Placed
 from explorer.app.session.jobs import Worker
-from explorer.app.session.tasks import StrataRequest, strata_distances
 from explorer.app.state.actions import GoHome, Open, SetPose, SetPosition
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, opened

@@ -16,9 +16,9 @@ import pytest
 from explorer.app.session import jobs
 from explorer.app.session.jobs import RESTARTED, Worker
 from explorer.app.session.worker import CANCELLED
+from tests.app import telling
 
 ROOT = Path(__file__).resolve().parents[2]
-TASKS = "tests.app.telling"
 PATIENCE = 120.0
 # Seconds that nothing here takes, however busy the machine is; and so few that all do.
 NEVER, AT_ONCE = 3600.0, 0.001
@@ -42,7 +42,7 @@ class Ear:
     ) -> None:
         self.number = self._worker.submit(
             key,
-            task,
+            getattr(telling, task),
             arguments,
             lambda value: self._heard.put(("done", value)),
             lambda problem: self._heard.put(("failed", problem)),
@@ -68,7 +68,7 @@ def reports() -> list[str]:
 
 @pytest.fixture
 def worker(reports: list[str]) -> Iterator[Worker]:
-    made = Worker(reports.append, tasks=TASKS, died="it died")
+    made = Worker(reports.append, died="it died")
     yield made
     made.stop()
 
@@ -235,15 +235,16 @@ def test_work_that_kills_its_process_is_tried_twice(
 
 
 def test_no_process_is_left_when_the_parent_is_gone() -> None:
-    code = f"""
+    code = """
 import os, sys
 from explorer.app.session.jobs import Worker
-worker = Worker(print, tasks={TASKS!r})
+from tests.app import telling
+worker = Worker(print)
 def told(value):
     if value == 5:
         print(worker.process_id, flush=True)
         os._exit(0)
-worker.submit("task", "count_until_cut", (), print, print, told=told)
+worker.submit("task", telling.count_until_cut, (), print, print, told=told)
 worker.wait_until_idle(600.0)
 """
     command = [sys.executable, "-c", code]

@@ -10,18 +10,14 @@ from typing import Any, cast
 import msgspec
 import pytest
 
+from explorer.app.features.legs.tasks import RadiusRequest, draw_radius_curve
 from explorer.app.features.workspace import feed as workspace_feed
 from explorer.app.features.workspace.feed import WorkspaceFeed
 from explorer.app.features.workspace.numbers import workspace_summary
 from explorer.app.features.workspace.reached import MOST_LIVE_NODES, reach_workspace
+from explorer.app.features.workspace.tasks import WorkspaceRequest, draw_workspace
 from explorer.app.session.feed import Stage
 from explorer.app.session.jobs import Worker
-from explorer.app.session.tasks import (
-    RadiusRequest,
-    WorkspaceRequest,
-    draw_radius_curve,
-    draw_workspace,
-)
 from explorer.app.session.worker import CancelledError, Line
 from explorer.app.state.actions import SetLimits, SetVariable, SetView
 from explorer.app.state.frame import Frame

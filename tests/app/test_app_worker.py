@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 
 from explorer.app.features.workspace.feed import WorkspaceFeed
+from explorer.app.features.workspace.tasks import WorkspaceDrawing, WorkspaceRequest, draw_workspace
 from explorer.app.scene.bands import COLOURED_EDGE, MOST_COLOURED, split_at
 from explorer.app.session.jobs import RESTARTED, Worker
-from explorer.app.session.tasks import WorkspaceDrawing, WorkspaceRequest, draw_workspace
 from explorer.app.state.actions import SetLimits, SetVariable, SetView
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, opened
@@ -77,7 +77,7 @@ def worker(reports: list[str]) -> Iterator[Worker]:
 
 
 def submit(worker: Worker, answers: Answers, key: object, request: WorkspaceRequest) -> None:
-    worker.submit(key, "draw_workspace", (request,), answers.done, answers.failed)
+    worker.submit(key, draw_workspace, (request,), answers.done, answers.failed)
 
 
 def test_a_task_runs_in_another_process_and_its_result_comes_back(worker: Worker) -> None:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
 from explorer.app.session.jobs import LONG_SECONDS, Worker
-from explorer.app.session.worker import CANCELLED
+from explorer.app.session.worker import CANCELLED, Line
 from explorer.app.state.frame import Frame
 
 
@@ -46,7 +46,7 @@ class Feed(Generic[Request, Drawing]):
 
     Args:
         worker: That computes them.
-        task: The name of a function in `explorer.app.session.tasks`, from requests to drawings.
+        task: A function of the worker, from requests to drawings.
         wanted: The request of a frame, None if nothing is to be drawn.
         redraw: Called when a new one is there.
         key: Of the requests, of which the newest counts; the task if None.
@@ -56,7 +56,7 @@ class Feed(Generic[Request, Drawing]):
     def __init__(
         self,
         worker: Worker,
-        task: str,
+        task: Callable[[Request], Drawing] | Callable[[Request, Line], Drawing],
         wanted: Callable[[Frame], Request | None],
         redraw: Callable[[], None],
         key: object = None,

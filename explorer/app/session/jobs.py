@@ -20,7 +20,15 @@ from dataclasses import dataclass
 from typing import IO, Any, Generic, TypeVar, cast
 
 from explorer.app.session.faults import Fault, Faults, log_fault
-from explorer.app.session.worker import Cancel, Order, Reply, Told, read_frame, write_frame
+from explorer.app.session.worker import (
+    Cancel,
+    Order,
+    Reply,
+    Told,
+    read_frame,
+    ready,
+    write_frame,
+)
 from explorer.files.packaged import SOURCES
 
 Item = TypeVar("Item")
@@ -125,7 +133,7 @@ class Worker:
 
     Args:
         report: Called with a message when the process died or failed unexpectedly.
-        tasks: The module that holds the tasks.
+        preload: The modules that the process imports first, so that its first task starts at once.
         died: What to say when the process died.
         faults: Where requests are kept that failed unexpectedly; None to keep none.
     """
@@ -134,13 +142,13 @@ class Worker:
         self,
         report: Callable[[str], None],
         *,
-        tasks: str = "explorer.app.session.tasks",
+        preload: Sequence[str] = (),
         died: str = "The worker process died over this twice; the next change starts it again.",
         faults: Faults | None = None,
     ) -> None:
         self._report = report
         self._faults = faults
-        self._tasks = tasks
+        self._preload = tuple(preload)
         self._died = died
         self._numbers = itertools.count()
         self._process: subprocess.Popen[bytes] | None = None
@@ -162,7 +170,7 @@ class Worker:
     def submit(
         self,
         key: object,
-        task: str,
+        task: Callable[..., Any],
         arguments: tuple[Any, ...],
         done: Callable[[Any], None],
         failed: Callable[[str], None],
@@ -174,7 +182,7 @@ class Worker:
 
         Args:
             key: What it is about.
-            task: The name of a function in the module of tasks.
+            task: A function of a module; the process imports that module.
             arguments: For it; they and the result must pickle.
             done: Called with the result.
             failed: Called with a message for people instead.
@@ -188,7 +196,7 @@ class Worker:
             A number to cancel it by.
         """
         number = next(self._numbers)
-        order = Order(number, task, arguments, tells=told is not None)
+        order = Order(number, task.__module__, task.__name__, arguments, tells=told is not None)
         request = _Request(key, order, done, failed, told, is_drawing)
         self._queue.post(key, number, request)
         self._hurry(key)
@@ -256,7 +264,7 @@ class Worker:
 
     def start(self, then: Callable[[], None] = lambda: None) -> None:
         """Start the process before it is needed; `then` is called when it is there."""
-        self.submit("start", "ready", (), lambda _: then(), lambda _: None)
+        self.submit("start", ready, (), lambda _: then(), lambda _: None)
 
     def wait_until_idle(self, timeout: float) -> bool:
         """Wait until nothing waits and nothing runs; say whether that came about."""
@@ -301,7 +309,7 @@ class Worker:
 
     def _tell(self, request: _Request, message: str, problem: str, trace: str = "") -> None:
         order = request.order
-        fault = Fault(self._tasks, order.task, order.arguments, order.tells, problem, trace)
+        fault = Fault(order.module, order.task, order.arguments, order.tells, problem, trace)
         self._report(log_fault(fault, message, self._faults))
 
     def _is_over(self, request: _Request) -> bool:
@@ -368,9 +376,11 @@ class Worker:
                 self._report(RESTARTED)
             if self._process is None:
                 paths = {"PYTHONPATH": str(SOURCES)}
-                code = "import sys; from explorer.app.session.worker import main; main(sys.argv[1])"
+                code = (
+                    "import sys; from explorer.app.session.worker import main; main(sys.argv[1:])"
+                )
                 self._process = subprocess.Popen(  # noqa: S603 - our own interpreter and words
-                    [sys.executable, "-P", "-c", code, self._tasks],
+                    [sys.executable, "-P", "-c", code, *self._preload],
                     stdin=subprocess.PIPE,
                     stdout=subprocess.PIPE,
                     env={**os.environ, **paths},

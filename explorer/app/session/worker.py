@@ -13,7 +13,7 @@ import queue
 import signal
 import threading
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import IO, Any
 
@@ -30,12 +30,14 @@ class Order:
 
     Attributes:
         number: Of the order.
-        task: The name of a function in the module of tasks.
+        module: The module that holds the task.
+        task: The name of the task, a function, in its module.
         arguments: For it.
         tells: Whether it takes a `Line` to its parent as its last argument.
     """
 
     number: int
+    module: str
     task: str
     arguments: tuple[Any, ...]
     tells: bool = False
@@ -142,11 +144,15 @@ class Inbox:
             self._orders.put(None)
 
 
-def main(module: str) -> None:
+def ready() -> None:
+    """Do nothing: the process that was asked has started."""
+
+
+def main(preload: Sequence[str]) -> None:
     """Do what the parent asks until it closes the pipe.
 
     Args:
-        module: That holds the tasks.
+        preload: The modules to import first, so that the first task starts at once.
     """
     # A terminal sends Ctrl-C to us too; it is the parent who ends us.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -154,19 +160,19 @@ def main(module: str) -> None:
     answers = os.fdopen(os.dup(1), "wb")
     # Whatever a library prints must not get between the frames.
     os.dup2(2, 1)
-    tasks = importlib.import_module(module)
-
+    for module in preload:
+        importlib.import_module(module)
     # Until the kernels are compiled, or loaded, they run interpreted.
     warm_in_background()
     while (order := inbox.next()) is not None:
         try:
-            write_frame(answers, _done(getattr(tasks, order.task), order, inbox, answers))
+            write_frame(answers, _done(order, inbox, answers))
         except BrokenPipeError:
             # The parent is gone: nobody is left to write to, not even on the way out.
             os._exit(1)
 
 
-def _done(task: Callable[..., Any], order: Order, inbox: Inbox, answers: IO[bytes]) -> Reply:
+def _done(order: Order, inbox: Inbox, answers: IO[bytes]) -> Reply:
     number = order.number
     arguments = order.arguments
     if order.tells:
@@ -176,6 +182,7 @@ def _done(task: Callable[..., Any], order: Order, inbox: Inbox, answers: IO[byte
         )
         arguments = (*arguments, line)
     try:
+        task: Callable[..., Any] = getattr(importlib.import_module(order.module), order.task)
         return Reply(number, task(*arguments))
     except ExplorerError as error:
         return Reply(number, problem=str(error))

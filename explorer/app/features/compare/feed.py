@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
-from explorer.app.features.compare.drawing import ComparedDrawing, ComparedRequest
+from explorer.app.features.compare.drawing import ComparedDrawing, ComparedRequest, compared_drawing
 from explorer.app.session.feed import Feed
 from explorer.app.session.jobs import Worker
 from explorer.app.state.compared import SLOTS, unnamed
@@ -36,10 +36,10 @@ class CompareFeed:
         self._feeds = [
             Feed[ComparedRequest, ComparedDrawing](
                 worker,
-                "draw_compared",
+                compared_drawing,
                 partial(_wanted, column),
                 redraw,
-                key=("draw_compared", column),
+                key=("compared", column),
             )
             for column in range(COLUMNS)
         ]

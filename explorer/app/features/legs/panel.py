@@ -8,8 +8,8 @@ from dataclasses import replace
 
 import viser
 
+from explorer.app.features.legs.feed import RadiusFeed
 from explorer.app.features.legs.radius_plot import RadiusPlot
-from explorer.app.features.workspace.feed import RadiusFeed
 from explorer.app.session.session import Session
 from explorer.app.state.actions import SetView
 from explorer.app.state.frame import Frame

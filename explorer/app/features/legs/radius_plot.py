@@ -10,7 +10,7 @@ import viser
 from numpy.typing import NDArray
 from viser import uplot
 
-from explorer.app.features.workspace.feed import RadiusFeed
+from explorer.app.features.legs.feed import RadiusFeed
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.charts import BLUE, ORANGE, TEAL, VIOLET, axis

@@ -11,6 +11,7 @@ import threading
 import time
 from collections.abc import Callable
 
+from explorer.app.features.optimise import tasks
 from explorer.app.features.optimise.actions import Advance, Compare, EndRun
 from explorer.app.session.faults import Faults
 from explorer.app.session.jobs import Worker
@@ -48,9 +49,7 @@ class Optimiser:
         is_drawn: Callable[[], bool],
         faults: Faults | None = None,
     ) -> None:
-        self.worker = Worker(
-            report, tasks="explorer.app.features.optimise.tasks", died=DIED, faults=faults
-        )
+        self.worker = Worker(report, preload=[tasks.__name__], died=DIED, faults=faults)
         self._session = session
         self._is_drawn = is_drawn
         self._stopped = threading.Event()
@@ -91,7 +90,7 @@ class Optimiser:
             self._is_cancelled, self._advanced = False, 0.0
         self._order = self.worker.submit(
             "optimise",
-            "optimise",
+            tasks.optimise,
             (run.problem, run.starts),
             self._ended,
             self._ended,
@@ -152,7 +151,7 @@ class Optimiser:
         boxes = (box, None if box is None else problem.required_box_at(best.values))
         self.worker.submit(
             "compare",
-            "compare",
+            tasks.compare,
             (run.own.design, best.design, margin, boxes),
             lambda found: self._session.do(Compare(run.number, found)),
             lambda _: None,

@@ -11,11 +11,6 @@ from explorer.optimise.problem import Box, Problem
 from explorer.optimise.solver import optimise_design
 
 
-def ready() -> None:
-    """Load what a search needs, so that the first one starts at once."""
-    import scipy.optimize  # noqa: F401 # pyright: ignore[reportUnusedImport]
-
-
 def optimise(problem: Problem, starts: int, line: Line) -> Outcome:
     """Look for the best design, telling each iterate as it is found.
 

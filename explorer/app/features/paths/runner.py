@@ -6,6 +6,7 @@ import threading
 import time
 from collections.abc import Callable
 
+from explorer.app.features.paths import tasks
 from explorer.app.features.paths.actions import Advance, TakePlan
 from explorer.app.session.faults import Faults
 from explorer.app.session.jobs import Worker
@@ -35,9 +36,7 @@ class PathRunner:
     def __init__(
         self, session: Session, report: Callable[[str], None], faults: Faults | None = None
     ) -> None:
-        self.worker = Worker(
-            report, tasks="explorer.app.features.paths.tasks", died=DIED, faults=faults
-        )
+        self.worker = Worker(report, preload=[tasks.__name__], died=DIED, faults=faults)
         self._session = session
         self._stopped = threading.Event()
         self._playing = threading.Event()
@@ -79,7 +78,7 @@ class PathRunner:
 
         self._order = self.worker.submit(
             "plan",
-            "plan",
+            tasks.plan,
             (design, paths.start, paths.goal, paths.seconds),
             found,
             lambda problem: self._end(request, None, problem),

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import msgspec
 
-from explorer.app.features.prototype.parts import Parts, PartsDrawing, PartsRequest
+from explorer.app.features.prototype.parts import Parts, PartsDrawing, PartsRequest, parts_drawing
 from explorer.app.session.feed import Feed
 from explorer.app.session.jobs import Worker
 from explorer.app.state.frame import Frame
@@ -16,7 +16,7 @@ class PartsFeed(Feed[PartsRequest, PartsDrawing]):
     """Parts of the design, made anew when it changes and not when it moves."""
 
     def __init__(self, worker: Worker, redraw: Callable[[], None]) -> None:
-        super().__init__(worker, "draw_parts", _wanted, redraw)
+        super().__init__(worker, parts_drawing, _wanted, redraw)
 
     @property
     def parts(self) -> Parts | None:

@@ -14,15 +14,18 @@ import viser
 
 from explorer.app.features.mechanism.marks import HANDLE_NAME
 from explorer.app.features.prototype.panel import assembly_name
+from explorer.app.features.prototype.tasks import export_assembly
 from explorer.app.features.sharing.reporting import ReportFormat
 from explorer.app.features.sharing.scene_html import Eye, scene_html
 from explorer.app.features.sharing.session_log import SessionLog
+from explorer.app.features.sharing.tasks import export_report, export_session
 from explorer.app.features.sharing.view_picture import check_size, shown_size, view_picture
 from explorer.app.features.workspace.feed import workspace_rows, workspace_start
 from explorer.app.features.workspace.panel import tolerance_of
+from explorer.app.features.workspace.reached import Rows
+from explorer.app.features.workspace.tasks import Region, export_mesh, exported_name
 from explorer.app.session.jobs import Worker
 from explorer.app.session.session import Session, Who
-from explorer.app.session.tasks import Region, Rows, exported_name
 from explorer.app.state.frame import Frame
 from explorer.errors import ExplorerError
 from explorer.export.trajectory import trajectory_csv
@@ -103,7 +106,7 @@ class Downloads:
         name = f"{state.design.name}-{exported_name(region, what).replace(' ', '-')}"
         self._worker.submit(
             ("export", client_id, what),
-            "export_mesh",
+            export_mesh,
             (state.design, rotation, tolerance_of(state), region, start, what, file_format),
             lambda data: client.send_file_download(
                 f"{name}.{file_format}", data, save_immediately=True
@@ -120,7 +123,7 @@ class Downloads:
         name = f"{design.name}-{assembly_name(file_format)}"
         self._worker.submit(
             ("export", client_id, "assembly"),
-            "export_assembly",
+            export_assembly,
             (design, file_format),
             lambda data: client.send_file_download(name, data, save_immediately=True),
             lambda problem: self._complain(problem, client_id),
@@ -190,7 +193,7 @@ class Downloads:
             name = f"{self._session.state.design.name}-session.csv"
             self._worker.submit(
                 ("export", client_id, "session"),
-                "export_session",
+                export_session,
                 (self.log.table(),),
                 lambda data: client.send_file_download(name, data, save_immediately=True),
                 lambda problem: self._complain(problem, client_id),
@@ -216,7 +219,7 @@ class Downloads:
             self._complain(problem, client_id)
 
         arguments = (state.design, state.pose, state.optimisation.record, file_format)
-        self._worker.submit(("report", object()), "export_report", arguments, done, failed)
+        self._worker.submit(("report", object()), export_report, arguments, done, failed)
 
     def _send_made(
         self, client_id: int | None, doing: str, made: Callable[[viser.ClientHandle], Made]

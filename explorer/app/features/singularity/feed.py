@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from explorer.app.features.singularity.tasks import StrataDistances, StrataRequest, strata_distances
 from explorer.app.session.feed import Feed
 from explorer.app.session.jobs import Worker
-from explorer.app.session.tasks import StrataDistances, StrataRequest
 from explorer.app.state.frame import Frame
 from explorer.singularity.strata import GENERIC
 
@@ -19,7 +19,7 @@ class StrataFeed(Feed[StrataRequest, StrataDistances]):
     """Distances to the nearest pose in each stratum."""
 
     def __init__(self, worker: Worker, redraw: Callable[[], None]) -> None:
-        super().__init__(worker, "strata_distances", _wanted, redraw)
+        super().__init__(worker, strata_distances, _wanted, redraw)
 
 
 def _wanted(frame: Frame) -> StrataRequest | None:

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from explorer.app.features.studies import tasks
 from explorer.app.features.studies.actions import OpenStudy
 from explorer.app.features.studies.feed import StudyFeed
 from explorer.app.features.studies.folders import keep_study, study_in
@@ -64,7 +65,7 @@ class StudyRunner:
     ) -> None:
         self.worker = Worker(
             lambda message: complain(message, None),
-            tasks="explorer.app.features.studies.tasks",
+            preload=[tasks.__name__],
             died=DIED,
             faults=faults,
         )
@@ -142,7 +143,7 @@ class StudyRunner:
                 return
             self._run = Run(name, study)
             self._order = self.worker.submit(
-                "study", "run", (study, folder), self._ended, self._failed, told=self._told
+                "study", tasks.run, (study, folder), self._ended, self._failed, told=self._told
             )
         self._feed.look()
         self._session.do(OpenStudy(name), who=who)

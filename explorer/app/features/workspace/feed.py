@@ -8,34 +8,21 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from explorer.app.features.workspace.reached import Rows
+from explorer.app.features.workspace.tasks import WorkspaceDrawing, WorkspaceRequest, draw_workspace
 from explorer.app.session.feed import Feed
 from explorer.app.session.jobs import Worker
-from explorer.app.session.tasks import (
-    RadiusDrawing,
-    RadiusRequest,
-    Rows,
-    WorkspaceDrawing,
-    WorkspaceRequest,
-)
 from explorer.app.state.frame import Frame
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
-from explorer.workspace.accessible.radii import with_radius
 
 
 class WorkspaceFeed(Feed[WorkspaceRequest, WorkspaceDrawing]):
     """Drawings of the workspace."""
 
     def __init__(self, worker: Worker, redraw: Callable[[], None]) -> None:
-        super().__init__(worker, "draw_workspace", _workspace, redraw, has_stages=True)
-
-
-class RadiusFeed(Feed[RadiusRequest, RadiusDrawing]):
-    """Drawings of the reachable volume against the radius of the legs."""
-
-    def __init__(self, worker: Worker, redraw: Callable[[], None]) -> None:
-        super().__init__(worker, "draw_radius_curve", _radius_curve, redraw, has_stages=True)
+        super().__init__(worker, draw_workspace, _workspace, redraw, has_stages=True)
 
 
 def workspace_rotation(frame: Frame) -> FloatArray:
@@ -75,10 +62,3 @@ def _workspace(frame: Frame) -> WorkspaceRequest | None:
         # What nothing is coloured by must not make it all anew.
         warn_below=frame.state.warn_below if coloured else 1.0,
     )
-
-
-def _radius_curve(frame: Frame) -> RadiusRequest | None:
-    if not frame.state.view.radius_curve:
-        return None
-    thin = with_radius(frame.state.design, 0.0)
-    return RadiusRequest(thin, workspace_rows(frame), workspace_start(frame))

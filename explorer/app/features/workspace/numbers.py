@@ -9,8 +9,9 @@ from html import escape
 import viser
 
 from explorer.app.features.workspace.feed import WorkspaceFeed
+from explorer.app.features.workspace.reached import Reached
+from explorer.app.features.workspace.tasks import WorkspaceDrawing
 from explorer.app.scene.bands import COLLIDING, PLAIN, WARN_CONDITION
-from explorer.app.session.tasks import Reached, WorkspaceDrawing
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.colours import css

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from explorer.app.features.workspace.feed import WorkspaceFeed
 from explorer.app.features.workspace.slice_map import level_within
+from explorer.app.features.workspace.tasks import LIVE_TOLERANCE, STEP, WorkspaceDrawing
 from explorer.app.session.session import Session
-from explorer.app.session.tasks import LIVE_TOLERANCE, STEP, WorkspaceDrawing
 from explorer.app.state.action import Action
 from explorer.app.state.actions import SetView, StartThere
 from explorer.app.state.frame import Frame

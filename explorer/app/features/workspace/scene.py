@@ -10,10 +10,10 @@ import viser
 from numpy.typing import NDArray
 
 from explorer.app.features.workspace.feed import WorkspaceFeed, workspace_rotation
+from explorer.app.features.workspace.tasks import WorkspaceDrawing
 from explorer.app.scene.bands import COLLIDING, PLAIN, Shell
 from explorer.app.scene.placing import Placed
 from explorer.app.scene.shapes import Patch
-from explorer.app.session.tasks import WorkspaceDrawing
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.colours import OUTLINE, Rgb, proximity_colour
 from explorer.numerics.arrays import FloatArray

@@ -1,4 +1,4 @@
-"""The heavy tasks that the worker process does; each takes and returns plain values."""
+"""The worker's tasks for the workspace: to draw and measure it, and to write files of it."""
 
 from __future__ import annotations
 
@@ -8,16 +8,12 @@ from typing import Literal
 
 import numpy as np
 
-from explorer.app.features.compare.drawing import ComparedDrawing, ComparedRequest, compared_drawing
-from explorer.app.features.prototype.parts import PartsDrawing, PartsRequest, parts_drawing
-from explorer.app.features.sharing.reporting import ReportFormat, make_report
 from explorer.app.features.workspace.reached import (
     Reached,
     Rows,
     Trouble,
     reach_workspace,
     reached_of,
-    trouble_of,
     watch_of,
 )
 from explorer.app.features.workspace.slice_map import (
@@ -30,24 +26,23 @@ from explorer.app.features.workspace.slice_map import (
 )
 from explorer.app.scene.bands import PLAIN, Colouring, Measure, Shell
 from explorer.app.session.worker import Line
-from explorer.errors import ExplorerError, InputError
-from explorer.export.session_log import SessionTable, session_csv
+from explorer.errors import InputError
 from explorer.mechanism.design import Design
-from explorer.mechanism.pose import Pose, Triple
+from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.stages import unwatched
-from explorer.optimise.record import Record
-from explorer.singularity.bruhat import Stratum
-from explorer.singularity.nearest_stratum import nearest_in_strata
-from explorer.workspace.accessible.radii import RadiusCurve, radius_curve
 from explorer.workspace.limits.constraints import HalfSpace
 from explorer.workspace.slices.volume import NodeCount, workspace_nodes, workspace_volume
 from explorer.workspace.solids.solid import Solid
 from explorer.workspace.solids.solids import convex_hull, cut_solid, workspace_solid
 
 Region = Literal["limits", "reachable"]
+
+
 # Of the reach: the chord tolerance of a live solid.
 LIVE_TOLERANCE = 0.004
+
+
 # The format with exact faces rather than facets.
 STEP = "step"
 
@@ -125,61 +120,6 @@ class WorkspaceDrawing:
     seconds: float
 
 
-@dataclass(frozen=True)
-class RadiusRequest:
-    """Of what to draw the reachable volume against the radius of the legs.
-
-    Attributes:
-        design: The manipulator; its legs without radii, since these do not count.
-        rotation: Platform to base, rows of the matrix.
-        start: From where it is to be reached; None for the home position.
-    """
-
-    design: Design
-    rotation: Rows
-    start: Triple | None
-
-
-@dataclass(frozen=True)
-class RadiusDrawing:
-    """The reachable volume against the radius.
-
-    Attributes:
-        request: What was asked for.
-        curve: None if there is trouble.
-        trouble: Why there is no curve.
-    """
-
-    request: RadiusRequest
-    curve: RadiusCurve | None
-    trouble: Trouble | None
-
-
-@dataclass(frozen=True)
-class StrataRequest:
-    """From which pose to measure the way to each stratum."""
-
-    design: Design
-    pose: Pose
-
-
-@dataclass(frozen=True)
-class StrataDistances:
-    """The root-mean-square way of b1 to b4 to the nearest pose in each of the 24 strata.
-
-    Attributes:
-        request: What was asked for.
-        distances: In design units, by stratum.
-    """
-
-    request: StrataRequest
-    distances: dict[Stratum, float]
-
-
-def ready() -> None:
-    """Do nothing: the process that was asked has started."""
-
-
 def draw_workspace(request: WorkspaceRequest, line: Line | None = None) -> WorkspaceDrawing:
     """Return the workspace, drawn and measured.
 
@@ -235,69 +175,6 @@ def draw_workspace(request: WorkspaceRequest, line: Line | None = None) -> Works
         empty_because=measured.empty_because,
         seconds=time.perf_counter() - begin,
     )
-
-
-def draw_radius_curve(request: RadiusRequest, line: Line | None = None) -> RadiusDrawing:
-    """Return the reachable volume against the radius of all legs; `line` as above."""
-    design, rotation = request.design, np.array(request.rotation)
-    try:
-        curve = radius_curve(design, rotation, start=request.start, watch=watch_of(line))
-    except ExplorerError as error:
-        return RadiusDrawing(request, None, trouble_of(error))
-    return RadiusDrawing(request, curve, None)
-
-
-def strata_distances(request: StrataRequest) -> StrataDistances:
-    """Return how far the pose is from each stratum."""
-    found = nearest_in_strata(request.design, request.pose)
-    return StrataDistances(request, {w: nearest.distance for w, nearest in found.items()})
-
-
-def draw_parts(request: PartsRequest) -> PartsDrawing:
-    """Return the parts of the prototype, or why there are none."""
-    return parts_drawing(request)
-
-
-def draw_compared(request: ComparedRequest) -> ComparedDrawing:
-    """Return the figures of a design that is compared, and its workspace if asked for."""
-    return compared_drawing(request)
-
-
-def export_assembly(design: Design, file_format: str) -> bytes:
-    """Return a file of the prototype, assembled in the home pose.
-
-    Args:
-        design: The manipulator.
-        file_format: As of `explorer.export.assembly`, or "step".
-
-    Raises:
-        ExplorerError: a design too tight for the parts, or a library that is missing.
-    """
-    from explorer.export.assembly import assembly_bytes
-    from explorer.prototype.assembly import make_prototype
-
-    if file_format == "step":
-        from explorer.export.step_assembly import assembly_step
-        from explorer.prototype.fitting import sizes_of
-
-        return assembly_step(sizes_of(design))
-    return assembly_bytes(make_prototype(design), file_format)
-
-
-def export_session(table: SessionTable) -> bytes:
-    """Return the poses of a session as comma-separated values."""
-    return session_csv(table).encode()
-
-
-def export_report(
-    design: Design, pose: Pose, record: Record | None, file_format: ReportFormat
-) -> bytes:
-    """Return the report of a design in a pose, with the search that found it, if one did.
-
-    Raises:
-        ExplorerError: PDF without what prints it.
-    """
-    return make_report(design, pose, record=record, file_format=file_format)
 
 
 def export_mesh(

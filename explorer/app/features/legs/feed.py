@@ -1,0 +1,26 @@
+"""Keeps the radius curve in step with the state."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from explorer.app.features.legs.tasks import RadiusDrawing, RadiusRequest, draw_radius_curve
+from explorer.app.features.workspace.feed import workspace_rows, workspace_start
+from explorer.app.session.feed import Feed
+from explorer.app.session.jobs import Worker
+from explorer.app.state.frame import Frame
+from explorer.workspace.accessible.radii import with_radius
+
+
+class RadiusFeed(Feed[RadiusRequest, RadiusDrawing]):
+    """Drawings of the reachable volume against the radius of the legs."""
+
+    def __init__(self, worker: Worker, redraw: Callable[[], None]) -> None:
+        super().__init__(worker, draw_radius_curve, _radius_curve, redraw, has_stages=True)
+
+
+def _radius_curve(frame: Frame) -> RadiusRequest | None:
+    if not frame.state.view.radius_curve:
+        return None
+    thin = with_radius(frame.state.design, 0.0)
+    return RadiusRequest(thin, workspace_rows(frame), workspace_start(frame))
