@@ -341,7 +341,7 @@ class Monkey:
         if isinstance(value, tuple):
             return [self._number(float(each)) for each in handle.value]
         if isinstance(value, str):
-            return self._random.choice(["", "mine", "../../etc", "<b>x</b>", "κ" * 200, "\x00"])
+            return self._random.choice(["", "mine", "../../etc", "<b>x</b>", "δ" * 200, "\x00"])
         if _is(handle, viser.GuiSliderHandle) and self._random.random() < 0.95:
             return self._random.uniform(handle.min, handle.max)
         return self._number(float(value))

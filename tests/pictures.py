@@ -82,7 +82,7 @@ class Scene:
 SCENES = {
     "home": Scene(),
     "page": Scene(panels=True),
-    # κ2 is small, the other two are not: both lines are orange and all else is blue.
+    # δ2 is small, the other two are not: both lines are orange and all else is blue.
     "near-singular": Scene(
         pose=Pose.of_yaw_pitch_roll((9, 8, 7.5), (-38, 24, 8)),
         actions=(SetView(View(handle=False)),),

@@ -26,7 +26,7 @@ NEARNESS = (1.0, 1e-3, 1e-6)
 """Shares of the size that a3y, b1y and b3 - b2 come down to; at zero they are degenerate."""
 
 WAYS = tuple(way for count in (1, 2, 3) for way in itertools.combinations((1, 2, 3), count))
-"""The ways of being singular: which of κ1, κ2, κ3 vanish."""
+"""The ways of being singular: which of δ1, δ2, δ3 vanish."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ def isolation(case: Case) -> float:
     """Return how far the pose is from being singular in two ways at once, over the size.
 
     It is the second smallest of the margins and the sine between the two lines, on whose
-    vanishing κ2 vanishes too.
+    vanishing δ2 vanishes too.
     """
     sine = math.hypot(case.rotation[1, 0], case.rotation[2, 0])
     found = np.abs(margins(case.position, case.rotation)) / case.size

@@ -122,7 +122,7 @@ MAKERS: tuple[Make, ...] = (
     lambda state, i, share: SetUnit(1.0 + share),
     lambda state, i, share: SetLimits(_limits(i, share)),
     _view,
-    lambda state, i, share: SetSingularView(SingularView(ghost="κ2 = 0", strata=i > 2)),
+    lambda state, i, share: SetSingularView(SingularView(ghost="δ2 = 0", strata=i > 2)),
     lambda state, i, share: Jog(i, _length(share)),
     lambda state, i, share: ChooseModes(i, 7 - i),
     lambda state, i, share: WatchModes(),

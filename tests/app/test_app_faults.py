@@ -33,7 +33,7 @@ def a_fault(number: int = 0, **changes: Any) -> Fault:
     given: dict[str, Any] = {
         "module": TASKS,
         "task": "fail",
-        "arguments": (1.5, ("κ", "−"), np.arange(3.0), StrataRequest(OPTIMAL, home_pose(OPTIMAL))),
+        "arguments": (1.5, ("δ", "−"), np.arange(3.0), StrataRequest(OPTIMAL, home_pose(OPTIMAL))),
         "tells": True,
         "problem": "ValueError: it failed",
         "trace": f'Traceback\n  File "telling.py", line {number}, in fail\nValueError: it failed\n',
@@ -103,7 +103,7 @@ def test_a_kept_request_reads_back_with_all_its_arguments(tmp_path: Path) -> Non
     Faults(tmp_path).keep(a_fault())
     (path,) = tmp_path.iterdir()
     number, words, array, request = read_fault(path).arguments
-    assert (number, words) == (1.5, ("κ", "−"))
+    assert (number, words) == (1.5, ("δ", "−"))
     assert np.array_equal(array, np.arange(3.0))
     assert request == StrataRequest(OPTIMAL, home_pose(OPTIMAL))
     # What people read in it.

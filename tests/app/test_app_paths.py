@@ -127,7 +127,7 @@ def test_a_path_between_modes_leads_from_one_to_the_other_with_the_same_joints(
     assert {i for i, bit in enumerate((4, 2, 1), 1) if (first ^ last) & bit} <= crossed
     words = path_words(journey)
     for incidence in crossed:
-        assert f"κ{incidence} = 0" in words
+        assert f"δ{incidence} = 0" in words
 
 
 def test_the_modes_are_the_present_one_and_its_neighbour_until_they_are_chosen() -> None:
@@ -262,7 +262,7 @@ def test_a_plan_is_made_in_a_process_of_its_own_and_keeps_everything(bench: Benc
     assert not journey.margins.crossings
     least = np.abs(journey.margins.margins).min(axis=0)
     closest = int(least.argmin())
-    assert f"|κ{closest + 1}| = {least[closest]:.3g}" in path_words(journey)
+    assert f"|δ{closest + 1}| = {least[closest]:.3g}" in path_words(journey)
     inner = [journey.pose_at(float(t)) for t in np.linspace(0, journey.trajectory.duration, 50)]
     positions, rotations = ([p.position for p in inner], [p.rotation for p in inner])
     assert poses_are_valid(state.design, np.array(positions), np.array(rotations)).all()

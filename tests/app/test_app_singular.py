@@ -85,7 +85,7 @@ def viewed(state: State, **changes: Any) -> State:
     return SetSingularView(replace(SingularView(), **changes)).apply(state)
 
 
-def kappas(pose: Pose) -> np.ndarray[Any, np.dtype[np.float64]]:
+def deltas(pose: Pose) -> np.ndarray[Any, np.dtype[np.float64]]:
     return margins(pose.position, pose.rotation)
 
 
@@ -173,7 +173,7 @@ def test_the_panel_says_where_one_more_incidence_leads(state: State) -> None:
     words = plain(neighbours(frame, strata_distances(_request(state)).distances))
     assert name_of(here) in words
     for lower in COVERED[here]:
-        zero = ", ".join(f"κ{i}" for i in incidences(lower))
+        zero = ", ".join(f"δ{i}" for i in incidences(lower))
         assert f"{zero} = 0: {', '.join(WORDS[c] for c in conditions(lower))}" in words
     assert ("Both flags coincide" in words) is (here == (1, 2, 3, 4))
 
@@ -182,7 +182,7 @@ def test_the_three_incidences_stand_beside_the_generic_stratum() -> None:
     state = opened(OPTIMAL)
     words = plain(neighbours(Frame(state), strata_distances(_request(state)).distances))
     for index, nearest in enumerate(nearest_singularities(OPTIMAL, state.pose)):
-        assert f"κ{index + 1} = 0: {INCIDENCES[index]} {nearest.distance:.4g}" in words
+        assert f"δ{index + 1} = 0: {INCIDENCES[index]} {nearest.distance:.4g}" in words
 
 
 def test_distances_come_from_the_worker_but_those_of_one_incidence_at_once() -> None:
@@ -210,7 +210,7 @@ def test_a_jog_moves_one_margin_and_no_other(motion: int) -> None:
     others = [i for i in range(3) if i != moved]
     for state in (*random_states(10), *singular_states()):
         after = Jog(motion, float(rng.uniform(-60.0, 60.0))).apply(state)
-        before, now = kappas(state.pose), kappas(after.pose)
+        before, now = deltas(state.pose), deltas(after.pose)
         size = float(np.linalg.norm(after.pose.position)) + 1.0
         np.testing.assert_allclose(now[others], before[others], atol=1e-13 * size)
 
@@ -247,7 +247,7 @@ def test_the_travel_in_the_table_ends_where_the_margin_vanishes(state: State) ->
         for index, row in zip(own, rows_of(travel_table(frame, name)), strict=True):
             motion = UNCOUPLED[index]
             travel = in_shown_units(motion, motion.travel(state.pose))
-            assert row[0].startswith(f"κ{motion.incidence}: ")
+            assert row[0].startswith(f"δ{motion.incidence}: ")
             for shown, end in zip(row[1:], (travel.low, travel.high), strict=True):
                 if math.isinf(end):
                     assert shown == "never"
@@ -255,7 +255,7 @@ def test_the_travel_in_the_table_ends_where_the_margin_vanishes(state: State) ->
                 assert number(shown.rstrip("°")) == pytest.approx(end, rel=1e-2)
                 after = Jog(index, end).apply(state)
                 size = float(np.linalg.norm(after.pose.position)) + 1.0
-                assert abs(kappas(after.pose)[motion.incidence - 1]) < 1e-12 * size
+                assert abs(deltas(after.pose)[motion.incidence - 1]) < 1e-12 * size
 
 
 @pytest.mark.parametrize("state", random_states(4))
@@ -299,7 +299,7 @@ def test_at_a_singular_pose_motions_say_so_and_lead_away() -> None:
         own = [i for i, each in enumerate(UNCOUPLED) if each.frame == motion.frame]
         row = rows_of(travel_table(Frame(state), motion.frame))[own.index(index)]
         assert row[1:] == ["singular", "here"]
-        assert f"κ{motion.incidence} = 0: {INCIDENCES[motion.incidence - 1]}" in plain(
+        assert f"δ{motion.incidence} = 0: {INCIDENCES[motion.incidence - 1]}" in plain(
             summary(Frame(state))
         )
         after = Jog(index, 5.0).apply(state)
@@ -372,7 +372,7 @@ def test_motions_are_drawn_at_singular_poses_too(server: viser.ViserServer, stat
 def test_the_distances_and_their_ghosts(server: viser.ViserServer, state: State) -> None:
     nearest = nearest_singularities(OPTIMAL, state.pose)
     rows = rows_of(distance_table(Frame(state)))
-    assert [row[0] for row in rows] == ["κ1 = 0", "κ2 = 0", "κ3 = 0"]
+    assert [row[0] for row in rows] == ["δ1 = 0", "δ2 = 0", "δ3 = 0"]
     distances = [each.distance for each in nearest]
     assert [number(row[1]) for row in rows] == pytest.approx(distances, rel=1e-3)
     assert [number(row[2]) for row in rows] == pytest.approx(
@@ -380,7 +380,7 @@ def test_the_distances_and_their_ghosts(server: viser.ViserServer, state: State)
     )
     scene = NearestGhost(server.scene)
     least = int(np.argmin(distances))
-    for ghost, index in (("κ1 = 0", 0), ("κ2 = 0", 1), ("κ3 = 0", 2), ("nearest", least)):
+    for ghost, index in (("δ1 = 0", 0), ("δ2 = 0", 1), ("δ3 = 0", 2), ("nearest", least)):
         placed = Placed(Frame(viewed(state, ghost=ghost)))
         drawn = by_name(scene.updates(placed))
         plate, ways = drawn["/nearest/platform"], drawn["/nearest/ways"]["points"]
@@ -388,7 +388,7 @@ def test_the_distances_and_their_ghosts(server: viser.ViserServer, state: State)
         assert plate["wxyz"] == nearest[index].pose.quaternion
         lengths = np.linalg.norm(ways[:, 1] - ways[:, 0], axis=1) / placed.scale
         assert float(np.sqrt((lengths**2).mean())) == pytest.approx(distances[index], rel=1e-4)
-        assert f"κ{index + 1} = 0" in drawn["/nearest/label"]["text"]
+        assert f"δ{index + 1} = 0" in drawn["/nearest/label"]["text"]
         there = attachment_points(
             OPTIMAL, nearest[index].pose.position, nearest[index].pose.rotation
         )
@@ -401,14 +401,14 @@ def test_the_buttons_go_to_the_nearest_pose_and_say_where_it_is_reached(
 ) -> None:
     panel = DistancePanel(server.gui, desk.session)
     expected = nearest_singularities(OPTIMAL, desk.state.pose)[1].pose
-    desk.use(panel.go, "κ2 = 0")
+    desk.use(panel.go, "δ2 = 0")
     assert desk.state.pose == expected
     assert Frame(desk.state).snapshot.stratum == (4, 2, 3, 1)
     drawn = by_name(
-        NearestGhost(server.scene).updates(Placed(Frame(viewed(desk.state, ghost="κ2 = 0"))))
+        NearestGhost(server.scene).updates(Placed(Frame(viewed(desk.state, ghost="δ2 = 0"))))
     )
     assert not any(each["visible"] for each in drawn.values())
-    with pytest.raises(InputError, match="κ2 = 0 already: lines a1a2 and b2b3 meeting"):
+    with pytest.raises(InputError, match="δ2 = 0 already: lines a1a2 and b2b3 meeting"):
         GoToSingularity(2).apply(viewed(GoToStratum((2, 1, 4, 3)).apply(desk.state)))
 
 
@@ -458,7 +458,7 @@ def test_the_ball_touches_the_nearest_singular_plane(
     rng = np.random.default_rng(0)
     away = rng.normal(size=(500, 3))
     inside = p + 0.999 * radius * away / np.linalg.norm(away, axis=1, keepdims=True)
-    assert (np.sign(margins(inside, state.pose.rotation)) == np.sign(kappas(state.pose))).all()
+    assert (np.sign(margins(inside, state.pose.rotation)) == np.sign(deltas(state.pose))).all()
 
 
 @pytest.mark.parametrize("state", singular_states())
@@ -472,11 +472,11 @@ def test_everything_is_told_and_drawn_at_singular_poses(
     frame = Frame(shown)
     words = plain(summary(frame))
     for index in incidences(frame.snapshot.stratum):
-        assert f"κ{index} = 0: {INCIDENCES[index - 1]}" in words
+        assert f"δ{index} = 0: {INCIDENCES[index - 1]}" in words
     panel, feed = SingularityPanel(server.gui, desk.session), StrataFeed(UNUSED, lambda: None)
     texts = [str(v) for _, n, v in panel.updates(frame, feed) if n == "content"]
     assert not any(re.search(r"\b(nan|inf)\b", plain(text)) for text in texts)
-    assert "none: κ" in plain(performance_table(frame))
+    assert "none: δ" in plain(performance_table(frame))
     placed = Placed(frame)
     for scene in (
         EllipsoidScene(server.scene),

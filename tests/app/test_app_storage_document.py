@@ -23,6 +23,7 @@ from explorer.app.storage import document as module
 from explorer.app.storage.document import (
     MOST_BYTES,
     MOST_STEPS,
+    SCHEMA,
     Document,
     Kept,
     SchemaError,
@@ -59,7 +60,7 @@ def _left_run(run: Run) -> Run:
     return replace(run, own=left_of(run.own), iterates=shown, comparison=None)
 
 
-def signed(body: bytes, schema: int = 1, generation: int = 3) -> bytes:
+def signed(body: bytes, schema: int = SCHEMA, generation: int = 3) -> bytes:
     """Return a file with this second line and a checksum that is right."""
     checksum = zlib.crc32(body, zlib.crc32(b"%d %d " % (schema, generation)))
     head = {"schema": schema, "generation": generation, "checksum": checksum}
@@ -282,11 +283,21 @@ def test_the_oldest_file_opens() -> None:
 
 
 def test_a_file_of_a_newer_schema_is_told_from_a_damaged_one() -> None:
-    head = b'{"schema": 2, "generation": 5, "what": "nobody knows"}\n'
+    head = b'{"schema": 3, "generation": 5, "what": "nobody knows"}\n'
     assert decode_header(head, "file").generation == 5
     for rest in (b"", b"anything", b"\xff"):
         with pytest.raises(SchemaError, match="newer"):
             decode_document(head + rest, "file")
+
+
+def test_sessions_of_the_first_schema_name_ghosts_by_kappa() -> None:
+    body = body_of(WHOLE)
+    ghosts = {"nearest", "none", "δ1 = 0", "δ2 = 0", "δ3 = 0"}
+    for ghost in sorted(ghosts):
+        for view in body["columns"]["view"]["values"]:
+            view["singular"]["ghost"] = ghost.replace("δ", "κ")
+        read = decode_document(signed(msgspec.json.encode(body), schema=1), "file")
+        assert read.present.view.singular.ghost == ghost
 
 
 def test_files_of_older_schemas_are_migrated_step_by_step(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -314,8 +325,8 @@ def test_files_of_older_schemas_are_migrated_step_by_step(monkeypatch: pytest.Mo
     old = signed(msgspec.json.encode(body))
     with pytest.raises(StorageError, match="placed"):
         decode_document(old, "file")
-    monkeypatch.setattr(module, "SCHEMA", 3)
-    monkeypatch.setattr(module, "MIGRATIONS", {1: renamed, 2: gathered})
+    monkeypatch.setattr(module, "SCHEMA", SCHEMA + 2)
+    monkeypatch.setattr(module, "MIGRATIONS", {SCHEMA: renamed, SCHEMA + 1: gathered})
     assert decode_document(old, "file").present == left_of(RICH)
     # Shared values are shared again, so that a long history stays small in memory.
     read = decode_document(old, "file")

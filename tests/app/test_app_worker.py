@@ -245,7 +245,7 @@ def test_a_workspace_large_beside_the_reach_is_coloured_with_a_bounded_number_of
 def test_bands_hold_the_values_they_stand_for() -> None:
     for shell in draw_workspace(a_request(colour="margin")).shells:
         index = band_colours().index(shell.colour)
-        # At this orientation κ1 and κ3 are ∓z, and κ2 is z times a sine below one.
+        # At this orientation δ1 and δ3 are ∓z, and δ2 is z times a sine below one.
         sine = abs(float(home_pose(OPTIMAL).rotation[1, 0]))
         values = sine * shell.vertices[:, 2]
         assert values.min() >= BAND_EDGES[index] - 1e-9

@@ -45,7 +45,7 @@ KEYS = (
     "Home",
     *"abcdefghijklmnopqrstuvwxyz0123456789?",
 )
-TEXTS = ("0", "12.5", "-3", "1e9", "abc", "", "-", "99999999999999999999", "κ")
+TEXTS = ("0", "12.5", "-3", "1e9", "abc", "", "-", "99999999999999999999", "δ")
 
 # viser's page does the updates of a frame after its removals, and then complains: a card that
 # is put away within a frame of its last change. And it is told of removals that were before its

@@ -21,7 +21,7 @@ from explorer.mechanism.home import home_pose
 from explorer.mechanism.kinematics import forward
 
 LABELS = [JOINT_LABELS[name] for name in JOINTS]
-MODE_LABEL = "κ1 κ2 κ3"
+MODE_LABEL = "δ1 δ2 δ3"
 
 
 def assert_page_shows_state(tab: Tab) -> None:

@@ -163,7 +163,7 @@ def with_the_camera_turned(stage: Stage) -> None:
         with_the_platform_aside,
         with_the_camera_turned,
     ],
-    ids=["no κ1", "no κ2", "no κ3", "orange flags", "platform aside", "camera turned by 1°"],
+    ids=["no δ1", "no δ2", "no δ3", "orange flags", "platform aside", "camera turned by 1°"],
 )
 def test_an_altered_scene_is_told_from_the_stored_one(stage: Stage, alter: Alteration) -> None:
     alter(stage)

@@ -18,7 +18,7 @@ from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 
 
-def kappas(tab: Tab) -> FloatArray:
+def deltas(tab: Tab) -> FloatArray:
     pose = tab.state.pose
     return margins(pose.position, pose.rotation)
 
@@ -35,23 +35,23 @@ def test_a_click_on_the_diagram_moves_to_the_stratum(tab: Tab) -> None:
     assert box["width"] <= 1.0
     tab.page.locator("label[title^='(3, 4, 1, 2)']").click()
     tab.wait_for(lambda: Frame(tab.state).snapshot.stratum == (3, 4, 1, 2), "the stratum")
-    expect(tab.page.get_by_text("κ3 = 0: b4 on the base plane", exact=False).first).to_be_visible()
-    assert np.abs(kappas(tab)[[0, 2]]).max() < 1e-9
+    expect(tab.page.get_by_text("δ3 = 0: b4 on the base plane", exact=False).first).to_be_visible()
+    assert np.abs(deltas(tab)[[0, 2]]).max() < 1e-9
 
 
 def test_a_jog_moves_one_margin_by_mouse_and_by_keyboard(tab: Tab) -> None:
-    before = kappas(tab)
-    tab.drag("κ2: about z (°)", 0.6)
+    before = deltas(tab)
+    tab.drag("δ2: about z (°)", 0.6)
     tab.wait_for(lambda: tab.state.jog_in_use is not None, "a jog")
-    tab.type("κ2: about z (°)", "-30\n")
+    tab.type("δ2: about z (°)", "-30\n")
     tab.wait_for(
         lambda: tab.state.jog_in_use is not None and tab.state.jog_in_use.amount == -30.0, "-30°"
     )
-    after = kappas(tab)
+    after = deltas(tab)
     np.testing.assert_allclose(after[[0, 2]], before[[0, 2]], atol=1e-12)
     assert abs(after[1] - before[1]) > 0.1
     tab.push("Home pose")
-    tab.wait_until_shown("κ2: about z (°)", 0.0)
+    tab.wait_until_shown("δ2: about z (°)", 0.0)
 
 
 def test_a_path_is_watched_planned_and_saved(tab: Tab, monkeypatch: pytest.MonkeyPatch) -> None:

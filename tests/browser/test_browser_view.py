@@ -26,7 +26,7 @@ def test_every_switch_of_the_view_switches_its_part_and_no_other(tab: Tab) -> No
     tab.turn_to("View")
     switches = {label: shows(name) for name, label, _ in SWITCHES}
     for index, points in enumerate(TETRAHEDRA):
-        switches[f"κ{index + 1}: {' '.join(points)}"] = shows_tetrahedron(index)
+        switches[f"δ{index + 1}: {' '.join(points)}"] = shows_tetrahedron(index)
     switches["6-4 twin"] = shows("twin")
     before = tab.state.view
     for label, part in switches.items():

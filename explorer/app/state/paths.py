@@ -75,7 +75,7 @@ class Paths:
 
     Attributes:
         modes: From which assembly mode to which to go; None for the present one, and for
-            the one beyond κ1 = 0 from the first.
+            the one beyond δ1 = 0 from the first.
         start, goal: Of the path to plan; None until they are stored.
         seconds: For planning.
         request: The number of the last request to plan; 0 before the first.

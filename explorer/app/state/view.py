@@ -70,7 +70,7 @@ class PrototypeView:
             )
 
 
-Ghost = Literal["none", "κ1 = 0", "κ2 = 0", "κ3 = 0", "nearest"]
+Ghost = Literal["none", "δ1 = 0", "δ2 = 0", "δ3 = 0", "nearest"]
 
 
 Arrows = Literal["one in use", "all six", "none"]

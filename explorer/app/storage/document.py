@@ -19,12 +19,23 @@ from explorer.app.storage.saved import SavedSession, restored, saved
 from explorer.errors import ExplorerError, InputError, StorageError
 from explorer.mechanism.design_file import MIGRATIONS as MIGRATIONS_OF_DESIGNS, up_to_date
 
-SCHEMA = 1
-"""Of what is written; files of an older one are migrated."""
+SCHEMA = 2
+"""The schema of the files that are written; files of an older one are migrated."""
 
 Migration = Callable[[dict[str, Any]], dict[str, Any]]
 
-MIGRATIONS: Mapping[int, Migration] = {}
+
+def _name_margins_delta(session: dict[str, Any]) -> dict[str, Any]:
+    """Return a session of the second schema: the ghost is called δ1 = 0, no longer κ1 = 0."""
+    view = session["view"]
+    singular = view.get("singular", {})
+    if "ghost" not in singular:
+        return session
+    singular = {**singular, "ghost": singular["ghost"].replace("κ", "δ")}
+    return {**session, "view": {**view, "singular": singular}}
+
+
+MIGRATIONS: Mapping[int, Migration] = {1: _name_margins_delta}
 """By schema: what turns the fields of a session into those of the next schema."""
 
 MOST_STEPS = 50

@@ -91,7 +91,7 @@ KEYS: dict[str, tuple[Key, ...]] = {
 }
 """Keys by the names of commands."""
 
-NAMES = {"κ1 κ2 κ3": "Assembly mode"}
+NAMES = {"δ1 δ2 δ3": "Assembly mode"}
 """Of controls whose label alone would not be searched for."""
 
 PAGE = "Page"
@@ -102,7 +102,7 @@ TOLD_WITH_FOLDER = frozenset({"What may change", "Tetrahedra"})
 
 OPEN_LISTS = frozenset(
     {
-        "κ1 κ2 κ3",
+        "δ1 δ2 δ3",
         "Arrows",
         "Preset",
         "On a change",

@@ -49,7 +49,7 @@ def _is_near(_: Frame, now: Frame) -> bool:
 
 
 def _approach(frame: Frame) -> Action:
-    """Lower b4 towards the base plane: κ3 is its height."""
+    """Lower b4 towards the base plane: δ3 is its height."""
     height = NEAR * frame.state.warn_below
     return SetPosition(2, height if frame.state.pose.position[2] >= 0.0 else -height)
 

@@ -82,7 +82,7 @@ DEEDS = (
     ),
     Deed(
         "Singularity › Go to the nearest one",
-        "Move the mechanism to the closest of the nearest poses of κ1, κ2 and κ3.",
+        "Move the mechanism to the closest of the nearest poses of δ1, δ2 and δ3.",
         lambda _: GoToSingularity(None),
     ),
     Deed(

@@ -217,7 +217,7 @@ class DesignPanel:
         )
         self._controls.slider(
             "margin",
-            "The least distance |κ| to each of the three singularities.",
+            "The least distance |δ| to each of the three singularities.",
             lambda frame: frame.state.design.limits.margin or 0.0,
             lambda state, value: _limited(state, "margin", value),
             length_span,

@@ -1,7 +1,7 @@
 """Both flags, coloured by the incidences: a point, a line and a plane that hangs from it.
 
 Each element takes the colour of the incidence that it is part of: a1 and the platform
-plane that of κ1, the two lines that of κ2, b4 and the base plane that of κ3.
+plane that of δ1, the two lines that of δ2, b4 and the base plane that of δ3.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ ALONG_X = turned_to(np.array([[1.0, 0.0, 0.0]]))[0]
 class Flag:
     """One flag in its own frame: the point at the origin, the line along x."""
 
-    def __init__(self, scene: viser.SceneApi, root: str, kappas: tuple[int, int, int]) -> None:
+    def __init__(self, scene: viser.SceneApi, root: str, deltas: tuple[int, int, int]) -> None:
         # Which margin colours the point, the line and the plane.
-        self._kappas = kappas
+        self._deltas = deltas
         self._point = scene.add_mesh_simple(
             f"{root}/flag/point", *sphere(), scale=POINT_RADIUS, cast_shadow=False
         )
@@ -42,7 +42,7 @@ class Flag:
         """Yield what draws it with a plane of four corners, the first two on its line."""
         state = placed.frame.state
         levels = placed.frame.verdict.levels
-        point, along, plane = (proximity_colour(levels[k], 1.0) for k in self._kappas)
+        point, along, plane = (proximity_colour(levels[k], 1.0) for k in self._deltas)
         low, high = corners[:2, 0].tolist()
         for handle in (self._point, self._line):
             yield handle, "visible", state.view.flags
@@ -59,8 +59,8 @@ class Flags:
     """The base's flag and the platform's."""
 
     def __init__(self, scene: viser.SceneApi) -> None:
-        self._base = Flag(scene, "/base", kappas=(0, 1, 2))
-        self._platform = Flag(scene, "/platform", kappas=(2, 1, 0))
+        self._base = Flag(scene, "/base", deltas=(0, 1, 2))
+        self._platform = Flag(scene, "/platform", deltas=(2, 1, 0))
 
     def updates(self, placed: Placed) -> Iterator[Update]:
         """Yield what draws the flags of this frame."""

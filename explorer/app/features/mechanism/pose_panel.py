@@ -84,7 +84,7 @@ class MovePanel:
             )
         with gui.add_folder("Assembly mode"):
             controls.dropdown(
-                "κ1 κ2 κ3",
+                "δ1 δ2 δ3",
                 "The eight ways to assemble these leg lengths, by the signs of the margins.",
                 MODES,
                 lambda frame: mode_options(frame)[-1 if is_between(frame) else frame.state.mode],

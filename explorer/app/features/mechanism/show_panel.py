@@ -66,8 +66,8 @@ class ViewPanel:
             return first, second, third
 
         self._controls.checkbox(
-            f"κ{index + 1}:  {points}",
-            f"The tetrahedron that is flat where κ{index + 1} is zero.",
+            f"δ{index + 1}:  {points}",
+            f"The tetrahedron that is flat where δ{index + 1} is zero.",
             lambda frame: frame.state.view.tetrahedra[index],
             lambda state, on: SetView(
                 replace(state.view, tetrahedra=write(state.view.tetrahedra, on))

@@ -153,7 +153,7 @@ def measure_rows(problem: Problem, before: Facts, after: Facts) -> Iterator[Row]
         better = goal == "largest-margin" and (margins[1] or 0.0) > (margins[0] or 0.0)
         yield Row(
             "margin over box, units",
-            "The least |κ| over the required box",
+            "The least |δ| over the required box",
             *margins,
             colour=WITHIN if better else None,
             is_goal=goal == "largest-margin",
@@ -172,8 +172,8 @@ def measure_rows(problem: Problem, before: Facts, after: Facts) -> Iterator[Row]
         # It is known to a thousandth of the reach.
         is_kept = found is None or found >= demands.clearance - known
         yield Row(
-            f"clearance, |κ| ≥ {after.demanded_margin:.3g}",
-            f"As it was demanded: the least of any two legs over the workspace, wherever every |κ| "
+            f"clearance, |δ| ≥ {after.demanded_margin:.3g}",
+            f"As it was demanded: the least of any two legs over the workspace, wherever every |δ| "
             f"is at least {after.demanded_margin:.3g} units{_pair(after.demanded_nearest)}",
             before.demanded_clearance,
             found,

@@ -40,7 +40,7 @@ class MarginPlot:
             scales=_scales(1.0, 1.0),
             axes=(
                 axis("time (s)", label_size=20, size=28),
-                axis("κ (units)", label_size=18, size=40, space=26),
+                axis("δ (units)", label_size=18, size=40, space=26),
             ),
             legend={"show": False},
             cursor={"drag": {"x": False, "y": False}},
@@ -65,7 +65,7 @@ class MarginPlot:
 
 
 def columns_of(journey: Journey) -> tuple[NDArray[Any], ...]:
-    """Return the columns of the chart: time, κ1 to κ3, zero, crossings, and now."""
+    """Return the columns of the chart: time, δ1 to δ3, zero, crossings, and now."""
     timed, found = journey.trajectory, journey.margins
     crossings = [crossing_time(journey, i) for i in range(len(found.crossings))]
     now = journey.at
@@ -73,14 +73,14 @@ def columns_of(journey: Journey) -> tuple[NDArray[Any], ...]:
     times = np.concatenate([timed.time, crossings, [now, now]])
     order = np.argsort(times, kind="stable")
     x = times[order]
-    kappas = _margins_at(journey, np.interp(x, timed.time, timed.at))
+    deltas = _margins_at(journey, np.interp(x, timed.time, timed.at))
     zero, crossed, cursor = np.zeros(len(x)), np.full(len(x), np.nan), np.full(len(x), np.nan)
     first = len(timed.time)
     crossed[np.isin(order, np.arange(first, first + len(crossings)))] = 0.0
-    top = 1.08 * float(np.abs(kappas).max())
+    top = 1.08 * float(np.abs(deltas).max())
     cursor[order == len(times) - 2] = -top
     cursor[order == len(times) - 1] = top
-    return (x, *kappas.T, zero, crossed, cursor)
+    return (x, *deltas.T, zero, crossed, cursor)
 
 
 def crossing_time(journey: Journey, index: int) -> float:
@@ -100,7 +100,7 @@ def path_words(journey: Journey) -> str:
     pose = journey.pose
     here = margins(pose.position, pose.rotation).tolist()
     legend = "".join(
-        f'<tr><td style="padding:1px 0">{_swatch(index)}κ{index + 1}</td>'
+        f'<tr><td style="padding:1px 0">{_swatch(index)}δ{index + 1}</td>'
         f'<td style="{DIM}">{INCIDENCES[index]}</td>'
         f'<td style="text-align:right">{signed(value)}</td></tr>'
         for index, value in enumerate(here)
@@ -115,17 +115,17 @@ def path_words(journey: Journey) -> str:
 def _crossings(journey: Journey) -> str:
     found = journey.margins
     lines = [
-        f"{crossing_time(journey, i):.2f} s: κ{c.incidence} = 0"
+        f"{crossing_time(journey, i):.2f} s: δ{c.incidence} = 0"
         f"{'' if c.changes_sign else ', only touched'}"
         for i, c in enumerate(found.crossings)
     ]
-    lines += [f"all along a move: κ{each} = 0" for each in found.lies_in]
+    lines += [f"all along a move: δ{each} = 0" for each in found.lies_in]
     if not lines:
         least = np.abs(found.margins).min(axis=0)
         index = int(least.argmin())
         return (
-            f'<span style="{DIM}">No singularity on the way; the closest is κ{index + 1} = 0, '
-            f"with |κ{index + 1}| = {scientific(float(least[index]), 3)}.</span>"
+            f'<span style="{DIM}">No singularity on the way; the closest is δ{index + 1} = 0, '
+            f"with |δ{index + 1}| = {scientific(float(least[index]), 3)}.</span>"
         )
     dot = (
         '<span style="display:inline-block;width:9px;height:9px;border-radius:5px;'
@@ -149,7 +149,7 @@ def _swatch(index: int) -> str:
 def _series() -> tuple[uplot.Series, ...]:
     lines: list[uplot.Series] = [
         {
-            "label": f"κ{index + 1}",
+            "label": f"δ{index + 1}",
             "stroke": css(colour),
             "width": 2.0,
             "dash": dash,

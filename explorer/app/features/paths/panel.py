@@ -53,7 +53,7 @@ class PathsPanel:
         with gui.add_folder("Between assembly modes"):
             controls.dropdown(
                 "From",
-                "The assembly mode to start from, by the signs of κ1 κ2 κ3.",
+                "The assembly mode to start from, by the signs of δ1 δ2 δ3.",
                 MODES,
                 lambda frame: MODES[chosen_modes(frame.state)[0]],
                 lambda state, chosen: ChooseModes(MODES.index(chosen), chosen_modes(state)[1]),

@@ -59,7 +59,7 @@ class Jog(Action):
         """Return what the action does."""
         motion = UNCOUPLED[self.motion]
         unit = "°" if motion.kind == "rotation" else ""
-        return f"κ{motion.incidence} alone, by {significant(self.amount, 4)}{unit}"
+        return f"δ{motion.incidence} alone, by {significant(self.amount, 4)}{unit}"
 
 
 def jog_start(state: State, motion: int) -> Pose:
@@ -123,14 +123,14 @@ class GoToSingularity(Action):
         )
         if nearest.distance == 0.0:
             index = nearest.incidence
-            raise InputError(f"the pose has κ{index} = 0 already: {INCIDENCES[index - 1]}")
+            raise InputError(f"the pose has δ{index} = 0 already: {INCIDENCES[index - 1]}")
         return moved(state, nearest.pose)
 
     def words(self) -> str:
         """Return what the action does."""
         if self.incidence is None:
             return "Go to the nearest singular pose"
-        return f"Go to the nearest pose with κ{self.incidence} = 0"
+        return f"Go to the nearest pose with δ{self.incidence} = 0"
 
 
 def name_of(stratum: Stratum) -> str:

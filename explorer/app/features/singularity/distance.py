@@ -19,7 +19,7 @@ from explorer.app.widgets.controls import Controls
 from explorer.app.widgets.markup import DIM, scientific
 
 GHOSTS: tuple[Ghost, ...] = get_args(Ghost)
-GO = ("κ1 = 0", "κ2 = 0", "κ3 = 0")
+GO = ("δ1 = 0", "δ2 = 0", "δ3 = 0")
 
 
 class DistancePanel:
@@ -58,7 +58,7 @@ def distance_table(frame: Frame) -> str:
     least = min(each.distance for each in nearest)
     rows = "".join(
         f'<tr title="{escape(each.name)}" style="{"font-weight:600" * (each.distance == least)}">'
-        f'<td style="padding:1px 0">{_swatch(levels[each.incidence - 1])}κ{each.incidence} = 0</td>'
+        f'<td style="padding:1px 0">{_swatch(levels[each.incidence - 1])}δ{each.incidence} = 0</td>'
         f'<td style="text-align:right">{scientific(each.distance, size=reach)}</td>'
         f'<td style="text-align:right">'
         f"{scientific(each.distance * unit, 3, size=reach * unit)}</td></tr>"

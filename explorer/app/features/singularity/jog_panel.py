@@ -68,7 +68,7 @@ class JogPanel:
 
         self._controls.slider(
             jog_label(motion),
-            f"Moves κ{motion.incidence} and no other margin: "
+            f"Moves δ{motion.incidence} and no other margin: "
             f"{'moves' if motion.kind == 'translation' else 'turns'} the platform {motion.name} "
             f"through {THROUGH[motion.frame]}, in {UNITS[motion.kind]} from where this began. The "
             "marks are singular.",
@@ -91,10 +91,10 @@ def jog_label(motion: UncoupledMotion) -> str:
 
 
 def _short_name(motion: UncoupledMotion) -> str:
-    """Return such as "κ1: about x′": the platform's axes have a prime."""
+    """Return such as "δ1: about x′": the platform's axes have a prime."""
     way = "about" if motion.kind == "rotation" else "along"
     prime = "′" if motion.frame == "platform" else ""
-    return f"κ{motion.incidence}: {way} {motion.axis}{prime}"
+    return f"δ{motion.incidence}: {way} {motion.axis}{prime}"
 
 
 def jog_amount(state: State, index: int) -> float:

@@ -62,7 +62,7 @@ class JogScene:
             for index in range(len(UNCOUPLED))
         ]
         self._labels = [
-            scene.add_label(f"/motion/{index}/label", "κ1", font_screen_scale=0.8, visible=False)
+            scene.add_label(f"/motion/{index}/label", "δ1", font_screen_scale=0.8, visible=False)
             for index in range(len(UNCOUPLED))
         ]
         count = 2 * len(UNCOUPLED)
@@ -100,7 +100,7 @@ class JogScene:
                 (is_stop if drawn.singular[side] else is_head)[row] = 1.0
                 if not drawn.singular[side]:
                     colours[row] = colour
-            yield self._labels[index], "text", f"κ{motion.incidence}: {motion.name}"
+            yield self._labels[index], "text", f"δ{motion.incidence}: {motion.name}"
             far = drawn.points[-1] if motion.kind == "translation" else drawn.points[POINTS // 4]
             yield self._labels[index], "position", tuple(far.tolist())
         turned = turned_to(towards)

@@ -98,9 +98,9 @@ def _legend(warn: float) -> str:
     share = 100.0 / FAR_WARNINGS
     stops = f"{css(SINGULAR)} 0%,{css(WARNED)} {share:g}%,{css(CLEAR)} {share:g}%,{css(FAR)} 100%"
     return (
-        f'<div style="{DIM};margin-bottom:3px">Margin |κ| or distance, the worse (units)</div>'
+        f'<div style="{DIM};margin-bottom:3px">Margin |δ| or distance, the worse (units)</div>'
         f'<div style="height:11px;border-radius:2px;background:linear-gradient(90deg,{stops})">'
-        f"</div>{_ticks('|κ|', warn)}{_ticks('distance', DISTANCE_SHARE * warn)}"
+        f"</div>{_ticks('|δ|', warn)}{_ticks('distance', DISTANCE_SHARE * warn)}"
     )
 
 
@@ -133,7 +133,7 @@ def _margin(frame: Frame, index: int) -> str:
         '<div style="margin:7px 0 0"><div style="display:flex;align-items:baseline;gap:7px">'
         f'<span style="width:11px;height:11px;border-radius:2px;background:{colour};'
         'flex:none;align-self:center"></span>'
-        f"<b>κ{index + 1}</b><span>{fitted(value, reach, 5)}</span>"
+        f"<b>δ{index + 1}</b><span>{fitted(value, reach, 5)}</span>"
         f'<span style="{DIM};font-size:11.5px">{fitted(value * unit_mm, reach * unit_mm, 4)} mm'
         f'</span><span style="{DIM};margin-left:auto;font-size:11.5px" '
         'title="Volume of its tetrahedron, signed">'
@@ -159,7 +159,7 @@ def _table(frame: Frame) -> str:
             share(snapshot.inverse_condition),
             "Inverse condition number of J made homogeneous with the reach; 0 is singular",
         ),
-        ("min |κ| / reach", share(snapshot.proximity), "Smallest margin over the reach |a3|"),
+        ("min |δ| / reach", share(snapshot.proximity), "Smallest margin over the reach |a3|"),
         *_mode_rows(frame),
         (
             "Stratum",
@@ -178,7 +178,7 @@ def _table(frame: Frame) -> str:
 
 def _mode_rows(frame: Frame) -> tuple[tuple[str, str, str], ...]:
     snapshot, mode = frame.snapshot, frame.state.mode
-    hint = "Assembly mode: the signs of κ1, κ2, κ3"
+    hint = "Assembly mode: the signs of δ1, δ2, δ3"
     if snapshot.stratum == GENERIC:
         return (("Mode", f"{mode_name(mode)} &nbsp;({mode})", hint),)
     between = "At a singular pose the modes meet whose signs differ where a margin is 0"

@@ -76,9 +76,9 @@ def performance_table(frame: Frame) -> str:
     room = (
         f"{scientific(ball.radius)} "
         f'<span style="{DIM}">= {scientific(ball.radius * unit, 3)} mm, '
-        f"to κ{ball.incidence} = 0</span>"
+        f"to δ{ball.incidence} = 0</span>"
         if frame.snapshot.stratum == GENERIC
-        else f"none: κ{ball.incidence} = 0 here"
+        else f"none: δ{ball.incidence} = 0 here"
     )
     return (
         '<div style="padding:2px 12px 6px;font-size:12.5px;line-height:1.45;'

@@ -55,7 +55,7 @@ class NearestGhost:
             for name, colour, thickness in (("legs", GHOST, 1.5), ("ways", SINGULAR, 3.0))
         )
         self._label = scene.add_label(
-            "/nearest/label", "κ1 = 0", font_screen_scale=0.9, visible=False
+            "/nearest/label", "δ1 = 0", font_screen_scale=0.9, visible=False
         )
 
     def updates(self, placed: Placed) -> Iterator[Update]:
@@ -80,7 +80,7 @@ class NearestGhost:
         yield self._legs, "points", np.stack([bases, tips], axis=1).astype(np.float32)
         yield self._ways, "points", np.stack([here, tips], axis=1).astype(np.float32)
         away = scientific(nearest.distance, size=placed.frame.state.design.reach)
-        yield self._label, "text", f"κ{nearest.incidence} = 0: {away} away"
+        yield self._label, "text", f"δ{nearest.incidence} = 0: {away} away"
         yield self._label, "position", tuple(tips[0].tolist())
 
 
@@ -170,7 +170,7 @@ class BallScene:
             thickness_units="screen",
             visible=False,
         )
-        self._label = scene.add_label("/ball/label", "κ1 = 0", font_screen_scale=0.9, visible=False)
+        self._label = scene.add_label("/ball/label", "δ1 = 0", font_screen_scale=0.9, visible=False)
 
     def updates(self, placed: Placed) -> Iterator[Update]:
         """Yield what draws the ball of this frame."""
@@ -189,7 +189,7 @@ class BallScene:
         yield self._touch, "position", tuple(touch.tolist())
         yield self._line, "points", np.stack([centre, touch])[None].astype(np.float32)
         away = scientific(ball.radius, size=placed.frame.state.design.reach)
-        yield self._label, "text", f"κ{ball.incidence} = 0: {away} away"
+        yield self._label, "text", f"δ{ball.incidence} = 0: {away} away"
         yield self._label, "position", tuple(touch.tolist())
 
 

@@ -147,7 +147,7 @@ def neighbours(frame: Frame, distances: Mapping[Stratum, float]) -> str:
 def _sentence(stratum: Stratum) -> str:
     if stratum == GENERIC:
         return "Generic: no incidence, not singular."
-    zero = ", ".join(f"κ{index}" for index in incidences(stratum))
+    zero = ", ".join(f"δ{index}" for index in incidences(stratum))
     return f"{zero} = 0: {words(stratum)}"
 
 
@@ -205,7 +205,7 @@ def _node(
 def _place(stratum: Stratum) -> tuple[int, int]:
     """Return the column of a stratum and how many its row has."""
     row = [w for w in STRATA if codimension(w) == codimension(stratum)]
-    # From the left as κ1, κ2 and κ3 are counted.
+    # From the left as δ1, δ2 and δ3 are counted.
     return row.index(stratum), len(row)
 
 

@@ -190,7 +190,7 @@ def _pair(pair: PairCost) -> str:
 
 def _legend(colour: str, warn_below: float) -> str:
     unit, name = (
-        (warn_below, "Smallest |κ| (design units)")
+        (warn_below, "Smallest |δ| (design units)")
         if colour == "margin"
         else (WARN_CONDITION, "1 / cond J")
     )

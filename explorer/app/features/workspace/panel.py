@@ -88,7 +88,7 @@ class WorkspacePanel:
             )
             controls.dropdown(
                 "Colour by",
-                "One colour, the smallest margin |κ|, or the inverse condition number.",
+                "One colour, the smallest margin |δ|, or the inverse condition number.",
                 tuple(COLOURINGS),
                 lambda frame: _key(COLOURINGS, frame.state.view.workspace.colour),
                 lambda state, chosen: _changed(state, colour=COLOURINGS[chosen]),

@@ -140,7 +140,7 @@ class _SingularPlane:
         self._index = index
         self._patch = Patch(scene, f"/singular/{index + 1}", opacity=PLANE_OPACITY, visible=False)
         self._label = scene.add_label(
-            f"/singular/{index + 1}/label", f"κ{index + 1} = 0", visible=False
+            f"/singular/{index + 1}/label", f"δ{index + 1} = 0", visible=False
         )
 
     def updates(self, placed: Placed) -> Iterator[Update]:
