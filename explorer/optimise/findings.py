@@ -1,4 +1,4 @@
-"""Our optima beside the paper's, found anew: the page of findings in the README.
+"""Our optima beside the paper's, computed again: the table in the manual's page on optimising.
 
 All have the orientation of the paper's optimum, its box, and lengths up to the reach.
 """

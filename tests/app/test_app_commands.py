@@ -12,7 +12,6 @@ import threading
 import time
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -65,6 +64,7 @@ from explorer.app.widgets.commands import (
 from explorer.app.widgets.palette import Command, Palette
 from explorer.app.widgets.pieces import Widget, widgets
 from explorer.errors import ExplorerError
+from explorer.files.manual import read_page
 from explorer.mechanism.design_file import PRESETS
 
 OF_VALUES = {
@@ -241,10 +241,9 @@ def test_no_key_is_taken_from_the_browser_the_camera_or_the_palette() -> None:
         assert key != PALETTE_KEY
 
 
-def test_the_readme_tells_every_key_and_no_other() -> None:
-    readme = Path(__file__).resolve().parents[2] / "README.md"
-    section = readme.read_text(encoding="utf-8").partition("## Hands on the keys")[2]
-    rows = re.findall(r"^\|.*\| (.+) \|$", section.partition("\n## ")[0], flags=re.MULTILINE)
+def test_manual_lists_every_key_and_no_other() -> None:
+    section = read_page("page.md").partition("## Keys")[2].partition("\n## ")[0]
+    _, *rows = re.findall(r"^\|.*\| (.+) \|$", section, flags=re.MULTILINE)
     told = {key for row in rows for key in re.split(r", | or ", row)}
     card = {str(key) for key in KEYS["Page › Keys"]}
     assert told | card == {str(key) for key in itertools.chain.from_iterable(KEYS.values())}

@@ -1,0 +1,59 @@
+"""The manual: Markdown pages in the folder `manual` of the package, in the order to read them."""
+
+from __future__ import annotations
+
+from importlib import resources
+from typing import NamedTuple
+
+from explorer.errors import InputError
+
+FILES = (
+    "glossary.md",
+    "mechanism.md",
+    "page.md",
+    "workspace.md",
+    "singularity.md",
+    "legs.md",
+    "optimise.md",
+    "studies.md",
+    "prototype-and-export.md",
+    "command-line.md",
+    "python.md",
+    "files.md",
+    "network.md",
+)
+
+
+class ManualPage(NamedTuple):
+    """A page of the manual.
+
+    Attributes:
+        title: Text of the page's first heading.
+        file: Name of the page's file, as `read_page` takes it and links between pages write it.
+    """
+
+    title: str
+    file: str
+
+
+def list_pages() -> tuple[ManualPage, ...]:
+    """Return the pages of the manual in the order to read them; the glossary is the first."""
+    return tuple(ManualPage(_title(read_page(file)), file) for file in FILES)
+
+
+def read_page(file: str) -> str:
+    """Return the Markdown of a page.
+
+    Args:
+        file: Name of the page's file, such as "glossary.md".
+
+    Raises:
+        InputError: the manual has no such page.
+    """
+    if file not in FILES:
+        raise InputError(f"the manual has no page {file!r}; its pages are {', '.join(FILES)}")
+    return resources.files("explorer").joinpath("manual", file).read_text(encoding="utf-8")
+
+
+def _title(markdown: str) -> str:
+    return markdown.partition("\n")[0].removeprefix("# ")
