@@ -27,7 +27,7 @@ from explorer.errors import InputError
 from explorer.files.manual import list_pages, read_page
 
 ROOT = Path(__file__).resolve().parents[1]
-MANUAL = Path(explorer.__file__).parent / "manual"
+MANUAL = Path(explorer.__file__).parents[1] / "assets" / "manual"
 DOCUMENTS = {"README.md": ROOT / "README.md", **{p.name: p for p in sorted(MANUAL.iterdir())}}
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 
@@ -49,7 +49,7 @@ def test_manual_pages_are_all_listed_glossary_first() -> None:
     assert len({page.title for page in pages}) == len(pages)
     for page in pages:
         assert read_page(page.file).startswith(f"# {page.title}\n")
-        assert f"(explorer/manual/{page.file})" in read("README.md")
+        assert f"(assets/manual/{page.file})" in read("README.md")
 
 
 @pytest.mark.parametrize("name", ["", "../README.md", "nothing.md", "glossary"])

@@ -1,11 +1,11 @@
-"""The manual: Markdown pages in the folder `manual` of the package, in the order to read them."""
+"""The manual: Markdown pages that come along, in the order to read them."""
 
 from __future__ import annotations
 
-from importlib import resources
 from typing import NamedTuple
 
 from explorer.errors import InputError
+from explorer.files.packaged import packaged_file
 
 FILES = (
     "glossary.md",
@@ -52,7 +52,7 @@ def read_page(file: str) -> str:
     """
     if file not in FILES:
         raise InputError(f"the manual has no page {file!r}; its pages are {', '.join(FILES)}")
-    return resources.files("explorer").joinpath("manual", file).read_text(encoding="utf-8")
+    return packaged_file("manual", file).read_text(encoding="utf-8")
 
 
 def _title(markdown: str) -> str:

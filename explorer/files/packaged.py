@@ -10,10 +10,18 @@ SOURCES = Path(__file__).parents[2]
 """The folder of the package `explorer`, for processes that must import these very sources."""
 
 
+def packaged_file(folder: str, name: str) -> Traversable:
+    """Return a file of one of the folders that come along, whether or not it is there."""
+    return _place(folder).joinpath(name)
+
+
 def packaged_files(folder: str, suffix: str) -> list[Traversable]:
     """Return the files with a suffix in one of the folders that come along, ordered by name."""
+    files = (file for file in _place(folder).iterdir() if file.name.endswith(suffix))
+    return sorted(files, key=lambda file: file.name)
+
+
+def _place(folder: str) -> Traversable:
     # In a wheel the folders lie inside the package, in a checkout beside it.
     packaged = resources.files("explorer").joinpath(folder)
-    place = packaged if packaged.is_dir() else SOURCES / "assets" / folder
-    files = (file for file in place.iterdir() if file.name.endswith(suffix))
-    return sorted(files, key=lambda file: file.name)
+    return packaged if packaged.is_dir() else SOURCES / "assets" / folder
