@@ -1,35 +1,20 @@
-"""The distance between two line segments and the points that realise it, in any position.
+"""Closest points of two line segments, as functions that kernels call.
 
 Parallel, touching, crossing and zero-length segments need no case of their own: the least
-is that of the two lines, where it lies within both, or one that an end has. See V. J.
-Lumelsky, "On fast computation of distance between line segments" (1985).
+distance is that of the two lines, where their closest points lie within both segments, or
+that of an end of one from the other. See V. J. Lumelsky, "On fast computation of distance
+between line segments" (1985).
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple, TypeAlias
+from typing import TypeAlias
 
-import numpy as np
-from numpy.typing import ArrayLike
-
-from explorer.numerics.arrays import FloatArray, batch_shape, finite_array
-from explorer.numerics.compiled import helper, kernel
+from explorer.numerics.arrays import FloatArray
+from explorer.numerics.compiled import helper
 
 Vector: TypeAlias = tuple[float, float, float]
-
-
-class SegmentDistances(NamedTuple):
-    """Distances of pairs of segments.
-
-    Attributes:
-        distance: Shape (...).
-        points: The closest point of the first segment and that of the second, shape
-            (..., 2, 3). Where several are closest, one pair of them.
-    """
-
-    distance: FloatArray
-    points: FloatArray
 
 
 @helper
@@ -117,41 +102,3 @@ def write_closest(first: FloatArray, second: FloatArray, points: FloatArray) -> 
         points[0, axis] = a[axis] + s * u[axis]
         points[1, axis] = b[axis] + t * v[axis]
     return math.sqrt(square_at(s, t, u, v, r))
-
-
-@kernel("void(f8[:,:,::1], f8[:,:,::1], f8[::1], f8[:,:,::1])")
-def distance_rows(
-    first: FloatArray, second: FloatArray, distance: FloatArray, points: FloatArray
-) -> None:
-    """Write the distance and the closest points of each pair of segments.
-
-    Args:
-        first: Shape (n, 2, 3).
-        second: Shape (n, 2, 3).
-        distance: Written, shape (n,).
-        points: Written, shape (n, 2, 3).
-    """
-    for row in range(first.shape[0]):
-        distance[row] = write_closest(first[row], second[row], points[row])
-
-
-def segment_distances(first: ArrayLike, second: ArrayLike) -> SegmentDistances:
-    """Return the distance between segments and the two points that realise it.
-
-    Args:
-        first: The two ends, shape (..., 2, 3); they may be one point.
-        second: Likewise; the batch axes of both are broadcast.
-
-    Raises:
-        InputError: not finite numbers of these shapes.
-    """
-    a = finite_array("first segment", first, (2, 3))
-    b = finite_array("second segment", second, (2, 3))
-    batch = batch_shape((a, 2), (b, 2))
-    a_rows, b_rows = (
-        np.broadcast_to(each, (*batch, 2, 3)).reshape(-1, 2, 3).copy() for each in (a, b)
-    )
-    count = len(a_rows)
-    distance, points = np.empty(count), np.empty((count, 2, 3))
-    distance_rows(count, a_rows, b_rows, distance, points)
-    return SegmentDistances(distance.reshape(batch), points.reshape(*batch, 2, 3))

@@ -19,9 +19,7 @@ from scipy.spatial.transform import Rotation
 
 from explorer.errors import InputError
 from explorer.legs.moves import poses_between
-from explorer.mechanism.design import Design
-from explorer.mechanism.kinematics import forward
-from explorer.mechanism.margins import margins, mode_of
+from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 
@@ -134,28 +132,6 @@ def _without_corners_twice(crossings: list[Crossing]) -> list[Crossing]:
             at = kept.index(before)
             kept[at] = dataclasses.replace(before, changes_sign=before.side != each.side)
     return kept
-
-
-def path_between_modes(design: Design, joints: FloatArray, first: int, last: int) -> PathMargins:
-    """Return the straight move between two assembly modes of the same joints.
-
-    Args:
-        design: The manipulator.
-        joints: (l1, d1, d2, d3, d4, l4), shape (6,).
-        first: The mode to start from, 0 to 7.
-        last: The mode to end in.
-
-    Raises:
-        InputError: no such mode, joints that cannot be used, or lengths that do not close.
-    """
-    for mode in (first, last):
-        if not 0 <= mode <= 7:
-            raise InputError(f"assembly modes are 0 to 7; got {mode}")
-    modes = forward(design, joints)
-    if not modes.feasible:
-        raise InputError("the lengths do not close, so there are no modes to go between")
-    start, end = (Pose.of(modes.position[mode], modes.rotation[mode]) for mode in (first, last))
-    return path_margins([start, end])
 
 
 def _of_move(start: Pose, end: Pose, index: int) -> tuple[list[Crossing], list[int]]:
@@ -293,11 +269,3 @@ def _waves(start: Pose, end: Pose) -> tuple[_Wave, _Wave, _Wave]:
     kappa2 = wave([np.cross(x, part) for part in turned(first[:, 0])])
     kappa3 = wave([np.array([0.0, 0.0, 1.0]), zero, zero])
     return kappa1, kappa2, kappa3
-
-
-def modes_differ(poses: Sequence[Pose]) -> tuple[int, ...]:
-    """Return the incidences (1, 2, 3) whose margins have other signs at a path's two ends."""
-    first, last = (
-        int(mode_of(margins(each.position, each.rotation))) for each in (poses[0], poses[-1])
-    )
-    return tuple(index for index, bit in enumerate((4, 2, 1), 1) if (first ^ last) & bit)

@@ -19,7 +19,7 @@ from strategies import (
 from explorer import PRESETS, InputError, Pose, forward, home_pose, inverse, margins, poses_between
 from explorer.mechanism.margins import mode_of
 from explorer.numerics.arrays import FloatArray
-from explorer.paths.crossings import modes_differ, path_between_modes, path_margins
+from explorer.paths.crossings import path_margins
 
 OPTIMAL = PRESETS["paper-optimal"]
 HOME = home_pose(OPTIMAL)
@@ -81,7 +81,6 @@ def test_any_path_between_two_modes_crosses_each_margin_that_they_differ_in(
     signs = np.sign([margins(each.position, each.rotation) for each in ends])
     expected = {k + 1 for k in range(3) if signs[0][k] != signs[1][k]}
     assert expected
-    assert expected == set(modes_differ(path))
     for incidence in (1, 2, 3):
         crossed = sum(c.incidence == incidence and c.changes_sign for c in found.crossings)
         # An odd number where the signs differ, else an even one.
@@ -112,11 +111,12 @@ def test_smooth_random_paths_between_modes_cross_too(case: Case, seed: int) -> N
 def test_the_straight_move_between_modes_is_marked_where_it_crosses(last: int) -> None:
     joints = inverse(OPTIMAL, HOME.position, HOME.rotation)
     first = 3
-    found = path_between_modes(OPTIMAL, joints, first, last)
+    modes = forward(OPTIMAL, joints)
+    ends = [Pose.of(modes.position[mode], modes.rotation[mode]) for mode in (first, last)]
+    found = path_margins(ends)
     assert found.margins.shape == (len(found.at), 3)
     differ = {k for k, bit in ((1, 4), (2, 2), (3, 1)) if (first ^ last) & bit}
     assert {c.incidence for c in found.crossings if c.changes_sign} >= differ
-    assert set(modes_differ(found.poses)) == differ
 
 
 @pytest.mark.parametrize("way", WAYS)
@@ -201,7 +201,3 @@ def test_two_crossings_close_together_are_both_found(gap: float) -> None:
 def test_what_is_no_path_is_refused() -> None:
     with pytest.raises(InputError, match="two poses"):
         path_margins([HOME])
-    with pytest.raises(InputError, match="0 to 7"):
-        path_between_modes(OPTIMAL, inverse(OPTIMAL, HOME.position, HOME.rotation), 0, 8)
-    with pytest.raises(InputError, match="do not close"):
-        path_between_modes(OPTIMAL, np.array([0.1, 1.0, 9.0, 2.0, 9.0, 1.0]), 0, 1)
