@@ -18,8 +18,8 @@ Vector: TypeAlias = tuple[float, float, float]
 
 
 @helper
-def clamped(value: float, over: float) -> float:
-    """Return value / over, kept within 0 and 1; 0 if there is nothing to divide by."""
+def clamp_ratio(value: float, over: float) -> float:
+    """Return value / over clamped to [0, 1]; 0 where `over` is not positive."""
     if value <= 0.0 or over <= 0.0:
         return 0.0
     if value >= over:
@@ -56,35 +56,35 @@ def square_at(s: float, t: float, u: Vector, v: Vector, r: Vector) -> float:
 
 @helper
 def closest_shares(u: Vector, v: Vector, r: Vector) -> tuple[float, float]:
-    """Return the s and t, each from 0 to 1, at which |r + s u − t v| is least.
+    """Return the s and t, both from 0 to 1, at which |r + s u − t v| is least.
 
-    These are the shares along two segments with the directions u and v; r leads from the
-    start of the second to the start of the first.
+    They are the shares of two segments with the directions u and v at their closest points;
+    r leads from the start of the second segment to the start of the first.
     """
     uu, vv, uv, ur, vr = dot3(u, u), dot3(v, v), dot3(u, v), dot3(u, r), dot3(v, r)
-    # An end of one against all of the other, four times.
-    best_s, best_t = 0.0, clamped(vr, vv)
+    # The distances of the four ends from the other segment.
+    best_s, best_t = 0.0, clamp_ratio(vr, vv)
     best = square_at(best_s, best_t, u, v, r)
-    s, t = 1.0, clamped(uv + vr, vv)
+    s, t = 1.0, clamp_ratio(uv + vr, vv)
     square = square_at(s, t, u, v, r)
     if square < best:
         best_s, best_t, best = s, t, square
-    s, t = clamped(-ur, uu), 0.0
+    s, t = clamp_ratio(-ur, uu), 0.0
     square = square_at(s, t, u, v, r)
     if square < best:
         best_s, best_t, best = s, t, square
-    s, t = clamped(uv - ur, uu), 1.0
+    s, t = clamp_ratio(uv - ur, uu), 1.0
     square = square_at(s, t, u, v, r)
     if square < best:
         best_s, best_t, best = s, t, square
-    # The common perpendicular; by cross products it stands up to nearly parallel lines,
+    # The common perpendicular. Cross products keep it accurate for nearly parallel lines,
     # where uu vv − uv² would lose twice the digits.
     n = cross3(u, v)
     nn = dot3(n, n)
     s, t = dot3(n, cross3(v, r)), dot3(n, cross3(u, r))
     if 0.0 < s < nn and 0.0 < t < nn:
         s = s / nn
-        t = clamped(uv * s + vr, vv)
+        t = clamp_ratio(uv * s + vr, vv)
         if square_at(s, t, u, v, r) < best:
             best_s, best_t = s, t
     return best_s, best_t
@@ -92,7 +92,7 @@ def closest_shares(u: Vector, v: Vector, r: Vector) -> tuple[float, float]:
 
 @helper
 def write_closest(first: FloatArray, second: FloatArray, points: FloatArray) -> float:
-    """Write the closest points of two segments, each of shape (2, 3); return the distance."""
+    """Write the closest points of two segments of shape (2, 3), and return their distance."""
     a, b = (first[0, 0], first[0, 1], first[0, 2]), (second[0, 0], second[0, 1], second[0, 2])
     u = minus((first[1, 0], first[1, 1], first[1, 2]), a)
     v = minus((second[1, 0], second[1, 1], second[1, 2]), b)

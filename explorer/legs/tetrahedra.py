@@ -18,18 +18,18 @@ from explorer.numerics.compiled import helper, kernel
 
 # A gap within this share of the largest coordinate is rounding: the two touch.
 TOUCHING = 2.0**-46
-# Coordinates whose fourth powers fit are taken as they are, others are scaled.
+# Coordinates between these are used as they are: their fourth powers neither overflow nor vanish.
 LEAST, MOST = 1e-60, 1e60
-# An overlap beyond this share of the size is deep.
+# An overlap of projections beyond this share of the size is deep.
 DEEP = 2.0**-8
-# A cross product below this share of the size's square is mostly rounding.
+# A cross product below this share of the squared size has mostly rounding for a direction.
 FAINT = 1e-12
 EDGES = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
 
 
 @helper
 def vertex(bodies: FloatArray, body: int, k: int) -> Vector:
-    """Return a vertex of one of the bodies of shape (2, 3, 4)."""
+    """Return vertex k of a body, from the vertices of both, shape (2, 3, 4)."""
     return (bodies[body, 0, k], bodies[body, 1, k], bodies[body, 2, k])
 
 
@@ -84,16 +84,16 @@ def cross_edges(
 def project(
     bodies: FloatArray, axes: FloatArray, count: int, tolerance: float, size: float
 ) -> tuple[bool, bool, bool]:
-    """Return whether the projections are apart, overlap slightly, or deeply, on some axis.
+    """Return whether on some axis the projections are apart, overlap slightly, overlap deeply.
 
     The loop has no branch, so that compilers turn it into vector instructions.
 
     Args:
         bodies: Vertices, shape (2, 3, 4).
         axes: Shape (3, n).
-        count: Axes in use.
-        tolerance: Of a gap.
-        size: Of the bodies.
+        count: Number of axes to use.
+        tolerance: Gap of projections that counts as touching, over the axis' length.
+        size: Largest extent of the bodies.
     """
     (ax, ay, az), (bx, by, bz) = vertex(bodies, 0, 0), vertex(bodies, 0, 1)
     (cx, cy, cz), (dx, dy, dz) = vertex(bodies, 0, 2), vertex(bodies, 0, 3)
@@ -129,7 +129,7 @@ def without(w: Vector, u: Vector) -> Vector:
 def connections_separate(
     bodies: FloatArray, axes: FloatArray, tolerance: float, size: float
 ) -> bool:
-    """Whether the shortest connection of an edge of each separates the bodies."""
+    """Return whether the shortest connection of some two edges is a separating axis."""
     for i, j in EDGES:
         a = vertex(bodies, 0, i)
         u = minus(vertex(bodies, 0, j), a)
@@ -145,7 +145,7 @@ def connections_separate(
             )
             if abs(w[0]) + abs(w[1]) + abs(w[2]) <= tolerance:
                 return False
-            # A short connection is mostly rounding, but for what is perpendicular.
+            # Of a short connection only the part perpendicular to the edges is more than rounding.
             if 0.0 < s < 1.0:
                 w = without(w, u)
             if 0.0 < t < 1.0:
@@ -160,7 +160,16 @@ def connections_separate(
 def overlaps(
     p: FloatArray, q: FloatArray, row: int, bodies: FloatArray, edges: FloatArray, axes: FloatArray
 ) -> bool:
-    """Whether a pair overlaps, given room for (2, 3, 4) vertices, (2, 3, 6) edges, (3, 36) axes."""
+    """Return whether a pair overlaps.
+
+    Args:
+        p: First bodies, shape (n, 4, 3).
+        q: Second bodies, shape (n, 4, 3).
+        row: Index of the pair.
+        bodies: Scratch for vertices, shape (2, 3, 4).
+        edges: Scratch for edges, shape (2, 3, 6).
+        axes: Scratch, shape (3, 36).
+    """
     largest, size, apart = compare_boxes(p, q, row)
     if apart:
         return False
@@ -207,16 +216,16 @@ def overlap_rows(p: FloatArray, q: FloatArray, overlap: BoolArray) -> None:
 def tetrahedra_overlap(p: ArrayLike, q: ArrayLike) -> BoolArray:
     """Return whether tetrahedra have a point in common, touching and containment included.
 
-    Flat ones (triangles, quadrilaterals, segments, points) are as good as solid ones. Two
-    touch if they are apart by less than the rounding of their coordinates: about 1e-14 of
-    the largest coordinate of the pair.
+    Flat ones (triangles, quadrilaterals, segments, points) are allowed. Two touch if their
+    gap is within the rounding of their coordinates: about 1e-14 of the largest coordinate
+    of the pair.
 
     Args:
-        p: The four vertices, shape (..., 4, 3), in any unit.
-        q: Likewise; the batch axes of both are broadcast.
+        p: Vertices, shape (..., 4, 3), in any unit.
+        q: Vertices, shape (..., 4, 3), in the same unit; batch axes are broadcast.
 
     Raises:
-        InputError: not finite numbers of these shapes.
+        InputError: p or q is not an array of finite numbers of that shape.
     """
     a, b = finite_array("p", p, (4, 3)), finite_array("q", q, (4, 3))
     batch = batch_shape((a, 2), (b, 2))
