@@ -1,8 +1,8 @@
-"""How far the four legs keep from each other in a pose (design.md, section 7).
+"""Clearances of the four legs in a pose.
 
-A leg is a capsule about its axis: from its base end (a1; the carriages on the guide at d1
+A leg is a capsule about its axis, from its base end (a1; the carriages on the guide at d1
 and d3; a3) to its platform end (b1, b2, b3, b4). The clearance of a pair is the distance
-of the axes less both radii; below zero the pair collides.
+of the axes less both radii; a pair with a negative clearance collides.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 from explorer.numerics.compiled import kernel
 
 PAIRS = ((1, 2), (1, 3), (1, 4), (2, 3), (2, 4), (3, 4))
-"""The pairs of legs in their one order; the array axis of six in everything about pairs."""
+"""Pairs of legs, in the order of every array axis of length six."""
 
 
 class LegClearances(NamedTuple):
@@ -30,10 +30,11 @@ class LegClearances(NamedTuple):
     and distance are infinite, and both its points are the joint.
 
     Attributes:
-        clearance: The distance less both radii, shape (..., 6); below zero in collision.
-        distance: That of the axes, shape (..., 6).
-        points: The closest points of the two axes, the leg named first first, shape
-            (..., 6, 2, 3), in the base frame.
+        clearance: Distance less both radii, in design units, shape (..., 6); negative in
+            collision.
+        distance: Distance of the two axes, in design units, shape (..., 6).
+        points: Closest points of the two axes, on the pair's first leg, then on its second,
+            in the base frame, shape (..., 6, 2, 3).
     """
 
     clearance: FloatArray
@@ -42,14 +43,15 @@ class LegClearances(NamedTuple):
 
     @property
     def closest(self) -> IntArray:
-        """The index into `PAIRS` of the pair with the least clearance, shape (...)."""
+        """Index into `PAIRS` of the pair with the least clearance, shape (...)."""
         return np.asarray(self.clearance.argmin(axis=-1), dtype=np.int64)
 
 
 def joined_pairs(design: Design) -> BoolArray:
     """Return which pairs of legs share a joint, shape (6,), in the order of `PAIRS`.
 
-    b2 or b3 is b4 where it is zero, to rounding. Such a pair is left out of every test.
+    Leg 2 or 3 ends in b4, as leg 4 does, where b2 or b3 is zero to rounding. No test looks
+    at such a pair.
     """
     least = DEGENERATE_RATIO * max(map(abs, design.variables))
     return np.array(
@@ -78,7 +80,7 @@ def leg_axes(design: Design, position: ArrayLike, rotation: ArrayLike) -> FloatA
         rotation: Platform to base, shape (..., 3, 3).
 
     Raises:
-        InputError: a pose that is not finite or not a rotation.
+        InputError: the pose has a number that is not finite, or no rotation.
     """
     points = attachment_points(design, position, rotation)
     axes = np.zeros((*points.b1.shape[:-1], 4, 2, 3))
@@ -93,12 +95,12 @@ def leg_clearances(design: Design, position: ArrayLike, rotation: ArrayLike) -> 
     """Return the clearances of all six pairs of legs.
 
     Args:
-        design: The manipulator; the radii are those of its limits.
+        design: The manipulator; its limits hold the radii.
         position: b4 in the base frame, shape (..., 3), in design units.
         rotation: Platform to base, shape (..., 3, 3).
 
     Raises:
-        InputError: a pose that is not finite or not a rotation.
+        InputError: the pose has a number that is not finite, or no rotation.
     """
     axes = leg_axes(design, position, rotation)
     batch = axes.shape[:-3]
@@ -116,35 +118,35 @@ def leg_clearances(design: Design, position: ArrayLike, rotation: ArrayLike) -> 
 
 
 def distance_gradients(
-    design: Design, position: ArrayLike, rotation: ArrayLike, found: LegClearances
+    design: Design, position: ArrayLike, rotation: ArrayLike, clearances: LegClearances
 ) -> FloatArray:
     """Return the rates of the distances of all pairs with the position, shape (..., 6, 3).
 
-    Zero where the axes of a pair cross, where a distance has no rate, and for a pair that
-    shares a joint.
+    The rate is zero for a pair that shares a joint, and where the axes of a pair cross,
+    since the distance has no rate there.
 
     Args:
         design: The manipulator.
         position: b4 in the base frame, shape (..., 3), in design units.
         rotation: Platform to base, shape (..., 3, 3).
-        found: The clearances there.
+        clearances: Clearances in that pose.
     """
-    off = found.points[..., 0, :] - found.points[..., 1, :]
-    length = np.linalg.norm(off, axis=-1, keepdims=True)
-    normal = off / np.where(length > 0.0, length, 1.0)
-    return normal * point_rates(leg_axes(design, position, rotation), found.points)
+    offset = clearances.points[..., 0, :] - clearances.points[..., 1, :]
+    length = np.linalg.norm(offset, axis=-1, keepdims=True)
+    normal = offset / np.where(length > 0.0, length, 1.0)
+    return normal * point_rates(leg_axes(design, position, rotation), clearances.points)
 
 
 def point_rates(axes: FloatArray, points: FloatArray) -> FloatArray:
-    """Return by how much more the first of two points moves than the second with p, by axis.
+    """Return the rates of the offset between two points on legs with the position of b4.
 
     Args:
-        axes: Of the legs, shape (..., 4, 2, 3).
-        points: Of each pair, one on each axis, shape (..., 6, 2, 3).
+        axes: Axes of the legs, shape (..., 4, 2, 3).
+        points: One point on each axis of a pair, shape (..., 6, 2, 3).
 
     Returns:
-        The diagonals of the matrices that the positions are multiplied with, shape
-        (..., 6, 3): platform ends move as p does, a base end on the guide along x only.
+        Diagonals of the Jacobians of (first point − second point) in the position, shape
+        (..., 6, 3): a platform end moves as b4 does, a carriage along x only.
     """
     sides: list[FloatArray] = []
     for side in (0, 1):

@@ -1,8 +1,9 @@
-"""The paper's test for leg crossings over one sampling step (design.md, section 7).
+"""The paper's test for leg interference over one sampling step, by swept tetrahedra.
 
-Over a step a leg stays within the tetrahedron of its two base ends and its two platform
-ends. The step is free if no two of the four tetrahedra overlap, touching included. Legs 1
-and 4 have fixed base ends, so theirs are triangles. Radii play no part in it.
+Over a step at constant orientation a leg stays within the tetrahedron of its two base ends
+and its two platform ends. The step is free if no two of the four tetrahedra overlap or
+touch. Legs 1 and 4 have fixed base ends, so their tetrahedra are triangles. The test
+ignores the legs' radii.
 """
 
 from __future__ import annotations
@@ -25,23 +26,23 @@ def swept_tetrahedra(
 ) -> FloatArray:
     """Return the tetrahedra that hold the four legs over a step, shape (..., 4, 4, 3).
 
-    The vertices of each are its base ends at the start and at the end of the step, then
-    its platform ends. All batch axes are broadcast.
+    The vertices of a tetrahedron are the leg's base ends at the start and at the end of the
+    step, then its platform ends. All batch axes are broadcast.
 
     Args:
         design: The manipulator.
         start_position: b4 in the base frame, shape (..., 3), in design units.
         start_rotation: Platform to base, shape (..., 3, 3).
-        end_position: Where b4 goes, shape (..., 3).
-        end_rotation: How the platform turns, shape (..., 3, 3).
+        end_position: b4 at the end of the step, shape (..., 3).
+        end_rotation: Platform to base at the end of the step, shape (..., 3, 3).
 
     Raises:
-        InputError: a pose that is not finite or not a rotation.
+        InputError: a pose has a number that is not finite, or no rotation.
     """
     start = leg_axes(design, start_position, start_rotation)
     end = leg_axes(design, end_position, end_rotation)
     start, end = np.broadcast_arrays(start, end)
-    # From (base, platform) of either to (base, base, platform, platform).
+    # From (base, platform) of both poses to (base, base, platform, platform).
     both = np.stack([start, end], axis=-2)
     return both.reshape(*both.shape[:-3], 4, 3)
 
@@ -55,18 +56,18 @@ def step_overlaps(
 ) -> BoolArray:
     """Return which pairs of swept tetrahedra overlap, shape (..., 6), in the order of `PAIRS`.
 
-    A pair that shares a joint (see `explorer.legs.clearance.joined_pairs`) is left out: False.
+    A pair that shares a joint (see `explorer.legs.clearance.joined_pairs`) has False.
     Arguments and errors are those of `swept_tetrahedra`.
     """
     swept = swept_tetrahedra(design, start_position, start_rotation, end_position, end_rotation)
-    found = np.zeros((*swept.shape[:-3], len(PAIRS)), dtype=np.bool_)
+    overlaps = np.zeros((*swept.shape[:-3], len(PAIRS)), dtype=np.bool_)
     for index, joined in enumerate(joined_pairs(design)):
         if not joined:
             first, second = PAIRS[index]
-            found[..., index] = tetrahedra_overlap(
+            overlaps[..., index] = tetrahedra_overlap(
                 swept[..., first - 1, :, :], swept[..., second - 1, :, :]
             )
-    return found
+    return overlaps
 
 
 def step_is_free(

@@ -1,10 +1,10 @@
 """Lower bounds of the distance between two legs over a whole interval of a move.
 
-Two bounds, of which the better counts. First, the distance of two segments changes no more
-than the farthest that an end of one moves relative to an end of the other. Second, for any
-direction n the distance is at least the least n·(X − Y)/|n| over the ends X and Y of the
-two: with the n of the closest points, turning with the legs to first order, it falls short
-of the truth by the square of the interval only.
+The greater of two bounds counts. First, the distance of two segments changes by no more than
+the greatest relative motion of an end of one and an end of the other. Second, for any
+direction n the distance is at least the minimum of n·(X − Y)/|n| over the ends X and Y of
+the two segments: with the n of the closest points, which turns with the legs to first order,
+this bound is low by the square of the interval only.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from explorer.legs.segments import Vector, closest_shares, dot3, minus, square_a
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import helper, kernel
 
-# Of a move, looked at first.
+# Intervals of a move whose ends give the first guess of the least distance.
 SAMPLES = 8
-# Intervals that wait are at most as many as halvings.
+# The most intervals in the queue: one for each halving.
 DEEPEST = 60
 
 
 @helper
-def end_at(
+def platform_end(
     leg: int,
     t: float,
     start: FloatArray,
@@ -32,7 +32,7 @@ def end_at(
     angle: float,
     parts: FloatArray,
 ) -> tuple[Vector, Vector]:
-    """Return where a leg's platform end is at t, and how fast it moves."""
+    """Return a leg's platform end at t, and its velocity."""
     c, s = math.cos(angle * t), math.sin(angle * t)
     x, y, z = (
         start[0] + t * step[0] + parts[leg, 0, 0] + c * parts[leg, 1, 0] + s * parts[leg, 2, 0],
@@ -49,8 +49,8 @@ def end_at(
 
 
 @helper
-def base_of(leg: int, end: Vector, velocity: Vector, a3: FloatArray) -> tuple[Vector, Vector]:
-    """Return the base end of a leg whose platform end is here, and how fast it moves."""
+def base_end(leg: int, end: Vector, velocity: Vector, a3: FloatArray) -> tuple[Vector, Vector]:
+    """Return a leg's base end, and its velocity, from those of its platform end."""
     if leg == 0:
         return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     if leg == 3:
@@ -59,25 +59,27 @@ def base_of(leg: int, end: Vector, velocity: Vector, a3: FloatArray) -> tuple[Ve
 
 
 @helper
-def bend(leg: int, half: float, angle: float, parts: FloatArray) -> float:
-    """Return how far an end may get from its tangent within half an interval."""
+def tangent_error(leg: int, half: float, angle: float, parts: FloatArray) -> float:
+    """Return the most that an end departs from its tangent within half an interval."""
     x, y, z = parts[leg, 1, 0], parts[leg, 1, 1], parts[leg, 1, 2]
     turn = angle * half
     return 0.5 * turn * turn * math.sqrt(x * x + y * y + z * z)
 
 
 @helper
-def turning(n: Vector, u: Vector, du: Vector, v: Vector, dv: Vector, s: float, t: float) -> Vector:
-    """Return how a direction has to turn to stay perpendicular to the segments.
+def normal_rate(
+    n: Vector, u: Vector, du: Vector, v: Vector, dv: Vector, s: float, t: float
+) -> Vector:
+    """Return the rate at which a direction turns to stay perpendicular to the segments.
 
-    Only to those in whose interior the closest point lies, at s along u and t along v.
+    A segment counts if its closest point, at s along u or t along v, lies in its interior.
     """
     uu, vv, uv = dot3(u, u), dot3(v, v), dot3(u, v)
     a, b = 0.0, 0.0
     inner_u, inner_v = 0.0 < s < 1.0 and uu > 0.0, 0.0 < t < 1.0 and vv > 0.0
     determinant = uu * vv - uv * uv
     if inner_u and inner_v:
-        # Nearly parallel ones have no common perpendicular that lasts.
+        # The common perpendicular of nearly parallel segments has no steady rate.
         if determinant > 1e-12 * uu * vv:
             f, g = -dot3(n, du), -dot3(n, dv)
             a, b = (f * vv - g * uv) / determinant, (g * uu - f * uv) / determinant
@@ -90,7 +92,7 @@ def turning(n: Vector, u: Vector, du: Vector, v: Vector, dv: Vector, s: float, t
 
 @helper
 def least_on_axis(n: Vector, m: Vector, w: Vector, dw: Vector, half: float) -> float:
-    """Return the least (n + t m)·(w + t dw) for |t| up to half."""
+    """Return the minimum of (n + t m)·(w + t dw) for |t| up to half."""
     a, b, c = dot3(n, w), dot3(n, dw) + dot3(m, w), dot3(m, dw)
     least = a - abs(b) * half + c * half * half
     if c > 0.0 and abs(b) < 2.0 * c * half:
@@ -99,7 +101,7 @@ def least_on_axis(n: Vector, m: Vector, w: Vector, dw: Vector, half: float) -> f
 
 
 @helper
-def look(
+def bound_interval(
     i: int,
     j: int,
     middle: float,
@@ -110,15 +112,15 @@ def look(
     parts: FloatArray,
     a3: FloatArray,
 ) -> tuple[float, float]:
-    """Return the distance of two legs in the middle of an interval and a bound over all of it."""
-    p, dp = end_at(i, middle, start, step, angle, parts)
-    q, dq = end_at(j, middle, start, step, angle, parts)
-    a, da = base_of(i, p, dp, a3)
-    b, db = base_of(j, q, dq, a3)
+    """Return the distance of two legs amid an interval, and a lower bound over all of it."""
+    p, dp = platform_end(i, middle, start, step, angle, parts)
+    q, dq = platform_end(j, middle, start, step, angle, parts)
+    a, da = base_end(i, p, dp, a3)
+    b, db = base_end(j, q, dq, a3)
     u, v, r = minus(p, a), minus(q, b), minus(a, b)
     s, t = closest_shares(u, v, r)
     distance = math.sqrt(square_at(s, t, u, v, r))
-    bends = bend(i, half, angle, parts) + bend(j, half, angle, parts)
+    bends = tangent_error(i, half, angle, parts) + tangent_error(j, half, angle, parts)
     d0, d1, d2, d3 = minus(da, db), minus(dp, db), minus(da, dq), minus(dp, dq)
     fastest = math.sqrt(max(dot3(d0, d0), dot3(d1, d1), dot3(d2, d2), dot3(d3, d3)))
     bound = distance - half * fastest
@@ -128,7 +130,7 @@ def look(
             (r[1] + s * u[1] - t * v[1]) / distance,
             (r[2] + s * u[2] - t * v[2]) / distance,
         )
-        m = turning(n, u, minus(dp, da), v, minus(dq, db), s, t)
+        m = normal_rate(n, u, minus(dp, da), v, minus(dq, db), s, t)
         least = min(
             least_on_axis(n, m, r, d0, half),
             least_on_axis(n, m, minus(p, b), d1, half),
@@ -157,20 +159,22 @@ def least_rows(
     least: FloatArray,
     share: FloatArray,
 ) -> None:
-    """Write for each move and each pair of legs the least distance and a bound of it.
+    """Write the least distance of each pair of legs over each move, and a lower bound of it.
 
     Args:
-        start: Of b4, shape (n, 3).
-        step: By which it goes, shape (n, 3).
-        angle: By which the platform turns, shape (n,).
-        parts: Of each leg's platform end, see `explorer.legs.moves`, shape (n, 4, 3, 3).
-        a3: Shape (3,).
-        tolerance: Within which the bound is to be, shape (n,).
-        target: A distance for each pair, shape (6,); all that is asked is whether there is
-            more. NaN where more is asked, −inf to leave a pair out.
-        bound: Written but for pairs left out, shape (n, 6).
-        least: Likewise, the least distance found, shape (n, 6).
-        share: Likewise, how far into the move that is, shape (n, 6).
+        start: b4 at the start, shape (n, 3).
+        step: Displacement of b4, shape (n, 3).
+        angle: Rotation of the platform, in radians, shape (n,).
+        parts: Parts of each leg's platform end, see `explorer.legs.moves`, shape
+            (n, 4, 3, 3).
+        a3: Base end of leg 4, shape (3,).
+        tolerance: The most that `least` may exceed `bound`, shape (n,).
+        target: Distance of each pair at which the search may end, once it is certain
+            whether the least is greater, shape (6,). NaN for a search to the tolerance, −inf
+            for a pair to leave out.
+        bound: Written except for pairs left out: the lower bound, shape (n, 6).
+        least: Written likewise: the least distance seen, shape (n, 6).
+        share: Written likewise: the share of the move where that is, shape (n, 6).
     """
     middles, halves = np.zeros(DEEPEST), np.zeros(DEEPEST)
     for row in range(start.shape[0]):
@@ -178,41 +182,41 @@ def least_rows(
         for i in range(3):
             for j in range(i + 1, 4):
                 pair += 1
-                enough = target[pair]
-                if enough == -math.inf:
+                limit = target[pair]
+                if limit == -math.inf:
                     continue
                 best, where, lowest = math.inf, 0.0, math.inf
-                # To find the least, a good guess saves halvings; to decide, it does not.
-                for k in range(SAMPLES + 1 if math.isnan(enough) else 0):
+                # A good guess saves halvings in finding the least, but none in deciding.
+                for k in range(SAMPLES + 1 if math.isnan(limit) else 0):
                     t = k / SAMPLES
-                    distance, _ = look(
+                    distance, _ = bound_interval(
                         i, j, t, 0.0, start[row], step[row], angle[row], parts[row], a3
                     )
                     if distance < best:
                         best, where = distance, t
                 middles[0], halves[0] = 0.5, 0.5
-                waiting = 1
-                while waiting > 0:
-                    waiting -= 1
-                    t, half = middles[waiting], halves[waiting]
-                    distance, low = look(
+                queued = 1
+                while queued > 0:
+                    queued -= 1
+                    t, half = middles[queued], halves[queued]
+                    distance, low = bound_interval(
                         i, j, t, half, start[row], step[row], angle[row], parts[row], a3
                     )
                     if distance < best:
                         best, where = distance, t
-                    if best <= enough:
-                        # It is known that there is no more: the rest has no bound.
+                    if best <= limit:
+                        # The least is not greater than the target: the rest needs no bound.
                         lowest = 0.0
                         break
-                    if low >= best - tolerance[row] or low > enough or waiting + 2 > DEEPEST:
+                    if low >= best - tolerance[row] or low > limit or queued + 2 > DEEPEST:
                         lowest = min(lowest, low)
                         continue
                     half *= 0.5
-                    # That beside the least so far comes first.
+                    # The half nearer to the least so far comes first.
                     near = half if where > t else -half
-                    middles[waiting], halves[waiting] = t - near, half
-                    middles[waiting + 1], halves[waiting + 1] = t + near, half
-                    waiting += 2
+                    middles[queued], halves[queued] = t - near, half
+                    middles[queued + 1], halves[queued + 1] = t + near, half
+                    queued += 2
                 bound[row, pair] = min(lowest, best)
                 least[row, pair] = best
                 share[row, pair] = where

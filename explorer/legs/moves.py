@@ -1,9 +1,9 @@
-"""Clearances of the legs over a whole straight move, whatever the sampling step.
+"""Clearances of the legs over a whole straight move, with a bound between all poses.
 
-The position goes on a straight line, the orientation about one fixed axis (slerp). An
-interval of the move is cut in half until a lower bound over all of it is as good as the
-least distance found so far, see `explorer.legs.move_bounds`. So the answer comes with a proof:
-nothing between the poses that were looked at is nearer than the bound.
+Over a straight move the position goes along a line and the platform turns about one fixed
+axis (slerp). An interval of the move is halved until a lower bound over all of it is within
+the tolerance of the least distance seen so far, see `explorer.legs.move_bounds`. The bound
+holds for every pose of the move, not only for those that were evaluated.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose, checked_rotation
 from explorer.numerics.arrays import BoolArray, FloatArray, batch_shape, finite_array
 
-# Of the reach, or of the longest way of a leg's end where that is longer.
+# Tolerances as shares of the reach, or of the longest way of a leg's end if that is longer.
 DEFAULT_TOLERANCE = 1e-6
 SMALLEST_TOLERANCE = 1e-9
-# Poses of one move that are looked at, about; interpreting them is slow.
-LOOKS = 64
-# A move is none if no point of a platform of the reach's size gets farther than this share.
+# About how many poses of a move the kernel evaluates, for its choice whether to compile.
+POSES_OF_MOVE = 64
+# A move has no length if no platform point goes farther than this share of the reach.
 NO_LENGTH = 1e-12
 
 
@@ -39,10 +39,10 @@ class MoveClearances(NamedTuple):
     A pair that shares a joint has the clearance inf, as in `explorer.LegClearances`.
 
     Attributes:
-        bound: Not undercut anywhere on the move (up to rounding), shape (..., 6).
-        clearance: Attained at `share`, above the bound by the tolerance at most, shape
-            (..., 6).
-        share: How far into the move that is, from 0 to 1, shape (..., 6).
+        bound: Lower bound of the clearance over the move, to rounding, shape (..., 6).
+        clearance: Clearance at `share`, greater than the bound by at most the tolerance,
+            shape (..., 6).
+        share: Share of the move, from 0 to 1, shape (..., 6).
     """
 
     bound: FloatArray
@@ -52,17 +52,17 @@ class MoveClearances(NamedTuple):
 
 @dataclass(frozen=True)
 class MoveClearance:
-    """One move by both answers: the exact one with radii, and the paper's without.
+    """One move by both tests: the exact one with radii, and the paper's without.
 
     Attributes:
         start, end: The two poses.
-        bound: Per pair of `PAIRS`, what its clearance never undercuts, shape (6,).
-        clearance: Per pair, the clearance attained at `share`, shape (6,).
-        share: Per pair, how far into the move that is, from 0 to 1, shape (6,).
-        points: Per pair, the closest points of the axes there, shape (6, 2, 3).
-        tolerance: What `clearance` exceeds `bound` by at the most, in design units.
-        steps: Into how many the move was cut for the paper's test.
-        overlaps: Per pair, whether its swept tetrahedra overlap in a step, shape (6,).
+        bound: Lower bound of each pair's clearance over the move, shape (6,).
+        clearance: Clearance of each pair at `share`, shape (6,).
+        share: Share of the move for each pair, from 0 to 1, shape (6,).
+        points: Closest points of the two axes there, shape (6, 2, 3).
+        tolerance: The most by which `clearance` exceeds `bound`, in design units.
+        steps: Number of steps of the paper's test.
+        overlaps: Whether the swept tetrahedra of each pair overlap in a step, shape (6,).
     """
 
     start: Pose
@@ -77,17 +77,17 @@ class MoveClearance:
 
     @property
     def closest(self) -> int:
-        """The index into `PAIRS` of the pair with the least clearance."""
+        """Index into `PAIRS` of the pair with the least clearance."""
         return int(self.clearance.argmin())
 
     @property
     def is_clear(self) -> bool:
-        """Whether no two legs collide anywhere on the move: every bound is above zero."""
+        """Whether no two legs collide anywhere on the move: every bound is positive."""
         return bool((self.bound > 0.0).all())
 
     @property
     def is_free(self) -> bool:
-        """The paper's answer, which has no radii, at this number of steps."""
+        """Whether the move is free by the paper's test, without radii, at this number of steps."""
         return not self.overlaps.any()
 
 
@@ -95,9 +95,9 @@ def poses_between(start: Pose, end: Pose, shares: ArrayLike) -> tuple[FloatArray
     """Return the poses of a straight move.
 
     Args:
-        start: Where it starts.
-        end: Where it ends; the platform turns the shorter way.
-        shares: How far into the move, from 0 to 1, shape (...).
+        start: Pose at the start.
+        end: Pose at the end; the platform turns the shorter way.
+        shares: Shares of the move, from 0 to 1, shape (...).
 
     Returns:
         Positions, shape (..., 3), and rotations, shape (..., 3, 3).
@@ -119,18 +119,20 @@ def move_clearances(
     *,
     tolerance: float | None = None,
 ) -> MoveClearances:
-    """Return the least clearances over straight moves; a pose that stays is one too.
+    """Return the least clearances over straight moves; those of no length are allowed.
 
     Args:
-        design: The manipulator; the radii are those of its limits.
+        design: The manipulator; its limits hold the radii.
         start_position: b4 in the base frame, shape (..., 3), in design units.
         start_rotation: Platform to base, shape (..., 3, 3).
-        end_position: Where b4 goes, shape (..., 3).
-        end_rotation: How the platform turns, shape (..., 3, 3), the shorter way.
+        end_position: b4 at the end, shape (..., 3).
+        end_rotation: Platform to base at the end, shape (..., 3, 3); the platform turns the
+            shorter way.
         tolerance: As for `move_clearance`.
 
     Raises:
-        InputError: a pose that is not finite or not a rotation, or a tolerance too small.
+        InputError: a pose has a number that is not finite, or no rotation, or the tolerance
+            is too small.
     """
     moves = _Moves.of(design, start_position, start_rotation, end_position, end_rotation)
     bound, least, share = moves.least(design, moves.tolerance(design, tolerance), math.nan)
@@ -147,7 +149,7 @@ def moves_are_clear(
     *,
     clearance: float = 0.0,
 ) -> BoolArray:
-    """Return whether all pairs keep more than a clearance all along, shape (...).
+    """Return whether all pairs have more than a clearance all along, shape (...).
 
     Arguments and errors are those of `pairs_are_clear`.
     """
@@ -164,12 +166,12 @@ def pairs_are_clear(
     *,
     clearance: float = 0.0,
 ) -> BoolArray:
-    """Return which pairs keep more than a clearance all along, shape (..., 6).
+    """Return which pairs have more than a clearance all along, shape (..., 6).
 
-    Much faster than `move_clearances`, since it ends as soon as that is certain. True is
-    a proof; a least clearance that exceeds the asked one by less than the default
-    tolerance of `move_clearance` may count as one that does not. A pair that shares a
-    joint is clear. Other arguments and errors are those of `move_clearances`.
+    This is much faster than `move_clearances`, since the search ends once the answer is
+    certain. True is a proof. A pair whose least clearance is greater by less than the
+    default tolerance of `move_clearance` may have False. A pair that shares a joint is
+    clear. Other arguments and errors are those of `move_clearances`.
     """
     moves = _Moves.of(design, start_position, start_rotation, end_position, end_rotation)
     bound, _, _ = moves.least(design, moves.tolerance(design, None), clearance)
@@ -179,18 +181,18 @@ def pairs_are_clear(
 def move_clearance(
     design: Design, start: Pose, end: Pose, *, steps: int = 1, tolerance: float | None = None
 ) -> MoveClearance:
-    """Return how close the legs come over a straight move, by both tests.
+    """Return the least clearances over a straight move, with the paper's test beside them.
 
     Args:
-        design: The manipulator; the radii are those of its limits.
-        start: Where the move starts.
-        end: Where it ends; the platform turns about one axis, the shorter way.
-        steps: Into how many steps the paper's test cuts it.
-        tolerance: Of the least clearances, in design units; by default a millionth of the
-            reach, or of the way of the farthest leg's end if that is longer.
+        design: The manipulator; its limits hold the radii.
+        start: Pose at the start of the move.
+        end: Pose at its end; the platform turns about one axis, the shorter way.
+        steps: Number of steps of the paper's test.
+        tolerance: Tolerance of the least clearances, in design units; by default a millionth
+            of the reach, or of the longest way of a leg's end if that is longer.
 
     Raises:
-        InputError: a move of no length, no steps, or a tolerance too small to be met.
+        InputError: the move has no length or no steps, or the tolerance is too small.
     """
     if steps < 1:
         raise InputError(f"a move has at least one step; got {steps}")
@@ -202,20 +204,20 @@ def move_clearance(
             f"a move needs two poses that differ; both have the position ({shown}) and the "
             "same orientation"
         )
-    finest = moves.tolerance(design, tolerance)
-    found = move_clearances(design, *arrays, tolerance=float(finest[0]))
+    tolerances = moves.tolerance(design, tolerance)
+    least = move_clearances(design, *arrays, tolerance=float(tolerances[0]))
     positions, rotations = poses_between(start, end, np.linspace(0.0, 1.0, steps + 1))
     overlaps = step_overlaps(design, positions[:-1], rotations[:-1], positions[1:], rotations[1:])
-    at = leg_clearances(design, *poses_between(start, end, found.share))
+    at = leg_clearances(design, *poses_between(start, end, least.share))
     pairs = np.arange(len(PAIRS))
     return MoveClearance(
         start=start,
         end=end,
-        bound=found.bound,
-        clearance=found.clearance,
-        share=found.share,
+        bound=least.bound,
+        clearance=least.clearance,
+        share=least.share,
         points=at.points[pairs, pairs],
-        tolerance=float(finest[0]),
+        tolerance=float(tolerances[0]),
         steps=steps,
         overlaps=np.asarray(overlaps.any(axis=0)),
     )
@@ -223,16 +225,18 @@ def move_clearance(
 
 @dataclass(frozen=True)
 class _Moves:
-    """Moves in the form of the kernel, one row each.
+    """Moves in the form of the kernel, one to a row.
 
-    A platform point is at start + t step + fixed + cos(t angle) across + sin(t angle) up.
+    At the share t of a move a platform point is
+    start + t step + fixed + cos(t angle) across + sin(t angle) up.
 
     Attributes:
         batch: The batch axes.
-        start, step: Of b4, shape (n, 3).
-        angle: By which the platform turns, shape (n,).
+        start: b4 at the start, shape (n, 3).
+        step: Displacement of b4, shape (n, 3).
+        angle: Rotation of the platform, in radians, shape (n,).
         parts: fixed, across and up of each leg's platform end, shape (n, 4, 3, 3).
-        way: The longest way of an end of a leg, at the most, shape (n,).
+        way: Upper bound of the longest way of a leg's end, shape (n,).
     """
 
     batch: tuple[int, ...]
@@ -272,45 +276,45 @@ class _Moves:
         way = np.linalg.norm(step, axis=-1) + angle * np.linalg.norm(across, axis=-1).max(axis=-1)
         return _Moves(batch, start.copy(), step, np.asarray(angle), parts, np.asarray(way))
 
-    def tolerance(self, design: Design, asked: float | None) -> FloatArray:
+    def tolerance(self, design: Design, requested: float | None) -> FloatArray:
         """Return the tolerance of each move, shape (n,).
 
         Raises:
-            InputError: one that is asked for is too small to be met.
+            InputError: the requested one is too small.
         """
         size = np.maximum(design.reach, self.way)
-        if asked is None:
+        if requested is None:
             return DEFAULT_TOLERANCE * size
         least = SMALLEST_TOLERANCE * float(size.max(initial=design.reach))
-        if not asked >= least:
-            raise InputError(f"the tolerance must be at least {least:.2g}; got {asked:g}")
-        return np.full(len(size), asked)
+        if not requested >= least:
+            raise InputError(f"the tolerance must be at least {least:.2g}; got {requested:g}")
+        return np.full(len(size), requested)
 
     def least(
-        self, design: Design, tolerance: FloatArray, enough: float
+        self, design: Design, tolerance: FloatArray, target: float
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return bound, least distance and its share of the move, each of shape (..., 6).
+        """Return lower bounds, least distances and their shares of the moves, shapes (..., 6).
 
         Args:
             design: The manipulator.
-            tolerance: Shape (n,).
-            enough: A clearance; the search ends once it is certain whether there is more.
-                NaN for no such end.
+            tolerance: The most by which a least distance exceeds its bound, shape (n,).
+            target: Clearance at which the search may end, once it is certain whether the
+                least is greater; NaN for a search to the tolerance.
         """
         rows = len(self.start)
         bound, least, share = (np.full((rows, len(PAIRS)), math.inf) for _ in range(3))
         share[:] = 0.0
-        target = np.where(joined_pairs(design), -math.inf, radii_of_pairs(design) + enough)
+        targets = np.where(joined_pairs(design), -math.inf, radii_of_pairs(design) + target)
         fixed = np.array([*design.a3, 0.0])
         least_rows(
-            LOOKS * rows,
+            POSES_OF_MOVE * rows,
             self.start,
             self.step,
             self.angle,
             self.parts,
             fixed,
             tolerance,
-            target,
+            targets,
             bound,
             least,
             share,

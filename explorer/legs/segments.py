@@ -1,40 +1,25 @@
-"""The distance between two line segments and the points that realise it, in any position.
+"""Closest points of two line segments, as functions that kernels call.
 
 Parallel, touching, crossing and zero-length segments need no case of their own: the least
-is that of the two lines, where it lies within both, or one that an end has. See V. J.
-Lumelsky, "On fast computation of distance between line segments" (1985).
+distance is that of the two lines, where their closest points lie within both segments, or
+that of an end of one from the other. See V. J. Lumelsky, "On fast computation of distance
+between line segments" (1985).
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple, TypeAlias
+from typing import TypeAlias
 
-import numpy as np
-from numpy.typing import ArrayLike
-
-from explorer.numerics.arrays import FloatArray, batch_shape, finite_array
-from explorer.numerics.compiled import helper, kernel
+from explorer.numerics.arrays import FloatArray
+from explorer.numerics.compiled import helper
 
 Vector: TypeAlias = tuple[float, float, float]
 
 
-class SegmentDistances(NamedTuple):
-    """Distances of pairs of segments.
-
-    Attributes:
-        distance: Shape (...).
-        points: The closest point of the first segment and that of the second, shape
-            (..., 2, 3). Where several are closest, one pair of them.
-    """
-
-    distance: FloatArray
-    points: FloatArray
-
-
 @helper
-def clamped(value: float, over: float) -> float:
-    """Return value / over, kept within 0 and 1; 0 if there is nothing to divide by."""
+def clamp_ratio(value: float, over: float) -> float:
+    """Return value / over clamped to [0, 1]; 0 where `over` is not positive."""
     if value <= 0.0 or over <= 0.0:
         return 0.0
     if value >= over:
@@ -71,35 +56,35 @@ def square_at(s: float, t: float, u: Vector, v: Vector, r: Vector) -> float:
 
 @helper
 def closest_shares(u: Vector, v: Vector, r: Vector) -> tuple[float, float]:
-    """Return the s and t, each from 0 to 1, at which |r + s u − t v| is least.
+    """Return the s and t, both from 0 to 1, at which |r + s u − t v| is least.
 
-    These are the shares along two segments with the directions u and v; r leads from the
-    start of the second to the start of the first.
+    They are the shares of two segments with the directions u and v at their closest points;
+    r leads from the start of the second segment to the start of the first.
     """
     uu, vv, uv, ur, vr = dot3(u, u), dot3(v, v), dot3(u, v), dot3(u, r), dot3(v, r)
-    # An end of one against all of the other, four times.
-    best_s, best_t = 0.0, clamped(vr, vv)
+    # The distances of the four ends from the other segment.
+    best_s, best_t = 0.0, clamp_ratio(vr, vv)
     best = square_at(best_s, best_t, u, v, r)
-    s, t = 1.0, clamped(uv + vr, vv)
+    s, t = 1.0, clamp_ratio(uv + vr, vv)
     square = square_at(s, t, u, v, r)
     if square < best:
         best_s, best_t, best = s, t, square
-    s, t = clamped(-ur, uu), 0.0
+    s, t = clamp_ratio(-ur, uu), 0.0
     square = square_at(s, t, u, v, r)
     if square < best:
         best_s, best_t, best = s, t, square
-    s, t = clamped(uv - ur, uu), 1.0
+    s, t = clamp_ratio(uv - ur, uu), 1.0
     square = square_at(s, t, u, v, r)
     if square < best:
         best_s, best_t, best = s, t, square
-    # The common perpendicular; by cross products it stands up to nearly parallel lines,
+    # The common perpendicular. Cross products keep it accurate for nearly parallel lines,
     # where uu vv − uv² would lose twice the digits.
     n = cross3(u, v)
     nn = dot3(n, n)
     s, t = dot3(n, cross3(v, r)), dot3(n, cross3(u, r))
     if 0.0 < s < nn and 0.0 < t < nn:
         s = s / nn
-        t = clamped(uv * s + vr, vv)
+        t = clamp_ratio(uv * s + vr, vv)
         if square_at(s, t, u, v, r) < best:
             best_s, best_t = s, t
     return best_s, best_t
@@ -107,7 +92,7 @@ def closest_shares(u: Vector, v: Vector, r: Vector) -> tuple[float, float]:
 
 @helper
 def write_closest(first: FloatArray, second: FloatArray, points: FloatArray) -> float:
-    """Write the closest points of two segments, each of shape (2, 3); return the distance."""
+    """Write the closest points of two segments of shape (2, 3), and return their distance."""
     a, b = (first[0, 0], first[0, 1], first[0, 2]), (second[0, 0], second[0, 1], second[0, 2])
     u = minus((first[1, 0], first[1, 1], first[1, 2]), a)
     v = minus((second[1, 0], second[1, 1], second[1, 2]), b)
@@ -117,41 +102,3 @@ def write_closest(first: FloatArray, second: FloatArray, points: FloatArray) -> 
         points[0, axis] = a[axis] + s * u[axis]
         points[1, axis] = b[axis] + t * v[axis]
     return math.sqrt(square_at(s, t, u, v, r))
-
-
-@kernel("void(f8[:,:,::1], f8[:,:,::1], f8[::1], f8[:,:,::1])")
-def distance_rows(
-    first: FloatArray, second: FloatArray, distance: FloatArray, points: FloatArray
-) -> None:
-    """Write the distance and the closest points of each pair of segments.
-
-    Args:
-        first: Shape (n, 2, 3).
-        second: Shape (n, 2, 3).
-        distance: Written, shape (n,).
-        points: Written, shape (n, 2, 3).
-    """
-    for row in range(first.shape[0]):
-        distance[row] = write_closest(first[row], second[row], points[row])
-
-
-def segment_distances(first: ArrayLike, second: ArrayLike) -> SegmentDistances:
-    """Return the distance between segments and the two points that realise it.
-
-    Args:
-        first: The two ends, shape (..., 2, 3); they may be one point.
-        second: Likewise; the batch axes of both are broadcast.
-
-    Raises:
-        InputError: not finite numbers of these shapes.
-    """
-    a = finite_array("first segment", first, (2, 3))
-    b = finite_array("second segment", second, (2, 3))
-    batch = batch_shape((a, 2), (b, 2))
-    a_rows, b_rows = (
-        np.broadcast_to(each, (*batch, 2, 3)).reshape(-1, 2, 3).copy() for each in (a, b)
-    )
-    count = len(a_rows)
-    distance, points = np.empty(count), np.empty((count, 2, 3))
-    distance_rows(count, a_rows, b_rows, distance, points)
-    return SegmentDistances(distance.reshape(batch), points.reshape(*batch, 2, 3))

@@ -1,176 +1,120 @@
 """Whether two tetrahedra overlap, by the separating axis theorem, flat ones included.
 
-Two convex bodies are apart if and only if their projections on some axis are. Four kinds
-of test, from the cheapest on; each answers only where it is sure and hands on the rest:
-
-1. the axes of coordinates, then the eight face normals;
-2. where one is solid, its six edges: a plane through an edge is a mix of the two faces
-   that meet there, so all 36 axes edge × edge come down to the distances from the faces,
-   as in F. Ganovelli, F. Ponchio and C. Rocchini, "Fast tetrahedron-tetrahedron overlap
-   algorithm" (2002);
-3. where both are flat, their sections with the line in which their planes meet;
-4. else (touching, parallel planes, segments, points) every axis edge × edge one by one,
-   and the shortest connections of edges, which are the axes within a common plane.
-
-The first three look at many pairs side by side, see `explorer.legs.overlap_lanes`.
+Two convex bodies are apart if and only if their projections on some axis are. For solid
+bodies the candidates are the face normals and the cross products of an edge of each: S.
+Gottschalk, M. C. Lin and D. Manocha, "OBBTree" (1996). If all these projections overlap
+deeply, so do the bodies. If some only touch, which includes bodies in one plane, segments
+and points, the shortest connections of edges are candidates as well.
 """
 
 from __future__ import annotations
 
-import math
-from typing import cast
-
 import numpy as np
 from numpy.typing import ArrayLike
 
-from explorer.legs.overlap_lanes import (
-    ANGLE,
-    BODY,
-    ENDS,
-    FACE,
-    GAP,
-    HEIGHT,
-    HIGH,
-    LANES,
-    LARGEST,
-    LOW,
-    NEAR,
-    ODD,
-    OPEN,
-    OWN,
-    SIZE,
-    SLACK,
-    STATES,
-    TOLERANCE,
-    test_boxes,
-    test_edges,
-    test_faces,
-    write_sections,
-)
-from explorer.legs.segments import Vector, closest_shares, cross3, dot3, minus
-from explorer.numerics.arrays import BoolArray, FloatArray, IntArray, batch_shape, finite_array
-from explorer.numerics.compiled import MANY_ROWS, helper, kernel
+from explorer.legs.segments import Vector, closest_shares, dot3, minus
+from explorer.numerics.arrays import BoolArray, FloatArray, batch_shape, finite_array, for_kernel
+from explorer.numerics.compiled import helper, kernel
 
-# Flat bodies at least this wide and this much inclined, as shares, have a section that is
-# sure where its vertices and ends are this clear.
-WIDE, CLEAR = 1e-3, 1e-5
+# A gap within this share of the largest coordinate is rounding: the two touch.
+TOUCHING = 2.0**-46
+# Coordinates between these are used as they are: their fourth powers neither overflow nor vanish.
+LEAST, MOST = 1e-60, 1e60
+# An overlap of projections beyond this share of the size is deep.
+DEEP = 2.0**-8
+# A cross product below this share of the squared size has mostly rounding for a direction.
+FAINT = 1e-12
 EDGES = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
-UNSURE, APART, OVERLAPPING = 0, 1, 2
 
 
 @helper
-def vertex(body: FloatArray, k: int) -> Vector:
-    """Return a row of a (4, 3) array."""
-    return (body[k, 0], body[k, 1], body[k, 2])
+def vertex(bodies: FloatArray, body: int, k: int) -> Vector:
+    """Return vertex k of a body, from the vertices of both, shape (2, 3, 4)."""
+    return (bodies[body, 0, k], bodies[body, 1, k], bodies[body, 2, k])
 
 
 @helper
-def size1(n: Vector) -> float:
-    """Return the sum of the magnitudes, a cheap stand-in for the length."""
-    return abs(n[0]) + abs(n[1]) + abs(n[2])
+def compare_boxes(p: FloatArray, q: FloatArray, row: int) -> tuple[float, float, bool]:
+    """Return the largest coordinate, the size, and whether the bounding boxes are apart."""
+    largest, size, gap = 0.0, 0.0, 0.0
+    for axis in range(3):
+        a, b, c, d = p[row, 0, axis], p[row, 1, axis], p[row, 2, axis], p[row, 3, axis]
+        low, high = min(a, b, c, d), max(a, b, c, d)
+        a, b, c, d = q[row, 0, axis], q[row, 1, axis], q[row, 2, axis], q[row, 3, axis]
+        low2, high2 = min(a, b, c, d), max(a, b, c, d)
+        largest = max(largest, -low, high, -low2, high2)
+        size = max(size, high - low, high2 - low2)
+        gap = max(gap, low2 - high, low - high2)
+    return largest, size, gap > TOUCHING * largest
 
 
 @helper
-def sort_out(
-    numbers: FloatArray,
-    vertices: FloatArray,
-    faces: FloatArray,
-    state: FloatArray,
-    known: IntArray,
+def place(
+    rows: FloatArray,
+    row: int,
+    scale: float,
+    origin: Vector,
+    body: int,
+    bodies: FloatArray,
+    edges: FloatArray,
 ) -> None:
-    """Write what is known of the pairs in the lanes, as many as there are results.
+    """Write the vertices of a body relative to a point, and its six edges."""
+    for axis in range(3):
+        o = scale * origin[axis]
+        a, b = scale * rows[row, 0, axis] - o, scale * rows[row, 1, axis] - o
+        c, d = scale * rows[row, 2, axis] - o, scale * rows[row, 3, axis] - o
+        bodies[body, axis, 0], bodies[body, axis, 1] = a, b
+        bodies[body, axis, 2], bodies[body, axis, 3] = c, d
+        edges[body, axis, 0], edges[body, axis, 1] = b - a, c - a
+        edges[body, axis, 2], edges[body, axis, 3] = d - a, c - b
+        edges[body, axis, 4], edges[body, axis, 5] = d - b, d - c
 
-    The coordinates, the faces, and the edges of the first body where it is solid.
+
+@helper
+def cross_edges(
+    edges: FloatArray, first: int, i: int, second: int, j: int, axes: FloatArray, k: int
+) -> None:
+    """Write the cross product of two edges as an axis."""
+    ux, uy, uz = edges[first, 0, i], edges[first, 1, i], edges[first, 2, i]
+    vx, vy, vz = edges[second, 0, j], edges[second, 1, j], edges[second, 2, j]
+    axes[0, k], axes[1, k], axes[2, k] = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+
+
+@helper
+def project(
+    bodies: FloatArray, axes: FloatArray, count: int, tolerance: float, size: float
+) -> tuple[bool, bool, bool]:
+    """Return whether on some axis the projections are apart, overlap slightly, overlap deeply.
+
+    The loop has no branch, so that compilers turn it into vector instructions.
+
+    Args:
+        bodies: Vertices, shape (2, 3, 4).
+        axes: Shape (3, n).
+        count: Number of axes to use.
+        tolerance: Gap of projections that counts as touching, over the axis' length.
+        size: Largest extent of the bodies.
     """
-    many = len(known)
-    test_boxes(numbers, vertices, state, many)
-    test_faces(vertices, faces, state, many)
-    solid = False
-    for k in range(many):
-        solid = solid or (state[GAP + k] <= 0.0 and state[HEIGHT + k] > 0.0)
-    if solid:
-        test_edges(faces, state, 0, many)
-    for k in range(many):
-        known[k] = UNSURE
-        if state[GAP + k] > 0.0:
-            known[k] = APART
-        elif state[HEIGHT + k] > 0.0 and state[OPEN + k] == 0.0:
-            known[k] = OVERLAPPING
-
-
-@helper
-def settle(
-    numbers: FloatArray,
-    vertices: FloatArray,
-    faces: FloatArray,
-    state: FloatArray,
-    rows: IntArray,
-    overlap: BoolArray,
-) -> None:
-    """Write at the given rows whether the pairs in the lanes overlap that were left unsure."""
-    many = len(rows)
-    test_boxes(numbers, vertices, state, many)
-    test_faces(vertices, faces, state, many)
-    solid, flat = False, False
-    for k in range(many):
-        solid = solid or state[HEIGHT + LANES + k] > 0.0
-        flat = flat or state[HEIGHT + LANES + k] <= 0.0
-    if solid:
-        test_edges(faces, state, 1, many)
-    if flat:
-        write_sections(vertices, faces, state, many)
-    bodies = np.zeros((2, 4, 3))
-    for k in range(many):
-        known = UNSURE
-        if state[GAP + k] > 0.0:
-            known = APART
-        elif state[HEIGHT + LANES + k] > 0.0:
-            known = OVERLAPPING if state[OPEN + LANES + k] == 0.0 else UNSURE
-        elif state[HEIGHT + k] <= 0.0:
-            known = by_sections(faces, state, k)
-        if known == UNSURE:
-            for corner in range(4):
-                for axis in range(3):
-                    at = (3 * corner + axis) * LANES + k
-                    bodies[0, corner, axis] = vertices[at]
-                    bodies[1, corner, axis] = vertices[at + BODY * LANES]
-            known = by_all_axes(bodies, state[TOLERANCE + k])
-        overlap[rows[k]] = known == OVERLAPPING
-
-
-@helper
-def by_sections(faces: FloatArray, state: FloatArray, lane: int) -> int:
-    """Decide on two flat bodies by their sections with the line where their planes meet."""
-    f, g = LARGEST + lane, LARGEST + FACE * LANES + lane
-    size_f, size_g = faces[f + 3 * LANES], faces[g + 3 * LANES]
-    size, angle = state[SIZE + lane], state[ANGLE + lane]
-    flat = faces[f + OWN] <= faces[f + SLACK] and faces[g + OWN] <= faces[g + SLACK]
-    # Of what is next to a segment or a point the normal is rounding.
-    wide = min(size_f, size_g) > WIDE * size * size
-    if not (flat and wide) or angle <= WIDE * size_f * size_g:
-        return UNSURE
-    # A vertex close to the other's plane makes the section unsure.
-    near, near2 = state[NEAR + lane], state[NEAR + ENDS + lane]
-    if near <= CLEAR * size * size_g or near2 <= CLEAR * size * size_f:
-        return UNSURE
-    apart = max(
-        state[LOW + lane] - state[HIGH + ENDS + lane],
-        state[LOW + ENDS + lane] - state[HIGH + lane],
-    )
-    margin = CLEAR * size * angle
-    if apart > margin:
-        return APART
-    return OVERLAPPING if apart < -margin else UNSURE
-
-
-@helper
-def is_separating(n: Vector, bodies: FloatArray, tolerance: float) -> bool:
-    """Whether the projections of both on an axis are apart."""
-    low, high, low2, high2 = math.inf, -math.inf, math.inf, -math.inf
-    for k in range(4):
-        x, y = dot3(n, vertex(bodies[0], k)), dot3(n, vertex(bodies[1], k))
-        low, high, low2, high2 = min(low, x), max(high, x), min(low2, y), max(high2, y)
-    return max(low - high2, low2 - high) > tolerance * size1(n)
+    (ax, ay, az), (bx, by, bz) = vertex(bodies, 0, 0), vertex(bodies, 0, 1)
+    (cx, cy, cz), (dx, dy, dz) = vertex(bodies, 0, 2), vertex(bodies, 0, 3)
+    (ex, ey, ez), (fx, fy, fz) = vertex(bodies, 1, 0), vertex(bodies, 1, 1)
+    (gx, gy, gz), (hx, hy, hz) = vertex(bodies, 1, 2), vertex(bodies, 1, 3)
+    faint = FAINT * size * size
+    apart = shallow = deep = False
+    for k in range(count):
+        x, y, z = axes[0, k], axes[1, k], axes[2, k]
+        a, b = x * ax + y * ay + z * az, x * bx + y * by + z * bz
+        c, d = x * cx + y * cy + z * cz, x * dx + y * dy + z * dz
+        e, f = x * ex + y * ey + z * ez, x * fx + y * fy + z * fz
+        g, h = x * gx + y * gy + z * gz, x * hx + y * hy + z * hz
+        low, high = min(a, b, c, d), max(a, b, c, d)
+        low2, high2 = min(e, f, g, h), max(e, f, g, h)
+        gap, length = max(low2 - high, low - high2), abs(x) + abs(y) + abs(z)
+        is_deep = gap < -DEEP * size * length
+        apart |= gap > tolerance * length
+        shallow |= (length > faint) & (not is_deep)
+        deep |= (length > faint) & is_deep
+    return apart, shallow, deep
 
 
 @helper
@@ -182,14 +126,16 @@ def without(w: Vector, u: Vector) -> Vector:
 
 
 @helper
-def by_all_axes(bodies: FloatArray, tolerance: float) -> int:
-    """Decide by all 36 axes edge × edge and the 36 shortest connections of edges."""
+def connections_separate(
+    bodies: FloatArray, axes: FloatArray, tolerance: float, size: float
+) -> bool:
+    """Return whether the shortest connection of some two edges is a separating axis."""
     for i, j in EDGES:
-        a = vertex(bodies[0], i)
-        u = minus(vertex(bodies[0], j), a)
+        a = vertex(bodies, 0, i)
+        u = minus(vertex(bodies, 0, j), a)
         for k, m in EDGES:
-            b = vertex(bodies[1], k)
-            v = minus(vertex(bodies[1], m), b)
+            b = vertex(bodies, 1, k)
+            v = minus(vertex(bodies, 1, m), b)
             r = minus(a, b)
             s, t = closest_shares(u, v, r)
             w = (
@@ -197,101 +143,95 @@ def by_all_axes(bodies: FloatArray, tolerance: float) -> int:
                 r[1] + s * u[1] - t * v[1],
                 r[2] + s * u[2] - t * v[2],
             )
-            if size1(w) <= tolerance:
-                return OVERLAPPING
-            if is_separating(cross3(u, v), bodies, tolerance):
-                return APART
-            # A short connection is mostly rounding, but for what is perpendicular.
+            if abs(w[0]) + abs(w[1]) + abs(w[2]) <= tolerance:
+                return False
+            # Of a short connection only the part perpendicular to the edges is more than rounding.
             if 0.0 < s < 1.0:
                 w = without(w, u)
             if 0.0 < t < 1.0:
                 w = without(w, v)
-            if is_separating(w, bodies, tolerance):
-                return APART
-    return OVERLAPPING
+            axes[0, 0], axes[1, 0], axes[2, 0] = w
+            if project(bodies, axes, 1, tolerance, size)[0]:
+                return True
+    return False
 
 
-@kernel("void(f8[:,:,::1], f8[:,:,::1], b1[::1], i8[::1])")
-def overlap_rows(p: FloatArray, q: FloatArray, overlap: BoolArray, odd: IntArray) -> None:
+@helper
+def overlaps(
+    p: FloatArray, q: FloatArray, row: int, bodies: FloatArray, edges: FloatArray, axes: FloatArray
+) -> bool:
+    """Return whether a pair overlaps.
+
+    Args:
+        p: First bodies, shape (n, 4, 3).
+        q: Second bodies, shape (n, 4, 3).
+        row: Index of the pair.
+        bodies: Scratch for vertices, shape (2, 3, 4).
+        edges: Scratch for edges, shape (2, 3, 6).
+        axes: Scratch, shape (3, 36).
+    """
+    largest, size, apart = compare_boxes(p, q, row)
+    if apart:
+        return False
+    scale = 1.0
+    if not LEAST < largest < MOST:
+        scale = 1.0 / max(largest, 1e-300)
+    tolerance, size = TOUCHING * largest * scale, size * scale
+    origin = (p[row, 0, 0], p[row, 0, 1], p[row, 0, 2])
+    place(p, row, scale, origin, 0, bodies, edges)
+    place(q, row, scale, origin, 1, bodies, edges)
+    for body in range(2):
+        cross_edges(edges, body, 0, body, 1, axes, 4 * body)
+        cross_edges(edges, body, 0, body, 2, axes, 4 * body + 1)
+        cross_edges(edges, body, 1, body, 2, axes, 4 * body + 2)
+        cross_edges(edges, body, 3, body, 4, axes, 4 * body + 3)
+    apart, shallow, deep = project(bodies, axes, 8, tolerance, size)
+    if apart:
+        return False
+    for i in range(6):
+        for j in range(6):
+            cross_edges(edges, 0, i, 1, j, axes, 6 * i + j)
+    apart, shallow2, deep2 = project(bodies, axes, 36, tolerance, size)
+    if apart:
+        return False
+    if not (shallow or shallow2) and (deep or deep2):
+        return True
+    return not connections_separate(bodies, axes, tolerance, size)
+
+
+@kernel("void(f8[:,:,::1], f8[:,:,::1], b1[::1])")
+def overlap_rows(p: FloatArray, q: FloatArray, overlap: BoolArray) -> None:
     """Write for each pair whether it overlaps.
 
     Args:
         p: Shape (n, 4, 3).
         q: Shape (n, 4, 3).
         overlap: Written, shape (n,).
-        odd: Written: how many pairs have a number that is not finite, shape (1,).
     """
-    numbers, waiting = np.zeros(24 * LANES), np.zeros(24 * LANES)
-    vertices, faces = np.zeros(2 * BODY * LANES), np.zeros(10 * FACE * LANES)
-    state, known = np.zeros(STATES * LANES), np.zeros(LANES, dtype=np.int64)
-    rows = np.zeros(LANES, dtype=np.int64)
-    odd[0] = 0
-    unsure = 0
-    for start in range(0, p.shape[0], LANES):
-        many = min(LANES, p.shape[0] - start)
-        for k in range(many):
-            for corner in range(4):
-                for axis in range(3):
-                    at = (3 * corner + axis) * LANES + k
-                    numbers[at] = p[start + k, corner, axis]
-                    numbers[at + 12 * LANES] = q[start + k, corner, axis]
-        sort_out(numbers, vertices, faces, state, known[:many])
-        for k in range(many):
-            odd[0] += state[ODD + k] != 0.0
-        for k in range(many):
-            overlap[start + k] = known[k] == OVERLAPPING
-            if known[k] != UNSURE:
-                continue
-            # They wait until there are enough of them to fill the lanes.
-            for row in range(24):
-                waiting[row * LANES + unsure] = numbers[row * LANES + k]
-            rows[unsure] = start + k
-            unsure += 1
-            if unsure == LANES:
-                settle(waiting, vertices, faces, state, rows, overlap)
-                unsure = 0
-    if unsure > 0:
-        settle(waiting, vertices, faces, state, rows[:unsure], overlap)
+    bodies, edges, axes = np.empty((2, 3, 4)), np.empty((2, 3, 6)), np.empty((3, 36))
+    for row in range(p.shape[0]):
+        overlap[row] = overlaps(p, q, row, bodies, edges, axes)
 
 
 def tetrahedra_overlap(p: ArrayLike, q: ArrayLike) -> BoolArray:
     """Return whether tetrahedra have a point in common, touching and containment included.
 
-    Flat ones (triangles, quadrilaterals, segments, points) are as good as solid ones. Two
-    touch if they are apart by less than the rounding of their coordinates: about 1e-14 of
-    the largest coordinate of the pair.
+    Flat ones (triangles, quadrilaterals, segments, points) are allowed. Two touch if their
+    gap is within the rounding of their coordinates: about 1e-14 of the largest coordinate
+    of the pair.
 
     Args:
-        p: The four vertices, shape (..., 4, 3), in any unit.
-        q: Likewise; the batch axes of both are broadcast.
+        p: Vertices, shape (..., 4, 3), in any unit.
+        q: Vertices, shape (..., 4, 3), in the same unit; batch axes are broadcast.
 
     Raises:
-        InputError: not finite numbers of these shapes.
+        InputError: p or q is not an array of finite numbers of that shape.
     """
-    a, b = _bodies("p", p), _bodies("q", q)
+    a, b = finite_array("p", p, (4, 3)), finite_array("q", q, (4, 3))
     batch = batch_shape((a, 2), (b, 2))
-    a_rows, b_rows = _rows(a, batch), _rows(b, batch)
-    overlap, odd = np.empty(len(a_rows), dtype=np.bool_), np.zeros(1, dtype=np.int64)
-    overlap_rows(len(a_rows), a_rows, b_rows, overlap, odd)
-    if odd[0]:
-        finite_array("p", a, (4, 3))
-        finite_array("q", b, (4, 3))
+    a_rows, b_rows = (
+        for_kernel(np.broadcast_to(each, (*batch, 4, 3)).reshape(-1, 4, 3)) for each in (a, b)
+    )
+    overlap = np.empty(len(a_rows), dtype=np.bool_)
+    overlap_rows(len(a_rows), a_rows, b_rows, overlap)
     return overlap.reshape(batch)
-
-
-def _bodies(name: str, value: ArrayLike) -> FloatArray:
-    """Return vertices whose shape is right; those of an array may still not be finite."""
-    if isinstance(value, np.ndarray):
-        array = cast("FloatArray", value)
-        large = array.shape[-2:] == (4, 3) and array.size >= 12 * MANY_ROWS
-        # The kernel looks at each number anyhow.
-        return array if large and array.dtype == np.float64 else finite_array(name, array, (4, 3))
-    return finite_array(name, value, (4, 3))
-
-
-def _rows(bodies: FloatArray, batch: tuple[int, ...]) -> FloatArray:
-    """Return one row for each pair, in an array as kernels take it: writeable, in C order."""
-    rows = np.broadcast_to(bodies, (*batch, 4, 3)).reshape(-1, 4, 3)
-    if bodies.flags.writeable and rows.size == bodies.size:
-        rows = bodies.reshape(-1, 4, 3)
-    return rows if rows.flags.c_contiguous and rows.flags.writeable else rows.copy()

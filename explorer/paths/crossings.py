@@ -1,9 +1,9 @@
-"""Where a path crosses singularities: all of them, however close together.
+"""Singular poses on a path: all of them, however close together.
 
-Along a straight move the position goes linearly and the platform turns about one axis, so each
-margin is (a + a' t) + (b + b' t) cos ωt + (c + c' t) sin ωt. Its roots are isolated by
-halving: an interval is done with where the Taylor polynomial of second order, with a bound of
-what it leaves out, has no root or one simple root for certain.
+Over a straight move the position goes along a line and the platform turns about one axis, so
+a margin is (a + a' t) + (b + b' t) cos ωt + (c + c' t) sin ωt. Its roots are isolated by
+halving intervals until a bound of the second derivative proves that an interval has no root,
+or one at most.
 """
 
 from __future__ import annotations
@@ -19,21 +19,19 @@ from scipy.spatial.transform import Rotation
 
 from explorer.errors import InputError
 from explorer.legs.moves import poses_between
-from explorer.mechanism.design import Design
-from explorer.mechanism.kinematics import forward
-from explorer.mechanism.margins import margins, mode_of
+from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 
-# Of the position and the way: a margin is zero below it, and all along a move.
+# A margin is zero at a pose, and over a whole move, below these shares of |position| + |way|.
 ROUNDING, ALL_ALONG = 1e-14, 1e-12
-# Intervals that are looked at for a margin, more than enough but where it is nearly zero long.
-MOST_LOOKS = 20_000
-# As far apart touches of zero can be told apart.
-SAME = 1e-6
-# Beside a crossing, to see on which side of zero the margin is.
+# The most intervals examined for a margin; only one that is nearly zero for long needs them.
+MOST_INTERVALS = 20_000
+# Two roots closer than this share of a move, without a change of sign between, are one.
+NEAREST_ROOTS = 1e-6
+# The distance from a crossing, as a share of the move, at which the margin's sign is read.
 ASIDE = 1e-5
-# For a plot of the margins over a path.
+# Samples of a move for a plot of the margins.
 SAMPLES = 101
 
 
@@ -42,14 +40,13 @@ class Crossing:
     """A singular pose on a path.
 
     Attributes:
-        incidence: 1, 2 or 3: which of κ1, κ2, κ3 vanishes.
-        move: Of the path's moves, from 0.
-        share: How far into that move, from 0 to 1.
-        pose: The pose there.
-        changes_sign: Whether the margin has other signs before and after; not where it only
-            touches zero, or where the path starts or ends.
-        side: The sign of the margin on the move that is at hand: before it, but after it
-            where the move starts with it.
+        incidence: 1, 2 or 3, for the vanishing margin δ1, δ2 or δ3.
+        move: Number of the move in the path, from 0.
+        share: Share of that move, from 0 to 1.
+        pose: The singular pose.
+        changes_sign: Whether the margin has opposite signs before and after; False where it
+            only touches zero, and at both ends of the path.
+        side: Sign of the margin before the crossing; after it where the move starts there.
     """
 
     incidence: int
@@ -65,11 +62,11 @@ class PathMargins:
     """The margins over a path, and its crossings.
 
     Attributes:
-        poses: The corners of the path.
-        at: Of the samples: the number of the move and the share of it added, shape (n,).
-        margins: At the samples, shape (n, 3).
-        crossings: In the order of the path.
-        lies_in: The incidences (1, 2, 3) that some whole move has, such as 3 for one in the
+        poses: Corners of the path.
+        at: Place of the samples: number of the move plus the share of it, shape (n,).
+        margins: (δ1, δ2, δ3) of the samples, in design units, shape (n, 3).
+        crossings: Singular poses in the order of the path.
+        lies_in: Incidences (1, 2, 3) that hold over some whole move, such as 3 for one in the
             base plane; such a move has no crossings of that margin.
     """
 
@@ -81,24 +78,24 @@ class PathMargins:
 
 
 def path_margins(poses: Sequence[Pose], samples: int = SAMPLES) -> PathMargins:
-    """Return the margins over a path of straight moves, and where it is singular.
+    """Return the margins over a path of straight moves, and its singular poses.
 
     Args:
-        poses: The corners of the path, two or more.
-        samples: Of each move, both ends included.
+        poses: Corners of the path, two or more.
+        samples: Number of samples of a move, both ends included.
 
     Raises:
-        InputError: fewer than two poses or samples.
+        InputError: there are fewer than two poses or samples.
     """
     if len(poses) < 2 or samples < 2:
-        raise InputError("a path has two poses and two samples of each move at least")
+        raise InputError("a path has at least two poses and at least two samples of a move")
     at: list[FloatArray] = []
     values: list[FloatArray] = []
     crossings: list[Crossing] = []
     lies_in: set[int] = set()
     shares = np.linspace(0.0, 1.0, samples, dtype=np.float64)
     for index, (start, end) in enumerate(itertools.pairwise(poses)):
-        # A corner is a sample of the move before it.
+        # A corner is a sample of the move that ends there.
         own = shares if index == 0 else shares[1:]
         at.append(index + own)
         values.append(margins(*poses_between(start, end, own)))
@@ -109,13 +106,13 @@ def path_margins(poses: Sequence[Pose], samples: int = SAMPLES) -> PathMargins:
         tuple(poses),
         np.concatenate(at),
         np.concatenate(values),
-        tuple(_without_corners_twice(crossings)),
+        tuple(_merge_corners(crossings)),
         tuple(sorted(lies_in)),
     )
 
 
-def _without_corners_twice(crossings: list[Crossing]) -> list[Crossing]:
-    """Return the crossings with those of a corner, of the moves before and after it, as one."""
+def _merge_corners(crossings: list[Crossing]) -> list[Crossing]:
+    """Return the crossings, with one for each corner that both its moves cross at."""
     kept: list[Crossing] = []
     for each in crossings:
         before = next(
@@ -124,11 +121,11 @@ def _without_corners_twice(crossings: list[Crossing]) -> list[Crossing]:
                 for other in reversed(kept)
                 if other.incidence == each.incidence
                 and other.move == each.move - 1
-                and other.share > 1.0 - SAME
+                and other.share > 1.0 - NEAREST_ROOTS
             ),
             None,
         )
-        if before is None or each.share > SAME:
+        if before is None or each.share > NEAREST_ROOTS:
             kept.append(each)
         else:
             at = kept.index(before)
@@ -136,30 +133,8 @@ def _without_corners_twice(crossings: list[Crossing]) -> list[Crossing]:
     return kept
 
 
-def path_between_modes(design: Design, joints: FloatArray, first: int, last: int) -> PathMargins:
-    """Return the straight move between two assembly modes of the same joints.
-
-    Args:
-        design: The manipulator.
-        joints: (l1, d1, d2, d3, d4, l4), shape (6,).
-        first: The mode to start from, 0 to 7.
-        last: The mode to end in.
-
-    Raises:
-        InputError: no such mode, joints that cannot be used, or lengths that do not close.
-    """
-    for mode in (first, last):
-        if not 0 <= mode <= 7:
-            raise InputError(f"assembly modes are 0 to 7; got {mode}")
-    modes = forward(design, joints)
-    if not modes.feasible:
-        raise InputError("the lengths do not close, so there are no modes to go between")
-    start, end = (Pose.of(modes.position[mode], modes.rotation[mode]) for mode in (first, last))
-    return path_margins([start, end])
-
-
 def _of_move(start: Pose, end: Pose, index: int) -> tuple[list[Crossing], list[int]]:
-    """Return the crossings of a move in order, and the incidences that all of it has."""
+    """Return the crossings of a move in order, and the incidences that hold all along it."""
     found: list[Crossing] = []
     everywhere: list[int] = []
     for which, wave in enumerate(_waves(start, end)):
@@ -168,7 +143,7 @@ def _of_move(start: Pose, end: Pose, index: int) -> tuple[list[Crossing], list[i
             continue
         for share, changes in wave.roots():
             position, rotation = poses_between(start, end, share)
-            aside = share - ASIDE if share > SAME else share + ASIDE
+            aside = share - ASIDE if share > NEAREST_ROOTS else share + ASIDE
             side = 1 if wave.at(aside)[0] > 0.0 else -1
             pose = Pose.of(position, rotation)
             found.append(Crossing(which + 1, index, share, pose, changes, side))
@@ -190,7 +165,7 @@ class _Wave:
 
     @property
     def is_zero(self) -> bool:
-        """Whether it vanishes all over, to rounding."""
+        """Whether it vanishes from 0 to 1, to rounding."""
         samples = [self.at(t)[0] for t in np.linspace(0.0, 1.0, 17).tolist()]
         return max(map(abs, samples)) <= ALL_ALONG * self.size
 
@@ -202,43 +177,43 @@ class _Wave:
         rate = self.da + self.db * cosine + self.dc * sine
         return value, rate + self.angle * (c * cosine - b * sine)
 
-    def bend(self) -> float:
-        """Return what the second derivative does not exceed."""
+    def curvature_bound(self) -> float:
+        """Return an upper bound of the second derivative's magnitude."""
         b = max(abs(self.b), abs(self.b + self.db))
         c = max(abs(self.c), abs(self.c + self.dc))
         rates = math.hypot(self.db, self.dc)
         return self.angle * (self.angle * math.hypot(b, c) + 2.0 * rates)
 
     def roots(self) -> list[tuple[float, bool]]:
-        """Return all roots with whether the sign changes there, in ascending order."""
-        bend, zero = self.bend(), ROUNDING * self.size
-        found: list[tuple[float, bool]] = []
-        waiting = [(0.0, 1.0)]
-        looks = 0
-        while waiting:
-            looks += 1
-            low, high = waiting.pop()
+        """Return all roots in ascending order, with whether the sign changes there."""
+        bend, zero = self.curvature_bound(), ROUNDING * self.size
+        roots: list[tuple[float, bool]] = []
+        queue = [(0.0, 1.0)]
+        examined = 0
+        while queue:
+            examined += 1
+            low, high = queue.pop()
             half, middle = 0.5 * (high - low), 0.5 * (low + high)
             value, rate = self.at(middle)
             off = 0.5 * bend * half * half
             if abs(value) > abs(rate) * half + off + zero:
                 continue
-            if abs(rate) > bend * half or off <= zero or looks > MOST_LOOKS:
-                found += self._only_root(low, high)
+            if abs(rate) > bend * half or off <= zero or examined > MOST_INTERVALS:
+                roots += self._only_root(low, high)
                 continue
-            # The left one is looked at first, so that roots come in order.
-            waiting += [(middle, high), (low, middle)]
-        return _distinct(found)
+            # The left half is next, so that roots come in order.
+            queue += [(middle, high), (low, middle)]
+        return _distinct(roots)
 
     def _only_root(self, low: float, high: float) -> list[tuple[float, bool]]:
-        """Return the root of an interval on which it is monotonous, or else zero to rounding."""
+        """Return the root in an interval where the wave is monotonic or zero to rounding."""
         zero = ROUNDING * self.size
         first, last = self.at(low)[0], self.at(high)[0]
         if (first > 0.0) == (last > 0.0):
-            # At an end of the move, or where it only touches.
+            # The root is at an end of the move, or the wave only touches zero.
             least, t = min((abs(self.at(t)[0]), t) for t in (low, 0.5 * (low + high), high))
             return [(t, False)] if least <= zero else []
-        # Newton's steps, kept within what is known to hold the root.
+        # Newton's steps, within the interval that brackets the root.
         t = 0.5 * (low + high)
         for _ in range(100):
             value, rate = self.at(t)
@@ -258,10 +233,10 @@ class _Wave:
 
 
 def _distinct(roots: list[tuple[float, bool]]) -> list[tuple[float, bool]]:
-    """Return ascending roots without what a touch or an end has in neighbouring intervals."""
+    """Return ascending roots, with one for each root that two neighbouring intervals have."""
     kept: list[tuple[float, bool]] = []
     for share, changes in roots:
-        if kept and share - kept[-1][0] <= SAME and not (changes and kept[-1][1]):
+        if kept and share - kept[-1][0] <= NEAREST_ROOTS and not (changes and kept[-1][1]):
             if changes:
                 kept[-1] = (share, True)
         else:
@@ -270,7 +245,7 @@ def _distinct(roots: list[tuple[float, bool]]) -> list[tuple[float, bool]]:
 
 
 def _waves(start: Pose, end: Pose) -> tuple[_Wave, _Wave, _Wave]:
-    """Return the three margins over a move."""
+    """Return the three margins of a move as waves."""
     p, first = np.array(start.position), start.rotation
     step = np.array(end.position) - p
     turn = Rotation.from_matrix(end.rotation @ first.T).as_rotvec()
@@ -278,8 +253,8 @@ def _waves(start: Pose, end: Pose) -> tuple[_Wave, _Wave, _Wave]:
     axis = turn / angle if angle > 0.0 else np.array([1.0, 0.0, 0.0])
     size = float(np.linalg.norm(p) + np.linalg.norm(step)) or 1.0
 
-    def turned(direction: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return its parts that stay, go with the cosine and go with the sine."""
+    def parts_of(direction: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return its constant, cosine and sine parts."""
         stays = axis * float(axis @ direction)
         return stays, direction - stays, np.cross(axis, direction)
 
@@ -289,15 +264,7 @@ def _waves(start: Pose, end: Pose) -> tuple[_Wave, _Wave, _Wave]:
         return _Wave(a, da, b, db, c, dc, angle, size)
 
     x, zero = np.array([1.0, 0.0, 0.0]), np.zeros(3)
-    kappa1 = wave([-part for part in turned(first[:, 2])])
-    kappa2 = wave([np.cross(x, part) for part in turned(first[:, 0])])
-    kappa3 = wave([np.array([0.0, 0.0, 1.0]), zero, zero])
-    return kappa1, kappa2, kappa3
-
-
-def modes_differ(poses: Sequence[Pose]) -> tuple[int, ...]:
-    """Return the incidences (1, 2, 3) whose margins have other signs at a path's two ends."""
-    first, last = (
-        int(mode_of(margins(each.position, each.rotation))) for each in (poses[0], poses[-1])
-    )
-    return tuple(index for index, bit in enumerate((4, 2, 1), 1) if (first ^ last) & bit)
+    delta1 = wave([-part for part in parts_of(first[:, 2])])
+    delta2 = wave([np.cross(x, part) for part in parts_of(first[:, 0])])
+    delta3 = wave([np.array([0.0, 0.0, 1.0]), zero, zero])
+    return delta1, delta2, delta3

@@ -1,8 +1,8 @@
 """Paths between two poses of one mode that keep all limits, margins and clearances.
 
-What cannot be joined is told before any search: poses of different modes, and poses between
-which two legs would have to pass each other on the guide. The others are joined by a straight
-move or by `explorer.paths.tree_search`; either way every move is proved valid as a whole.
+Poses without a path are refused before any search: those of different modes, and those between
+which two legs would have to pass each other on the guide. Other poses are joined by a straight
+move or by `explorer.paths.tree_search`; in both cases a proof covers every move as a whole.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ from explorer.workspace.limits.broken import violations
 from explorer.workspace.limits.valid_poses import Rules
 
 DEFAULT_SECONDS = 2.0
-# Of the reach, and of what the ends keep: the margins and clearances that paths had better keep.
-COMFORT, SHARE_OF_ENDS = 0.02, 0.5
-# Of the time: for a path that keeps them.
-SHARE_FOR_COMFORT = 0.5
+# Preferred margins and clearances, as shares of the reach and of those of the ends.
+PREFERRED, SHARE_OF_ENDS = 0.02, 0.5
+# The share of the time for a path with these.
+SHARE_FOR_PREFERRED = 0.5
 
 Reason = Literal["other mode", "other order", "out of time"]
 EndReason = Literal["outside limits", "singular"]
@@ -41,7 +41,7 @@ class EndError(InputError):
     """A start or goal that no path can have.
 
     Attributes:
-        reason: Why not; the message says which end, and by which limits or incidences.
+        reason: Kind of the error; the message names the end, and the limits or incidences.
     """
 
     def __init__(self, reason: EndReason, message: str) -> None:
@@ -50,10 +50,10 @@ class EndError(InputError):
 
 
 class NoPathError(NoAnswerError):
-    """There is no path, or none was found in time.
+    """There is no path, or the search ended without one.
 
     Attributes:
-        reason: "other mode" and "other order" are proofs that there is none.
+        reason: Kind of the error; "other mode" and "other order" are proofs of no path.
     """
 
     def __init__(self, reason: Reason, message: str) -> None:
@@ -63,20 +63,22 @@ class NoPathError(NoAnswerError):
 
 @dataclass(frozen=True)
 class PlannedPath:
-    """A path of straight moves, each of which keeps everything.
+    """A path of straight moves, all of which keep limits, margins and clearances.
 
     Attributes:
-        poses: Its corners, from the start to the goal.
-        found: Those of the path as it was found, before smoothing.
-        length: The root-mean-square way of b1 to b4 along it, in design units.
-        margin: What no |κ| is less than along it, but for the tolerance of moves.
-        clearance: What no two legs are nearer than along it.
-        seconds: What finding and smoothing took.
-        checked: How many moves were checked to find it.
+        poses: Corners, from the start to the goal.
+        unsmoothed: Corners before smoothing.
+        length: Root-mean-square way of b1 to b4, in design units.
+        margin: Lower bound of |δ1|, |δ2| and |δ3| along the path, in design units, to the
+            tolerance of moves.
+        clearance: Lower bound of the clearance of any two legs along the path, in design
+            units.
+        seconds: Time for search and smoothing.
+        checked: Number of moves checked in the search.
     """
 
     poses: tuple[Pose, ...]
-    found: tuple[Pose, ...]
+    unsmoothed: tuple[Pose, ...]
     length: float
     margin: float
     clearance: float
@@ -94,22 +96,22 @@ def plan_path(
 ) -> PlannedPath:
     """Return a path from a pose to another that keeps limits, margins and clearances.
 
-    The margins keep the sign triple of the start, whatever mode the home has, and the carriages
-    keep the order that they have there. Where it can, the path also stays off singularities and
-    collisions, by a share of what both ends keep.
+    The margins keep the sign triple of the start, whatever the mode of the home pose, and the
+    carriages keep their order at the start. If possible, margins and clearances also stay
+    above a share of those at both ends.
 
     Args:
         design: The manipulator.
-        start: Where the path starts.
-        goal: Where it ends.
-        seconds: For finding it; smoothing takes some tenths more.
-        seed: Of the shortcuts that smooth it.
+        start: Pose at the start.
+        goal: Pose at the end.
+        seconds: Time for the search; smoothing takes some tenths of a second more.
+        seed: Seed of the random shortcuts in smoothing.
 
     Raises:
-        EndError: a start or goal that is singular or outside the limits; it says which.
-        InputError: no time at all.
-        NoPathError: there is no path, or none was found in time.
-        MissingExtraError: OMPL is not installed, and the straight move is not valid.
+        EndError: the start or the goal is singular or outside the limits.
+        InputError: `seconds` is not a positive number.
+        NoPathError: there is no path, or the search ended without one.
+        MissingExtraError: the straight move is not valid, and OMPL is not installed.
     """
     if not (math.isfinite(seconds) and seconds > 0.0):
         raise InputError(f"planning needs a time above zero, in seconds; got {seconds:g}")
@@ -123,18 +125,18 @@ def plan_path(
     began = time.perf_counter()
     planner = _Planner(design, start, goal, seed)
     exact = Rules.of(design, ends[0].signs, _order(ends[0]))
-    margin, clearance = _comfort(*ends)
-    comfortable = exact.with_room(margin, clearance)
-    path = planner.straight(comfortable, margin, clearance)
+    margin, clearance = _preferred(*ends)
+    preferred = exact.with_room(margin, clearance)
+    path = planner.plan_straight(preferred, margin, clearance)
     if path is None and search_is_possible():
-        # The first time on a machine takes seconds, which are not the path's.
+        # Compiling takes seconds, once on a machine; they do not count as search.
         compile_checks()
         began = time.perf_counter()
-        path = planner.searched(comfortable, margin, clearance, SHARE_FOR_COMFORT * seconds)
-    path = path or planner.straight(exact, 0.0, 0.0)
+        path = planner.search(preferred, margin, clearance, SHARE_FOR_PREFERRED * seconds)
+    path = path or planner.plan_straight(exact, 0.0, 0.0)
     if path is None:
         left = seconds - (time.perf_counter() - began)
-        path = planner.searched(exact, 0.0, 0.0, max(left, 0.0))
+        path = planner.search(exact, 0.0, 0.0, max(left, 0.0))
     if path is None:
         raise NoPathError(
             "out of time",
@@ -145,10 +147,10 @@ def plan_path(
 
 
 class _Planner:
-    """Looks for paths between two poses under one set of rules after another.
+    """Searches for paths between two poses, under one set of rules after another.
 
     Attributes:
-        checked: How many moves have been checked to find one.
+        checked: Number of moves checked so far.
     """
 
     def __init__(self, design: Design, start: Pose, goal: Pose, seed: int) -> None:
@@ -157,7 +159,7 @@ class _Planner:
         self._ends = start, goal
         self._seed = seed
 
-    def straight(self, rules: Rules, margin: float, clearance: float) -> PlannedPath | None:
+    def plan_straight(self, rules: Rules, margin: float, clearance: float) -> PlannedPath | None:
         """Return the straight move if it is valid."""
         self.checked += 1
         smoother = Smoother(self._design, rules, self._seed)
@@ -165,29 +167,29 @@ class _Planner:
             return None
         return self._path(smoother, self._ends, self._ends, margin, clearance)
 
-    def searched(
+    def search(
         self, rules: Rules, margin: float, clearance: float, seconds: float
     ) -> PlannedPath | None:
-        """Return a path that OMPL finds, smoothed, or None if there was too little time."""
-        search = TreeSearch(self._design, rules)
-        found = search.path(*self._ends, seconds)
-        self.checked += search.checked
-        if found is None:
+        """Return a smoothed path of OMPL's search, or None if the time was too short."""
+        tree = TreeSearch(self._design, rules)
+        unsmoothed = tree.path(*self._ends, seconds)
+        self.checked += tree.checked
+        if unsmoothed is None:
             return None
         smoother = Smoother(self._design, rules, self._seed)
-        return self._path(smoother, found, smoother.smoothed(found), margin, clearance)
+        return self._path(smoother, unsmoothed, smoother.smooth(unsmoothed), margin, clearance)
 
     def _path(
         self,
         smoother: Smoother,
-        found: tuple[Pose, ...],
+        unsmoothed: tuple[Pose, ...],
         poses: tuple[Pose, ...],
         margin: float,
         clearance: float,
     ) -> PlannedPath:
         return PlannedPath(
             poses=poses,
-            found=found,
+            unsmoothed=unsmoothed,
             length=float(smoother.lengths(poses).sum()),
             margin=max(smoother.design.limits.margin or 0.0, margin),
             clearance=clearance,
@@ -196,21 +198,21 @@ class _Planner:
         )
 
 
-def _comfort(start: Snapshot, goal: Snapshot) -> tuple[float, float]:
-    """Return the margin and the clearance that a path had better keep, as both ends do."""
-    most = COMFORT * start.design.reach
+def _preferred(start: Snapshot, goal: Snapshot) -> tuple[float, float]:
+    """Return the preferred margin and clearance of a path, which both ends have."""
+    most = PREFERRED * start.design.reach
     margin = min(float(np.abs(each.margins).min()) for each in (start, goal))
     clearance = min(float(each.clearances.clearance.min()) for each in (start, goal))
     return min(most, SHARE_OF_ENDS * margin), min(most, SHARE_OF_ENDS * clearance)
 
 
 def _check_not_singular(name: str, snapshot: Snapshot) -> None:
-    found = incidences(snapshot.stratum)
-    if found:
-        words = " and ".join(INCIDENCES[index - 1] for index in found)
+    vanishing = incidences(snapshot.stratum)
+    if vanishing:
+        words = " and ".join(INCIDENCES[index - 1] for index in vanishing)
         raise EndError(
             "singular",
-            f"the {name} is singular ({words}); a path may neither start nor end so",
+            f"the {name} is singular ({words}); a path cannot start or end there",
         )
 
 
@@ -218,7 +220,7 @@ def _check_same_mode(start: Snapshot, goal: Snapshot) -> None:
     if start.mode == goal.mode:
         return
     signs = zip(start.signs, goal.signs, strict=True)
-    differ = [f"κ{index}" for index, (a, b) in enumerate(signs, 1) if a != b]
+    differ = [f"δ{index}" for index, (a, b) in enumerate(signs, 1) if a != b]
     raise NoPathError(
         "other mode",
         f"the start is in mode {start.mode} ({mode_name(start.mode)}), the goal in mode "
@@ -228,7 +230,7 @@ def _check_same_mode(start: Snapshot, goal: Snapshot) -> None:
 
 
 def _check_within(name: str, snapshot: Snapshot, signs: tuple[int, int, int]) -> None:
-    # Of the carriages' order the two ends tell together, see `_check_same_order`.
+    # The carriages' order is a matter of both ends, see `_check_same_order`.
     position = np.array(snapshot.pose.position)
     broken = [
         str(each)
@@ -257,13 +259,13 @@ def _order(snapshot: Snapshot) -> int:
 
 
 def _check_same_order(start: Snapshot, goal: Snapshot) -> None:
-    """Refuse poses between which the feet of two legs would have to meet on the guide.
+    """Refuse poses between which the base ends of two legs would meet on the guide.
 
-    Legs 1, 2 and 3 all start from the guide, at 0, d1 and d3: where two of these are equal,
-    two legs touch. So their order is the same all along a path without collisions.
+    Legs 1, 2 and 3 start from the guide at 0, d1 and d3. Two legs touch where two of these
+    are equal, so their order is the same all along a path without collisions.
     """
     orders = [
-        sorted((("a1", 0.0), ("d1", float(q[1])), ("d3", float(q[3]))), key=lambda foot: foot[1])
+        sorted((("a1", 0.0), ("d1", float(q[1])), ("d3", float(q[3]))), key=lambda base: base[1])
         for q in (start.joints, goal.joints)
     ]
     first, last = ([name for name, _ in order] for order in orders)
@@ -271,5 +273,5 @@ def _check_same_order(start: Snapshot, goal: Snapshot) -> None:
         raise NoPathError(
             "other order",
             f"on the guide the start has the order {', '.join(first)}, the goal "
-            f"{', '.join(last)}: in between two legs would collide where they start",
+            f"{', '.join(last)}: between them two legs would collide on the guide",
         )

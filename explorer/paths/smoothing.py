@@ -1,7 +1,7 @@
 """Shorter and rounder paths: shortcuts between random points, then corners cut off.
 
-Every new piece is a straight move that is proved valid before it is taken (see
-`explorer.workspace.limits.valid_moves`); what is left of the old ones is valid as a part of them.
+Every new piece is a straight move with a proof that it is valid (see
+`explorer.workspace.limits.valid_moves`); the rest of an old move is valid as a part of it.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from explorer.numerics.arrays import FloatArray
 from explorer.workspace.limits.valid_moves import moves_are_valid
 from explorer.workspace.limits.valid_poses import Rules
 
-# Shortcuts that are tried at once, and rounds without gain after which there are no more.
+# Shortcuts checked at once, rounds without gain that end the search, and the most rounds.
 TRIES, PATIENCE, MOST_ROUNDS = 24, 4, 60
-# Of the length: what is a gain.
+# The least gain, as a share of the path's length.
 GAIN = 1e-3
-# Where corners are cut, as a share of the moves beside them, the widest cut first; how often.
+# Cuts of a corner, as shares of the two moves beside it, widest first; rounds of cutting.
 CUTS, CUT_ROUNDS = (0.25, 0.08), 3
 
 
@@ -34,17 +34,17 @@ class Smoother:
 
     Attributes:
         design: The manipulator.
-        rules: What every pose is to keep.
-        seed: Of the random shortcuts.
+        rules: Rules that every pose keeps.
+        seed: Seed of the random shortcuts.
     """
 
     design: Design
     rules: Rules
     seed: int = 0
 
-    def smoothed(self, poses: Sequence[Pose]) -> tuple[Pose, ...]:
+    def smooth(self, poses: Sequence[Pose]) -> tuple[Pose, ...]:
         """Return a path with the same ends, shorter and with its corners cut off."""
-        return tuple(self._rounded(self._shortened(list(poses))))
+        return tuple(self._cut_corners(self._shorten(list(poses))))
 
     def lengths(self, poses: Sequence[Pose]) -> FloatArray:
         """Return the root-mean-square way of each move, shape (n,)."""
@@ -59,7 +59,7 @@ class Smoother:
         (p, r), (q, s) = (_arrays(each) for each in zip(*pieces, strict=True))
         return moves_are_valid(self.design, p, r, q, s, rules=self.rules).tolist()
 
-    def _shortened(self, poses: list[Pose]) -> list[Pose]:
+    def _shorten(self, poses: list[Pose]) -> list[Pose]:
         rng = np.random.default_rng(self.seed)
         idle = 0
         for _ in range(MOST_ROUNDS):
@@ -67,18 +67,18 @@ class Smoother:
                 break
             ends = np.concatenate([[0.0], np.cumsum(self.lengths(poses))])
             pairs = np.sort(rng.uniform(0.0, ends[-1], (TRIES, 2)), axis=1)
-            # Now and then from corner to corner, which takes all between away.
+            # Some shortcuts go from corner to corner.
             pairs[0] = ends[0], ends[-1]
             pairs[1:4] = np.sort(ends[rng.integers(0, len(ends), (3, 2))], axis=1)
             shorter = [self._shortcut(poses, ends, *pair) for pair in pairs.tolist()]
             worth = [each for each in shorter if each.gain > GAIN * float(ends[-1])]
-            found: list[Pose] | None = None
+            shortened: list[Pose] | None = None
             if worth:
                 worth.sort(key=lambda each: -each.gain)
                 valid = self._are_valid([each.piece for each in worth])
-                found = next((w.poses for w, v in zip(worth, valid, strict=True) if v), None)
-            idle = 0 if found else idle + 1
-            poses = found or poses
+                shortened = next((w.poses for w, v in zip(worth, valid, strict=True) if v), None)
+            idle = 0 if shortened else idle + 1
+            poses = shortened or poses
         return poses
 
     def _shortcut(
@@ -94,7 +94,7 @@ class Smoother:
         return _Shortcut(_without_repeats(path), (start, end), gain)
 
     def _at(self, poses: list[Pose], ends: FloatArray, way: float) -> tuple[int, Pose]:
-        """Return the move, and the pose, after some way."""
+        """Return the number of the move, and the pose, after a way along the path."""
         index = int(np.searchsorted(ends, way, side="right")) - 1
         if index >= len(poses) - 1:
             return len(poses) - 2, poses[-1]
@@ -104,7 +104,7 @@ class Smoother:
             poses[index], poses[index + 1], share
         )
 
-    def _rounded(self, poses: list[Pose]) -> list[Pose]:
+    def _cut_corners(self, poses: list[Pose]) -> list[Pose]:
         for _ in range(CUT_ROUNDS):
             if len(poses) < 3:
                 break
@@ -124,7 +124,7 @@ class Smoother:
 
 @dataclass(frozen=True)
 class _Shortcut:
-    """A path with one straight piece in it, and what it gains if that piece is valid."""
+    """A path with one new straight piece, and the length that it saves."""
 
     poses: list[Pose]
     piece: tuple[Pose, Pose]

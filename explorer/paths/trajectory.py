@@ -1,7 +1,7 @@
-"""Paths over time: when the platform is where, with the joints that it takes.
+"""Trajectories: paths over time, with the joints.
 
-The actuator that moves most moves at a given speed all along, so no other is faster. Samples are
-evenly spaced in time and lie on the path exactly; their joints are those of their poses.
+The fastest actuator has the given speed all along, so no other is faster. Samples are evenly
+spaced in time and lie on the path exactly; their joints come from inverse kinematics.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from explorer.mechanism.kinematics import inverse
 from explorer.mechanism.pose import Pose, quaternion_from_rotation
 from explorer.numerics.arrays import FloatArray
 
-# Of the reach, per second: the speed of the fastest actuator unless told otherwise.
+# The default speed of the fastest actuator, as a share of the reach per second.
 DEFAULT_SPEED = 0.1
 DEFAULT_SAMPLES = 201
 MOST_SAMPLES = 100_000
-# Of each move, to measure how far the actuators go on it.
+# Steps of a move over which the actuators' ways are added up.
 STEPS = 32
 
 
@@ -33,11 +33,11 @@ class Trajectory:
     """A path over time.
 
     Attributes:
-        time: In seconds, from 0, evenly spaced, shape (n,).
-        joints: (l1, d1, d2, d3, d4, l4), shape (n, 6).
-        position: b4 in the base frame, shape (n, 3).
-        quaternion: (w, x, y, z), each on the same side as the one before, shape (n, 4).
-        at: The number of the path's move and the share of it added, shape (n,).
+        time: Time in seconds, from 0, evenly spaced, shape (n,).
+        joints: (l1, d1, d2, d3, d4, l4), in design units, shape (n, 6).
+        position: b4 in the base frame, in design units, shape (n, 3).
+        quaternion: (w, x, y, z), without changes of sign between samples, shape (n, 4).
+        at: Place on the path: number of the move plus the share of it, shape (n,).
     """
 
     time: FloatArray
@@ -48,11 +48,11 @@ class Trajectory:
 
     @property
     def duration(self) -> float:
-        """The seconds that it takes."""
+        """Duration in seconds."""
         return float(self.time[-1])
 
     def pose(self, seconds: float) -> Pose:
-        """Return the pose of the sample that is nearest in time."""
+        """Return the pose of the sample nearest in time."""
         index = int(np.abs(self.time - seconds).argmin())
         x, y, z = self.position[index].tolist()
         w, i, j, k = self.quaternion[index].tolist()
@@ -66,20 +66,21 @@ def trajectory(
     speed: float | None = None,
     samples: int = DEFAULT_SAMPLES,
 ) -> Trajectory:
-    """Return a path of straight moves over time.
+    """Return the trajectory along a path of straight moves.
 
     Args:
         design: The manipulator.
-        poses: The corners of the path, two or more.
-        speed: Of the fastest actuator, in design units a second; by default a tenth of the
-            reach.
-        samples: How many, both ends included.
+        poses: Corners of the path, two or more.
+        speed: Speed of the fastest actuator, in design units per second; by default a tenth
+            of the reach.
+        samples: Number of samples, both ends included.
 
     Raises:
-        InputError: too few poses, too few or too many samples, or a speed not above zero.
+        InputError: there are too few poses, too few or too many samples, or the speed is not
+            positive.
     """
     if len(poses) < 2:
-        raise InputError("a trajectory needs a path of two poses at least")
+        raise InputError("a trajectory needs a path of at least two poses")
     if not 2 <= samples <= MOST_SAMPLES:
         raise InputError(f"a trajectory has 2 to {MOST_SAMPLES} samples; got {samples}")
     fastest = DEFAULT_SPEED * design.reach if speed is None else speed
@@ -93,9 +94,9 @@ def trajectory(
         ways = np.abs(np.diff(joints, axis=0)).max(axis=-1)
         time.append(time[-1][-1] + np.cumsum(ways) / fastest)
     known = np.concatenate(time)
-    wanted = np.linspace(0.0, float(known[-1]), samples, dtype=np.float64)
-    # Where nothing moves no time passes: a path that stays has all its samples at its start.
-    at = np.interp(wanted, known, np.arange(len(known)) / STEPS)
+    sampled = np.linspace(0.0, float(known[-1]), samples, dtype=np.float64)
+    # A path without motion takes no time: all its samples are at its start.
+    at = np.interp(sampled, known, np.arange(len(known)) / STEPS)
     at[-1] = len(moves)
     number = np.minimum(at.astype(np.int64), len(moves) - 1)
     position, rotation = np.empty((samples, 3)), np.empty((samples, 3, 3))
@@ -106,7 +107,7 @@ def trajectory(
     turns = (quaternion[1:] * quaternion[:-1]).sum(axis=-1) < 0.0
     signs = np.cumprod(np.where(np.concatenate([[False], turns]), -1.0, 1.0))
     return Trajectory(
-        time=wanted,
+        time=sampled,
         joints=inverse(design, position, rotation),
         position=position,
         quaternion=quaternion * signs[:, None],

@@ -1,7 +1,7 @@
-"""Trees of straight moves over SE(3), by OMPL: a path between two poses under given rules.
+"""Search for a path of straight moves over SE(3) under given rules, by OMPL.
 
-RRT-Connect (Kuffner and LaValle 2000) grows a tree from either end. Each of its moves is proved
-valid as a whole (see `explorer.workspace.limits.valid_moves`), so that no step can be too coarse.
+RRT-Connect (Kuffner and LaValle 2000) grows a tree of moves from both ends. A proof covers
+every move as a whole (see `explorer.workspace.limits.valid_moves`), so no step is too coarse.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.workspace.limits.valid_moves import DEFAULT_TOLERANCE, valid_move_rows
 from explorer.workspace.limits.valid_poses import Rules, valid_rows
 
-# Of the whole extent: the longest move of a tree.
+# The longest move of a tree, as a share of the extent of the space.
 LONGEST_MOVE = 0.25
 
 
@@ -35,7 +35,7 @@ def search_is_possible() -> bool:
 
 
 def compile_checks() -> None:
-    """Have the checks of poses and moves compiled; it takes seconds, once on a machine."""
+    """Compile the checks of poses and moves; this takes seconds, once on a machine."""
     valid_move_rows.compile()
     valid_rows.compile()
 
@@ -56,7 +56,7 @@ class _Ompl:
             )
         except ImportError:
             raise MissingExtraError(
-                "a path that is no straight move needs OMPL: pip install "
+                "a path of more than one straight move needs OMPL: pip install "
                 "'flagged-explorer[planning]'"
             ) from None
         _prepare(util)
@@ -75,10 +75,10 @@ class TreeSearch:
 
     Args:
         design: The manipulator.
-        rules: What every pose of the path is to keep.
+        rules: Rules that every pose of the path keeps.
 
     Attributes:
-        checked: How many moves have been checked.
+        checked: Number of moves checked so far.
     """
 
     def __init__(self, design: Design, rules: Rules) -> None:
@@ -91,12 +91,12 @@ class TreeSearch:
         self._valid: BoolArray = np.empty(1, dtype=np.bool_)
 
     def path(self, start: Pose, goal: Pose, seconds: float) -> tuple[Pose, ...] | None:
-        """Return the corners of a path, or None if there was too little time.
+        """Return the corners of a path, or None if the time was too short.
 
         Args:
-            start: Where it starts; valid.
-            goal: Where it ends; valid.
-            seconds: To look for it.
+            start: Valid pose at the start.
+            goal: Valid pose at the end.
+            seconds: Time for the search.
 
         Raises:
             MissingExtraError: OMPL is not installed.
@@ -110,7 +110,7 @@ class TreeSearch:
             bounds.setLow(axis, lows[axis])
             bounds.setHigh(axis, highs[axis])
         space.setBounds(bounds)
-        # Half the angle times the reach: a turn counts as what it does to b4 seen from a1.
+        # OMPL weighs half the angle: with the reach that is a length, as for positions.
         space.setSubspaceWeight(1, self._design.reach)
         setup = geometric.SimpleSetup(space)
         information = setup.getSpaceInformation()
@@ -125,7 +125,7 @@ class TreeSearch:
         if not setup.haveExactSolutionPath():
             return None
         states = setup.getSolutionPath().getStates()
-        # The ends as they were given, to the last bit.
+        # The ends are those given, to the last bit.
         return (start, *(_pose(state) for state in list(states)[1:-1]), goal)
 
     def _read(self, which: int, state: Any) -> None:
@@ -162,7 +162,7 @@ class TreeSearch:
 
 
 def _validator(base: Any, information: Any, is_valid: Callable[[Any, Any], bool]) -> Any:
-    """Return OMPL's check of moves; a class made here, as its base is imported late."""
+    """Return OMPL's check of moves, of a class made here since OMPL is imported late."""
 
     def check(_: Any, start: Any, end: Any) -> bool:
         return is_valid(start, end)
@@ -172,13 +172,13 @@ def _validator(base: Any, information: Any, is_valid: Callable[[Any, Any], bool]
 
 
 def _box(design: Design, start: Pose, goal: Pose) -> tuple[list[float], list[float]]:
-    """Return lows and highs of the positions that can be within the limits."""
+    """Return lows and highs of a box that holds all positions within the limits."""
     centre, radius = np.array([*design.a3, 0.0]), design.length_range("l4")[1]
     lows, highs = centre - radius, centre + radius
     if design.limits.box is not None:
         lows = np.maximum(lows, design.limits.box[0])
         highs = np.minimum(highs, design.limits.box[1])
-    # Both ends are within the limits, to rounding.
+    # The ends may be beyond the limits by rounding.
     ends = np.array([start.position, goal.position])
     spare = 1e-9 * design.reach
     lows = np.minimum(lows, ends.min(axis=0)) - spare

@@ -13,8 +13,7 @@ from hypothesis import given, strategies as st
 from strategies import Case, ordinary_cases, uniform_rotations
 
 from explorer import PAIRS, PRESETS, Design, InputError, Limits, home_pose, leg_clearances
-from explorer.legs.clearance import joined_pairs, leg_axes
-from explorer.legs.segments import segment_distances
+from explorer.legs.clearance import joined_pairs, leg_axes, pair_rows
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import MANY_ROWS
 
@@ -23,6 +22,15 @@ REFERENCE: dict[str, list[dict[str, Any]]] = json.loads(
 )
 OPTIMAL = PRESETS["paper-optimal"]
 SCALES = (1e-30, 1e-3, 1.0, 1e5, 1e30)
+
+
+def closest_points(a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return distances (n,) and closest points (n, 2, 3) of segments as axes of legs 1 and 2."""
+    axes = np.zeros((len(a), 4, 2, 3))
+    axes[:, 0], axes[:, 1] = a, b
+    distance, points = np.empty((len(a), 6)), np.empty((len(a), 6, 2, 3))
+    pair_rows(len(a), axes, distance, points)
+    return distance[:, 0], points[:, 0]
 
 
 def random_segments(seed: int, count: int = 2000) -> tuple[FloatArray, FloatArray]:
@@ -68,30 +76,30 @@ def searched_distance(a: FloatArray, b: FloatArray) -> FloatArray:
     return np.minimum(ends, to_second(0.5 * (low + high)))
 
 
-def test_distances_are_those_of_the_reference() -> None:
+def test_closest_points_reference_segments_have_its_distances() -> None:
     cases = REFERENCE["segments"]
     assert len(cases) == 200
     a, b = (np.array([case[key] for case in cases]) for key in "ab")
     expected = np.array([case["distance"] for case in cases])
-    np.testing.assert_allclose(segment_distances(a, b).distance, expected, rtol=1e-9)
+    np.testing.assert_allclose(closest_points(a, b)[0], expected, rtol=1e-9)
 
 
 @pytest.mark.parametrize("scale", SCALES)
-def test_distances_are_those_of_a_search_over_both_segments(scale: float) -> None:
+def test_closest_points_any_segments_match_a_search(scale: float) -> None:
     a, b = random_segments(1)
-    found = segment_distances(scale * a, scale * b).distance / scale
+    found = closest_points(scale * a, scale * b)[0] / scale
     np.testing.assert_allclose(found, searched_distance(a, b), atol=1e-9)
 
 
-def test_nothing_is_closer_than_the_closest_points() -> None:
+def test_closest_points_any_segments_lie_on_them_with_nothing_closer() -> None:
     a, b = random_segments(2)
-    found = segment_distances(a, b)
-    x, y = found.points[:, 0], found.points[:, 1]
-    np.testing.assert_allclose(np.linalg.norm(x - y, axis=-1), found.distance, atol=1e-14)
+    distance, points = closest_points(a, b)
+    x, y = points[:, 0], points[:, 1]
+    np.testing.assert_allclose(np.linalg.norm(x - y, axis=-1), distance, atol=1e-14)
     # The points lie on the segments, and no end lies farther towards the other point.
     for point, ends in ((x, a), (y, b)):
         np.testing.assert_allclose(
-            segment_distances(np.stack([point, point], axis=1), ends).distance, 0.0, atol=1e-14
+            closest_points(np.stack([point, point], axis=1), ends)[0], 0.0, atol=1e-14
         )
     off = y - x
     for ends, point, sign in ((a, x, 1.0), (b, y, -1.0)):
@@ -100,42 +108,34 @@ def test_nothing_is_closer_than_the_closest_points() -> None:
 
 
 @pytest.mark.parametrize("size", [1e-8, 1e-5])
-def test_nearly_parallel_segments_that_cross_are_seen_to_cross(size: float) -> None:
+def test_closest_points_nearly_parallel_crossing_segments_meet(size: float) -> None:
     a = np.array([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
     for share in np.linspace(-0.9, 0.9, 7):
         b = np.array([[-1.0, size * (-1.0 - share), 0.0], [1.0, size * (1.0 - share), 0.0]])
-        assert segment_distances(a, b).distance < 1e-15
+        assert closest_points(a[None], b[None])[0] < 1e-15
 
 
-def test_distances_are_symmetric_and_move_with_the_segments() -> None:
+def test_closest_points_swapped_or_moved_segments_keep_the_distance() -> None:
     a, b = random_segments(3)
-    found = segment_distances(a, b)
-    swapped = segment_distances(b, a[:, ::-1])
-    np.testing.assert_allclose(found.distance, swapped.distance, atol=1e-14)
+    distance, _ = closest_points(a, b)
+    swapped, _ = closest_points(b, a[:, ::-1])
+    np.testing.assert_allclose(distance, swapped, atol=1e-14)
     turn = home_pose(OPTIMAL).rotation
-    moved = segment_distances(a @ turn.T + [1.0, -2.0, 3.0], b @ turn.T + [1.0, -2.0, 3.0])
-    np.testing.assert_allclose(found.distance, moved.distance, atol=1e-14)
+    moved, _ = closest_points(a @ turn.T + [1.0, -2.0, 3.0], b @ turn.T + [1.0, -2.0, 3.0])
+    np.testing.assert_allclose(distance, moved, atol=1e-14)
 
 
-def test_few_and_many_pairs_have_the_same_distances_over_broadcast_axes() -> None:
-    a, b = random_segments(4, 40)
-    table = segment_distances(a[:, None], b)
-    assert table.distance.shape == (40, 40)
-    assert MANY_ROWS < 1600
-    for row in range(0, 40, 7):
-        alone = segment_distances(a[row], b[row])
-        assert alone.points.shape == (2, 3)
-        np.testing.assert_allclose(alone.distance, table.distance[row, row], atol=1e-15)
-
-
-@pytest.mark.parametrize("bad", [np.zeros((3, 3)), np.full((2, 3), np.nan), "legs"])
-def test_segments_that_are_none_are_refused(bad: Any) -> None:
-    with pytest.raises(InputError, match="second segment"):
-        segment_distances(np.zeros((2, 3)), bad)
+def test_closest_points_few_and_many_pairs_agree() -> None:
+    a, b = random_segments(4, 2 * MANY_ROWS)
+    distance, points = closest_points(a, b)
+    for row in range(0, len(a), 7):
+        alone = closest_points(a[row : row + 1], b[row : row + 1])
+        np.testing.assert_allclose(alone[0][0], distance[row], atol=1e-15)
+        np.testing.assert_allclose(alone[1][0], points[row], atol=1e-12)
 
 
 @given(ordinary_cases())
-def test_legs_reach_from_their_base_ends_to_their_platform_ends(case: Case) -> None:
+def test_leg_axes_any_pose_run_from_base_ends_to_platform_ends(case: Case) -> None:
     axes = leg_axes(case.design, case.position, case.rotation)
     d = case.design
     platform = np.array([[*d.b1, 0.0], [d.b2, 0.0, 0.0], [d.b3, 0.0, 0.0], [0.0, 0.0, 0.0]])
@@ -146,7 +146,7 @@ def test_legs_reach_from_their_base_ends_to_their_platform_ends(case: Case) -> N
 
 
 @given(ordinary_cases())
-def test_clearances_are_the_distances_of_the_axes_less_the_radii(case: Case) -> None:
+def test_leg_clearances_any_pose_are_axis_distances_less_radii(case: Case) -> None:
     radii = (0.1, 0.2, 0.4, 0.8)
     design = Design(
         a3=case.design.a3,
@@ -160,16 +160,18 @@ def test_clearances_are_the_distances_of_the_axes_less_the_radii(case: Case) -> 
     for index, (i, j) in enumerate(PAIRS):
         if joined_pairs(design)[index]:
             continue
-        alone = segment_distances(axes[i - 1], axes[j - 1])
-        assert found.distance[index] == pytest.approx(alone.distance, abs=1e-12)
-        np.testing.assert_allclose(found.points[index], alone.points, atol=1e-12)
-        expected = alone.distance - radii[i - 1] - radii[j - 1]
+        distance, points = closest_points(axes[i - 1][None], axes[j - 1][None])
+        assert found.distance[index] == pytest.approx(distance[0], abs=1e-12)
+        np.testing.assert_allclose(found.points[index], points[0], atol=1e-12)
+        expected = distance[0] - radii[i - 1] - radii[j - 1]
         assert found.clearance[index] == pytest.approx(expected, abs=1e-12)
     assert found.clearance[found.closest] == found.clearance.min()
 
 
 @given(uniform_rotations(), st.sampled_from((0.0, 1e-14)))
-def test_a_pair_that_shares_a_joint_has_no_clearance(rotation: FloatArray, least: float) -> None:
+def test_leg_clearances_pair_with_a_shared_joint_is_infinite(
+    rotation: FloatArray, least: float
+) -> None:
     position = np.array([1.0, 2.0, 3.0])
     second = leg_clearances(Design(a3=(10, 4), b1=(4, -1), b2=least, b3=2), position, rotation)
     third = leg_clearances(Design(a3=(10, 4), b1=(4, -1), b2=2, b3=-least), position, rotation)
@@ -180,7 +182,7 @@ def test_a_pair_that_shares_a_joint_has_no_clearance(rotation: FloatArray, least
         assert PAIRS[int(found.closest)] != pair
 
 
-def test_clearances_of_a_batch_are_those_of_its_poses() -> None:
+def test_leg_clearances_batch_matches_its_poses() -> None:
     home = home_pose(OPTIMAL)
     positions = np.array(home.position) + np.random.default_rng(5).uniform(-2, 2, (20, 20, 3))
     batch = leg_clearances(OPTIMAL, positions, home.rotation)

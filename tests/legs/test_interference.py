@@ -73,7 +73,7 @@ def sampled(design: Design, start: Pose, end: Pose, count: int = 1001) -> FloatA
 
 
 @given(moves(), st.floats(0.0, 1.0), st.floats(0.0, 1.0), st.integers(0, 3))
-def test_ends_of_a_leg_stay_on_the_edges_of_its_tetrahedron(
+def test_swept_tetrahedra_constant_orientation_hold_the_legs(
     move: tuple[Design, Pose, Pose], share: float, along: float, leg: int
 ) -> None:
     design, start, end = move
@@ -85,14 +85,14 @@ def test_ends_of_a_leg_stay_on_the_edges_of_its_tetrahedron(
     assert tetrahedra_overlap(swept[leg], np.tile(point, (4, 1)))
 
 
-def test_tetrahedra_of_legs_with_a_fixed_base_end_are_flat() -> None:
+def test_swept_tetrahedra_legs_with_fixed_base_ends_are_flat() -> None:
     swept = swept_tetrahedra(OPTIMAL, *random_moves(1, 10))
     for leg in (0, 3):
         np.testing.assert_array_equal(swept[:, leg, 0], swept[:, leg, 1])
 
 
 @given(moves())
-def test_a_free_step_has_no_crossing_at_constant_orientation(
+def test_step_is_free_constant_orientation_has_no_crossing(
     move: tuple[Design, Pose, Pose],
 ) -> None:
     design, start, end = move
@@ -105,7 +105,7 @@ def test_a_free_step_has_no_crossing_at_constant_orientation(
     assert (least[~overlaps] > 0.0).all()
 
 
-def test_steps_of_a_batch_are_those_of_its_moves() -> None:
+def test_step_overlaps_batch_matches_its_moves() -> None:
     many = random_moves(2, 300)
     found = step_overlaps(OPTIMAL, *many)
     assert found.shape == (300, 6)
@@ -117,7 +117,7 @@ def test_steps_of_a_batch_are_those_of_its_moves() -> None:
     assert table.shape == (4, 5)
 
 
-def test_pairs_that_share_a_joint_are_left_out_of_every_answer() -> None:
+def test_move_clearance_pair_with_a_shared_joint_is_left_out() -> None:
     start, end = Pose((3, 2, 4), (1, 0.2, 0.1, -0.4)), Pose((4, 3, 5), (1, 0.2, 0.3, -0.4))
     joined = int(joined_pairs(JOINED).argmax())
     assert PAIRS[joined] == (2, 4)
@@ -144,7 +144,7 @@ def crossing() -> tuple[Design, Pose, Pose]:
     return design, Pose.of(position - side, rotation), Pose.of(position + side, rotation)
 
 
-def test_legs_that_cross_on_the_way_are_found_by_both_tests() -> None:
+def test_move_clearance_legs_that_cross_fail_both_tests() -> None:
     design, start, end = crossing()
     found = move_clearance(design, start, end, steps=7)
     pair = PAIRS.index((1, 4))
@@ -160,7 +160,7 @@ def test_legs_that_cross_on_the_way_are_found_by_both_tests() -> None:
 
 
 @given(moves(), st.sampled_from((None, 1e-2, 1e-6)))
-def test_the_bound_of_a_move_holds_and_is_nearly_attained(
+def test_move_clearance_bound_holds_and_is_nearly_attained(
     move: tuple[Design, Pose, Pose], share: float | None
 ) -> None:
     design, start, end = move
@@ -185,7 +185,7 @@ def test_the_bound_of_a_move_holds_and_is_nearly_attained(
     np.testing.assert_allclose(apart - sums, clearance, atol=rounding)
 
 
-def test_many_moves_at_once_are_bounded_as_tightly_as_asked() -> None:
+def test_move_clearances_batch_meets_the_tolerance() -> None:
     many = random_moves(3, 2000)
     first, turn, last, turned = many
     for tolerance in (1e-2, 1e-4, 1e-6):
@@ -200,7 +200,7 @@ def test_many_moves_at_once_are_bounded_as_tightly_as_asked() -> None:
             assert (found.clearance[row] <= least + tolerance).all()
 
 
-def test_whether_moves_are_clear_agrees_with_the_least_clearance() -> None:
+def test_moves_are_clear_any_clearance_agrees_with_the_least() -> None:
     design = with_radii(OPTIMAL, (0.1, 0.2, 0.2, 0.3))
     many = random_moves(4, 2000)
     least = move_clearances(design, *many).bound.min(axis=-1)
@@ -211,7 +211,7 @@ def test_whether_moves_are_clear_agrees_with_the_least_clearance() -> None:
         assert 0.02 < clear.mean() < 0.98
 
 
-def test_what_is_clear_without_radii_is_free_at_some_number_of_steps() -> None:
+def test_move_clearance_clear_move_is_free_at_fine_steps() -> None:
     start = HOME
     end = Pose((13.0, 2.0, 5.0), (0.7, 0.2, -0.3, -0.5))
     coarse = move_clearance(OPTIMAL, start, end, steps=1)
@@ -224,14 +224,14 @@ def test_what_is_clear_without_radii_is_free_at_some_number_of_steps() -> None:
     np.testing.assert_allclose(coarse.bound, fine.bound)
 
 
-def test_a_move_and_its_way_back_have_the_same_least_clearances() -> None:
+def test_move_clearances_reversed_moves_are_unchanged() -> None:
     first, turn, last, turned = random_moves(5, 300)
     there = move_clearances(OPTIMAL, first, turn, last, turned, tolerance=1e-6)
     back = move_clearances(OPTIMAL, last, turned, first, turn, tolerance=1e-6)
     np.testing.assert_allclose(there.clearance, back.clearance, atol=2e-6)
 
 
-def test_poses_between_start_at_the_start_and_end_at_the_end() -> None:
+def test_poses_between_shares_zero_and_one_are_the_ends() -> None:
     end = Pose((1.0, 2.0, 3.0), (0.1, 0.7, -0.2, 0.4))
     position, rotation = poses_between(HOME, end, [[0.0, 0.5, 1.0]])
     assert position.shape == (1, 3, 3)
@@ -242,7 +242,7 @@ def test_poses_between_start_at_the_start_and_end_at_the_end() -> None:
     np.testing.assert_allclose(half @ half @ HOME.rotation, end.rotation, atol=1e-14)
 
 
-def test_a_move_of_no_length_is_refused() -> None:
+def test_move_clearance_no_length_is_refused() -> None:
     with pytest.raises(InputError, match="two poses that differ"):
         move_clearance(OPTIMAL, HOME, HOME)
     turned = Pose(HOME.position, (1.0, 0.0, 0.0, 0.0))
@@ -252,12 +252,12 @@ def test_a_move_of_no_length_is_refused() -> None:
 
 
 @pytest.mark.parametrize("steps", [0, -3])
-def test_a_move_without_steps_is_refused(steps: int) -> None:
+def test_move_clearance_no_steps_is_refused(steps: int) -> None:
     with pytest.raises(InputError, match=f"at least one step; got {steps}"):
         move_clearance(OPTIMAL, HOME, Pose((9, 5, 9), HOME.quaternion), steps=steps)
 
 
 @pytest.mark.parametrize("tolerance", [0.0, -1.0, 1e-12, math.nan])
-def test_a_tolerance_that_cannot_be_met_is_refused(tolerance: float) -> None:
+def test_move_clearance_tolerance_too_small_is_refused(tolerance: float) -> None:
     with pytest.raises(InputError, match="tolerance must be at least"):
         move_clearance(OPTIMAL, HOME, Pose((9, 5, 9), HOME.quaternion), tolerance=tolerance)

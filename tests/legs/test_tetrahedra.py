@@ -102,13 +102,13 @@ def plain_sat(p: FloatArray, q: FloatArray) -> BoolArray:
 
 
 @pytest.mark.parametrize("scale", SCALES)
-def test_answers_are_those_of_the_reference(scale: float) -> None:
+def test_overlap_reference_pairs_at_any_scale_match(scale: float) -> None:
     assert len(REFERENCE) == 400
     np.testing.assert_array_equal(tetrahedra_overlap(scale * P, scale * Q), OVERLAP)
     np.testing.assert_array_equal(tetrahedra_overlap(scale * Q, scale * P), OVERLAP)
 
 
-def test_answers_hold_for_turned_moved_and_renumbered_bodies() -> None:
+def test_overlap_turned_moved_or_renumbered_bodies_is_unchanged() -> None:
     rng = np.random.default_rng(1)
     turn = np.swapaxes(turns(rng, 400), -1, -2)
     for distance in (1.0, 1e3, 1e6):
@@ -118,7 +118,7 @@ def test_answers_hold_for_turned_moved_and_renumbered_bodies() -> None:
         np.testing.assert_array_equal(tetrahedra_overlap(p, q), OVERLAP)
 
 
-def test_single_pairs_are_answered_as_in_a_batch() -> None:
+def test_overlap_single_pairs_match_a_batch() -> None:
     for p, q, expected in list(zip(P, Q, OVERLAP, strict=True))[::5]:
         assert tetrahedra_overlap(p, q).shape == ()
         assert bool(tetrahedra_overlap(p, q)) is bool(expected)
@@ -130,7 +130,7 @@ def test_single_pairs_are_answered_as_in_a_batch() -> None:
     np.testing.assert_array_equal(few, again)
 
 
-def test_batch_axes_broadcast_and_arrays_may_be_read_only_or_strided() -> None:
+def test_overlap_broadcast_read_only_or_strided_arrays_are_taken() -> None:
     table = tetrahedra_overlap(P[:, None], Q)
     assert table.shape == (400, 400)
     np.testing.assert_array_equal(table.diagonal(), OVERLAP)
@@ -143,7 +143,7 @@ def test_batch_axes_broadcast_and_arrays_may_be_read_only_or_strided() -> None:
 
 
 @pytest.mark.parametrize("seed", [3, 4])
-def test_answers_agree_with_a_linear_programme(seed: int) -> None:
+def test_overlap_all_kinds_of_bodies_match_a_linear_programme(seed: int) -> None:
     for p, q in (all_kinds(seed, 12), in_a_plane(seed, 12)):
         found = tetrahedra_overlap(p, q)
         gaps = np.array([separation(a, b) for a, b in zip(p, q, strict=True)])
@@ -153,7 +153,7 @@ def test_answers_agree_with_a_linear_programme(seed: int) -> None:
         assert 0.05 < found.mean() < 0.9
 
 
-def test_solid_bodies_agree_with_all_44_axes() -> None:
+def test_overlap_solid_bodies_match_all_44_axes() -> None:
     rng = np.random.default_rng(5)
     p = bodies(rng, "solid", 20_000)
     q = bodies(rng, "solid", 20_000) + rng.uniform(-0.6, 0.6, (20_000, 1, 3))
@@ -162,12 +162,12 @@ def test_solid_bodies_agree_with_all_44_axes() -> None:
     assert 0.2 < found.mean() < 0.8
 
 
-def test_the_order_of_the_two_does_not_matter() -> None:
+def test_overlap_swapped_bodies_is_unchanged() -> None:
     for p, q in (all_kinds(6, 200), in_a_plane(6, 100)):
         np.testing.assert_array_equal(tetrahedra_overlap(p, q), tetrahedra_overlap(q, p))
 
 
-def test_a_body_overlaps_itself_and_what_it_contains() -> None:
+def test_overlap_body_with_itself_or_a_contained_one_is_true() -> None:
     p, _ = all_kinds(7, 50)
     assert tetrahedra_overlap(p, p).all()
     shares = np.random.default_rng(8).dirichlet(np.ones(4), (len(p), 4))
@@ -176,7 +176,7 @@ def test_a_body_overlaps_itself_and_what_it_contains() -> None:
     assert tetrahedra_overlap(inside, p).all()
 
 
-def test_enlarging_a_body_keeps_its_overlaps() -> None:
+def test_overlap_enlarged_body_keeps_its_overlaps() -> None:
     p, q = all_kinds(9, 200)
     before = tetrahedra_overlap(p, q)
     middle = p.mean(axis=1, keepdims=True)
@@ -187,7 +187,7 @@ def test_enlarging_a_body_keeps_its_overlaps() -> None:
 
 @pytest.mark.parametrize("shared", [1, 2, 3])
 @pytest.mark.parametrize("kind", RANKS)
-def test_bodies_that_share_vertices_touch(shared: int, kind: str) -> None:
+def test_overlap_bodies_with_shared_vertices_touch(shared: int, kind: str) -> None:
     rng = np.random.default_rng(10)
     p, q = bodies(rng, kind, 500), bodies(rng, "solid", 500)
     # The second lies beyond the plane x = 0 of what both share.
@@ -222,7 +222,7 @@ def touching(rng: np.random.Generator, count: int) -> tuple[FloatArray, FloatArr
 
 
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 1e5])
-def test_touching_counts_and_a_little_more_or_less_decides(scale: float) -> None:
+def test_overlap_touching_bodies_is_decided_by_the_smallest_shift(scale: float) -> None:
     rng = np.random.default_rng(11)
     p, q = touching(rng, 900)
     turn = np.swapaxes(turns(rng, 900), -1, -2)
@@ -236,7 +236,7 @@ def test_touching_counts_and_a_little_more_or_less_decides(scale: float) -> None
             np.testing.assert_array_equal(found[sure], expected)
 
 
-def test_flat_bodies_in_one_plane_touch_and_part() -> None:
+def test_overlap_coplanar_bodies_touch_until_shifted() -> None:
     rng = np.random.default_rng(12)
     p, q = bodies(rng, "triangle", 600), bodies(rng, "quadrilateral", 600)
     for each in (p, q):
@@ -256,7 +256,7 @@ def test_flat_bodies_in_one_plane_touch_and_part() -> None:
 
 
 @pytest.mark.parametrize("gap", [1e-12, 1e-9, 1e-3])
-def test_segments_and_points_part_however_close(gap: float) -> None:
+def test_overlap_segments_and_points_touch_until_shifted(gap: float) -> None:
     rng = np.random.default_rng(13)
     turn = np.swapaxes(turns(rng, 300), -1, -2)
     o, (x, y, z) = np.zeros(3), np.eye(3)
@@ -275,7 +275,7 @@ def test_segments_and_points_part_however_close(gap: float) -> None:
         assert not tetrahedra_overlap(p @ turn, (q + gap * away) @ turn).any(), name
 
 
-def test_a_body_at_the_end_of_a_long_one_is_seen() -> None:
+def test_overlap_small_body_at_the_end_of_a_needle_is_seen() -> None:
     needle = np.array([[0, 0, 0], [1e6, 0, 0], [0, 1e-3, 0], [0, 0, 1e-3]])
     at_the_end = 1e-4 * CORNER + [1e6 - 1e-5, 0.0, 0.0]
     assert tetrahedra_overlap(needle, at_the_end)
@@ -284,7 +284,7 @@ def test_a_body_at_the_end_of_a_long_one_is_seen() -> None:
 
 @pytest.mark.parametrize("odd", [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize("count", [1, 3 * MANY_ROWS])
-def test_numbers_that_are_not_finite_are_refused(odd: float, count: int) -> None:
+def test_overlap_numbers_not_finite_are_refused(odd: float, count: int) -> None:
     q = np.tile(CORNER, (count, 1, 1))
     q[count // 2, 3, 1] = odd
     with pytest.raises(InputError, match="q must be finite"):
@@ -294,7 +294,7 @@ def test_numbers_that_are_not_finite_are_refused(odd: float, count: int) -> None
 
 
 @pytest.mark.parametrize("bad", [np.zeros((3, 3)), np.zeros(12), "four corners", [[1, 2, 3]]])
-def test_what_are_no_tetrahedra_is_refused(bad: Any) -> None:
+def test_overlap_arrays_of_another_shape_are_refused(bad: Any) -> None:
     with pytest.raises(InputError, match="p must"):
         tetrahedra_overlap(bad, CORNER)
     with pytest.raises(InputError, match="do not broadcast"):

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 import explorer
-from explorer.legs import clearance, segments
+from explorer.legs import clearance, tetrahedra
 from explorer.numerics import kernel_cache
 from explorer.numerics.compiled import Kernel
 from explorer.numerics.kernel_cache import Cacheable, compile_all, fingerprint_of, when_cached
@@ -70,7 +70,7 @@ def test_fingerprint_changes_with_what_the_code_depends_on_and_nothing_else() ->
 
 
 def test_kernels_have_fingerprints_of_their_own() -> None:
-    kernels = (clearance.pair_rows, segments.distance_rows, nodes.count_nodes)
+    kernels = (clearance.pair_rows, tetrahedra.overlap_rows, nodes.count_nodes)
     assert len({each.entry.fingerprint for each in kernels}) == len(kernels)
 
 
@@ -93,7 +93,7 @@ def stand_in(
     order: list[str] = []
     stands = [Stand(each, folder, order) for each in kernels]
     for each, stand in zip(kernels, stands, strict=True):
-        module = {clearance: "pair_rows", segments: "distance_rows", nodes: "count_nodes"}
+        module = {clearance: "pair_rows", tetrahedra: "overlap_rows", nodes: "count_nodes"}
         for place, name in module.items():
             if getattr(place, name) is each:
                 monkeypatch.setattr(place, name, stand)
@@ -103,7 +103,7 @@ def stand_in(
 def test_compiling_takes_requested_kernels_first_then_the_shortest(
     empty_cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    kernels = (nodes.count_nodes, clearance.pair_rows, segments.distance_rows)
+    kernels = (nodes.count_nodes, clearance.pair_rows, tetrahedra.overlap_rows)
     stands, order = stand_in(monkeypatch, empty_cache, *kernels)
     by_effort = sorted(stands, key=lambda each: each.entry.effort)
     longest = by_effort[-1].entry
@@ -162,23 +162,24 @@ def test_kernel_compiled_by_another_process_is_awaited_not_compiled_again(
 def test_kernel_with_many_rows_is_compiled_by_a_child_into_the_cache(tmp_path: Path) -> None:
     program = """
 import numpy as np
-from explorer.legs.segments import distance_rows
-ends = np.random.default_rng(0).normal(size=(2, 300, 2, 3))
-found, same, points = np.zeros(300), np.zeros(300), np.zeros((300, 2, 3))
-distance_rows(1, ends[0], ends[1], same, points)
-assert not distance_rows.ready
-distance_rows(300, ends[0], ends[1], found, points)
-assert distance_rows.ready
-assert distance_rows.entry.is_filled
+from explorer.legs import tetrahedra
+from explorer.legs.clearance import pair_rows
+axes = np.random.default_rng(0).normal(size=(300, 4, 2, 3))
+found, same, points = np.zeros((300, 6)), np.zeros((300, 6)), np.zeros((300, 6, 2, 3))
+pair_rows(1, axes, same, points)
+assert not pair_rows.ready
+pair_rows(300, axes, found, points)
+assert pair_rows.ready
+assert pair_rows.entry.is_filled
 np.testing.assert_allclose(found, same, rtol=1e-12)
 """
     environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path), "LOCALAPPDATA": str(tmp_path)}
     for _ in range(2):
         subprocess.run([sys.executable, "-c", program], check=True, env=environment)
-    made = [path.name for path in tmp_path.rglob("*.nbc") if "distance_rows" in path.name]
+    made = [path.name for path in tmp_path.rglob("*.nbc") if "pair_rows" in path.name]
     assert len(made) == 1
     # The code of helpers, requests and the lock aside, nothing else was made.
-    assert not any("pair_rows" in path.name for path in tmp_path.rglob("*"))
+    assert not any("overlap_rows" in path.name for path in tmp_path.rglob("*"))
 
 
 def test_kernel_is_compiled_where_nothing_can_be_kept(tmp_path: Path) -> None:
@@ -186,11 +187,11 @@ def test_kernel_is_compiled_where_nothing_can_be_kept(tmp_path: Path) -> None:
     blocked.touch()
     program = """
 import numpy as np
-from explorer.legs.segments import distance_rows
-ends = np.random.default_rng(0).normal(size=(2, 300, 2, 3))
-distance_rows(300, ends[0], ends[1], np.zeros(300), np.zeros((300, 2, 3)))
-assert distance_rows.ready
-assert not distance_rows.entry.is_filled
+from explorer.legs.clearance import pair_rows
+axes = np.random.default_rng(0).normal(size=(300, 4, 2, 3))
+pair_rows(300, axes, np.zeros((300, 6)), np.zeros((300, 6, 2, 3)))
+assert pair_rows.ready
+assert not pair_rows.entry.is_filled
 """
     environment = {**os.environ, "XDG_CACHE_HOME": str(blocked), "LOCALAPPDATA": str(blocked)}
     subprocess.run([sys.executable, "-c", program], check=True, env=environment)

@@ -19,7 +19,7 @@ from strategies import (
 from explorer import PRESETS, InputError, Pose, forward, home_pose, inverse, margins, poses_between
 from explorer.mechanism.margins import mode_of
 from explorer.numerics.arrays import FloatArray
-from explorer.paths.crossings import modes_differ, path_between_modes, path_margins
+from explorer.paths.crossings import path_margins
 
 OPTIMAL = PRESETS["paper-optimal"]
 HOME = home_pose(OPTIMAL)
@@ -37,7 +37,7 @@ def sign_changes(start: Pose, end: Pose, samples: int = 4001) -> FloatArray:
 
 
 @given(st.integers(0, 2**32))
-def test_crossings_are_singular_and_none_that_samples_see_is_missing(seed: int) -> None:
+def test_path_margins_random_move_has_all_crossings(seed: int) -> None:
     rng = np.random.default_rng(seed)
     start, end = random_pose(rng), random_pose(rng)
     found = path_margins([start, end])
@@ -52,7 +52,7 @@ def test_crossings_are_singular_and_none_that_samples_see_is_missing(seed: int) 
     assert crossed == sign_changes(start, end).tolist()
 
 
-def test_a_margin_can_be_crossed_several_times_in_one_move() -> None:
+def test_path_margins_one_move_can_cross_a_margin_twice() -> None:
     rng = np.random.default_rng(1)
     paths = [path_margins([random_pose(rng), random_pose(rng)], samples=2) for _ in range(100)]
     crossings = [[c.incidence for c in path.crossings] for path in paths]
@@ -62,13 +62,13 @@ def test_a_margin_can_be_crossed_several_times_in_one_move() -> None:
 
 
 @given(cases(), st.integers(0, 4), st.integers(0, 2**32))
-def test_any_path_between_two_modes_crosses_each_margin_that_they_differ_in(
+def test_path_margins_between_modes_cross_the_margins_that_differ(
     case: Case, corners: int, seed: int
 ) -> None:
     """The claim: modes are the sign triples, so a path to another crosses what differs."""
     modes = forward(case.design, inverse(case.design, case.position, case.rotation))
     assume(bool(modes.feasible))
-    # All eight have the same |κ| but for the rounding of the joints, which a platform of a
+    # All eight have the same |δ| but for the rounding of the joints, which a platform of a
     # millionth of the size blows up until an end may lie on the singular set.
     found_margins = margins(modes.position, modes.rotation)
     assume(bool(np.abs(found_margins).min() > 1e-6 * case.size))
@@ -81,7 +81,6 @@ def test_any_path_between_two_modes_crosses_each_margin_that_they_differ_in(
     signs = np.sign([margins(each.position, each.rotation) for each in ends])
     expected = {k + 1 for k in range(3) if signs[0][k] != signs[1][k]}
     assert expected
-    assert expected == set(modes_differ(path))
     for incidence in (1, 2, 3):
         crossed = sum(c.incidence == incidence and c.changes_sign for c in found.crossings)
         # An odd number where the signs differ, else an even one.
@@ -89,7 +88,7 @@ def test_any_path_between_two_modes_crosses_each_margin_that_they_differ_in(
 
 
 @given(ordinary_cases(), st.integers(0, 2**32))
-def test_smooth_random_paths_between_modes_cross_too(case: Case, seed: int) -> None:
+def test_margins_smooth_path_between_modes_change_sign(case: Case, seed: int) -> None:
     modes = forward(case.design, inverse(case.design, case.position, case.rotation))
     assume(bool(np.abs(margins(case.position, case.rotation)).min() > 1e-6 * case.size))
     rng = np.random.default_rng(seed)
@@ -109,18 +108,19 @@ def test_smooth_random_paths_between_modes_cross_too(case: Case, seed: int) -> N
 
 
 @pytest.mark.parametrize("last", range(8))
-def test_the_straight_move_between_modes_is_marked_where_it_crosses(last: int) -> None:
+def test_path_margins_straight_move_between_modes_has_its_crossings(last: int) -> None:
     joints = inverse(OPTIMAL, HOME.position, HOME.rotation)
     first = 3
-    found = path_between_modes(OPTIMAL, joints, first, last)
+    modes = forward(OPTIMAL, joints)
+    ends = [Pose.of(modes.position[mode], modes.rotation[mode]) for mode in (first, last)]
+    found = path_margins(ends)
     assert found.margins.shape == (len(found.at), 3)
     differ = {k for k, bit in ((1, 4), (2, 2), (3, 1)) if (first ^ last) & bit}
     assert {c.incidence for c in found.crossings if c.changes_sign} >= differ
-    assert set(modes_differ(found.poses)) == differ
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_a_move_from_a_singular_pose_starts_with_a_crossing(way: tuple[int, ...]) -> None:
+def test_path_margins_singular_start_is_a_crossing(way: tuple[int, ...]) -> None:
     @given(singular_cases(way, st.just(OPTIMAL)))
     def law(case: Case) -> None:
         start = Pose.of(case.position, case.rotation)
@@ -132,7 +132,7 @@ def test_a_move_from_a_singular_pose_starts_with_a_crossing(way: tuple[int, ...]
     law()
 
 
-def test_a_move_in_the_base_plane_lies_in_the_singular_set() -> None:
+def test_path_margins_move_in_the_base_plane_lies_in_incidence_3() -> None:
     start = Pose((1.0, 2.0, 0.0), HOME.quaternion)
     end = Pose((3.0, -2.0, 0.0), (0.8, 0.3, -0.4, 0.2))
     assert path_margins([start, end]).lies_in == (3,)
@@ -145,8 +145,8 @@ def test_a_move_in_the_base_plane_lies_in_the_singular_set() -> None:
     assert still.lies_in == still.crossings == ()
 
 
-def test_a_margin_that_touches_zero_is_no_change_of_mode() -> None:
-    # κ3 is linear, so it touches at a corner: down to the base plane and up again.
+def test_path_margins_touch_of_zero_changes_no_sign() -> None:
+    # δ3 is linear, so it touches at a corner: down to the base plane and up again.
     x, y, z = HOME.position
     down = Pose((x, y, 0.0), (0.8, 0.3, -0.4, 0.2))
     start, end = Pose((x - 1, y, z), down.quaternion), Pose((x + 1, y, z), down.quaternion)
@@ -155,7 +155,7 @@ def test_a_margin_that_touches_zero_is_no_change_of_mode() -> None:
     below = Pose((x + 1, y, -z), down.quaternion)
     (through,) = [c for c in path_margins([start, down, below]).crossings if c.incidence == 3]
     assert (through.move, through.share, through.changes_sign) == (0, 1.0, True)
-    # κ1 = −n·p of a platform that nods to where it just points at a1, and back.
+    # δ1 = −n·p of a platform that nods to where it just points at a1, and back.
     nod = 2.0 * math.atan2(1.0, 2.0)
     first = Rotation.from_euler("y", 0.0).as_matrix()
     last = Rotation.from_euler("y", nod).as_matrix()
@@ -165,8 +165,8 @@ def test_a_margin_that_touches_zero_is_no_change_of_mode() -> None:
 
 
 @pytest.mark.parametrize("gap", [1e-2, 1e-5])
-def test_two_crossings_close_together_are_both_found(gap: float) -> None:
-    # The platform turns about y by θ at b4 = (x, y, z): κ1 = −(x sin θ + z cos θ), which has
+def test_path_margins_two_close_crossings_are_both_present(gap: float) -> None:
+    # The platform turns about y by θ at b4 = (x, y, z): δ1 = −(x sin θ + z cos θ), which has
     # its extreme −|(x, z)| where the normal points away from a1. Taking b4 along keeps
     # that extreme at the middle and lets it come as close to zero as one likes.
     turn = Rotation.from_rotvec([0.0, 1.0, 0.0]).as_matrix()
@@ -198,10 +198,6 @@ def test_two_crossings_close_together_are_both_found(gap: float) -> None:
     assert float(np.diff(pair).min()) < 20.0 * gap
 
 
-def test_what_is_no_path_is_refused() -> None:
+def test_path_margins_single_pose_is_refused() -> None:
     with pytest.raises(InputError, match="two poses"):
         path_margins([HOME])
-    with pytest.raises(InputError, match="0 to 7"):
-        path_between_modes(OPTIMAL, inverse(OPTIMAL, HOME.position, HOME.rotation), 0, 8)
-    with pytest.raises(InputError, match="do not close"):
-        path_between_modes(OPTIMAL, np.array([0.1, 1.0, 9.0, 2.0, 9.0, 1.0]), 0, 1)

@@ -82,21 +82,21 @@ def assert_keeps_everything(path: PlannedPath, poses: tuple[Pose, ...]) -> None:
 
 @needs_ompl
 @pytest.mark.parametrize("index", range(12))
-def test_a_path_keeps_limits_margins_and_clearances_from_start_to_goal(index: int) -> None:
+def test_plan_path_valid_ends_keeps_limits_margins_and_clearances(index: int) -> None:
     start, goal = pairs()[index]
     path = plan_path(DESIGN, start, goal, seconds=20.0)
     assert path.poses[0] is start
     assert path.poses[-1] is goal
-    assert path.found[0] is start
-    assert path.found[-1] is goal
-    assert len(path.found) > 2
+    assert path.unsmoothed[0] is start
+    assert path.unsmoothed[-1] is goal
+    assert len(path.unsmoothed) > 2
     assert path.checked >= 2
     assert_keeps_everything(path, path.poses)
-    assert_keeps_everything(path, path.found)
+    assert_keeps_everything(path, path.unsmoothed)
 
 
 @needs_ompl
-def test_smoothing_makes_a_path_shorter_and_rounder() -> None:
+def test_plan_path_smoothed_path_is_shorter() -> None:
     smoother = Smoother(DESIGN, Rules.of(DESIGN))
     smooth = rough = 0.0
     for start, goal in pairs()[:6]:
@@ -106,23 +106,23 @@ def test_smoothing_makes_a_path_shorter_and_rounder() -> None:
         )
         assert path.length == pytest.approx(float(smoother.lengths(path.poses).sum()))
         assert straight <= path.length + 1e-9
-        found = float(smoother.lengths(path.found).sum())
+        found = float(smoother.lengths(path.unsmoothed).sum())
         assert path.length <= found + 1e-9
         smooth, rough = smooth + path.length, rough + found
     assert smooth < 0.95 * rough
 
 
-def test_the_sharpest_corners_are_cut() -> None:
+def test_smooth_detour_in_free_space_becomes_straight() -> None:
     """In free space a detour becomes the straight way, or nearly."""
     x, y, z = HOME.position
     corner = Pose((x, y + 2.0, z), HOME.quaternion)
     end = Pose((x + 2.0, y + 2.0, z), HOME.quaternion)
     smoother = Smoother(DESIGN, Rules.of(DESIGN))
     assert smoother.is_valid(HOME, end)
-    assert smoother.smoothed([HOME, corner, end]) == (HOME, end)
+    assert smoother.smooth([HOME, corner, end]) == (HOME, end)
 
 
-def test_a_straight_way_that_is_valid_is_taken_without_any_search(
+def test_plan_path_valid_straight_move_needs_no_search(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setitem(sys.modules, "ompl.base", None)
@@ -135,14 +135,14 @@ def test_a_straight_way_that_is_valid_is_taken_without_any_search(
     assert plan_path(DESIGN, HOME, HOME).length == 0.0
 
 
-def test_without_ompl_it_is_told_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_plan_path_without_ompl_names_its_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "ompl.util", None)
     with pytest.raises(MissingExtraError, match=r"flagged-explorer\[planning\]"):
         plan_path(DESIGN, *pairs()[0])
 
 
 @pytest.mark.parametrize("mode", [0, 2, 3, 4, 5, 6, 7])
-def test_poses_of_two_modes_have_no_path(mode: int) -> None:
+def test_plan_path_other_mode_names_the_margins(mode: int) -> None:
     modes = forward(DESIGN, inverse(DESIGN, HOME.position, HOME.rotation))
     goal = Pose.of(modes.position[mode], modes.rotation[mode])
     with pytest.raises(NoPathError, match="is in mode") as caught:
@@ -150,12 +150,12 @@ def test_poses_of_two_modes_have_no_path(mode: int) -> None:
     assert caught.value.reason == "other mode"
     assert isinstance(caught.value, NoAnswerError)
     differ = {k for k, bit in ((1, 4), (2, 2), (3, 1)) if (1 ^ mode) & bit}
-    named = {k for k in (1, 2, 3) if f"κ{k}" in str(caught.value)}
+    named = {k for k in (1, 2, 3) if f"δ{k}" in str(caught.value)}
     assert named == differ
 
 
 @pytest.mark.parametrize("demanded", ["home", "any"])
-def test_poses_with_the_carriages_in_another_order_have_no_path(demanded: str) -> None:
+def test_plan_path_other_carriage_order_names_both_orders(demanded: str) -> None:
     plain = limited(DESIGN, carriage_order="any")
     start = next(each for each in valid_poses(plain) if order(each) == [0, 1, 2])
     goal = next(each for each in valid_poses(plain) if order(each) == [0, 2, 1])
@@ -170,7 +170,7 @@ def test_poses_with_the_carriages_in_another_order_have_no_path(demanded: str) -
 
 
 @needs_ompl
-def test_paths_stay_off_singularities_and_collisions_as_far_as_their_ends_do() -> None:
+def test_plan_path_room_at_both_ends_is_kept() -> None:
     kept: list[bool] = []
     for start, goal in pairs():
         path = plan_path(DESIGN, start, goal, seconds=20.0)
@@ -182,7 +182,7 @@ def test_paths_stay_off_singularities_and_collisions_as_far_as_their_ends_do() -
     assert np.mean(kept) > 0.7
 
 
-def test_room_is_added_to_what_rules_demand() -> None:
+def test_rules_with_room_demand_more_margin_and_clearance() -> None:
     rules = Rules.of(DESIGN)
     position, rotation = HOME.position, HOME.rotation
     snapshot = evaluate(DESIGN, HOME)
@@ -200,13 +200,13 @@ def test_room_is_added_to_what_rules_demand() -> None:
 
 
 @needs_ompl
-def test_too_little_time_is_told() -> None:
+def test_plan_path_too_little_time_names_it() -> None:
     with pytest.raises(NoPathError, match="1e-09 s") as caught:
         plan_path(DESIGN, *pairs()[0], seconds=1e-9)
     assert caught.value.reason == "out of time"
 
 
-def test_a_start_or_goal_outside_the_limits_is_told_with_each_limit() -> None:
+def test_plan_path_end_outside_limits_names_them() -> None:
     x, y, z = HOME.position
     far = Pose((40.0, y, z), HOME.quaternion)
     broken = [str(each) for each in evaluate(DESIGN, far).violations]
@@ -224,7 +224,7 @@ def test_a_start_or_goal_outside_the_limits_is_told_with_each_limit() -> None:
 
 
 @pytest.mark.parametrize(("height", "words"), [(0.0, "b4 on the base plane")])
-def test_a_singular_start_or_goal_is_told_with_its_incidence(height: float, words: str) -> None:
+def test_plan_path_singular_end_names_its_incidence(height: float, words: str) -> None:
     x, y, _ = HOME.position
     singular = Pose.of_yaw_pitch_roll((x, y, height), (-70.0, 20.0, 30.0))
     for ends in ((singular, HOME), (HOME, singular)):
@@ -233,14 +233,14 @@ def test_a_singular_start_or_goal_is_told_with_its_incidence(height: float, word
         assert caught.value.reason == "singular"
 
 
-def test_margins_of_the_limits_are_kept() -> None:
+def test_plan_path_margin_below_the_limit_is_refused() -> None:
     demanding = limited(DESIGN, margin=2.0)
     low = Pose((10.0, 5.0, 1.5), HOME.quaternion)
     with pytest.raises(InputError, match="margin κ1"):
         plan_path(demanding, HOME, low)
 
 
-def test_paths_can_be_of_another_mode_than_the_home() -> None:
+def test_plan_path_mode_other_than_the_home_has_a_path() -> None:
     modes = forward(DESIGN, inverse(DESIGN, HOME.position, HOME.rotation))
     free = limited(PRESETS["paper-optimal"], box=None)
     start = Pose.of(modes.position[6], modes.rotation[6])
@@ -250,6 +250,6 @@ def test_paths_can_be_of_another_mode_than_the_home() -> None:
 
 
 @pytest.mark.parametrize("seconds", [0.0, -1.0, math.nan, math.inf])
-def test_a_time_that_is_none_is_refused(seconds: float) -> None:
+def test_plan_path_time_not_positive_is_refused(seconds: float) -> None:
     with pytest.raises(InputError, match="time above zero"):
         plan_path(DESIGN, HOME, HOME, seconds=seconds)

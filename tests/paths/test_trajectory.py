@@ -38,7 +38,9 @@ def random_path(seed: int, corners: int) -> list[Pose]:
 
 
 @given(st.integers(0, 2**32), st.integers(2, 6), st.sampled_from((0.1, 2.0, 50.0)))
-def test_samples_lie_on_the_path_at_even_times(seed: int, corners: int, speed: float) -> None:
+def test_trajectory_random_path_has_even_samples_on_it(
+    seed: int, corners: int, speed: float
+) -> None:
     path = random_path(seed, corners)
     found = trajectory(DESIGN, path, speed=speed, samples=301)
     assert found.time.shape == (301,)
@@ -57,7 +59,7 @@ def test_samples_lie_on_the_path_at_even_times(seed: int, corners: int, speed: f
 
 
 @given(st.integers(0, 2**32), st.sampled_from((0.1, 2.0)))
-def test_no_actuator_is_faster_than_the_speed_and_one_is_as_fast(seed: int, speed: float) -> None:
+def test_trajectory_fastest_actuator_has_the_speed(seed: int, speed: float) -> None:
     found = trajectory(DESIGN, random_path(seed, 3), speed=speed, samples=2001)
     rates = np.abs(np.diff(found.joints, axis=0)).max(axis=-1) / np.diff(found.time)
     # Speeds are even over a thirty-second part of a move, and corners come between samples.
@@ -65,7 +67,7 @@ def test_no_actuator_is_faster_than_the_speed_and_one_is_as_fast(seed: int, spee
     assert rates.mean() <= 1.02 * speed
 
 
-def test_a_speed_is_in_units_a_second() -> None:
+def test_trajectory_speed_is_in_units_per_second() -> None:
     x, y, z = HOME.position
     # Along the guide both carriages go as far as the platform, and no leg goes farther.
     path = [HOME, Pose((x + 3.0, y, z), HOME.quaternion)]
@@ -73,14 +75,14 @@ def test_a_speed_is_in_units_a_second() -> None:
     assert trajectory(DESIGN, path).duration == pytest.approx(3.0 / (0.1 * DESIGN.reach))
 
 
-def test_a_path_that_stays_takes_no_time() -> None:
+def test_trajectory_without_motion_takes_no_time() -> None:
     found = trajectory(DESIGN, [HOME, HOME], samples=5)
     assert found.duration == 0.0
     assert_allclose(found.position, [HOME.position] * 5)
     assert np.isfinite(found.joints).all()
 
 
-def test_the_pose_at_a_time_is_that_of_the_nearest_sample() -> None:
+def test_trajectory_pose_is_that_of_the_nearest_sample() -> None:
     found = trajectory(DESIGN, random_path(1, 4), samples=11)
     for index in (0, 4, 10):
         pose = found.pose(float(found.time[index]) + 0.01 * found.duration)
@@ -89,7 +91,7 @@ def test_the_pose_at_a_time_is_that_of_the_nearest_sample() -> None:
     assert found.pose(1e9).position == tuple(found.position[-1].tolist())
 
 
-def test_a_table_reads_back_to_the_last_bit(tmp_path: Path) -> None:
+def test_trajectory_csv_reads_back_to_the_last_bit(tmp_path: Path) -> None:
     found = trajectory(DESIGN, random_path(2, 3), samples=50)
     file = tmp_path / "path.csv"
     write_trajectory(found, file)
@@ -105,7 +107,7 @@ def test_a_table_reads_back_to_the_last_bit(tmp_path: Path) -> None:
         assert earlier < later
 
 
-def test_trajectories_that_cannot_be_are_refused() -> None:
+def test_trajectory_bad_input_is_refused() -> None:
     with pytest.raises(InputError, match="two poses"):
         trajectory(DESIGN, [HOME])
     with pytest.raises(InputError, match="samples"):
