@@ -217,6 +217,19 @@ def test_an_empty_workspace_has_nothing_to_reach() -> None:
     assert found.solid.empty_because
 
 
+@pytest.mark.parametrize("home_z", [8.0, 9.0])
+def test_accessible_workspace_without_volume_counts_its_nodes(home_z: float) -> None:
+    home = Pose.of((10.0, 5.0, home_z), home_rotation(OPTIMAL))
+    (x, y, _), (far_x, far_y, _) = OPTIMAL.limits.box or ((), ())
+    flat = limited(OPTIMAL, box=((x, y, 8.0), (far_x, far_y, 8.0)))
+    design = msgspec.structs.replace(flat, home=home)
+    found, count = reachable_workspace(design), workspace_nodes(design).count
+    assert found.solid.is_empty
+    assert found.node_count == count > 0
+    # Nothing is accessible from a home that breaks a limit.
+    assert found.reachable_node_count == (count if home_z == 8.0 else 0)
+
+
 def test_a_home_out_of_limits_or_in_collision_names_the_cause_and_a_way_out() -> None:
     far = msgspec.structs.replace(OPTIMAL, home=Pose.of((10.0, 5.0, 19.0), home_rotation(OPTIMAL)))
     with pytest.raises(InputError, match=r"box z = 19 is above its maximum 18; the nearest pos"):

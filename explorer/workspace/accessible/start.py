@@ -42,7 +42,7 @@ def check_start(design: Design, rotation: FloatArray, position: FloatArray) -> N
 
     It names the limits or pairs of legs, and the nearest position where all is well.
     """
-    trouble = _troubles(design, rotation, position)
+    trouble = troubles(design, rotation, position)
     if not trouble:
         return
     text = f"nothing can be reached from {_shown(position)}: {'; '.join(trouble)}"
@@ -55,7 +55,7 @@ def check_start(design: Design, rotation: FloatArray, position: FloatArray) -> N
     )
 
 
-def _troubles(design: Design, rotation: FloatArray, position: FloatArray) -> list[str]:
+def troubles(design: Design, rotation: FloatArray, position: FloatArray) -> list[str]:
     joints, kappa = inverse(design, position, rotation), margins(position, rotation)
     broken = violations(design, position, rotation, joints, kappa, home_signs(design))
     clearance = leg_clearances(design, position, rotation).clearance
@@ -115,6 +115,6 @@ def nearest_clear_position(
             continue
         at = found * reach
         nearer = np.linalg.norm(at - position) < np.linalg.norm(best - position)
-        if nearer and not _troubles(design, rotation, at):
+        if nearer and not troubles(design, rotation, at):
             best = at
     return best

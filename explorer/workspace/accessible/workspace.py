@@ -31,7 +31,7 @@ from explorer.workspace.accessible.nodes import (
     grid_over,
     survey,
 )
-from explorer.workspace.accessible.start import check_start
+from explorer.workspace.accessible.start import check_start, troubles
 from explorer.workspace.least_clearance import LeastClearances, least_clearances
 from explorer.workspace.limits.constraints import Constraint, constraints
 from explorer.workspace.limits.region import region_of
@@ -152,8 +152,10 @@ def reachable_workspace(
     stages.begin("least clearances")
     least = least_clearances(design, r)
     if whole.is_empty:
+        # A workspace without volume, such as a part of a plane, may hold nodes of the grid.
+        counts = _paper_nodes(design, r, limits, p, step, most_nodes)
         pairs = (_cost(pair, least, 0.0) for pair in ALL_PAIRS)
-        return ReachableWorkspace(0.0, 0.0, whole, step, 0, 0, tuple(pairs))
+        return ReachableWorkspace(0.0, 0.0, whole, step, *counts, tuple(pairs))
     check_start(design, r, p)
     volume = exact.volume
     stages.begin("grid of positions")
@@ -200,7 +202,8 @@ def _paper_nodes(
         return 0, 0
     x, y, z = many.astype(int).tolist()
     found = survey(design, rotation, Grid(first * step, np.full(3, step), (x, y, z)))
-    return int(found.within.sum()), int(found.reached(start).sum())
+    accessible = 0 if troubles(design, rotation, start) else int(found.reached(start).sum())
+    return int(found.within.sum()), accessible
 
 
 class _Carver:
