@@ -472,7 +472,7 @@ def test_everything_is_told_and_drawn_at_singular_poses(
     frame = Frame(shown)
     words = plain(summary(frame))
     for index in incidences(frame.snapshot.stratum):
-        assert f"κ{index} = 0: {INCIDENCES[index - 1]}" in words
+        assert f"δ{index} = 0: {INCIDENCES[index - 1]}" in words
     panel, feed = SingularityPanel(server.gui, desk.session), StrataFeed(UNUSED, lambda: None)
     texts = [str(v) for _, n, v in panel.updates(frame, feed) if n == "content"]
     assert not any(re.search(r"\b(nan|inf)\b", plain(text)) for text in texts)

@@ -35,7 +35,7 @@ def test_a_click_on_the_diagram_moves_to_the_stratum(tab: Tab) -> None:
     assert box["width"] <= 1.0
     tab.page.locator("label[title^='(3, 4, 1, 2)']").click()
     tab.wait_for(lambda: Frame(tab.state).snapshot.stratum == (3, 4, 1, 2), "the stratum")
-    expect(tab.page.get_by_text("κ3 = 0: b4 on the base plane", exact=False).first).to_be_visible()
+    expect(tab.page.get_by_text("δ3 = 0: b4 on the base plane", exact=False).first).to_be_visible()
     assert np.abs(kappas(tab)[[0, 2]]).max() < 1e-9
 
 
