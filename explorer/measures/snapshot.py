@@ -1,6 +1,6 @@
-"""Everything there is to know about one design in one pose, computed once, when it is needed.
+"""The snapshot of a design in a pose: all of its values, each computed once, on first use.
 
-The page, the command line, reports and tests all read this; none computes its own.
+The page, the command line and reports all read these values.
 """
 
 from __future__ import annotations
@@ -43,13 +43,11 @@ from explorer.workspace.limits.broken import Violation, violations
 
 @dataclass(frozen=True)
 class Snapshot:
-    """A design in a pose; what follows is computed when it is first asked for.
-
-    Lengths are in design units.
+    """A design in a pose, and the values that follow from both; lengths in design units.
 
     Attributes:
         design: The manipulator.
-        pose: Of the platform.
+        pose: The pose of the platform.
     """
 
     design: Design
@@ -57,7 +55,7 @@ class Snapshot:
 
     @cached_property
     def rotation(self) -> FloatArray:
-        """The rotation of the pose, shape (3, 3)."""
+        """The rotation from platform to base, shape (3, 3)."""
         return self.pose.rotation
 
     @cached_property
@@ -67,51 +65,51 @@ class Snapshot:
 
     @cached_property
     def joints(self) -> FloatArray:
-        """(l1, d1, d2, d3, d4, l4), shape (6,)."""
+        """The joint values (l1, d1, d2, d3, d4, l4), shape (6,)."""
         return inverse(self.design, self.pose.position, self.rotation)
 
     @cached_property
     def margins(self) -> FloatArray:
-        """(κ1, κ2, κ3), shape (3,)."""
+        """The margins (δ1, δ2, δ3), shape (3,)."""
         return margins(self.pose.position, self.rotation)
 
     @cached_property
     def volumes(self) -> FloatArray:
-        """Of the three tetrahedra, shape (3,), in cubed design units."""
+        """The volumes of the three tetrahedra, shape (3,), in cubed design units."""
         return tetrahedron_volumes(self.design, self.margins)
 
     @cached_property
     def determinant(self) -> float:
-        """The determinant of J."""
+        """The determinant of the actuator Jacobian J."""
         return float(determinant(self.design, self.joints, self.margins))
 
     @property
     def volume_sizes(self) -> FloatArray:
-        """The volumes with margins as long as the reach, beside which rounding is told, (3,)."""
-        return np.abs(tetrahedron_volumes(self.design, np.full(3, self.design.reach)))
+        """The volumes if all margins were the reach, a scale for rounding errors, shape (3,)."""
+        return tetrahedron_volumes(self.design, np.full(3, self.design.reach))
 
     @property
     def determinant_size(self) -> float:
-        """The |determinant| with the smallest margin as long as the reach, as `volume_sizes`."""
+        """The |determinant| if the smallest margin were the reach, a scale for rounding errors."""
         long = self.margins.copy()
         long[np.abs(long).argmin()] = self.design.reach
         return abs(float(determinant(self.design, self.joints, long)))
 
     @cached_property
     def inverse_condition(self) -> float:
-        """Of J made homogeneous with the reach, 0 (singular) to 1."""
+        """The inverse condition number of J, made homogeneous by the reach, 0 (singular) to 1."""
         matrix = jacobian(self.design, self.pose.position, self.rotation)
         return float(inverse_condition(matrix, self.design.reach))
 
     @cached_property
     def stratum(self) -> tuple[int, ...]:
-        """The relative position of the two flags."""
+        """The stratum: the permutation of the relative position of the two flags."""
         found = stratum(self.pose.position, self.rotation, self.design.reach)
         return tuple(found.tolist())
 
     @property
     def stratum_dimension(self) -> int:
-        """6 generic to 0 coinciding."""
+        """The dimension of the stratum, from 6 (generic) to 0 (flags that coincide)."""
         return inversions(self.stratum)
 
     @property
@@ -126,13 +124,13 @@ class Snapshot:
 
     @property
     def bordering_modes(self) -> tuple[int, ...]:
-        """The assembly modes that meet in the pose: its own, or where singular 2, 4 or 8."""
+        """The assembly modes that meet in the pose: 1, or 2, 4 or 8 if it is singular."""
         free = sum(4 >> (incidence - 1) for incidence in incidences(self.stratum))
         return tuple(mode for mode in range(8) if mode & ~free == self.mode & ~free)
 
     @property
     def sign_words(self) -> str:
-        """The signs of the margins as people read them, 0 for one that vanishes: "− 0 +"."""
+        """The signs of the margins as text, 0 for one that vanishes, such as "− 0 +"."""
         signs = mode_name(self.mode).split()
         for incidence in incidences(self.stratum):
             signs[incidence - 1] = "0"
@@ -140,7 +138,7 @@ class Snapshot:
 
     @property
     def proximity(self) -> float:
-        """The smallest |margin| over the reach."""
+        """The smallest |δ| over the reach."""
         return float(np.abs(self.margins).min()) / self.design.reach
 
     @cached_property
@@ -162,13 +160,13 @@ class Snapshot:
 
     @cached_property
     def nearest_distances(self) -> tuple[float, float, float]:
-        """The distances of `nearest`, without the poses, which take three times as long."""
+        """The distances of `nearest`, in a third of the time that the poses take."""
         first, second, third = self._nearest_poses.distance.tolist()
         return first, second, third
 
     @cached_property
     def nearest(self) -> tuple[NearestSingularity, NearestSingularity, NearestSingularity]:
-        """The nearest singular pose of each incidence, in the order κ1, κ2, κ3."""
+        """The nearest singular pose of each incidence, in the order δ1, δ2, δ3."""
         return each_singularity(self._nearest_poses, self.pose)
 
     @cached_property
@@ -177,12 +175,12 @@ class Snapshot:
 
     @cached_property
     def modes(self) -> ForwardKinematics:
-        """All eight assembly modes of these joints."""
+        """The eight assembly modes of the joint values."""
         return forward(self.design, self.joints)
 
     @cached_property
     def intervals(self) -> tuple[tuple[Interval, ...], ...]:
-        """Per joint, the intervals in which the lengths close while the others hold."""
+        """The intervals of each joint in which a pose exists, the other joints held."""
         return feasible_intervals(self.design, self.joints)
 
 
@@ -191,7 +189,7 @@ def evaluate(design: Design, pose: Pose) -> Snapshot:
 
     Args:
         design: The manipulator.
-        pose: Of its platform, in design units.
+        pose: The pose of the platform, in design units.
     """
     return Snapshot(design, pose)
 

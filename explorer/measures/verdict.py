@@ -1,11 +1,11 @@
 """The verdict on a pose: singular, near a singularity, or clear, and by which incidence.
 
-An incidence is measured twice: by its margin, and by the distance of the nearest pose that has
-it (`explorer.singularity.nearest`). Either may be small while the other is not: a small turn of the
-platform can undo a large margin, and the margin of two lines that are nearly parallel is small
-however far apart they are. So the smaller counts, each as a multiple of its own warning length:
-that of the distances is a share of that of the margins, since b1 to b4 reach a singular pose by
-a way that is shorter than the margin: the platform may turn as well as shift.
+An incidence is measured by its margin, and by the distance of the nearest pose that has it
+(`explorer.singularity.nearest`). Either may be small while the other is not: a small turn of the
+platform can remove a large margin, and the margin of two nearly parallel lines is small however
+far apart they are. So the smaller of the two counts, each over a warning length of its own. The
+warning length of distances is the shorter one: the platform can turn as well as shift, so its
+points move to the nearest singular pose by less than the margin.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from explorer.measures.snapshot import Snapshot
 from explorer.mechanism.margins import INCIDENCES
 from explorer.singularity.bruhat import incidences
 
-# The warning length of the distances, as a share of that of the margins.
+# The warning length of distances, over that of margins.
 DISTANCE_SHARE = 1.0 / 3.0
 
 Kind = Literal["singular", "near", "clear"]
@@ -34,12 +34,12 @@ class Verdict:
 
     Attributes:
         kind: Whether the pose is singular, near a singularity, or clear of all.
-        levels: Of each incidence, the smaller of |margin| and distance to its nearest singular
-            pose, each over its warning length: 0 is singular, below 1 is near.
-        incidences: Those that hold where the pose is singular; else those that are near, the
-            lowest level first; else the one whose nearest singular pose is the nearest; 1 to 3.
-        distance: The root-mean-square way of b1 to b4 to the nearest pose with the first of
-            these incidences, in design units; 0 where the pose is singular.
+        levels: Level of each incidence: the smaller of |δ| and the distance to its nearest
+            singular pose, each over its warning length; 0 is singular, below 1 is near.
+        incidences: Numbers 1 to 3 of the incidences that hold in a singular pose; of those
+            that are near, the lowest level first; in a clear pose, of the nearest one.
+        distance: Root-mean-square displacement of b1 to b4 to the nearest pose with the first
+            of these incidences, in design units; 0 in a singular pose.
     """
 
     kind: Kind
@@ -53,15 +53,15 @@ class Verdict:
         return TITLES[self.kind]
 
     def reason(self, length: str) -> str:
-        """Return what it rests on, such as "2.52 mm from κ2 = 0, lines a1a2 and b2b3 meeting".
+        """Return the reason, such as "2.52 mm from δ2 = 0, lines a1a2 and b2b3 meeting".
 
         Args:
-            length: The distance, with its unit.
+            length: Text of the distance, with its unit.
         """
         if self.kind == "singular":
-            return "; ".join(f"κ{each} = 0: {INCIDENCES[each - 1]}" for each in self.incidences)
+            return "; ".join(f"δ{index} = 0: {INCIDENCES[index - 1]}" for index in self.incidences)
         first = self.incidences[0]
-        return f"{length} from κ{first} = 0, {INCIDENCES[first - 1]}"
+        return f"{length} from δ{first} = 0, {INCIDENCES[first - 1]}"
 
 
 def verdict(snapshot: Snapshot, warn_below: float) -> Verdict:
@@ -69,7 +69,7 @@ def verdict(snapshot: Snapshot, warn_below: float) -> Verdict:
 
     Args:
         snapshot: The design in the pose.
-        warn_below: The warning length of the margins, in design units.
+        warn_below: Warning length of the margins, in design units.
     """
     levels, distances = _levels(snapshot, warn_below), snapshot.nearest_distances
     if holding := incidences(snapshot.stratum):

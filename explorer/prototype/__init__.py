@@ -1,1 +1,1 @@
-"""The mechanism as things: the bodies of each leg, their sizes, their shapes and where they are."""
+"""The prototype: the bodies of each leg, their sizes, shapes, masses and placements."""

@@ -1,6 +1,6 @@
-"""The prototype: all parts of a design, and where they are in a pose.
+"""The prototype: all parts of a design, their placements in a pose, and the exploded view.
 
-Parts are made once for a design; in a pose they only move as rigid bodies.
+Parts are made once for a design; between poses they move as rigid bodies.
 """
 
 from __future__ import annotations
@@ -13,12 +13,15 @@ from numpy.typing import ArrayLike
 
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import FloatArray
-from explorer.prototype.chains import BODIES, Chains, Places
+from explorer.prototype.chains import BODIES, LEGS, Chains, Places
 from explorer.prototype.fitting import sizes_of
-from explorer.prototype.mass import Mass, together
-from explorer.prototype.motion import hindrances
+from explorer.prototype.joint_limits import broken_joint_limits
+from explorer.prototype.mass import Mass, total_mass
 from explorer.prototype.part import Part
 from explorer.prototype.sizes import Sizes
+
+# The gap between layers of the exploded view: over the reach, and over the largest leg radius.
+_GAP, _GAP_IN_RADII = 0.05, 6.0
 
 
 @dataclass(frozen=True)
@@ -26,8 +29,8 @@ class Prototype:
     """The parts of a design.
 
     Attributes:
-        sizes: Those of the parts, in millimetres.
-        parts: The base first; their names are unique.
+        sizes: Sizes of the parts, in millimetres.
+        parts: Parts with unique names, the base first.
     """
 
     sizes: Sizes
@@ -35,20 +38,20 @@ class Prototype:
 
     @property
     def design(self) -> Design:
-        """What it is made from."""
+        """The design of which these are the parts."""
         return self.sizes.design
 
     @property
     def chains(self) -> Chains:
-        """How its bodies are joined."""
+        """The chains of bodies and joints."""
         return self.sizes.chains
 
     def places(self, position: ArrayLike, rotation: ArrayLike) -> Places:
-        """Return where the parts are in a pose, in their order.
+        """Return the placements of the parts in a pose, in the order of `parts`.
 
         Args:
-            position: b4 in the base frame, shape (..., 3), in design units.
-            rotation: Platform to base, shape (..., 3, 3).
+            position: Position of b4 in the base frame, shape (..., 3), in design units.
+            rotation: Rotation from platform to base, shape (..., 3, 3).
 
         Raises:
             InputError: a pose that is not finite or not a rotation.
@@ -57,24 +60,24 @@ class Prototype:
         index = [part.body_index for part in self.parts]
         return Places(bodies.origin[..., index, :], bodies.rotation[..., index, :, :])
 
-    def hindrances(self, position: ArrayLike, rotation: ArrayLike) -> tuple[str, ...]:
-        """Return why actuators and joints do not take one pose, () if they do.
+    def broken_joint_limits(self, position: ArrayLike, rotation: ArrayLike) -> tuple[str, ...]:
+        """Return the limits of actuators and joints that one pose breaks, as sentences.
 
-        Whether parts of different legs meet is not looked at.
+        Collisions between the parts of different legs are not checked.
 
         Raises:
             InputError: a pose that is not finite or not a rotation.
         """
-        return hindrances(self.sizes, position, rotation)
+        return broken_joint_limits(self.sizes, position, rotation)
 
     def masses(self, density: float) -> Mapping[str, Mass]:
         """Return the masses of all bodies but the base, in kilograms and metres.
 
         Args:
-            density: Of the parts, in kg/m³.
+            density: Density of the parts, in kg/m³.
         """
         return {
-            body: together(
+            body: total_mass(
                 part.mass(density, self.design.unit_mm) for part in self.parts if part.body == body
             )
             for body in BODIES[1:]
@@ -96,7 +99,42 @@ def make_prototype(design: Design) -> Prototype:
         InputError: the design is too tight for the parts; the message says what would fit.
         ExplorerError: a body cannot be made.
     """
-    from explorer.prototype.shapes import parts_of
+    from explorer.prototype.shapes import make_parts
 
     sizes = sizes_of(design)
-    return Prototype(sizes, parts_of(sizes))
+    return Prototype(sizes, make_parts(sizes))
+
+
+def exploded_offsets(prototype: Prototype, places: Places) -> FloatArray:
+    """Return the shift of each part in the full exploded view, shape (n, 3), in design units.
+
+    Parts are lifted off the base in layers, each as far as it takes to clear the one below:
+    crosses and carriages, cylinders, rods, balls, and the platform. So the parts of one layer
+    keep their places beside each other, however the legs lean.
+
+    Args:
+        prototype: The parts.
+        places: Placements of all parts in one pose.
+    """
+    sizes, parts = prototype.sizes, prototype.parts
+    index = {part.name: i for i, part in enumerate(parts)}
+    cylinders, rods, balls = (
+        [index[f"{kind} {leg}"] for leg in LEGS] for kind in ("cylinder", "rod", "ball")
+    )
+    design = prototype.design
+    gap = max(_GAP * design.reach, _GAP_IN_RADII * max(sizes.radii) / design.unit_mm)
+    up = np.array([0.0, 0.0, float(sizes.chains.side)])
+    tops = np.array([parts[i].vertices[:, 2].max() for i in cylinders])
+    bottoms = np.array([parts[i].vertices[:, 2].min() for i in rods])
+    along = places.rotation[rods][:, :, 2]
+    lengths = np.linalg.norm(places.origin[rods] - places.origin[cylinders], axis=1)
+    overlap = np.maximum(tops - (lengths + bottoms), 0.0) * np.abs(along @ up)
+    # The necks of balls leave the platform along its normal, which may lean.
+    normal = -sizes.chains.platform_side * places.rotation[index["platform"]][:, 2]
+    offsets = np.zeros_like(places.origin)
+    offsets[[i for i, part in enumerate(parts) if part.kind in ("cross", "carriage")]] = gap * up
+    offsets[cylinders] = 2.0 * gap * up
+    offsets[rods] = (3.0 * gap + overlap.max()) * up
+    offsets[balls] = offsets[rods] + gap * normal
+    offsets[index["platform"]] = offsets[balls][0] + gap * normal
+    return offsets

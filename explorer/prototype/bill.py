@@ -1,4 +1,4 @@
-"""The bill of materials: every part with its measures, actuators with stroke and length."""
+"""The bill of materials: every part with its extents and mass, every actuator with its stroke."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from explorer.prototype.dimensions import Stroke
 
 @dataclass(frozen=True)
 class Item:
-    """A line of the bill.
+    """One part in the bill of materials.
 
     Attributes:
-        name: Of the part, such as "cylinder 2".
-        size: Its extents along the axes of its own frame, in millimetres.
-        volume: In cubic millimetres.
-        mass: In kilograms.
+        name: Name of the part, such as "cylinder 2".
+        size: Extents along the axes of the part's own frame, in millimetres.
+        volume: Volume in cubic millimetres.
+        mass: Mass in kilograms.
     """
 
     name: str
@@ -30,11 +30,11 @@ class Actuator:
     """An actuator of a leg: a cylinder and its rod.
 
     Attributes:
-        leg: 1 to 4.
-        stroke: Between what lengths it moves, from base joint to ball, in millimetres.
-        asked: Between what lengths the limits ask for; one rod may have less.
-        diameter: Of the cylinder, in millimetres.
-        mass: Of cylinder and rod, in kilograms.
+        leg: Number of the leg, 1 to 4.
+        stroke: Shortest and longest length, from base joint to ball, in millimetres.
+        asked: Stroke that the limits of the design allow; a single rod may cover less of it.
+        diameter: Diameter of the cylinder, in millimetres.
+        mass: Mass of cylinder and rod, in kilograms.
     """
 
     leg: int
@@ -53,16 +53,16 @@ class Bill:
 
     @property
     def mass(self) -> float:
-        """That of all parts together, in kilograms."""
+        """The mass of all parts, in kilograms."""
         return sum(item.mass for item in self.items)
 
 
 def bill_of_materials(prototype: Prototype, density: float) -> Bill:
-    """Return the bill of a prototype.
+    """Return the bill of materials of a prototype.
 
     Args:
-        prototype: Its parts.
-        density: Of what they are made from, in kg/m³.
+        prototype: The parts.
+        density: Density of the parts, in kg/m³.
     """
     unit, sizes = prototype.design.unit_mm, prototype.sizes
     items: list[Item] = []

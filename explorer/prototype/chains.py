@@ -1,11 +1,12 @@
-"""The legs as chains of bodies and joints: the angles of a pose, and the bodies' places.
+"""The legs as chains of bodies and joints: joint values and the bodies' placements in a pose.
 
-Legs 1 and 4 turn about two axes of a universal joint, fixed at a1 and a3, and then
-lengthen. Legs 2 and 3 slide along the guide, turn about it and lengthen. So each leg has
-three joints, three bodies behind them and a ball joint at the end.
+Legs 1 and 4 have a universal joint, fixed at a1 and a3, and a prismatic actuator. Legs 2 and 3
+have a carriage on the guide, a revolute about it and a prismatic actuator. So each leg has
+three joints, three bodies, and a ball joint at its end.
 
-A body's frame lies at its leg's base joint, a rod's at its ball; the z-axis of cylinders
-and rods is the leg, the x-axis of crosses and carriages what is held in the base.
+The origin of a body's frame is its leg's base joint, that of a rod's frame its ball. The z-axis
+of cylinders and rods points along the leg; the x-axis of crosses and carriages is the axis that
+the base holds.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from explorer.numerics.arrays import FloatArray
 
 LEGS = (1, 2, 3, 4)
 ON_GUIDE = (2, 3)
-"""The legs that start from carriages."""
+"""The legs whose base joint is a carriage on the guide."""
 
 CHAIN_JOINTS = (
     *("a1 first", "a1 second", "l1"),
@@ -35,7 +36,7 @@ CHAIN_JOINTS = (
 """The joints of the four chains, from the base to the platform; angles in radians."""
 
 ACTUATED = (2, 3, 5, 6, 8, 11)
-"""Which of them are the joints of the design, in the order of
+"""Indices of those chain joints that are the design's, in the order of
 `explorer.mechanism.design.JOINTS`."""
 
 BODIES = (
@@ -46,18 +47,19 @@ BODIES = (
     *("cross 4", "cylinder 4", "rod 4"),
     "platform",
 )
-"""The bodies that move as one, the base first and the platform last."""
+"""The rigid bodies, the base first and the platform last."""
 
 _GUIDE = np.array([False, True, True, False])
 _LENGTHS, _FIRST, _SECOND, _CARRIAGES = [2, 5, 8, 11], [0, 4, 7, 9], [1, 10], [3, 6]
 
 
 class Places(NamedTuple):
-    """Where bodies are: points of a body's frame go to `origin + rotation @ point`.
+    """Placements of bodies: a point of a body's frame lies at `origin + rotation @ point`.
 
     Attributes:
-        origin: In the base frame, in design units, shape (..., 14, 3).
-        rotation: To the base frame, shape (..., 14, 3, 3).
+        origin: Origins of the bodies' frames in the base frame, in design units, shape
+            (..., 14, 3).
+        rotation: Rotations from the bodies' frames to the base frame, shape (..., 14, 3, 3).
     """
 
     origin: FloatArray
@@ -66,15 +68,15 @@ class Places(NamedTuple):
 
 @dataclass(frozen=True)
 class Chains:
-    """How the chains of a design are mounted; it depends on the home pose.
+    """The mounting of a design's chains; it depends on the home pose.
 
     Attributes:
         design: The manipulator.
-        side: +1 if the platform is above the base plane at home, else −1.
-        platform_side: +1 if a1 is above the platform plane at home, on the side of the
-            platform's z-axis, else −1.
-        mounts: Of each leg, base joint to base frame, shape (4, 3, 3): x is the first
-            axis, which lies in the base plane, z points to the platform's side.
+        side: Side of the base plane on which the platform is at home, +1 above, else −1.
+        platform_side: Side of the platform plane on which a1 is at home, +1 on the side of
+            the platform's z-axis, else −1.
+        mounts: Rotations from each leg's base joint to the base frame, shape (4, 3, 3): x is
+            the joint's first axis, in the base plane; z points to the platform's side.
     """
 
     design: Design
@@ -103,14 +105,14 @@ class Chains:
         return Chains(design, side, above, mounts)
 
     def joints(self, position: ArrayLike, rotation: ArrayLike) -> FloatArray:
-        """Return the joints of all chains in a pose, shape (..., 12), see `CHAIN_JOINTS`.
+        """Return the joint values of all chains in a pose, shape (..., 12), as `CHAIN_JOINTS`.
 
-        Angles are zero where a leg is normal to the base plane. Where a leg lies in the
-        first axis of its universal joint the first angle is undefined, and zero.
+        Angles are zero where a leg is normal to the base plane. Where a leg lies along the
+        first axis of its universal joint, the first angle is undefined and is set to zero.
 
         Args:
-            position: b4 in the base frame, shape (..., 3), in design units.
-            rotation: Platform to base, shape (..., 3, 3).
+            position: Position of b4 in the base frame, shape (..., 3), in design units.
+            rotation: Rotation from platform to base, shape (..., 3, 3).
 
         Raises:
             InputError: a pose that is not finite or not a rotation.
@@ -129,12 +131,12 @@ class Chains:
         return found
 
     def places(self, joints: FloatArray, position: ArrayLike, rotation: ArrayLike) -> Places:
-        """Return where all bodies are, in the order of `BODIES`.
+        """Return the placements of all bodies, in the order of `BODIES`.
 
         Args:
-            joints: Of the chains, shape (..., 12); each leg follows from its own alone.
-            position: Of the platform, shape (..., 3), in design units.
-            rotation: Of the platform, shape (..., 3, 3).
+            joints: Joint values of the chains, shape (..., 12); a leg depends on its own alone.
+            position: Position of the platform, shape (..., 3), in design units.
+            rotation: Rotation of the platform, shape (..., 3, 3).
 
         Raises:
             InputError: not a rotation.
@@ -143,7 +145,7 @@ class Chains:
         origin = np.zeros((*shape, len(BODIES), 3))
         turn = np.zeros((*shape, len(BODIES), 3, 3))
         turn[..., 0, :, :] = np.eye(3)
-        # The middle one of each leg's three bodies is the cylinder.
+        # The second of each leg's three bodies is the cylinder.
         first, cylinder, rod = slice(1, 13, 3), slice(2, 13, 3), slice(3, 13, 3)
         alpha, beta = joints[..., _FIRST], np.zeros((*shape, 4))
         beta[..., [0, 3]] = joints[..., _SECOND]
@@ -160,11 +162,11 @@ class Chains:
         return Places(origin, turn)
 
     def places_at(self, position: ArrayLike, rotation: ArrayLike) -> Places:
-        """Return where all bodies are in a pose.
+        """Return the placements of all bodies in a pose.
 
         Args:
-            position: b4 in the base frame, shape (..., 3), in design units.
-            rotation: Platform to base, shape (..., 3, 3).
+            position: Position of b4 in the base frame, shape (..., 3), in design units.
+            rotation: Rotation from platform to base, shape (..., 3, 3).
 
         Raises:
             InputError: a pose that is not finite or not a rotation.

@@ -1,7 +1,7 @@
-"""How large a leg and the guide are: all from their radii, with clearances in millimetres.
+"""The dimensions of a leg and of the guide, in millimetres, derived from one radius each.
 
-A leg's radius is that of its cylinder; joints are as large as it asks for. The clearance and
-the thinnest wall do not scale with it. Everything here is in millimetres.
+The radius of a leg is that of its cylinder; its joints scale with it. The clearance and the
+thinnest wall do not.
 """
 
 from __future__ import annotations
@@ -11,23 +11,23 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 CLEARANCE = 0.2
-"""Between parts that move against each other."""
+"""Clearance between parts that move against each other."""
 
 THINNEST = 0.5
-"""Of walls and of rods' radii."""
+"""Thinnest wall, and smallest radius of a rod."""
 
 FIRST_SWING, SECOND_SWING = math.radians(60.0), math.radians(50.0)
-"""How far universal joints lean about their two axes, from the normal of the base plane."""
+"""Largest angles of a universal joint about its two axes, from the normal of the base plane."""
 
-# Over the radius of a leg.
+# Dimensions over the radius of a leg.
 _WALL, _SWING, _EYE, _PIN, _NECK, _OVERLAP, _SHAFT = 0.3, 2.6, 1.1, 0.45, 0.45, 3.0, 0.7
-# The rim of a cup lies below the ball's centre by this share of its radius, so that the neck
-# swings to a right angle. A magnet holds the ball.
+# Depth of a cup's rim below the ball's centre, over the ball's radius: the neck can swing to a
+# right angle. A magnet holds the ball.
 _RIM = 0.5
 
 
 class Stroke(NamedTuple):
-    """The lengths between which an actuator moves."""
+    """The shortest and the longest length of an actuator."""
 
     shortest: float
     longest: float
@@ -35,11 +35,11 @@ class Stroke(NamedTuple):
 
 @dataclass(frozen=True)
 class LegSizes:
-    """A leg from its base joint to its ball.
+    """The dimensions of a leg from its base joint to its ball.
 
     Attributes:
-        radius: Of its cylinder.
-        floor: From the base joint to the bottom of the bore.
+        radius: Radius of its cylinder.
+        floor: Distance from the base joint to the bottom of the bore.
     """
 
     radius: float
@@ -47,7 +47,7 @@ class LegSizes:
 
     @property
     def wall(self) -> float:
-        """How thick walls are."""
+        """The thickness of walls."""
         return max(_WALL * self.radius, THINNEST)
 
     @property
@@ -72,31 +72,31 @@ class LegSizes:
 
     @property
     def inner(self) -> float:
-        """From the centre of the universal joint to where its eyes begin."""
+        """The distance from the centre of the universal joint to the inner face of its eyes."""
         return self.eye + 2.0 * CLEARANCE
 
     @property
     def plate(self) -> float:
-        """How thick eyes and the cylinder's bottom are."""
+        """The thickness of eyes and of the cylinder's bottom."""
         return max(0.5 * self.radius, 1.2 * THINNEST)
 
     @property
     def outer(self) -> float:
-        """From the centre of the universal joint to where its eyes end."""
+        """The distance from the centre of the universal joint to the outer face of its eyes."""
         return self.inner + self.plate
 
     @property
     def swing(self) -> float:
-        """The radius about the universal joint within which its parts but the leg stay."""
+        """The radius of a ball about the universal joint that holds its parts, the leg excluded."""
         return math.hypot(self.outer, self.eye)
 
     def sweep(self, height: float) -> float:
-        """Return how far from its joint a leaning leg is lower than a height."""
+        """Return the distance from its joint within which a leaning leg is below a height."""
         return height * math.tan(FIRST_SWING) + self.outer / math.cos(FIRST_SWING)
 
     @property
     def bottom(self) -> float:
-        """From the universal joint to the cylinder's bottom."""
+        """The distance from the universal joint to the cylinder's bottom."""
         return _SWING * self.radius + CLEARANCE
 
     @property
@@ -106,12 +106,12 @@ class LegSizes:
 
     @property
     def neck(self) -> float:
-        """The radius of what carries the ball."""
+        """The radius of the neck that carries the ball."""
         return _NECK * self.radius
 
     @property
     def rim(self) -> float:
-        """From the ball's centre back to the rim of the cup."""
+        """The distance from the ball's centre back to the rim of the cup."""
         return _RIM * self.ball
 
     @property
@@ -121,19 +121,23 @@ class LegSizes:
 
     @property
     def end(self) -> float:
-        """From the ball's centre back to the end of the cup."""
+        """The distance from the ball's centre back to the end of the cup."""
         return self.ball + CLEARANCE + 2.0 * self.wall
 
     @property
     def dead(self) -> float:
-        """By how much twice the shortest length exceeds the longest one."""
+        """The dead length: the excess of twice the shortest length over the longest one."""
         return self.floor + self.end + _OVERLAP * self.radius + 2.0 * CLEARANCE
 
     def stroke(self, asked: Stroke, at_home: float) -> Stroke:
-        """Return the stroke that is asked for, or what a single rod has of it.
+        """Return the required stroke, or the part of it that a single rod covers.
 
-        A rod no longer than its cylinder at most doubles a leg. If more is asked for, home
-        is midway, or nearer to an end of what is asked for.
+        A rod no longer than its cylinder can at most double the length of a leg. Of a longer
+        stroke, the part covered has the home length midway, unless it would pass an end.
+
+        Args:
+            asked: The required stroke.
+            at_home: The length of the leg at home.
         """
         shortest = max(
             asked.shortest,
@@ -144,13 +148,13 @@ class LegSizes:
 
 @dataclass(frozen=True)
 class GuideSizes:
-    """The shaft of the guide, and the sleeves and eyes about it."""
+    """The dimensions of the guide's shaft, and of the sleeves and eyes about it."""
 
     radius: float
 
     @property
     def wall(self) -> float:
-        """How thick walls are."""
+        """The thickness of walls."""
         return max(_WALL * self.radius, THINNEST)
 
     @property
@@ -160,7 +164,7 @@ class GuideSizes:
 
     @property
     def sleeve(self) -> float:
-        """The radius of a carriage's sleeve, which legs turn on."""
+        """The radius of a carriage's sleeve, on which a leg turns."""
         return math.sqrt(2.0) * (self.shaft + CLEARANCE) + self.wall
 
     @property
@@ -175,5 +179,5 @@ class GuideSizes:
 
     @property
     def pillar(self) -> float:
-        """How thick the pillars are along the guide."""
+        """The thickness of the pillars along the guide."""
         return max(0.8 * self.radius, 2.0 * THINNEST)

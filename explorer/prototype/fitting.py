@@ -1,7 +1,7 @@
-"""Whether a design has room for its parts, and if not, what would make room.
+"""Sizes of parts that fit a design, and what to change in a design that has no room for them.
 
-Walls and clearances do not scale, joints do: legs may be too thin for a rod within a
-cylinder, and too thick for their neighbours. A larger unit helps against both.
+Joints scale with the legs; walls and clearances do not. A leg may be too thin to hold a rod in
+its cylinder, or too thick beside its neighbours. A larger unit helps in both cases.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from explorer.mechanism.design import Design
 from explorer.mechanism.home import home_pose
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.chains import LEGS
-from explorer.prototype.motion import hindrances
+from explorer.prototype.joint_limits import broken_joint_limits
 from explorer.prototype.sizes import Sizes
 
 THICKEST_SHARE = 0.012
-"""Radius of legs that have none in the design, over the reach, where nothing is in the way."""
+"""Largest radius, over the reach, of a leg that has none in the design."""
 
 LARGEST_FACTOR = 1e4
-"""By which a unit may grow to make a design fit."""
+"""Largest factor on the unit that is tried to make a design fit."""
 
 
 def sizes_of(design: Design) -> Sizes:
@@ -32,8 +32,8 @@ def sizes_of(design: Design) -> Sizes:
     Legs without a radius in the design get the largest that fits, up to a share of the reach.
 
     Raises:
-        InputError: the design is too tight for its parts, or its home breaks the limits
-            of a leg; the message names the parts, the distance and what would fit.
+        InputError: the design is too tight for its parts, or its home breaks the limits of a
+            leg; the message names the parts, their distance and what would fit.
     """
     design = msgspec.structs.replace(design, home=home_pose(design))
     share = 1.0 if all(design.limits.leg_radii) else _thicker(design, 1.0)[0]
@@ -49,19 +49,19 @@ def sizes_of(design: Design) -> Sizes:
                 f"{low:.4g} to {high:.4g} mm; choose another home"
             )
     home = home_pose(design)
-    for hindrance in hindrances(found, home.position, home.rotation):
-        raise InputError(f"at home {hindrance}; choose another home")
+    for problem in broken_joint_limits(found, home.position, home.rotation):
+        raise InputError(f"at home {problem}; choose another home")
     return found
 
 
 def _sizes(design: Design, unit: float, share: float, all_of: bool = False) -> Sizes:
-    """Return sizes with the unit so many times larger, and a share of the radii.
+    """Return sizes with a scaled unit and scaled radii.
 
     Args:
         design: The manipulator.
-        unit: Times its unit.
-        share: Of the radii that the design leaves open.
-        all_of: Whether it is also of those that it gives.
+        unit: Factor on its unit.
+        share: Factor on the radii that the design leaves open.
+        all_of: Whether `share` also scales the radii that the design gives.
     """
     larger = msgspec.structs.replace(design, unit_mm=unit * design.unit_mm)
     open_radius = THICKEST_SHARE * design.reach * share
@@ -73,7 +73,7 @@ def _sizes(design: Design, unit: float, share: float, all_of: bool = False) -> S
 def _thicker(
     design: Design, unit: float, all_of: bool = False
 ) -> tuple[float | None, float | None]:
-    """Return the largest share of the radii, at most 1, that fits, and the smallest beyond."""
+    """Return the largest factor up to 1 on the radii that fits, and the smallest from 1 on."""
 
     def first(shares: FloatArray) -> float | None:
         for share in shares.tolist():
@@ -81,7 +81,7 @@ def _thicker(
                 return share
         return None
 
-    # Thin legs want walls and thick ones room: what fits is one interval.
+    # Thin legs lack room for walls, thick ones beside each other: what fits is one interval.
     return first(np.geomspace(1.0, 1e-2, 100)), first(np.geomspace(1.0, 1e2, 100))
 
 
@@ -110,10 +110,10 @@ def _refusal(design: Design, worst: tuple[str, float, float]) -> str:
 
 
 def _least_unit(design: Design) -> float | None:
-    """Return by how much the unit must grow for everything to fit, None if by no factor."""
+    """Return the least factor on the unit with which everything fits, None if there is none."""
     share: float | None = 1.0
     if not all(design.limits.leg_radii):
-        # Where clearances are nothing, radii that are open are as large as they will be.
+        # With a huge unit clearances vanish, so open radii are at their largest.
         share = _thicker(design, LARGEST_FACTOR)[0]
 
     def fits(factor: float) -> bool:
@@ -133,7 +133,7 @@ def _mm(value: float) -> str:
 
 
 def _rounded(value: float, up: bool) -> str:
-    """Return three digits, rounded up or down."""
+    """Return a value to three digits, rounded up or down."""
     step = 10.0 ** (math.floor(math.log10(value)) - 2)
     whole = math.ceil(value / step) if up else math.floor(value / step)
     return f"{whole * step:.6g}"

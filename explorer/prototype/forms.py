@@ -1,7 +1,6 @@
-"""The forms of the parts, by booleans of plain shapes, whatever kernel makes these.
+"""The forms of the parts, as booleans of simple shapes that any `Kernel` can make.
 
-Shapes are in millimetres, each in the frame of the body that it moves with, see
-`explorer.prototype.chains`.
+Shapes are in millimetres, each in the frame of its body (`explorer.prototype.chains`).
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ from explorer.prototype.kernel import Circle, Kernel, Shape
 from explorer.prototype.sizes import Sizes
 from explorer.prototype.sketch import platform_points
 
-# Of eyes over which lugs and arms are wide.
+# Half the width of lugs and arms, over the radius of their eyes.
 _SLIM = 0.55
 
 
@@ -36,7 +35,7 @@ def forms_of(sizes: Sizes, k: Kernel) -> Iterator[tuple[str, str, Shape]]:
 
 
 def _base(k: Kernel, sizes: Sizes) -> Shape:
-    """Return the plate, the lugs of both universal joints, the rails on their pillars."""
+    """Return the base: its plate, the lugs of both universal joints, the rails on pillars."""
     side, unit = sizes.chains.side, sizes.design.unit_mm
     low, high = -sizes.depth - sizes.base_plate, -sizes.depth
     a3 = (sizes.design.a3[0] * unit, sizes.design.a3[1] * unit * side)
@@ -58,7 +57,7 @@ def _base(k: Kernel, sizes: Sizes) -> Shape:
             k.box((foot, -guide.shaft, low), (foot + guide.pillar, guide.shaft, guide.shaft))
             for foot in (start, end - guide.pillar)
         )
-    # Made with the platform above it.
+    # The base was made for a platform above it.
     return k.union(pieces).rotate((180.0 * (side < 0), 0.0, 0.0))
 
 
@@ -102,7 +101,7 @@ def _flange(own: LegSizes) -> float:
 
 
 def _cylinder(k: Kernel, sizes: Sizes, leg: int) -> Shape:
-    """Return a cylinder, open at its end, with what joins it to the base."""
+    """Return a cylinder, open at its end, with the eye or the fork that joins it to the base."""
     own, stroke = sizes.legs[leg - 1], sizes.strokes[leg - 1]
     top = stroke.shortest - own.end - CLEARANCE
     bottom = own.floor - own.plate
@@ -115,7 +114,7 @@ def _ring(k: Kernel, sizes: Sizes, own: LegSizes) -> Shape:
     guide = sizes.guide
     half = own.radius - _flange(own) - CLEARANCE
     around = k.disc(Circle(guide.eye), -half, half).rotate((0.0, 90.0, 0.0))
-    # The neck fills what is left between the eye and the round bottom.
+    # The neck fills the space between the eye and the round bottom.
     neck = k.box((-half, -0.6 * guide.eye, 0.0), (half, 0.6 * guide.eye, guide.eye + own.plate))
     neck ^= k.disc(Circle(own.radius), 0.0, guide.eye + own.plate)
     hole = k.hole(Circle(guide.sleeve + CLEARANCE), -half - 1.0, half + 1.0).rotate(
@@ -146,7 +145,7 @@ def _rod(k: Kernel, sizes: Sizes, leg: int) -> Shape:
 
 
 def _platform(k: Kernel, sizes: Sizes) -> Shape:
-    """Return the plate, on the far side of the platform plane, with a hole for each ball."""
+    """Return the platform plate, beyond the platform plane, with a hole for each ball's neck."""
     points = platform_points(sizes.design) * sizes.design.unit_mm
     low, high = sizes.standoff, sizes.standoff + sizes.platform_plate
     pads: list[Circle] = []
@@ -166,5 +165,5 @@ def _ball(k: Kernel, sizes: Sizes, leg: int) -> Shape:
 
 
 def _facing(shape: Shape, sizes: Sizes) -> Shape:
-    """Return a shape that was made for a1 below the platform, facing a1 where it is."""
+    """Return a shape made for a1 below the platform, mirrored if a1 is above it."""
     return shape.mirror((0.0, 0.0, 1.0)) if sizes.chains.platform_side > 0 else shape

@@ -1,4 +1,4 @@
-"""What the bodies of the parts are made with: meshes by manifold3d, or exact solids for STEP."""
+"""The operations that shape parts: by manifold3d as meshes, or as exact solids for STEP."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ class Circle(NamedTuple):
 
 
 class Kernel(Protocol):
-    """Makes bodies, in millimetres."""
+    """A maker of bodies, in millimetres."""
 
     def disc(self, circle: Circle, low: float, high: float) -> Shape:
         """Return a cylinder along z between two heights."""
         ...
 
     def hole(self, circle: Circle, low: float, high: float) -> Shape:
-        """Return what to cut out for a round hole, whose chords lie outside the circle."""
+        """Return the tool that cuts a round hole; its chords lie outside the circle."""
         ...
 
     def ball(self, radius: float) -> Shape:
@@ -37,7 +37,7 @@ class Kernel(Protocol):
         ...
 
     def cavity(self, radius: float) -> Shape:
-        """Return what to cut out for a ball about the origin."""
+        """Return the tool that cuts a seat for a ball about the origin."""
         ...
 
     def box(self, low: Triple, high: Triple) -> Shape:
@@ -45,7 +45,7 @@ class Kernel(Protocol):
         ...
 
     def union(self, shapes: Sequence[Shape]) -> Shape:
-        """Return the union of some shapes."""
+        """Return the union of shapes."""
         ...
 
     def hull(self, circles: Sequence[Circle], low: float, high: float) -> Shape:

@@ -1,6 +1,6 @@
-"""Mass, centre and inertia: of bars and balls in closed form, of closed meshes exactly.
+"""Mass, centre of mass and inertia of bars, balls and closed meshes, all in closed form.
 
-In whatever units lengths and density have; the inertia is that about the centre.
+Units are those of the lengths and the density given.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from explorer.numerics.arrays import FloatArray
 
 @dataclass(frozen=True)
 class Mass:
-    """How a body resists being moved.
+    """The mass properties of a rigid body.
 
     Attributes:
-        mass: Positive.
-        centre: Of mass, in the body's frame, shape (3,).
-        inertia: About the centre, along the axes of the body's frame, shape (3, 3).
+        mass: Mass, positive.
+        centre: Centre of mass in the body's frame, shape (3,).
+        inertia: Inertia about the centre, along the axes of the body's frame, shape (3, 3).
     """
 
     mass: float
@@ -30,17 +30,16 @@ class Mass:
     inertia: FloatArray
 
     def scaled(self, length: float, mass: float = 1.0) -> Mass:
-        """Return the same body with lengths and masses in units so many times smaller."""
+        """Return the same properties with numbers for length and mass multiplied by factors."""
         return Mass(self.mass * mass, self.centre * length, self.inertia * (mass * length**2))
 
 
 def bar(radius: float, start: FloatArray, end: FloatArray, density: float) -> Mass:
-    """Return the mass of a round bar between two points (3,); none has length zero."""
+    """Return the mass properties of a round bar between two points (3,), at zero length none."""
     along = end - start
     length = float(np.linalg.norm(along))
     mass = density * math.pi * radius**2 * length
     across = mass * (radius**2 / 4.0 + length**2 / 12.0)
-    # Of the bar itself it is less about its axis.
     about_axis = mass * radius**2 / 2.0
     axis = along / length if length > 0.0 else np.zeros(3)
     inertia = across * np.eye(3) + (about_axis - across) * np.outer(axis, axis)
@@ -48,13 +47,13 @@ def bar(radius: float, start: FloatArray, end: FloatArray, density: float) -> Ma
 
 
 def ball(radius: float, centre: FloatArray, density: float) -> Mass:
-    """Return the mass of a ball about a point (3,)."""
+    """Return the mass properties of a ball about a point (3,)."""
     mass = density * 4.0 / 3.0 * math.pi * radius**3
     return Mass(mass, centre, 0.4 * mass * radius**2 * np.eye(3))
 
 
-def together(parts: Iterable[Mass]) -> Mass:
-    """Return the mass of parts that move as one; at least one of them has a mass."""
+def total_mass(parts: Iterable[Mass]) -> Mass:
+    """Return the mass properties of parts joined as one body; one at least has a mass."""
     known = list(parts)
     mass = sum(each.mass for each in known)
     centre = np.sum([each.mass * each.centre for each in known], axis=0) / mass
@@ -66,15 +65,15 @@ def together(parts: Iterable[Mass]) -> Mass:
 
 
 def mesh_mass(vertices: FloatArray, faces: NDArray[np.int32], density: float) -> Mass:
-    """Return the mass of what a closed mesh encloses, exactly.
+    """Return the mass properties of the body that a closed mesh encloses, exactly.
 
-    It is summed over the tetrahedra between the faces and one point, whose second moments
+    They are sums over the tetrahedra between the faces and one point, whose second moments
     have a closed form.
 
     Args:
-        vertices: Shape (n, 3).
+        vertices: Vertices, shape (n, 3).
         faces: Indices of vertices, counter-clockwise from outside, shape (m, 3).
-        density: Mass for each unit of volume.
+        density: Mass over volume.
     """
     middle = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
     corners = (vertices - middle)[faces]

@@ -1,4 +1,4 @@
-"""A part of the prototype: a closed body of one piece, in the frame of what it moves with."""
+"""A part of the prototype: a closed mesh of one piece in the frame of its body."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ class Part:
     """A part, in design units.
 
     Attributes:
-        name: Such as "cylinder 2"; each is there once.
-        body: What it moves with, one of `explorer.prototype.chains.BODIES`.
-        vertices: In the frame of the body, shape (n, 3).
+        name: Unique name, such as "cylinder 2".
+        body: Body that it belongs to, one of `explorer.prototype.chains.BODIES`.
+        vertices: Vertices in the frame of the body, shape (n, 3).
         faces: Indices of vertices, counter-clockwise from outside, shape (m, 3).
     """
 
@@ -32,12 +32,12 @@ class Part:
 
     @property
     def kind(self) -> str:
-        """Its name without a number, which tells its colour."""
+        """The name without its number, on which the colour depends."""
         return self.name.partition(" ")[0]
 
     @property
     def body_index(self) -> int:
-        """The index of its body."""
+        """The index of the body in `BODIES`."""
         return BODIES.index(self.body)
 
     @cached_property
@@ -48,14 +48,14 @@ class Part:
 
     @cached_property
     def unit_mass(self) -> Mass:
-        """Its volume, centre and inertia at a density of 1, in design units."""
+        """The mass properties at a density of 1, in design units."""
         return mesh_mass(self.vertices, self.faces, 1.0)
 
     def mass(self, density: float, unit_mm: float) -> Mass:
-        """Return its mass in kilograms and metres.
+        """Return the mass properties in kilograms and metres.
 
         Args:
-            density: In kg/m³.
+            density: Density in kg/m³.
             unit_mm: Millimetres in a design unit.
         """
         metres = 1e-3 * unit_mm

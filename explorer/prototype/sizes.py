@@ -1,7 +1,4 @@
-"""How large the parts of a design are, and what of it is too tight for them.
-
-Everything here is in millimetres, but for the design.
-"""
+"""The sizes of a design's parts, in millimetres, and the places that are too tight for them."""
 
 from __future__ import annotations
 
@@ -27,8 +24,8 @@ class Sizes:
     """The sizes of all parts of a design.
 
     Attributes:
-        design: With its `unit_mm`.
-        radii: Of the four legs.
+        design: The manipulator; its `unit_mm` sets the scale.
+        radii: Radii of the four legs, in millimetres.
     """
 
     design: Design
@@ -36,12 +33,12 @@ class Sizes:
 
     @cached_property
     def guide(self) -> GuideSizes:
-        """Those of the guide."""
+        """The dimensions of the guide."""
         return GuideSizes(max(self.radii[leg - 1] for leg in ON_GUIDE))
 
     @cached_property
     def legs(self) -> tuple[LegSizes, ...]:
-        """Those of the four legs."""
+        """The dimensions of the four legs."""
         found: list[LegSizes] = []
         for leg, radius in zip(LEGS, self.radii, strict=True):
             own = LegSizes(radius, 0.0)
@@ -51,12 +48,12 @@ class Sizes:
 
     @cached_property
     def chains(self) -> Chains:
-        """How the legs are mounted."""
+        """The chains of bodies and joints."""
         return Chains.of(self.design)
 
     @cached_property
     def home_joints(self) -> tuple[float, ...]:
-        """The chains' joints at home, in design units and radians."""
+        """The joint values of the chains at home, in design units and radians."""
         home = home_pose(self.design)
         return tuple(self.chains.joints(home.position, home.rotation).tolist())
 
@@ -65,17 +62,17 @@ class Sizes:
         return self.home_joints[3 * leg - 1] * self.design.unit_mm
 
     def carriage_at_home(self, leg: int) -> float:
-        """Return where the carriage of a leg is on the guide at home."""
+        """Return the place on the guide of a leg's carriage at home."""
         return self.home_joints[3 * leg - 3] * self.design.unit_mm
 
     def asked(self, leg: int) -> Stroke:
-        """Return the stroke that the limits of a leg ask for."""
+        """Return the stroke that the limits of a leg allow."""
         low, high = self.design.length_range(LENGTHS[leg - 1])
         return Stroke(low * self.design.unit_mm, high * self.design.unit_mm)
 
     @cached_property
     def strokes(self) -> tuple[Stroke, ...]:
-        """Those of the four actuators."""
+        """The strokes of the four actuators."""
         return tuple(
             own.stroke(self.asked(leg), self.at_home(leg))
             for leg, own in zip(LEGS, self.legs, strict=True)
@@ -83,36 +80,36 @@ class Sizes:
 
     @cached_property
     def depth(self) -> float:
-        """From the base plane to the base plate."""
+        """The distance from the base plane to the base plate."""
         swings = max(self.legs[0].swing, self.legs[3].swing)
         return max(swings, self.guide.eye) + 2.0 * CLEARANCE
 
     @cached_property
     def base_plate(self) -> float:
-        """How thick the base plate is."""
+        """The thickness of the base plate."""
         return max(1.5 * max(self.radii), 3.0 * THINNEST)
 
     @cached_property
     def standoff(self) -> float:
-        """From the platform plane to the platform plate: room for a rod along it."""
+        """The distance from the platform plane to its plate, where a rod along it has room."""
         return max(1.1 * own.cup for own in self.legs) + 2.0 * CLEARANCE
 
     @cached_property
     def platform_plate(self) -> float:
-        """How thick the platform plate is."""
+        """The thickness of the platform plate."""
         return max(1.2 * max(self.radii), 3.0 * THINNEST)
 
     def nearest_to_a1(self, leg: int) -> float:
-        """Return how near to a1 the carriage of a leg may come: a pillar stands between."""
+        """Return the least distance of a leg's carriage from a1; a pillar stands between."""
         own = self.radii[leg - 1]
         sweep = self.legs[0].sweep(self.guide.eye)
         return sweep + 2.0 * CLEARANCE + self.guide.pillar + own
 
     def carriage_range(self, leg: int) -> Stroke:
-        """Return between what places the carriage of a leg moves along the guide.
+        """Return the range along the guide of the carriage of a leg.
 
-        That is what the guide's limits allow, or the workspace asks for, on the side of a1
-        that it has at home.
+        It is the range of the guide's limits or, without any, the range that the workspace
+        needs, on the carriage's own side of a1.
         """
         return self._carriage_ranges[leg]
 
@@ -146,7 +143,7 @@ class Sizes:
 
     @cached_property
     def rails(self) -> tuple[Stroke, ...]:
-        """The ends of the shaft, or of both shafts if a1 is between the carriages."""
+        """The ends of the shaft, or of two shafts if a1 is between the carriages."""
         found: dict[bool, list[float]] = {}
         for leg in ON_GUIDE:
             room = self.radii[leg - 1] + CLEARANCE + self.guide.pillar
@@ -156,13 +153,13 @@ class Sizes:
 
     @property
     def between_carriages(self) -> float:
-        """How far apart the carriages' middles are at the least."""
+        """The least distance between the centres of the carriages."""
         return self.radii[1] + self.radii[2] + CLEARANCE
 
-    def shortages(self) -> Iterator[tuple[str, float, float]]:
-        """Yield what is too tight: the parts, their distance, and the distance they need."""
+    def tight_places(self) -> Iterator[tuple[str, float, float]]:
+        """Yield the tight places: the parts, their distance, and the distance that they need."""
         for leg, own in zip(LEGS, self.legs, strict=True):
-            # Legs this thin have the thinnest wall.
+            # A leg this thin has the thinnest wall.
             yield f"the radius of leg {leg}", own.radius, 2.0 * THINNEST + CLEARANCE
         d1, d3 = (self.carriage_at_home(leg) for leg in ON_GUIDE)
         yield "carriages 2 and 3 at home", abs(d1 - d3), self.between_carriages
@@ -178,11 +175,11 @@ class Sizes:
             needed = self.legs[i].cup + self.legs[j].cup + CLEARANCE
             yield f"the ball joints at b{i + 1} and b{j + 1}", apart, needed
         for leg, own in zip(LEGS, self.legs, strict=True):
-            # At home the stroke has room on both sides.
+            # The stroke needs room on both sides of the home length.
             yield f"the ends of leg {leg} at home", self.at_home(leg), 1.1 * own.dead
 
     @cached_property
     def worst(self) -> tuple[str, float, float] | None:
-        """The shortage that misses the largest share, None if everything fits."""
-        short = [each for each in self.shortages() if each[1] < each[2]]
+        """The tight place that lacks the largest share of its need, None if everything fits."""
+        short = [each for each in self.tight_places() if each[1] < each[2]]
         return max(short, key=lambda each: each[2] / max(each[1], 1e-300), default=None)

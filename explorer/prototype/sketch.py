@@ -1,4 +1,4 @@
-"""The bodies as bars and balls: enough to simulate a design that is too tight for its parts."""
+"""Bars and balls in place of the parts, to simulate a design that is too tight for them."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ import numpy as np
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.chains import ON_GUIDE, Chains
-from explorer.prototype.mass import Mass, ball, bar, together
+from explorer.prototype.mass import Mass, ball, bar, total_mass
 
 DEFAULT_RADIUS = 0.01
-"""Radius of legs that have none in the design, over the reach."""
+"""Radius, over the reach, of a leg that has none in the design."""
 
-# Of the length at home that cylinder and rod each have, so that they overlap.
+# Length of a cylinder and of a rod, over the leg's length at home: they overlap.
 SHARE = 0.55
-# Over the radius of the leg.
+# Radii over the radius of the leg.
 ROD, JOINT, BALL = 0.6, 2.0, 1.2
 
 
 def leg_radii(design: Design) -> tuple[float, ...]:
-    """Return the radii of the four legs in design units, of each more than zero."""
+    """Return the radii of the four legs, all positive, in design units."""
     return tuple(radius or DEFAULT_RADIUS * design.reach for radius in design.limits.leg_radii)
 
 
@@ -33,12 +33,12 @@ def platform_points(design: Design) -> FloatArray:
 
 
 def sketch_masses(chains: Chains, home_joints: FloatArray, density: float) -> Mapping[str, Mass]:
-    """Return the masses of all bodies but the base, in their own frames and design units.
+    """Return the mass properties of all bodies but the base, in own frames and design units.
 
     Args:
-        chains: Of the design.
-        home_joints: Of the chains, shape (12,).
-        density: Mass for each cubed design unit.
+        chains: Chains of the design.
+        home_joints: Joint values of the chains at home, shape (12,).
+        density: Mass over volume, the volume in cubed design units.
     """
     radii = leg_radii(chains.design)
     found: dict[str, Mass] = {}
@@ -53,5 +53,5 @@ def sketch_masses(chains: Chains, home_joints: FloatArray, density: float) -> Ma
     hub = points.mean(axis=0)
     balls = (ball(BALL * r, point, density) for r, point in zip(radii, points, strict=True))
     bars = (bar(r, hub, point, density) for r, point in zip(radii, points, strict=True))
-    found["platform"] = together([*balls, *bars])
+    found["platform"] = total_mass([*balls, *bars])
     return found

@@ -1,8 +1,8 @@
-"""How far a workspace goes in some directions: its extent, and the least margins within it.
+"""The extent of a workspace, and the least margins within it.
 
-Margins are linear in the position, so both are the ends of linear functions. The corner of the
-mesh that goes farthest says about where; from there a descent on the exact limits ends on the
-true surface.
+Margins are linear in the position, so both are extremes of linear functions over a solid. The
+best vertex of its mesh is the start of a descent on the exact limits, which ends on the true
+surface.
 """
 
 from __future__ import annotations
@@ -18,25 +18,25 @@ from explorer.singularity.ellipsoids import planes_of_singularity
 from explorer.workspace.limits.constraints import Cone, Constraint, constraints, slacks
 from explorer.workspace.solids.solid import Solid
 
-# A limit broken by less, a share of the reach, is kept.
+# Tolerance of a limit, over the reach.
 KEPT = 1e-9
-# So many tolerances of the mesh its corners may be off, where surfaces meet at a small angle.
+# Error of a vertex, over the mesh's tolerance, where surfaces meet at a small angle.
 OFF = 4.0
 
 
 def farthest(
     design: Design, rotation: ArrayLike, solid: Solid, directions: ArrayLike
 ) -> FloatArray:
-    """Return the largest of direction · p over a workspace, shape (k,), in design units.
+    """Return the largest direction · p over a workspace, shape (k,), in design units.
 
-    Exact where the descent ends within a few tolerances of the mesh, as it does unless
-    surfaces touch; otherwise that of the mesh.
+    It is exact where the descent ends within a few tolerances of the mesh, as it does unless
+    surfaces touch; otherwise it is the value of the mesh.
 
     Args:
         design: The manipulator.
-        rotation: Platform to base, shape (3, 3).
-        solid: Its workspace at this orientation; not empty.
-        directions: Shape (k, 3), none of them zero.
+        rotation: Rotation from platform to base, shape (3, 3).
+        solid: Workspace at this orientation; not empty.
+        directions: Directions, shape (k, 3), none of them zero.
 
     Raises:
         InputError: not a rotation, or directions that are not finite.
@@ -53,8 +53,8 @@ def extent_of(design: Design, rotation: ArrayLike, solid: Solid) -> tuple[FloatA
 
     Args:
         design: The manipulator.
-        rotation: Platform to base, shape (3, 3).
-        solid: Its workspace at this orientation; not empty.
+        rotation: Rotation from platform to base, shape (3, 3).
+        solid: Workspace at this orientation; not empty.
 
     Raises:
         InputError: not a rotation.
@@ -64,39 +64,39 @@ def extent_of(design: Design, rotation: ArrayLike, solid: Solid) -> tuple[FloatA
 
 
 def least_margins(design: Design, rotation: ArrayLike, solid: Solid) -> FloatArray:
-    """Return the least |κ1|, |κ2| and |κ3| over a workspace, shape (3,), in design units.
+    """Return the least |δ1|, |δ2| and |δ3| over a workspace, shape (3,), in design units.
 
     Args:
         design: The manipulator.
-        rotation: Platform to base, shape (3, 3).
-        solid: Its workspace at this orientation; not empty.
+        rotation: Rotation from platform to base, shape (3, 3).
+        solid: Workspace at this orientation; not empty.
 
     Raises:
         InputError: not a rotation.
     """
-    found = np.zeros(3)
+    least = np.zeros(3)
     for index, normal in enumerate(planes_of_singularity(rotation)):
         values = solid.vertices @ normal
         if not normal.any():
             continue
         corners = values[solid.faces]
         if ((corners > 0.0).any(axis=1) & (corners < 0.0).any(axis=1)).any():
-            # The singular plane goes through.
+            # The singular plane cuts the workspace.
             continue
-        # Parts on either side of it are looked at one by one.
+        # The parts on either side of the plane are taken one by one.
         nearest = [
             -float(farthest(design, rotation, _part(solid, off >= 0.0), [-side * normal])[0])
             for side in (-1.0, 1.0)
             for off in [side * values]
             if (off > 0.0).any()
         ]
-        found[index] = max(0.0, min(nearest, default=0.0))
-    found[found <= KEPT * design.reach] = 0.0
-    return found
+        least[index] = max(0.0, min(nearest, default=0.0))
+    least[least <= KEPT * design.reach] = 0.0
+    return least
 
 
 def _part(solid: Solid, kept: BoolArray) -> Solid:
-    """Return a mesh of some corners alone, which is all that is asked of it."""
+    """Return a solid with some of the vertices and no faces, enough for `farthest`."""
     return Solid(
         solid.vertices[kept],
         np.zeros((0, 3), dtype=np.int32),
@@ -119,7 +119,7 @@ def _farthest(
     def away(p: FloatArray) -> tuple[float, FloatArray]:
         return -float(p @ unit), -unit
 
-    # Those about the corner bound it, unless a surface is so curved that others do.
+    # The limits at the vertex bound the solid there, unless a surface is so curved that others do.
     for bounding in (near, limits):
 
         def kept(p: FloatArray, bounding: tuple[Constraint, ...] = bounding) -> FloatArray:

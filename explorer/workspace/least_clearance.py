@@ -1,9 +1,9 @@
-"""How close each pair of legs comes anywhere in a workspace, by branch and bound.
+"""The least clearance of each pair of legs in a workspace, by branch and bound.
 
-At a fixed orientation a base or platform end moves as the position does, or less, so the
-distance of two legs changes by no more than the position. A cell of positions has thus a
-bound, its middle's distance less half its diagonal, and is cut in eight until the least
-distance found is certain to the tolerance.
+At a fixed orientation the ends of legs move no farther than the position does, so the distance
+of two legs is Lipschitz in position with constant 1. In a cell of positions it is therefore
+bounded from below by its value at the centre less half the cell's diagonal. Cells are divided
+into eight until that bound is within the tolerance of the least distance attained.
 """
 
 from __future__ import annotations
@@ -30,28 +30,32 @@ from explorer.workspace.limits.constraints import Cone, Constraint, HalfSpace, N
 from explorer.workspace.limits.region import region_of
 from explorer.workspace.slices.volume import bounds, home_rotation
 
-# Of the reach.
+# Tolerance of a least clearance, over the reach.
 DEFAULT_TOLERANCE = 1e-4
-# Cells an axis at first, and the most that wait for a pair; beyond, its bound is theirs.
+# Number of cells on each axis at first, and the largest number of cells that a pair may have
+# left to divide; beyond that, the bound of the pair is the least bound of those cells.
 FIRST_CELLS = 8
 MOST_CELLS = 10_000
 
-# Axes so near, a share of the reach, cross; a limit broken by less is kept.
+# Distance, over the reach, at which axes count as crossing; also the tolerance of a limit.
 CROSSING = 1e-9
 
 CORNERS = np.array(list(itertools.product((-0.5, 0.5), repeat=3)))
 
 
 class LeastClearances(NamedTuple):
-    """The least clearance of each pair over a workspace, in the order of `PAIRS`.
+    """The least clearance of each pair of legs in a workspace, in the order of `PAIRS`.
 
-    A pair that shares a joint has the clearance inf, and so has every pair if no position
-    within the limits is found.
+    The clearance is inf for a pair that shares a joint, and for every pair if no position
+    within the limits is found, as in a workspace without volume.
 
     Attributes:
-        clearance: Attained at `position`, shape (6,); below zero in collision.
-        bound: Not undercut anywhere in the workspace, shape (6,).
-        position: Shape (6, 3); NaN where the clearance is infinite.
+        clearance: Least clearance attained, in design units, shape (6,); negative in
+            collision.
+        bound: Certified lower bound of the clearance in the workspace, in design units,
+            shape (6,).
+        position: Positions of b4 in the base frame at which the clearances are attained, in
+            design units, shape (6, 3); NaN where the clearance is infinite.
     """
 
     clearance: FloatArray
@@ -66,15 +70,15 @@ def least_clearances(
     *,
     only_least: bool = False,
 ) -> LeastClearances:
-    """Return the least clearances over the constant-orientation workspace.
+    """Return the least clearances in the constant-orientation workspace.
 
     Args:
-        design: The manipulator; the radii are those of its limits.
-        rotation: Platform to base, shape (3, 3); that of the home pose if None.
-        tolerance: To which they are to be certain, in design units; a 10,000th of the
-            reach if None. Where too many positions come as close, the bound is lower.
-        only_least: Whether only the least of all six is wanted, which takes far less time;
-            the others are then attained, and their bounds hold, but may lie far apart.
+        design: The manipulator; the radii of the legs are those of its limits.
+        rotation: Rotation from platform to base, shape (3, 3); that of the home pose if None.
+        tolerance: Largest difference between a clearance and its bound, in design units; a
+            10,000th of the reach if None. It is exceeded where too many cells are left.
+        only_least: Whether to resolve the least of the six alone, which takes far less time;
+            the other clearances and bounds still hold, but may differ by more.
 
     Raises:
         InputError: not a rotation.
@@ -85,68 +89,69 @@ def least_clearances(
     radii, joined = radii_of_pairs(design), joined_pairs(design)
     best = np.full(len(PAIRS), math.inf)
     places = np.full((len(PAIRS), 3), math.nan)
-    settled = np.full(len(PAIRS), math.inf)
+    # The least bound of the cells of each pair that are not divided any further.
+    bounded = np.full(len(PAIRS), math.inf)
     lows, highs = bounds(region_of(limits))
-    if any(isinstance(each, Never) for each in limits) or not (lows < highs).all():
-        return LeastClearances(best, settled, places)
-    # Legs 2 and 3 stand upright on the guide, in planes that keep their distance.
+    if any(isinstance(limit, Never) for limit in limits) or not (lows < highs).all():
+        return LeastClearances(best, bounded, places)
+    # Legs 2 and 3 are perpendicular to the guide: the planes of both keep their distance.
     floor = np.zeros(len(PAIRS))
     floor[PAIRS.index((2, 3))] = abs((design.b3 - design.b2) * float(r[0, 0]))
     size = (highs - lows) / FIRST_CELLS
     middles = lows + size * (
         np.stack(np.meshgrid(*[np.arange(FIRST_CELLS)] * 3, indexing="ij"), axis=-1) + 0.5
     ).reshape(-1, 3)
-    # The pairs whose bounds still rise.
-    asked = ~joined
+    # Pairs whose bounds can still be raised.
+    is_open = ~joined
     while len(middles):
         half = 0.5 * float(np.linalg.norm(size))
-        slack = np.stack([_reach_of(limit, middles) for limit in limits], axis=-1)
+        slack = np.stack([_distance_within(limit, middles) for limit in limits], axis=-1)
         near = np.asarray((slack >= -half).all(axis=-1))
         middles, slack = middles[near], slack[near]
         distance = leg_clearances(design, middles, r).distance
         inside = np.flatnonzero((slack >= 0.0).all(axis=-1))
         if len(inside):
             least = inside[distance[inside].argmin(axis=0)]
-            found = distance[least, np.arange(len(PAIRS))]
-            better = ~joined & (found < best)
-            best[better], places[better] = found[better], middles[least[better]]
+            attained = distance[least, np.arange(len(PAIRS))]
+            better = ~joined & (attained < best)
+            best[better], places[better] = attained[better], middles[least[better]]
             if only_least:
-                # What is least already spares all cells that cannot undercut it.
+                # The lower the least clearance so far, the more cells are ruled out by it.
                 pair = int((best - radii).argmin())
                 if better[pair] and best[pair] > floor[pair]:
-                    best[pair], places[pair] = _polished(
+                    best[pair], places[pair] = _descend(
                         design, r, limits, pair, best[pair], places[pair]
                     )
                     if best[pair] <= CROSSING * design.reach:
                         best[pair] = 0.0
         low = np.maximum(distance - half, floor)
         top = (best - radii).min() + radii if only_least else best
-        goes_on = asked & (low < top - finest)
-        asked = asked & (goes_on.sum(axis=0) <= MOST_CELLS)
-        goes_on = goes_on & asked
-        settled = np.minimum(settled, np.where(goes_on, math.inf, low).min(axis=0, initial=np.inf))
+        divides = is_open & (low < top - finest)
+        is_open = is_open & (divides.sum(axis=0) <= MOST_CELLS)
+        divides = divides & is_open
+        bounded = np.minimum(bounded, np.where(divides, math.inf, low).min(axis=0, initial=np.inf))
         size = 0.5 * size
-        again = goes_on.any(axis=-1)
-        middles = (middles[again][:, None, :] + size * CORNERS).reshape(-1, 3)
+        divided = divides.any(axis=-1)
+        middles = (middles[divided][:, None, :] + size * CORNERS).reshape(-1, 3)
     if not only_least:
         for pair in np.flatnonzero(np.isfinite(best) & (best > floor)).tolist():
-            best[pair], places[pair] = _polished(design, r, limits, pair, best[pair], places[pair])
+            best[pair], places[pair] = _descend(design, r, limits, pair, best[pair], places[pair])
     best[best <= CROSSING * design.reach] = 0.0
     places[np.abs(places) <= CROSSING * design.reach] = 0.0
-    bound = np.where(joined, math.inf, np.minimum(settled, best))
+    bound = np.where(joined, math.inf, np.minimum(bounded, best))
     return LeastClearances(best - radii, bound - radii, places)
 
 
-def _reach_of(limit: Constraint, p: FloatArray) -> FloatArray:
-    """Return how far positions (..., 3) are within a limit, or at the least beyond it."""
+def _distance_within(limit: Constraint, p: FloatArray) -> FloatArray:
+    """Return signed distances of positions (..., 3) within a limit, or upper bounds of them."""
     if isinstance(limit, HalfSpace):
         return limit.slack(p) / float(np.linalg.norm(limit.normal))
     slack = limit.slack(p)
-    # The angle of a cone tells no distance, only on which side a position is.
+    # The slack of a cone is an angle, not a distance; only its sign is used.
     return np.where(slack >= 0.0, math.inf, -0.0) if isinstance(limit, Cone) else slack
 
 
-def _polished(
+def _descend(
     design: Design,
     rotation: FloatArray,
     limits: tuple[Constraint, ...],
@@ -154,7 +159,7 @@ def _polished(
     least: float,
     place: FloatArray,
 ) -> tuple[float, FloatArray]:
-    """Return the local least near a place, if there is less within the limits."""
+    """Return the least distance near a place within the limits, and where it is attained."""
     reach = design.reach
 
     def distance(p: FloatArray) -> tuple[float, FloatArray]:

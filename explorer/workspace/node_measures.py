@@ -1,8 +1,8 @@
-"""What the nodes of a grid over a workspace tell: its extent, margins and clearances.
+"""Measures of a workspace at the nodes of a grid: its extent, margins and clearances.
 
-The nodes are the middles of the cells of a box about the constant-orientation workspace, so
-that none lies in a surface. What is least over them is an upper bound of what is least over
-the workspace: `explorer.least_clearances` looks between them.
+The nodes are the centres of the cells of a box about the constant-orientation workspace, so
+that none lies on its surface. A least value at the nodes is an upper bound of the least value
+in the workspace; `explorer.least_clearances` certifies a lower bound too.
 """
 
 from __future__ import annotations
@@ -26,39 +26,29 @@ from explorer.workspace.limits.valid_poses import LENGTH_LOWS, vector, write_end
 from explorer.workspace.slices.nodes import keeps_all
 from explorer.workspace.slices.volume import bounds, home_rotation
 
-# Nodes on each axis.
+# Number of nodes on each axis: default, least and largest.
 DEFAULT_NODES = 20
 FEWEST_NODES, MOST_NODES = 2, 200
 
-# Where in the row of results what is; see `measure_nodes`.
-COUNT, LOWS, HIGHS, LEAST, MEAN, OFF_PLANES, CLEAR, DISTANCES, RESULTS = (
-    0,
-    1,
-    4,
-    7,
-    10,
-    11,
-    12,
-    13,
-    19,
-)
+# Indices of the results of `measure_nodes`, and their number.
+COUNT, LOWS, HIGHS, LEAST = 0, 1, 4, 7
+MEAN, OFF_PLANES, CLEAR, DISTANCES, RESULTS = 10, 11, 12, 13, 19
 
 
 @dataclass(frozen=True)
 class NodeMeasures:
-    """What the nodes of a grid over a workspace tell, in design units.
+    """Measures of a workspace at the nodes of a grid, in design units.
 
-    Where there is no node to tell of, lengths are NaN and clearances infinite.
+    Without any nodes, lengths are NaN and clearances infinite.
 
     Attributes:
-        positions: The nodes within the limits, shape (n, 3).
-        extent: From the lowest to the highest of them on each axis, shape (3,).
-        margins: Least |κ1|, |κ2|, |κ3| over them, shape (3,).
-        mean_margin: The mean over them of the smallest of |κ1|, |κ2|, |κ3|.
-        clearances: Least over those with every |κ| at least the margin asked for, shape
-            (6,), in the order of `PAIRS`; inf for a pair that shares a joint.
-        clear_share: Which share of all nodes has every clearance above zero; NaN if
-            there are none.
+        positions: Nodes within the limits, shape (n, 3).
+        extent: Distance between the lowest and the highest of them on each axis, shape (3,).
+        margins: Least |δ1|, |δ2|, |δ3| at the nodes, shape (3,).
+        mean_margin: Mean over the nodes of the smallest of |δ1|, |δ2|, |δ3|.
+        clearances: Least clearances at the nodes with every |δ| at least `clearance_margin`,
+            shape (6,), in the order of `PAIRS`; inf for a pair that shares a joint.
+        clear_share: Share of the nodes at which no legs collide; NaN without any nodes.
     """
 
     positions: FloatArray
@@ -76,14 +66,14 @@ def node_measures(
     nodes: int = DEFAULT_NODES,
     clearance_margin: float = 0.0,
 ) -> NodeMeasures:
-    """Return what a grid of nodes tells of the constant-orientation workspace.
+    """Measure the constant-orientation workspace at the nodes of a grid.
 
     Args:
-        design: The manipulator; the radii are those of its limits.
-        rotation: Platform to base, shape (3, 3); that of the home pose if None.
-        nodes: On each axis of a box about the workspace.
-        clearance_margin: Clearances count only where every |κ| is at least this, in
-            design units; nearer to a singularity legs may have to meet.
+        design: The manipulator; the radii of the legs are those of its limits.
+        rotation: Rotation from platform to base, shape (3, 3); that of the home pose if None.
+        nodes: Number of nodes on each axis of a box about the workspace.
+        clearance_margin: Least |δ|, in design units, of nodes at which clearances count;
+            nearer to a singularity legs may have to meet.
 
     Raises:
         InputError: not a rotation, or too few or too many nodes.
@@ -131,7 +121,7 @@ def node_measures(
     "void(f8[:,::1], f8[:,::1], f8[:,::1], f8[::1], f8[::1], f8[::1], f8[:,::1], f8[::1], f8, "
     "b1[:,:,::1], f8[::1])"
 )
-def measure_nodes(  # noqa: PLR0917 - all that it depends on
+def measure_nodes(  # noqa: PLR0917 - a compiled loop takes plain values
     rounds: FloatArray,
     planes: FloatArray,
     cones: FloatArray,
@@ -144,22 +134,22 @@ def measure_nodes(  # noqa: PLR0917 - all that it depends on
     within: BoolArray,
     found: FloatArray,
 ) -> None:
-    """Write what the nodes tell.
+    """Write the measures at all nodes.
 
     Args:
-        rounds: Of the region, shape (n, 6).
-        planes: Of the region, shape (m, 4).
-        cones: Of the region, shape (k, 8).
-        first: The first node, shape (3,).
-        step: Between the nodes, shape (3,).
+        rounds: Balls and cylinders of the region, shape (n, 6).
+        planes: Planes of the region, shape (m, 4).
+        cones: Cones of the region, shape (k, 8).
+        first: Position of the first node, shape (3,).
+        step: Distance between nodes on each axis, shape (3,).
         row: Design variables, shape (6,).
-        r: The rotation, shape (3, 3).
-        radii: Sum of both of each pair, shape (6,); -inf for a pair not looked at.
-        margin: From which on clearances count.
-        within: Written: which nodes are in the region.
-        found: Written, shape (RESULTS,): how many those are, their lowest and highest
-            indices, least margins, sum of the smallest margins, how many are off the
-            singular planes, how many have clear legs, least clearances of the pairs.
+        r: Rotation from platform to base, shape (3, 3).
+        radii: Sum of the two radii of each pair, shape (6,); -inf for a pair to leave out.
+        margin: Least |δ| of nodes at which clearances count.
+        within: Written: whether a node is in the region, shape (n, n, n).
+        found: Written, shape (RESULTS,): number of nodes in the region, their lowest and
+            highest indices, least margins, sum of the smallest margins, number of nodes off
+            the singular planes, number with clear legs, least clearances of the pairs.
     """
     p, base, ends = np.zeros(3), np.zeros((4, 3)), np.zeros((4, 3))
     found[:] = 0.0
@@ -180,13 +170,13 @@ def measure_nodes(  # noqa: PLR0917 - all that it depends on
                     at = float(i if axis == 0 else (j if axis == 1 else k))
                     found[LOWS + axis] = min(found[LOWS + axis], at)
                     found[HIGHS + axis] = max(found[HIGHS + axis], at)
-                k1 = abs(r[0, 2] * p[0] + r[1, 2] * p[1] + r[2, 2] * p[2])
-                k2 = abs(r[1, 0] * p[2] - r[2, 0] * p[1])
-                k3 = abs(p[2])
-                found[LEAST] = min(found[LEAST], k1)
-                found[LEAST + 1] = min(found[LEAST + 1], k2)
-                found[LEAST + 2] = min(found[LEAST + 2], k3)
-                smallest = min(k1, k2, k3)
+                delta1 = abs(r[0, 2] * p[0] + r[1, 2] * p[1] + r[2, 2] * p[2])
+                delta2 = abs(r[1, 0] * p[2] - r[2, 0] * p[1])
+                delta3 = abs(p[2])
+                found[LEAST] = min(found[LEAST], delta1)
+                found[LEAST + 1] = min(found[LEAST + 1], delta2)
+                found[LEAST + 2] = min(found[LEAST + 2], delta3)
+                smallest = min(delta1, delta2, delta3)
                 found[MEAN] += smallest
                 counts = smallest >= margin
                 if counts:

@@ -1,8 +1,8 @@
-"""Sets of orientations, and how many of them a position can have.
+"""Sets of orientations, and the share of them that a position can have.
 
-A range of yaw, pitch and roll, a cone of tilts, or all rotations evenly: super-Fibonacci
-spirals (M. Alexa, "Super-Fibonacci Spirals: Fast, Low-Discrepancy Sampling of SO(3)",
-CVPR 2022).
+A set is a range of yaw, pitch and roll, a cone of tilts, or an even sample of all rotations on
+super-Fibonacci spirals (M. Alexa, "Super-Fibonacci Spirals: Fast, Low-Discrepancy Sampling of
+SO(3)", CVPR 2022).
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ from explorer.numerics.arrays import BoolArray, FloatArray, finite_array, for_ke
 from explorer.numerics.compiled import kernel
 from explorer.workspace.limits.constraints import demanded_order, home_signs, joint_cones
 
-# The most orientations of one set.
+# Largest number of orientations in a set.
 MOST_ORIENTATIONS = 1_000_000
 # Turns of the two spirals between neighbours: 1/√2, and 1/ψ with ψ⁴ = ψ + 4.
 PHI, PSI = math.sqrt(2.0), 1.533751168755204288118041
 GOLDEN_ANGLE = math.pi * (3.0 - math.sqrt(5.0))
-# Orientations that tell the share of a position to about a thousandth.
+# Number of orientations that gives the share at a position to about a thousandth.
 CAPABILITY_ORIENTATIONS = 100_000
 
 
@@ -41,16 +41,16 @@ def yaw_pitch_roll_range(
     """Return the orientations of a grid over ranges of yaw, pitch and roll.
 
     Args:
-        lows: Of yaw, pitch and roll, in degrees.
-        highs: Of yaw, pitch and roll, in degrees, ends included.
-        counts: Of values on each range; one value is that in the middle.
+        lows: Least yaw, pitch and roll, in degrees.
+        highs: Largest yaw, pitch and roll, in degrees.
+        counts: Numbers of values on the ranges, ends included; a single one is the middle.
 
     Returns:
-        Platform to base, shape (n, 3, 3), yaw outermost.
+        Rotations from platform to base, shape (n, 3, 3), yaw outermost.
 
     Raises:
-        InputError: not three of each, a reversed range, or a count that is not positive or
-            makes too many.
+        InputError: not three of each, a reversed range, a count that is not positive, or too
+            many orientations.
     """
     low, high = finite_array("lows", lows, (3,)), finite_array("highs", highs, (3,))
     if low.ndim != 1 or high.ndim != 1 or len(counts) != 3:
@@ -67,18 +67,18 @@ def yaw_pitch_roll_range(
 
 
 def cone_of_directions(rotation: ArrayLike, half_angle: float, count: int) -> FloatArray:
-    """Return orientations that tilt a platform every way up to a half-angle.
+    """Return orientations that tilt a platform in all directions up to a half-angle.
 
-    Each turns the platform's z-axis the shortest way, without a twist about it; the axes
-    are spread evenly over the cone, the first at its middle, the last on its rim.
+    Each tilt turns the platform's z-axis along the shortest arc, without torsion. The tilted
+    axes are spread evenly over the cone, the first at its centre, the last on its rim.
 
     Args:
-        rotation: What is tilted, platform to base, shape (3, 3).
-        half_angle: In degrees, 0 to 180.
-        count: How many.
+        rotation: Rotation from platform to base without tilt, shape (3, 3).
+        half_angle: Half-angle of the cone in degrees, 0 to 180.
+        count: Number of orientations.
 
     Returns:
-        Platform to base, shape (count, 3, 3).
+        Rotations from platform to base, shape (count, 3, 3).
 
     Raises:
         InputError: not a rotation, a half-angle out of its range, or no usable count.
@@ -88,7 +88,7 @@ def cone_of_directions(rotation: ArrayLike, half_angle: float, count: int) -> Fl
         raise InputError(f"the half-angle of tilts must lie within 0° to 180°; got {half_angle:g}°")
     _check_count("the number of orientations", count)
     share = np.arange(count) / max(1, count - 1)
-    # 1 - cos of the tilt grows evenly, since areas of the sphere do.
+    # The area of a spherical cap grows with 1 - cos of the tilt.
     tilt = 2.0 * np.arcsin(np.sqrt(share) * math.sin(0.5 * math.radians(half_angle)))
     turn = GOLDEN_ANGLE * np.arange(count)
     about = np.column_stack([np.cos(turn), np.sin(turn), np.zeros(count)])
@@ -96,13 +96,13 @@ def cone_of_directions(rotation: ArrayLike, half_angle: float, count: int) -> Fl
 
 
 def uniform_rotations(count: int) -> FloatArray:
-    """Return rotations spread evenly over all there are, the same for each count.
+    """Return rotations spread evenly over SO(3), always the same for a count.
 
     Args:
-        count: How many.
+        count: Number of rotations.
 
     Returns:
-        Shape (count, 3, 3).
+        Rotations, shape (count, 3, 3).
 
     Raises:
         InputError: a count that is not positive or too large.
@@ -130,8 +130,9 @@ def orientation_capability(
 
     Args:
         design: The manipulator.
-        position: b4 in the base frame, in design units, shape (3,).
-        orientations: Platform to base, shape (n, 3, 3), or how many of `uniform_rotations`.
+        position: Position of b4 in the base frame, in design units, shape (3,).
+        orientations: Rotations from platform to base, shape (n, 3, 3), or their number for
+            `uniform_rotations`.
 
     Raises:
         InputError: not a position, not rotations, or no usable count.
@@ -144,13 +145,13 @@ def orientation_capability(
 def orientations_within(design: Design, position: ArrayLike, rotations: ArrayLike) -> BoolArray:
     """Return which orientations a position can have within all limits, shape (n,).
 
-    The limits are those of `explorer.workspace.limits.broken.violations`: lengths, guide, gap, the
-    carriages' order, box, margin with the home's sign triple, and swing cones.
+    The limits are those of `explorer.workspace.limits.broken.violations`: lengths, guide, gap,
+    carriage order, box, margins with the home's sign triple, and swing cones.
 
     Args:
         design: The manipulator.
-        position: b4 in the base frame, in design units, shape (3,).
-        rotations: Platform to base, shape (n, 3, 3).
+        position: Position of b4 in the base frame, in design units, shape (3,).
+        rotations: Rotations from platform to base, shape (n, 3, 3).
 
     Raises:
         InputError: not a position, or not rotations.
@@ -177,7 +178,7 @@ def orientations_within(design: Design, position: ArrayLike, rotations: ArrayLik
         demands = np.array([(sign, limits.margin) for sign in home_signs(design)], dtype=np.float64)
     cones = np.array(
         [
-            # A leg without a length at home keeps no cone.
+            # A leg of length zero at home has no direction, so no pose keeps its cone.
             (cone.leg, cone.in_platform, *cone.axis, cone.half_angle + TOLERANCE)
             if cone.axis is not None
             else (cone.leg, cone.in_platform, 0.0, 0.0, 0.0, -1.0)
@@ -210,17 +211,17 @@ def keep_limits(
     cones: FloatArray,
     within: BoolArray,
 ) -> None:
-    """Find the orientations in which a position keeps limits.
+    """Write whether a position keeps all limits in each orientation.
 
     Args:
-        variables: X = (a3x, a3y, b1x, b1y, b2, b3).
-        p: b4 in the base frame, shape (3,).
-        rotations: Platform to base, shape (n, 3, 3).
-        ranges: (lowest, highest) of each joint and of the gap, shape (7, 2).
-        demands: (sign, least) of each margin, of which the product with the sign may not
-            be less; minus infinity twice for no demand, shape (3, 2).
-        order: The sign of d3 − d1 that is demanded, 0 for either.
-        cones: (leg, in platform, axis, half-angle), shape (k, 6).
+        variables: Design variables X = (a3x, a3y, b1x, b1y, b2, b3).
+        p: Position of b4 in the base frame, shape (3,).
+        rotations: Rotations from platform to base, shape (n, 3, 3).
+        ranges: (lowest, highest) value of each joint and of the gap, shape (7, 2).
+        demands: (sign, least value) of each margin times that sign, shape (3, 2); minus
+            infinity twice for no demand.
+        order: Demanded sign of d3 − d1, 0 for either.
+        cones: (leg, whether in platform axes, axis, half-angle), shape (k, 6).
         within: Written: whether all limits are kept, shape (n,).
     """
     legs = np.zeros((4, 3))
@@ -250,11 +251,11 @@ def keep_limits(
         ):
             continue
         if demands[0, 0] > -2.0:
-            kappa1 = -(r[0, 2] * p[0] + r[1, 2] * p[1] + r[2, 2] * p[2])
-            kappa2 = r[1, 0] * p[2] - r[2, 0] * p[1]
+            delta1 = -(r[0, 2] * p[0] + r[1, 2] * p[1] + r[2, 2] * p[2])
+            delta2 = r[1, 0] * p[2] - r[2, 0] * p[1]
             if (
-                demands[0, 0] * kappa1 < demands[0, 1]
-                or demands[1, 0] * kappa2 < demands[1, 1]
+                demands[0, 0] * delta1 < demands[0, 1]
+                or demands[1, 0] * delta2 < demands[1, 1]
                 or demands[2, 0] * p[2] < demands[2, 1]
             ):
                 continue

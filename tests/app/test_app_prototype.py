@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import viser
 from desk import Desk, number, rows_of, thick
+from part_gaps import least_gap
 from test_app_drawing import closed_volume
 
 from explorer.app.features.mechanism.legs import Legs
@@ -48,7 +49,6 @@ from explorer.mechanism.pose import Pose
 from explorer.prototype.assembly import make_prototype
 from explorer.prototype.bill import bill_of_materials
 from explorer.prototype.chains import LEGS, ON_GUIDE, Places
-from explorer.prototype.shapes import least_gap
 from explorer.prototype.sizes import Sizes
 
 OPTIMAL = PRESETS["paper-optimal"]
@@ -326,7 +326,7 @@ def test_a_pose_that_the_parts_do_not_take_is_told(feed: PartsFeed) -> None:
     state = SetPosition(2, 17.0).apply(shown())
     feed.follow(Frame(state))
     assert feed.parts is not None
-    hindrances = feed.parts.prototype.hindrances(state.pose.position, state.pose.rotation)
+    hindrances = feed.parts.prototype.broken_joint_limits(state.pose.position, state.pose.rotation)
     assert hindrances
     told = trouble_of(Frame(state), feed) or ""
     assert "do not take this pose" in told

@@ -545,7 +545,7 @@ def test_what_is_reached_is_exported(what: str) -> None:
 def test_where_nothing_is_reached_nothing_is_exported() -> None:
     state = shown(beyond_its_limits())
     rows = drawing_of(state).request.rotation
-    with pytest.raises(InputError, match="nothing can be reached from"):
+    with pytest.raises(InputError, match="no position is accessible from"):
         export_mesh(state.design, rows, 0.1, "reachable", None, "workspace", "stl")
 
 

@@ -15,7 +15,7 @@ from explorer import PRESETS, radius_curve, reachable_workspace
 from explorer.legs.clearance import PAIRS, leg_axes
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import warm
-from explorer.workspace.accessible.nodes import middles_over, survey
+from explorer.workspace.accessible.nodes import make_cell_grid, survey
 from explorer.workspace.accessible.radii import with_radius
 from explorer.workspace.limits.constraints import constraints, slacks
 from explorer.workspace.slices.volume import home_rotation
@@ -41,7 +41,7 @@ def run() -> Iterator[Row]:
             "1 s",
         )
     lows, highs = np.array(DESIGN.limits.box)
-    grid = middles_over(lows, highs, NODES)
+    grid = make_cell_grid(lows, highs, NODES)
     surveyed = best_of(ROUNDS, lambda: survey(thick, r, grid))
     yield Row(
         "of that, the nodes and all steps between neighbours, certified",

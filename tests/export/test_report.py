@@ -224,7 +224,7 @@ def test_a_home_in_collision_is_told_where_the_reachable_volume_would_stand() ->
     design = with_radius(OPTIMAL, 0.4)
     page = page_of(design)
     assert "reachable" not in table_of(page, "Volumes")
-    assert "nothing can be reached from (10, 5, 9): legs 2 and 3 overlap" in page.text
+    assert "no position is accessible from (10, 5, 9): legs 2 and 3 overlap" in page.text
 
 
 def test_the_bill_is_that_of_the_prototype() -> None:

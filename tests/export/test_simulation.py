@@ -32,7 +32,7 @@ from explorer.mechanism.margins import mode_of
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.assembly import make_prototype
 from explorer.prototype.chains import ACTUATED, BODIES, CHAIN_JOINTS, Chains
-from explorer.prototype.mass import ball, bar, mesh_mass, together
+from explorer.prototype.mass import ball, bar, mesh_mass, total_mass
 
 engine: Any = mujoco
 OPTIMAL = PRESETS["paper-optimal"]
@@ -379,7 +379,7 @@ def test_masses_of_bars_balls_and_meshes_agree() -> None:
     sphere.apply_translation([3.0, 1.0, 0.0])
     found = bar(0.5, start, end, 2.0), ball(0.7, np.array([3.0, 1.0, 0.0]), 2.0)
     meshes = [mesh_mass(each.vertices, each.faces, 2.0) for each in (rod, sphere)]
-    for exact, mesh in zip((*found, together(found)), (*meshes, together(meshes)), strict=True):
+    for exact, mesh in zip((*found, total_mass(found)), (*meshes, total_mass(meshes)), strict=True):
         assert mesh.mass == pytest.approx(exact.mass, rel=2e-3)
         np.testing.assert_allclose(mesh.centre, exact.centre, atol=1e-3)
         np.testing.assert_allclose(mesh.inertia, exact.inertia, atol=5e-3 * exact.inertia.max())

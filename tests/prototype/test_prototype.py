@@ -12,6 +12,7 @@ import pytest
 import trimesh
 from hypothesis import given, strategies as st
 from limited_designs import limited
+from part_gaps import least_gap, overlaps
 from scipy.spatial.transform import Rotation
 
 from explorer import PRESETS, Design, InputError, Pose, home_pose, leg_clearances
@@ -26,7 +27,6 @@ from explorer.prototype.dimensions import (
     LegSizes,
     Stroke,
 )
-from explorer.prototype.shapes import least_gap, overlaps
 
 untyped: Any = trimesh
 OPTIMAL, INITIAL = PRESETS["paper-optimal"], PRESETS["paper-initial"]
@@ -96,7 +96,7 @@ def test_parts_are_closed_and_of_one_piece(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", [OPTIMAL.name, LARGE.name])
-def test_masses_are_those_that_trimesh_finds(name: str) -> None:
+def test_masses_agree_with_trimesh(name: str) -> None:
     prototype = PROTOTYPES[name]
     metres = 1e-3 * prototype.design.unit_mm
     for part in prototype.parts:
@@ -114,7 +114,7 @@ def test_masses_are_those_that_trimesh_finds(name: str) -> None:
 
 
 @pytest.mark.parametrize("design", [BELOW, UPSIDE_DOWN, BACKWARDS])
-def test_turned_frames_make_the_same_mechanism(design: Design) -> None:
+def test_parts_of_turned_frames_are_those_of_the_same_mechanism(design: Design) -> None:
     plain, other = PROTOTYPES[UNBOXED.name], PROTOTYPES[design.name]
     assert other.sizes.radii == pytest.approx(plain.sizes.radii, rel=1e-9)
     for one, two in zip(plain.parts, other.parts, strict=True):
@@ -135,7 +135,7 @@ def pose_of(prototype: Prototype) -> tuple[FloatArray, FloatArray]:
 @pytest.mark.parametrize("name", NAMES)
 def test_parts_keep_their_clearance_at_home(name: str) -> None:
     prototype = PROTOTYPES[name]
-    assert prototype.hindrances(*pose_of(prototype)) == ()
+    assert prototype.broken_joint_limits(*pose_of(prototype)) == ()
     places = at_home(prototype)
     assert list(overlaps(prototype.parts, places)) == []
     unit = prototype.design.unit_mm
@@ -158,7 +158,7 @@ def motion(prototype: Prototype, many: int) -> Iterator[tuple[FloatArray, FloatA
 
     for phase in np.linspace(0.0, 2.0 * math.pi, many, endpoint=False).tolist():
         width = 1.0
-        while prototype.hindrances(*pose(phase, width)) or not clear(
+        while prototype.broken_joint_limits(*pose(phase, width)) or not clear(
             prototype, *pose(phase, width)
         ):
             width *= 0.85
@@ -186,7 +186,7 @@ def test_parts_stay_clear_along_a_motion(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", [OPTIMAL.name, BELOW.name, LARGE.name])
-def test_universal_joints_swing_as_far_as_they_say(name: str) -> None:
+def test_universal_joints_within_their_swings_are_clear(name: str) -> None:
     prototype = PROTOTYPES[name]
     chains, (position, rotation) = prototype.chains, pose_of(prototype)
     home = chains.joints(position, rotation)
@@ -205,7 +205,7 @@ def test_universal_joints_swing_as_far_as_they_say(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", [OPTIMAL.name, UPSIDE_DOWN.name, LARGE.name])
-def test_ball_joints_swing_to_nearly_a_right_angle(name: str) -> None:
+def test_ball_joints_up_to_nearly_a_right_angle_are_clear(name: str) -> None:
     prototype = PROTOTYPES[name]
     places = at_home(prototype)
     for leg in LEGS:
@@ -227,7 +227,7 @@ def test_ball_joints_swing_to_nearly_a_right_angle(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", [OPTIMAL.name, LARGE.name])
-def test_rods_stay_within_their_cylinders_over_the_whole_stroke(name: str) -> None:
+def test_rods_over_their_stroke_stay_within_their_cylinders(name: str) -> None:
     prototype = PROTOTYPES[name]
     chains, (position, rotation) = prototype.chains, pose_of(prototype)
     unit = prototype.design.unit_mm
@@ -258,7 +258,7 @@ def test_rods_stay_within_their_cylinders_over_the_whole_stroke(name: str) -> No
     home=st.floats(1.1, 50.0),
     ends=st.tuples(st.floats(0.0, 1.0), st.floats(1.0, 5.0)),
 )
-def test_strokes_hold_home_and_what_one_rod_can_do(
+def test_strokes_of_random_legs_hold_home_and_fit_one_rod(
     radius: float, floor: float, home: float, ends: tuple[float, float]
 ) -> None:
     own = LegSizes(radius, floor * radius)
@@ -273,18 +273,18 @@ def test_strokes_hold_home_and_what_one_rod_can_do(
         assert found == pytest.approx(asked, rel=1e-9)
 
 
-def test_a_stroke_that_one_rod_can_do_is_the_one_asked_for() -> None:
+def test_stroke_that_fits_one_rod_is_that_of_the_limits() -> None:
     sizes = PROTOTYPES[LARGE.name].sizes
     assert sizes.strokes[0] == pytest.approx((7.5 * 40.0, 12.0 * 40.0))
     assert sizes.strokes[3] == pytest.approx((9.0 * 40.0, 16.0 * 40.0))
 
 
-def test_carriages_that_come_too_close_do_overlap_and_are_told() -> None:
+def test_carriages_too_close_overlap_and_are_named() -> None:
     prototype = PROTOTYPES[OPTIMAL.name]
     position, rotation = pose_of(prototype)
     # At a yaw of −90° both legs are at the same place of the guide.
     turn = Rotation.from_euler("Z", -15.0, degrees=True).as_matrix() @ rotation
-    assert "carriages 2 and 3 are" in " ".join(prototype.hindrances(position, turn))
+    assert "carriages 2 and 3 are" in " ".join(prototype.broken_joint_limits(position, turn))
     pairs = {frozenset(pair[:2]) for pair in pose_overlaps(prototype, position, turn)}
     assert frozenset(("carriage 2", "carriage 3")) in pairs
 
@@ -299,14 +299,14 @@ def test_carriages_that_come_too_close_do_overlap_and_are_told() -> None:
         ((0.0, 0.0, -12.0), "about the guide"),
     ],
 )
-def test_what_hinders_a_pose_is_told(shift: tuple[float, float, float], words: str) -> None:
+def test_broken_joint_limits_are_named(shift: tuple[float, float, float], words: str) -> None:
     prototype = PROTOTYPES[OPTIMAL.name]
     position, rotation = pose_of(prototype)
-    assert words in " ".join(prototype.hindrances(position + np.array(shift), rotation))
+    assert words in " ".join(prototype.broken_joint_limits(position + np.array(shift), rotation))
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_places_are_those_of_the_legs(name: str) -> None:
+def test_places_of_random_poses_lie_along_the_legs(name: str) -> None:
     prototype = PROTOTYPES[name]
     design = prototype.design
     rng = np.random.default_rng(4)
@@ -354,7 +354,7 @@ TIGHT = (
 
 
 @pytest.mark.parametrize(("design", "words"), TIGHT)
-def test_what_is_too_tight_is_named_with_what_would_fit(design: Design, words: str) -> None:
+def test_design_too_tight_for_parts_names_what_would_fit(design: Design, words: str) -> None:
     with pytest.raises(InputError) as refusal:
         make_prototype(design)
     message = str(refusal.value)
@@ -378,7 +378,7 @@ def scaled_radii(design: Design, largest: float) -> Design:
     return limited(design, leg_radii=tuple(factor * r for r in design.limits.leg_radii))
 
 
-def test_homes_that_legs_cannot_have_are_refused() -> None:
+def test_homes_beyond_joint_limits_are_refused() -> None:
     with pytest.raises(InputError, match=r"leg 1 is 117\.4 mm long at home, but its limits"):
         make_prototype(limited(OPTIMAL, l1=(0.0, 11.0)))
     leaning = msgspec.structs.replace(
@@ -394,7 +394,7 @@ def test_homes_that_legs_cannot_have_are_refused() -> None:
 
 
 @pytest.mark.parametrize("name", [OPTIMAL.name, LARGE.name])
-def test_the_bill_has_every_part_and_every_actuator(name: str) -> None:
+def test_bill_of_materials_has_every_part_and_actuator(name: str) -> None:
     prototype = PROTOTYPES[name]
     bill = bill_of_materials(prototype, 2700.0)
     assert [item.name for item in bill.items] == [part.name for part in prototype.parts]

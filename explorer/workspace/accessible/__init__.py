@@ -1,1 +1,1 @@
-"""What of a workspace a collision-free move leads to from home."""
+"""The accessible workspace: positions that a collision-free move from home leads to."""

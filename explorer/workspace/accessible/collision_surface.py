@@ -1,8 +1,8 @@
-"""Where legs begin to collide, as a surface in the positions at one orientation.
+"""The surface of positions at which legs begin to collide, at one orientation.
 
-Between the nodes of a grid the surface is interpolated, then moved onto the true one. Legs
-without a thickness collide only where their axes cross, on a surface that separates nothing
-but its two sides; so the side counts, not the distance alone.
+A surface interpolated between the nodes of a grid is projected onto the true one. Legs without
+a radius collide only where their axes cross: on a surface with free positions on both sides, so
+that a signed distance is needed to tell the sides apart.
 """
 
 from __future__ import annotations
@@ -15,47 +15,50 @@ from explorer.legs.clearance import PAIRS, leg_axes, leg_clearances, point_rates
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray, dot
 
-# Newton steps onto the surface; each may go this share of a cell, all together at most one.
+# Newton steps onto the surface, and the largest step as a share of a cell.
 STEPS = 6
 SHARE = 0.3
-# Strides towards a collision, and what counts as before it, a share of a cell.
+# Strides of the search for a first collision, and its tolerance as a share of a cell.
 STRIDES = 16
 NEAR = 0.05
-# Slopes of clearance over position below this are not followed.
+# The least slope of clearance over position that a Newton step divides by.
 LEAST_SLOPE = 0.02
 
 
-def settle(
+def project_onto_collisions(
     design: Design,
     rotation: FloatArray,
     pairs: Sequence[int],
     touching: float,
     step: FloatArray,
     points: FloatArray,
-    kept: FloatArray,
+    beside: FloatArray,
 ) -> FloatArray:
-    """Return points moved onto the surface where the nearest pair begins to collide.
+    """Project points onto the surface at which the nearest pair of legs begins to collide.
 
     Args:
         design: The manipulator.
-        rotation: Platform to base, shape (3, 3).
+        rotation: Rotation from platform to base, shape (3, 3).
         pairs: Indices of the pairs that count.
-        touching: How far beyond a mere crossing the surface lies, for pairs without radii.
-        step: Of the grid, shape (3,).
-        points: Near the surface, shape (n, 3).
-        kept: For each a place on the side that is kept, shape (n, 3).
+        touching: Distance of the surface beyond a crossing of axes, for pairs without radii.
+        step: Step of the grid on each axis, shape (3,).
+        points: Points near the surface, shape (n, 3).
+        beside: For each point a free position on the near side of the surface, shape (n, 3).
+
+    Returns:
+        Points on the surface, shape (n, 3); those that diverge are returned unprojected.
     """
     if not len(points):
         return points
-    # Legs may pass through one another between the two, so the way there is followed.
-    hit, which, passed = _first_hit(design, rotation, pairs, step, kept, points)
-    side = np.sign(_apart(design, rotation, which, kept)[3])[:, 0]
-    has_side = _apart(design, rotation, which, points)[2][:, 0]
+    # Legs may pass through one another on the segment between the two.
+    hit, which, collides = _first_collisions(design, rotation, pairs, step, beside, points)
+    side = np.sign(_signed_distances(design, rotation, which, beside)[3])[:, 0]
+    has_side = _signed_distances(design, rotation, which, points)[2][:, 0]
     radii = radii_of_pairs(design)[which[:, 0]]
     target = np.where(radii > 0.0, 0.0, -touching)
-    at = np.where((passed & ~has_side)[:, None], hit, points)
+    at = np.where((collides & ~has_side)[:, None], hit, points)
     for _ in range(STEPS):
-        values, gradients, sides, _ = _apart(design, rotation, which, at)
+        values, gradients, sides, _ = _signed_distances(design, rotation, which, at)
         value, gradient, has_side = values[:, 0], gradients[:, 0], sides[:, 0]
         turned = np.where(has_side, side, 1.0)
         value, gradient = value * turned - radii, gradient * turned[:, None]
@@ -65,11 +68,11 @@ def settle(
         cells = np.abs(move / step).max(axis=1)
         at += move * np.minimum(1.0, SHARE / np.maximum(cells, 1e-300))[:, None]
     astray = np.abs((at - points) / step).max(axis=1) > 1.0
-    at[astray] = np.where(passed[:, None], hit, points)[astray]
+    at[astray] = np.where(collides[:, None], hit, points)[astray]
     return at
 
 
-def _first_hit(
+def _first_collisions(
     design: Design,
     rotation: FloatArray,
     pairs: Sequence[int],
@@ -77,48 +80,53 @@ def _first_hit(
     start: FloatArray,
     end: FloatArray,
 ) -> tuple[FloatArray, IntArray, BoolArray]:
-    """Return where the way from start to end first meets a collision, else the end.
+    """Return the first collisions on segments from free starts to ends.
 
-    A clearance is safe to go, as it changes no faster than the position. All of shape
-    (n, 3); then the pair, shape (n, 1), and whether it is met before the end, shape (n,).
+    A stride as long as the clearance is free, since clearance changes no faster than position.
+
+    Returns:
+        Positions of the collisions, or the ends where there is none, shape (n, 3); the pairs
+        of legs nearest there, shape (n, 1); whether a collision precedes the end, shape (n,).
     """
-    way = end - start
-    length = np.linalg.norm(way, axis=1)
+    segment = end - start
+    length = np.linalg.norm(segment, axis=1)
     near = NEAR * float(step.min())
     chosen = np.asarray(pairs, dtype=np.int64)
-    gone, at = np.zeros(len(start)), start
+    covered, at = np.zeros(len(start)), start
     clearance = leg_clearances(design, at, rotation).clearance[:, chosen]
     for _ in range(STRIDES):
-        gone = np.minimum(length, gone + np.maximum(clearance.min(axis=1), 0.0))
-        at = start + (gone / np.maximum(length, 1e-300))[:, None] * way
+        covered = np.minimum(length, covered + np.maximum(clearance.min(axis=1), 0.0))
+        at = start + (covered / np.maximum(length, 1e-300))[:, None] * segment
         clearance = leg_clearances(design, at, rotation).clearance[:, chosen]
-    return at, chosen[clearance.argmin(axis=1)][:, None], gone < length - near
+    return at, chosen[clearance.argmin(axis=1)][:, None], covered < length - near
 
 
 def nearest_pair(
     design: Design, rotation: FloatArray, pairs: Sequence[int], points: FloatArray
 ) -> IntArray:
-    """Return the pair with the least clearance at positions (n, 3), shape (n,)."""
+    """Return the index of the pair with the least clearance at positions (n, 3), shape (n,)."""
     clearance = leg_clearances(design, points, rotation).clearance
     return np.asarray(pairs, dtype=np.int64)[clearance[:, list(pairs)].argmin(axis=1)]
 
 
-def _apart(
+def _signed_distances(
     design: Design, rotation: FloatArray, which: IntArray, at: FloatArray
 ) -> tuple[FloatArray, FloatArray, BoolArray, FloatArray]:
-    """Return how far pairs are apart at positions, its rates, and on which side they are.
+    """Return distances between the axes of pairs of legs at positions, signed where possible.
 
-    Where the closest points lie between the ends, that is the signed distance of the lines,
-    which tells the side; whether they do comes third, the signed distance itself last.
+    Where the closest points lie between the ends of the legs, the distance is that of the two
+    lines, whose sign tells on which side of each other they are.
 
     Args:
         design: The manipulator.
-        rotation: Platform to base, shape (3, 3).
-        which: Indices of m pairs, shape (m,), or for each position, shape (n, m).
+        rotation: Rotation from platform to base, shape (3, 3).
+        which: Indices of m pairs, shape (m,), or m for each position, shape (n, m).
         at: Positions, shape (n, 3).
 
     Returns:
-        Shapes (n, m), (n, m, 3), (n, m) and (n, m).
+        The distances, signed where they can be, shape (n, m); their gradients in position,
+        shape (n, m, 3); whether they are signed, shape (n, m); the signed distances of the
+        lines in any case, shape (n, m).
     """
     found = leg_clearances(design, at, rotation)
     axes = leg_axes(design, at, rotation)

@@ -1,9 +1,8 @@
-"""Which nodes of a grid can be reached from a place without a collision of legs.
+"""The nodes of a grid that are accessible from a position without a collision of legs.
 
-The nodes keep all limits, the steps between neighbours are certified to be clear of every
-pair of legs (`explorer.legs.moves`), and what can be reached is a connected component of that
-graph (design.md, section 7). The grid goes on beyond the limits, so that a surface of
-collision can be followed up to them.
+They form a connected component of a graph: its nodes keep all limits, and its edges are steps
+between neighbours that are certified free of collisions (`explorer.legs.moves`). The grid
+extends beyond the limits, so that a surface of collision can be followed up to them.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 from explorer.workspace.limits.constraints import constraints, keeps
 
 ALL_PAIRS = tuple(range(len(PAIRS)))
-# Legs touch at a node where their axes are as near as this; a share of the reach.
+# Clearance, over the reach, below which legs touch at a node.
 SLACK = 1e-9
 
 
@@ -31,9 +30,9 @@ class Grid:
     """A grid of positions.
 
     Attributes:
-        lows: Of its first node, shape (3,), in design units.
-        step: Between neighbours on each axis, shape (3,), in design units.
-        counts: Nodes on each axis, at least 2.
+        lows: Position of the first node, shape (3,), in design units.
+        step: Distance between neighbours on each axis, shape (3,), in design units.
+        counts: Numbers of nodes on the axes.
     """
 
     lows: FloatArray
@@ -50,7 +49,7 @@ class Grid:
         return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
 
     def cell_around(self, position: FloatArray, wider: int = 0) -> tuple[slice, slice, slice]:
-        """Return the nodes of the cell that holds a position, or of cells around it too."""
+        """Return the nodes of the cell that holds a position, and of `wider` cells around it."""
         first = np.floor((position - self.lows) / self.step).astype(np.int64)
         x, y, z = (
             slice(max(0, int(i) - wider), max(0, min(int(i) + 2 + wider, many)))
@@ -59,38 +58,38 @@ class Grid:
         return x, y, z
 
 
-def grid_over(lows: FloatArray, highs: FloatArray, nodes: int, beyond: int) -> Grid:
-    """Return a grid over a box: its first and last nodes on the box, and some beyond it.
+def make_grid(lows: FloatArray, highs: FloatArray, nodes: int, beyond: int) -> Grid:
+    """Make a grid over a box, with nodes on its faces and some beyond it.
 
     Args:
-        lows: Of the box, shape (3,).
-        highs: Of the box, shape (3,).
-        nodes: On each axis, at least 2.
-        beyond: How many more nodes on either side.
+        lows: Lowest corner of the box, shape (3,).
+        highs: Highest corner of the box, shape (3,).
+        nodes: Number of nodes within the box on each axis, at least 2.
+        beyond: Number of further nodes on either side.
     """
     step = (highs - lows) / (nodes - 1)
     many = nodes + 2 * beyond
     return Grid(lows - beyond * step, step, (many, many, many))
 
 
-def middles_over(lows: FloatArray, highs: FloatArray, cells: int) -> Grid:
-    """Return the grid of the middles of a box's cells, `cells` on each axis, at least 2."""
+def make_cell_grid(lows: FloatArray, highs: FloatArray, cells: int) -> Grid:
+    """Make the grid of the centres of a box's cells, `cells` on each axis, at least 2."""
     step = (highs - lows) / cells
     return Grid(lows + 0.5 * step, step, (cells, cells, cells))
 
 
 @dataclass(frozen=True)
 class Survey:
-    """What is known of a grid of positions at one orientation.
+    """The limits and collisions of a grid of positions at one orientation.
 
     Attributes:
         design: The manipulator.
-        rotation: Platform to base, shape (3, 3).
-        grid: The nodes.
-        within: Whether each keeps all limits, shape (nx, ny, nz).
-        clearance: Of each pair at each node, shape (nx, ny, nz, 6).
-        first, second: The nodes of each step along an axis, as flat indices, shape (m,).
-        clear: Which pairs are certified to be clear all along each step, shape (m, 6).
+        rotation: Rotation from platform to base, shape (3, 3).
+        grid: The grid.
+        within: Whether a node keeps all limits, shape (nx, ny, nz).
+        clearance: Clearance of each pair of legs at each node, shape (nx, ny, nz, 6).
+        first, second: Flat indices of the two nodes of each step along an axis, shape (m,).
+        clear: Whether a pair is certified free of collision on a step, shape (m, 6).
     """
 
     design: Design
@@ -102,25 +101,25 @@ class Survey:
     second: IntArray
     clear: BoolArray
 
-    def reached(self, start: FloatArray, pairs: Sequence[int] = ALL_PAIRS) -> BoolArray:
-        """Return which nodes can be reached within the limits, shape (nx, ny, nz).
+    def accessible_from(self, start: FloatArray, pairs: Sequence[int] = ALL_PAIRS) -> BoolArray:
+        """Return which nodes are accessible within the limits, shape (nx, ny, nz).
 
         Args:
-            start: A position that keeps all limits and clearances, shape (3,).
+            start: Position that keeps all limits and clearances, shape (3,).
             pairs: Indices of the pairs that count.
         """
-        return self._component(self.linked(start, pairs), self.within, pairs)
+        return self._component(self.next_to(start, pairs), self.within, pairs)
 
-    def flooded(self, reached: BoolArray, pairs: Sequence[int] = ALL_PAIRS) -> BoolArray:
-        """Return what can be reached if the limits may be left, but not come back within.
+    def extended(self, accessible: BoolArray, pairs: Sequence[int] = ALL_PAIRS) -> BoolArray:
+        """Return accessible nodes with those beyond the limits that clear steps lead to.
 
-        Nodes that keep the limits belong to it only if they are reached. What separates
-        it from the others are collisions alone, at the limits and beyond.
+        Of the nodes within the limits only the accessible ones belong to it, so that nothing
+        but collisions separates it from the others, at the limits and beyond.
         """
-        return self._component(reached, reached | ~self.within, pairs)
+        return self._component(accessible, accessible | ~self.within, pairs)
 
-    def linked(self, start: FloatArray, pairs: Sequence[int] = ALL_PAIRS) -> BoolArray:
-        """Return the nodes next to a position that a straight clear move leads to."""
+    def next_to(self, start: FloatArray, pairs: Sequence[int] = ALL_PAIRS) -> BoolArray:
+        """Return the nodes near a position to which a straight move is clear."""
         linked = np.zeros(self.within.shape, dtype=np.bool_)
         for wider in range(3):
             cell = self.grid.cell_around(start, wider)
@@ -131,12 +130,12 @@ class Survey:
                 break
         return linked
 
-    def _component(self, seeds: BoolArray, among: BoolArray, pairs: Sequence[int]) -> BoolArray:
-        """Return the nodes among some that clear steps connect with seeds."""
+    def _component(self, seeds: BoolArray, allowed: BoolArray, pairs: Sequence[int]) -> BoolArray:
+        """Return the allowed nodes that clear steps connect with seeds."""
         from scipy.sparse import coo_array
         from scipy.sparse.csgraph import connected_components
 
-        allowed = among.ravel()
+        shape, allowed = allowed.shape, allowed.ravel()
         clear = self.clear[:, list(pairs)].all(axis=-1)
         kept = clear & allowed[self.first] & allowed[self.second]
         ends = (self.first[kept], self.second[kept])
@@ -145,16 +144,16 @@ class Survey:
         count, labels = connected_components(graph, directed=False)
         is_home = np.zeros(count, dtype=np.bool_)
         is_home[labels[seeds.ravel() & allowed]] = True
-        return np.asarray((is_home[labels] & allowed).reshape(among.shape))
+        return np.asarray((is_home[labels] & allowed).reshape(shape))
 
 
 def survey(design: Design, rotation: FloatArray, grid: Grid) -> Survey:
-    """Return what limits and collisions leave of a grid of positions.
+    """Check limits and collisions at the nodes and on the steps of a grid of positions.
 
     Args:
         design: The manipulator.
-        rotation: Platform to base, shape (3, 3).
-        grid: The nodes.
+        rotation: Rotation from platform to base, shape (3, 3).
+        grid: The grid.
     """
     positions = grid.positions
     slack = SLACK * design.reach
@@ -168,8 +167,8 @@ def survey(design: Design, rotation: FloatArray, grid: Grid) -> Survey:
     length = np.repeat(grid.step, [len(one) for one, _ in ends])
     flat = clearance.reshape(-1, len(PAIRS))
     a, b = flat[first], flat[second]
-    # At a fixed orientation a clearance changes by no more than the position does, so that
-    # most steps are clear beyond doubt, or not clear because an end is not.
+    # At a fixed orientation a clearance changes by no more than the position does. So most
+    # steps are certainly clear, or not clear because an end is not.
     clear = a + b > (1.0 + SLACK) * length[:, None]
     apart = (a > slack) & (b > slack)
     doubtful = np.flatnonzero((~clear & apart).any(axis=-1))

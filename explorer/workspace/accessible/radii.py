@@ -1,8 +1,9 @@
-"""How the reachable workspace shrinks as all legs grow thicker.
+"""The volume of the accessible workspace as a function of one radius of all legs.
 
-Every position has a radius up to which it can be reached from the start: that of the way
-there whose narrowest place is widest. One spanning tree of a grid tells all of them, and so
-the whole curve at once.
+A position is accessible up to a largest radius: half the bottleneck clearance of the widest
+path from the start. A maximum spanning tree of a grid gives the widest paths to all nodes, and
+so the whole curve at once (T. C. Hu, "The Maximum Capacity Route Problem", Operations Research
+9, 1961).
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.numerics.stages import Stages, Watch, unwatched
-from explorer.workspace.accessible.nodes import Survey, middles_over, survey
+from explorer.workspace.accessible.nodes import Survey, make_cell_grid, survey
 from explorer.workspace.accessible.start import check_start
 from explorer.workspace.least_clearance import LeastClearances, least_clearances
 from explorer.workspace.slices.volume import home_rotation, workspace_volume
@@ -28,24 +29,24 @@ from explorer.workspace.solids.solids import workspace_solid
 
 DEFAULT_CELLS = 40
 POINTS = 60
-# Of the narrowest place of a step, as a share of the reach.
+# Tolerance of the least distance of legs over a step, over the reach.
 TOLERANCE = 1e-4
-# Stages of the computation.
+# Number of stages of the computation.
 STAGES = 4
-# Radii that differ by less than this share are one.
+# Relative tolerance of a radius at which a cell is still accessible.
 SAME = 1e-9
 
 
 @dataclass(frozen=True)
 class RadiusCurve:
-    """Reachable volume against one radius of all four legs, in design units.
+    """The volume of the accessible workspace against one radius of all four legs.
 
     Attributes:
-        radii: From 0 to the radius beyond which nothing is left, which comes twice, shape
-            (n,).
-        volumes: Reachable with them, shape (n,), in cubed design units; counted in cells
-            of a grid as shares of the exact volume within the limits.
-        least: How close legs without radii come within the limits.
+        radii: Radii in design units, shape (n,), from 0 to the one beyond which nothing is
+            accessible, which comes twice.
+        volumes: Accessible volumes in cubed design units, shape (n,): shares counted in the
+            cells of a grid, times the exact volume within the limits.
+        least: Least clearances within the limits of legs without radii.
     """
 
     radii: FloatArray
@@ -56,28 +57,28 @@ class RadiusCurve:
     def harmless(self) -> float:
         """The largest radius with which no two legs collide anywhere within the limits.
 
-        0 if some touch without a radius, or if there is nothing within the limits.
+        It is 0 if two legs touch without a radius, or if the workspace is empty.
         """
         return 0.0 if self.closest_legs is None else 0.5 * float(self.least.clearance.min())
 
     @property
     def harmless_bound(self) -> float:
-        """Certified not to exceed `harmless`."""
+        """A certified lower bound of `harmless`."""
         return 0.0 if self.closest_legs is None else 0.5 * max(0.0, float(self.least.bound.min()))
 
     @property
     def closest_legs(self) -> tuple[int, int] | None:
-        """The pair that comes closest, None if there is nothing within the limits."""
+        """The pair of legs that comes closest, None if the workspace is empty."""
         closest = self.least.clearance.argmin()
         return PAIRS[closest] if np.isfinite(self.least.clearance[closest]) else None
 
     @property
     def closest_position(self) -> FloatArray:
-        """Where that pair comes closest, shape (3,); NaN if there is none."""
+        """The position at which that pair comes closest, shape (3,); NaN if there is none."""
         return self.least.position[self.least.clearance.argmin()]
 
     def radius_at(self, share: float) -> float:
-        """Return the radius at which this share of the first volume is left."""
+        """Return the radius at which a share of the volume at radius 0 is left."""
         at = np.interp(-share * float(self.volumes[0]), -self.volumes, self.radii)
         return float(at)
 
@@ -90,17 +91,17 @@ def radius_curve(
     cells: int = DEFAULT_CELLS,
     watch: Watch = unwatched,
 ) -> RadiusCurve:
-    """Return the reachable volume against the radius of all legs; the design's count not.
+    """Compute the accessible volume against one radius of all legs.
 
     Args:
-        design: The manipulator.
-        rotation: Platform to base, shape (3, 3); that of the home pose if None.
-        start: The position that is to be connected, shape (3,); that of the home if None.
-        cells: Of the grid, on each axis of the workspace's extent.
+        design: The manipulator; its own radii are ignored.
+        rotation: Rotation from platform to base, shape (3, 3); that of the home pose if None.
+        start: Position from which moves start, shape (3,); that of the home pose if None.
+        cells: Number of cells of the grid on each axis of the workspace's extent.
         watch: Called before each stage.
 
     Raises:
-        InputError: the start breaks a limit, or legs cross there.
+        InputError: not a rotation, the start breaks a limit, or legs cross there.
     """
     r = home_rotation(design) if rotation is None else checked_rotation(rotation)
     p = np.array(home_pose(design).position) if start is None else np.array(start, dtype=float)
@@ -116,24 +117,24 @@ def radius_curve(
     least = least_clearances(thin, r)
     stages.begin("grid of positions")
     lows, highs = whole.vertices.min(axis=0), whole.vertices.max(axis=0)
-    found = survey(thin, r, middles_over(lows, highs, cells))
-    stages.begin("widest ways")
-    widest = 0.5 * _widest(found, p)[found.within]
+    found = survey(thin, r, make_cell_grid(lows, highs, cells))
+    stages.begin("widest paths")
+    widest = 0.5 * _bottleneck_clearances(found, p)[found.within]
     radii = np.linspace(0.0, float(widest.max(initial=0.0)), POINTS)
-    # A cell is reached with radii up to its own, to rounding.
+    # A cell is accessible with radii up to its own, to rounding.
     left = len(widest) - np.searchsorted(np.sort(widest), (1.0 - SAME) * radii)
     shares = np.append(left / max(1, len(widest)), 0.0)
     return RadiusCurve(np.append(radii, radii[-1]), shares * exact.volume, least)
 
 
 def with_radius(design: Design, radius: float) -> Design:
-    """Return a design whose four legs have one radius."""
+    """Return a design whose four legs have one radius, in design units."""
     limits = msgspec.structs.replace(design.limits, leg_radii=(radius,) * 4)
     return msgspec.structs.replace(design, limits=limits)
 
 
-def _widest(found: Survey, start: FloatArray) -> FloatArray:
-    """Return the least distance of legs on the best way to each node, −1 if there is none."""
+def _bottleneck_clearances(found: Survey, start: FloatArray) -> FloatArray:
+    """Return the least distance of legs on the widest path to each node, −1 without a path."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
 
@@ -142,15 +143,15 @@ def _widest(found: Survey, start: FloatArray) -> FloatArray:
     distance = found.clearance.reshape(many, -1).min(axis=1)
     steps = allowed[found.first] & allowed[found.second] & found.clear.all(axis=1)
     first, second = found.first[steps], found.second[steps]
-    linked = np.flatnonzero(found.linked(start))
+    linked = np.flatnonzero(found.next_to(start))
     at_start = float(leg_clearances(found.design, start, found.rotation).clearance.min())
-    # The start is one node more.
+    # The start is one more node.
     first = np.append(first, np.full(len(linked), many))
     second = np.append(second, linked)
     distance = np.append(distance, at_start)
     positions = np.vstack([found.grid.positions.reshape(-1, 3), start])
-    width = _narrowest(found, positions, distance, first, second)
-    # The tree of least weight has the widest ways; a weight of zero would be no step.
+    width = _step_clearances(found, positions, distance, first, second)
+    # The tree of least weight has the widest paths; a weight of zero would be no edge.
     weight = 1.0 + width.max(initial=0.0) - width
     graph = coo_array((weight, (first, second)), shape=(many + 1, many + 1)).tocsr()
     tree = minimum_spanning_tree(graph)
@@ -167,18 +168,18 @@ def _widest(found: Survey, start: FloatArray) -> FloatArray:
     return np.array(best[:many]).reshape(found.within.shape)
 
 
-def _narrowest(
+def _step_clearances(
     found: Survey, positions: FloatArray, distance: FloatArray, first: IntArray, second: IntArray
 ) -> FloatArray:
     """Return the least distance of legs over each step.
 
-    It is that of one of the ends, but for steps near a crossing, which are looked at.
+    Far from collisions it is bounded by the distance at an end; near them it is computed.
     """
     width = np.minimum(distance[first], distance[second])
     length = np.linalg.norm(positions[second] - positions[first], axis=1)
     near = np.flatnonzero(width < length)
     design, r = found.design, found.rotation
     a, b = positions[first[near]], positions[second[near]]
-    looked = move_clearances(design, a, r, b, r, tolerance=TOLERANCE * design.reach)
-    width[near] = np.maximum(0.0, np.minimum(width[near], looked.clearance.min(axis=-1)))
+    exact = move_clearances(design, a, r, b, r, tolerance=TOLERANCE * design.reach)
+    width[near] = np.maximum(0.0, np.minimum(width[near], exact.clearance.min(axis=-1)))
     return width

@@ -1,4 +1,4 @@
-"""Whether a position can be started from, and if not, which one nearby can."""
+"""The position from which an accessible workspace is computed, checked before it is used."""
 
 from __future__ import annotations
 
@@ -11,25 +11,25 @@ from explorer.mechanism.kinematics import inverse
 from explorer.mechanism.margins import margins
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.descent import descend
-from explorer.workspace.accessible.nodes import middles_over
+from explorer.workspace.accessible.nodes import make_cell_grid
 from explorer.workspace.limits.broken import violations
 from explorer.workspace.limits.constraints import Never, constraints, home_signs, slacks
 from explorer.workspace.limits.region import region_of
 from explorer.workspace.slices.volume import bounds
 
-# Of the nearest position without trouble: cells an axis that are looked at, the nearest of
-# which are descended from, and what counts as clear, a share of the reach.
+# Search for the nearest valid position: cells on each axis, number of the nearest nodes from
+# which a descent starts, and clearance over the reach.
 CELLS = 40
 STARTS = 6
 CLEAR = 1e-6
 
 
 class StartError(InputError):
-    """A position from which nothing can be reached.
+    """A start that breaks a limit or at which legs collide.
 
     Attributes:
-        nearest: The nearest position without trouble at the same orientation, shape (3,);
-            None if there is none.
+        nearest: Nearest valid position at the same orientation, shape (3,); None if there
+            is none.
     """
 
     def __init__(self, message: str, nearest: FloatArray | None) -> None:
@@ -38,26 +38,34 @@ class StartError(InputError):
 
 
 def check_start(design: Design, rotation: FloatArray, position: FloatArray) -> None:
-    """Raise a `StartError` if a position, that of the home pose say, cannot be used.
+    """Check that a position keeps the limits and that no legs collide there.
 
-    It names the limits or pairs of legs, and the nearest position where all is well.
+    Args:
+        design: The manipulator.
+        rotation: Rotation from platform to base, shape (3, 3).
+        position: Position of b4 in the base frame, shape (3,).
+
+    Raises:
+        StartError: the position is not valid; the message names the limits or the pairs of
+            legs, and the nearest valid position.
     """
-    trouble = _troubles(design, rotation, position)
-    if not trouble:
+    faults = start_faults(design, rotation, position)
+    if not faults:
         return
-    text = f"nothing can be reached from {_shown(position)}: {'; '.join(trouble)}"
+    text = f"no position is accessible from {_text_of(position)}: {'; '.join(faults)}"
     nearest = nearest_clear_position(design, rotation, position)
     if nearest is None:
-        raise StartError(f"{text}; at this orientation no other position is better", None)
+        raise StartError(f"{text}; no valid position is found at this orientation", None)
     raise StartError(
-        f"{text}; the nearest position without trouble at this orientation is {_shown(nearest)}",
+        f"{text}; the nearest valid position at this orientation is {_text_of(nearest)}",
         nearest,
     )
 
 
-def _troubles(design: Design, rotation: FloatArray, position: FloatArray) -> list[str]:
-    joints, kappa = inverse(design, position, rotation), margins(position, rotation)
-    broken = violations(design, position, rotation, joints, kappa, home_signs(design))
+def start_faults(design: Design, rotation: FloatArray, position: FloatArray) -> list[str]:
+    """Return the limits that a position breaks and the pairs of legs that touch there."""
+    joints, delta = inverse(design, position, rotation), margins(position, rotation)
+    broken = violations(design, position, rotation, joints, delta, home_signs(design))
     clearance = leg_clearances(design, position, rotation).clearance
     touching = np.flatnonzero(clearance <= 0.0)
     pairs = [(PAIRS[pair], -float(clearance[pair])) for pair in touching]
@@ -70,28 +78,28 @@ def _troubles(design: Design, rotation: FloatArray, position: FloatArray) -> lis
     ]
 
 
-def _shown(position: FloatArray) -> str:
+def _text_of(position: FloatArray) -> str:
     return "(" + ", ".join(f"{x:.6g}" for x in position) + ")"
 
 
 def nearest_clear_position(
     design: Design, rotation: FloatArray, position: FloatArray
 ) -> FloatArray | None:
-    """Return the nearest position within the limits where no legs collide, shape (3,).
+    """Return the nearest position within the limits at which no legs collide, shape (3,).
 
-    The best of what descends from nearby nodes of a grid, so to the grid's step a global
-    one. None if no node of the grid is clear.
+    It is the best of the local optima near the nearest free nodes of a grid; None if no node
+    of the grid is free.
 
     Args:
         design: The manipulator.
-        rotation: Platform to base, shape (3, 3).
-        position: Shape (3,).
+        rotation: Rotation from platform to base, shape (3, 3).
+        position: Position of b4 in the base frame, shape (3,).
     """
     limits = constraints(design, rotation)
     lows, highs = bounds(region_of(limits))
     if any(isinstance(each, Never) for each in limits) or not (lows < highs).all():
         return None
-    nodes = middles_over(lows, highs, CELLS).positions.reshape(-1, 3)
+    nodes = make_cell_grid(lows, highs, CELLS).positions.reshape(-1, 3)
     nodes = nodes[(slacks(limits, nodes) >= 0.0).all(axis=-1)]
     nodes = nodes[(leg_clearances(design, nodes, rotation).clearance > 0.0).all(axis=-1)]
     if not len(nodes):
@@ -115,6 +123,6 @@ def nearest_clear_position(
             continue
         at = found * reach
         nearer = np.linalg.norm(at - position) < np.linalg.norm(best - position)
-        if nearer and not _troubles(design, rotation, at):
+        if nearer and not start_faults(design, rotation, at):
             best = at
     return best

@@ -1,8 +1,8 @@
-"""The reachable workspace: what the home pose leads to without a collision of legs.
+"""The accessible workspace: positions that a collision-free move from home leads to.
 
-A component of a grid of nodes and certified steps tells on which side of the collisions
-the home lies; the solid is that of the limits, exact where they bound it, carved along the
-collision surface. See section 7 of design.md.
+A connected component of a grid of nodes and certified steps tells on which side of the
+collisions the home lies. The solid of the limits, exact where they bound it, is cut along the
+collision surface, and the part with the home is kept.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 from explorer.numerics.stages import Stages, Watch, unwatched
-from explorer.workspace.accessible.collision_surface import nearest_pair, settle
+from explorer.workspace.accessible.collision_surface import nearest_pair, project_onto_collisions
 from explorer.workspace.accessible.nodes import (
     ALL_PAIRS,
     SLACK,
     Grid,
     Survey,
-    grid_over,
+    make_grid,
     survey,
 )
-from explorer.workspace.accessible.start import check_start
+from explorer.workspace.accessible.start import check_start, start_faults
 from explorer.workspace.least_clearance import LeastClearances, least_clearances
 from explorer.workspace.limits.constraints import Constraint, constraints
 from explorer.workspace.limits.region import region_of
@@ -45,33 +45,33 @@ from explorer.workspace.slices.volume import (
 from explorer.workspace.solids.solid import Solid
 from explorer.workspace.solids.solids import Surface, carved_solid, workspace_solid
 
-# Nodes on each axis of the workspace's extent, and of the grid beyond it on either side.
+# Numbers of nodes on each axis of the workspace's extent, and beyond it on either side.
 DEFAULT_NODES = 40
 FEWEST_NODES, MOST_NODES = 8, 160
 BEYOND = 2
-# Where legs without radii merely touch, the surface is put this share of the reach beyond,
-# since it may coincide with a limit.
+# Offset, over the reach, of the collision surface of legs without radii beyond their crossing,
+# where it might coincide with a limit.
 TOUCHING = 1e-4
-# Nodes of the paper's grid, whose steps are all looked at.
+# Largest number of nodes of the paper's grid, all steps of which are checked.
 MOST_PAPER_NODES = 2_000_000
-# Stages of the computation besides those of single pairs.
+# Number of stages of the computation besides those of single pairs.
 FIXED_STAGES = 5
 CUBE = np.ones((3, 3, 3), dtype=np.bool_)
 PAIR_NAMES = tuple(f"legs {first}–{second}" for first, second in PAIRS)
-"""What the faces come from that lie where a pair begins to collide."""
+"""Names of the faces at which a pair of legs begins to collide."""
 
 
 @dataclass(frozen=True)
 class PairCost:
-    """What one pair of legs means for a workspace.
+    """The least clearance of one pair of legs in a workspace, and the volume that it blocks.
 
     Attributes:
-        legs: Such as (1, 2).
-        clearance: The least within the limits, in design units; below zero in collision,
-            inf for a pair that shares a joint.
-        bound: Certified not to be undercut there.
-        blocked_volume: What this pair alone takes from the workspace, in cubed design
-            units: where it collides, and what it cuts off from the home pose.
+        legs: Numbers of the two legs, such as (1, 2).
+        clearance: Least clearance within the limits, in design units; negative in
+            collision, inf for a pair that shares a joint.
+        bound: Certified lower bound of the clearance within the limits.
+        blocked_volume: Volume that this pair alone takes from the workspace, in cubed design
+            units: positions at which it collides, and those that it cuts off from the home.
     """
 
     legs: tuple[int, int]
@@ -82,17 +82,18 @@ class PairCost:
 
 @dataclass(frozen=True)
 class ReachableWorkspace:
-    """A constant-orientation workspace within the limits, and what of it can be reached.
+    """A constant-orientation workspace within the limits, and its accessible part.
 
     Attributes:
-        volume: Within the limits, exact, in cubed design units.
-        reachable_volume: Of what can be reached.
-        solid: What can be reached.
-        step: Of the paper's grid of nodes, see `explorer.workspace.slices.volume.NodeCount`.
-        node_count: How many of its nodes lie within the limits; None if not counted.
-        reachable_node_count: How many of these can be reached by steps of the grid; None
-            if not counted.
-        pairs: In the order of `PAIRS`.
+        volume: Exact volume within the limits, in cubed design units.
+        reachable_volume: Volume of the accessible part, in cubed design units.
+        solid: The accessible part.
+        step: Step of the paper's grid of nodes, as in
+            `explorer.workspace.slices.volume.NodeCount`.
+        node_count: Number of its nodes within the limits; None if not counted.
+        reachable_node_count: Number of its nodes that steps of the grid lead to; None if not
+            counted.
+        pairs: The six pairs of legs, in the order of `PAIRS`.
     """
 
     volume: float
@@ -105,7 +106,7 @@ class ReachableWorkspace:
 
     @property
     def harmless_radius(self) -> float:
-        """By how much all radii may grow before any two legs collide, 0 if some touch."""
+        """The largest increase of all radii with which no two legs collide, 0 if two touch."""
         return max(0.0, 0.5 * min(pair.clearance for pair in self.pairs))
 
 
@@ -120,22 +121,23 @@ def reachable_workspace(
     tolerance: float | None = None,
     watch: Watch = unwatched,
 ) -> ReachableWorkspace:
-    """Return what can be reached at one orientation without a collision of legs.
+    """Compute the accessible workspace at one orientation.
 
     Args:
-        design: The manipulator; the radii are those of its limits.
-        rotation: Platform to base, shape (3, 3); that of the home pose if None.
-        start: The position that is to be connected, shape (3,); that of the home if None.
-        nodes: Of the grid, on each axis of the workspace's extent.
-        node_step: Of the paper's grid of nodes, as of `explorer.workspace_nodes`.
-        most_nodes: The most nodes of the paper's grid that are counted; the counts of a
+        design: The manipulator; the radii of the legs are those of its limits.
+        rotation: Rotation from platform to base, shape (3, 3); that of the home pose if None.
+        start: Position from which moves start, shape (3,); that of the home pose if None.
+        nodes: Number of nodes of the grid on each axis of the workspace's extent.
+        node_step: Step of the paper's grid of nodes, as in `explorer.workspace_nodes`.
+        most_nodes: Largest number of nodes of the paper's grid to count; the counts of a
             finer grid are None. If this is None, too fine a grid is refused.
-        tolerance: Of the solid where limits bound it, as of `explorer.workspace_solid`.
-            Where collisions do, faces are as long as the step of the grid.
+        tolerance: Tolerance of the solid where limits bound it, as in
+            `explorer.workspace_solid`. Where collisions do, faces are as long as a step.
         watch: Called before each stage.
 
     Raises:
-        InputError: the start collides or breaks a limit, or a number is out of range.
+        InputError: not a rotation, the start collides or breaks a limit, or a number is out
+            of range. An empty workspace has no start to check.
     """
     r = home_rotation(design) if rotation is None else checked_rotation(rotation)
     p = np.array(home_pose(design).position) if start is None else np.array(start, dtype=float)
@@ -152,8 +154,10 @@ def reachable_workspace(
     stages.begin("least clearances")
     least = least_clearances(design, r)
     if whole.is_empty:
+        # A workspace without volume, such as a part of a plane, may hold nodes of the grid.
+        counts = _paper_nodes(design, r, limits, p, step, most_nodes)
         pairs = (_cost(pair, least, 0.0) for pair in ALL_PAIRS)
-        return ReachableWorkspace(0.0, 0.0, whole, step, 0, 0, tuple(pairs))
+        return ReachableWorkspace(0.0, 0.0, whole, step, *counts, tuple(pairs))
     check_start(design, r, p)
     volume = exact.volume
     stages.begin("grid of positions")
@@ -162,15 +166,15 @@ def reachable_workspace(
     alone = blocking if len(blocking) > 1 else []
     stages.count = FIXED_STAGES + len(alone)
     stages.begin("collisions of all legs")
-    solid, reachable = carver.carved(blocking)
-    blocked = dict.fromkeys(blocking, volume - reachable)
+    solid, accessible = carver.carve(blocking)
+    blocked = dict.fromkeys(blocking, volume - accessible)
     for pair in alone:
         stages.begin(f"collisions of {PAIR_NAMES[pair]}")
-        blocked[pair] = max(0.0, volume - carver.carved([pair])[1])
+        blocked[pair] = max(0.0, volume - carver.carve([pair])[1])
     costs = [_cost(pair, least, blocked.get(pair, 0.0)) for pair in ALL_PAIRS]
     stages.begin("nodes of the grid")
     counts = _paper_nodes(design, r, limits, p, step, most_nodes)
-    return ReachableWorkspace(volume, reachable, solid, step, *counts, tuple(costs))
+    return ReachableWorkspace(volume, accessible, solid, step, *counts, tuple(costs))
 
 
 def _cost(pair: int, least: LeastClearances, blocked: float) -> PairCost:
@@ -186,9 +190,9 @@ def _paper_nodes(
     step: float,
     most: int | None,
 ) -> tuple[int, int] | tuple[None, None]:
-    """Return how many nodes of the paper's grid are within the limits, and are reached.
+    """Count the nodes of the paper's grid that are within the limits, and accessible.
 
-    None for both if the grid has more nodes than a given number.
+    Both counts are None if the grid has more nodes than `most`.
     """
     first, many = node_range(region_of(limits), step)
     with np.errstate(over="ignore"):
@@ -200,19 +204,22 @@ def _paper_nodes(
         return 0, 0
     x, y, z = many.astype(int).tolist()
     found = survey(design, rotation, Grid(first * step, np.full(3, step), (x, y, z)))
-    return int(found.within.sum()), int(found.reached(start).sum())
+    accessible = (
+        0 if start_faults(design, rotation, start) else int(found.accessible_from(start).sum())
+    )
+    return int(found.within.sum()), accessible
 
 
 class _Carver:
-    """Carves the workspace within the limits along the collisions of chosen pairs.
+    """A cutter of the workspace within the limits along the collisions of chosen pairs.
 
     Args:
         design: The manipulator.
-        rotation: Platform to base, shape (3, 3).
-        start: A position without trouble, shape (3,).
+        rotation: Rotation from platform to base, shape (3, 3).
+        start: A valid position, shape (3,).
         whole: The workspace within the limits.
-        volume: Its exact volume.
-        nodes: On each axis.
+        volume: Exact volume of the workspace, in cubed design units.
+        nodes: Number of nodes on each axis.
     """
 
     def __init__(
@@ -230,40 +237,42 @@ class _Carver:
 
     @cached_property
     def survey(self) -> Survey:
-        """The grid; made only if some pair may collide at all."""
+        """The survey of the grid, needed only if a pair may collide."""
         lows, highs = self.whole.vertices.min(axis=0), self.whole.vertices.max(axis=0)
-        grid = grid_over(lows, highs, self.nodes, BEYOND)
+        grid = make_grid(lows, highs, self.nodes, BEYOND)
         return survey(self.design, self.rotation, grid)
 
     def blocks(self, pair: int) -> bool:
-        """Whether a pair that may collide takes any volume.
+        """Return whether a pair that may collide blocks any volume.
 
-        Legs without radii take none where they cross, but for what they cut off.
+        Legs without radii block none where they cross, only what they cut off.
         """
         if self.radii[pair] > 0.0:
             return True
         found = self.survey
-        cut = found.reached(self.start, ()) & ~found.reached(self.start, [pair])
+        cut = found.accessible_from(self.start, ()) & ~found.accessible_from(self.start, [pair])
         return bool((cut & (found.clearance[..., pair] > SLACK * self.design.reach)).any())
 
-    def carved(self, pairs: Sequence[int]) -> tuple[Solid, float]:
-        """Return the part with the start where none of these pairs collides, and its volume."""
+    def carve(self, pairs: Sequence[int]) -> tuple[Solid, float]:
+        """Cut out collisions of some pairs; return the part with the start, and its volume."""
         surface = self._surface(pairs) if pairs else None
         solid = carved_solid(self.whole, surface, self.start)
-        # What facets lack at the limits they lack of both, so the difference is exact there.
+        # Both meshes lack the same volume at the limits, so it cancels in their difference.
         return solid, max(0.0, self.volume - max(0.0, self.whole.volume - solid.volume))
 
-    def _thin(self, flooded: BoolArray, clearance: FloatArray, pairs: Sequence[int]) -> IntArray:
-        """Return the nodes nearest to legs' collisions that lie between two reached nodes.
+    def _thin_walls(
+        self, extended: BoolArray, clearance: FloatArray, pairs: Sequence[int]
+    ) -> IntArray:
+        """Return those free nodes, one of each step, between which legs collide.
 
-        Legs thinner than a step may collide between nodes of which none collides. With one
-        of the two cut out the surface has a place to settle on either side.
+        Legs thinner than a step may collide between two nodes at which they do not. With
+        the nearer one cut out, the surface passes on either side of it.
         """
         found = self.survey
         thick = [pair for pair in pairs if self.radii[pair] > 0.0]
         hit = ~found.clear[:, thick].all(axis=1)
         first, second = found.first[hit], found.second[hit]
-        free = flooded.ravel()
+        free = extended.ravel()
         between = free[first] & free[second]
         first, second = first[between], second[between]
         least = clearance.ravel()
@@ -273,16 +282,15 @@ class _Carver:
         from scipy.ndimage import binary_dilation
 
         found, (design, rotation) = self.survey, (self.design, self.rotation)
-        reached = found.reached(self.start, pairs)
-        flooded = found.flooded(reached, pairs)
+        extended = found.extended(found.accessible_from(self.start, pairs), pairs)
         clearance = np.minimum(found.clearance[..., list(pairs)].min(axis=-1), design.reach)
-        # Beyond a wall that has no thickness the distance from it counts as negative.
-        values = clearance * np.where(flooded, 1.0, -np.sign(clearance))
+        # Beyond a wall without thickness the distance from it counts as negative.
+        values = clearance * np.where(extended, 1.0, -np.sign(clearance))
         touching = TOUCHING * design.reach
         if not self.radii[list(pairs)].all():
             values = values + touching
-        values.ravel()[self._thin(flooded, clearance, pairs)] = -touching
-        # Far from what is within the limits there is nothing to cut.
+        values.ravel()[self._thin_walls(extended, clearance, pairs)] = -touching
+        # Far from all nodes within the limits there is nothing to cut.
         near: Any = binary_dilation(found.within, CUBE)
         values[~near] = np.abs(values[~near])
 
@@ -293,7 +301,7 @@ class _Carver:
             values,
             found.grid.lows,
             found.grid.step,
-            partial(settle, design, rotation, pairs, touching, found.grid.step),
+            partial(project_onto_collisions, design, rotation, pairs, touching, found.grid.step),
             PAIR_NAMES,
             name_of,
         )

@@ -115,7 +115,7 @@ def trouble_of(frame: Frame, feed: PartsFeed) -> str | None:
 
 
 def _hindered(frame: Frame, parts: Parts) -> str | None:
-    found = parts.prototype.hindrances(frame.state.pose.position, frame.snapshot.rotation)
+    found = parts.prototype.broken_joint_limits(frame.state.pose.position, frame.snapshot.rotation)
     return alert("The parts do not take this pose", _sentence("; ".join(found))) if found else None
 
 

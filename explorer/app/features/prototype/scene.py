@@ -28,8 +28,8 @@ from explorer.app.widgets.colours import (
 )
 from explorer.mechanism.pose import quaternion_from_rotation
 from explorer.numerics.arrays import FloatArray
+from explorer.prototype.assembly import exploded_offsets
 from explorer.prototype.chains import BODIES, LEGS, Places
-from explorer.prototype.exploded import Explosion
 
 COLOURS: dict[str, Rgb] = {
     "base": PLATFORM_BODY,
@@ -114,7 +114,7 @@ def shown_places(placed: Placed, parts: Parts) -> Places:
     share = frame.state.view.prototype.exploded
     if share == 0.0:
         return places
-    away = share * Explosion(parts.prototype).offsets(places)
+    away = share * exploded_offsets(parts.prototype, places)
     return Places(places.origin + away, places.rotation)
 
 

@@ -1,4 +1,4 @@
-"""What the actuators and joints of the prototype take: strokes, carriages, swings."""
+"""The limits of the prototype's actuators and joints: strokes, carriages, swings."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from explorer.prototype.dimensions import FIRST_SWING, SECOND_SWING
 from explorer.prototype.sizes import Sizes
 
 BALL_SWING = math.radians(85.0)
-"""How far a leg leans at the most from the normal of the platform."""
+"""Largest angle between a leg and the normal of the platform."""
 
-# A pose at the end of a stroke is within it, whatever its last bits say.
+# A pose at the end of a stroke is within it up to rounding.
 _SLACK = 1e-9
 
 
-def hindrances(sizes: Sizes, position: ArrayLike, rotation: ArrayLike) -> tuple[str, ...]:
-    """Return why the actuators and joints do not take one pose, () if they do.
+def broken_joint_limits(sizes: Sizes, position: ArrayLike, rotation: ArrayLike) -> tuple[str, ...]:
+    """Return the limits of actuators and joints that one pose breaks, as sentences.
 
     Args:
-        sizes: Those of the parts.
-        position: b4 in the base frame, shape (3,), in design units.
-        rotation: Platform to base, shape (3, 3).
+        sizes: Sizes of the parts.
+        position: Position of b4 in the base frame, shape (3,), in design units.
+        rotation: Rotation from platform to base, shape (3, 3).
 
     Raises:
         InputError: a pose that is not finite or not a rotation.

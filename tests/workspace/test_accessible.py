@@ -1,4 +1,4 @@
-"""The workspace that can be reached: against legs that move, grids and other radii."""
+"""The accessible workspace: against moving legs, random positions, grids and other radii."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from explorer import (
 )
 from explorer.legs.clearance import distance_gradients
 from explorer.numerics.arrays import FloatArray
-from explorer.workspace.accessible.nodes import Grid, grid_over, survey
+from explorer.workspace.accessible.nodes import Grid, make_grid, survey
 from explorer.workspace.accessible.radii import with_radius
 from explorer.workspace.accessible.start import check_start, nearest_clear_position
 from explorer.workspace.least_clearance import least_clearances
@@ -64,7 +64,7 @@ def scaled(design: Design, by: float) -> Design:
 
 
 def random_design(seed: int) -> Design | None:
-    """Return a design with radii in a random orientation, None if its home is in trouble."""
+    """Return a design with radii in a random orientation, None if its home is not valid."""
     rng = np.random.default_rng(seed)
     size = 10.0 ** int(rng.integers(-3, 4))
     b1x, b1y, b2, b3 = size * rng.uniform(-0.6, 0.6, 4)
@@ -87,7 +87,9 @@ def random_design(seed: int) -> Design | None:
 
 
 @pytest.mark.parametrize("design", ROWS, ids=lambda d: d.name)
-def test_thin_legs_of_table_1_cross_nowhere_but_on_the_base_plane(design: Design) -> None:
+def test_accessible_workspace_with_thin_legs_loses_nodes_of_the_base_plane_alone(
+    design: Design,
+) -> None:
     found = reachable_workspace(design)
     assert found.reachable_volume == found.volume == workspace_volume(design).volume
     assert found.solid.volume == pytest.approx(workspace_solid(design).volume, rel=1e-12)
@@ -106,7 +108,7 @@ def test_thin_legs_of_table_1_cross_nowhere_but_on_the_base_plane(design: Design
 
 
 @pytest.mark.parametrize("seed", range(40))
-def test_the_solid_holds_what_can_be_reached_and_nothing_else(seed: int) -> None:
+def test_accessible_solid_of_random_designs_holds_the_ends_of_clear_moves_alone(seed: int) -> None:
     design = random_design(seed)
     if design is None:
         return
@@ -146,7 +148,7 @@ def test_random_designs_are_thick_thin_cut_and_whole() -> None:
 
 @pytest.mark.parametrize("design", ROWS, ids=lambda d: d.name)
 @pytest.mark.parametrize("radius", [0.0025, 0.01])
-def test_the_volume_is_what_many_random_positions_say(design: Design, radius: float) -> None:
+def test_accessible_volume_agrees_with_random_positions(design: Design, radius: float) -> None:
     design, r = thick(design, radius), home_rotation(design)
     found = reachable_workspace(design)
     rng = np.random.default_rng(5)
@@ -161,7 +163,7 @@ def test_the_volume_is_what_many_random_positions_say(design: Design, radius: fl
     assert found.reachable_volume / found.volume == pytest.approx(share, abs=4.0 * error + 5e-4)
 
 
-def test_faces_say_what_they_come_from() -> None:
+def test_accessible_solid_faces_name_their_limit_or_pair() -> None:
     design = thick(OPTIMAL, 0.01)
     solid = reachable_workspace(design).solid
     centres = solid.vertices[solid.faces].mean(axis=1)
@@ -183,7 +185,7 @@ def test_faces_say_what_they_come_from() -> None:
     assert np.quantile(offs, 0.95) < 0.05
 
 
-def test_a_pair_is_told_what_it_costs_alone() -> None:
+def test_blocked_volume_is_that_of_a_pair_alone() -> None:
     design = limited(OPTIMAL, leg_radii=(0.0, 0.2, 0.0, 0.2))
     found = reachable_workspace(design)
     blocked = {pair.legs: pair.blocked_volume for pair in found.pairs}
@@ -198,40 +200,63 @@ def test_a_pair_is_told_what_it_costs_alone() -> None:
 
 
 @pytest.mark.parametrize("by", [1e-6, 1e6])
-def test_size_changes_nothing(by: float) -> None:
+def test_accessible_workspace_of_a_scaled_design_is_scaled(by: float) -> None:
     small, large = thick(OPTIMAL, 0.01), scaled(thick(OPTIMAL, 0.01), by)
     one, other = reachable_workspace(small, nodes=20), reachable_workspace(large, nodes=20)
     assert other.reachable_volume / by**3 == pytest.approx(one.reachable_volume, rel=2e-5)
     assert other.reachable_node_count == one.reachable_node_count
 
 
-def test_a_finer_grid_agrees() -> None:
+def test_accessible_volume_with_a_finer_grid_is_the_same() -> None:
     coarse, fine = (reachable_workspace(thick(INITIAL, 0.01), nodes=n) for n in (30, 60))
     assert coarse.reachable_volume == pytest.approx(fine.reachable_volume, rel=2e-3)
 
 
-def test_an_empty_workspace_has_nothing_to_reach() -> None:
+def test_accessible_workspace_within_empty_limits_is_empty() -> None:
     found = reachable_workspace(limited(OPTIMAL, l1=(0.0, 1.0), l4=(0.0, 0.1)))
     assert found.volume == found.reachable_volume == found.reachable_node_count == 0
     assert found.solid.is_empty
     assert found.solid.empty_because
 
 
-def test_a_home_out_of_limits_or_in_collision_names_the_cause_and_a_way_out() -> None:
-    far = msgspec.structs.replace(OPTIMAL, home=Pose.of((10.0, 5.0, 19.0), home_rotation(OPTIMAL)))
-    with pytest.raises(InputError, match=r"box z = 19 is above its maximum 18; the nearest pos"):
-        reachable_workspace(far)
-    fat = limited(OPTIMAL, leg_radii=(0.0, 0.4, 0.4, 0.0))
-    with pytest.raises(InputError, match=r"legs 2 and 3 overlap by 0.1306; at this orientation"):
-        reachable_workspace(fat)
-    low = msgspec.structs.replace(
-        thick(OPTIMAL, 0.01), home=Pose.of((10.0, -8.0, 0.3), home_rotation(OPTIMAL))
-    )
-    with pytest.raises(InputError, match=r"legs 3 and 4 overlap by .* the nearest position"):
-        reachable_workspace(low)
+@pytest.mark.parametrize("home_z", [8.0, 9.0])
+def test_accessible_workspace_without_volume_counts_its_nodes(home_z: float) -> None:
+    home = Pose.of((10.0, 5.0, home_z), home_rotation(OPTIMAL))
+    flat = limited(OPTIMAL, box=((0.0, -12.0, 8.0), (20.0, 22.0, 8.0)))
+    design = msgspec.structs.replace(flat, home=home)
+    found, count = reachable_workspace(design), workspace_nodes(design).count
+    assert found.solid.is_empty
+    assert found.node_count == count > 0
+    # Nothing is accessible from a home that breaks a limit.
+    assert found.reachable_node_count == (count if home_z == 8.0 else 0)
 
 
-def test_the_nearest_position_without_trouble_is_the_nearest() -> None:
+@pytest.mark.parametrize(
+    ("radii", "home", "words"),
+    [
+        (
+            (0.0,) * 4,
+            (10.0, 5.0, 19.0),
+            r"box z = 19 is above its maximum 18; the nearest valid",
+        ),
+        ((0.0, 0.4, 0.4, 0.0), (10.0, 5.0, 9.0), r"legs 2 and 3 overlap by 0.1306; no valid pos"),
+        (
+            (0.01 * OPTIMAL.reach,) * 4,
+            (10.0, -8.0, 0.3),
+            r"legs 3 and 4 overlap by .* the nearest valid",
+        ),
+    ],
+)
+def test_accessible_workspace_from_an_invalid_home_names_cause_and_remedy(
+    radii: tuple[float, ...], home: tuple[float, float, float], words: str
+) -> None:
+    design = limited(OPTIMAL, leg_radii=radii)
+    design = msgspec.structs.replace(design, home=Pose.of(home, home_rotation(OPTIMAL)))
+    with pytest.raises(InputError, match=words):
+        reachable_workspace(design)
+
+
+def test_nearest_clear_position_has_no_nearer_one() -> None:
     r = home_rotation(OPTIMAL)
     above = np.array([10.0, 5.0, 19.0])
     assert nearest_clear_position(OPTIMAL, r, above) == pytest.approx([10.0, 5.0, 18.0], abs=1e-4)
@@ -248,19 +273,19 @@ def test_the_nearest_position_without_trouble_is_the_nearest() -> None:
 
 
 @pytest.mark.parametrize("nodes", [0, 7, 161])
-def test_grids_too_coarse_or_too_fine_are_refused(nodes: int) -> None:
+def test_accessible_workspace_with_a_grid_out_of_range_is_refused(nodes: int) -> None:
     with pytest.raises(InputError, match=f"from 8 to 160; got {nodes}"):
         reachable_workspace(OPTIMAL, nodes=nodes)
     with pytest.raises(InputError, match="at most"):
         reachable_workspace(OPTIMAL, node_step=1e-3)
 
 
-def test_what_is_reached_is_a_component_of_clear_steps() -> None:
+def test_accessible_nodes_are_a_component_of_clear_steps() -> None:
     design, r = thick(INITIAL, 0.02), home_rotation(INITIAL)
     home = np.array(home_pose(design).position)
     grid = Grid(home - 4.5, np.full(3, 1.5), (7, 7, 7))
     found = survey(design, r, grid)
-    reached = found.reached(home)
+    reached = found.accessible_from(home)
     nodes = grid.positions.reshape(-1, 3)
     # All steps again, each by itself, and a search over them from the home's node.
     first, second = np.nonzero(np.isclose(np.abs(nodes[:, None] - nodes).sum(axis=-1), 1.5))
@@ -272,8 +297,8 @@ def test_what_is_reached_is_a_component_of_clear_steps() -> None:
     assert 0 < len(order) < int(found.within.sum())
 
 
-def test_a_grid_begins_and_ends_on_its_box() -> None:
-    grid = grid_over(np.array([0.0, -1.0, 2.0]), np.array([4.0, 1.0, 3.0]), 5, 2)
+def test_grid_within_its_box_ends_on_the_faces() -> None:
+    grid = make_grid(np.array([0.0, -1.0, 2.0]), np.array([4.0, 1.0, 3.0]), 5, 2)
     inner = grid.positions[2:-2, 2:-2, 2:-2].reshape(-1, 3)
     assert inner.min(axis=0) == pytest.approx([0.0, -1.0, 2.0])
     assert inner.max(axis=0) == pytest.approx([4.0, 1.0, 3.0])
@@ -285,7 +310,7 @@ def test_a_grid_begins_and_ends_on_its_box() -> None:
 
 @pytest.mark.parametrize("margin", [0.0, 0.5, 1.0])
 @pytest.mark.parametrize("design", ROWS, ids=lambda d: d.name)
-def test_least_clearances_are_not_undercut(design: Design, margin: float) -> None:
+def test_least_clearances_at_random_positions_hold(design: Design, margin: float) -> None:
     design = limited(design, margin=margin, leg_radii=(0.1, 0.2, 0.3, 0.4))
     r = home_rotation(design)
     found = least_clearances(design)
@@ -303,7 +328,7 @@ def test_least_clearances_are_not_undercut(design: Design, margin: float) -> Non
     assert (found.clearance <= sampled + 1e-12).all()
 
 
-def test_distances_change_with_the_position_as_their_gradients_say() -> None:
+def test_distance_gradients_agree_with_finite_differences() -> None:
     rng = np.random.default_rng(2)
     design, r = OPTIMAL, rotation_from_yaw_pitch_roll((-60.0, 20.0, 10.0))
     p = np.array([10.0, 5.0, 9.0]) + rng.uniform(-4.0, 4.0, (200, 3))
@@ -319,7 +344,7 @@ def test_distances_change_with_the_position_as_their_gradients_say() -> None:
 
 
 @pytest.mark.parametrize("design", ROWS, ids=lambda d: d.name)
-def test_the_radius_curve_agrees_with_the_solids(design: Design) -> None:
+def test_radius_curve_agrees_with_solids(design: Design) -> None:
     curve = radius_curve(design)
     exact = workspace_volume(design).volume
     assert curve.volumes[0] == pytest.approx(exact, rel=5e-3)
@@ -333,7 +358,7 @@ def test_the_radius_curve_agrees_with_the_solids(design: Design) -> None:
     assert curve.radius_at(0.99) < curve.radius_at(0.95)
 
 
-def test_harmless_radii_take_nothing_and_larger_ones_do() -> None:
+def test_harmless_radius_blocks_nothing_and_a_larger_one_does() -> None:
     design = limited(OPTIMAL, margin=1.0)
     curve = radius_curve(design, cells=20)
     assert 0.0 < curve.harmless_bound <= curve.harmless
@@ -344,14 +369,14 @@ def test_harmless_radii_take_nothing_and_larger_ones_do() -> None:
     assert touched.reachable_volume < touched.volume * (1.0 - 1e-6)
 
 
-def test_the_radius_curve_of_nothing_is_nothing() -> None:
+def test_radius_curve_of_an_empty_workspace_is_zero() -> None:
     curve = radius_curve(limited(OPTIMAL, l1=(0.0, 1.0), l4=(0.0, 0.1)))
     assert curve.volumes.tolist() == [0.0]
     with pytest.raises(InputError, match="box z"):
         radius_curve(OPTIMAL, start=(10.0, 5.0, 30.0))
 
 
-def test_limits_of_home_need_not_be_its_own() -> None:
+def test_accessible_workspace_of_another_orientation_and_start_holds_the_start() -> None:
     # Another orientation than the home's, from a start of one's own.
     r: FloatArray = rotation_from_yaw_pitch_roll((-60.0, 5.0, 5.0))
     design = msgspec.structs.replace(OPTIMAL, limits=Limits(leg_radii=(0.1, 0.1, 0.1, 0.1)))
