@@ -17,7 +17,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from explorer.errors import ExplorerError, MissingExtraError
-from explorer.export.mesh import Rgb, linear
+from explorer.export.metadata import Rgb, linear
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.kernel import Circle

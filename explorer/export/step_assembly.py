@@ -9,7 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from explorer.export.assembly import COLOURS, groups_of
+from explorer.export.assembly import COLOURS, part_groups
 from explorer.export.opencascade import Document, ExactKernel, ExactShape, occ, placed
 from explorer.files.writing import write_whole
 from explorer.mechanism.home import home_pose
@@ -41,7 +41,7 @@ def assembly_step(sizes: Sizes) -> bytes:
     parts = exact_parts(sizes)
     document = Document()
     whole = _group(document, f"mechanism of {design.name}")
-    for name, members in groups_of():
+    for name, members in part_groups():
         group = _group(document, name)
         for member in members:
             label = document.shapes.AddShape(parts[member].shape, False)
