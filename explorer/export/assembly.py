@@ -2,8 +2,8 @@
 
 3MF and STL are in millimetres, GLB by its specification in metres with y up. The assembly is
 in the home pose. In 3MF each leg is a group of its parts; in GLB the tree of nodes is that of
-the joints, so that turning or moving a node moves all that hangs on it. STL files hold each
-part in the frame that it moves with.
+the joints, so that a rotated or moved node carries its children along. STL files hold each
+part in the frame of its body.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ COLOURS: Mapping[str, Rgb] = MappingProxyType(
 )
 """The colours of the kinds of parts."""
 
-# Of the coordinates in 3MF, which are in millimetres.
+# The decimals of coordinates in 3MF, in millimetres.
 _DECIMALS = 6
 
 
@@ -49,11 +49,11 @@ def assembly_bytes(prototype: Prototype, file_format: str) -> bytes:
     """Return a file of a prototype, assembled in the home pose.
 
     Args:
-        prototype: Its parts.
+        prototype: Prototype with its parts.
         file_format: One of `FORMATS`.
 
     Raises:
-        InputError: another format, or parts too large for it.
+        InputError: unknown format, or parts too large for it.
         ExplorerError: the library of the format refuses the parts.
     """
     check_format(file_format)
@@ -64,17 +64,17 @@ def write_assembly(prototype: Prototype, path: Path, file_format: str) -> None:
     """Write a file of a prototype, whole or not at all.
 
     Raises:
-        InputError: as of `assembly_bytes`, or a file that cannot be written.
+        InputError: as for `assembly_bytes`, or a file that cannot be written.
         ExplorerError: the library of the format refuses the parts.
     """
     write_whole(path, assembly_bytes(prototype, file_format))
 
 
 def check_format(file_format: str) -> None:
-    """Refuse formats that there are not.
+    """Refuse an unknown format.
 
     Raises:
-        InputError: no such format.
+        InputError: unknown format; the message lists the formats.
     """
     if file_format not in FORMATS:
         raise InputError(
@@ -83,13 +83,13 @@ def check_format(file_format: str) -> None:
 
 
 def _at_home(prototype: Prototype) -> Places:
-    """Return where the bodies are at home, in the order of `BODIES`."""
+    """Return the places of the bodies in the home pose, in the order of `BODIES`."""
     home = home_pose(prototype.design)
     return prototype.chains.places_at(home.position, home.rotation)
 
 
 def part_groups() -> Sequence[tuple[str, Sequence[str]]]:
-    """Return the groups that people take apart, with the names of their parts."""
+    """Return the subassemblies, each with the names of its parts."""
     legs = [(f"leg {leg}", [f"{kind} {leg}" for kind in _chain(leg)]) for leg in LEGS]
     top = ["platform", *(f"ball {leg}" for leg in LEGS)]
     return [("base", ["base"]), *legs, ("platform with balls", top)]
@@ -154,7 +154,7 @@ def _nodes(prototype: Prototype, places: Places, metres: float) -> list[dict[str
 
 
 def _parent(body: str) -> str | None:
-    """Return what a body is joined to on the side of the base; the platform to the base."""
+    """Return the parent of a body in its chain; None for the base."""
     if body == "base":
         return None
     kind, _, leg = body.partition(" ")
@@ -173,7 +173,7 @@ def _stl_zip(prototype: Prototype) -> bytes:
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
         for part in prototype.parts:
-            # Without a date equal parts make equal files.
+            # Without a date equal parts give equal files.
             entry = zipfile.ZipInfo(f"{part.name.replace(' ', '-')}.stl")
             entry.compress_type, entry.external_attr = zipfile.ZIP_DEFLATED, 0o644 << 16
             archive.writestr(entry, mesh_bytes(part.solid, "stl", prototype.design, part.name))
@@ -183,4 +183,4 @@ def _stl_zip(prototype: Prototype) -> bytes:
 FORMATS: Mapping[str, Callable[[Prototype], bytes]] = MappingProxyType(
     {"3mf": _3mf, "glb": _glb, "stl-zip": _stl_zip}
 )
-"""What writes each format."""
+"""The writer of each format."""

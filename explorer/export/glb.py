@@ -1,8 +1,8 @@
 """GLB files: named meshes below a tree of nodes, in metres with y up.
 
-trimesh packs the meshes. Nodes, materials and the description of the file are given to it as
-glTF has them, because trimesh writes nodes as matrices, which no viewer may animate, drops
-offsets below 1e-8 m and rounds colours to 8 bits of linear light.
+trimesh packs the meshes. Nodes, materials and metadata are glTF of our own, because trimesh
+writes a node as a matrix, which glTF does not allow to be animated, drops offsets below 1e-8 m
+and rounds colours to 8 bits of linear light.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ Y_UP = [-math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)]
 
 @dataclass(frozen=True)
 class Material:
-    """A surface colour and how it reflects.
+    """A surface: its colour and its reflectance.
 
     Attributes:
         name: Name in the file.
@@ -43,7 +43,7 @@ class Material:
     roughness: float
 
     def as_gltf(self) -> dict[str, Any]:
-        """Return the material as glTF has it."""
+        """Return the material in glTF."""
         factors = {
             "baseColorFactor": [*(linear(channel) for channel in self.rgb), 1.0],
             "metallicFactor": self.metallic,
@@ -76,8 +76,8 @@ def glb_bytes(
     """Return a GLB file.
 
     Args:
-        bodies: Meshes by name, none empty; a node names one by its number in this order.
-        nodes: The nodes as glTF has them. The first is the root and turns by `Y_UP`.
+        bodies: Meshes by name, none empty; nodes refer to them by their index in this order.
+        nodes: Nodes in glTF; the first is the root and rotates by `Y_UP`.
         materials: The materials that the bodies refer to.
         design: The design, kept as JSON in the file.
     """

@@ -1,9 +1,12 @@
 """Meshes for printers, CAD and viewers: 3MF, STL, GLB, OBJ and PLY.
 
 Coordinates are those of the base frame in millimetres; GLB is by its specification in
-metres and has y up, and says so. 3MF, STL and GLB hold single precision (6e-8 of the
-largest coordinate), PLY and OBJ double. What a format has room for goes with it: a name,
-a colour for each limit, and the design as JSON.
+metres with y up. 3MF, STL and GLB hold single precision (6e-8 of the largest coordinate),
+PLY and OBJ double. A file holds the name, a colour or group for each limit, and the design
+as JSON, as far as its format allows.
+
+trimesh packs GLB and STL, lib3mf 3MF. PLY and OBJ are written here: those of trimesh have no
+limits (comments, groups), and its PLY has single precision.
 """
 
 from __future__ import annotations
@@ -26,7 +29,6 @@ from explorer.mechanism.design import Design
 from explorer.numerics.arrays import FloatArray
 from explorer.workspace.solids.solid import Solid
 
-# By the first word of a limit's name; pairs that colour-vision deficiencies keep apart.
 COLOURS: Mapping[str, Rgb] = MappingProxyType(
     {
         "l1": (68, 119, 170),
@@ -40,22 +42,24 @@ COLOURS: Mapping[str, Rgb] = MappingProxyType(
         "swing": (170, 51, 119),
     }
 )
+"""The colour of a limit by the first word of its name, distinct with colour-vision deficiencies."""
+
 HULL_COLOUR: Rgb = (153, 170, 187)
-# Rounding may change a volume by this share before a format is refused.
 ROUNDING = 1e-5
+"""The largest relative change of a volume by rounding; a format that exceeds it is refused."""
 
 
 def mesh_bytes(solid: Solid, file_format: str, design: Design, name: str) -> bytes:
     """Return a file of a solid.
 
     Args:
-        solid: Closed and not empty.
+        solid: Solid in design units, closed and not empty.
         file_format: One of `FORMATS`.
-        design: What it is of.
-        name: What to call it.
+        design: Design of the solid, which gives the unit.
+        name: Name of the solid in the file.
 
     Raises:
-        InputError: another format, or one too coarse for where the solid lies.
+        InputError: unknown format, or one too coarse for coordinates this far from the origin.
         NoAnswerError: the solid is empty.
         ExplorerError: the solid is not closed, or the library of the format refuses it.
     """
@@ -80,7 +84,7 @@ def write_mesh(solid: Solid, path: Path, file_format: str, design: Design, name:
         name: What to call it.
 
     Raises:
-        InputError: as of `mesh_bytes`, or a file that cannot be written.
+        InputError: as for `mesh_bytes`, or a file that cannot be written.
         NoAnswerError: the solid is empty.
         ExplorerError: the solid is not closed, or the library of the format refuses it.
     """
@@ -88,17 +92,17 @@ def write_mesh(solid: Solid, path: Path, file_format: str, design: Design, name:
 
 
 def check_format(file_format: str) -> None:
-    """Refuse formats that there are not.
+    """Refuse an unknown format.
 
     Raises:
-        InputError: no such format.
+        InputError: unknown format; the message lists the formats.
     """
     if file_format not in FORMATS:
         raise InputError(f"no mesh format {file_format!r}; there are {', '.join(FORMATS)}")
 
 
 def colour_of(limit: str) -> Rgb:
-    """Return the colour of the faces that a limit bounds."""
+    """Return the colour of the faces that lie on a limit."""
     return COLOURS.get(limit.partition(" ")[0], HULL_COLOUR)
 
 
@@ -112,7 +116,7 @@ def _single(
     """Return points rounded to single precision, and to decimals if given, as float64.
 
     Raises:
-        InputError: rounding spoils the volume.
+        InputError: rounding changes the volume by more than `ROUNDING`.
     """
     with np.errstate(over="ignore", under="ignore"):
         rounded = points.astype(np.float32).astype(np.float64)
@@ -138,7 +142,7 @@ def _stl(solid: Solid, design: Design, name: str) -> bytes:
     import trimesh
 
     points = _single(_millimetres(solid, design), solid, "stl")
-    # Edges that rounding has closed leave facets of two corners, which bound nothing.
+    # Rounding may merge corners; the facets that it degenerates are left out.
     a, b, c = (points[solid.faces[:, k]] for k in range(3))
     kept = ~((a == b).all(axis=1) | (b == c).all(axis=1) | (c == a).all(axis=1))
     untyped: Any = trimesh
@@ -203,7 +207,7 @@ def _glb(solid: Solid, design: Design, name: str) -> bytes:
 def _3mf(solid: Solid, design: Design, name: str) -> bytes:
     points = _millimetres(solid, design)
     largest = check_size(points)
-    # lib3mf writes fixed decimals, by way of integers of 64 bits.
+    # lib3mf writes fixed decimals, which it computes as integers of 64 bits.
     decimals = min(16, max(4, 11 - math.floor(math.log10(largest))))
     points = _single(points, solid, "3mf", decimals)
     with refusals_of_lib3mf("mesh"):
@@ -218,11 +222,11 @@ def _ascii(text: str) -> str:
 
 
 def _spaced(values: Iterable[float]) -> str:
-    """Return numbers with all their digits, separated by blanks."""
+    """Return numbers with all their digits, separated by spaces."""
     return " ".join(map(repr, values))
 
 
 FORMATS: Mapping[str, Callable[[Solid, Design, str], bytes]] = MappingProxyType(
     {"3mf": _3mf, "stl": _stl, "glb": _glb, "obj": _obj, "ply": _ply}
 )
-"""What writes each format, by its name, which is also its suffix."""
+"""The writer of each format by its name, which is also its suffix."""

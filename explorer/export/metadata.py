@@ -1,4 +1,4 @@
-"""What a file says of itself: the program that wrote it, the design, colours."""
+"""Metadata of the files: the program, the design as JSON, and colours."""
 
 from __future__ import annotations
 
