@@ -144,7 +144,7 @@ def test_optimise_volume_beyond_the_box_is_refused_at_once(
     assert capsys.readouterr().err.endswith("asked for: lift the box with --box none\n")
 
 
-def test_optimise_box_none_removes_the_box(capsys: pytest.CaptureFixture[str]) -> None:
+def test_optimise_box_none_lifts_the_box(capsys: pytest.CaptureFixture[str]) -> None:
     argv = ["--design", "paper-initial", "--target-volume", "8000", "--clearance", "0.2"]
     found = answer(capsys, *argv, "--box", "none")
     assert found["converged"] is True

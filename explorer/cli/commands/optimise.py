@@ -83,7 +83,7 @@ class Optimise(JsonOptions, DesignOptions):
         numbers_or_none("--box", "x-low y-low z-low x-high y-high z-high"),
         tyro.conf.arg(help_behavior_hint="(default: that of the design)"),
     ] = None
-    """Box that bounds the workspace, in design units; none removes that of the design."""
+    """Box that bounds the workspace, in design units; none lifts that of the design."""
 
     clearance: Annotated[float | None, positive("--clearance"), _OPTIONAL] = None
     """Least clearance of every pair of legs over the workspace, in design units."""
