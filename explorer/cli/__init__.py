@@ -1,11 +1,10 @@
-"""The command line: `explorer COMMAND [options]`, one small module for each command.
+"""The command line: `explorer COMMAND [options]`, one module per command.
 
-A command is a frozen dataclass with a `run` method; its fields are its options. The table
-below is all that is known of them until one is chosen, so that no command pays for what
-another one imports.
+A command is a frozen dataclass with a `run` method; its fields are its options. Only the
+module of the chosen command is imported, so that no command waits for the imports of another.
 
-The exit status is 0 (done), 1 (the question has no answer) or 2 (bad input). Whatever
-goes wrong is one line on standard error, never a traceback.
+The exit status is 0 (done), 1 (the question has no answer) or 2 (bad input). An error is one
+line on standard error, never a traceback.
 """
 
 from __future__ import annotations
@@ -20,19 +19,19 @@ from explorer.errors import ExplorerError
 
 COMMANDS: Mapping[str, str] = {
     "serve": "Serve the explorer's page and open it in the browser (the default).",
-    "inverse": "Find the joints of a pose.",
-    "forward": "Find the eight assembly modes of the joints.",
-    "singularity": "Tell how near a pose is to a singularity, and to which.",
-    "interference": "Tell how far the legs keep from each other, in a pose or over a move.",
-    "path": "Plan a path between two poses that keeps limits, margins and clearances.",
+    "inverse": "Compute the joints of a pose.",
+    "forward": "Compute the eight assembly modes of the joints.",
+    "singularity": "Measure how near a pose is to a singularity, and to which.",
+    "interference": "Measure the clearances of the legs, in a pose or over a move.",
+    "path": "Plan a path between two poses within limits, margins and clearances.",
     "workspace": "Measure the workspace: exact volume and gradient, the paper's nodes, a mesh.",
-    "optimise": "Look for the best design by SQP: a volume to match, the smallest reach or others.",
-    "sweep": "Measure many designs as a study says, on every core or a cluster; tell the front.",
+    "optimise": "Optimise a design by SQP: match a volume, minimise the reach, or others.",
+    "sweep": "Measure the designs of a study, on every core or a cluster; list the Pareto front.",
     "export": "Write the workspace as a mesh, the mechanism as parts or simulation, or the scene.",
-    "report": "Write a report of a design: drawings, slices, tables, and how to make it again.",
+    "report": "Write a report of a design: drawings, slices, tables, and how to reproduce it.",
     "screenshot": "Draw a pose into a PNG file.",
 }
-"""Each command's name, which is that of its module, and what it does."""
+"""The summary of each command by its name, which is that of its module."""
 
 INTERNAL_ERROR = 70
 INTERRUPTED = 130
@@ -50,25 +49,25 @@ def run(argv: Sequence[str]) -> int:
     """Run a command line and return its exit status.
 
     Args:
-        argv: The arguments after the name of the program.
+        argv: Arguments after the name of the program.
     """
     try:
         streams.prepare()
         _dispatch(list(argv))
     except ExplorerError as error:
         program = error.program if isinstance(error, UsageError) else "explorer"
-        streams.complain(f"{program}: {error}")
+        streams.write_error(f"{program}: {error}")
         return error.exit_status
     except KeyboardInterrupt:
         return INTERRUPTED
     except BrokenPipeError:
         return BROKEN_PIPE
-    except Exception as error:  # noqa: BLE001 - the last resort: people get no traceback
+    except Exception as error:  # noqa: BLE001 - the last resort: users get no traceback
         if os.environ.get("EXPLORER_DEBUG"):
             import traceback
 
             traceback.print_exc()
-        streams.complain(
+        streams.write_error(
             f"explorer: unexpected {type(error).__name__}: {error}; please report this "
             "(EXPLORER_DEBUG=1 shows where it happened)"
         )

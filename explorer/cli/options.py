@@ -1,4 +1,4 @@
-"""Options that commands share, to inherit from: the design, the pose, the form of output."""
+"""Base classes of the commands, with the options that they share: design, pose, output."""
 
 from __future__ import annotations
 
@@ -20,31 +20,31 @@ from explorer.mechanism.pose import Pose, Quadruple, Triple
 
 @dataclass(frozen=True, kw_only=True)
 class DesignOptions:
-    """Which design a command is about."""
+    """The option for the design."""
 
     design: Annotated[str, tyro.conf.arg(metavar="PRESET_OR_FILE")] = "paper-optimal"
-    """A preset (paper-initial, paper-optimal), a design file (JSON), or a design that was saved
-    on the page, by its name."""
+    """A preset (paper-initial, paper-optimal), a design file (JSON), or the name of a design
+    saved on the page."""
 
     def load(self) -> Design:
         """Return the design.
 
         Raises:
-            DesignError: no such preset, file or saved design, or a file that holds none.
+            DesignError: no such preset, file or saved design, or a file without a design.
         """
         return load(self.design)
 
 
 def load(name: str) -> Design:
-    """Return a preset, the design in a file, or one that was saved on the page.
+    """Return a preset, the design in a file, or a design saved on the page.
 
     Raises:
-        DesignError: there is none of that name, or the file holds no design.
+        DesignError: no such preset, file or saved design, or a file without a design.
     """
     try:
         return load_design(name)
     except DesignError:
-        # A file that is there and of no use is what was meant.
+        # A file of this name exists, so it was meant, and is invalid.
         if os.path.exists(name):  # noqa: PTH110 - that of a Path raises for names too long
             raise
         from explorer.app.storage.library import Library
@@ -56,15 +56,15 @@ def load(name: str) -> Design:
 
 @dataclass(frozen=True, kw_only=True)
 class JsonOptions:
-    """In which form a command answers."""
+    """The option for JSON."""
 
     json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
-    """Answer with one JSON object on standard output, and nothing else there."""
+    """Write one JSON object to standard output, and nothing else."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class RadiiOptions:
-    """How thick the legs are."""
+    """The option for the radii of the legs."""
 
     radii: Annotated[
         Quadruple | None,
@@ -74,7 +74,7 @@ class RadiiOptions:
     """Radii of the four legs in design units, or one for all."""
 
     def with_radii(self, design: Design) -> Design:
-        """Return the design with the radii that are asked for.
+        """Return the design with the given radii.
 
         Raises:
             DesignError: a radius is negative.
@@ -90,20 +90,20 @@ _THE_HOME = tyro.conf.arg(help_behavior_hint="(default: that of the home pose)")
 
 @dataclass(frozen=True, kw_only=True)
 class OrientationOptions:
-    """Which orientation a command is about; that of the design's home unless given."""
+    """The options for the orientation; that of the home pose by default."""
 
     quaternion: Annotated[Quadruple | None, numbers("--quaternion", "w x y z"), _THE_HOME] = None
-    """Orientation of the platform; need not be of unit length."""
+    """Orientation of the platform; of any length but zero."""
 
     yaw_pitch_roll: Annotated[
         Triple | None,
         numbers("--yaw-pitch-roll", "yaw pitch roll"),
         tyro.conf.arg(help_behavior_hint="(instead of --quaternion)"),
     ] = None
-    """Orientation of the platform: degrees about its own z, then y, then x axis."""
+    """Orientation of the platform: angles in degrees about its own z, then y, then x axis."""
 
-    def oriented(self, design: Design) -> Pose:
-        """Return the home pose of the design, with the orientation given.
+    def oriented_home(self, design: Design) -> Pose:
+        """Return the home pose of the design, with the given orientation.
 
         Raises:
             InputError: two orientations, or a quaternion of length zero.
@@ -118,16 +118,16 @@ class OrientationOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class PoseOptions(OrientationOptions):
-    """Which pose a command is about; what is not given is that of the design's home."""
+    """The options for the pose; position and orientation are those of the home pose by default."""
 
     position: Annotated[Triple | None, numbers("--position", "x y z"), _THE_HOME] = None
     """Position of b4 in the base frame, in design units."""
 
     def pose(self, design: Design) -> Pose:
-        """Return the pose, from the design's home where no option says otherwise.
+        """Return the pose, completed from the home pose.
 
         Raises:
             InputError: two orientations, or a quaternion of length zero.
         """
-        oriented = self.oriented(design)
+        oriented = self.oriented_home(design)
         return oriented if self.position is None else Pose(self.position, oriented.quaternion)

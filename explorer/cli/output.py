@@ -1,6 +1,6 @@
-"""What the commands write: one JSON object, or aligned columns for people.
+"""The output of commands: one JSON object, or text in aligned columns.
 
-Plain text without colours; numbers carry a minus sign that can be pasted back.
+The text has no colours, and its numbers have ASCII minus signs, so that they can be pasted back.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ def table(rows: Sequence[Sequence[str]], align: str) -> str:
     """Return rows as lines of aligned columns.
 
     Args:
-        rows: Cells, as many in each row.
-        align: One letter for each column, "<" or ">".
+        rows: Rows of cells, all of the same length.
+        align: One letter per column, "<" or ">".
     """
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return "\n".join(
@@ -52,21 +52,21 @@ def figure(value: float, size: float = 0.0) -> str:
     """Return a number with six significant digits.
 
     Args:
-        value: The number.
-        size: The size of the numbers that it comes from, beside which rounding reads 0.
+        value: Number to write.
+        size: Magnitude of the terms that it is computed from; rounding errors of it read 0.
     """
     return significant(value, 6, size=size, padded=True)
 
 
 def figures(values: Iterable[float]) -> list[str]:
-    """Return numbers of one kind with six significant digits each."""
+    """Return numbers of equal unit with six significant digits."""
     listed = list(values)
     size = max(map(abs, listed), default=0.0)
     return [figure(value, size) for value in listed]
 
 
 def degrees(values: Iterable[float]) -> list[str]:
-    """Return angles in degrees with three decimals each, never a negative zero."""
+    """Return angles in degrees with three decimals, never a negative zero."""
     return [f"{fixed(value, 3)}°" for value in values]
 
 
@@ -79,13 +79,13 @@ def millimetres(design: Design, values: Iterable[float]) -> str:
 
 def heading(design: Design) -> str:
     """Return the line that names the design and its unit."""
-    # A name from a file may hold anything; what is not printable stays out of terminals.
+    # A name from a file may hold control sequences, which must not reach a terminal.
     name = "".join(letter if letter.isprintable() else "?" for letter in design.name)
     return f"{name} (1 unit = {design.unit_mm:g} mm, reach {design.reach:.6g})"
 
 
 def pose_table(design: Design, pose: Pose) -> str:
-    """Return position, quaternion and angles of a pose, a line each."""
+    """Return three lines: position, quaternion and angles of a pose."""
     angles = yaw_pitch_roll_from_rotation(pose.rotation).tolist()
     position = f"{'  '.join(figures(pose.position))}  {millimetres(design, pose.position)}"
     return table(
@@ -99,11 +99,11 @@ def pose_table(design: Design, pose: Pose) -> str:
 
 
 DISAGREES = "its volume does not agree with the exact one"
-"""What is told of a mesh that is not the workspace, see `explorer.workspace.solids.agreement`."""
+"""The remark on a mesh that `explorer.workspace.solids.agreement` rejects."""
 
 
 def mesh_json(solid: Solid) -> dict[str, object]:
-    """Return the measures of a mesh, as in the contract."""
+    """Return the measures of a mesh as plain values."""
     return {
         "volume": solid.volume,
         "triangles": len(solid.faces),

@@ -1,8 +1,8 @@
-"""From arguments to a command: tyro reads the options, this module words what is wrong.
+"""Parsing of arguments: tyro reads the options, and this module writes the error messages.
 
-Tyro frames its complaints in boxes of several lines; here each becomes one line that ends
-with where to find help. What people get wrong most, a misspelt option or command, is
-looked at before tyro, with a suggestion.
+tyro frames its messages in boxes of several lines; here a message becomes one line that ends
+with the command for help. Misspelt options and commands are caught before tyro, with a
+suggestion.
 """
 
 from __future__ import annotations
@@ -27,24 +27,24 @@ _HELP = ("-h", "--help")
 
 
 class Command(Protocol):
-    """What a command's dataclass has."""
+    """The interface of a command's dataclass."""
 
     __dataclass_fields__: ClassVar[dict[str, dataclasses.Field[Any]]]
 
     def run(self) -> None:
-        """Do what the options say, writing to standard output.
+        """Run the command and write its answer to standard output.
 
         Raises:
-            ExplorerError: bad input, or no answer.
+            ExplorerError: bad input, or the question has no answer.
         """
         ...
 
 
 def load_command(name: str, known: Iterable[str]) -> type[Command]:
-    """Return the dataclass of a command, importing only its module.
+    """Import a command's module and return its dataclass.
 
     Raises:
-        UsageError: there is no such command.
+        UsageError: unknown command; the message suggests a similar one.
     """
     if name not in known:
         hint = suggestion(name, known) or f"there are {', '.join(known)}"
@@ -54,17 +54,17 @@ def load_command(name: str, known: Iterable[str]) -> type[Command]:
 
 
 def parse(name: str, command: type[Command], argv: Sequence[str]) -> Command | None:
-    """Return the command with the options in the arguments; None once help was shown.
+    """Return the command with its options set; None if the arguments ask for help.
 
     Raises:
-        UsageError: the arguments do not make a command.
+        UsageError: invalid arguments.
     """
     program = f"explorer {name}"
-    page, complaint = io.StringIO(), io.StringIO()
+    page, errors = io.StringIO(), io.StringIO()
     try:
         if not any(argument in _HELP for argument in argv):
             _check_options(command, argv)
-        with contextlib.redirect_stdout(page), contextlib.redirect_stderr(complaint):
+        with contextlib.redirect_stdout(page), contextlib.redirect_stderr(errors):
             parsed, unread = tyro.cli(command, prog=program, args=argv, return_unknown_args=True)
         if not unread:
             return parsed
@@ -73,15 +73,15 @@ def parse(name: str, command: type[Command], argv: Sequence[str]) -> Command | N
         if not leave.code:
             write("".join(f"{line.rstrip()}\n" for line in page.getvalue().splitlines()))
             return None
-        reason = condensed(complaint.getvalue())
+        reason = condense(errors.getvalue())
     except UsageError as error:
         reason = str(error)
     raise UsageError(f"{reason}; see {program} --help", program)
 
 
-def condensed(complaint: str) -> str:
-    """Return tyro's framed complaint as one line: what it says first, without the frame."""
-    lines = [_COLOUR.sub("", line).strip() for line in complaint.strip().splitlines()]
+def condense(message: str) -> str:
+    """Return the first sentence of tyro's framed message, as one line without the frame."""
+    lines = [_COLOUR.sub("", line).strip() for line in message.strip().splitlines()]
     titled = bool(lines) and lines[0].startswith("╭")
     sections: list[list[str]] = [[]]
     for line in lines:
@@ -106,7 +106,7 @@ def condensed(complaint: str) -> str:
 
 
 def suggestion(word: str, known: Iterable[str]) -> str | None:
-    """Return "did you mean …?" with the known word that is most like the given one."""
+    """Return "did you mean …?" with the most similar known word; None if none is similar."""
     close = difflib.get_close_matches(word, list(known), n=1)
     return f"did you mean {close[0]}?" if close else None
 
@@ -114,7 +114,7 @@ def suggestion(word: str, known: Iterable[str]) -> str | None:
 def _check_options(command: type[Command], argv: Sequence[str]) -> None:
     known = ["--help"]
     for field in dataclasses.fields(command):
-        # A name that is a word of Python, such as from, has an underscore behind it.
+        # A field whose name Python reserves, such as from, ends in an underscore.
         option = field.name.rstrip("_").replace("_", "-")
         known.append(f"--{option}")
         if isinstance(field.default, bool):

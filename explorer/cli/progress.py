@@ -1,4 +1,4 @@
-"""How far a long search has got, on standard error: a bar in a terminal, else a line a second."""
+"""Progress on standard error: a bar in a terminal, elsewhere one line per second."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ if TYPE_CHECKING:
     from explorer.optimise.outcome import Iterate
 
 WIDTH = 20
-# Seconds between two looks at it, in a terminal and elsewhere.
+# The seconds between updates, in a terminal and elsewhere.
 IN_TERMINAL, ELSEWHERE = 0.05, 1.0
 
 
 class Meter:
-    """A bar with a line of text beside it."""
+    """A progress bar with a line of text."""
 
     def __init__(self) -> None:
         self.is_terminal = sys.stderr.isatty()
@@ -24,7 +24,7 @@ class Meter:
         self._last = 0
 
     def __enter__(self) -> Self:
-        """Begin."""
+        """Return the meter."""
         return self
 
     def __exit__(
@@ -33,11 +33,11 @@ class Meter:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Leave the line to whatever comes next."""
+        """Erase the bar from a terminal."""
         self.clear()
 
     def clear(self) -> None:
-        """Leave the line to whatever comes next."""
+        """Erase the bar from a terminal."""
         if self._last and self.is_terminal:
             sys.stderr.write("\r" + " " * self._last + "\r")
             sys.stderr.flush()
@@ -45,16 +45,16 @@ class Meter:
 
     @property
     def is_due(self) -> bool:
-        """Whether the last line was shown more than a moment ago."""
+        """Whether the last update is old enough for another."""
         pause = IN_TERMINAL if self.is_terminal else ELSEWHERE
         return time.monotonic() - self._shown >= pause
 
     def show(self, text: str, share: float) -> None:
-        """Show a line, unless the last one was shown a moment ago.
+        """Show a line, unless the last update is too recent.
 
         Args:
-            text: What to say.
-            share: How much is done, from 0 to 1.
+            text: Text beside the bar.
+            share: Completed share of the work, from 0 to 1.
         """
         if not self.is_due:
             return
@@ -69,13 +69,13 @@ class Meter:
         sys.stderr.flush()
 
 
-class Progress(Meter):
-    """A bar that shows the iterates of an optimisation.
+class SearchMeter(Meter):
+    """A progress bar for the iterates of an optimisation.
 
     Args:
-        starts: How many starts there are.
-        iterations: The most steps of each.
-        objective: What people call the objective, such as "F".
+        starts: Number of starts.
+        iterations: Largest number of iterations per start.
+        objective: Symbol of the objective, such as "F".
     """
 
     def __init__(self, starts: int, iterations: int, objective: str) -> None:
@@ -86,8 +86,8 @@ class Progress(Meter):
         self._steps = 0
         self._run: int = 0
 
-    def see(self, iterate: Iterate) -> None:
-        """Show an iterate, unless the last one was shown a moment ago."""
+    def show_iterate(self, iterate: Iterate) -> None:
+        """Show an iterate, unless the last update is too recent."""
         if iterate.run != self._run:
             self._run, self._steps = iterate.run, 0
         self._steps += 1

@@ -1,7 +1,7 @@
-"""Standard output and standard error, whatever they are connected to.
+"""Standard output and standard error, robust against what they are connected to.
 
-Everything is written through here, so that a closed pipe, a full disk or a terminal
-without Greek letters ends in a plain message at the most.
+Commands write through these functions only, so that a closed pipe, a full disk or a terminal
+without Greek letters causes no traceback.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from explorer.errors import ExplorerError
 
 
 class OutputError(ExplorerError):
-    """Standard output takes nothing, for instance because the disk is full."""
+    """Standard output cannot be written, for instance because the disk is full."""
 
 
 def prepare() -> None:
-    """Make both streams take any text: elsewhere if closed, with ? for what they lack."""
-    # A process started with its output closed has None here.
+    """Make both streams accept any text: replace closed ones, write ? for missing characters."""
+    # A stream that was closed when the process started is None.
     if sys.stdout is None or sys.stderr is None:
         nowhere = os.fdopen(os.open(os.devnull, os.O_WRONLY), "w", encoding="utf-8")
         sys.stdout, sys.stderr = sys.stdout or nowhere, sys.stderr or nowhere
@@ -29,23 +29,23 @@ def prepare() -> None:
 
 
 def write(text: str) -> None:
-    """Write text to standard output, at once.
+    """Write text to standard output and flush it.
 
     Raises:
-        OutputError: it cannot be written.
-        BrokenPipeError: nobody reads it any more.
+        OutputError: standard output cannot be written.
+        BrokenPipeError: the reader has closed the pipe.
     """
     try:
         sys.stdout.write(text)
         sys.stdout.flush()
     except OSError as error:
-        # The interpreter writes out what is left at the exit: let that go nowhere.
+        # The interpreter flushes the rest at exit: discard it.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         if isinstance(error, BrokenPipeError):
             raise
         raise OutputError(f"cannot write to standard output: {error.strerror}") from None
 
 
-def complain(message: str) -> None:
+def write_error(message: str) -> None:
     """Write one line to standard error."""
     sys.stderr.write(" ".join(message.split()) + "\n")

@@ -1,4 +1,4 @@
-"""The error for arguments that cannot be read, apart so that it costs no import of tyro."""
+"""The error for invalid arguments, in a module of its own because it needs no import of tyro."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ from explorer.errors import ExplorerError
 
 
 class UsageError(ExplorerError):
-    """Arguments that cannot be read.
+    """Invalid arguments.
 
-    No ValueError, so that tyro lets it pass with its own words.
+    The class is no ValueError, so that tyro does not replace its message.
 
     Args:
-        reason: What is wrong, in one line.
-        program: The program or command whose arguments they are.
+        reason: Reason, in one line.
+        program: Program or command that the arguments are for.
     """
 
     def __init__(self, reason: str, program: str = "explorer") -> None:

@@ -1,4 +1,4 @@
-"""How the words after an option become numbers, with messages that name what is wanted."""
+"""Parsers of option values for tyro, with messages that name the expected values."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ _COUNTS = {2: "two", 3: "three", 4: "four", 6: "six", 7: "seven"}
 
 
 def numbers(option: str, order: str, *, or_one: bool = False) -> PrimitiveConstructorSpec[Any]:
-    """Return how to read an option that takes one finite number for each name.
+    """Return the parser of an option with one finite number per name.
 
     Args:
-        option: The option, such as ``--joints``.
-        order: The names of the numbers in their order, separated by blanks.
-        or_one: Whether one number may stand for all of them.
+        option: Option, such as ``--joints``.
+        order: Names of the numbers in their order, separated by spaces.
+        or_one: Whether a single number may stand for all of them.
     """
     names = order.split()
 
@@ -53,10 +53,7 @@ def numbers(option: str, order: str, *, or_one: bool = False) -> PrimitiveConstr
 
 
 def numbers_or_none(option: str, order: str) -> PrimitiveConstructorSpec[Any]:
-    """Return how to read an option that takes a number for each name, or the word none.
-
-    None is told as ().
-    """
+    """Return the parser of an option with one number per name, or the word none, which gives ()."""
     all_numbers = numbers(option, order)
 
     def read(words: list[str]) -> tuple[float, ...]:
@@ -74,9 +71,9 @@ def numbers_or_none(option: str, order: str) -> PrimitiveConstructorSpec[Any]:
 
 
 def pose_numbers(option: str) -> PrimitiveConstructorSpec[Any]:
-    """Return how to read an option that takes a position, an orientation after it or not.
+    """Return the parser of an option with a position and, optionally, an orientation.
 
-    Three numbers are a position; six go on with yaw, pitch and roll, seven with a quaternion.
+    Three numbers are a position; six add yaw, pitch and roll, seven a quaternion.
     """
     orders = {
         count: numbers(option, order).instance_from_str
@@ -105,7 +102,7 @@ def pose_numbers(option: str) -> PrimitiveConstructorSpec[Any]:
 
 
 def positive(option: str) -> PrimitiveConstructorSpec[Any]:
-    """Return how to read an option that takes one finite number above zero."""
+    """Return the parser of an option with one finite number above zero."""
 
     def read(words: list[str]) -> float:
         value = _number(option, words[0])
@@ -123,7 +120,7 @@ def positive(option: str) -> PrimitiveConstructorSpec[Any]:
 
 
 def whole_number(option: str, low: int, high: int) -> PrimitiveConstructorSpec[Any]:
-    """Return how to read an option that takes a whole number in a range, ends included."""
+    """Return the parser of an option with a whole number from low to high."""
 
     def read(words: list[str]) -> int:
         try:
@@ -144,7 +141,7 @@ def whole_number(option: str, low: int, high: int) -> PrimitiveConstructorSpec[A
 
 
 def pixels(option: str, low: int, high: int) -> PrimitiveConstructorSpec[Any]:
-    """Return how to read an option that takes a size in pixels, such as 1280x800."""
+    """Return the parser of an option with a size in pixels, such as 1280x800."""
 
     def read(words: list[str]) -> tuple[int, int]:
         match = re.fullmatch(r"([0-9]{1,9})[xX×]([0-9]{1,9})", words[0])

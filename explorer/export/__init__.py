@@ -1,1 +1,1 @@
-"""Files for other programs, written from what the package computes."""
+"""Files for other programs: meshes, parts, models, trajectories and reports."""

@@ -1,38 +1,34 @@
 """Meshes for printers, CAD and viewers: 3MF, STL, GLB, OBJ and PLY.
 
 Coordinates are those of the base frame in millimetres; GLB is by its specification in
-metres and has y up, and says so. 3MF, STL and GLB hold single precision (6e-8 of the
-largest coordinate), PLY and OBJ double. What a format has room for goes with it: a name,
-a colour for each limit, and the design as JSON.
+metres with y up. 3MF, STL and GLB hold single precision (6e-8 of the largest coordinate),
+PLY and OBJ double. A file holds the name, a colour or group for each limit, and the design
+as JSON, as far as its format allows.
+
+trimesh packs GLB and STL, lib3mf 3MF. PLY and OBJ are written here: those of trimesh have no
+limits (comments, groups), and its PLY has single precision.
 """
 
 from __future__ import annotations
 
 import json
 import math
-import struct
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, TypeAlias
+from typing import Any
 
-import msgspec
 import numpy as np
 
-from explorer import __version__
 from explorer.errors import ExplorerError, InputError, NoAnswerError
+from explorer.export.glb import METRES_PER_MILLIMETRE, Y_UP, Body, Material, glb_bytes
+from explorer.export.metadata import APPLICATION, Rgb, design_json
+from explorer.export.three_mf import Model, check_size, refusals_of_lib3mf
 from explorer.files.writing import write_whole
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import FloatArray
 from explorer.workspace.solids.solid import Solid
 
-Rgb: TypeAlias = tuple[int, int, int]
-
-APPLICATION = f"flagged-explorer {__version__}"
-NAMESPACE = "urn:flagged-explorer"
-"""Of the design in the metadata of a 3MF file."""
-
-# By the first word of a limit's name; pairs that colour-vision deficiencies keep apart.
 COLOURS: Mapping[str, Rgb] = MappingProxyType(
     {
         "l1": (68, 119, 170),
@@ -46,23 +42,24 @@ COLOURS: Mapping[str, Rgb] = MappingProxyType(
         "swing": (170, 51, 119),
     }
 )
+"""The colour of a limit by the first word of its name, distinct with colour-vision deficiencies."""
+
 HULL_COLOUR: Rgb = (153, 170, 187)
-LARGEST_3MF = 1e9
-# Rounding may change a volume by this share before a format is refused.
 ROUNDING = 1e-5
+"""The largest relative change of a volume by rounding; a format that exceeds it is refused."""
 
 
 def mesh_bytes(solid: Solid, file_format: str, design: Design, name: str) -> bytes:
     """Return a file of a solid.
 
     Args:
-        solid: Closed and not empty.
+        solid: Solid in design units, closed and not empty.
         file_format: One of `FORMATS`.
-        design: What it is of.
-        name: What to call it.
+        design: Design of the solid, which gives the unit.
+        name: Name of the solid in the file.
 
     Raises:
-        InputError: another format, or one too coarse for where the solid lies.
+        InputError: unknown format, or one too coarse for coordinates this far from the origin.
         NoAnswerError: the solid is empty.
         ExplorerError: the solid is not closed, or the library of the format refuses it.
     """
@@ -87,7 +84,7 @@ def write_mesh(solid: Solid, path: Path, file_format: str, design: Design, name:
         name: What to call it.
 
     Raises:
-        InputError: as of `mesh_bytes`, or a file that cannot be written.
+        InputError: as for `mesh_bytes`, or a file that cannot be written.
         NoAnswerError: the solid is empty.
         ExplorerError: the solid is not closed, or the library of the format refuses it.
     """
@@ -95,23 +92,18 @@ def write_mesh(solid: Solid, path: Path, file_format: str, design: Design, name:
 
 
 def check_format(file_format: str) -> None:
-    """Refuse formats that there are not.
+    """Refuse an unknown format.
 
     Raises:
-        InputError: no such format.
+        InputError: unknown format; the message lists the formats.
     """
     if file_format not in FORMATS:
         raise InputError(f"no mesh format {file_format!r}; there are {', '.join(FORMATS)}")
 
 
 def colour_of(limit: str) -> Rgb:
-    """Return the colour of the faces that a limit bounds."""
+    """Return the colour of the faces that lie on a limit."""
     return COLOURS.get(limit.partition(" ")[0], HULL_COLOUR)
-
-
-def design_json(design: Design) -> str:
-    """Return the design as JSON on one line, in ASCII."""
-    return json.dumps(json.loads(msgspec.json.encode(design)))
 
 
 def _millimetres(solid: Solid, design: Design) -> FloatArray:
@@ -124,7 +116,7 @@ def _single(
     """Return points rounded to single precision, and to decimals if given, as float64.
 
     Raises:
-        InputError: rounding spoils the volume.
+        InputError: rounding changes the volume by more than `ROUNDING`.
     """
     with np.errstate(over="ignore", under="ignore"):
         rounded = points.astype(np.float32).astype(np.float64)
@@ -147,21 +139,19 @@ def _volume(points: FloatArray, solid: Solid) -> float:
 
 
 def _stl(solid: Solid, design: Design, name: str) -> bytes:
+    import trimesh
+
     points = _single(_millimetres(solid, design), solid, "stl")
-    corners = points[solid.faces]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-    normals = np.divide(normals, lengths, out=np.zeros_like(normals), where=lengths > 0.0)
-    # Edges that rounding has closed leave facets of two corners, which bound nothing.
-    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    # Rounding may merge corners; the facets that it degenerates are left out.
+    a, b, c = (points[solid.faces[:, k]] for k in range(3))
     kept = ~((a == b).all(axis=1) | (b == c).all(axis=1) | (c == a).all(axis=1))
-    layout = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-    facets = np.zeros(int(kept.sum()), dtype=layout)
-    facets["normal"], facets["corners"] = normals[kept], corners[kept]
-    # It must not start with "solid", by which readers tell text from binary.
+    untyped: Any = trimesh
+    mesh = untyped.Trimesh(points, solid.faces[kept], process=False)
+    data: bytes = mesh.export(file_type="stl")
+    # trimesh leaves the header empty. It must not start with "solid", by which readers tell text
+    # from binary.
     text = f"binary STL in millimetres, {APPLICATION}: {name}"
-    header = text.encode("ascii", "replace")[:80].ljust(80)
-    return header + struct.pack("<I", len(facets)) + facets.tobytes()
+    return text.encode("ascii", "replace")[:80].ljust(80) + data[80:]
 
 
 def _ply(solid: Solid, design: Design, name: str) -> bytes:
@@ -205,147 +195,26 @@ def _obj(solid: Solid, design: Design, name: str) -> bytes:
 
 
 def _glb(solid: Solid, design: Design, name: str) -> bytes:
-    points = _single(_millimetres(solid, design) * 1e-3, solid, "glb")
-    positions = points.astype("<f4").tobytes()
-    indices = solid.faces.astype("<u4").tobytes()
-    red, green, blue = (linear(channel) for channel in HULL_COLOUR)
-    quarter = math.sqrt(0.5)
-    scene: dict[str, Any] = {
-        "asset": {
-            "version": "2.0",
-            "generator": APPLICATION,
-            "extras": {
-                "unit": "metre; millimetres of the base frame times 0.001",
-                "up": "the node turns the base frame, whose z is up, to y up",
-                "unit_mm": design.unit_mm,
-                "design": json.loads(design_json(design)),
-            },
-        },
-        "scene": 0,
-        "scenes": [{"nodes": [0]}],
-        "nodes": [{"name": name, "mesh": 0, "rotation": [-quarter, 0.0, 0.0, quarter]}],
-        "meshes": [
-            {
-                "name": name,
-                "primitives": [{"attributes": {"POSITION": 0}, "indices": 1, "material": 0}],
-            }
-        ],
-        "materials": [
-            {
-                "name": "workspace",
-                "pbrMetallicRoughness": {
-                    "baseColorFactor": [red, green, blue, 1.0],
-                    "metallicFactor": 0.0,
-                    "roughnessFactor": 0.8,
-                },
-            }
-        ],
-        "accessors": [
-            {
-                "bufferView": 0,
-                "componentType": 5126,
-                "count": len(points),
-                "type": "VEC3",
-                "min": points.min(axis=0).tolist(),
-                "max": points.max(axis=0).tolist(),
-            },
-            {
-                "bufferView": 1,
-                "componentType": 5125,
-                "count": int(solid.faces.size),
-                "type": "SCALAR",
-            },
-        ],
-        "bufferViews": [
-            {"buffer": 0, "byteOffset": 0, "byteLength": len(positions), "target": 34962},
-            {
-                "buffer": 0,
-                "byteOffset": len(positions),
-                "byteLength": len(indices),
-                "target": 34963,
-            },
-        ],
-        "buffers": [{"byteLength": len(positions) + len(indices)}],
-    }
-    return pack_glb(scene, positions + indices)
-
-
-def pack_glb(scene: Mapping[str, Any], binary: bytes) -> bytes:
-    """Return a GLB file of a glTF scene and its one buffer, a multiple of four bytes."""
-    text = json.dumps(scene).encode()
-    text += b" " * (-len(text) % 4)
-    length = 12 + 8 + len(text) + 8 + len(binary)
-    return b"".join(
-        [
-            struct.pack("<4sII", b"glTF", 2, length),
-            struct.pack("<I4s", len(text), b"JSON"),
-            text,
-            struct.pack("<I4s", len(binary), b"BIN\0"),
-            binary,
-        ]
+    points = _single(_millimetres(solid, design) * METRES_PER_MILLIMETRE, solid, "glb")
+    return glb_bytes(
+        {name: Body(points, solid.faces)},
+        [{"name": name, "mesh": 0, "rotation": Y_UP}],
+        [Material("workspace", HULL_COLOUR, metallic=0.0, roughness=0.8)],
+        design,
     )
 
 
 def _3mf(solid: Solid, design: Design, name: str) -> bytes:
-    import lib3mf  # pyright: ignore[reportMissingTypeStubs]
-
     points = _millimetres(solid, design)
-    largest = float(np.abs(points).max())
-    if largest > LARGEST_3MF:
-        raise InputError(
-            f"lib3mf takes coordinates up to {LARGEST_3MF:g} mm; these reach {largest:.3g} mm: use "
-            "another format, or a smaller unit"
-        )
-    # lib3mf writes fixed decimals, by way of integers of 64 bits.
+    largest = check_size(points)
+    # lib3mf writes fixed decimals, which it computes as integers of 64 bits.
     decimals = min(16, max(4, 11 - math.floor(math.log10(largest))))
     points = _single(points, solid, "3mf", decimals)
-    library: Any = lib3mf
-    try:
-        wrapper = library.get_wrapper()
-        model = wrapper.CreateModel()
-        model.SetUnit(library.ModelUnit.MilliMeter)
-        describe(model, name, design)
-        mesh = model.AddMeshObject()
-        mesh.SetName(name)
-        corners = np.ascontiguousarray(points, dtype="<f4")
-        faces = np.ascontiguousarray(solid.faces, dtype="<u4")
-        mesh.SetGeometry(
-            (library.Position * len(corners)).from_buffer_copy(corners),
-            (library.Triangle * len(faces)).from_buffer_copy(faces),
-        )
-        materials = model.AddBaseMaterialGroup()
-        resource = materials.GetResourceID()
-        ids = np.array(
-            [
-                materials.AddMaterial(limit, wrapper.RGBAToColor(*colour_of(limit), 255))
-                for limit in solid.limits
-            ],
-            dtype="<u4",
-        )
-        of_face = np.repeat(ids[solid.limit_of_face][:, None], 4, axis=1)
-        of_face[:, 0] = resource
-        mesh.SetObjectLevelProperty(resource, int(ids[0]))
-        mesh.SetAllTriangleProperties(
-            (library.TriangleProperties * len(faces)).from_buffer_copy(of_face)
-        )
-        model.AddBuildItem(mesh, wrapper.GetIdentityTransform())
-        writer = model.QueryWriter("3mf")
-        writer.SetDecimalPrecision(decimals)
-        return bytes(writer.WriteToBuffer())
-    except library.ELib3MFException as error:
-        raise ExplorerError(f"lib3mf refuses the mesh: {error}") from None
-
-
-def describe(model: Any, name: str, design: Design) -> None:
-    """Add what a model of lib3mf is of: its name, the application and the design."""
-    about = model.GetMetaDataGroup()
-    for key, value in (
-        ("Title", name),
-        ("Application", APPLICATION),
-        ("Description", f"{name}; one design unit is {design.unit_mm:g} mm"),
-    ):
-        about.AddMetaData("", key, value, "xs:string", True)
-    about.AddMetaData(NAMESPACE, "design", design_json(design), "xs:string", True)
+    with refusals_of_lib3mf("mesh"):
+        model = Model(name, design, {limit: colour_of(limit) for limit in solid.limits})
+        mesh = model.add_mesh(name, points, solid.faces, 0)
+        model.colour_faces(mesh, solid.limit_of_face)
+        return model.encode(mesh, decimals)
 
 
 def _ascii(text: str) -> str:
@@ -353,17 +222,11 @@ def _ascii(text: str) -> str:
 
 
 def _spaced(values: Iterable[float]) -> str:
-    """Return numbers with all their digits, separated by blanks."""
+    """Return numbers with all their digits, separated by spaces."""
     return " ".join(map(repr, values))
-
-
-def linear(channel: int) -> float:
-    """Return a channel of sRGB, 0 to 255, as linear light."""
-    share = channel / 255.0
-    return share / 12.92 if share <= 0.04045 else ((share + 0.055) / 1.055) ** 2.4
 
 
 FORMATS: Mapping[str, Callable[[Solid, Design, str], bytes]] = MappingProxyType(
     {"3mf": _3mf, "stl": _stl, "glb": _glb, "obj": _obj, "ply": _ply}
 )
-"""What writes each format, by its name, which is also its suffix."""
+"""The writer of each format by its name, which is also its suffix."""

@@ -1,6 +1,6 @@
-"""OpenCASCADE: its classes when they are asked for, exact shapes, and STEP files of documents.
+"""OpenCASCADE: its classes, imported on first use, exact shapes, and STEP files of documents.
 
-It comes with the extra `cad`, and has no types.
+It comes with the extra `cad`, and is untyped.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from explorer.errors import ExplorerError, MissingExtraError
-from explorer.export.mesh import Rgb, linear
+from explorer.export.metadata import Rgb, linear
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.kernel import Circle
 
 SCHEMA = "AP242DIS"
 
-# Directions in which the outline of a hull is looked for; only neighbours are taken from it.
+# The directions in which the outline of a hull is sampled, to order its circles.
 _DIRECTIONS = 3600
 
 
@@ -32,7 +32,7 @@ def occ(name: str) -> Any:
     """Return a class of OpenCASCADE; its package is the first word of its name.
 
     Raises:
-        MissingExtraError: it is not installed; the message says how to get it.
+        MissingExtraError: OpenCASCADE is not installed; the message says how to install it.
     """
     try:
         package = importlib.import_module(f"OCP.{name.partition('_')[0]}")
@@ -58,19 +58,19 @@ def coordinates(of: Any) -> FloatArray:
     return np.array([of.X(), of.Y(), of.Z()])
 
 
-def placed(rotation: FloatArray, origin: FloatArray) -> Any:
-    """Return a `gp_Trsf` that turns and then moves."""
-    found = occ("gp_Trsf")()
+def transform(rotation: FloatArray, origin: FloatArray) -> Any:
+    """Return a `gp_Trsf` that rotates and then translates."""
+    made = occ("gp_Trsf")()
     rows = np.column_stack([rotation, origin])
-    found.SetValues(*map(float, rows.ravel()))
-    return found
+    made.SetValues(*map(float, rows.ravel()))
+    return made
 
 
 def faces_of(shape: Any) -> Iterator[Any]:
     """Yield the faces of a shape."""
     walk = occ("TopExp_Explorer")(shape, occ("TopAbs_ShapeEnum").TopAbs_FACE)
     namespace = occ("TopoDS")
-    # The name of static functions had an ending before OpenCASCADE 8.
+    # Static functions had the suffix _s before OpenCASCADE 8.
     to_face = getattr(namespace, "Face", None) or namespace.Face_s
     while walk.More():
         yield to_face(walk.Current())
@@ -79,15 +79,15 @@ def faces_of(shape: Any) -> Iterator[Any]:
 
 def volume_of(shape: Any) -> float:
     """Return the volume of a shape, integrated over its exact faces."""
-    found = occ("GProp_GProps")()
-    # Asked for this precision, quadrature over curved faces does not stop at 1e-4.
-    occ("BRepGProp").VolumeProperties_s(shape, found, 1e-9)
-    return float(found.Mass())
+    properties = occ("GProp_GProps")()
+    # With the default precision quadrature over curved faces stops at 1e-4.
+    occ("BRepGProp").VolumeProperties_s(shape, properties, 1e-9)
+    return float(properties.Mass())
 
 
 @dataclass(frozen=True)
 class ExactShape:
-    """A body with exact faces, as `explorer.prototype.kernel.Shape` has it."""
+    """A body with exact faces; implements `explorer.prototype.kernel.Shape`."""
 
     shape: Any
 
@@ -101,20 +101,20 @@ class ExactShape:
         return self._with(other, "BRepAlgoAPI_Common")
 
     def translate(self, offset: Triple) -> ExactShape:
-        """Return it moved."""
-        return self._moved(placed(np.eye(3), np.array(offset)))
+        """Return the shape translated."""
+        return self._moved(transform(np.eye(3), np.array(offset)))
 
     def rotate(self, degrees: Triple) -> ExactShape:
-        """Return it turned about x, y and z in turn."""
+        """Return the shape rotated about x, then y, then z, in degrees."""
         turn = Rotation.from_euler("xyz", degrees, degrees=True).as_matrix()
-        return self._moved(placed(turn, np.zeros(3)))
+        return self._moved(transform(turn, np.zeros(3)))
 
     def transform(self, matrix: FloatArray) -> ExactShape:
-        """Return it turned and moved by a matrix of three rows and four columns."""
-        return self._moved(placed(matrix[:, :3], matrix[:, 3]))
+        """Return the shape rotated and translated by a matrix, shape (3, 4)."""
+        return self._moved(transform(matrix[:, :3], matrix[:, 3]))
 
     def mirror(self, normal: Triple) -> ExactShape:
-        """Return its mirror image at a plane through the origin."""
+        """Return the mirror image in a plane through the origin."""
         found = occ("gp_Trsf")()
         found.SetMirror(occ("gp_Ax2")(point(np.zeros(3)), direction(np.array(normal))))
         return self._moved(found)
@@ -130,7 +130,7 @@ class ExactShape:
 
 
 class ExactKernel:
-    """Makes bodies of exact faces: what to cut out for a hole is the hole itself."""
+    """Bodies of exact faces; a hole needs no correction for facets."""
 
     def disc(self, circle: Circle, low: float, high: float) -> ExactShape:
         """Return a cylinder along z between two heights."""
@@ -138,7 +138,7 @@ class ExactKernel:
         return ExactShape(occ("BRepPrimAPI_MakeCylinder")(frame, circle.radius, high - low).Shape())
 
     def hole(self, circle: Circle, low: float, high: float) -> ExactShape:
-        """Return what to cut out for a round hole."""
+        """Return the cutter of a round hole."""
         return self.disc(circle, low, high)
 
     def ball(self, radius: float) -> ExactShape:
@@ -146,7 +146,7 @@ class ExactKernel:
         return ExactShape(occ("BRepPrimAPI_MakeSphere")(radius).Shape())
 
     def cavity(self, radius: float) -> ExactShape:
-        """Return what to cut out for a ball about the origin."""
+        """Return the cutter of a ball about the origin."""
         return self.ball(radius)
 
     def box(self, low: Triple, high: Triple) -> ExactShape:
@@ -193,7 +193,7 @@ class ExactKernel:
 
 
 def _outline(circles: Sequence[Circle]) -> list[int]:
-    """Return the circles on the convex hull, counter-clockwise; one may come twice."""
+    """Return the indices of the circles on the convex hull, counter-clockwise, with repeats."""
     angles = np.linspace(0.0, 2.0 * math.pi, _DIRECTIONS, endpoint=False)
     reach = np.array([c.x * np.cos(angles) + c.y * np.sin(angles) + c.radius for c in circles])
     farthest = reach.argmax(axis=0).tolist()
@@ -202,7 +202,7 @@ def _outline(circles: Sequence[Circle]) -> list[int]:
 
 
 class Document:
-    """A document of shapes with names and colours, to be written as STEP."""
+    """A document of shapes with names and colours, for a STEP file."""
 
     def __init__(self) -> None:
         self._document = occ("TDocStd_Document")(_text("XmlOcaf"))
@@ -210,12 +210,12 @@ class Document:
         self.shapes = tools.ShapeTool_s(self._document.Main())
         self.colours = tools.ColorTool_s(self._document.Main())
 
-    def name(self, label: Any, name: str) -> None:
-        """Give a label a name."""
+    def set_name(self, label: Any, name: str) -> None:
+        """Set the name of a label."""
         occ("TDataStd_Name").Set_s(label, _text(name))
 
-    def colour(self, label: Any, rgb: Rgb) -> None:
-        """Give the surface of a label a colour."""
+    def set_colour(self, label: Any, rgb: Rgb) -> None:
+        """Set the surface colour of a label."""
         red, green, blue = (linear(channel) for channel in rgb)
         colour = occ("Quantity_Color")(
             red, green, blue, occ("Quantity_TypeOfColor").Quantity_TOC_RGB
@@ -228,7 +228,7 @@ class Document:
         Raises:
             ExplorerError: OpenCASCADE cannot write it.
         """
-        _hush()
+        _silence_messages()
         occ("STEPCAFControl_Controller").Init_s()
         static = occ("Interface_Static")
         static.SetCVal_s("write.step.schema", SCHEMA)
@@ -249,7 +249,7 @@ def _text(text: str) -> Any:
     return occ("TCollection_ExtendedString")(text, True)
 
 
-def _hush() -> None:
-    """Keep OpenCASCADE from telling on standard output what it writes."""
+def _silence_messages() -> None:
+    """Stop OpenCASCADE from writing progress to standard output."""
     for printer in occ("Message").DefaultMessenger_s().Printers():
         printer.SetTraceLevel(occ("Message_Gravity").Message_Alarm)

@@ -1,7 +1,7 @@
-"""Where the platform was in a session, as a table of comma-separated values.
+"""The poses of a session as CSV.
 
-Each row holds its design too, so that it can be computed again by itself: the forward kinematics
-of its joints in its mode is its pose.
+A row holds its design too, so that it is reproducible on its own: the forward kinematics of its
+joints in its assembly mode is its pose.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from explorer.export.trajectory import COLUMNS as OF_TRAJECTORIES
+from explorer.export.trajectory import COLUMNS as TRAJECTORY_COLUMNS
 from explorer.mechanism.design import VARIABLES
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.kinematics import inverse
@@ -21,12 +21,12 @@ from explorer.mechanism.pose import rotation_from_quaternion
 from explorer.numerics.arrays import FloatArray
 
 COLUMNS = (
-    *OF_TRAJECTORIES,
+    *TRAJECTORY_COLUMNS,
     *("kappa1", "kappa2", "kappa3", "mode", "moved_by", "unit_mm"),
     *VARIABLES,
 )
 """The names of the columns; lengths are in design units of `unit_mm` millimetres, and so are
-the margins kappa1 to kappa3. What moved the platform is told in words."""
+the margins δ1 to δ3, in the columns kappa1 to kappa3. The column moved_by is in words."""
 
 
 @dataclass(frozen=True)
@@ -34,13 +34,13 @@ class SessionTable:
     """The poses of a session, in their order.
 
     Attributes:
-        time: In seconds since the session began, shape (n,).
-        position: b4 in the base frame, in design units, shape (n, 3).
-        quaternion: Platform to base, (w, x, y, z), shape (n, 4).
-        mode: The assembly mode, 0 to 7, shape (n,).
-        moved_by: What brought the platform there.
-        unit_mm: Millimetres in one design unit, shape (n,).
-        variables: Of the design, in the order of `VARIABLES`, shape (n, 6).
+        time: Time in seconds since the session began, shape (n,).
+        position: Position of b4 in the base frame, in design units, shape (n, 3).
+        quaternion: Orientation, platform to base, (w, x, y, z), shape (n, 4).
+        mode: Assembly mode, 0 to 7, shape (n,).
+        moved_by: Cause of each move, in words.
+        unit_mm: Millimetres per design unit, shape (n,).
+        variables: Design variables, in the order of `VARIABLES`, shape (n, 6).
     """
 
     time: FloatArray
@@ -53,9 +53,9 @@ class SessionTable:
 
 
 def session_csv(table: SessionTable) -> str:
-    """Return the poses of a session as text: a line of names, then a line for each pose.
+    """Return the poses of a session as CSV: a header, then a line per pose.
 
-    Numbers are written so that they read back to the last bit.
+    Numbers round-trip to the last bit.
     """
     rotation = rotation_from_quaternion(table.quaternion)
     numbers = np.column_stack(
@@ -78,7 +78,7 @@ def session_csv(table: SessionTable) -> str:
 
 
 def _joints(table: SessionTable, rotation: FloatArray) -> FloatArray:
-    """Return the joints (n, 6), each row in the design of its own."""
+    """Return the joints (n, 6), each row by its own design."""
     joints = np.empty((len(table.time), 6))
     if not len(joints):
         return joints

@@ -1,12 +1,12 @@
 """The mechanism for physics engines: an MJCF model, in metres, kilograms and radians.
 
 Every leg is a chain of three joints from the base; the platform is free, and each ball
-joint a `connect` that closes a loop. The home pose is the reference configuration, joint
-values are those of `explorer.prototype.chains`, lengths in metres. Position servos move
+joint is a `connect` that closes a loop. The home pose is the reference configuration; joint
+values are those of `explorer.prototype.chains`, with lengths in metres. Position servos move
 the six actuators.
 
-A swing limit of a universal joint is a cone, that of its two hinges the box around it.
-Limits of the ball joints and of the pose (box, margins) have no counterpart and are left out.
+The swing limit of a universal joint is a cone; its two hinges have the box around it. Limits
+of the ball joints and of the pose (box, margins) have no counterpart in MJCF and are left out.
 """
 
 from __future__ import annotations
@@ -39,12 +39,12 @@ from explorer.prototype.sketch import BALL, ROD, leg_radii, platform_points, ske
 from explorer.workspace.limits.constraints import demanded_order
 
 DENSITY = 1240.0
-"""Of what the bodies are made unless told otherwise, in kg/m³: that of printed PLA."""
+"""The default density of the bodies, in kg/m³: that of printed PLA."""
 
 TIMESTEP = 5e-4
-# How fast the servos follow, in rad/s; a load of their own weight puts them off by g/ω².
+# The natural frequency of the servos, in rad/s; their own weight deflects them by g/ω².
 SERVO = 300.0
-# MuJoCo takes moving bodies for massless below this, in kg and kg m².
+# MuJoCo treats lighter moving bodies as massless, in kg and kg m².
 LEAST_MASS = LEAST_INERTIA = 1e-14
 
 X, Y, Z = (1, 0, 0), (0, 1, 0), (0, 0, 1)
@@ -53,13 +53,13 @@ X, Y, Z = (1, 0, 0), (0, 1, 0), (0, 0, 1)
 def simulation_joints(design: Design, position: FloatArray, rotation: FloatArray) -> FloatArray:
     """Return the joint values of the model in a pose (MuJoCo's `qpos`), shape (..., 19).
 
-    They are the joints of the four chains, lengths in metres, then the position of the
-    platform and its quaternion (w, x, y, z).
+    The values are the joints of the four chains, with lengths in metres, then the position of
+    the platform and its quaternion (w, x, y, z).
 
     Args:
         design: The manipulator.
-        position: b4 in the base frame, shape (..., 3), in design units.
-        rotation: Platform to base, shape (..., 3, 3).
+        position: Position of b4 in the base frame, shape (..., 3), in design units.
+        rotation: Rotation from platform to base, shape (..., 3, 3).
 
     Raises:
         InputError: a pose that is not finite or not a rotation.
@@ -79,14 +79,14 @@ def simulation_mjcf(
 
     Args:
         design: The manipulator.
-        density: Of the bodies, in kg/m³.
-        masses: Of the bodies in their own frames, in metres and kilograms, such as those of
-            the parts, see `explorer.prototype.assembly.Prototype.masses`; those of bars with
-            the legs' radii if None.
+        density: Density of the bodies, in kg/m³.
+        masses: Masses of the bodies in their own frames, in metres and kilograms, such as
+            `explorer.prototype.assembly.Prototype.masses`; those of bars with the legs' radii
+            if None.
 
     Raises:
-        InputError: a density that is not positive, a home pose in which a leg has no
-            length, or bodies so light that MuJoCo takes them for massless.
+        InputError: a density that is not positive, a home pose in which a leg has zero
+            length, or bodies so light that MuJoCo treats them as massless.
     """
     if not (math.isfinite(density) and density > 0.0):
         raise InputError(f"the density must be positive; got {density:g}")
@@ -102,13 +102,13 @@ def write_simulation(
     """Write the model into a file, whole or not at all.
 
     Raises:
-        InputError: as of `simulation_mjcf`, or a file that cannot be written.
+        InputError: as for `simulation_mjcf`, or a file that cannot be written.
     """
     write_whole(path, simulation_mjcf(design, density, masses).encode())
 
 
 class _Model:
-    """What the elements of the model are made from."""
+    """The elements of the model, from a design in its home pose."""
 
     def __init__(self, design: Design, density: float, masses: Mapping[str, Mass] | None) -> None:
         self.design = design
@@ -166,7 +166,7 @@ class _Model:
             tolerance="1e-12",
         )
         default = ET.SubElement(root, "default")
-        # Bodies overlap in their joints; what may touch is for the explorer to say.
+        # Bodies overlap in their joints, so contacts are off; the explorer checks collisions.
         ET.SubElement(default, "geom", contype="0", conaffinity="0")
         stiff = {"solref": f"{2 * TIMESTEP!r} 1", "solimp": "0.9999 0.99999 1e-5"}
         ET.SubElement(default, "equality", stiff)
@@ -199,7 +199,7 @@ class _Model:
             first = self._body(world, names[0], "base")
             _geom(first, "sphere", BALL * radius)
             cylinder = self._body(first, names[1], names[0])
-            # Through all of its length, whatever the stroke, so that nothing gapes.
+            # Half of the leg at home, whatever the stroke, so that no gap shows.
             _geom(cylinder, "capsule", radius, fromto=_row([0, 0, 0, 0, 0, 0.5 * length]))
             rod = self._body(cylinder, names[2], names[1])
             _geom(rod, "capsule", ROD * radius, fromto=_row([0, 0, -length, 0, 0, 0]))
@@ -267,7 +267,7 @@ class _Model:
                 return None
             swing = math.radians(degrees)
             return at_home - swing, at_home + swing
-        # A range of no width would be one that MuJoCo refuses.
+        # MuJoCo refuses a range of zero width.
         return (low * self.metres, high * self.metres) if high > low else None
 
     def _gap(self, root: ET.Element) -> None:

@@ -1,10 +1,10 @@
 """The constant-orientation workspace as STEP: true spheres, cylinders, cones and planes.
 
 Each limit is an exact primitive of OpenCASCADE, which the booleans keep, so that the file is
-small and its volume that of `explorer.workspace.slices.volume`. AP242, in millimetres of the base
-frame; each face has the name and the colour of the limit that it comes from.
+small and its volume is that of `explorer.workspace.slices.volume`. AP242, in millimetres of the
+base frame; each face has the name and the colour of the limit that it comes from.
 
-Needs the extra `cad`, which is imported only when asked for.
+Needs the extra `cad`, which is imported only when it is used.
 """
 
 from __future__ import annotations
@@ -37,14 +37,14 @@ from explorer.workspace.limits.constraints import Cone, Constraint, HalfSpace, R
 from explorer.workspace.limits.region import Region, region_of
 from explorer.workspace.slices.volume import bounds, home_rotation, workspace_volume
 
-# OpenCASCADE takes points that are nearer than 1e-7 for one, whatever the unit.
+# OpenCASCADE merges points that are nearer than 1e-7, whatever the unit.
 SMALLEST_MM, LARGEST_MM = 1e-1, 1e7
 GOOD_ERROR, LARGEST_ERROR = 1e-6, 1e-4
-"""Of the volume: at the first no other order of the booleans is tried, the last is refused."""
+"""Relative errors of the volume: the first is accepted at once, beyond the last is refused."""
 
-# Of the largest extent: how far the first box reaches beyond the workspace.
+# The overhang of the first box over the workspace, relative to the largest extent.
 _BEYOND = 0.1
-# Of the largest extent: planes and cones are cut off so far away.
+# The size of half-spaces, relative to the largest extent.
 _FAR = 4.0
 
 
@@ -54,7 +54,7 @@ class ExactSolid:
 
     Attributes:
         shape: A `TopoDS_Shape` of solids.
-        limit_of_face: Of each face, in the order of OpenCASCADE's explorer.
+        limit_of_face: Name of the limit of each face, in the order of OpenCASCADE's explorer.
     """
 
     shape: Any
@@ -71,7 +71,7 @@ def exact_workspace(design: Design, rotation: ArrayLike | None = None) -> ExactS
 
     Args:
         design: The manipulator.
-        rotation: Platform to base, shape (3, 3); that of the home pose if None.
+        rotation: Rotation from platform to base, shape (3, 3); that of the home pose if None.
 
     Raises:
         MissingExtraError: OpenCASCADE is not installed.
@@ -96,7 +96,7 @@ def exact_workspace(design: Design, rotation: ArrayLike | None = None) -> ExactS
         )
     best: ExactSolid | None = None
     off = math.inf
-    for shape in _Maker(lows, highs, unit).attempts(limits, region):
+    for shape in _Primitives(lows, highs, unit).attempts(limits, region):
         found = ExactSolid(shape, tuple(_limit_of(face, limits, unit) for face in faces_of(shape)))
         error = abs(found.volume / unit**3 - exact.volume) / exact.volume
         if error < off:
@@ -115,7 +115,7 @@ def workspace_step(design: Design, rotation: ArrayLike | None = None) -> bytes:
     """Return a STEP file of the constant-orientation workspace.
 
     Raises:
-        MissingExtraError, InputError, NoAnswerError, ExplorerError: as of `exact_workspace`.
+        MissingExtraError, InputError, NoAnswerError, ExplorerError: as for `exact_workspace`.
     """
     return step_bytes(exact_workspace(design, rotation), f"workspace of {design.name}")
 
@@ -123,11 +123,11 @@ def workspace_step(design: Design, rotation: ArrayLike | None = None) -> bytes:
 def write_workspace_step(
     design: Design, path: Path, rotation: ArrayLike | None = None
 ) -> ExactSolid:
-    """Write a STEP file of the workspace, whole or not at all, and return what is in it.
+    """Write a STEP file of the workspace, whole or not at all, and return its solid.
 
     Raises:
-        MissingExtraError, NoAnswerError, ExplorerError: as of `exact_workspace`.
-        InputError: as of it, or a file that cannot be written.
+        MissingExtraError, NoAnswerError, ExplorerError: as for `exact_workspace`.
+        InputError: as for `exact_workspace`, or a file that cannot be written.
     """
     solid = exact_workspace(design, rotation)
     write_whole(path, step_bytes(solid, f"workspace of {design.name}"))
@@ -135,16 +135,16 @@ def write_workspace_step(
 
 
 def check_extra() -> None:
-    """Find out whether OpenCASCADE is installed.
+    """Check that OpenCASCADE is installed.
 
     Raises:
-        MissingExtraError: it is not; the message says how to get it.
+        MissingExtraError: OpenCASCADE is not installed; the message says how to get it.
     """
     occ("gp_Pnt")
 
 
-class _Maker:
-    """Makes the primitives, in millimetres, as far as a box of positions needs them."""
+class _Primitives:
+    """The primitives of the limits, in millimetres, as large as a box of positions needs."""
 
     def __init__(self, lows: FloatArray, highs: FloatArray, unit: float) -> None:
         self.unit = unit
@@ -153,9 +153,9 @@ class _Maker:
         self.highs = highs + _BEYOND * self.size
 
     def attempts(self, limits: tuple[Constraint, ...], region: Region) -> Iterator[Any]:
-        """Yield what keeps all limits of a region, the limits in one order and another.
+        """Yield the intersection of the limits of a region, computed in several orders.
 
-        Where surfaces nearly touch, some orders fail and others do not.
+        Where surfaces nearly touch, the booleans fail in some orders only.
         """
         steps = list(self._steps(limits, region))
         half = len(steps) // 2
@@ -207,7 +207,6 @@ class _Maker:
         return occ("BRepPrimAPI_MakeBox")(corner, 2.0 * far, 2.0 * far, 2.0 * far).Shape()
 
     def _round(self, each: Round) -> Any:
-
         radius, centre = each.radius * self.unit, each.centre * self.unit
         if each.is_ball:
             away = self._away(centre)
@@ -224,7 +223,7 @@ class _Maker:
         return away if np.linalg.norm(away) > 1e-9 * self.size else np.array([0.0, 0.0, 1.0])
 
     def _frame(self, origin: FloatArray, axis: FloatArray) -> Any:
-        """Return a frame whose seam is away from the workspace: it would spoil booleans."""
+        """Return a frame whose seam is away from the workspace, where it would break booleans."""
         away = self._away(origin)
         across = _cross(_cross(axis, away), axis)
         if np.linalg.norm(across) <= 1e-9 * np.linalg.norm(away) * (axis @ axis):
@@ -258,7 +257,6 @@ class _Maker:
             yield self._round_cone(apex, axis, angle), not outside
 
     def _round_cone(self, apex: FloatArray, axis: FloatArray, angle: float) -> Any:
-
         apex = apex * self.unit
         far = np.maximum(np.abs(self.lows - apex), np.abs(self.highs - apex))
         height = 1.1 * float(np.linalg.norm(far))
@@ -267,7 +265,7 @@ class _Maker:
 
 
 def _turned(vector: FloatArray, angle: float) -> FloatArray:
-    """Return a vector of the yz-plane turned about x."""
+    """Return a vector of the yz-plane rotated about x."""
     c, s = math.cos(angle), math.sin(angle)
     return np.array([0.0, c * vector[1] - s * vector[2], s * vector[1] + c * vector[2]])
 
@@ -302,9 +300,9 @@ def step_bytes(solid: ExactSolid, name: str) -> bytes:
     """
     document = Document()
     top = document.shapes.AddShape(solid.shape, False)
-    document.name(top, name)
+    document.set_name(top, name)
     for face, limit in zip(faces_of(solid.shape), solid.limit_of_face, strict=True):
         label = document.shapes.AddSubShape(top, face)
-        document.name(label, limit)
-        document.colour(label, colour_of(limit))
+        document.set_name(label, limit)
+        document.set_colour(label, colour_of(limit))
     return document.step()

@@ -1,7 +1,7 @@
-"""The prototype as STEP: parts of exact faces, in the groups that people take apart.
+"""The prototype as STEP: parts of exact faces, in subassemblies.
 
 AP242, millimetres of the base frame, in the home pose; names and colours as in 3MF. Needs
-the extra `cad`, which is imported only when asked for.
+the extra `cad`, which is imported only when it is used.
 """
 
 from __future__ import annotations
@@ -9,8 +9,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from explorer.export.assembly import COLOURS, groups_of
-from explorer.export.opencascade import Document, ExactKernel, ExactShape, occ, placed
+from explorer.export.assembly import COLOURS, part_groups
+from explorer.export.opencascade import Document, ExactKernel, ExactShape, occ, transform
 from explorer.files.writing import write_whole
 from explorer.mechanism.home import home_pose
 from explorer.prototype.chains import BODIES, Chains
@@ -41,14 +41,14 @@ def assembly_step(sizes: Sizes) -> bytes:
     parts = exact_parts(sizes)
     document = Document()
     whole = _group(document, f"mechanism of {design.name}")
-    for name, members in groups_of():
+    for name, members in part_groups():
         group = _group(document, name)
         for member in members:
             label = document.shapes.AddShape(parts[member].shape, False)
-            document.name(label, member)
-            document.colour(label, COLOURS[member.partition(" ")[0]])
+            document.set_name(label, member)
+            document.set_colour(label, COLOURS[member.partition(" ")[0]])
             body = BODIES.index(member if member in BODIES else "platform")
-            where = placed(places.rotation[body], places.origin[body] * design.unit_mm)
+            where = transform(places.rotation[body], places.origin[body] * design.unit_mm)
             _add(document, group, label, where, member)
         _add(document, whole, group, occ("gp_Trsf")(), name)
     document.shapes.UpdateAssemblies()
@@ -59,7 +59,7 @@ def write_assembly_step(sizes: Sizes, path: Path) -> None:
     """Write a STEP file of the parts, whole or not at all.
 
     Raises:
-        MissingExtraError, ExplorerError: as of `assembly_step`.
+        MissingExtraError, ExplorerError: as for `assembly_step`.
         InputError: the file cannot be written.
     """
     write_whole(path, assembly_step(sizes))
@@ -67,9 +67,11 @@ def write_assembly_step(sizes: Sizes, path: Path) -> None:
 
 def _group(document: Document, name: str) -> Any:
     label = document.shapes.NewShape()
-    document.name(label, name)
+    document.set_name(label, name)
     return label
 
 
 def _add(document: Document, group: Any, label: Any, where: Any, name: str) -> None:
-    document.name(document.shapes.AddComponent(group, label, occ("TopLoc_Location")(where)), name)
+    document.set_name(
+        document.shapes.AddComponent(group, label, occ("TopLoc_Location")(where)), name
+    )

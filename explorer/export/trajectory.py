@@ -11,13 +11,13 @@ from explorer.mechanism.design import JOINTS
 from explorer.paths.trajectory import Trajectory
 
 COLUMNS = ("time_s", *JOINTS, "x", "y", "z", "qw", "qx", "qy", "qz")
-"""The names of the columns; lengths are in design units, angles nowhere."""
+"""The names of the columns; lengths are in design units."""
 
 
 def trajectory_csv(trajectory: Trajectory) -> str:
-    """Return a trajectory as text: a line of names, then a line for each sample.
+    """Return a trajectory as CSV: a header, then a line per sample.
 
-    Numbers are written so that they read back to the last bit.
+    Numbers round-trip to the last bit.
     """
     rows = np.column_stack(
         [trajectory.time, trajectory.joints, trajectory.position, trajectory.quaternion]
@@ -27,7 +27,7 @@ def trajectory_csv(trajectory: Trajectory) -> str:
 
 
 def write_trajectory(trajectory: Trajectory, path: Path) -> None:
-    """Write a trajectory into a file.
+    """Write a trajectory as a CSV file.
 
     Raises:
         InputError: the file cannot be written.

@@ -39,7 +39,7 @@ def answer(capsys: pytest.CaptureFixture[str], *argv: str, status: int = 0) -> d
     return found  # pyright: ignore[reportUnknownVariableType]
 
 
-def test_inverse_gives_the_joints_in_their_one_order(capsys: pytest.CaptureFixture[str]) -> None:
+def test_inverse_json_has_joints_in_order(capsys: pytest.CaptureFixture[str]) -> None:
     found = answer(capsys, "inverse", *POSE)
     expected = snapshot()
     assert set(found) == {"joints", "within_limits", "violations"}
@@ -48,7 +48,7 @@ def test_inverse_gives_the_joints_in_their_one_order(capsys: pytest.CaptureFixtu
     assert found["within_limits"] is (not expected.violations)
 
 
-def test_inverse_names_every_limit_that_the_pose_breaks(
+def test_inverse_pose_outside_limits_names_them(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     found = answer(capsys, "inverse", "--position", "30", "5", "9")
@@ -56,7 +56,7 @@ def test_inverse_names_every_limit_that_the_pose_breaks(
     assert any("box x" in each for each in found["violations"])
 
 
-def test_inverse_names_the_order_of_the_carriages_that_a_pose_breaks(
+def test_inverse_swapped_carriages_names_their_order(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     other = ["--position", "10", "5", "9", "--yaw-pitch-roll", "-106.9", "0", "0"]
@@ -71,7 +71,7 @@ def test_inverse_names_the_order_of_the_carriages_that_a_pose_breaks(
     assert answer(capsys, "inverse", *other, "--design", str(file))["within_limits"] is True
 
 
-def test_singularity_gives_what_the_snapshot_holds(capsys: pytest.CaptureFixture[str]) -> None:
+def test_singularity_json_has_the_snapshot(capsys: pytest.CaptureFixture[str]) -> None:
     found = answer(capsys, "singularity", *POSE)
     expected = snapshot()
     assert found == {
@@ -97,7 +97,7 @@ def test_singularity_gives_what_the_snapshot_holds(capsys: pytest.CaptureFixture
     }
 
 
-def test_singularity_of_a_singular_pose_is_an_answer(capsys: pytest.CaptureFixture[str]) -> None:
+def test_singularity_singular_pose_has_status_0(capsys: pytest.CaptureFixture[str]) -> None:
     found = answer(capsys, "singularity", "--position", "0", "0", "0")
     assert found["determinant"] == 0.0
     assert found["stratum_dimension"] < 5
@@ -106,18 +106,18 @@ def test_singularity_of_a_singular_pose_is_an_answer(capsys: pytest.CaptureFixtu
     assert all(each["position"] == [0.0, 0.0, 0.0] for each in found["nearest"])
 
 
-def test_singularity_says_which_incidence_a_pose_has(capsys: pytest.CaptureFixture[str]) -> None:
+def test_singularity_singular_pose_names_its_incidence(capsys: pytest.CaptureFixture[str]) -> None:
     argv = ["singularity", "--position", "10", "5", "0", "--yaw-pitch-roll", "-70", "20", "30"]
     assert run(argv) == 0
     text = capsys.readouterr().out
     (row,) = [line for line in text.splitlines() if line.startswith("singular ")]
     assert row.split(maxsplit=1)[1] == "b4 on the base plane"
     assert "stratum            4 3 1 2, dimension 5: b4 on the base plane" in text
-    (row,) = [line for line in text.splitlines() if line.startswith("κ3 = 0")]
+    (row,) = [line for line in text.splitlines() if line.startswith("δ3 = 0")]
     assert [float(word) for word in row.split()[3:7]] == [0.0, 0.0, 10.0, 5.0]
 
 
-def test_forward_of_inverse_holds_the_pose_in_its_mode(
+def test_forward_joints_of_inverse_give_the_pose_in_its_mode(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     expected = snapshot()
@@ -134,7 +134,7 @@ def test_forward_of_inverse_holds_the_pose_in_its_mode(
     )
 
 
-def test_forward_lists_modes_whose_margins_have_their_signs(
+def test_forward_modes_have_margins_of_their_signs(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     found = answer(capsys, "forward", "--joints", *map(repr, snapshot().joints.tolist()))
@@ -148,7 +148,7 @@ def test_forward_lists_modes_whose_margins_have_their_signs(
         assert bits == [sign > 0 for sign in mode["signs"]]
 
 
-def test_lengths_that_cannot_close_are_an_answer_with_status_1(
+def test_forward_infeasible_joints_have_status_1(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     joints = snapshot().joints.copy()
@@ -161,7 +161,7 @@ def test_lengths_that_cannot_close_are_an_answer_with_status_1(
 
 
 @pytest.mark.parametrize("joint", range(6))
-def test_the_value_that_is_said_to_close_does_close_as_written(
+def test_forward_infeasible_joints_suggested_value_is_feasible(
     capsys: pytest.CaptureFixture[str], joint: int
 ) -> None:
     joints = snapshot().joints.copy()
@@ -177,7 +177,7 @@ def test_the_value_that_is_said_to_close_does_close_as_written(
     assert explorer.forward(PRESET, joints).feasible
 
 
-def test_the_failing_trilateration_is_named_with_its_points(
+def test_forward_infeasible_joints_name_the_tetrahedron(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     joints = snapshot().joints.copy()
@@ -192,12 +192,12 @@ def test_the_failing_trilateration_is_named_with_its_points(
     assert "l4 from 60 to " in message
 
 
-def test_without_pose_options_it_is_the_home_pose(capsys: pytest.CaptureFixture[str]) -> None:
+def test_pose_options_none_give_the_home_pose(capsys: pytest.CaptureFixture[str]) -> None:
     home = explorer.evaluate(PRESET, explorer.home_pose(PRESET))
     assert answer(capsys, "inverse")["joints"] == home.joints.tolist()
 
 
-def test_a_position_alone_keeps_the_orientation_of_home(
+def test_pose_options_position_keeps_the_home_orientation(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     home = explorer.home_pose(PRESET)
@@ -205,7 +205,7 @@ def test_a_position_alone_keeps_the_orientation_of_home(
     assert found["joints"] == explorer.inverse(PRESET, POSITION, home.rotation).tolist()
 
 
-def test_an_orientation_alone_keeps_the_position_of_home(
+def test_pose_options_orientation_keeps_the_home_position(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     home = explorer.home_pose(PRESET)
@@ -216,7 +216,7 @@ def test_an_orientation_alone_keeps_the_position_of_home(
     )
 
 
-def test_both_forms_of_an_orientation_mean_the_same(capsys: pytest.CaptureFixture[str]) -> None:
+def test_pose_options_quaternion_and_angles_agree(capsys: pytest.CaptureFixture[str]) -> None:
     quaternion = explorer.quaternion_from_rotation(explorer.rotation_from_yaw_pitch_roll(ANGLES))
     # Of any length, and -q is the same rotation as q.
     words = map(repr, (-3.0 * quaternion).tolist())
@@ -225,7 +225,7 @@ def test_both_forms_of_an_orientation_mean_the_same(capsys: pytest.CaptureFixtur
     np.testing.assert_allclose(by_quaternion["joints"], by_angles["joints"], rtol=1e-12)
 
 
-def test_a_design_file_counts_like_its_preset(
+def test_design_option_file_equals_its_preset(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     file = tmp_path / "my design.json"
@@ -235,7 +235,7 @@ def test_a_design_file_counts_like_its_preset(
     assert by_file != answer(capsys, "inverse", *POSE)
 
 
-def test_text_for_people_shows_units_and_millimetres(capsys: pytest.CaptureFixture[str]) -> None:
+def test_text_answers_show_units_and_millimetres(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["inverse", *POSE]) == 0
     text = capsys.readouterr().out
     joints = snapshot().joints
@@ -246,7 +246,7 @@ def test_text_for_people_shows_units_and_millimetres(capsys: pytest.CaptureFixtu
 
 
 @pytest.mark.parametrize("command", ["inverse", "singularity"])
-def test_text_for_people_has_no_colour_and_no_loose_ends(
+def test_text_answers_have_no_colour_and_no_trailing_spaces(
     capsys: pytest.CaptureFixture[str], command: str
 ) -> None:
     assert run([command, *POSE]) == 0
@@ -256,7 +256,7 @@ def test_text_for_people_has_no_colour_and_no_loose_ends(
     assert captured.err == ""
 
 
-def test_forward_for_people_has_a_row_for_each_mode(capsys: pytest.CaptureFixture[str]) -> None:
+def test_forward_text_has_a_row_per_mode(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["forward", "--joints", *map(repr, snapshot().joints.tolist())]) == 0
     rows = [line.split() for line in capsys.readouterr().out.splitlines()]
     assert [row[0] for row in rows[-8:]] == list("01234567")
@@ -264,7 +264,7 @@ def test_forward_for_people_has_a_row_for_each_mode(capsys: pytest.CaptureFixtur
 
 
 @pytest.mark.parametrize("form", [[], ["--json"]])
-def test_what_libraries_report_stays_out_of_the_answer(
+def test_answers_are_free_of_messages_of_libraries(
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
     tmp_path: Path,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,7 @@ untyped: Any = trimesh
 
 
 @pytest.mark.parametrize("file_format", FORMATS)
-def test_the_suffix_tells_the_format(
+def test_export_suffix_selects_the_format(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, file_format: str
 ) -> None:
     out = tmp_path / f"workspace.{file_format.upper()}"
@@ -39,7 +40,7 @@ def test_the_suffix_tells_the_format(
     assert [each.name for each in tmp_path.iterdir()] == [out.name]
 
 
-def test_a_hull_in_a_format_of_its_own_at_an_orientation(
+def test_export_hull_has_format_and_orientation_of_options(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     out = tmp_path / "hull"
@@ -53,13 +54,15 @@ def test_a_hull_in_a_format_of_its_own_at_an_orientation(
     assert found.volume == pytest.approx(expected * OPTIMAL.unit_mm**3, rel=1e-9)
 
 
-def test_an_empty_workspace_has_no_file(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_export_empty_workspace_writes_no_file(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
     out = tmp_path / "empty.stl"
     argv = ["export", "workspace", "--out", str(out), "--yaw-pitch-roll", "0", "0", "0"]
     assert run(argv) == 1
     captured = capsys.readouterr()
     assert captured.out == ""
-    assert "empty: margin κ2" in captured.err
+    assert re.search("empty: margin .2", captured.err)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -78,7 +81,7 @@ def test_an_empty_workspace_has_no_file(capsys: pytest.CaptureFixture[str], tmp_
         ("file.stl", ["--design", "no-such"], "no preset and no file"),
     ],
 )
-def test_what_cannot_be_written_is_refused_with_one_line(
+def test_export_unusable_options_are_one_line(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, name: str, options: list[str], words: str
 ) -> None:
     assert run(["export", "workspace", "--out", str(tmp_path / name), *options]) == 2
@@ -89,7 +92,7 @@ def test_what_cannot_be_written_is_refused_with_one_line(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_an_existing_file_survives_a_refusal(
+def test_export_refusal_keeps_an_existing_file(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     out = tmp_path / "file.stl"
@@ -99,14 +102,14 @@ def test_an_existing_file_survives_a_refusal(
     assert capsys.readouterr().out == ""
 
 
-def test_what_to_write_and_where_must_be_given(capsys: pytest.CaptureFixture[str]) -> None:
+def test_export_missing_object_or_file_is_named(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["export", "workspace"]) == 2
     assert "missing --out" in capsys.readouterr().err
     assert run(["export", "manual", "--out", "x.stl"]) == 2
     assert "mechanism" in capsys.readouterr().err
 
 
-def test_the_simulation_is_an_mjcf_model(
+def test_export_simulation_is_an_mjcf_model(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     from explorer.export.simulation import simulation_mjcf
@@ -145,7 +148,7 @@ def test_the_simulation_is_an_mjcf_model(
         ("hull", "hull.mjcf", [], "no mesh format 'mjcf'"),
     ],
 )
-def test_options_and_formats_belong_to_what_is_written(
+def test_export_foreign_options_and_formats_are_refused(
     capsys: pytest.CaptureFixture[str],
     tmp_path: Path,
     what: str,
@@ -164,7 +167,7 @@ def test_options_and_formats_belong_to_what_is_written(
 @pytest.mark.parametrize(
     ("name", "expected"), [("a.3mf", "3mf"), ("a.zip", "stl-zip"), ("a.step", "step")]
 )
-def test_the_mechanism_is_written_as_parts(
+def test_export_mechanism_writes_its_parts(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, name: str, expected: str
 ) -> None:
     out = tmp_path / name
@@ -182,10 +185,10 @@ def test_the_mechanism_is_written_as_parts(
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == str(out)
     assert len(lines) == 5
-    assert all("the limits ask for 0.0 to 204.2 mm" in line for line in lines[1:])
+    assert all("the limits require 0.0 to 204.2 mm" in line for line in lines[1:])
 
 
-def test_a_design_too_tight_for_its_parts_has_no_file(
+def test_export_mechanism_too_tight_writes_no_file(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     design = tmp_path / "thick.json"
@@ -200,7 +203,7 @@ def test_a_design_too_tight_for_its_parts_has_no_file(
     assert not out.exists()
 
 
-def test_the_workspace_as_step(capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_export_workspace_as_step(capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     out = tmp_path / "workspace.stp"
     words = ["--yaw-pitch-roll", "-60", "5", "0", "--json"]
     assert run(["export", "workspace", "--out", str(out), *words]) == 0
@@ -216,7 +219,7 @@ def test_the_workspace_as_step(capfd: pytest.CaptureFixture[str], tmp_path: Path
     assert out.read_bytes().startswith(b"ISO-10303-21;")
 
 
-def test_without_its_extra_step_is_refused_with_one_line(
+def test_export_step_without_extra_is_one_line(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "OCP.gp", None)
@@ -228,7 +231,7 @@ def test_without_its_extra_step_is_refused_with_one_line(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_scene_is_one_page_that_says_what_it_shows(
+def test_export_scene_is_one_page_with_its_title(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     out = tmp_path / "scene.html"
@@ -260,7 +263,7 @@ def test_a_scene_is_one_page_that_says_what_it_shows(
         (["simulation", "--format", "mjcf", "--position", "1", "2", "3"], "--position is not for"),
     ],
 )
-def test_what_does_not_belong_to_a_kind_of_file_is_refused(
+def test_export_scene_foreign_options_are_refused(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, argv: list[str], reason: str
 ) -> None:
     out = tmp_path / "out.html"

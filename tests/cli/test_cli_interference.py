@@ -72,7 +72,7 @@ def joined(tmp_path: Path) -> str:
     return str(file)
 
 
-def test_a_pose_gives_the_clearances_of_its_pairs_of_legs(
+def test_interference_pose_has_clearances_of_pairs(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     found = answer(capsys, *POSE, "--radii", *map(str, RADII))
@@ -94,12 +94,12 @@ def test_a_pose_gives_the_clearances_of_its_pairs_of_legs(
     assert found["within_limits"] is (not expected.violations)
 
 
-def test_without_options_it_is_the_home_pose(capsys: pytest.CaptureFixture[str]) -> None:
+def test_interference_default_is_the_home_pose(capsys: pytest.CaptureFixture[str]) -> None:
     legs = explorer.evaluate(OPTIMAL, HOME).clearances
     assert column(answer(capsys), "clearance") == legs.clearance.tolist()
 
 
-def test_one_radius_stands_for_all_and_those_of_the_file_for_none(
+def test_interference_one_radius_is_for_all_legs(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     thick = answer(capsys, "--radii", "0.4")
@@ -112,7 +112,7 @@ def test_one_radius_stands_for_all_and_those_of_the_file_for_none(
     assert answer(capsys, "--design", str(file), "--radii", "0") == answer(capsys)
 
 
-def test_the_limits_that_the_pose_breaks_are_named(capsys: pytest.CaptureFixture[str]) -> None:
+def test_interference_pose_outside_limits_names_them(capsys: pytest.CaptureFixture[str]) -> None:
     words = ["--position", "30", "5", "9"]
     found = answer(capsys, *words)
     assert found["within_limits"] is False
@@ -123,7 +123,7 @@ def test_the_limits_that_the_pose_breaks_are_named(capsys: pytest.CaptureFixture
     assert "the pose is within the limits" in text(capsys)
 
 
-def test_a_move_gives_both_answers_side_by_side(capsys: pytest.CaptureFixture[str]) -> None:
+def test_interference_move_has_exact_and_swept_tests(capsys: pytest.CaptureFixture[str]) -> None:
     found = answer(capsys, *MOVE, "--steps", "3", "--radii", *map(str, RADII))
     expected = explorer.move_clearance(with_radii(RADII), HOME, END, steps=3)
     for key in ("clearance", "bound", "share", "points", "overlaps"):
@@ -136,7 +136,7 @@ def test_a_move_gives_both_answers_side_by_side(capsys: pytest.CaptureFixture[st
     assert found["end"]["position"] == list(END.position)
 
 
-def test_the_clearance_of_a_move_is_that_of_the_pose_given_with_it(
+def test_interference_move_clearance_is_that_of_its_pose(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     start, end = np.array(HOME.position), np.array(END.position)
@@ -155,7 +155,7 @@ def test_the_clearance_of_a_move_is_that_of_the_pose_given_with_it(
 
 @pytest.mark.parametrize("preset", ["paper-initial", "paper-optimal"])
 @pytest.mark.parametrize("words", [MOVE, MOVE[:4], ["--to-quaternion", "1", "0.5", "-0.2", "0"]])
-def test_no_end_of_a_leg_goes_farther_in_a_step_than_the_node_step(
+def test_interference_default_steps_are_within_the_node_step(
     capsys: pytest.CaptureFixture[str], preset: str, words: list[str]
 ) -> None:
     design = explorer.PRESETS[preset]
@@ -177,7 +177,7 @@ def test_no_end_of_a_leg_goes_farther_in_a_step_than_the_node_step(
         assert farthest(found["steps"] - 1) > step
 
 
-def test_without_a_position_to_go_to_the_platform_turns_where_it_is(
+def test_interference_orientation_only_rotates_in_place(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     by_angles = answer(capsys, "--to-yaw-pitch-roll", "-20", "0", "15")
@@ -189,14 +189,14 @@ def test_without_a_position_to_go_to_the_platform_turns_where_it_is(
     )
 
 
-def test_a_move_keeps_the_orientation_unless_told_otherwise(
+def test_interference_position_only_keeps_the_orientation(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     found = answer(capsys, *POSE, "--to", "14", "-2", "6")
     assert found["end"]["quaternion"] == found["start"]["quaternion"]
 
 
-def test_a_move_that_leaves_the_limits_tells_at_which_end(
+def test_interference_move_outside_limits_names_the_end(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     found = answer(capsys, "--to", "30", "5", "9")
@@ -208,7 +208,7 @@ def test_a_move_that_leaves_the_limits_tells_at_which_end(
     assert "the end is outside the limits" in shown
 
 
-def test_legs_that_share_a_joint_are_null_and_said_in_words(
+def test_interference_joined_legs_are_null_and_in_words(
     capsys: pytest.CaptureFixture[str], joined: str
 ) -> None:
     index = explorer.PAIRS.index((2, 4))
@@ -228,7 +228,7 @@ def test_legs_that_share_a_joint_are_null_and_said_in_words(
         assert "inf" not in row
 
 
-def test_text_for_people_has_a_row_for_each_pair(capsys: pytest.CaptureFixture[str]) -> None:
+def test_interference_text_has_a_row_per_pair(capsys: pytest.CaptureFixture[str]) -> None:
     for words in ([], MOVE):
         found = answer(capsys, "--radii", "0.4", *words)
         rows = [
@@ -246,7 +246,7 @@ def test_text_for_people_has_a_row_for_each_pair(capsys: pytest.CaptureFixture[s
             assert [row[-1] == "overlap" for row in rows] == column(found, "overlaps")
 
 
-def test_the_verdict_tells_clear_legs_from_those_that_touch_and_collide(
+def test_interference_verdict_separates_clear_touching_and_colliding(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     assert "the legs are clear; closest 2–3" in text(capsys)
@@ -272,13 +272,13 @@ def test_the_verdict_tells_clear_legs_from_those_that_touch_and_collide(
         (["--too", "1", "2", "3"], "did you mean --to?"),
     ],
 )
-def test_what_cannot_be_used_is_refused_with_what_would_work(
+def test_interference_bad_input_is_refused_with_advice(
     capsys: pytest.CaptureFixture[str], words: list[str], reason: str
 ) -> None:
     assert reason in refusal(capsys, *words)
 
 
-def test_many_steps_can_be_asked_for_where_they_are_not_taken(
+def test_interference_many_steps_are_accepted(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     assert answer(capsys, "--to", "1e9", "2", "3", "--steps", "7")["steps"] == 7

@@ -16,7 +16,7 @@ import pytest
 
 import explorer
 from explorer.cli import run
-from explorer.cli.found import findings_table
+from explorer.cli.answers.optimisation import findings_table
 from explorer.numerics.compiled import warm
 from explorer.optimise.facts import facts_of
 from explorer.optimise.findings import Finding
@@ -46,7 +46,9 @@ def refusal(capsys: pytest.CaptureFixture[str], *argv: str) -> str:
     return captured.err
 
 
-def test_the_papers_problem_is_solved(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_optimise_paper_problem_converges(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
     out = tmp_path / "design.json"
     found = answer(capsys, *PAPER, "--clearance", "0.2", "--out", str(out))
     assert set(found) >= CONTRACT
@@ -65,7 +67,9 @@ def test_the_papers_problem_is_solved(capsys: pytest.CaptureFixture[str], tmp_pa
     assert found["files"] == [str(out), str(tmp_path / "design.record.json")]
 
 
-def test_a_record_repeats_its_search(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_optimise_repeat_gives_the_same_outcome(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
     kept = tmp_path / "run.json"
     first = answer(capsys, *PAPER, "--seed", "3", "--record", str(kept))
     record = load_record(kept)
@@ -75,7 +79,7 @@ def test_a_record_repeats_its_search(capsys: pytest.CaptureFixture[str], tmp_pat
     assert {**again, "seconds": 0, "files": []} == {**first, "seconds": 0, "files": []}
 
 
-def test_people_see_the_start_beside_what_was_found(capsys: pytest.CaptureFixture[str]) -> None:
+def test_optimise_text_has_start_beside_optimum(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["optimise", *PAPER]) == 0
     captured = capsys.readouterr()
     assert "converged: F = " in captured.out
@@ -85,7 +89,7 @@ def test_people_see_the_start_beside_what_was_found(capsys: pytest.CaptureFixtur
     assert "start 1 of 1" in captured.err
 
 
-def test_without_convergence_the_best_is_told_and_no_design_is_written(
+def test_optimise_without_convergence_writes_no_design(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     out, kept = tmp_path / "design.json", tmp_path / "run.json"
@@ -110,7 +114,7 @@ def test_without_convergence_the_best_is_told_and_no_design_is_written(
 
 
 @pytest.mark.parametrize("json_too", [False, True])
-def test_what_the_box_cannot_hold_is_refused_before_anything_is_searched(
+def test_optimise_volume_beyond_the_box_is_refused_at_once(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, json_too: bool
 ) -> None:
     def never(*_: object, **__: object) -> None:
@@ -140,7 +144,7 @@ def test_what_the_box_cannot_hold_is_refused_before_anything_is_searched(
     assert capsys.readouterr().err.endswith("asked for: lift the box with --box none\n")
 
 
-def test_the_box_of_a_design_is_lifted_by_one_option(capsys: pytest.CaptureFixture[str]) -> None:
+def test_optimise_box_none_lifts_the_box(capsys: pytest.CaptureFixture[str]) -> None:
     argv = ["--design", "paper-initial", "--target-volume", "8000", "--clearance", "0.2"]
     found = answer(capsys, *argv, "--box", "none")
     assert found["converged"] is True
@@ -154,7 +158,7 @@ def help_of(capsys: pytest.CaptureFixture[str]) -> str:
     return capsys.readouterr().out
 
 
-def test_other_objectives_and_variables(capsys: pytest.CaptureFixture[str]) -> None:
+def test_optimise_other_objectives_and_variables(capsys: pytest.CaptureFixture[str]) -> None:
     required = ["--required-box", "8", "4", "6", "12", "8", "10"]
     margin = answer(
         capsys, "--objective", "largest-margin", *required, "--free", "yaw", "--least", "0.5"
@@ -198,13 +202,13 @@ def test_other_objectives_and_variables(capsys: pytest.CaptureFixture[str]) -> N
         (["--objective", "largest"], "--objective"),
     ],
 )
-def test_bad_input_is_one_line(
+def test_optimise_bad_input_is_one_line(
     capsys: pytest.CaptureFixture[str], argv: list[str], words: str
 ) -> None:
     assert words in refusal(capsys, *argv)
 
 
-def test_an_interrupted_search_leaves_files_as_they_were(tmp_path: Path) -> None:
+def test_optimise_interrupt_leaves_files_unchanged(tmp_path: Path) -> None:
     warm()
     out = tmp_path / "design.json"
     out.write_text("as it was")
@@ -229,7 +233,7 @@ def test_an_interrupted_search_leaves_files_as_they_were(tmp_path: Path) -> None
     assert [path.name for path in tmp_path.iterdir()] == ["design.json"]
 
 
-def test_the_page_of_findings_has_a_row_for_each() -> None:
+def test_findings_table_has_a_row_per_finding() -> None:
     facts = facts_of(explorer.PRESETS["paper-optimal"], box=((8.0, 3.0, 7.0), (12.0, 7.0, 11.0)))
     found = [Finding("given", None, None, None, facts), Finding("ours", 5, 1e-13, 0.1, facts)]
     page = findings_table(found).splitlines()

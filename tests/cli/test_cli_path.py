@@ -26,7 +26,7 @@ def answer(capsys: pytest.CaptureFixture[str], *argv: str, status: int = 0) -> d
     return json.loads(captured.out)
 
 
-def test_a_path_has_its_corners_and_its_course_over_time(
+def test_path_json_has_poses_and_trajectory(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     file = tmp_path / "path.csv"
@@ -61,9 +61,7 @@ def test_a_path_has_its_corners_and_its_course_over_time(
         ],
     ],
 )
-def test_a_pose_can_be_given_in_several_ways(
-    capsys: pytest.CaptureFixture[str], words: list[str]
-) -> None:
+def test_path_forms_of_a_pose_agree(capsys: pytest.CaptureFixture[str], words: list[str]) -> None:
     found = answer(capsys, *words)
     rotation = rotation_from_yaw_pitch_roll((-70.0, 5.0, 3.0))
     for end, place in ((0, [9.0, 6.0, 8.0]), (-1, [10.0, 6.0, 8.0])):
@@ -75,13 +73,13 @@ def test_a_pose_can_be_given_in_several_ways(
         )
 
 
-def test_a_quaternion_can_follow_the_position(capsys: pytest.CaptureFixture[str]) -> None:
+def test_path_quaternion_after_position_is_used(capsys: pytest.CaptureFixture[str]) -> None:
     words = [*map(repr, HOME.quaternion)]
     found = answer(capsys, "--to", "11", "6", "8", *words)
     assert found["poses"][-1] == {"position": [11.0, 6.0, 8.0], "quaternion": list(HOME.quaternion)}
 
 
-def test_no_path_is_an_answer_with_status_1_and_a_reason(
+def test_path_without_solution_has_status_1_and_reason(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     found = answer(capsys, "--to", "12", "8", "-7", status=1)
@@ -93,7 +91,7 @@ def test_no_path_is_an_answer_with_status_1_and_a_reason(
 
 
 @pytest.mark.parametrize(("height", "reason"), [("30", "outside limits"), ("0", "singular")])
-def test_an_end_that_no_path_can_have_is_bad_input_with_a_reason(
+def test_path_invalid_end_has_status_2_and_reason(
     capsys: pytest.CaptureFixture[str], height: str, reason: str
 ) -> None:
     found = answer(capsys, "--to", "12", "8", height, status=2)
@@ -115,7 +113,7 @@ def test_an_end_that_no_path_can_have_is_bad_input_with_a_reason(
         (["--form", "12", "8", "7"], "did you mean --from?"),
     ],
 )
-def test_bad_input_is_one_line_and_status_2(
+def test_path_bad_input_is_one_line_and_status_2(
     capsys: pytest.CaptureFixture[str], words: list[str], message: str
 ) -> None:
     assert run(["path", *words]) == 2
@@ -125,11 +123,11 @@ def test_bad_input_is_one_line_and_status_2(
     assert message in captured.err
 
 
-def test_text_for_people_tells_ends_length_and_margins(
+def test_path_text_has_ends_length_and_margins(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     assert run(["path", "--to", "12", "8", "7"]) == 0
     text = capsys.readouterr().out
     assert "moves       1, each proved to keep limits and clearances" in text
-    assert "least |κ|" in text
+    assert "least |δ|" in text
     assert all(line == line.rstrip() for line in text.splitlines())

@@ -30,26 +30,26 @@ def process(*argv: str, env: dict[str, str] | None = None) -> subprocess.Complet
     )
 
 
-def test_an_answer_is_one_json_object_and_status_0() -> None:
+def test_process_answer_is_one_json_object_and_status_0() -> None:
     done = process("inverse", "--position", "10", "5", "9", "--json")
     assert (done.returncode, done.stderr) == (0, "")
     assert set(json.loads(done.stdout)) == {"joints", "within_limits", "violations"}
 
 
-def test_no_answer_is_status_1_with_one_line_beside_the_json() -> None:
+def test_process_no_answer_is_status_1_and_one_line() -> None:
     done = process("forward", "--joints", "1", "1", "1", "1", "1", "1", "--json")
     assert done.returncode == 1
     assert json.loads(done.stdout)["feasible"] is False
     assert done.stderr.count("\n") == 1
 
 
-def test_bad_input_is_status_2_with_one_line() -> None:
+def test_process_bad_input_is_status_2_and_one_line() -> None:
     done = process("forward", "--joints", "1", "2", "x")
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.count("\n") == 1
 
 
-def test_the_installed_script_is_the_module() -> None:
+def test_installed_script_runs_the_module() -> None:
     script = Path(sys.executable).parent / "explorer"
     if not script.exists():
         pytest.skip("the project is not installed here")
@@ -67,7 +67,7 @@ def test_help_lists_every_command(capsys: pytest.CaptureFixture[str], flag: str)
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_every_command_has_help_on_every_option(
+def test_help_of_a_command_describes_every_option(
     capsys: pytest.CaptureFixture[str], name: str
 ) -> None:
     assert run([name, "--help"]) == 0
@@ -85,7 +85,7 @@ def test_every_command_has_help_on_every_option(
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_the_listing_says_what_the_command_says(name: str) -> None:
+def test_summary_of_a_command_is_its_first_line(name: str) -> None:
     doc = inspect.getdoc(load_command(name, COMMANDS))
     assert doc is not None
     assert doc.splitlines()[0] == COMMANDS[name]
@@ -97,7 +97,7 @@ def test_version_is_that_of_the_package(capsys: pytest.CaptureFixture[str]) -> N
 
 
 @pytest.mark.parametrize("argv", [["inverse"], ["forward", "--joints", *"123456"], ["--help"]])
-def test_small_commands_import_nothing_large(argv: list[str]) -> None:
+def test_small_commands_import_no_slow_library(argv: list[str]) -> None:
     code = (
         "import sys; from explorer.cli import run; run(sys.argv[1:]); "
         "large = {'viser', 'numba', 'trimesh', 'manifold3d', 'playwright', 'scipy.optimize'}; "
@@ -109,7 +109,7 @@ def test_small_commands_import_nothing_large(argv: list[str]) -> None:
     assert done.stderr.endswith("[]")
 
 
-def test_an_interrupt_is_quiet_and_status_130(
+def test_interrupt_is_silent_with_status_130(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def interrupted(name: str) -> object:
@@ -121,7 +121,7 @@ def test_an_interrupt_is_quiet_and_status_130(
     assert (captured.out, captured.err) == ("", "")
 
 
-def test_a_fault_of_ours_is_one_line_and_status_70(
+def test_internal_error_is_one_line_with_status_70(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def faulty(name: str) -> object:
@@ -142,7 +142,7 @@ def test_a_fault_of_ours_is_one_line_and_status_70(
 
 
 @pytest.mark.skipif(os.name != "posix", reason="pipes of POSIX")
-def test_a_reader_that_has_left_is_no_fault() -> None:
+def test_closed_pipe_is_silent() -> None:
     read, write = os.pipe()
     os.close(read)
     done = subprocess.run([*PROGRAM, "inverse"], stdout=write, stderr=subprocess.PIPE, check=False)
@@ -151,7 +151,7 @@ def test_a_reader_that_has_left_is_no_fault() -> None:
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a full device")
-def test_a_full_disk_is_one_line() -> None:
+def test_full_disk_is_one_line() -> None:
     with Path("/dev/full").open("w") as full:
         done = subprocess.run(
             [*PROGRAM, "inverse", "--json"], stdout=full, stderr=subprocess.PIPE, check=False
@@ -161,7 +161,7 @@ def test_a_full_disk_is_one_line() -> None:
     assert done.stderr.count(b"\n") == 1
 
 
-def test_a_terminal_without_greek_letters_still_gets_its_text() -> None:
+def test_ascii_terminal_gets_text_with_replacements() -> None:
     done = process("singularity", env={"PYTHONIOENCODING": "ascii", "PYTHONUTF8": "0"})
     assert (done.returncode, done.stderr) == (0, "")
     assert "?1" in done.stdout

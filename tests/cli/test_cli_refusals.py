@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from explorer.cli import COMMANDS, run
-from explorer.cli.parsing import condensed
+from explorer.cli.parsing import condense
 
 SIX = ["1", "2", "3", "4", "5", "6"]
 
@@ -26,9 +26,7 @@ def refusal(capsys: pytest.CaptureFixture[str], *argv: str) -> str:
 
 
 @pytest.mark.parametrize("count", [0, 1, 5, 7])
-def test_another_count_of_joints_than_six_is_told_the_order(
-    capsys: pytest.CaptureFixture[str], count: int
-) -> None:
+def test_joints_wrong_count_names_the_order(capsys: pytest.CaptureFixture[str], count: int) -> None:
     message = refusal(capsys, "forward", "--joints", *(["2"] * count))
     assert "six numbers in the order l1 d1 d2 d3 d4 l4" in message
     assert f"got {count}" in message
@@ -42,45 +40,45 @@ def test_another_count_of_joints_than_six_is_told_the_order(
         ("--yaw-pitch-roll", ["1"], "three numbers in the order yaw pitch roll"),
     ],
 )
-def test_another_count_of_pose_numbers_is_told_the_order(
+def test_pose_wrong_count_names_the_order(
     capsys: pytest.CaptureFixture[str], option: str, words: list[str], order: str
 ) -> None:
     assert f"{option} needs {order}; got {len(words)}" in refusal(capsys, "inverse", option, *words)
 
 
 @pytest.mark.parametrize("word", ["nan", "inf", "-inf", "1e999"])
-def test_numbers_must_be_finite(capsys: pytest.CaptureFixture[str], word: str) -> None:
+def test_numbers_not_finite_are_refused(capsys: pytest.CaptureFixture[str], word: str) -> None:
     assert "y must be a finite number" in refusal(capsys, "inverse", "--position", "1", word, "2")
     joints = [*SIX[:3], word, *SIX[4:]]
     assert "d3 must be a finite number" in refusal(capsys, "forward", "--joints", *joints)
 
 
-def test_numbers_that_would_overflow_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
+def test_numbers_too_large_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
     assert "±1e+30" in refusal(capsys, "singularity", "--position", "1e200", "1", "1")
 
 
 @pytest.mark.parametrize("word", ["x", "1,2,3", "--5", "1e", "0x10", ""])
-def test_what_is_no_number_is_quoted(capsys: pytest.CaptureFixture[str], word: str) -> None:
+def test_numbers_other_words_are_quoted(capsys: pytest.CaptureFixture[str], word: str) -> None:
     assert word in refusal(capsys, "inverse", "--position", "1", "2", word)
 
 
-def test_negative_and_scientific_numbers_are_values(capsys: pytest.CaptureFixture[str]) -> None:
+def test_numbers_negative_and_scientific_are_values(capsys: pytest.CaptureFixture[str]) -> None:
     words = ["-1", "-2.5e-3", "+.5E1"]
     assert run(["inverse", "--position", *words, "--yaw-pitch-roll", "-1e2", "-.5", "-0"]) == 0
     assert capsys.readouterr().err == ""
 
 
-def test_negative_lengths_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
+def test_joints_negative_lengths_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
     message = refusal(capsys, "forward", "--joints", "-1", *SIX[1:])
     assert message.startswith("explorer: l1 ")
     assert "negative" in message
 
 
-def test_a_quaternion_of_zeros_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+def test_quaternion_of_zeros_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     assert "quaternion" in refusal(capsys, "inverse", "--quaternion", "0", "0", "0", "0")
 
 
-def test_two_orientations_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
+def test_pose_two_orientations_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
     options = ["--quaternion", "1", "0", "0", "0", "--yaw-pitch-roll", "1", "2", "3"]
     for command in ("inverse", "singularity", "screenshot"):
         message = refusal(capsys, command, *options)
@@ -88,33 +86,33 @@ def test_two_orientations_are_refused(capsys: pytest.CaptureFixture[str]) -> Non
         assert "--yaw-pitch-roll" in message
 
 
-def test_a_missing_option_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+def test_missing_option_is_named(capsys: pytest.CaptureFixture[str]) -> None:
     assert refusal(capsys, "forward").startswith("explorer forward: missing --joints; see ")
 
 
-def test_an_option_without_its_value_is_named(capsys: pytest.CaptureFixture[str]) -> None:
+def test_option_without_value_is_named(capsys: pytest.CaptureFixture[str]) -> None:
     assert "--design needs a value" in refusal(capsys, "inverse", "--design")
 
 
-def test_a_misspelt_option_gets_the_right_one(capsys: pytest.CaptureFixture[str]) -> None:
+def test_misspelt_option_gets_a_suggestion(capsys: pytest.CaptureFixture[str]) -> None:
     message = refusal(capsys, "forward", "--joint", *SIX)
     assert message == (
         "explorer forward: no option --joint (did you mean --joints?); see explorer forward --help"
     )
 
 
-def test_a_misspelt_command_gets_the_right_one(capsys: pytest.CaptureFixture[str]) -> None:
+def test_misspelt_command_gets_a_suggestion(capsys: pytest.CaptureFixture[str]) -> None:
     assert "did you mean forward?" in refusal(capsys, "foward")
     for command in COMMANDS:
         assert command in refusal(capsys, "xyzzy")
 
 
 @pytest.mark.parametrize("stray", ["stray", "-x", "a" * 200])
-def test_a_stray_argument_is_quoted_whole(capsys: pytest.CaptureFixture[str], stray: str) -> None:
+def test_stray_argument_is_quoted(capsys: pytest.CaptureFixture[str], stray: str) -> None:
     assert repr(stray) in refusal(capsys, "inverse", "--json", stray)
 
 
-def test_an_unknown_preset_is_told_the_presets(capsys: pytest.CaptureFixture[str]) -> None:
+def test_unknown_preset_lists_the_presets(capsys: pytest.CaptureFixture[str]) -> None:
     for command in ("inverse", "singularity", "screenshot", "serve"):
         message = refusal(capsys, command, "--design", "no-such")
         assert "paper-initial, paper-optimal" in message
@@ -132,7 +130,7 @@ def test_an_unknown_preset_is_told_the_presets(capsys: pytest.CaptureFixture[str
         ('{"a3": [1, 2], "b1": [1, 2], "b2": 1, "b3": "2"}', "b3"),
     ],
 )
-def test_a_design_file_that_holds_no_design_is_told_why(
+def test_invalid_design_file_gives_reason(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, text: str, word: str
 ) -> None:
     file = tmp_path / "design.json"
@@ -140,35 +138,33 @@ def test_a_design_file_that_holds_no_design_is_told_why(
     assert word in refusal(capsys, "inverse", "--design", str(file))
 
 
-def test_a_design_that_is_a_folder_is_refused(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_design_folder_is_refused(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     assert "directory" in refusal(capsys, "inverse", "--design", str(tmp_path)).lower()
 
 
 @pytest.mark.parametrize("port", ["-1", "65536", "http", "80.5", ""])
-def test_a_port_outside_its_range_is_refused(capsys: pytest.CaptureFixture[str], port: str) -> None:
+def test_port_outside_range_is_refused(capsys: pytest.CaptureFixture[str], port: str) -> None:
     message = refusal(capsys, "serve", "--port", port)
     assert message.startswith("explorer serve: --port must ")
 
 
-def test_without_a_command_it_is_serve(capsys: pytest.CaptureFixture[str]) -> None:
+def test_no_command_is_serve(capsys: pytest.CaptureFixture[str]) -> None:
     assert refusal(capsys, "--port", "x").startswith("explorer serve: --port")
     assert "no-such" in refusal(capsys, "--design", "no-such")
 
 
 @pytest.mark.parametrize("size", ["1280", "1280*800", "63x800", "800x8193", "-1x5", "1e3x800"])
-def test_a_size_outside_its_range_is_refused(capsys: pytest.CaptureFixture[str], size: str) -> None:
+def test_size_outside_range_is_refused(capsys: pytest.CaptureFixture[str], size: str) -> None:
     assert "--size" in refusal(capsys, "screenshot", "--size", size)
 
 
-def test_an_unknown_view_is_told_the_views(capsys: pytest.CaptureFixture[str]) -> None:
+def test_unknown_view_lists_the_views(capsys: pytest.CaptureFixture[str]) -> None:
     message = refusal(capsys, "screenshot", "--view", "below")
     for view in ("isometric", "front", "side", "top"):
         assert view in message
 
 
-def test_a_picture_that_could_not_be_written_is_refused_before_the_work(
+def test_screenshot_unwritable_file_is_refused_first(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     def out(path: str) -> str:
@@ -184,7 +180,7 @@ def test_a_picture_that_could_not_be_written_is_refused_before_the_work(
 
 
 @pytest.mark.skipif(not Path("/proc/self").is_dir(), reason="needs a folder that takes no file")
-def test_a_folder_that_takes_no_file_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+def test_screenshot_unwritable_folder_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     assert "cannot write" in refusal(capsys, "screenshot", "--out", "/proc/self/shot.png")
 
 
@@ -199,5 +195,5 @@ def test_a_folder_that_takes_no_file_is_refused(capsys: pytest.CaptureFixture[st
         (" Oh\n --\n Missing from x:\n     --one A B\n         One.\n --\n Run", "missing --one"),
     ],
 )
-def test_framed_complaints_become_one_line(complaint: str, line: str) -> None:
-    assert condensed(complaint) == line
+def test_condense_framed_message_is_one_line(complaint: str, line: str) -> None:
+    assert condense(complaint) == line

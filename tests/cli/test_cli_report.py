@@ -21,7 +21,7 @@ from explorer.optimise.record import Record, RunRecord, Settings, Step, encode_r
 OPTIMAL = explorer.PRESETS["paper-optimal"]
 
 
-def test_the_answer_is_one_object(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_report_json_is_one_object(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     out = tmp_path / "report.HTM"
     assert run(["report", "--out", str(out), "--json"]) == 0
     captured = capsys.readouterr()
@@ -33,7 +33,7 @@ def test_the_answer_is_one_object(capsys: pytest.CaptureFixture[str], tmp_path: 
     assert next(read(out.read_text(encoding="utf-8")).all("h1")).text == "paper-optimal"
 
 
-def test_its_commands_tell_the_same_again(
+def test_report_commands_reproduce_its_figures(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -63,7 +63,7 @@ def test_its_commands_tell_the_same_again(
     assert [told["singularity"]["inverse_condition"]] == condition
 
 
-def test_a_record_brings_its_history(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_report_record_adds_its_history(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     problem = paper_problem()
     step = Step(
         number=0,
@@ -116,7 +116,7 @@ def test_a_record_brings_its_history(capsys: pytest.CaptureFixture[str], tmp_pat
         ("report.html", ["--view", "top"], "no option --view"),
     ],
 )
-def test_what_cannot_be_written_is_refused_with_one_line(
+def test_report_bad_input_is_one_line(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, name: str, options: list[str], words: str
 ) -> None:
     assert run(["report", "--out", str(tmp_path / name), *options]) == 2
@@ -127,7 +127,9 @@ def test_what_cannot_be_written_is_refused_with_one_line(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_degenerate_design_is_refused(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_report_degenerate_design_is_refused(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
     flat = tmp_path / "flat.json"
     text = encode_design(OPTIMAL).decode().replace("7.0062", "0.0")
     flat.write_text(text, encoding="utf-8")
@@ -136,7 +138,7 @@ def test_a_degenerate_design_is_refused(capsys: pytest.CaptureFixture[str], tmp_
     assert [each.name for each in tmp_path.iterdir()] == ["flat.json"]
 
 
-def test_an_empty_workspace_is_no_reason_for_no_report(
+def test_report_empty_workspace_is_written(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     out = tmp_path / "report.html"
@@ -145,7 +147,7 @@ def test_an_empty_workspace_is_no_reason_for_no_report(
     assert "The workspace is empty" in out.read_text(encoding="utf-8")
 
 
-def test_without_a_browser_pdf_is_refused_with_one_line_and_html_is_not(
+def test_report_without_browser_refuses_pdf_only(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "playwright.sync_api", None)

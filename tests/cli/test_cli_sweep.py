@@ -64,7 +64,7 @@ def refusal(capsys: pytest.CaptureFixture[str], *argv: object) -> str:
     return captured.err
 
 
-def test_a_study_is_computed_goes_on_and_is_summed_up(
+def test_sweep_study_continues_and_is_summarised(
     capsys: pytest.CaptureFixture[str], file: Path, tmp_path: Path
 ) -> None:
     out = tmp_path / "results"
@@ -93,7 +93,7 @@ def test_a_study_is_computed_goes_on_and_is_summed_up(
     assert f"Pareto front (volume max, reach min): {len(summary['front'])} designs" in page
 
 
-def test_what_does_not_count_in_a_folder_is_told(
+def test_sweep_summary_names_damaged_parts_and_strays(
     capsys: pytest.CaptureFixture[str], file: Path, tmp_path: Path
 ) -> None:
     out = tmp_path / "results"
@@ -108,7 +108,7 @@ def test_what_does_not_count_in_a_folder_is_told(
     assert "has that name: 'part-000001 copy.parquet'; move" in second
 
 
-def test_designs_without_a_wanted_measure_are_counted(
+def test_sweep_summary_counts_incomparable_designs(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     file, out = tmp_path / "study.json", tmp_path / "results"
@@ -125,10 +125,10 @@ def test_designs_without_a_wanted_measure_are_counted(
     assert summary["incomparable"] == summary["counts"]["done"] == 16
     assert summary["front"] == []
     assert run(["sweep", "--out", str(out), "--summary"]) == 0
-    assert "without a measure that is wanted, so not in it: 16" in capsys.readouterr().out
+    assert "without a value of an objective, so not in the front: 16" in capsys.readouterr().out
 
 
-def test_a_row_becomes_a_design_file(
+def test_sweep_row_is_a_design_file(
     capsys: pytest.CaptureFixture[str], file: Path, tmp_path: Path
 ) -> None:
     out = tmp_path / "results"
@@ -142,7 +142,7 @@ def test_a_row_becomes_a_design_file(
     assert "degenerate" in refusal(capsys, "--out", out, "--row", 2)
 
 
-def test_another_design_takes_the_place_of_the_studys(
+def test_sweep_design_replaces_that_of_the_study(
     capsys: pytest.CaptureFixture[str], file: Path, tmp_path: Path
 ) -> None:
     out = tmp_path / "results"
@@ -151,7 +151,7 @@ def test_another_design_takes_the_place_of_the_studys(
     assert "another study" in refusal(capsys, file, "--out", out)
 
 
-def test_a_design_that_was_saved_is_known_by_its_name(
+def test_sweep_saved_design_is_found_by_name(
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
     file: Path,
@@ -166,13 +166,13 @@ def test_a_design_that_was_saved_is_known_by_its_name(
         assert load_results(out).study.base.name == name
 
 
-def test_a_study_to_begin_with_is_one_that_can_be_read(capsys: pytest.CaptureFixture[str]) -> None:
+def test_sweep_new_study_can_be_loaded(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["sweep", "--new"]) == 0
     study = decode_study(capsys.readouterr().out.encode(), "new")
     assert study.name == "trade-off"
 
 
-def test_a_study_without_objectives_has_no_front(
+def test_sweep_study_without_objectives_has_no_front(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     file = tmp_path / "study.json"
@@ -182,7 +182,7 @@ def test_a_study_without_objectives_has_no_front(
     assert "names no objectives" in capsys.readouterr().out
 
 
-def test_bad_input_is_one_line_and_makes_nothing(
+def test_sweep_bad_input_is_one_line_and_writes_nothing(
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
     file: Path,
@@ -230,7 +230,7 @@ def test_bad_input_is_one_line_and_makes_nothing(
         assert not out.exists()
 
 
-def test_a_scheduler_without_workers_is_told_and_waited_for(
+def test_sweep_scheduler_without_workers_is_reported(
     file: Path,
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
@@ -246,18 +246,14 @@ def test_a_scheduler_without_workers_is_told_and_waited_for(
             said.append(words)
             farm.scale(1)
 
-        monkeypatch.setattr("explorer.cli.commands.sweep.complain", send_one)
+        monkeypatch.setattr("explorer.cli.commands.sweep.write_error", send_one)
         scheduler = farm.scheduler_address
         found = answer(capsys, file, "--out", tmp_path / "out", "--scheduler", scheduler)
     assert (found["done"], found["complete"]) == (20, True)
-    assert said == [
-        f"no worker has come to the scheduler yet: start one with dask worker {scheduler}"
-    ]
+    assert said == [f"the scheduler has no worker yet: start one with dask worker {scheduler}"]
 
 
-def test_an_interruption_keeps_what_is_finished_and_leaves_no_process(
-    file: Path, tmp_path: Path
-) -> None:
+def test_sweep_interrupt_keeps_finished_parts(file: Path, tmp_path: Path) -> None:
     many = msgspec.structs.replace(
         STUDY, sampling=Sampling(count=100_000), measures=("volume", "reach", "clearance"), nodes=20
     )
@@ -279,7 +275,7 @@ def test_an_interruption_keeps_what_is_finished_and_leaves_no_process(
     assert process.returncode == 130
     assert written == ""
     assert "Traceback" not in complaint
-    assert complaint.splitlines()[-1].startswith("stopped; what is finished is kept")
+    assert complaint.splitlines()[-1].startswith("stopped; finished designs are kept")
     assert " of 100000 designs" in complaint
     assert load_results(out).count % 4 == 0
     # Nobody is left in its group, some moments later.

@@ -55,7 +55,7 @@ def refusal(capsys: pytest.CaptureFixture[str], *argv: str) -> str:
     return captured.err
 
 
-def test_the_answer_is_what_the_package_measures(capsys: pytest.CaptureFixture[str]) -> None:
+def test_workspace_json_has_the_public_measures(capsys: pytest.CaptureFixture[str]) -> None:
     found = answer(capsys)
     assert set(found) == KEYS
     volume, nodes, solid = (
@@ -75,7 +75,7 @@ def test_the_answer_is_what_the_package_measures(capsys: pytest.CaptureFixture[s
     }
 
 
-def test_mesh_that_disagrees_with_the_exact_volume_is_told(
+def test_workspace_disagreeing_mesh_is_reported(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     wrong = replace(workspace_solid(OPTIMAL), agrees=False)
@@ -89,7 +89,9 @@ def test_mesh_that_disagrees_with_the_exact_volume_is_told(
     assert "its volume does not agree with the exact one" in capsys.readouterr().out
 
 
-def test_orientation_step_and_tolerance_count(capsys: pytest.CaptureFixture[str]) -> None:
+def test_workspace_orientation_step_and_tolerance_are_used(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     found = answer(capsys, "--yaw-pitch-roll", "-60", "5", "2", "--step", "3", *COARSE, "--hull")
     rotation = explorer.rotation_from_yaw_pitch_roll([-60.0, 5.0, 2.0])
     assert found["volume"] == pytest.approx(workspace_volume(OPTIMAL, rotation).volume, rel=1e-9)
@@ -99,7 +101,9 @@ def test_orientation_step_and_tolerance_count(capsys: pytest.CaptureFixture[str]
     assert found["hull_volume"] == pytest.approx(convex_hull(solid).volume, rel=1e-9)
 
 
-def test_table_1_is_reproduced_beside_what_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
+def test_workspace_table1_has_printed_and_computed_values(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     found = answer(capsys, "--table1")
     initial, optimal = found["table1"]
     assert (initial["node_count"], optimal["node_count"]) == (2468, 999)
@@ -118,9 +122,7 @@ def test_table_1_is_reproduced_beside_what_is_printed(capsys: pytest.CaptureFixt
     assert found["note"] in text
 
 
-def test_an_empty_workspace_is_an_answer(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_workspace_empty_has_status_0(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     limits = msgspec.structs.replace(OPTIMAL.limits, gap=50.0)
     file = tmp_path / "empty.json"
     file.write_bytes(explorer.encode_design(msgspec.structs.replace(OPTIMAL, limits=limits)))
@@ -133,7 +135,7 @@ def test_an_empty_workspace_is_an_answer(
     assert "empty because of gap |d1 − d3|" in capsys.readouterr().out
 
 
-def test_ranges_and_tilts_have_reachable_and_dexterous_volumes(
+def test_workspace_ranges_and_tilts_add_two_volumes(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     found = answer(
@@ -155,7 +157,7 @@ def test_ranges_and_tilts_have_reachable_and_dexterous_volumes(
     assert tilted["reachable_mesh"]["volume"] == pytest.approx(volume, rel=1e-6)
 
 
-def test_capability_is_of_all_orientations_or_of_those_asked_for(
+def test_workspace_capability_is_over_the_given_orientations(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     position = ["--capability", "10", "5", "9"]
@@ -167,7 +169,7 @@ def test_capability_is_of_all_orientations_or_of_those_asked_for(
     assert near["orientation_capability"] == 1.0
 
 
-def test_text_for_people_has_each_measure(capsys: pytest.CaptureFixture[str]) -> None:
+def test_workspace_text_has_every_measure(capsys: pytest.CaptureFixture[str]) -> None:
     words = ["--hull", "--tilt", "5", "--samples", "3", "--capability", "10", "5", "9", *COARSE]
     assert run(["workspace", *words]) == 0
     captured = capsys.readouterr()
@@ -198,13 +200,15 @@ def test_text_for_people_has_each_measure(capsys: pytest.CaptureFixture[str]) ->
         (["--quaternion", "1", "0", "0", "0", "--yaw-pitch-roll", "1", "2", "3"], "not both"),
     ],
 )
-def test_unusable_options_are_refused(
+def test_workspace_unusable_options_are_refused(
     capsys: pytest.CaptureFixture[str], argv: list[str], words: str
 ) -> None:
     assert words in refusal(capsys, *argv)
 
 
-def test_interference_adds_what_can_be_reached(capsys: pytest.CaptureFixture[str]) -> None:
+def test_workspace_interference_adds_the_accessible_volume(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     found = answer(capsys, "--interference", "--radii", "0.2")
     assert set(found) == KEYS | {
         *("reachable_volume", "reachable_node_count", "harmless_radius", "pairs"),
@@ -223,10 +227,12 @@ def test_interference_adds_what_can_be_reached(capsys: pytest.CaptureFixture[str
     assert run(["workspace", "--interference", "--radii", "0.2", "--radius-curve"]) == 0
     text = capsys.readouterr().out
     assert "943 of 999 nodes" in text
-    assert "any radius takes something" in text
+    assert "no radius is harmless" in text
 
 
-def test_nothing_can_be_reached_of_an_empty_workspace(capsys: pytest.CaptureFixture[str]) -> None:
+def test_workspace_interference_empty_workspace_has_no_accessible_volume(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     level = ("--yaw-pitch-roll", "0", "0", "0")
     found = answer(capsys, "--interference", *level)
     assert found["reachable_volume"] == found["reachable_node_count"] == 0
@@ -235,7 +241,7 @@ def test_nothing_can_be_reached_of_an_empty_workspace(capsys: pytest.CaptureFixt
     assert "joined" not in capsys.readouterr().out
 
 
-def test_a_pair_that_shares_a_joint_has_no_clearance(
+def test_workspace_interference_joined_pair_has_no_clearance(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     joined = explorer.Design(a3=(10.0, 4.0), b1=(4.0, -3.0), b2=0.0, b3=2.0)
@@ -263,7 +269,7 @@ def test_a_pair_that_shares_a_joint_has_no_clearance(
         (("--interference", "--radii", "1", "2"), "--radii"),
     ],
 )
-def test_interference_that_cannot_be_told_is_refused(
+def test_workspace_interference_unusable_input_is_refused(
     capsys: pytest.CaptureFixture[str], words: tuple[str, ...], reason: str
 ) -> None:
     assert reason in refusal(capsys, *words)

@@ -37,7 +37,7 @@ def matrix_of(transform: Any) -> FloatArray:
     return np.array([list(row) for row in transform.Fields])
 
 
-def test_3mf_has_units_names_colours_and_the_tree() -> None:
+def test_3mf_reads_back_unit_names_colours_and_tree() -> None:
     model = library.get_wrapper().CreateModel()
     reader = model.QueryReader("3mf")
     reader.SetStrictModeActive(True)
@@ -97,7 +97,7 @@ def glb_json() -> dict[str, Any]:
     return json.loads(data[20 : 20 + length])
 
 
-def test_glb_puts_every_part_where_it_is_at_home() -> None:
+def test_glb_parts_lie_where_they_are_at_home() -> None:
     scene = untyped.load(io.BytesIO(DATA["glb"]), file_type="glb", process=False)
     assert set(scene.graph.nodes_geometry) == set(NAMES)
     for name in NAMES:
@@ -110,7 +110,7 @@ def test_glb_puts_every_part_where_it_is_at_home() -> None:
         np.testing.assert_allclose(points, expected, atol=1e-7)
 
 
-def test_the_nodes_of_glb_hang_on_each_other_as_the_joints_do() -> None:
+def test_glb_node_tree_is_that_of_the_joints() -> None:
     scene = untyped.load(io.BytesIO(DATA["glb"]), file_type="glb", process=False)
     parents = scene.graph.transforms.parents
     for leg, first in ((1, "cross"), (2, "carriage"), (3, "carriage"), (4, "cross")):
@@ -122,7 +122,7 @@ def test_the_nodes_of_glb_hang_on_each_other_as_the_joints_do() -> None:
     assert joints == list(CHAIN_JOINTS)
 
 
-def test_moving_the_joints_of_glb_moves_the_mechanism() -> None:
+def test_glb_moved_joints_move_the_mechanism() -> None:
     scene = untyped.load(io.BytesIO(DATA["glb"]), file_type="glb", process=False)
     nodes = {node["name"]: node for node in glb_json()["nodes"]}
     position = np.array(HOME.position) + [0.5, -0.4, 0.3]
@@ -155,7 +155,7 @@ def test_moving_the_joints_of_glb_moves_the_mechanism() -> None:
         np.testing.assert_allclose(points, expected, atol=1e-6)
 
 
-def test_glb_has_colours_and_the_design() -> None:
+def test_glb_reads_back_colours_and_design() -> None:
     scene = glb_json()
     assert [material["name"] for material in scene["materials"]] == list(COLOURS)
     extras = scene["asset"]["extras"]
@@ -168,7 +168,7 @@ def test_glb_has_colours_and_the_design() -> None:
         assert view["byteOffset"] % 4 == 0
 
 
-def test_the_zip_has_a_closed_stl_for_each_part() -> None:
+def test_stl_zip_holds_a_closed_mesh_per_part() -> None:
     with zipfile.ZipFile(io.BytesIO(DATA["stl-zip"])) as archive:
         assert archive.testzip() is None
         assert archive.namelist() == [f"{name.replace(' ', '-')}.stl" for name in NAMES]
@@ -180,7 +180,7 @@ def test_the_zip_has_a_closed_stl_for_each_part() -> None:
 
 
 @pytest.mark.parametrize("file_format", FORMATS)
-def test_equal_designs_make_equal_files_of_modest_size(file_format: str) -> None:
+def test_assembly_bytes_equal_designs_give_equal_files(file_format: str) -> None:
     again = assembly_bytes(make_prototype(DESIGN), file_format)
     if file_format == "3mf":
         # lib3mf gives each file ids of its own.
@@ -190,12 +190,12 @@ def test_equal_designs_make_equal_files_of_modest_size(file_format: str) -> None
     assert len(again) < 2_000_000
 
 
-def test_an_unknown_format_is_told_the_formats() -> None:
+def test_assembly_bytes_unknown_format_lists_the_formats() -> None:
     with pytest.raises(InputError, match="3mf, glb, stl-zip"):
         assembly_bytes(PROTOTYPE, "dwg")
 
 
-def test_parts_beyond_what_3mf_holds_are_refused() -> None:
+def test_assembly_bytes_huge_parts_are_refused_as_3mf() -> None:
     huge = make_prototype(msgspec.structs.replace(DESIGN, unit_mm=1e9))
     with pytest.raises(InputError, match="smaller unit"):
         assembly_bytes(huge, "3mf")

@@ -67,7 +67,7 @@ def mesh_of(model: Any) -> tuple[Any, Any]:
 
 
 @pytest.mark.parametrize("solid", [SOLID, convex_hull(SOLID)], ids=["workspace", "hull"])
-def test_3mf_has_unit_names_colours_and_the_design(solid: Solid) -> None:
+def test_3mf_reads_back_unit_names_colours_and_design(solid: Solid) -> None:
     model = model_of(mesh_bytes(solid, "3mf", OPTIMAL, NAME))
     assert model.GetUnit() == library.ModelUnit.MilliMeter
     mesh, shape = mesh_of(model)
@@ -93,7 +93,7 @@ def test_3mf_has_unit_names_colours_and_the_design(solid: Solid) -> None:
         assert (colour.Red, colour.Green, colour.Blue, colour.Alpha) == (*colour_of(limit), 255)
 
 
-def test_stl_says_millimetres_and_is_binary() -> None:
+def test_stl_is_binary_and_names_millimetres() -> None:
     data = mesh_bytes(SOLID, "stl", OPTIMAL, NAME)
     assert b"millimetres" in data[:80]
     assert not data.lower().startswith(b"solid")
@@ -107,7 +107,7 @@ def test_stl_says_millimetres_and_is_binary() -> None:
     np.testing.assert_allclose(np.linalg.norm(own, axis=1), 1.0, atol=1e-5)
 
 
-def test_glb_is_in_metres_with_y_up_and_says_so() -> None:
+def test_glb_is_in_metres_with_y_up() -> None:
     data = mesh_bytes(SOLID, "glb", OPTIMAL, NAME)
     shape = read(data, "glb")
     assert shape.is_watertight
@@ -128,7 +128,7 @@ def test_glb_is_in_metres_with_y_up_and_says_so() -> None:
 
 
 @pytest.mark.parametrize("file_format", ["ply", "obj"])
-def test_ply_and_obj_hold_double_precision_and_the_design(file_format: str) -> None:
+def test_ply_and_obj_hold_double_precision_and_design(file_format: str) -> None:
     data = mesh_bytes(SOLID, file_format, OPTIMAL, NAME)
     shape = read(data, file_format)
     assert shape.is_watertight
@@ -142,7 +142,7 @@ def test_ply_and_obj_hold_double_precision_and_the_design(file_format: str) -> N
     assert b"unit millimetre" in data
 
 
-def test_ply_has_the_corners_and_a_colour_for_each_face() -> None:
+def test_ply_reads_back_corners_and_face_colours() -> None:
     data = mesh_bytes(SOLID, "ply", OPTIMAL, NAME)
     start = data.index(b"end_header\n") + len(b"end_header\n")
     corners = np.frombuffer(data[start:], "<f8", SOLID.vertices.size).reshape(-1, 3)
@@ -152,7 +152,7 @@ def test_ply_has_the_corners_and_a_colour_for_each_face() -> None:
     np.testing.assert_array_equal(colours, expected)
 
 
-def test_obj_has_the_corners_and_a_group_for_each_limit() -> None:
+def test_obj_reads_back_corners_and_groups_of_limits() -> None:
     lines = mesh_bytes(SOLID, "obj", OPTIMAL, NAME).decode("ascii").splitlines()
     corners = [[float(x) for x in line.split()[1:]] for line in lines if line.startswith("v ")]
     np.testing.assert_array_equal(corners, SOLID.vertices * OPTIMAL.unit_mm)
@@ -162,16 +162,16 @@ def test_obj_has_the_corners_and_a_group_for_each_limit() -> None:
     assert len(groups) == len(used)
 
 
-def test_limits_of_a_kind_share_a_colour_and_kinds_do_not() -> None:
+def test_colour_of_limits_differs_by_kind_only() -> None:
     assert colour_of("l1 minimum") == colour_of("l1 maximum") != colour_of("l4 maximum")
     assert len({colour_of(limit) for limit in ("l1", "d2", "d4", "l4", "box x", "swing a1")}) == 6
     assert colour_of(HULL) == colour_of("anything else")
 
 
 @pytest.mark.parametrize("file_format", FORMATS)
-def test_an_empty_or_torn_mesh_is_refused_with_the_reason(file_format: str) -> None:
+def test_mesh_bytes_empty_or_open_solid_is_refused_with_reason(file_format: str) -> None:
     empty = workspace_solid(OPTIMAL, np.eye(3))
-    with pytest.raises(NoAnswerError, match="empty: margin κ2"):
+    with pytest.raises(NoAnswerError, match=r"empty: margin .2"):
         mesh_bytes(empty, file_format, OPTIMAL, NAME)
     with pytest.raises(ExplorerError, match="not watertight"):
         mesh_bytes(replace(SOLID, faces=SOLID.faces[1:]), file_format, OPTIMAL, NAME)
@@ -179,7 +179,7 @@ def test_an_empty_or_torn_mesh_is_refused_with_the_reason(file_format: str) -> N
 
 @pytest.mark.parametrize("file_format", FORMATS)
 @pytest.mark.parametrize("s", [1e-6, 1e-3, 1e3, 1e6])
-def test_meshes_of_any_size_keep_their_volume_or_are_refused(file_format: str, s: float) -> None:
+def test_mesh_bytes_any_size_keeps_volume_or_is_refused(file_format: str, s: float) -> None:
     solid = replace(SOLID, vertices=s * SOLID.vertices)
     try:
         data = mesh_bytes(solid, file_format, OPTIMAL, NAME)
@@ -193,7 +193,7 @@ def test_meshes_of_any_size_keep_their_volume_or_are_refused(file_format: str, s
 
 
 @pytest.mark.parametrize("file_format", ["stl", "glb", "3mf"])
-def test_a_mesh_too_far_off_for_single_precision_is_refused(file_format: str) -> None:
+def test_mesh_bytes_far_solid_is_refused_in_single_precision(file_format: str) -> None:
     far = replace(SOLID, vertices=SOLID.vertices + [1e7, 0.0, 0.0])
     with pytest.raises(InputError, match="ply and obj hold double"):
         mesh_bytes(far, file_format, OPTIMAL, NAME)
@@ -201,7 +201,7 @@ def test_a_mesh_too_far_off_for_single_precision_is_refused(file_format: str) ->
     assert shape.is_watertight
 
 
-def test_coordinates_that_3mf_cannot_hold_are_refused() -> None:
+def test_mesh_bytes_huge_coordinates_are_refused() -> None:
     huge = replace(SOLID, vertices=1e9 * SOLID.vertices)
     with pytest.raises(InputError, match="mm"):
         mesh_bytes(huge, "3mf", OPTIMAL, NAME)
@@ -210,13 +210,13 @@ def test_coordinates_that_3mf_cannot_hold_are_refused() -> None:
         mesh_bytes(vast, "stl", OPTIMAL, NAME)
 
 
-def test_an_unknown_format_is_told_the_formats() -> None:
+def test_mesh_bytes_unknown_format_lists_the_formats() -> None:
     with pytest.raises(InputError, match="3mf, stl, glb, obj, ply"):
         mesh_bytes(SOLID, "step", OPTIMAL, NAME)
 
 
 @pytest.mark.parametrize("file_format", FORMATS)
-def test_files_hold_what_the_bytes_hold(tmp_path: Path, file_format: str) -> None:
+def test_write_mesh_file_equals_the_bytes(tmp_path: Path, file_format: str) -> None:
     path = tmp_path / f"a file.{file_format}"
     path.write_bytes(b"old")
     write_mesh(SOLID, path, file_format, OPTIMAL, NAME)
@@ -225,7 +225,7 @@ def test_files_hold_what_the_bytes_hold(tmp_path: Path, file_format: str) -> Non
     assert [each.name for each in tmp_path.iterdir()] == [path.name]
 
 
-def test_what_cannot_be_written_is_refused_before_and_after(tmp_path: Path) -> None:
+def test_write_mesh_unwritable_path_is_refused(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     for path, reason in (
         (tmp_path, "folder"),

@@ -87,7 +87,7 @@ def equality_rows(model: Any, data: Any) -> tuple[FloatArray, FloatArray]:
     return np.array(data.efc_pos)[own], dense[own]
 
 
-def test_the_model_has_every_joint_and_six_servos() -> None:
+def test_model_has_every_joint_and_six_servos() -> None:
     model = model_of(OPTIMAL)
     assert (model.nq, model.nv, model.nu, model.neq) == (19, 18, 6, 4)
     names = [model.joint(k).name for k in range(model.njnt)]
@@ -100,7 +100,7 @@ def test_the_model_has_every_joint_and_six_servos() -> None:
 
 
 @pytest.mark.parametrize("design", DESIGNS)
-def test_the_reference_configuration_is_the_home_pose(design: Design) -> None:
+def test_model_reference_configuration_is_the_home_pose(design: Design) -> None:
     model = model_of(design)
     home = home_pose(design)
     expected = simulation_joints(design, np.array(home.position), home.rotation)
@@ -113,7 +113,7 @@ def test_the_reference_configuration_is_the_home_pose(design: Design) -> None:
 
 
 @pytest.mark.parametrize("design", DESIGNS)
-def test_the_loops_close_at_our_joint_values(design: Design) -> None:
+def test_model_loops_close_at_our_joint_values(design: Design) -> None:
     model = model_of(design)
     data = engine.MjData(model)
     metres = design.unit_mm * 1e-3
@@ -134,7 +134,7 @@ def test_the_loops_close_at_our_joint_values(design: Design) -> None:
 
 
 @pytest.mark.parametrize("design", DESIGNS[:6])
-def test_bodies_are_where_the_chains_say(design: Design) -> None:
+def test_model_bodies_lie_where_the_chains_put_them(design: Design) -> None:
     model = model_of(design)
     data = engine.MjData(model)
     chains = Chains.of(design)
@@ -182,9 +182,7 @@ def singular_pose(
 
 @pytest.mark.parametrize("design", DESIGNS[:5])
 @pytest.mark.parametrize("way", [way for way in WAYS if len(way) < 3])
-def test_the_locked_mechanism_can_move_at_singular_poses(
-    design: Design, way: tuple[int, ...]
-) -> None:
+def test_locked_model_singular_poses_move(design: Design, way: tuple[int, ...]) -> None:
     rng = np.random.default_rng(7)
     for _ in range(4):
         position, rotation = singular_pose(design, way, rng)
@@ -193,17 +191,17 @@ def test_the_locked_mechanism_can_move_at_singular_poses(
 
 
 @pytest.mark.parametrize("design", DESIGNS[:5])
-def test_and_only_there(design: Design) -> None:
+def test_locked_model_regular_poses_do_not_move(design: Design) -> None:
     positions, rotations = random_poses(design, 30, seed=11)
     for position, rotation in zip(positions, rotations, strict=True):
-        kappa = margins(position, rotation) / design.reach
+        share = margins(position, rotation) / design.reach
         locked = locked_jacobian(design, position, rotation)
         values = np.linalg.svd(locked, compute_uv=False)
-        assert values[-1] > 1e-6 * np.abs(kappa).min() * values[0]
+        assert values[-1] > 1e-6 * np.abs(share).min() * values[0]
 
 
 @pytest.mark.parametrize("design", DESIGNS[:5])
-def test_platform_velocities_are_those_of_our_jacobian(design: Design) -> None:
+def test_model_platform_velocities_match_the_jacobian(design: Design) -> None:
     model = model_of(design)
     data = engine.MjData(model)
     metres = design.unit_mm * 1e-3
@@ -223,7 +221,7 @@ def test_platform_velocities_are_those_of_our_jacobian(design: Design) -> None:
 
 
 @pytest.mark.parametrize("name", ["paper-optimal", "paper-initial"])
-def test_servos_lead_the_platform_where_the_forward_kinematics_says(name: str) -> None:
+def test_model_servos_reach_the_pose_of_forward_kinematics(name: str) -> None:
     design = PRESETS[name]
     model = model_of(design)
     data = engine.MjData(model)
@@ -260,7 +258,7 @@ def test_servos_lead_the_platform_where_the_forward_kinematics_says(name: str) -
     assert moved > 0.9 * np.linalg.norm(shift)
 
 
-def test_limits_become_ranges_in_metres() -> None:
+def test_model_limits_become_ranges_in_metres() -> None:
     limits: dict[str, Any] = {
         "l1": (3.0, 15.0),
         "d2": (2.0, None),
@@ -291,7 +289,7 @@ def test_limits_become_ranges_in_metres() -> None:
 
 
 @pytest.mark.parametrize("yaw", [-73.1, -106.9])
-def test_carriages_keep_the_order_of_home_unless_the_design_says_otherwise(yaw: float) -> None:
+def test_model_carriages_keep_the_demanded_order(yaw: float) -> None:
     home = Pose.of_yaw_pitch_roll(home_pose(OPTIMAL).position, (yaw, 0.0, 0.0))
     design = msgspec.structs.replace(OPTIMAL, home=home)
     model = model_of(design)
@@ -303,7 +301,7 @@ def test_carriages_keep_the_order_of_home_unless_the_design_says_otherwise(yaw: 
 
 
 @pytest.mark.parametrize("half_angle", [20.0, 60.0, 89.0])
-def test_the_hinges_of_a_swing_hold_its_whole_cone(half_angle: float) -> None:
+def test_model_hinge_ranges_hold_the_swing_cone(half_angle: float) -> None:
     design = limited(OPTIMAL, margin=None, swing=Swing(a1=half_angle, a3=half_angle))
     model = model_of(design)
     rng = np.random.default_rng(2)
@@ -324,7 +322,7 @@ def test_the_hinges_of_a_swing_hold_its_whole_cone(half_angle: float) -> None:
     assert kept > 20
 
 
-def test_masses_grow_with_density_and_the_unit() -> None:
+def test_model_masses_scale_with_density_and_unit() -> None:
     one, twice = (model_of(msgspec.structs.replace(OPTIMAL, unit_mm=u)) for u in (10.0, 20.0))
     np.testing.assert_allclose(twice.body_mass, 8.0 * one.body_mass, rtol=1e-9)
     np.testing.assert_allclose(twice.body_inertia, 32.0 * one.body_inertia, rtol=1e-9)
@@ -332,7 +330,7 @@ def test_masses_grow_with_density_and_the_unit() -> None:
     np.testing.assert_allclose(dense.body_mass, 2.0 * one.body_mass, rtol=1e-9)
 
 
-def test_masses_can_be_those_of_the_parts() -> None:
+def test_model_masses_of_parts_are_used() -> None:
     prototype = make_prototype(OPTIMAL)
     masses = prototype.masses(2700.0)
     model = engine.MjModel.from_xml_string(simulation_mjcf(OPTIMAL, masses=masses))
@@ -350,7 +348,7 @@ def test_masses_can_be_those_of_the_parts() -> None:
     assert float(model.body_mass.sum()) == pytest.approx(2700.0 * volume, rel=1e-9)
 
 
-def test_what_cannot_be_simulated_is_refused_with_what_would_work() -> None:
+def test_model_unusable_designs_are_refused_with_advice() -> None:
     for density in (0.0, -1.0, math.nan, math.inf):
         with pytest.raises(InputError, match="density must be positive"):
             simulation_mjcf(OPTIMAL, density)
@@ -364,7 +362,7 @@ def test_what_cannot_be_simulated_is_refused_with_what_would_work() -> None:
         simulation_mjcf(msgspec.structs.replace(OPTIMAL, home=collapsed))
 
 
-def test_a_name_of_any_letters_is_carried() -> None:
+def test_model_any_name_is_kept() -> None:
     design = msgspec.structs.replace(OPTIMAL, name='κ < "two" & -- three')
     assert model_of(design).names.startswith('κ < "two" & -- three'.encode())
 

@@ -13,7 +13,7 @@ from explorer.app.features.optimise.tasks import compare
 from explorer.app.features.optimise.words import measure_rows
 from explorer.app.state.studies import spoken
 from explorer.cli import run
-from explorer.cli.found import fact_rows
+from explorer.cli.answers.optimisation import fact_rows
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS, encode_design
 from explorer.numerics.compiled import warm

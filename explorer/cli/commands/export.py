@@ -1,4 +1,4 @@
-"""`explorer export`: the workspace as a mesh, the mechanism for other programs and people."""
+"""`explorer export`: the workspace, the mechanism or the scene as a file."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from explorer.errors import InputError
 What = Literal["workspace", "hull", "mechanism", "simulation", "scene"]
 
 _OF_MESHES = "(workspace and hull; default: a 500th of the reach)"
-# Width over height of the windows in which scenes are opened, about.
+# The typical width over height of a browser window.
 ASPECT = 1.6
 _OF_BODIES = "(mechanism, simulation; default: 1240, printed PLA)"
 
@@ -27,19 +27,20 @@ _OF_BODIES = "(mechanism, simulation; default: 1240, printed PLA)"
 class Export(JsonOptions, PoseOptions, DesignOptions):
     """Write the workspace as a mesh, the mechanism as parts or simulation, or the scene.
 
-    Meshes have the coordinates of the base frame in millimetres; GLB is in metres, as it must
-    be. The mechanism is its parts, assembled in the home pose; as `stl-zip` each in a file of
-    its own. The simulation is an MJCF model in metres: every joint, closed loops, six servos.
-    The scene is one HTML file, to be turned in any browser, in the home pose or that given.
+    Meshes have the coordinates of the base frame in millimetres; GLB is in metres, as its
+    specification requires. The mechanism consists of its parts, assembled in the home pose; in
+    `stl-zip` a part is a file of its own. The simulation is an MJCF model in metres: every joint,
+    closed loops, six servos. The scene is one HTML file for any browser, in the home pose unless
+    a pose is given.
     """
 
     what: Annotated[
         Literal["workspace", "hull", "mechanism", "simulation", "scene"], tyro.conf.Positional
     ]
-    """What to write."""
+    """Object to write."""
 
     out: Path
-    """The file to write; an existing one is replaced."""
+    """File to write; an existing one is replaced."""
 
     format: Annotated[
         str | None,
@@ -48,7 +49,7 @@ class Export(JsonOptions, PoseOptions, DesignOptions):
             help_behavior_hint="(default: the suffix of the file)",
         ),
     ] = None
-    """3mf holds unit, names, colours, ply and obj doubles, step (extra `cad`) exact faces."""
+    """Format; 3mf has unit, names, colours, ply and obj doubles, step (extra `cad`) exact faces."""
 
     tolerance: Annotated[
         float | None, positive("--tolerance"), tyro.conf.arg(help_behavior_hint=_OF_MESHES)
@@ -64,10 +65,10 @@ class Export(JsonOptions, PoseOptions, DesignOptions):
         Literal["bars", "parts"],
         tyro.conf.arg(help_behavior_hint="(simulation; default: bars)"),
     ] = "bars"
-    """What bodies weigh: bars as thick as the legs, or the parts of `export mechanism`."""
+    """Masses of the bodies: of bars as thick as the legs, or of the parts of `export mechanism`."""
 
     def run(self) -> None:
-        """Write the file, and what is in it.
+        """Write the file, and its measures to standard output.
 
         Raises:
             InputError: a design, option, format or file that cannot be used.
@@ -79,7 +80,7 @@ class Export(JsonOptions, PoseOptions, DesignOptions):
         file_format = self.format or self.out.suffix.lower().removeprefix(".")
         if not file_format:
             raise InputError(
-                f"--out {str(self.out)!r} has no suffix to tell the format: give --format"
+                f"--out {str(self.out)!r} has no suffix that names the format: give --format"
             )
         facts = _WRITERS[self.what](self, file_format, lambda: check_writable(self.out))
         if self.json:
@@ -88,10 +89,10 @@ class Export(JsonOptions, PoseOptions, DesignOptions):
             write_lines(str(self.out), *_as_lines(facts))
 
     def refuse(self, *options: str) -> None:
-        """Refuse options that say nothing about what is to be written.
+        """Refuse options that do not apply to the object to write.
 
         Raises:
-            InputError: one of them was given.
+            InputError: one of the options is given.
         """
         for option in options:
             if getattr(self, option) != getattr(type(self), option):
@@ -102,13 +103,13 @@ Facts = dict[str, Any]
 
 
 def _as_lines(facts: Facts) -> list[str]:
-    """Return what people are to know of the file: what is off, and strokes below the limits."""
+    """Return remarks on the file: a mesh that is off, and strokes below the limits."""
     from explorer.cli.output import DISAGREES
 
-    off = [f"This is not quite the workspace: {DISAGREES}."] if facts.get("agrees") is False else []
+    off = [f"This differs from the workspace: {DISAGREES}."] if facts.get("agrees") is False else []
     return off + [
         f"leg {each['leg']}: stroke {_range(each['stroke_mm'])} mm"
-        f" (the limits ask for {_range(each['asked_mm'])} mm)"
+        f" (the limits require {_range(each['asked_mm'])} mm)"
         for each in facts.get("actuators", [])
     ]
 
@@ -126,7 +127,7 @@ def _mesh(command: Export, file_format: str, check: Callable[[], None]) -> Facts
     check_format(file_format)
     check()
     design = command.load()
-    rotation = command.oriented(design).rotation
+    rotation = command.oriented_home(design).rotation
     from explorer.workspace.solids.solids import convex_hull, workspace_solid
 
     solid = workspace_solid(design, rotation, command.tolerance)
@@ -144,7 +145,7 @@ def _step(command: Export, check: Callable[[], None]) -> Facts:
     check_extra()
     check()
     design = command.load()
-    solid = write_workspace_step(design, command.out, command.oriented(design).rotation)
+    solid = write_workspace_step(design, command.out, command.oriented_home(design).rotation)
     volume = solid.volume / design.unit_mm**3
     return {"format": "step", "volume": volume, "faces": len(solid.limit_of_face)}
 
@@ -158,10 +159,9 @@ def _mechanism(command: Export, file_format: str, check: Callable[[], None]) -> 
     command.refuse("tolerance", "masses", "position", "quaternion", "yaw_pitch_roll")
     file_format = {"zip": "stl-zip", "stp": "step"}.get(file_format, file_format)
     if file_format == "step":
-        from explorer.export.opencascade import occ
+        from explorer.export.step import check_extra
 
-        # Without OpenCASCADE nothing else needs to be looked at.
-        occ("gp_Pnt")
+        check_extra()
     else:
         check_format(file_format)
     check()

@@ -1,4 +1,4 @@
-"""`explorer forward`: the eight assembly modes of the joints, or why there are none."""
+"""`explorer forward`: the eight assembly modes of the joints, or why there is none."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ Joints = tuple[float, float, float, float, float, float]
 
 @dataclass(frozen=True, kw_only=True)
 class Forward(JsonOptions, DesignOptions):
-    """Find the eight assembly modes of the joints.
+    """Compute the eight assembly modes of the joints.
 
-    All eight are real or none is; where none is, the exit status is 1 and the message says
-    which trilateration fails and what would close it.
+    All eight are real or none is. If none is, the exit status is 1 and the message names the
+    failing trilateration and the smallest change of a joint that makes it feasible.
     """
 
     joints: Annotated[Joints, numbers("--joints", " ".join(JOINTS))]
-    """The joints in design units."""
+    """Values of the joints, in design units."""
 
     def run(self) -> None:
         """Write all eight poses of the joints.
@@ -82,7 +82,7 @@ def _modes(position: FloatArray, rotation: FloatArray) -> list[dict[str, object]
 def _mode_table(position: FloatArray, rotation: FloatArray) -> str:
     angles = yaw_pitch_roll_from_rotation(rotation)
     margin = margins(position, rotation)
-    rows = [("mode", "signs", *"xyz", "yaw", "pitch", "roll", "κ1", "κ2", "κ3")]
+    rows = [("mode", "signs", *"xyz", "yaw", "pitch", "roll", "δ1", "δ2", "δ3")]
     rows += [
         (
             str(mode),
@@ -99,7 +99,7 @@ def _mode_table(position: FloatArray, rotation: FloatArray) -> str:
 def _why_not(design: Design, joints: FloatArray, squares: FloatArray) -> str:
     failures = [
         f"trilateration {index + 1} (tetrahedron {' '.join(TETRAHEDRA[index])}) has "
-        f"κ{index + 1}² = {square:.4g}"
+        f"δ{index + 1}² = {square:.4g}"
         for index, square in enumerate(squares.tolist())
         if square < 0.0
     ]
@@ -110,7 +110,7 @@ def _why_not(design: Design, joints: FloatArray, squares: FloatArray) -> str:
 
 
 def _way_out(design: Design, joints: FloatArray) -> str:
-    """Return the one joint that has to move least for the lengths to close, and where to."""
+    """Return the smallest change of a single joint with which the lengths close, in words."""
     moves: list[tuple[float, str]] = []
     for index, intervals in enumerate(feasible_intervals(design, joints)):
         nearest = nearest_feasible(design, joints, index, intervals)
@@ -125,7 +125,7 @@ def _way_out(design: Design, joints: FloatArray) -> str:
 
 
 def _in_few_digits(design: Design, joints: FloatArray, joint: int, closing: float) -> str:
-    """Return a closing value of a joint with so many digits that it still closes as written."""
+    """Return a closing value of a joint in the fewest digits with which it still closes."""
     trial = joints.copy()
     for digits in range(6, 17):
         written = f"{closing:.{digits}g}"

@@ -1,4 +1,4 @@
-"""`explorer inverse`: the joints of a pose, and which limits they break."""
+"""`explorer inverse`: the joints of a pose, and the limits that they violate."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from explorer.mechanism.design import JOINTS, LENGTHS
 
 @dataclass(frozen=True, kw_only=True)
 class Inverse(JsonOptions, PoseOptions, DesignOptions):
-    """Find the joints of a pose.
+    """Compute the joints of a pose.
 
-    They come in the order l1 d1 d2 d3 d4 l4, with the limits of the design that they break.
+    Their order is l1 d1 d2 d3 d4 l4. The violated limits of the design are listed.
     """
 
     def run(self) -> None:

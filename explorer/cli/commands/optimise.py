@@ -1,4 +1,4 @@
-"""`explorer optimise`: the best design for a purpose, or how far the search got."""
+"""`explorer optimise`: an optimal design, or the best iterate of the search."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import tyro
 from tyro.constructors import PrimitiveConstructorSpec
 
-from explorer.cli.found import (
+from explorer.cli.answers.optimisation import (
     finding_json,
     findings_table,
-    found_design,
+    infeasible_json,
+    optimised_design,
     outcome_json,
     outcome_lines,
-    refused_json,
 )
 from explorer.cli.options import DesignOptions, JsonOptions
 from explorer.cli.output import heading, write_json, write_lines
-from explorer.cli.progress import Progress
-from explorer.cli.streams import complain
+from explorer.cli.progress import SearchMeter
+from explorer.cli.streams import write_error
 from explorer.cli.usage import UsageError
 from explorer.cli.values import numbers, numbers_or_none, positive, whole_number
 from explorer.errors import InputError, NoAnswerError
@@ -41,7 +41,7 @@ _FILE = tyro.conf.arg(metavar="FILE", help_behavior_hint="(optional)")
 
 
 def _words(option: str, metavar: str) -> PrimitiveConstructorSpec[Any]:
-    """Return how to read an option that takes any number of words, at least one."""
+    """Return the parser of an option with one word or more."""
 
     def read(words: list[str]) -> tuple[str, ...]:
         if not words:
@@ -59,31 +59,31 @@ def _words(option: str, metavar: str) -> PrimitiveConstructorSpec[Any]:
 
 @dataclass(frozen=True, kw_only=True)
 class Optimise(JsonOptions, DesignOptions):
-    """Look for the best design by SQP: a volume to match, the smallest reach or others.
+    """Optimise a design by SQP: match a volume, minimise the reach, or others.
 
-    The gradients are exact, and the search begins at a given design.
-
-    The limits of the design hold throughout. A design is called found only if all demands hold
-    and it cannot get better nearby; otherwise the exit status is 1, and the best so far is told.
+    The gradients are exact, and the search starts from a given design, whose limits hold
+    throughout. The search converges if all demands hold at a local optimum; otherwise the exit
+    status is 1, and the output is the best iterate.
     """
 
     objective: Literal["match-volume", "smallest-reach", "largest-volume", "largest-margin"] = (
         "match-volume"
     )
-    """What is wanted; F = |1 − V/V′| of the exact volume, or the worst margin over a box."""
+    """Objective: F = |1 − V/V′| of the exact volume, the reach, the volume, or the worst margin
+    over a box."""
 
     target_volume: Annotated[float | None, positive("--target-volume"), _OPTIONAL] = None
-    """The volume to match, or at least; for the smallest reach that of the design unless given."""
+    """Volume to match, or least volume; for the smallest reach by default that of the design."""
 
     target_reach: Annotated[float | None, positive("--target-reach"), _OPTIONAL] = None
-    """The largest reach allowed; for the largest volume that of the design unless given."""
+    """Largest reach; for the largest volume by default that of the design."""
 
     box: Annotated[
         Six | tuple[()] | None,
         numbers_or_none("--box", "x-low y-low z-low x-high y-high z-high"),
         tyro.conf.arg(help_behavior_hint="(default: that of the design)"),
     ] = None
-    """The box that bounds the workspace, in design units; none lifts that of the design."""
+    """Box that bounds the workspace, in design units; none lifts that of the design."""
 
     clearance: Annotated[float | None, positive("--clearance"), _OPTIONAL] = None
     """Least clearance of every pair of legs over the workspace, in design units."""
@@ -93,10 +93,10 @@ class Optimise(JsonOptions, DesignOptions):
         positive("--clearance-margin"),
         tyro.conf.arg(help_behavior_hint="(default: a 20th of the reach)"),
     ] = None
-    """Demand it only where every margin is this large: legs meet at singularities."""
+    """Least margin of the poses at which the clearance is demanded: legs meet at singularities."""
 
     stroke_ratio: Annotated[float | None, positive("--stroke-ratio"), _OPTIONAL] = None
-    """Longest over shortest length of each actuator."""
+    """Largest ratio of longest to shortest length of an actuator."""
 
     required_box: Annotated[
         Six | None,
@@ -122,32 +122,32 @@ class Optimise(JsonOptions, DesignOptions):
     """From how many designs to start: the given one, and others within the bounds."""
 
     seed: Annotated[int, whole_number("--seed", 0, 2**31 - 1)] = 0
-    """Of the sequence of other starts."""
+    """Seed of the other starts."""
 
     iterations: Annotated[int, whole_number("--iterations", 1, 100_000)] = 300
-    """The most steps from each start."""
+    """Largest number of iterations per start."""
 
     out: Annotated[Path | None, _FILE] = None
-    """Write the design found to this file, and the record of the search beside it."""
+    """File for the optimal design; the record of the search is written beside it."""
 
     record: Annotated[
         Path | None,
         tyro.conf.arg(metavar="FILE", help_behavior_hint="(default: OUT with .record.json)"),
     ] = None
-    """Write problem, history and versions to this file, whether or not a design was found."""
+    """File for the record: problem, history and versions, written even without convergence."""
 
     repeat: Annotated[Path | None, _FILE] = None
-    """Run the problem in a record again, instead of one given by options."""
+    """Record whose problem to solve again, instead of one given by options."""
 
     findings: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
-    """Put our optima beside the paper's instead."""
+    """Compare our optima with the paper's instead."""
 
     def run(self) -> None:
-        """Write what was found.
+        """Write the outcome of the search.
 
         Raises:
             InputError: a design, problem or file that cannot be used.
-            NoAnswerError: no design was found; the best so far has been told.
+            NoAnswerError: the search did not converge; the best iterate has been written.
         """
         if self.findings:
             self._write_findings()
@@ -160,19 +160,19 @@ class Optimise(JsonOptions, DesignOptions):
         for path in (self.out, record):
             if path is not None:
                 check_writable(path)
-        problem, settings = self._asked()
+        problem, settings = self._problem()
         self._check_possible(problem)
-        outcome = _searched(problem, settings)
-        written = self._files(outcome, settings, record)
+        outcome = _search(problem, settings)
+        written = self._write_files(outcome, settings, record)
         if self.json:
             write_json(outcome_json(outcome, written))
         else:
-            write_lines(heading(found_design(outcome)), *outcome_lines(outcome, written))
+            write_lines(heading(optimised_design(outcome)), *outcome_lines(outcome, written))
         if not outcome.converged:
             raise NoAnswerError(outcome.run.message)
 
-    def _asked(self) -> tuple[Problem, Settings]:
-        """Return what the options ask for."""
+    def _problem(self) -> tuple[Problem, Settings]:
+        """Return the problem and the settings that the options describe."""
         from explorer.optimise.defaults import make_problem
         from explorer.optimise.record import Settings, load_record
 
@@ -197,7 +197,7 @@ class Optimise(JsonOptions, DesignOptions):
         return problem, Settings(starts=self.starts, seed=self.seed, iterations=self.iterations)
 
     def _start(self) -> Design:
-        """Return the design to start from, with its home as it is before the box changes."""
+        """Return the start of the search, whose home is fixed before the box changes."""
         design = self.load()
         if self.box is None:
             return design
@@ -206,10 +206,11 @@ class Optimise(JsonOptions, DesignOptions):
         return with_box(design, _as_box(self.box) if self.box else None)
 
     def _check_possible(self, problem: Problem) -> None:
-        """Refuse what the limits cannot give before anything is compiled for a search.
+        """Refuse a problem that the limits make infeasible, before kernels are compiled.
 
         Raises:
-            NoAnswerError: no design within the bounds meets the demands, and what would help.
+            NoAnswerError: no design within the bounds meets the demands; the message says what
+                would help.
         """
         from explorer.optimise.refutation.refutation import (
             BOX_LIMIT,
@@ -230,17 +231,17 @@ class Optimise(JsonOptions, DesignOptions):
                 advice += f", or take the paper's with --box {corners}"
             message += f": {advice}"
         if self.json:
-            write_json(refused_json(problem, found[0].limit, message))
+            write_json(infeasible_json(problem, found[0].limit, message))
         raise NoAnswerError(message)
 
-    def _files(self, outcome: Outcome, settings: Settings, record: Path | None) -> list[Path]:
-        """Write the files that were asked for, and return which."""
+    def _write_files(self, outcome: Outcome, settings: Settings, record: Path | None) -> list[Path]:
+        """Write the requested files and return their paths."""
         from explorer.files.writing import write_whole
         from explorer.optimise.record import encode_record, record_of
 
         written: list[Path] = []
         if self.out is not None and outcome.converged:
-            write_whole(self.out, encode_design(found_design(outcome)))
+            write_whole(self.out, encode_design(optimised_design(outcome)))
             written.append(self.out)
         if record is not None and (outcome.converged or self.record is not None):
             write_whole(record, encode_record(record_of(outcome, settings)))
@@ -252,25 +253,25 @@ class Optimise(JsonOptions, DesignOptions):
         from explorer.optimise.findings import findings
 
         warm()
-        found = list(findings(lambda name: complain(f"looking for: {name}")))
+        found = list(findings(lambda name: write_error(f"computing: {name}")))
         if self.json:
             write_json({"findings": [finding_json(each) for each in found]})
         else:
             write_lines(findings_table(found))
 
 
-def _searched(problem: Problem, settings: Settings) -> Outcome:
-    """Run a search, showing how far it has got."""
+def _search(problem: Problem, settings: Settings) -> Outcome:
+    """Run a search with a progress bar."""
     from explorer.optimise.solver import optimise_design
 
     called = CALLED[problem.objective]
-    with Progress(settings.starts, settings.iterations, called) as progress:
+    with SearchMeter(settings.starts, settings.iterations, called) as meter:
         return optimise_design(
             problem,
             starts=settings.starts,
             seed=settings.seed,
             iterations=settings.iterations,
-            watch=progress.see,
+            watch=meter.show_iterate,
         )
 
 

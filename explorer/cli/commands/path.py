@@ -1,4 +1,4 @@
-"""`explorer path`: a path between two poses that keeps all limits and clearances, over time."""
+"""`explorer path`: a path between two poses within all limits and clearances, over time."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ Numbers = tuple[float, ...]
 
 @dataclass(frozen=True, kw_only=True)
 class Path(JsonOptions, RadiiOptions, DesignOptions):
-    """Plan a path between two poses that keeps limits, margins and clearances.
+    """Plan a path between two poses within limits, margins and clearances.
 
-    Both must be of one assembly mode. A pose is a position x y z, or a position and yaw pitch
-    roll in degrees, or a position and a quaternion w x y z. Needs the extra `planning`.
+    Both poses must have the same assembly mode. A pose is a position x y z, or a position and yaw
+    pitch roll in degrees, or a position and a quaternion w x y z. Needs the extra `planning`.
     """
 
     from_: Annotated[Numbers | None, pose_numbers("--from"), _HOME] = None
-    """Where the path starts, in design units."""
+    """Start of the path; lengths are in design units."""
 
     from_quaternion: Annotated[
         Quadruple | None, numbers("--from-quaternion", "w x y z"), _ORIENTATION_OF_HOME
@@ -53,7 +53,7 @@ class Path(JsonOptions, RadiiOptions, DesignOptions):
     """Orientation of the platform at the start, in degrees."""
 
     to: Annotated[Numbers | None, pose_numbers("--to"), _OPTIONAL] = None
-    """Where the path ends, in design units."""
+    """End of the path; lengths are in design units."""
 
     to_quaternion: Annotated[
         Quadruple | None, numbers("--to-quaternion", "w x y z"), _ORIENTATION_OF_START
@@ -68,27 +68,27 @@ class Path(JsonOptions, RadiiOptions, DesignOptions):
     """Orientation of the platform at the end, in degrees."""
 
     seconds: Annotated[float, positive("--seconds")] = 2.0
-    """How long to look for a path, at the most."""
+    """Longest time to search for a path, in seconds."""
 
     speed: Annotated[
         float | None,
         positive("--speed"),
         tyro.conf.arg(help_behavior_hint="(default: a tenth of the reach)"),
     ] = None
-    """Speed of the fastest actuator, in design units a second."""
+    """Speed of the fastest actuator, in design units per second."""
 
     samples: Annotated[int, whole_number("--samples", 2, 100_000)] = 201
-    """Rows of the table over time."""
+    """Number of rows of the trajectory."""
 
     out: Annotated[File | None, tyro.conf.arg(metavar="FILE.csv"), _OPTIONAL] = None
-    """Write time, joints and pose as CSV into this file."""
+    """File for the trajectory as CSV: time, joints and pose."""
 
     def run(self) -> None:
         """Write the path.
 
         Raises:
             InputError: a design, pose, number or file that cannot be used.
-            NoPathError: there is no path, or none was found in time.
+            NoPathError: there is no path, or the time ended before one was found.
             MissingExtraError: OMPL is not installed.
         """
         from explorer.export.trajectory import write_trajectory
@@ -129,7 +129,7 @@ def _pose(
     yaw_pitch_roll: Triple | None,
     otherwise: Pose,
 ) -> Pose:
-    """Return the pose that options give; what they leave out is that of another pose."""
+    """Return the pose that options give, completed from another pose."""
     given = [
         name
         for name, value in (("quaternion", quaternion), ("yaw-pitch-roll", yaw_pitch_roll))
@@ -194,10 +194,10 @@ def _as_lines(design: Design, path: PlannedPath, timed: Trajectory, out: File | 
             [
                 ("moves", f"{len(path.poses) - 1}, each proved to keep limits and clearances"),
                 ("length", f"{figure(path.length)} (root mean square of b1 to b4)"),
-                ("keeps", f"|κ| {figure(path.margin)}, clearance {figure(path.clearance)} or more"),
+                ("keeps", f"|δ| {figure(path.margin)}, clearance {figure(path.clearance)} or more"),
                 ("planned in", f"{path.seconds:.3g} s, {path.checked} moves checked"),
                 ("takes", f"{figure(timed.duration)} s"),
-                ("least |κ|", "  ".join(f"κ{i + 1} {figure(v)}" for i, v in enumerate(least))),
+                ("least |δ|", "  ".join(f"δ{i + 1} {figure(v)}" for i, v in enumerate(least))),
             ],
             "<<",
         ),

@@ -1,4 +1,4 @@
-"""`explorer report`: a design on a few pages, to read, print and keep."""
+"""`explorer report`: a report of a design as HTML or PDF."""
 
 from __future__ import annotations
 
@@ -19,27 +19,27 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Report(JsonOptions, PoseOptions, DesignOptions):
-    """Write a report of a design: drawings, slices, tables, and how to make it again.
+    """Write a report of a design: drawings, slices, tables, and how to reproduce it.
 
     The figures are those of the other commands, in the home pose unless a pose is given. HTML
-    is one file that needs no other and no network; PDF is the same page and needs the extra
+    is one file that needs no other file and no network; PDF is the same page and needs the extra
     "screenshot" and a Chromium, which EXPLORER_CHROMIUM may name.
     """
 
     out: Path = Path("report.html")
-    """The file to write, .html or .pdf; an existing one is replaced."""
+    """File to write, .html or .pdf; an existing one is replaced."""
 
     record: Annotated[
         Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="(optional)")
     ] = None
-    """The record of the search that found the design, as `explorer optimise` writes it."""
+    """Record of the search that found the design, written by `explorer optimise`."""
 
     def run(self) -> None:
         """Write the report and its path.
 
         Raises:
             InputError: a design, pose, record or file that cannot be used.
-            MissingExtraError: PDF without what prints it.
+            MissingExtraError: PDF without the extra "screenshot" or a Chromium.
         """
         from explorer.files.writing import check_writable, write_whole
 
@@ -71,10 +71,10 @@ class Report(JsonOptions, PoseOptions, DesignOptions):
 
 
 def format_of(path: Path) -> ReportFormat:
-    """Return the format that the suffix of a file asks for.
+    """Return the format that the suffix of a file names.
 
     Raises:
-        InputError: another suffix than .html, .htm and .pdf.
+        InputError: the suffix is not .html, .htm or .pdf.
     """
     match path.suffix.lower():
         case ".html" | ".htm":

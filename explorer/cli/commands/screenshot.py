@@ -23,23 +23,23 @@ class Screenshot(JsonOptions, PoseOptions, DesignOptions):
     """
 
     view: Literal["isometric", "front", "side", "top"] = "isometric"
-    """From where to look."""
+    """Direction of the view."""
 
     out: Path = Path("shot.png")
-    """The file to write; an existing one is replaced."""
+    """File to write, .png; an existing one is replaced."""
 
     size: Annotated[tuple[int, int], pixels("--size", 64, 8192)] = (1280, 800)
     """Size of the picture in pixels."""
 
     panels: bool = False
-    """Whether the panels of the page are in the picture, or the scene alone."""
+    """Include the panels of the page in the picture."""
 
     def run(self) -> None:
         """Draw the picture and write its path.
 
         Raises:
             InputError: a design, pose or file that cannot be used.
-            MissingExtraError: what draws the picture is not installed.
+            MissingExtraError: the extra "screenshot" or a Chromium is missing.
         """
         from explorer.files.writing import check_writable
 

@@ -18,27 +18,27 @@ class Serve:
     """Serve the explorer's page and open it in the browser (the default)."""
 
     design: Annotated[str | None, tyro.conf.arg(metavar="PRESET_OR_FILE")] = None
-    """A preset, a design file (JSON), or a design saved on the page, by its name; the session
-    that was left last if none is given."""
+    """A preset, a design file (JSON), or the name of a design saved on the page; by default the
+    last session."""
 
     host: str = "127.0.0.1"
     """Address to listen on; the default is for this machine alone."""
 
     port: Annotated[int, whole_number("--port", 0, 65535)] = 8080
-    """Port to listen on; 0 takes any free one, a taken one is an error."""
+    """Port to listen on; 0 takes any free port, a port in use is an error."""
 
     token: str | None = None
-    """What has to be known to get in, 16 to 128 letters, digits, - and _; by default that of
-    the environment variable EXPLORER_TOKEN, else a random one where other machines get in."""
+    """Access token of 16 to 128 letters, digits, - and _; by default that of the environment
+    variable EXPLORER_TOKEN, else a random one if other machines can connect."""
 
     study: Annotated[
         tuple[Path, ...],
         tyro.conf.arg(metavar="FOLDER …", help_behavior_hint="(optional)"),
     ] = ()
-    """Results of explorer sweep that the page offers, beside the studies made on it."""
+    """Results of explorer sweep to list on the page, beside the studies run there."""
 
     open: bool = True
-    """Whether to open the browser."""
+    """Open the browser."""
 
     def run(self) -> None:
         """Serve the page until interrupted.
@@ -46,7 +46,7 @@ class Serve:
         Raises:
             DesignError: a design that cannot be used.
             InputError: a folder without the results of a study.
-            ServerError: the server cannot start, for instance because the port is taken, or
+            ServerError: the server cannot start, for instance because the port is in use, or
                 the token cannot be used.
         """
         design = None if self.design is None else load(self.design)

@@ -1,4 +1,4 @@
-"""`explorer singularity`: the margins of a pose, and all that tells how singular it is."""
+"""`explorer singularity`: the margins of a pose and the other measures of singularity."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ from explorer.singularity.colours import WARN_SHARE
 
 @dataclass(frozen=True, kw_only=True)
 class Singularity(JsonOptions, PoseOptions, DesignOptions):
-    """Tell how near a pose is to a singularity, and to which.
+    """Measure how near a pose is to a singularity, and to which.
 
-    Each of the three margins is zero where one of three tetrahedra is flat; together their
-    signs name the assembly mode. The nearest singular poses are nearest in the
-    root-mean-square way of the platform's points b1 to b4.
+    A margin is zero where its tetrahedron is flat; the signs of the three margins name the
+    assembly mode. The nearest singular poses minimise the root-mean-square displacement of the
+    platform's points b1 to b4.
     """
 
     def run(self) -> None:
-        """Write the margins of the pose and what follows from them.
+        """Write the margins of the pose and the measures of singularity.
 
         Raises:
             InputError: a design or pose that cannot be used.
@@ -84,7 +84,7 @@ def _margin_table(snapshot: Snapshot) -> str:
         unit = snapshot.design.unit_mm
         rows.append(
             (
-                f"κ{index + 1}",
+                f"δ{index + 1}",
                 figure(margin, reach),
                 figure(margin * unit, reach * unit),
                 INCIDENCES[index],
@@ -114,7 +114,7 @@ def _measures(snapshot: Snapshot) -> str:
                 "inverse condition",
                 f"{figure(snapshot.inverse_condition, 1.0)} (0 singular, 1 best)",
             ),
-            ("proximity", f"{figure(snapshot.proximity, 1.0)} (least |κ| over the reach)"),
+            ("proximity", f"{figure(snapshot.proximity, 1.0)} (least |δ| over the reach)"),
         ],
         "<<",
     )
@@ -127,5 +127,5 @@ def _nearest_table(snapshot: Snapshot) -> str:
         angles = yaw_pitch_roll_from_rotation(each.pose.rotation).tolist()
         yaw, pitch, roll = degrees(angles)
         distance = (figure(each.distance), figure(each.distance * snapshot.design.unit_mm))
-        rows.append((f"κ{each.incidence} = 0", *distance, x, y, z, yaw, pitch, roll))
+        rows.append((f"δ{each.incidence} = 0", *distance, x, y, z, yaw, pitch, roll))
     return table(rows, "<>>>>>>>>")

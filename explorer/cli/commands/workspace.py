@@ -1,4 +1,4 @@
-"""`explorer workspace`: how large the workspace is, by each way of measuring it."""
+"""`explorer workspace`: the measures of the workspace."""
 
 from __future__ import annotations
 
@@ -7,38 +7,23 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from explorer.cli.collisions import (
-    curve_json,
-    curve_table,
-    interference_json,
-    interference_table,
-)
+from explorer.cli.answers.workspace import WorkspaceMeasures
 from explorer.cli.options import DesignOptions, JsonOptions, OrientationOptions, RadiiOptions
-from explorer.cli.output import (
-    DISAGREES,
-    degrees,
-    figure,
-    heading,
-    mesh_json,
-    table,
-    write_json,
-    write_lines,
-)
+from explorer.cli.output import degrees, heading, write_json, write_lines
 from explorer.cli.values import numbers, positive, whole_number
 from explorer.errors import InputError
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose, Triple, yaw_pitch_roll_from_rotation
-from explorer.workspace.slices.volume import NodeCount, Volume, workspace_nodes, workspace_volume
+from explorer.workspace.slices.volume import workspace_nodes, workspace_volume
 
 if TYPE_CHECKING:
     from explorer.numerics.arrays import FloatArray
     from explorer.workspace.accessible.radii import RadiusCurve
     from explorer.workspace.accessible.workspace import ReachableWorkspace
-    from explorer.workspace.solids.solid import Solid
 
 Ends = tuple[float, float]
 
-# Orientations of a range of angles, and of a cone of tilts, unless told otherwise.
+# The default number of orientations of a range of angles, and of a cone of tilts.
 SAMPLES_ON_RANGE = 5
 SAMPLES_OF_TILT = 33
 
@@ -49,8 +34,8 @@ _OPTIONAL = tyro.conf.arg(help_behavior_hint="(optional)")
 class Workspace(JsonOptions, RadiiOptions, OrientationOptions, DesignOptions):
     """Measure the workspace: exact volume and gradient, the paper's nodes, a mesh.
 
-    With ranges or a tilt also the volumes that some (reachable) and all (dexterous) of these
-    orientations have. An empty workspace is an answer too: it names the limits that empty it.
+    Ranges or a tilt add the reachable volume (union over these orientations) and the dexterous
+    volume (intersection). An empty workspace is an answer too, with the limits that empty it.
     """
 
     step: Annotated[
@@ -68,35 +53,37 @@ class Workspace(JsonOptions, RadiiOptions, OrientationOptions, DesignOptions):
     """Largest distance of the mesh from the true surface, in design units."""
 
     hull: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
-    """Measure the convex hull too."""
+    """Add the convex hull."""
 
     interference: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
-    """Measure too what the home pose leads to without a collision of legs, and each pair's cost."""
+    """Add the accessible volume, without a collision of legs on the way from the home pose, and
+    the volume that each pair blocks."""
 
     radius_curve: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
-    """Tell too how that shrinks as one radius of all legs grows, and which is harmless."""
+    """Add the accessible volume as a function of one radius of all legs, and the largest radius
+    without a loss."""
 
     yaw_range: Annotated[Ends | None, numbers("--yaw-range", "low high"), _OPTIONAL] = None
-    """Orientations with a yaw from low to high, in degrees, else as the orientation given."""
+    """Range of yaw in degrees; the other angles are those of the given orientation."""
 
     pitch_range: Annotated[Ends | None, numbers("--pitch-range", "low high"), _OPTIONAL] = None
-    """Orientations with a pitch from low to high, in degrees."""
+    """Range of pitch in degrees."""
 
     roll_range: Annotated[Ends | None, numbers("--roll-range", "low high"), _OPTIONAL] = None
-    """Orientations with a roll from low to high, in degrees."""
+    """Range of roll in degrees."""
 
     tilt: Annotated[float | None, positive("--tilt"), _OPTIONAL] = None
-    """Orientations that tilt the platform every way up to this half-angle, in degrees."""
+    """Half-angle of a cone of tilts of the platform, in degrees."""
 
     samples: Annotated[
         int | None,
         whole_number("--samples", 1, 1_000_000),
         tyro.conf.arg(help_behavior_hint="(default: 5 a range, 33 tilts, 100000 for a capability)"),
     ] = None
-    """How many orientations: on each range, of a tilt, or of all."""
+    """Number of orientations: per range, of a tilt, or of all."""
 
     capability: Annotated[Triple | None, numbers("--capability", "x y z"), _OPTIONAL] = None
-    """Tell the share of orientations that this position can have: of those asked for, or of all."""
+    """Position at which to compute the share of feasible orientations, among the given or all."""
 
     table1: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
     """Reproduce the paper's Table 1 instead, from both presets."""
@@ -111,17 +98,19 @@ class Workspace(JsonOptions, RadiiOptions, OrientationOptions, DesignOptions):
             self._write_table_one()
             return
         design = self.with_radii(self.load())
-        pose = self.oriented(design)
+        pose = self.oriented_home(design)
         orientations = self._orientations(pose)
-        findings = self._findings(design, pose, orientations)
+        measures = self._measure(design, pose, orientations)
         if self.json:
-            write_json(findings.as_json())
+            write_json(measures.as_json())
         else:
             angles = "  ".join(degrees(yaw_pitch_roll_from_rotation(pose.rotation).tolist()))
-            lines = findings.as_lines(design)
+            lines = measures.as_lines(design)
             write_lines(heading(design), f"yaw pitch roll  {angles}", "", *lines)
 
-    def _findings(self, design: Design, pose: Pose, orientations: FloatArray | None) -> _Findings:
+    def _measure(
+        self, design: Design, pose: Pose, orientations: FloatArray | None
+    ) -> WorkspaceMeasures:
         from explorer.workspace.solids.solids import (
             convex_hull,
             dexterous_solid,
@@ -136,7 +125,7 @@ class Workspace(JsonOptions, RadiiOptions, OrientationOptions, DesignOptions):
         if orientations is not None:
             reachable = reachable_solid(design, orientations, self.tolerance)
             dexterous = dexterous_solid(design, orientations, self.tolerance)
-        return _Findings(
+        return WorkspaceMeasures(
             volume=volume,
             nodes=nodes,
             solid=solid,
@@ -166,7 +155,7 @@ class Workspace(JsonOptions, RadiiOptions, OrientationOptions, DesignOptions):
         return radius_curve(design, pose.rotation)
 
     def _orientations(self, pose: Pose) -> FloatArray | None:
-        """Return the set of orientations that is asked for, shape (n, 3, 3)."""
+        """Return the requested orientations, shape (n, 3, 3); None without any."""
         from explorer.workspace.orientations import cone_of_directions, yaw_pitch_roll_range
 
         ranges = (self.yaw_range, self.pitch_range, self.roll_range)
@@ -193,114 +182,22 @@ class Workspace(JsonOptions, RadiiOptions, OrientationOptions, DesignOptions):
         from explorer.workspace.orientations import CAPABILITY_ORIENTATIONS, orientation_capability
 
         count = self.samples or CAPABILITY_ORIENTATIONS
-        asked = count if orientations is None else orientations
-        return orientation_capability(design, self.capability, asked)
+        chosen = count if orientations is None else orientations
+        return orientation_capability(design, self.capability, chosen)
 
     def _write_table_one(self) -> None:
-        from explorer.cli.table_one import WHY_THEY_DIFFER, as_json, as_lines, table_one
+        from explorer.cli.answers.table_one import (
+            WHY_THEY_DIFFER,
+            as_json,
+            as_lines,
+            compute_table_one,
+        )
 
-        rows = table_one()
+        rows = compute_table_one()
         if self.json:
             write_json({"table1": [as_json(row) for row in rows], "note": WHY_THEY_DIFFER})
             return
-        write_lines("Table 1 of the paper, and what this program finds, in design units")
+        write_lines("Table 1 of the paper, and the values of this program, in design units")
         for row in rows:
             write_lines("", as_lines(row))
         write_lines("", WHY_THEY_DIFFER)
-
-
-@dataclass(frozen=True)
-class _Findings:
-    """What has been found of a workspace; None is what was not asked for."""
-
-    volume: Volume
-    nodes: NodeCount
-    solid: Solid
-    hull: Solid | None
-    orientations: int | None
-    reachable: Solid | None
-    dexterous: Solid | None
-    capability: float | None
-    interference: ReachableWorkspace | None
-    curve: RadiusCurve | None
-
-    def as_json(self) -> dict[str, object]:
-        extent = self.nodes.extent
-        answer: dict[str, object] = {
-            "volume": self.volume.volume,
-            "gradient": self.volume.gradient,
-            "empty_because": list(self.volume.empty_because),
-            "node_step": self.nodes.step,
-            "node_count": self.nodes.count,
-            "node_volume": self.nodes.volume,
-            "extent": None if extent is None else [list(ends) for ends in extent],
-            "mesh": mesh_json(self.solid),
-        }
-        if self.solid.agrees is False:
-            answer["mesh_agrees"] = False
-        if self.hull is not None:
-            answer["hull_volume"] = self.hull.volume
-        if self.reachable is not None and self.dexterous is not None:
-            answer["orientations"] = self.orientations
-            answer["reachable_mesh"] = mesh_json(self.reachable)
-            answer["dexterous_mesh"] = mesh_json(self.dexterous)
-        if self.capability is not None:
-            answer["orientation_capability"] = self.capability
-        if self.interference is not None:
-            answer |= interference_json(self.interference)
-        if self.curve is not None:
-            answer["radius_curve"] = curve_json(self.curve)
-        return answer
-
-    def as_lines(self, design: Design) -> list[str]:
-        rows = [("", "units³", "cm³", "")]
-
-        def add(name: str, volume: float, remark: str = "") -> None:
-            rows.append(
-                (name, figure(volume), figure(volume * (0.1 * design.unit_mm) ** 3), remark)
-            )
-
-        add("exact volume", self.volume.volume)
-        add(
-            "node volume",
-            self.nodes.volume,
-            f"{self.nodes.count} nodes at multiples of {self.nodes.step:.6g}",
-        )
-        add("mesh", self.solid.volume, _mesh_remark(self.solid))
-        if self.hull is not None:
-            add("convex hull", self.hull.volume)
-        for name, solid in (("reachable", self.reachable), ("dexterous", self.dexterous)):
-            if solid is not None:
-                add(name, solid.volume, f"{self.orientations} orientations, {_mesh_remark(solid)}")
-        found = self.interference
-        if found is not None:
-            remark = f"{found.reachable_node_count} of {found.node_count} nodes"
-            add("without collisions", found.reachable_volume, remark)
-        lines = [table(rows, "<>><")]
-        if self.nodes.extent is not None:
-            lines += ["", "extent of the nodes"]
-            lines += [
-                f"  {axis}  {figure(low)} to {figure(high)}"
-                for axis, low, high in zip("xyz", *self.nodes.extent, strict=True)
-            ]
-        if self.volume.empty_because:
-            lines += ["", f"empty because of {', '.join(self.volume.empty_because)}"]
-        if self.volume.gradient:
-            moves = [("moves with", "units² (yaw: units³ a radian)")]
-            moves += [(name, figure(rate)) for name, rate in self.volume.gradient.items()]
-            lines += ["", table(moves, "<>")]
-        if self.capability is not None:
-            lines += ["", f"orientation capability {100.0 * self.capability:.2f} %"]
-        if found is not None:
-            lines += ["", interference_table(design, found)]
-        if self.curve is not None:
-            lines += ["", curve_table(design, self.curve)]
-        return lines
-
-
-def _mesh_remark(solid: Solid) -> str:
-    off = f", {DISAGREES}" if solid.agrees is False else ""
-    if solid.is_empty:
-        return f"empty because of {', '.join(solid.empty_because) or 'the tolerance'}{off}"
-    state = "watertight" if solid.is_watertight else "not watertight"
-    return f"{len(solid.faces)} triangles, {state}, tolerance {solid.tolerance:.3g}{off}"

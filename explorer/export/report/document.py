@@ -1,4 +1,4 @@
-"""The report as one HTML page: title block, sections, and how to make it again."""
+"""The report as one HTML page: title block, sections, and the commands that reproduce it."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from importlib import resources
 from xml.etree.ElementTree import Element
 
 from explorer import __version__
-from explorer.export.report.drawings.mechanism import lead
-from explorer.export.report.findings import Findings, Missing
+from explorer.export.report.data import Missing, ReportData
+from explorer.export.report.drawings.mechanism import cover_drawing
 from explorer.export.report.markup import (
     Piece,
     as_html,
-    count,
     element,
-    figure,
+    format_number,
     illustration,
+    number,
     paragraph,
     table,
-    written,
+    whole,
 )
 from explorer.export.report.sections.legs import legs_section
 from explorer.export.report.sections.mechanism import mechanism_section, pose_words
@@ -32,20 +32,20 @@ from explorer.files.versions import versions
 from explorer.mechanism.design_file import PRESETS
 from explorer.workspace.accessible.workspace import ReachableWorkspace
 
-# What a browser may fetch for this page: nothing at all.
+# The page may fetch nothing.
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
 
 
-def report_html(found: Findings, date: dt.date) -> str:
-    """Return the report, which needs no other file and no network.
+def report_html(data: ReportData, date: dt.date) -> str:
+    """Return the report as HTML that needs no other file and no network.
 
-    The same findings make the same report, but for the date and the versions that it tells.
+    Equal data give equal reports, except for the date and the versions of the libraries.
 
     Args:
-        found: What it tells.
-        date: Of the report.
+        data: Data of the report.
+        date: Date of the report.
     """
-    title = f"{_name(found)} – design report"
+    title = f"{_name(data)} – design report"
     style = (
         resources.files("explorer.export.report").joinpath("style.css").read_text(encoding="utf-8")
     )
@@ -58,13 +58,13 @@ def report_html(found: Findings, date: dt.date) -> str:
         element("title", title),
         element("style", style),
     )
-    body = element("body", element("header", *_title_block(found, date), class_="cover"))
+    body = element("body", element("header", *_title_block(data, date), class_="cover"))
     for section in (mechanism_section, workspace_section, singularity_section, legs_section):
-        body.append(element("section", *section(found)))
-    body.append(element("section", *parts_section(found)))
-    if found.record is not None:
-        body.append(element("section", *search_section(found, found.record)))
-    body.append(element("section", *_reproduction(found)))
+        body.append(element("section", *section(data)))
+    body.append(element("section", *parts_section(data)))
+    if data.record is not None:
+        body.append(element("section", *search_section(data, data.record)))
+    body.append(element("section", *_reproduction(data)))
     return f"<!DOCTYPE html>\n{as_html(element('html', head, body, lang='en-GB'))}\n"
 
 
@@ -72,27 +72,27 @@ def _meta(name: str, content: str) -> Element:
     return element("meta", name=name, content=content)
 
 
-def _title_block(found: Findings, date: dt.date) -> Iterator[Element]:
-    design = found.design
+def _title_block(data: ReportData, date: dt.date) -> Iterator[Element]:
+    design = data.design
     yield element("p", "Design report", class_="kind")
-    yield element("h1", _name(found))
+    yield element("h1", _name(data))
     yield element("p", "Flagged 4-4 parallel manipulator", class_="subtitle")
     particulars: tuple[tuple[str, Piece], ...] = (
         ("Date", element("time", date.isoformat(), datetime=date.isoformat())),
         ("Made by", f"Flagged 4-4 explorer {__version__}"),
-        ("Unit", f"1 unit = {written(design.unit_mm)} mm"),
+        ("Unit", f"1 unit = {format_number(design.unit_mm)} mm"),
         (
             "Design file, SHA-256",
-            element("span", f"{found.design_hash[:16]}…", title=found.design_hash),
+            element("span", f"{data.design_hash[:16]}…", title=data.design_hash),
         ),
     )
     yield element("dl", *map(_entry, particulars), class_="particulars")
-    yield illustration(lead(found.snapshot), f"The mechanism in {pose_words(found)}.")
-    yield element("dl", *map(_entry, _headline(found)), class_="headline")
+    yield illustration(cover_drawing(data.snapshot), f"The mechanism in {pose_words(data)}.")
+    yield element("dl", *map(_entry, _headline(data)), class_="headline")
 
 
-def _name(found: Findings) -> str:
-    return found.design.name or "untitled"
+def _name(data: ReportData) -> str:
+    return data.design.name or "untitled"
 
 
 def _entry(entry: tuple[str, Piece | tuple[Piece, ...]]) -> Element:
@@ -101,75 +101,75 @@ def _entry(entry: tuple[str, Piece | tuple[Piece, ...]]) -> Element:
     return element("div", element("dt", name), element("dd", *pieces))
 
 
-def _headline(found: Findings) -> Iterator[tuple[str, tuple[Piece, ...]]]:
-    unit = found.design.unit_mm
-    yield "Exact volume", (figure(found.volume.volume), _unit("units³"))
-    if isinstance(found.nodes, Missing):
+def _headline(data: ReportData) -> Iterator[tuple[str, tuple[Piece, ...]]]:
+    unit = data.design.unit_mm
+    yield "Exact volume", (number(data.volume.volume), _unit("units³"))
+    if isinstance(data.nodes, Missing):
         yield "Node volume", ("–",)
     else:
-        many = element("span", count(found.nodes.count), " nodes")
-        yield "Node volume", (figure(found.nodes.volume), _unit("units³, "), many)
-    yield "Reach", (figure(found.design.reach * unit, 4), _unit("mm"))
-    margin = found.snapshot.proximity * found.design.reach
-    yield "Smallest margin |κ| here", (figure(margin * unit, 4), _unit("mm"))
-    yield "Inverse condition here", (figure(found.snapshot.inverse_condition, 4), _unit("of 1"))
-    clearance = float(found.snapshot.clearances.clearance.min())
-    yield "Least clearance of legs here", (figure(clearance * unit, 4), _unit("mm"))
+        many = element("span", whole(data.nodes.count), " nodes")
+        yield "Node volume", (number(data.nodes.volume), _unit("units³, "), many)
+    yield "Reach", (number(data.design.reach * unit, 4), _unit("mm"))
+    margin = data.snapshot.proximity * data.design.reach
+    yield "Smallest margin |δ| here", (number(margin * unit, 4), _unit("mm"))
+    yield "Inverse condition here", (number(data.snapshot.inverse_condition, 4), _unit("of 1"))
+    clearance = float(data.snapshot.clearances.clearance.min())
+    yield "Least clearance of legs here", (number(clearance * unit, 4), _unit("mm"))
 
 
 def _unit(words: str) -> Element:
     return element("span", f" {words}")
 
 
-def _reproduction(found: Findings) -> Iterator[Element]:
-    design = found.design
+def _reproduction(data: ReportData) -> Iterator[Element]:
+    design = data.design
     yield element("h2", "How to reproduce it")
     is_preset = PRESETS.get(design.name) == design
     source = design.name if is_preset else "design.json"
-    pose = found.snapshot.pose
+    pose = data.snapshot.pose
     orientation = f" --quaternion {_words(pose.quaternion)}"
     position = f" --position {_words(pose.position)}"
-    at = "" if found.is_home else position + orientation
-    turned = "" if found.is_home else orientation
-    radii = " --interference" if isinstance(found.reachable, ReachableWorkspace) else ""
-    record = "" if found.record is None else " --record record.json"
+    at = "" if data.is_home else position + orientation
+    turned = "" if data.is_home else orientation
+    radii = " --interference" if isinstance(data.reachable, ReachableWorkspace) else ""
+    record = "" if data.record is None else " --record record.json"
     commands = [
         f"explorer report --design {shlex.quote(source)}{at}{record} --out report.html",
         f"explorer workspace --design {shlex.quote(source)}{turned} --hull{radii}",
         f"explorer singularity --design {shlex.quote(source)}{at}",
         f"explorer interference --design {shlex.quote(source)}{at}",
     ]
-    if not isinstance(found.bill, Missing):
+    if not isinstance(data.bill, Missing):
         commands.append(
             f"explorer export mechanism --design {shlex.quote(source)} --out mechanism.zip"
         )
-    if found.record is not None:
-        commands.append("explorer optimise --repeat record.json --out found.json")
-    where: tuple[Piece, ...] = ("The design comes along with the explorer. ",)
+    if data.record is not None:
+        commands.append("explorer optimise --repeat record.json --out data.json")
+    where: tuple[Piece, ...] = ("The design is a preset of the explorer. ",)
     if not is_preset:
         where = ("Save the file below as ", element("code", "design.json"), ". ")
-    yield paragraph(*where, "These commands tell the same figures:")
+    yield paragraph(*where, "These commands give the same figures:")
     yield element("pre", "\n".join(commands), id="commands")
-    if found.record is not None:
-        settings = found.record.settings
+    if data.record is not None:
+        settings = data.record.settings
         yield paragraph(
             "The search is the same each time: seed ",
-            count(settings.seed),
+            whole(settings.seed),
             ", ",
-            count(settings.starts),
+            whole(settings.starts),
             " start" if settings.starts == 1 else " starts",
             " of at most ",
-            count(settings.iterations),
-            " iterations. All else here has no chance in it.",
+            whole(settings.iterations),
+            " iterations. Nothing else here is random.",
         )
     else:
-        yield paragraph("Nothing here depends on chance; there is no seed.")
+        yield paragraph("Nothing here is random; there is no seed.")
     heads, rows = ("", "this report"), [(name, value) for name, value in versions().items()]
     yield element("h3", "Versions")
-    if found.record is None:
+    if data.record is None:
         yield table(heads, rows, align="<<")
     else:
-        searched = found.record.versions
+        searched = data.record.versions
         names = dict.fromkeys((*versions(), *searched))
         yield table(
             ("", "this report", "the search"),
@@ -177,8 +177,8 @@ def _reproduction(found: Findings) -> Iterator[Element]:
             align="<<<",
         )
     yield element("h3", "Design file")
-    yield paragraph("SHA-256 ", element("code", found.design_hash, id="design-hash"), class_="dim")
-    yield element("pre", found.design_file, id="design")
+    yield paragraph("SHA-256 ", element("code", data.design_hash, id="design-hash"), class_="dim")
+    yield element("pre", data.design_file, id="design")
 
 
 def _words(values: tuple[float, ...]) -> str:

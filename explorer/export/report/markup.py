@@ -1,6 +1,7 @@
-"""Pieces of HTML and SVG, as trees: text is text, whatever it holds.
+"""Elements of HTML and SVG as trees.
 
-Everything that goes into a report is made here, so that no name in a file can become markup.
+A report consists of elements only, whose text is escaped: no name in a design file can become
+markup. Looks are classes of `style.css`.
 """
 
 from __future__ import annotations
@@ -15,14 +16,14 @@ Piece: TypeAlias = "Element | str | float | None"
 Cell: TypeAlias = "Piece | Sequence[Piece]"
 
 _SUPERSCRIPTS = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
-# Below and from here on a number is written with a power of ten.
+# A number below the first, or from the second on, is written with a power of ten.
 _LEAST, _MOST = 1e-4, 1e9
 
 
 def element(tag: str, *pieces: Piece, **attributes: str | float | None) -> Element:
     """Return an element with pieces inside; attributes of None are left out.
 
-    A name of an attribute may end in _, where it is a word of Python; within it _ is a hyphen.
+    The name of an attribute may end in _, if Python reserves the word; other _ become hyphens.
     """
     made = Element(tag)
     for name, value in attributes.items():
@@ -35,11 +36,11 @@ def element(tag: str, *pieces: Piece, **attributes: str | float | None) -> Eleme
 
 
 def add(parent: Element, piece: Piece) -> None:
-    """Put a piece at the end of an element: another one, text, or a figure."""
+    """Append a piece to an element: an element, text, or a number."""
     if piece is None:
         return
     if isinstance(piece, float | int):
-        piece = figure(piece)
+        piece = number(piece)
     if isinstance(piece, Element):
         parent.append(piece)
     elif len(parent):
@@ -49,7 +50,7 @@ def add(parent: Element, piece: Piece) -> None:
 
 
 def printable(text: str) -> str:
-    """Return text without what no document may hold, such as a NUL."""
+    """Return text with control characters and lone surrogates replaced, except line breaks."""
     return "".join(
         "\N{REPLACEMENT CHARACTER}" if category(c).startswith("C") and c != "\n" else c
         for c in text
@@ -57,23 +58,23 @@ def printable(text: str) -> str:
 
 
 def as_html(root: Element) -> str:
-    """Return an element as HTML."""
+    """Return an element as HTML text."""
     return tostring(root, encoding="unicode", method="html")
 
 
 def power_of_ten(exponent: int) -> str:
-    """Return ten to a power as people write it."""
+    """Return a power of ten, such as 10⁻³."""
     return f"10{str(exponent).translate(_SUPERSCRIPTS)}"
 
 
 def coordinate(value: float) -> str:
-    """Return a number of a drawing to a hundredth, as short as it can be."""
+    """Return a number rounded to a hundredth, in the fewest characters."""
     text = f"{value:.2f}".rstrip("0").rstrip(".")
     return "0" if text == "-0" else text
 
 
-def written(value: float, digits: int = 6) -> str:
-    """Return a number for people: a true minus, and powers of ten as powers of ten."""
+def format_number(value: float, digits: int = 6) -> str:
+    """Return a number with a true minus, and with a power of ten where it is tiny or huge."""
     if math.isnan(value):
         return "–"
     if math.isinf(value):
@@ -88,20 +89,20 @@ def written(value: float, digits: int = 6) -> str:
     return f"{value + 0.0:.{digits}g}".replace("-", "−")
 
 
-def figure(value: float, digits: int = 6) -> Element:
-    """Return a number as people read it, with its full value for machines."""
-    return element("data", written(value, digits), value=repr(float(value) + 0.0))
+def number(value: float, digits: int = 6) -> Element:
+    """Return an element with a rounded number, whose `value` is the number in full."""
+    return element("data", format_number(value, digits), value=repr(float(value) + 0.0))
 
 
-def text(
+def drawing_text(
     words: str, x: float, y: float, *, anchor: str = "middle", class_: str = "small"
 ) -> Element:
-    """Return words in a drawing, at a place that is their middle, start or end."""
+    """Return words in a drawing; `anchor` says whether (x, y) is their middle, start or end."""
     return element("text", words, x=x, y=y, class_=class_, text_anchor=anchor)
 
 
-def count(value: int) -> Element:
-    """Return a whole number, its digits in groups of three."""
+def whole(value: int) -> Element:
+    """Return an element with a whole number, its digits in groups of three."""
     return element("data", f"{value:,}".replace(",", "\N{NARROW NO-BREAK SPACE}"), value=str(value))
 
 
@@ -111,10 +112,10 @@ def table(
     """Return a table.
 
     Args:
-        heads: Of the columns; () for none.
-        rows: Cells, each a piece or several.
-        align: One letter for each column, "<" for words and ">" for figures.
-        caption: Above it.
+        heads: Headings of the columns; () for none.
+        rows: Rows of cells; a cell is one piece or several.
+        align: One letter per column, "<" for words and ">" for numbers.
+        caption: Caption above the table.
     """
 
     def line(tag: str, cells: Sequence[Cell]) -> Element:
@@ -141,5 +142,5 @@ def paragraph(*pieces: Piece, class_: str | None = None) -> Element:
 
 
 def illustration(drawing: Element, *caption: Piece) -> Element:
-    """Return a drawing with its caption."""
+    """Return a figure: a drawing with its caption."""
     return element("figure", drawing, element("figcaption", *caption))

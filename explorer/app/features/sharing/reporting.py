@@ -40,10 +40,10 @@ def make_report(
         MissingExtraError: PDF without Playwright or a Chromium.
         PictureError: the browser did not start.
     """
+    from explorer.export.report.data import gather_report_data
     from explorer.export.report.document import report_html
-    from explorer.export.report.findings import find
 
-    html = report_html(find(design, pose, record), date or dt.date.today())
+    html = report_html(gather_report_data(design, pose, record), date or dt.date.today())
     if file_format == "html":
         return html.encode()
     # In a thread of its own: where an event loop runs, as in a notebook, the browser's calls

@@ -1,4 +1,4 @@
-"""How a search went, as charts: objective, volume and worst demand over its iterations."""
+"""Charts of a search: objective, volume and worst demand over its iterations."""
 
 from __future__ import annotations
 
@@ -7,8 +7,14 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from explorer.export.report.drawings.mechanism import WIDTH, drawing, round_length
-from explorer.export.report.markup import coordinate, element, power_of_ten, text, written
+from explorer.export.report.drawings.mechanism import WIDTH, round_length, svg_drawing
+from explorer.export.report.markup import (
+    coordinate,
+    drawing_text,
+    element,
+    format_number,
+    power_of_ten,
+)
 from explorer.optimise.curves import CALLED, Curve, curves_of
 from explorer.optimise.record import Record, Step
 
@@ -18,12 +24,12 @@ _TICKS = 5
 
 
 def steps_of(record: Record) -> list[Step]:
-    """Return the iterates of the start that was chosen."""
+    """Return the iterates of the chosen start."""
     return [step for step in record.history if step.run == record.chosen]
 
 
 def charts(record: Record) -> Element | None:
-    """Return the charts of the start that was chosen; None if it has no iterates."""
+    """Return the charts of the chosen start; None if it has no iterates."""
     steps = steps_of(record)
     if not steps:
         return None
@@ -37,7 +43,7 @@ def charts(record: Record) -> Element | None:
             )
         )
         made.extend(_chart(curve, index * width + LEFT, width - LEFT - RIGHT))
-    return drawing(HEIGHT, "The search, by iterations", *made)
+    return svg_drawing(HEIGHT, "The search, by iterations", *made)
 
 
 def _title(record: Record, curve: Curve) -> str:
@@ -66,13 +72,13 @@ def _chart(curve: Curve, left: float, width: float) -> list[Element]:
     for tick in _ticks(low, high, whole=curve.powers):
         _, y = place(0.0, tick)
         made.append(element("line", x1=left, y1=y, x2=left + width, y2=y, class_="grid"))
-        words = power_of_ten(round(tick)) if curve.powers else written(tick, 5)
-        made.append(text(words, left - 5.0, y + 3.5, anchor="end"))
+        words = power_of_ten(round(tick)) if curve.powers else format_number(tick, 5)
+        made.append(drawing_text(words, left - 5.0, y + 3.5, anchor="end"))
     for tick in _ticks(0.0, float(last), whole=True):
         x, _ = place(tick, low)
         made.append(element("line", x1=x, y1=TOP + tall, x2=x, y2=TOP + tall + 4.0))
-        made.append(text(written(tick), x, TOP + tall + 15.0))
-    made.append(text("iteration", left + 0.5 * width, HEIGHT - 6.0, class_="axis"))
+        made.append(drawing_text(format_number(tick), x, TOP + tall + 15.0))
+    made.append(drawing_text("iteration", left + 0.5 * width, HEIGHT - 6.0, class_="axis"))
     pieces = [made]
     if curve.level is not None:
         _, y = place(0.0, curve.level)

@@ -1,4 +1,4 @@
-"""Names beside what they name: each is put where it covers least."""
+"""Labels beside points, placed where they cover least."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from explorer.export.report.markup import text
+from explorer.export.report.markup import drawing_text
 from explorer.numerics.arrays import FloatArray
 
 Box: TypeAlias = tuple[float, float, float, float]
-Way: TypeAlias = tuple[float, float]
-"""How far from its point a label is, and in which direction."""
+Offset: TypeAlias = tuple[float, float]
+"""The distance of a label from its point, and its direction in radians."""
 
-# Of a letter at the size of labels, in points of paper.
+# The size of a letter of a label, in points of paper.
 LETTER, HEIGHT = 6.4, 12.0
-_WAYS = tuple(math.radians(angle) for angle in (45, 135, -45, -135, 90, -90, 0, 180))
-_REACHES = (13.0, 19.0, 26.0)
+_DIRECTIONS = tuple(math.radians(angle) for angle in (45, 135, -45, -135, 90, -90, 0, 180))
+_DISTANCES = (13.0, 19.0, 26.0)
 _ALONG = np.linspace(0.0, 1.0, 25)[:, None]
 
 
@@ -32,9 +32,9 @@ def labels(
     """Return labels of points.
 
     Args:
-        names: What to write, and beside which point, shape (2,).
-        lines: What not to cover: straight lines by their ends, each (2,).
-        within: Lows and highs of where they may be.
+        names: Words of each label and its point, shape (2,).
+        lines: Straight lines to keep clear, by their ends, each of shape (2,).
+        within: Frame of the labels: left, top, right, bottom.
     """
     taken = [_box(point, 9.0, 9.0) for _, point in names]
     covered = np.concatenate([np.zeros((0, 2)), *(a + _ALONG * (b - a) for a, b in lines)])
@@ -42,8 +42,8 @@ def labels(
     for name, point in names:
         width = LETTER * len(name) + 4.0
 
-        def cost(way: Way, point: FloatArray = point, width: float = width) -> float:
-            x0, y0, x1, y1 = box = _placed(point, way, width)
+        def cost(offset: Offset, point: FloatArray = point, width: float = width) -> float:
+            x0, y0, x1, y1 = box = _placed(point, offset, width)
             inside = (
                 (covered[:, 0] > x0)
                 & (covered[:, 0] < x1)
@@ -52,20 +52,20 @@ def labels(
             )
             outside = max(0.0, within[0] - x0, x1 - within[2], within[1] - y0, y1 - within[3])
             overlap = sum(_overlap(box, other) for other in taken)
-            return overlap + 4.0 * float(inside.sum()) + 50.0 * outside + 0.4 * way[0]
+            return overlap + 4.0 * float(inside.sum()) + 50.0 * outside + 0.4 * offset[0]
 
-        best = min(itertools.product(_REACHES, _WAYS), key=cost)
+        best = min(itertools.product(_DISTANCES, _DIRECTIONS), key=cost)
         box = _placed(point, best, width)
         taken.append(box)
-        made.append(text(name, 0.5 * (box[0] + box[2]), box[3] - 2.5, class_="label"))
+        made.append(drawing_text(name, 0.5 * (box[0] + box[2]), box[3] - 2.5, class_="label"))
     return made
 
 
-def _placed(point: FloatArray, way: Way, width: float) -> Box:
-    reach, angle = way
+def _placed(point: FloatArray, offset: Offset, width: float) -> Box:
+    distance, angle = offset
     x, y = point.tolist()
-    off_x = math.cos(angle) * (reach + 0.5 * width - 4.0)
-    return _box(np.array([x + off_x, y - math.sin(angle) * reach]), width, HEIGHT)
+    off_x = math.cos(angle) * (distance + 0.5 * width - 4.0)
+    return _box(np.array([x + off_x, y - math.sin(angle) * distance]), width, HEIGHT)
 
 
 def _box(middle: FloatArray, width: float, height: float) -> Box:

@@ -1,8 +1,8 @@
 """The mechanism as a line drawing: base, guide, four legs, platform, and the flags' colours.
 
 Each element of the two flags has the colour of the incidence that it is part of, as in the
-page: a1 and the platform that of κ1, the guide and the line b2b3 that of κ2, b4 and the base
-that of κ3.
+page: a1 and the platform that of δ1, the guide and the line b2b3 that of δ2, b4 and the base
+that of δ3.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from explorer.export.report.drawings.labels import labels
-from explorer.export.report.drawings.projection import Projection, ViewName, fitted
-from explorer.export.report.markup import coordinate, element, text, written
+from explorer.export.report.drawings.projection import Projection, ViewName, fit_view
+from explorer.export.report.markup import coordinate, drawing_text, element, format_number
 from explorer.legs.clearance import leg_axes
 from explorer.measures.snapshot import Snapshot
 from explorer.measures.verdict import verdict
@@ -22,27 +22,27 @@ from explorer.numerics.arrays import FloatArray
 from explorer.singularity.colours import WARN_SHARE, css, proximity_colour
 
 WIDTH = 720.0
-# Of a leg, how much of it is cylinder.
+# The share of a leg that is cylinder.
 CYLINDER = 0.56
-# Around the points of a view, for labels.
+# The space around the points of a view, for labels.
 ROOM = 30.0
-# Of the sheet of three views, and of the first picture.
+# The heights of the sheet of three views and of the first picture.
 SHEET_HEIGHT, LEAD_HEIGHT = 640.0, 430.0
 # The least width and height of a view's cell.
 LEAST_CELL = 210.0
 
 
-def outermost(snapshot: Snapshot) -> FloatArray:
-    """Return the points that a drawing of a mechanism has to show, shape (n, 3)."""
+def points_to_show(snapshot: Snapshot) -> FloatArray:
+    """Return the points that a drawing of a mechanism must show, shape (n, 3)."""
     return np.concatenate([np.array(_points(snapshot)), _guide(snapshot), _carriages(snapshot)])
 
 
-def lead(snapshot: Snapshot) -> Element:
+def cover_drawing(snapshot: Snapshot) -> Element:
     """Return the first picture of a report."""
     frame = (2 * ROOM, ROOM, WIDTH - 4 * ROOM, LEAD_HEIGHT - 2 * ROOM)
-    view = fitted("isometric", outermost(snapshot), frame)
+    view = fit_view("isometric", points_to_show(snapshot), frame)
     box = (0.0, 0.0, WIDTH, LEAD_HEIGHT)
-    return drawing(
+    return svg_drawing(
         LEAD_HEIGHT,
         "The mechanism, seen from above at an angle",
         element("g", *mechanism(snapshot, view, box)),
@@ -51,9 +51,9 @@ def lead(snapshot: Snapshot) -> Element:
     )
 
 
-def sheet(snapshot: Snapshot) -> Element:
+def three_views(snapshot: Snapshot) -> Element:
     """Return the mechanism from above, from the front and from the side, at one scale."""
-    points = outermost(snapshot)
+    points = points_to_show(snapshot)
     wide, deep = (float(each) for each in np.ptp(points[:, :2], axis=0))
     high = float(np.ptp(points[:, 2]))
     least = 1e-9 * max(wide, deep, high)
@@ -72,7 +72,7 @@ def sheet(snapshot: Snapshot) -> Element:
     )
     made: list[Element] = []
     for name, title, x, y, width, tall in cells:
-        view = fitted(name, points, (x, y + 16.0, width, tall - 16.0), scale)
+        view = fit_view(name, points, (x, y + 16.0, width, tall - 16.0), scale)
         box = (x, y + 16.0, x + width, y + tall)
         made.append(element("text", title, x=x + 8.0, y=y + 18.0, class_="title"))
         made.extend(mechanism(snapshot, view, box))
@@ -82,8 +82,8 @@ def sheet(snapshot: Snapshot) -> Element:
         d=f"M0,{coordinate(upper)}H{coordinate(WIDTH)}M{coordinate(left)},0V{coordinate(height)}",
         class_="rule",
     )
-    view = fitted("front", points, (0.0, 0.0, 1.0, 1.0), scale)
-    return drawing(
+    view = fit_view("front", points, (0.0, 0.0, 1.0, 1.0), scale)
+    return svg_drawing(
         height,
         "The mechanism from above, from the front and from the right, at one scale",
         lines,
@@ -93,7 +93,7 @@ def sheet(snapshot: Snapshot) -> Element:
     )
 
 
-def drawing(height: float, title: str, *pieces: Element) -> Element:
+def svg_drawing(height: float, title: str, *pieces: Element) -> Element:
     """Return a drawing as wide as the page."""
     return element(
         "svg",
@@ -108,7 +108,7 @@ def drawing(height: float, title: str, *pieces: Element) -> Element:
 def mechanism(
     snapshot: Snapshot, view: Projection, box: tuple[float, float, float, float] | None
 ) -> Iterator[Element]:
-    """Yield what draws a mechanism; with labels within a box, or without any if None."""
+    """Yield the elements of a mechanism, with labels within a box, or without labels if None."""
     points = snapshot.points
     legs = leg_axes(snapshot.design, snapshot.pose.position, snapshot.rotation)
     found = verdict(snapshot, WARN_SHARE * snapshot.design.reach)
@@ -149,14 +149,14 @@ def mechanism(
 
 
 def scale_bar(view: Projection, unit_mm: float, x: float, y: float) -> Element:
-    """Return a bar of a round length, with that length."""
+    """Return a scale bar of a round length, labelled in design units and millimetres."""
     length = round_length(130.0 / view.scale)
     end = x + length * view.scale
     path = (
         f"M{coordinate(x)},{coordinate(y - 4.0)}v8M{coordinate(x)},{coordinate(y)}"
         f"H{coordinate(end)}m0,-4v8"
     )
-    words = f"{written(length)} units = {written(length * unit_mm)} mm"
+    words = f"{format_number(length)} units = {format_number(length * unit_mm)} mm"
     return element(
         "g",
         element("path", d=path, class_="bar"),
@@ -165,13 +165,13 @@ def scale_bar(view: Projection, unit_mm: float, x: float, y: float) -> Element:
 
 
 def round_length(length: float) -> float:
-    """Return the largest of 1, 2 and 5 times a power of ten that is not longer."""
+    """Return the largest of 1, 2 and 5 times a power of ten that is not above a length."""
     power = 10.0 ** np.floor(np.log10(length))
     return float(power * max(step for step in (1.0, 2.0, 5.0) if step * power <= length))
 
 
 def axes_cross(view: Projection, x: float, y: float, *, flat: bool = False) -> Element:
-    """Return the directions of the base's axes; of a flat view only those in its plane."""
+    """Return the axes of the base; of a flat view only those in its plane."""
     made = element("g", class_="axes")
     for name, axis in zip("xyz", np.eye(3), strict=True):
         dx, dy = ((view.to(axis) - view.to(np.zeros(3))) / view.scale).tolist()
@@ -179,7 +179,7 @@ def axes_cross(view: Projection, x: float, y: float, *, flat: bool = False) -> E
             continue
         end_x, end_y = x + 22.0 * dx, y + 22.0 * dy
         made.append(element("line", x1=x, y1=y, x2=end_x, y2=end_y))
-        made.append(text(name, x + 30.0 * dx, y + 30.0 * dy + 3.5))
+        made.append(drawing_text(name, x + 30.0 * dx, y + 30.0 * dy + 3.5))
     return made
 
 
@@ -193,7 +193,7 @@ def _points(snapshot: Snapshot) -> Sequence[FloatArray]:
 
 
 def _carriages(snapshot: Snapshot) -> FloatArray:
-    """Return where the carriages stand, shape (2, 3)."""
+    """Return the positions of the carriages, shape (2, 3)."""
     return np.array([[snapshot.joints[k], 0.0, 0.0] for k in (1, 3)])
 
 
@@ -234,7 +234,7 @@ def _dot(
 
 
 def _key(x: float, y: float) -> Iterator[Element]:
-    """Yield what the signs of the drawings mean."""
+    """Yield the key to the signs of the drawings."""
     yield element("text", "Key", x=x, y=y, class_="title")
     entries: tuple[tuple[Element, str], ...] = (
         (

@@ -33,8 +33,8 @@ class Projection:
 
     Attributes:
         axes: Right, up and towards the eye, in rows, shape (3, 3).
-        scale: Points of paper in a design unit.
-        offset: Where the origin of space lies on paper, shape (2,).
+        scale: Points of paper per design unit.
+        offset: Position of the origin of space on paper, shape (2,).
     """
 
     axes: FloatArray
@@ -47,7 +47,7 @@ class Projection:
         return flat * np.array([1.0, -1.0]) + self.offset
 
     def depth(self, points: FloatArray) -> FloatArray:
-        """Return how near to the eye points (..., 3) are, in design units."""
+        """Return the nearness of points (..., 3) to the eye, in design units, shape (...)."""
         return np.asarray(points @ self.axes[2])
 
     @property
@@ -62,7 +62,7 @@ def extents(name: ViewName, points: FloatArray) -> tuple[FloatArray, FloatArray]
     return flat.min(axis=0), flat.max(axis=0)
 
 
-def fitted(
+def fit_view(
     name: ViewName,
     points: FloatArray,
     frame: tuple[float, float, float, float],
@@ -71,10 +71,10 @@ def fitted(
     """Return the view in which points (n, 3) fill a frame, in its middle.
 
     Args:
-        name: Of the view.
-        points: What is to be seen.
+        name: Name of the view.
+        points: Points to show, shape (n, 3).
         frame: Left, top, width and height on paper.
-        scale: Points of paper in a design unit; as large as fits if None.
+        scale: Points of paper per design unit; the largest that fits if None.
     """
     lows, highs = extents(name, points)
     left, top, width, height = frame

@@ -1,4 +1,4 @@
-"""Drawings of several slices at one scale, with axes, and what their colours mean."""
+"""Drawings of several slices at one scale, with axes and a legend of their colours."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ import math
 from collections.abc import Sequence
 from xml.etree.ElementTree import Element
 
-from explorer.export.report.drawings.mechanism import WIDTH, drawing, round_length
+from explorer.export.report.drawings.mechanism import WIDTH, round_length, svg_drawing
 from explorer.export.report.drawings.slices import Slices
-from explorer.export.report.markup import coordinate, element, text, written
+from explorer.export.report.markup import coordinate, drawing_text, element, format_number
 from explorer.singularity.colours import BAND_EDGES, OUTLINE, band_colours, css
 from explorer.workspace.slices.fields import AXES
 
-# Around a map that has ticks, and between maps.
+# The space around a map that has ticks, and between maps.
 LEFT, RIGHT, TOP, BOTTOM = 42.0, 12.0, 26.0, 38.0
 MOST_HEIGHT = 290.0
 _TICKS = 5
 
 
-def through(slices: Slices, position: Sequence[float]) -> Element:
+def slices_through(slices: Slices, position: Sequence[float]) -> Element:
     """Return the three maps of the slices through a position, side by side at one scale."""
     spans = slices.highs - slices.lows
     wide = float(2.0 * spans[0] + spans[1])
@@ -39,16 +39,16 @@ def through(slices: Slices, position: Sequence[float]) -> Element:
         cross = f"M{coordinate(x + home_u - 5)},{coordinate(y - home_v)}h10m-5,-5v10"
         made.append(element("path", d=cross, class_="cross casing"))
         made.append(element("path", d=cross, class_="cross"))
-        title = f"{axis} = {written(level, 4)}"
+        title = f"{axis} = {format_number(level, 4)}"
         made.append(element("text", title, x=x, y=y - tall - 10.0, class_="title"))
         left += LEFT + width + RIGHT
-    return drawing(height, "Three slices of the workspace", *made)
+    return svg_drawing(height, "Three slices of the workspace", *made)
 
 
-def strip(
+def slice_strip(
     slices: Slices, axis: str, many: int = 6
 ) -> tuple[Element, list[tuple[float, float | None]]]:
-    """Return the maps of slices at even steps along an axis, with levels and areas of them."""
+    """Return maps of slices at even steps along an axis, and the level and area of each."""
     cut = AXES.index(axis)
     first, second = (each for each in range(3) if each != cut)
     spans = slices.highs - slices.lows
@@ -62,36 +62,36 @@ def strip(
         left = (index + 0.5) * WIDTH / many - 0.5 * scale * float(spans[first])
         made.append(_placed(slices, axis, level, left, TOP + tall, scale, f"strip-{index}"))
         middle = (index + 0.5) * WIDTH / many
-        title = f"{axis} = {written(level, 4)}"
-        made.append(text(title, middle, 16.0, class_="title"))
+        title = f"{axis} = {format_number(level, 4)}"
+        made.append(drawing_text(title, middle, 16.0, class_="title"))
         found.append((level, slices.area(axis, level)))
-    return drawing(TOP + tall + 6.0, f"Slices along {axis}", *made), found
+    return svg_drawing(TOP + tall + 6.0, f"Slices along {axis}", *made), found
 
 
 def legend(slices: Slices, unit_mm: float) -> Element:
-    """Return what the colours of the maps mean."""
+    """Return the legend of the maps' colours."""
     colours, warn = band_colours(), slices.warn_below
     step, left, made = 46.0, 130.0, list[Element]()
-    made.append(text("smallest margin", left - 12.0, 15.0, anchor="end"))
-    made.append(text("units", left - 12.0, 33.0, anchor="end"))
-    made.append(text("mm", left - 12.0, 47.0, anchor="end"))
+    made.append(drawing_text("smallest margin", left - 12.0, 15.0, anchor="end"))
+    made.append(drawing_text("units", left - 12.0, 33.0, anchor="end"))
+    made.append(drawing_text("mm", left - 12.0, 47.0, anchor="end"))
     for index, (edge, colour) in enumerate(zip(BAND_EDGES, colours, strict=True)):
         x = left + step * index
         made.append(element("rect", x=x, y=4.0, width=step, height=14.0, fill=css(colour)))
         for factor, y in ((1.0, 33.0), (unit_mm, 47.0)):
-            words = written(edge * warn * factor, 3)
-            made.append(text(words, x, y))
+            words = format_number(edge * warn * factor, 3)
+            made.append(drawing_text(words, x, y))
     if any(slices.design.limits.leg_radii):
         x = left + step * len(colours) + 18.0
         made.append(element("rect", x=x, y=4.0, width=14.0, height=14.0, fill=css(OUTLINE)))
         made.append(element("text", "legs collide", x=x + 19.0, y=15.0, class_="small"))
-    return drawing(52.0, "The colours of the maps", *made)
+    return svg_drawing(52.0, "The colours of the maps", *made)
 
 
 def _placed(
     slices: Slices, axis: str, level: float, x: float, y: float, scale: float, name: str
 ) -> Element:
-    """Return a map with its lows at a place on paper, at a scale in points of a design unit."""
+    """Return a map with its lows at (x, y) on paper, at a scale in points per design unit."""
     size = scale / slices.own_scale
     group = slices.map(axis, level, name)
     group.set("transform", f"matrix({size:.6g} 0 0 {-size:.6g} {x:.6g} {y:.6g})")
@@ -112,15 +112,15 @@ def _ruler(
     made.append(element("line", **dict(zip(("x1", "y1", "x2", "y2"), line, strict=True))))
     for tick in ticks:
         at = start + way * scale * (tick * step - low)
-        words = written(tick * step, 4)
+        words = format_number(tick * step, 4)
         if up:
             made.append(element("line", x1=across, y1=at, x2=across - 4.0, y2=at))
-            made.append(text(words, across - 7.0, at + 3.5, anchor="end"))
+            made.append(drawing_text(words, across - 7.0, at + 3.5, anchor="end"))
         else:
             made.append(element("line", x1=at, y1=across, x2=at, y2=across + 4.0))
-            made.append(text(words, at, across + 15.0))
+            made.append(drawing_text(words, at, across + 15.0))
     if up:
-        made.append(text(AXES[k], across - 30.0, 0.5 * (start + end) + 3.5, class_="axis"))
+        made.append(drawing_text(AXES[k], across - 30.0, 0.5 * (start + end) + 3.5, class_="axis"))
     else:
-        made.append(text(AXES[k], 0.5 * (start + end), across + 30.0, class_="axis"))
+        made.append(drawing_text(AXES[k], 0.5 * (start + end), across + 30.0, class_="axis"))
     return made

@@ -28,7 +28,7 @@ from explorer.workspace.slices.fields import AXES, slice_field
 from explorer.workspace.slices.outline import Edge, Outline, slice_outline
 from explorer.workspace.slices.volume import bounds
 
-# Points of paper on the longer side of a workspace, in the drawing's own coordinates.
+# The longer side of a workspace in the drawing's own coordinates.
 OWN_SIZE = 1000.0
 # Cells on the longer side, where a slice has no exact outline and where legs collide.
 CELLS = 240
@@ -39,12 +39,12 @@ CONTOURS = 60
 
 @dataclass(frozen=True)
 class Slices:
-    """The workspace of a design at an orientation, to slice.
+    """Slices of the workspace of a design at one orientation.
 
     Attributes:
         design: The manipulator.
-        rotation: Platform to base, shape (3, 3).
-        lows, highs: Of a box that holds the workspace, each (3,).
+        rotation: Rotation from platform to base, shape (3, 3).
+        lows, highs: Corners of a box that holds the workspace, each of shape (3,).
     """
 
     design: Design
@@ -60,17 +60,17 @@ class Slices:
 
     @property
     def warn_below(self) -> float:
-        """The length below which margins are warned of, in design units."""
+        """The warning length of margins, in design units."""
         return WARN_SHARE * self.design.reach
 
     @property
     def own_scale(self) -> float:
-        """The drawing's own points in a design unit."""
+        """The drawing's own points per design unit."""
         return OWN_SIZE / float((self.highs - self.lows).max())
 
     @property
     def contour_step(self) -> float:
-        """Of the margin, from one contour to the next, in design units."""
+        """The step of the margin from one contour to the next, in design units."""
         return round_length(0.15 * float((self.highs - self.lows).max()))
 
     @property
@@ -95,9 +95,9 @@ class Slices:
         """Return the map of a slice, in its own coordinates: scaled, from the lows, y upwards.
 
         Args:
-            axis: Across which it is cut.
-            level: Where, in design units.
-            name: Of its outline, unique in the document.
+            axis: Axis that the slice is normal to.
+            level: Coordinate of the slice on that axis, in design units.
+            name: Identifier of the outline, unique in the document.
         """
         outline = self.outline(axis, level)
         own = self._own(axis)
@@ -243,7 +243,7 @@ def _ends(columns: FloatArray, rows: FloatArray) -> FloatArray:
 
 
 def _runs(cells: BoolArray, ends: FloatArray) -> str:
-    """Return the cells that are set, each run of a row as a rectangle."""
+    """Return the set cells as the data of a path, one rectangle for a run in a row."""
     data: list[str] = []
     for row, flags in enumerate(cells):
         jumps = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))

@@ -18,14 +18,14 @@ from explorer.numerics.arrays import FloatArray
 from explorer.singularity.colours import css, mixed
 from explorer.workspace.solids.solid import Solid
 
-# Where the light comes from: right, up and towards the eye.
+# The direction of the light: right, up and towards the eye.
 _LIGHT = np.array([-0.45, 0.65, 0.62])
 _DARK, _PALE = (86, 124, 172), (222, 232, 243)
 _SHADES = 24
 
 
-def shaded(solid: Solid, view: Projection) -> Element:
-    """Return the faces of a solid that are seen, in shades by how they face the light."""
+def shaded_faces(solid: Solid, view: Projection) -> Element:
+    """Return the visible faces of a solid, shaded by their angle to the light."""
     corners = solid.vertices[solid.faces]
     normals = _normals(solid)
     seen = np.flatnonzero(normals @ view.toward > 0.0)
@@ -47,8 +47,8 @@ def shaded(solid: Solid, view: Projection) -> Element:
     return made
 
 
-def edges(solid: Solid, view: Projection) -> Element:
-    """Return the seen edges: where two limits meet, and where faces turn away."""
+def visible_edges(solid: Solid, view: Projection) -> Element:
+    """Return the visible edges: those between two limits, and the silhouette."""
     return element("path", d="".join(_edges(solid, view)), class_="edge")
 
 

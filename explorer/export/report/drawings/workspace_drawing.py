@@ -1,4 +1,4 @@
-"""The workspace about the mechanism as drawings: whole, and cut open through the pose."""
+"""Drawings of the workspace about the mechanism: whole, and cut open through the pose."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from explorer.export.report.drawings.mechanism import (
     ROOM,
     WIDTH,
     axes_cross,
-    drawing,
     mechanism,
-    outermost,
+    points_to_show,
     scale_bar,
+    svg_drawing,
 )
-from explorer.export.report.drawings.projection import Projection, extents, fitted
+from explorer.export.report.drawings.projection import Projection, extents, fit_view
 from explorer.export.report.drawings.slices import Slices
-from explorer.export.report.drawings.solid_drawing import edges, shaded
+from explorer.export.report.drawings.solid_drawing import shaded_faces, visible_edges
 from explorer.export.report.markup import element
 from explorer.measures.snapshot import Snapshot
 from explorer.workspace.limits.constraints import HalfSpace
@@ -27,40 +27,40 @@ from explorer.workspace.solids.solids import cut_solid
 MOST_HEIGHT = 380.0
 
 
-def whole_and_cut(snapshot: Snapshot, solid: Solid, slices: Slices) -> Element:
+def workspace_views(snapshot: Snapshot, solid: Solid, slices: Slices) -> Element:
     """Return the workspace with the mechanism in it, and cut open at the pose's y.
 
     Args:
-        snapshot: The design in its pose.
-        solid: Its workspace, not empty.
-        slices: The same, to slice.
+        snapshot: Measures of the design in its pose.
+        solid: Mesh of its workspace, not empty.
+        slices: Slices of the same workspace.
     """
-    points = np.concatenate([outermost(snapshot), solid.vertices])
+    points = np.concatenate([points_to_show(snapshot), solid.vertices])
     lows, highs = extents("isometric", points)
     half = 0.5 * WIDTH
     wide, high = (highs - lows).tolist()
     scale = min((half - 2.0 * ROOM) / wide, (MOST_HEIGHT - 2.0 * ROOM) / high)
     height = scale * high + 2.0 * ROOM
-    whole = fitted("isometric", points, (0.0, 0.0, half, height), scale)
-    opened = fitted("isometric", points, (half, 0.0, half, height), scale)
+    whole = fit_view("isometric", points, (0.0, 0.0, half, height), scale)
+    opened = fit_view("isometric", points, (half, 0.0, half, height), scale)
     level = snapshot.pose.position[1]
     kept = cut_solid(solid, HalfSpace("cut", np.array([0.0, -1.0, 0.0]), -level))
     pieces = [
         element("g", *mechanism(snapshot, whole, None)),
-        element("g", shaded(solid, whole), opacity="0.66"),
-        edges(solid, whole),
+        element("g", shaded_faces(solid, whole), opacity="0.66"),
+        visible_edges(solid, whole),
         scale_bar(whole, snapshot.design.unit_mm, 4.0, height - 6.0),
         axes_cross(whole, half - 40.0, height - 30.0),
     ]
     if not kept.is_empty:
-        pieces += [shaded(kept, opened), edges(kept, opened)]
+        pieces += [shaded_faces(kept, opened), visible_edges(kept, opened)]
     pieces.append(_on_cut(slices, level, opened))
     pieces.append(element("g", *mechanism(snapshot, opened, None), opacity="0.9"))
-    return drawing(height, "The workspace, whole and cut open", *pieces)
+    return svg_drawing(height, "The workspace, whole and cut open", *pieces)
 
 
 def _on_cut(slices: Slices, level: float, view: Projection) -> Element:
-    """Return the map of the slice across y in its place in space."""
+    """Return the map of the slice normal to y, projected into the view."""
     group = slices.map("y", level, "slice-cut")
     corner = np.array([slices.lows[0], level, slices.lows[2]])
     origin = view.to(corner)

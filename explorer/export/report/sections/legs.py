@@ -1,4 +1,4 @@
-"""What a report tells of the legs: how far they keep from each other."""
+"""The section on the legs: their clearances, here and over the workspace."""
 
 from __future__ import annotations
 
@@ -6,20 +6,20 @@ import math
 from collections.abc import Iterator
 from xml.etree.ElementTree import Element
 
-from explorer.export.report.findings import Findings, Missing
+from explorer.export.report.data import Missing, ReportData
 from explorer.export.report.markup import Cell, element, paragraph, table
 from explorer.legs.clearance import PAIRS
 
 
-def legs_section(found: Findings) -> Iterator[Element]:
+def legs_section(data: ReportData) -> Iterator[Element]:
     """Yield the section on the clearances of the legs."""
-    unit, at = found.design.unit_mm, found.snapshot.clearances
-    least, reachable = found.least, found.reachable
+    unit, at = data.design.unit_mm, data.snapshot.clearances
+    least, reachable = data.least, data.reachable
     yield element("h2", "Legs")
     yield paragraph(
-        "The clearance of a pair is the distance of the legs’ axes less both radii; below zero "
-        "they collide. The least is that over the whole workspace at this orientation, found by "
-        "branch and bound. A pair that shares a joint has none."
+        "The clearance of a pair is the distance of the legs’ axes minus both radii; below zero "
+        "they collide. The least clearance over the workspace at this orientation is computed by "
+        "branch and bound. A pair that shares a joint has no clearance."
     )
     blocked = reachable is not None and not isinstance(reachable, Missing)
     heads = ["legs", "here, units", "here, mm", "least, units", "least, mm"]

@@ -1,23 +1,23 @@
-"""What a report tells of the search that found the design."""
+"""The section on the search that found the design."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from xml.etree.ElementTree import Element
 
+from explorer.export.report.data import ReportData
 from explorer.export.report.drawings.history import charts, steps_of
-from explorer.export.report.findings import Findings
-from explorer.export.report.markup import Cell, count, element, illustration, paragraph, table
+from explorer.export.report.markup import Cell, element, illustration, paragraph, table, whole
 from explorer.mechanism.design import VARIABLES
 from explorer.optimise.curves import CALLED
 from explorer.optimise.record import Record
 
 
-def search_section(found: Findings, record: Record) -> Iterator[Element]:
+def search_section(data: ReportData, record: Record) -> Iterator[Element]:
     """Yield the section on the search that found the design."""
     yield element("h2", "Optimisation")
     run, problem = record.runs[record.chosen], record.problem
-    if record.design.variables != found.design.variables:
+    if record.design.variables != data.design.variables:
         yield paragraph(
             "The design of this report is not the one that this search found.", class_="note"
         )
@@ -26,24 +26,23 @@ def search_section(found: Findings, record: Record) -> Iterator[Element]:
     if drawn is not None:
         yield illustration(
             drawn,
-            "The search from the start that was chosen, by its iterations; dashed is what is "
-            "asked for.",
+            "The search from the chosen start, by iterations; dashed lines are the demands.",
         )
     best = next((step for step in record.history if step.number == run.best), None)
     rows: list[tuple[Cell, ...]] = [
         ("objective", problem.objective.replace("-", " ")),
         ("status", run.status),
-        ("iterations", count(run.iterations)),
-        ("evaluations", count(run.evaluations)),
-        ("starts", count(record.settings.starts)),
-        ("seed", count(record.settings.seed)),
+        ("iterations", whole(run.iterations)),
+        ("evaluations", whole(run.evaluations)),
+        ("starts", whole(record.settings.starts)),
+        ("seed", whole(record.settings.seed)),
         ("time, s", record.seconds),
     ]
     if best is not None:
         rows.insert(2, (CALLED[problem.objective], best.objective))
         rows.insert(3, ("volume, units³", best.volume))
     if problem.demands.volume is not None:
-        rows.insert(2, ("volume asked for, units³", problem.demands.volume))
+        rows.insert(2, ("demanded volume, units³", problem.demands.volume))
     if run.holding:
         rows.append(("held by", run.holding))
     start, end = problem.start, record.design
@@ -57,7 +56,7 @@ def search_section(found: Findings, record: Record) -> Iterator[Element]:
     yield element(
         "div",
         table((), rows, align="<>", caption="The search"),
-        table(("units", "start", "found", "change"), changes, align="<>>>", caption="The design"),
+        table(("units", "start", "optimum", "change"), changes, align="<>>>", caption="The design"),
         class_="pair",
     )
     if not steps_of(record):

@@ -1,20 +1,20 @@
-"""What a report tells of singularities: margins, measures, the nearest poses, performance."""
+"""The section on singularities: margins, measures, the nearest poses, performance."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from xml.etree.ElementTree import Element
 
-from explorer.export.report.findings import Findings
+from explorer.export.report.data import ReportData
 from explorer.export.report.markup import (
     Cell,
     Piece,
-    count,
     element,
-    figure,
+    format_number,
+    number,
     paragraph,
     table,
-    written,
+    whole,
 )
 from explorer.export.report.sections.mechanism import pose_words
 from explorer.measures.verdict import verdict
@@ -25,16 +25,16 @@ from explorer.singularity.colours import WARN_SHARE
 from explorer.singularity.ellipsoids import Ellipsoid
 
 
-def singularity_section(found: Findings) -> Iterator[Element]:
+def singularity_section(data: ReportData) -> Iterator[Element]:
     """Yield the section on singularities."""
-    snapshot, unit = found.snapshot, found.design.unit_mm
+    snapshot, unit = data.snapshot, data.design.unit_mm
     yield element("h2", "Singularities")
-    here = verdict(snapshot, WARN_SHARE * found.design.reach)
+    here = verdict(snapshot, WARN_SHARE * data.design.reach)
     if here.kind == "singular":
         names = " and ".join(INCIDENCES[index - 1] for index in here.incidences)
         yield paragraph(f"The pose is singular: {names}.", class_="note")
     else:
-        away = f"{written(here.distance * unit, 3)} mm"
+        away = f"{format_number(here.distance * unit, 3)} mm"
         note = None if here.kind == "clear" else "note"
         yield paragraph(f"{here.title}: {here.reason(away)}.", class_=note)
     yield paragraph(
@@ -45,7 +45,7 @@ def singularity_section(found: Findings) -> Iterator[Element]:
         ("margin", "zero when", "units", "mm", "tetrahedron", "volume, units³"),
         [
             (
-                element("b", f"κ{k + 1}"),
+                element("b", f"δ{k + 1}"),
                 INCIDENCES[k],
                 float(snapshot.margins[k]),
                 float(snapshot.margins[k]) * unit,
@@ -55,7 +55,7 @@ def singularity_section(found: Findings) -> Iterator[Element]:
             for k in range(3)
         ],
         align="<<>><>",
-        caption=f"Margins in {pose_words(found)}",
+        caption=f"Margins in {pose_words(data)}",
     )
     yield table(
         (),
@@ -66,7 +66,7 @@ def singularity_section(found: Findings) -> Iterator[Element]:
                 snapshot.inverse_condition,
                 "0 singular, 1 best",
             ),
-            ("proximity: smallest |κ| over the reach", snapshot.proximity, ""),
+            ("proximity: smallest |δ| over the reach", snapshot.proximity, ""),
             ("assembly mode", _mode_figure(snapshot.bordering_modes), snapshot.sign_words),
             (
                 "stratum of the two flags",
@@ -75,23 +75,23 @@ def singularity_section(found: Findings) -> Iterator[Element]:
             ),
             (
                 "ball of positions without a singular one",
-                found.ball.radius,
-                ("radius in units; ", figure(found.ball.radius * unit), " mm"),
+                data.ball.radius,
+                ("radius in units; ", number(data.ball.radius * unit), " mm"),
             ),
             (
                 "all poses nearer than this are regular",
-                found.certified,
-                ("units, mean way of b1 to b4; ", figure(found.certified * unit), " mm"),
+                data.certified,
+                ("units, root mean square of b1 to b4; ", number(data.certified * unit), " mm"),
             ),
         ],
         align="<><",
         caption="Measures",
     )
-    yield _nearest(found)
+    yield _nearest(data)
     yield element(
         "div",
-        _ellipsoid(found.performance.translation, "Speed of b4 per actuator speed"),
-        _ellipsoid(found.performance.rotation, "Turning, times the reach"),
+        _ellipsoid(data.performance.translation, "Speed of b4 per actuator speed"),
+        _ellipsoid(data.performance.rotation, "Turning, times the reach"),
         class_="pair",
     )
     yield paragraph(
@@ -102,35 +102,35 @@ def singularity_section(found: Findings) -> Iterator[Element]:
 
 
 def _mode_figure(modes: tuple[int, ...]) -> Piece:
-    return count(modes[0]) if len(modes) == 1 else mode_words(modes)
+    return whole(modes[0]) if len(modes) == 1 else mode_words(modes)
 
 
-def _nearest(found: Findings) -> Element:
-    unit = found.design.unit_mm
+def _nearest(data: ReportData) -> Element:
+    unit = data.design.unit_mm
     rows: list[tuple[Cell, ...]] = []
-    for each in found.snapshot.nearest:
+    for each in data.snapshot.nearest:
         angles = yaw_pitch_roll_from_rotation(each.pose.rotation).tolist()
         rows.append(
             (
-                element("b", f"κ{each.incidence} = 0"),
+                element("b", f"δ{each.incidence} = 0"),
                 each.distance,
                 each.distance * unit,
-                *(figure(value, 5) for value in each.pose.position),
-                *((figure(value, 5), "°") for value in angles),
+                *(number(value, 5) for value in each.pose.position),
+                *((number(value, 5), "°") for value in angles),
             )
         )
     return table(
         ("nearest with", "units", "mm", "x", "y", "z", "yaw", "pitch", "roll"),
         rows,
         align="<>>>>>>>>",
-        caption="Nearest singular poses, by the root-mean-square way of b1 to b4",
+        caption="Nearest singular poses, by the root-mean-square displacement of b1 to b4",
     )
 
 
 def _ellipsoid(ellipsoid: Ellipsoid, caption: str) -> Element:
     rows: list[tuple[Cell, ...]] = [
         (
-            written(index, 1),
+            format_number(index, 1),
             float(gain),
             ", ".join(f"{x:z.3f}".replace("-", "−") for x in axis.tolist()),
         )

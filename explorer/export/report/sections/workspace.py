@@ -1,4 +1,4 @@
-"""What a report tells of the workspace: pictures, slices, volumes, what bounds it."""
+"""The section on the workspace: pictures, slices, volumes, and the limits that bound it."""
 
 from __future__ import annotations
 
@@ -7,29 +7,29 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from explorer.export.report.drawings.slice_drawing import legend, strip, through
+from explorer.export.report.data import Missing, ReportData
+from explorer.export.report.drawings.slice_drawing import legend, slice_strip, slices_through
 from explorer.export.report.drawings.slices import Slices
-from explorer.export.report.drawings.workspace_drawing import whole_and_cut
-from explorer.export.report.findings import Findings, Missing
+from explorer.export.report.drawings.workspace_drawing import workspace_views
 from explorer.export.report.markup import (
     Cell,
-    count,
     element,
-    figure,
+    format_number,
     illustration,
+    number,
     paragraph,
     table,
-    written,
+    whole,
 )
 from explorer.export.report.sections.mechanism import pose_words
 from explorer.workspace.solids.solid import Solid
 
 
-def workspace_section(found: Findings) -> Iterator[Element]:
-    """Yield the section."""
+def workspace_section(data: ReportData) -> Iterator[Element]:
+    """Yield the section on the workspace."""
     yield element("h2", "Workspace")
-    if found.volume.volume <= 0.0:
-        causes = ", ".join(found.volume.empty_because)
+    if data.volume.volume <= 0.0:
+        causes = ", ".join(data.volume.empty_because)
         yield paragraph(
             f"The workspace is empty at this orientation because of {causes}: "
             "no position of b4 keeps all limits.",
@@ -38,43 +38,45 @@ def workspace_section(found: Findings) -> Iterator[Element]:
         return
     yield paragraph(
         "All positions of b4 within the limits, at the orientation of ",
-        f"{pose_words(found)}. The volume is integrated from exact slices and good to rounding; ",
-        "the node volume is how the paper counts: nodes of a grid, boundary included, times step³.",
+        f"{pose_words(data)}. The volume is integrated from exact slices and exact to rounding; ",
+        "the node volume is counted as in the paper: grid nodes, boundary included, times step³.",
     )
-    solid = found.solid
+    solid = data.solid
     if isinstance(solid, Missing):
         yield paragraph(f"There is no picture of it: {solid.reason}", class_="note")
     elif solid.is_empty:
         yield paragraph("It is too thin to be drawn.", class_="note")
     else:
-        yield from _pictures(found, solid)
-    yield _volumes(found)
-    yield from _reachable(found)
+        yield from _pictures(data, solid)
+    yield _volumes(data)
+    yield from _accessible(data)
     tables = [
-        _extent(found),
+        _extent(data),
         _bounding(solid) if isinstance(solid, Solid) and not solid.is_empty else None,
     ]
     yield element(
         "div",
         element("div", *tables),
-        _gradient(found) if found.volume.gradient else None,
+        _gradient(data) if data.volume.gradient else None,
         class_="pair",
     )
 
 
-def _pictures(found: Findings, solid: Solid) -> Iterator[Element]:
+def _pictures(data: ReportData, solid: Solid) -> Iterator[Element]:
     extent = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
-    slices = Slices.of(found.design, found.snapshot.rotation, extent)
-    snapshot = found.snapshot
-    level = written(snapshot.pose.position[1], 4)
+    slices = Slices.of(data.design, data.snapshot.rotation, extent)
+    snapshot = data.snapshot
+    level = format_number(snapshot.pose.position[1], 4)
     yield illustration(
-        whole_and_cut(snapshot, solid, slices),
+        workspace_views(snapshot, solid, slices),
         "The workspace about the mechanism: whole, and cut open at "
         f"y = {level} with the map of the cut, in the colours of the next figure.",
     )
     yield illustration(
         element(
-            "div", through(slices, snapshot.pose.position), legend(slices, snapshot.design.unit_mm)
+            "div",
+            slices_through(slices, snapshot.pose.position),
+            legend(slices, snapshot.design.unit_mm),
         ),
         "Slices through b4 (the cross), axes in design units, coloured by the smallest "
         "of the three margins. ",
@@ -82,62 +84,62 @@ def _pictures(found: Findings, solid: Solid) -> Iterator[Element]:
         "in the position."
         if slices.are_exact
         else "Limits on swings bound it, so the outlines are those of a fine grid.",
-        " Where all is clear, thin lines follow every ",
-        figure(slices.contour_step),
+        " Beyond the bands, thin lines mark every ",
+        number(slices.contour_step),
         " units of it.",
     )
-    drawn, areas = strip(slices, "x")
+    drawn, areas = slice_strip(slices, "x")
     yield illustration(drawn, "Slices along the guide, at one scale, in the same colours.")
     if all(area is not None for _, area in areas):
         unit = snapshot.design.unit_mm
         yield table(
-            ("slice at", *(f"x = {written(x, 4)}" for x, _ in areas)),
+            ("slice at", *(f"x = {format_number(x, 4)}" for x, _ in areas)),
             [
-                ("area, units²", *(figure(area or 0.0, 5) for _, area in areas)),
-                ("area, cm²", *(figure((area or 0.0) * (0.1 * unit) ** 2, 5) for _, area in areas)),
+                ("area, units²", *(number(area or 0.0, 5) for _, area in areas)),
+                ("area, cm²", *(number((area or 0.0) * (0.1 * unit) ** 2, 5) for _, area in areas)),
             ],
             align="<" + ">" * len(areas),
         )
 
 
-def _volumes(found: Findings) -> Element:
-    centimetres = (0.1 * found.design.unit_mm) ** 3
+def _volumes(data: ReportData) -> Element:
+    centimetres = (0.1 * data.design.unit_mm) ** 3
     rows: list[tuple[Cell, ...]] = []
 
     def add(name: str, volume: float, *remark: Cell) -> None:
         rows.append((name, volume, volume * centimetres, *(remark or ("",))))
 
-    exact = "exact" if found.volume.error <= 1e-6 * found.volume.volume else "to four digits"
-    add("exact volume", found.volume.volume, exact)
-    if isinstance(found.nodes, Missing):
-        rows.append(("node volume", "–", "–", found.nodes.reason))
+    exact = "exact" if data.volume.error <= 1e-6 * data.volume.volume else "to four digits"
+    add("exact volume", data.volume.volume, exact)
+    if isinstance(data.nodes, Missing):
+        rows.append(("node volume", "–", "–", data.nodes.reason))
     else:
-        nodes = found.nodes
-        remark = (count(nodes.count), " nodes at multiples of ", figure(nodes.step), " units")
+        nodes = data.nodes
+        remark = (whole(nodes.count), " nodes at multiples of ", number(nodes.step), " units")
         add("node volume", nodes.volume, remark)
-    if isinstance(found.hull_volume, Missing):
-        rows.append(("convex hull", "–", "–", found.hull_volume.reason))
+    if isinstance(data.hull_volume, Missing):
+        rows.append(("convex hull", "–", "–", data.hull_volume.reason))
     else:
-        add("convex hull", found.hull_volume, "of the mesh")
-    reachable = found.reachable
+        add("convex hull", data.hull_volume, "of the mesh")
+    reachable = data.reachable
     if reachable is not None and not isinstance(reachable, Missing):
         remark = ("without a collision of legs",)
         of, within = reachable.reachable_node_count, reachable.node_count
         if of is not None and within is not None:
-            remark = (*remark, "; ", count(of), " of ", count(within), " nodes")
-        add("reachable", reachable.reachable_volume, remark)
+            remark = (*remark, "; ", whole(of), " of ", whole(within), " nodes")
+        add("accessible", reachable.reachable_volume, remark)
     return table(("volume", "units³", "cm³", ""), rows, align="<>><", caption="Volumes")
 
 
-def _extent(found: Findings) -> Element | None:
-    if isinstance(found.nodes, Missing) or found.nodes.extent is None:
+def _extent(data: ReportData) -> Element | None:
+    if isinstance(data.nodes, Missing) or data.nodes.extent is None:
         return None
-    unit, (lows, highs) = found.design.unit_mm, found.nodes.extent
+    unit, (lows, highs) = data.design.unit_mm, data.nodes.extent
     extents: list[tuple[Cell, ...]] = [
         (
             axis,
-            (figure(low), " to ", figure(high)),
-            (figure(low * unit), " to ", figure(high * unit)),
+            (number(low), " to ", number(high)),
+            (number(low * unit), " to ", number(high * unit)),
         )
         for axis, low, high in zip("xyz", lows, highs, strict=True)
     ]
@@ -146,10 +148,10 @@ def _extent(found: Findings) -> Element | None:
     )
 
 
-def _reachable(found: Findings) -> Iterator[Element]:
-    if isinstance(found.reachable, Missing):
+def _accessible(data: ReportData) -> Iterator[Element]:
+    if isinstance(data.reachable, Missing):
         yield paragraph(
-            f"What can be reached without a collision is not known: {found.reachable.reason}.",
+            f"The accessible workspace cannot be computed: {data.reachable.reason}.",
             class_="note",
         )
 
@@ -161,18 +163,20 @@ def _bounding(solid: Solid) -> Element:
     areas = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
     shares = np.bincount(solid.limit_of_face, areas, len(solid.limits)) / areas.sum()
     rows: list[tuple[Cell, ...]] = [
-        (name, (figure(100.0 * share, 3), " %"))
+        (name, (number(100.0 * share, 3), " %"))
         for share, name in sorted(zip(shares.tolist(), solid.limits, strict=True), reverse=True)
         if share > 0.0
     ]
-    return table(("bounded by", "share of the surface"), rows, align="<>", caption="What bounds it")
+    return table(
+        ("bounded by", "share of the surface"), rows, align="<>", caption="Limits that bound it"
+    )
 
 
-def _gradient(found: Findings) -> Element:
-    rows: list[tuple[Cell, ...]] = [(name, rate) for name, rate in found.volume.gradient.items()]
+def _gradient(data: ReportData) -> Element:
+    rows: list[tuple[Cell, ...]] = [(name, rate) for name, rate in data.volume.gradient.items()]
     return table(
         ("with", "units³ per unit; yaw per radian"),
         rows,
         align="<>",
-        caption="How the volume moves",
+        caption="Gradient of the volume",
     )

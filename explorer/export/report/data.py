@@ -1,6 +1,6 @@
-"""All that a report tells of a design, found once by the functions that everything else uses.
+"""The data of a report, computed by the functions that the page and the command line use.
 
-What cannot be found is no reason for no report: its reason stands where it would have stood.
+A value that cannot be computed does not stop the report: the reason stands in its place.
 """
 
 from __future__ import annotations
@@ -38,33 +38,34 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Missing:
-    """What could not be found, and why.
+    """A value that could not be computed.
 
     Attributes:
-        reason: One line for people.
+        reason: Reason, in one line.
     """
 
     reason: str
 
 
 @dataclass(frozen=True)
-class Findings:
-    """A design in a pose, its workspace at that orientation, and what follows.
+class ReportData:
+    """The data of a report: a design in a pose and its workspace at that orientation.
 
     Attributes:
-        snapshot: The design in the pose.
-        is_home: Whether that is its home pose.
-        volume: Of the workspace, exact.
-        nodes: The paper's measure of it.
-        solid: The workspace as a mesh.
-        hull_volume: Of the convex hull of the mesh.
-        least: The least clearances over the workspace.
-        reachable: What of it can be reached; None where legs have no radii.
-        performance: The ellipsoids of the pose.
-        ball: The largest ball of positions about the pose without a singular one.
-        certified: The way of b1 to b4 below which no pose is singular.
-        bill: Of the prototype's parts.
-        record: Of the search that found the design, if one was given.
+        snapshot: Measures of the design in the pose.
+        is_home: Whether the pose is the home pose.
+        volume: Exact volume of the workspace.
+        nodes: Nodes of the workspace, counted as in the paper.
+        solid: Mesh of the workspace.
+        hull_volume: Volume of the convex hull of the mesh, in cubed design units.
+        least: Least clearances of the legs over the workspace.
+        reachable: Accessible part of the workspace; None where all legs have zero radius.
+        performance: Ellipsoids of the pose.
+        ball: Largest ball of positions about the pose that holds no singular one.
+        certified: Root-mean-square displacement of b1 to b4, in design units, below which no
+            pose is singular.
+        bill: Bill of the prototype's parts.
+        record: Record of the search that found the design; None without one.
     """
 
     snapshot: Snapshot
@@ -88,22 +89,25 @@ class Findings:
 
     @property
     def design_file(self) -> str:
-        """The design as a file."""
+        """The text of the design file."""
         return encode_design(self.design).decode()
 
     @property
     def design_hash(self) -> str:
-        """The SHA-256 of that file, in hexadecimal."""
+        """The SHA-256 of the design file, in hexadecimal."""
         return sha256(encode_design(self.design)).hexdigest()
 
 
-def find(design: Design, pose: Pose | None = None, record: Record | None = None) -> Findings:
-    """Return all that a report tells.
+def gather_report_data(
+    design: Design, pose: Pose | None = None, record: Record | None = None
+) -> ReportData:
+    """Compute the data of a report.
 
     Args:
         design: The manipulator.
-        pose: Of its platform, whose orientation the workspace has; its home pose if None.
-        record: Of the search that found the design.
+        pose: Pose of the platform, whose orientation is that of the workspace; the home pose if
+            None.
+        record: Record of the search that found the design.
     """
     home = home_pose(design)
     at = home if pose is None else pose
@@ -111,23 +115,23 @@ def find(design: Design, pose: Pose | None = None, record: Record | None = None)
     volume = workspace_volume(design, r)
     solid = Missing("the workspace is empty")
     if volume.volume > 0.0:
-        solid = _attempt(lambda: workspace_solid(design, r, volume=volume))
+        solid = _compute(lambda: workspace_solid(design, r, volume=volume))
     thick = any(design.limits.leg_radii)
-    return Findings(
+    return ReportData(
         snapshot=evaluate(design, at),
         is_home=at == home,
         volume=volume,
-        nodes=_attempt(lambda: workspace_nodes(design, r)),
+        nodes=_compute(lambda: workspace_nodes(design, r)),
         solid=solid,
-        hull_volume=solid if isinstance(solid, Missing) else _attempt(lambda: _hull(solid)),
+        hull_volume=solid if isinstance(solid, Missing) else _compute(lambda: _hull(solid)),
         least=least_clearances(design, r),
-        reachable=_attempt(lambda: reachable_workspace(design, r, start=at.position))
+        reachable=_compute(lambda: reachable_workspace(design, r, start=at.position))
         if thick
         else None,
         performance=performance(design, at),
         ball=singularity_free_ball(at),
         certified=certified_radius(design, at),
-        bill=_attempt(lambda: bill_of_materials(make_prototype(design), DENSITY)),
+        bill=_compute(lambda: bill_of_materials(make_prototype(design), DENSITY)),
         record=record,
     )
 
@@ -136,8 +140,8 @@ def _hull(solid: Solid) -> float:
     return convex_hull(solid).volume
 
 
-def _attempt(find: Callable[[], T]) -> T | Missing:
+def _compute(function: Callable[[], T]) -> T | Missing:
     try:
-        return find()
+        return function()
     except ExplorerError as error:
         return Missing(str(error))

@@ -1,4 +1,4 @@
-"""How `explorer optimise` tells what was found: as JSON, and as tables beside the start."""
+"""The outcome of `explorer optimise` as JSON, and as tables of the start and the optimum."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from explorer.optimise.problem import Problem
 
 
-def found_design(outcome: Outcome) -> Design:
-    """Return the design of an outcome under a name of its own."""
+def optimised_design(outcome: Outcome) -> Design:
+    """Return the design of an outcome, renamed."""
     name = f"{outcome.problem.start.name[:80]}, optimised"
     return msgspec.structs.replace(outcome.design, name=name)
 
@@ -32,7 +32,7 @@ def outcome_json(outcome: Outcome, written: Sequence[Path]) -> dict[str, object]
 
     best, run = outcome.best, outcome.run
     return {
-        "design": _design_json(found_design(outcome)),
+        "design": _design_json(optimised_design(outcome)),
         "objective": best.objective,
         "objective_name": outcome.problem.objective,
         "volume": best.volume,
@@ -58,13 +58,13 @@ def outcome_json(outcome: Outcome, written: Sequence[Path]) -> dict[str, object]
     }
 
 
-def refused_json(problem: Problem, limit: str, message: str) -> dict[str, object]:
-    """Return as plain values that nothing was looked for; null is what was not measured.
+def infeasible_json(problem: Problem, limit: str, message: str) -> dict[str, object]:
+    """Return the answer to an infeasible problem as plain values; null is not measured.
 
     Args:
-        problem: Which has no answer.
-        limit: That keeps its demands from being met.
-        message: One line for people.
+        problem: Infeasible problem.
+        limit: Limit that contradicts the demands.
+        message: Reason, in one line.
     """
     from explorer.optimise.facts import reach_of
 
@@ -88,7 +88,7 @@ def refused_json(problem: Problem, limit: str, message: str) -> dict[str, object
 
 
 def outcome_lines(outcome: Outcome, written: Sequence[Path]) -> list[str]:
-    """Return an outcome as lines of text: the start and what was found, side by side."""
+    """Return an outcome as lines of text, with the start and the best design side by side."""
     from explorer.optimise.facts import facts_of
 
     problem, best = outcome.problem, outcome.best
@@ -100,7 +100,7 @@ def outcome_lines(outcome: Outcome, written: Sequence[Path]) -> list[str]:
         facts_of(problem.start, demanded_margin=margin, box=box),
         facts_of(outcome.design, demanded_margin=margin, box=box),
     )
-    rows = [("", "start", "best so far" if not outcome.converged else "found", "change")]
+    rows = [("", "start", "optimum" if outcome.converged else "best so far", "change")]
     for name, (before, after) in fact_rows(facts):
         change = "" if before is None or after is None else f"{after - before:+.6g}"
         cells = ["none" if each is None else figure(each) for each in (before, after)]
@@ -119,7 +119,7 @@ def outcome_lines(outcome: Outcome, written: Sequence[Path]) -> list[str]:
 def fact_rows(
     facts: tuple[Facts, Facts],
 ) -> list[tuple[str, tuple[float | None, float | None]]]:
-    """Return what is told of two designs, by name."""
+    """Return the rows of a table of two designs: a name and its two values."""
     named: list[tuple[str, Callable[[Facts], float | None]]] = [
         ("yaw (degrees)", lambda each: each.yaw),
         ("reach", lambda each: each.reach),
@@ -140,7 +140,7 @@ def fact_rows(
 
 
 def finding_json(finding: Finding) -> dict[str, object]:
-    """Return a finding as plain values; null is what there is not."""
+    """Return a finding as plain values; null is not available."""
     facts = finding.facts
     return {
         "name": finding.name,
@@ -162,7 +162,7 @@ def finding_json(finding: Finding) -> dict[str, object]:
 
 
 def findings_table(found: Sequence[Finding]) -> str:
-    """Return the page of findings."""
+    """Return the table of findings with notes."""
     from explorer.optimise.findings import BOX, CLEARANCE, PAPER_VOLUME, STARTS, STEP
 
     demanded = found[0].facts.demanded_margin or 0.0
@@ -200,9 +200,9 @@ def findings_table(found: Sequence[Finding]) -> str:
         f"F = |1 − V / {PAPER_VOLUME:g}|: the paper counts nodes (step {STEP:g}), here V is the "
         "exact volume.\n"
         f"Interference on: every pair of legs keeps {CLEARANCE:g} wherever every margin is at "
-        f"least {demanded:.4g}; clearance: the least there.\n"
-        f"Margin: the worst over the box {_shown(lows)} to {_shown(highs)}. It depends on the "
-        "pose alone, so that of a smaller reach is larger for its size.\n"
+        f"least {demanded:.4g}; clearance: the least of these.\n"
+        f"Margin: the worst over the box {_point_text(lows)} to {_point_text(highs)}. It depends "
+        "on the pose alone, so that it is larger relative to a smaller reach.\n"
         f"The smallest reach: the best of {STARTS} starts, with |b1y|, a3y and |b3 − b2| at "
         "least 1 and b within ±10."
     )
@@ -213,5 +213,5 @@ def _design_json(design: Design) -> Any:
     return json.loads(encode_design(design))
 
 
-def _shown(p: tuple[float, float, float]) -> str:
+def _point_text(p: tuple[float, float, float]) -> str:
     return f"({', '.join(f'{value:g}' for value in p)})"

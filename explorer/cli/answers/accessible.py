@@ -1,4 +1,4 @@
-"""What collisions of legs take from a workspace, for `explorer workspace`."""
+"""The accessible workspace, for `explorer workspace`: what is left without collisions of legs."""
 
 from __future__ import annotations
 
@@ -12,38 +12,38 @@ if TYPE_CHECKING:
     from explorer.workspace.accessible.radii import RadiusCurve
     from explorer.workspace.accessible.workspace import ReachableWorkspace
 
-# Of the radius curve in a table.
+# The number of rows of the radius curve in a table, less one.
 ROWS = 10
 
 
-def interference_json(found: ReachableWorkspace) -> dict[str, object]:
-    """Return the keys that interference adds to those of the workspace."""
+def interference_json(workspace: ReachableWorkspace) -> dict[str, object]:
+    """Return the accessible workspace as plain values, added to those of the workspace."""
     return {
-        "reachable_volume": found.reachable_volume,
-        "reachable_node_count": found.reachable_node_count,
-        "harmless_radius": _finite(found.harmless_radius),
+        "reachable_volume": workspace.reachable_volume,
+        "reachable_node_count": workspace.reachable_node_count,
+        "harmless_radius": _finite(workspace.harmless_radius),
         "pairs": [
             {
                 "legs": list(pair.legs),
-                # A pair that shares a joint is left out of every test.
+                # A pair that shares a joint has no clearance.
                 "clearance": _finite(pair.clearance),
                 "bound": _finite(pair.bound),
                 "blocked_volume": pair.blocked_volume,
             }
-            for pair in found.pairs
+            for pair in workspace.pairs
         ],
-        "reachable_solid": mesh_json(found.solid),
+        "reachable_solid": mesh_json(workspace.solid),
     }
 
 
-def interference_table(design: Design, found: ReachableWorkspace) -> str:
-    """Return what each pair of legs means for the workspace, a line each."""
+def interference_table(design: Design, workspace: ReachableWorkspace) -> str:
+    """Return the table of pairs of legs and the volumes that they block."""
     radii = "  ".join(f"{radius:g}" for radius in design.limits.leg_radii)
     rows = [("legs", "least clearance", "certified", "blocked alone (units³)")]
-    for pair in found.pairs:
+    for pair in workspace.pairs:
         legs = f"{pair.legs[0]} and {pair.legs[1]}"
         if math.isinf(pair.clearance):
-            rows.append((legs, "none" if found.solid.is_empty else "joined", "", figure(0.0)))
+            rows.append((legs, "none" if workspace.solid.is_empty else "joined", "", figure(0.0)))
         else:
             rows.append(
                 (legs, figure(pair.clearance), figure(pair.bound), figure(pair.blocked_volume))
@@ -52,7 +52,7 @@ def interference_table(design: Design, found: ReachableWorkspace) -> str:
 
 
 def curve_json(curve: RadiusCurve) -> dict[str, object]:
-    """Return the curve as plain values."""
+    """Return a radius curve as plain values."""
     return {
         "radii": curve.radii.tolist(),
         "volumes": curve.volumes.tolist(),
@@ -63,9 +63,9 @@ def curve_json(curve: RadiusCurve) -> dict[str, object]:
 
 
 def curve_table(design: Design, curve: RadiusCurve) -> str:
-    """Return the curve at a few radii, and the radius that is harmless."""
-    rows = [("radius of all legs", "mm", "reachable (units³)", "share")]
-    # The last radius comes twice: beyond it nothing is left.
+    """Return a radius curve at a few radii, and the largest radius without a loss."""
+    rows = [("radius of all legs", "mm", "accessible (units³)", "share")]
+    # The last radius comes twice: beyond it the volume is zero.
     last = max(0, len(curve.radii) - 2)
     for index in sorted({round(last * row / ROWS) for row in range(ROWS + 1)}):
         radius, volume = float(curve.radii[index]), float(curve.volumes[index])
@@ -80,7 +80,7 @@ def curve_table(design: Design, curve: RadiusCurve) -> str:
             lines.append(f"no legs collide up to a radius of {figure(curve.harmless)}")
             lines.append(f"legs {i} and {j} come closest, at ({place})")
         else:
-            lines.append(f"any radius takes something: legs {i} and {j} touch at ({place})")
+            lines.append(f"no radius is harmless: legs {i} and {j} touch at ({place})")
     return "\n".join(lines)
 
 

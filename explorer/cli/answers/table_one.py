@@ -1,4 +1,4 @@
-"""The paper's Table 1, beside what is counted and what is exact."""
+"""The paper's Table 1 beside the counted nodes and the exact volumes."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ class Printed:
     """A row as the paper prints it.
 
     Attributes:
-        extent: (lows, highs) of the workspace.
-        volume: Of the workspace, by nodes; None if it is not printed.
+        extent: Extent of the workspace, lows then highs, in design units.
+        volume: Node volume of the workspace in cubed design units; None if it is not printed.
     """
 
     extent: Extent
@@ -38,12 +38,12 @@ PRINTED: Mapping[str, Printed] = MappingProxyType(
         "paper-optimal": Printed(((0.0, -12.0, 0.0), (20.0, 22.0, 18.0)), 7992.0),
     }
 )
-"""By the preset that is the row."""
+"""The rows by preset."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """A row of the table, as printed and as this program has it."""
+    """A row of the table, as printed and as computed by this program."""
 
     name: str
     printed: Printed
@@ -51,8 +51,8 @@ class Row:
     volume: float
 
 
-def table_one() -> list[Row]:
-    """Return both rows of the table."""
+def compute_table_one() -> list[Row]:
+    """Compute both rows of the table."""
     return [
         Row(name, printed, workspace_nodes(PRESETS[name]), workspace_volume(PRESETS[name]).volume)
         for name, printed in PRINTED.items()
@@ -60,7 +60,7 @@ def table_one() -> list[Row]:
 
 
 def as_json(row: Row) -> dict[str, object]:
-    """Return a row as plain values; what the paper does not print is null."""
+    """Return a row as plain values; null is not printed in the paper."""
     return {
         "design": row.name,
         "printed": {
