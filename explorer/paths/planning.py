@@ -124,7 +124,7 @@ def plan_path(
     planner = _Planner(design, start, goal, seed)
     exact = Rules.of(design, ends[0].signs, _order(ends[0]))
     margin, clearance = _comfort(*ends)
-    comfortable = exact.with_room(margin, clearance)
+    comfortable = exact.tighten(margin, clearance)
     path = planner.straight(comfortable, margin, clearance)
     if path is None and search_is_possible():
         # The first time on a machine takes seconds, which are not the path's.

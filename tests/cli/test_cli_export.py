@@ -59,7 +59,7 @@ def test_an_empty_workspace_has_no_file(capsys: pytest.CaptureFixture[str], tmp_
     assert run(argv) == 1
     captured = capsys.readouterr()
     assert captured.out == ""
-    assert "empty: margin κ2" in captured.err
+    assert "empty: margin δ2" in captured.err
     assert list(tmp_path.iterdir()) == []
 
 

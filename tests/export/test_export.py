@@ -171,7 +171,7 @@ def test_limits_of_a_kind_share_a_colour_and_kinds_do_not() -> None:
 @pytest.mark.parametrize("file_format", FORMATS)
 def test_an_empty_or_torn_mesh_is_refused_with_the_reason(file_format: str) -> None:
     empty = workspace_solid(OPTIMAL, np.eye(3))
-    with pytest.raises(NoAnswerError, match="empty: margin κ2"):
+    with pytest.raises(NoAnswerError, match="empty: margin δ2"):
         mesh_bytes(empty, file_format, OPTIMAL, NAME)
     with pytest.raises(ExplorerError, match="not watertight"):
         mesh_bytes(replace(SOLID, faces=SOLID.faces[1:]), file_format, OPTIMAL, NAME)

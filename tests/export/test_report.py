@@ -339,7 +339,7 @@ def test_what_is_no_number_is_written_as_people_do() -> None:
 def test_an_empty_workspace_has_a_report_that_says_why() -> None:
     level = Pose((10.0, 5.0, 9.0), (1.0, 0.0, 0.0, 0.0))
     page = page_of(OPTIMAL, level)
-    assert "The workspace is empty at this orientation because of margin κ2" in page.text
+    assert "The workspace is empty at this orientation because of margin δ2" in page.text
     assert "The pose is singular: lines a1a2 and b2b3 meeting" in page.text
     assert "∞" in page.text
     commands = page.one(id="commands").text

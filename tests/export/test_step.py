@@ -117,7 +117,7 @@ def test_the_file_is_read_back_with_names_colours_and_volume(tmp_path: Path) -> 
 
 
 def test_an_empty_workspace_or_one_beyond_the_tolerance_is_refused() -> None:
-    with pytest.raises(NoAnswerError, match="empty: margin κ2"):
+    with pytest.raises(NoAnswerError, match="empty: margin δ2"):
         workspace_step(OPTIMAL, np.eye(3))
     for unit in (1e-4, 1e7):
         with pytest.raises(InputError, match="choose another unit"):

@@ -65,19 +65,19 @@ def volume_in_parts(design: Design, rotation: FloatArray) -> tuple[float, float]
     lows, highs = bounds(region)
     if region.is_empty or not (lows < highs).all():
         return 0.0, 0.0
-    by_round, by_plane = np.zeros((len(region.rounds), 4)), np.zeros((len(region.planes), 4))
+    by_circle, by_plane = np.zeros((len(region.circles), 4)), np.zeros((len(region.planes), 4))
     result, total, error = np.zeros(6), 0.0, 0.0
     ends = np.linspace(region.low, region.high, PARTS + 1).tolist()
     for low, high in itertools.pairwise(ends):
         integrate_slices(
             1,
-            region.rounds,
+            region.circles,
             region.planes,
             low,
             high,
             measures.quadrature(),
             result,
-            by_round,
+            by_circle,
             by_plane,
         )
         total += float(result[0])

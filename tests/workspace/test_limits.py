@@ -128,7 +128,7 @@ def test_the_margin_demands_the_sign_triple_of_home_and_a_distance(
     by_name = {v.limit: v for v in found}
     margin = margins(case.position, case.rotation).tolist()
     for index, (value, sign) in enumerate(zip(margin, signs, strict=True), 1):
-        name = f"margin κ{index}"
+        name = f"margin δ{index}"
         if sign * value < least - 1e-9:
             assert by_name[name].value == value
             assert by_name[name].bound == sign * least
@@ -202,9 +202,9 @@ def test_violations_come_in_the_order_of_the_design_file() -> None:
         "box x",
         "box y",
         "box z",
-        "margin κ1",
-        "margin κ2",
-        "margin κ3",
+        "margin δ1",
+        "margin δ2",
+        "margin δ3",
     ]
 
 
@@ -218,4 +218,4 @@ def test_the_snapshot_judges_by_the_sign_triple_of_home(name: str) -> None:
     found = [v.limit for v in evaluate(design, below).violations]
     # Mirrored in the base plane only b4 has changed sides, and left the box.
     assert "box z" in found
-    assert "margin κ3" in found
+    assert "margin δ3" in found

@@ -40,8 +40,15 @@ from explorer.mechanism.design import Swing
 from explorer.mechanism.pose import rotation_from_yaw_pitch_roll
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import warm
-from explorer.workspace.limits.constraints import Cone, HalfSpace, Never, Round, constraints, slacks
-from explorer.workspace.limits.contraction import contracted
+from explorer.workspace.limits.constraints import (
+    BallOrCylinder,
+    Cone,
+    HalfSpace,
+    Never,
+    constraints,
+    slacks,
+)
+from explorer.workspace.limits.contraction import contract_box
 from explorer.workspace.limits.region import region_of
 from explorer.workspace.slices.volume import bounds, home_rotation, workspace_volume
 from explorer.workspace.solids.solids import (
@@ -132,7 +139,7 @@ def lens(depth: float) -> tuple[Design, float]:
     """Return a design whose workspace is where two balls overlap so deep, and its volume."""
     bare = free(OPTIMAL)
     balls = constraints(bare, home_rotation(bare))
-    one, other = (x.centre for x in balls if isinstance(x, Round) and x.is_ball)
+    one, other = (x.centre for x in balls if isinstance(x, BallOrCylinder) and x.is_ball)
     apart = float(np.linalg.norm(one - other))
     r, s = 0.4 * apart, 0.6 * apart + depth
     # E. W. Weisstein, Sphere-sphere intersection.
@@ -199,14 +206,14 @@ def test_contracted_box_holds_all_positions_within_the_limits(seed: int) -> None
     design, rotation = ordinary_case(seed)
     limits = constraints(design, rotation)
     lows, highs = bounds(region_of(limits))
-    found = contracted(limits, lows, highs)
+    found = contract_box(limits, lows, highs)
     assert found is not None
     points = np.random.default_rng(seed).uniform(lows, highs, (20_000, 3))
     within = points[(slacks(limits, points) >= 0.0).all(axis=1)]
     assert len(within) > 20
     assert (found[0] <= within).all()
     assert (within <= found[1]).all()
-    assert contracted(limits, highs + 1.0, highs + 2.0) is None
+    assert contract_box(limits, highs + 1.0, highs + 2.0) is None
 
 
 @pytest.mark.parametrize("name", PRESETS)
@@ -396,7 +403,7 @@ def test_an_empty_solid_names_what_empties_it() -> None:
     assert solid.empty_because == ("gap |d1 − d3|",)
     assert (solid.volume, solid.is_watertight) == (0.0, False)
     assert convex_hull(solid) is solid
-    assert workspace_solid(OPTIMAL, np.eye(3)).empty_because == ("margin κ2",)
+    assert workspace_solid(OPTIMAL, np.eye(3)).empty_because == ("margin δ2",)
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -516,10 +523,10 @@ def test_families_that_leave_nothing_say_so() -> None:
     opposite = rotation_from_yaw_pitch_roll([(-73.1, 0.0, 0.0), (73.1, 0.0, 0.0)])
     nothing = dexterous_solid(OPTIMAL, opposite)
     assert nothing.is_empty
-    assert nothing.empty_because == ("margin κ2",)
+    assert nothing.empty_because == ("margin δ2",)
     assert not reachable_solid(OPTIMAL, opposite).is_empty
     level = np.eye(3)[None]
-    assert reachable_solid(OPTIMAL, level).empty_because == ("margin κ2",)
+    assert reachable_solid(OPTIMAL, level).empty_because == ("margin δ2",)
 
 
 @pytest.mark.parametrize("tolerance", [0.0, -1.0, float("nan"), float("inf")])
@@ -533,7 +540,7 @@ def test_a_tolerance_that_takes_too_many_faces_is_told_what_is_allowed() -> None
         workspace_solid(OPTIMAL, tolerance=1e-7)
     allowed = float(str(refusal.value).rpartition(" ")[2])
     assert 1e-7 < allowed < 1e-2
-    with pytest.raises(InputError, match="orientations fewer"):
+    with pytest.raises(InputError, match="fewer orientations"):
         reachable_solid(OPTIMAL, YAWS, 1e-6)
 
 

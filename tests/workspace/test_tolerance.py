@@ -40,7 +40,8 @@ from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import warm
 from explorer.optimise.problem import SHIFTS, Box
 from explorer.optimise.search.demands import corners_of
-from explorer.workspace.limits.constraints import angle_between, constraints, legs, slacks
+from explorer.workspace.limits.constraints import constraints, slacks
+from explorer.workspace.limits.joint_cones import angle_between, legs
 from explorer.workspace.orientations import orientations_within
 
 DEFECTS: list[dict[str, Any]] = json.loads(

@@ -26,7 +26,7 @@ from explorer import (
 from explorer.mechanism.design import Swing
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import MANY_ROWS
-from explorer.workspace.limits.valid_moves import moves_are_valid, write_at, write_turn
+from explorer.workspace.limits.valid_moves import moves_are_valid, write_pose_at, write_turn
 from explorer.workspace.limits.valid_poses import Rules, poses_are_valid
 
 OPTIMAL = PRESETS["paper-optimal"]
@@ -152,7 +152,9 @@ def test_moves_are_those_of_the_move_model(
     found = write_turn(start.rotation, end.rotation, found_axis)
     step = np.array(end.position) - np.array(start.position)
     for share in (0.0, 0.3, 1.0):
-        write_at(share, np.array(start.position), start.rotation, step, found_axis, found, p, r)
+        write_pose_at(
+            share, np.array(start.position), start.rotation, step, found_axis, found, p, r
+        )
         expected = poses_between(start, end, share)
         np.testing.assert_allclose(p, expected[0], atol=1e-14)
         np.testing.assert_allclose(r, expected[1], atol=1e-9)

@@ -180,7 +180,7 @@ def _columns(design: Design, rotation: FloatArray, many: int) -> float:
     lows, highs = bounds(region)
     total = np.zeros(1)
     column_lengths(
-        many * many, region.rounds, region.planes, region.cones, lows, highs, many, total
+        many * many, region.circles, region.planes, region.cones, lows, highs, many, total
     )
     return float(total[0] * (highs[0] - lows[0]) * (highs[1] - lows[1])) / many**2
 
@@ -247,26 +247,26 @@ def test_kernels_say_the_same_interpreted_and_compiled(seed: int) -> None:
     def run(*, compiled: bool) -> list[FloatArray]:
         plain: Any = "__wrapped__"
         volume, grid, lengths = np.zeros(6), np.zeros(7, dtype=np.int64), np.zeros(1)
-        by_round = np.zeros((len(region.rounds), 4))
+        by_circle = np.zeros((len(region.circles), 4))
         by_plane = np.zeros((len(region.planes), 4))
         for kernel, arguments in (
             (
                 integrate_slices,
                 (
-                    *(region.rounds, region.planes, region.low, region.high),
-                    *(measures.quadrature(), volume, by_round, by_plane),
+                    *(region.circles, region.planes, region.low, region.high),
+                    *(measures.quadrature(), volume, by_circle, by_plane),
                 ),
             ),
             (
                 count_nodes,
                 (
-                    *(region.rounds, region.planes, region.cones),
+                    *(region.circles, region.planes, region.cones),
                     *(np.array([region.low, region.high]), 1e-9, first, counts, step, grid),
                 ),
             ),
             (
                 column_lengths,
-                (region.rounds, region.planes, region.cones, lows, highs, 12, lengths),
+                (region.circles, region.planes, region.cones, lows, highs, 12, lengths),
             ),
         ):
             untyped: Any = kernel
@@ -275,7 +275,7 @@ def test_kernels_say_the_same_interpreted_and_compiled(seed: int) -> None:
                 untyped(1, *arguments)
             else:
                 getattr(untyped, plain)(*arguments)
-        return [volume, by_round, by_plane, grid.astype(np.float64), lengths]
+        return [volume, by_circle, by_plane, grid.astype(np.float64), lengths]
 
     for one, other in zip(run(compiled=True), run(compiled=False), strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-12 * np.abs(one).max())
@@ -321,7 +321,7 @@ def test_volumes_scale_with_the_cube_of_lengths(seed: int, s: float) -> None:
     ("limits", "because"),
     [
         ({"gap": 50.0}, ("gap |d1 − d3|",)),
-        ({"margin": 19.0}, ("box z maximum", "margin κ3")),
+        ({"margin": 19.0}, ("box z maximum", "margin δ3")),
         ({"l1": (5.0, 5.0)}, ("l1 minimum", "l1 maximum")),
         ({"l1": (30.0, 40.0)}, ("l1 minimum", "box x maximum")),
         ({"d4": (0.0, 0.0)}, ("d4 maximum",)),
@@ -348,7 +348,7 @@ def test_an_empty_workspace_names_what_empties_it(
 
 def test_parallel_lines_leave_nothing_but_without_a_margin() -> None:
     level = np.eye(3)
-    assert workspace_volume(OPTIMAL, level).empty_because == ("margin κ2",)
+    assert workspace_volume(OPTIMAL, level).empty_because == ("margin δ2",)
     assert workspace_volume(limited(OPTIMAL, margin=None), level).volume > 1000.0
 
 
@@ -356,7 +356,7 @@ def test_parallel_lines_leave_nothing_but_without_a_margin() -> None:
 def test_a_limit_that_is_there_twice_counts_once(seed: int) -> None:
     design, rotation = ordinary_case(seed)
     lows, highs = design.limits.box or pytest.fail("no box")
-    # The box may start where κ3 is zero, and then says the same as the margin.
+    # The box may start where δ3 is zero, and then says the same as the margin.
     upper = limited(design, margin=0.0, box=((lows[0], lows[1], 0.0), highs))
     sign = 1.0 if design.home is not None and design.home.position[2] > 0.0 else -1.0
     if sign > 0.0:

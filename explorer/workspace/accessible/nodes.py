@@ -19,7 +19,7 @@ from explorer.legs.clearance import PAIRS, leg_clearances
 from explorer.legs.moves import pairs_are_clear
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
-from explorer.workspace.limits.constraints import constraints, keeps
+from explorer.workspace.limits.constraints import constraints, satisfies
 
 ALL_PAIRS = tuple(range(len(PAIRS)))
 # Legs touch at a node where their axes are as near as this; a share of the reach.
@@ -158,7 +158,7 @@ def survey(design: Design, rotation: FloatArray, grid: Grid) -> Survey:
     """
     positions = grid.positions
     slack = SLACK * design.reach
-    kept = keeps(design, constraints(design, rotation), positions)
+    kept = satisfies(design, constraints(design, rotation), positions)
     clearance = leg_clearances(design, positions, rotation).clearance
     index = np.arange(math.prod(grid.counts)).reshape(grid.counts)
     ends = [

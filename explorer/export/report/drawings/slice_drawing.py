@@ -10,7 +10,7 @@ from explorer.export.report.drawings.mechanism import WIDTH, drawing, round_leng
 from explorer.export.report.drawings.slices import Slices
 from explorer.export.report.markup import coordinate, element, text, written
 from explorer.singularity.colours import BAND_EDGES, OUTLINE, band_colours, css
-from explorer.workspace.slices.fields import AXES
+from explorer.workspace.slices.axes import AXES
 
 # Around a map that has ticks, and between maps.
 LEFT, RIGHT, TOP, BOTTOM = 42.0, 12.0, 26.0, 38.0
