@@ -1,4 +1,4 @@
-"""Random designs with random limits: ordinary, thin-walled, in trouble; reference workspaces."""
+"""Random designs with random limits: ordinary, thin-walled, extreme; reference workspaces."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ DEFECTS: dict[str, Any] = json.loads(
 SIZES = (10.0, 1e-9, 1e9, 1e-20, 1e20)
 NEARNESS = (1.0, 1e-3, 1e-6)
 HALF_ANGLES = (1e-3, 30.0, 60.0, 89.999, 90.0, 90.0001, 120.0, 179.0, 180.0)
-# Shares of the maximum: the last ones leave shells far thinner than a chord.
+# Minima as shares of the maximum; the last ones make shells far thinner than a chord.
 MINIMA = (0.1, 0.5, 0.9, 0.999, 1.0 - 1e-6)
 
 
 def limited(design: Design, **limits: Any) -> Design:
-    """Return the design with these of its limits changed."""
+    """Return a design with some of its limits changed."""
     return msgspec.structs.replace(design, limits=msgspec.structs.replace(design.limits, **limits))
 
 
@@ -56,16 +56,16 @@ def reference_case(index: int) -> tuple[Design, FloatArray, float]:
 
 
 def defect_case(index: int) -> tuple[Design, FloatArray, float]:
-    """Return a workspace whose solid once was another: design, rotation and its exact volume."""
+    """Return a workspace that is hard to mesh: design, rotation and its exact volume."""
     row = DEFECTS["solids"][index]
     design = decode_design(json.dumps(row["design"]).encode(), "defects_solid.json")
     return design, np.array(row["rotation"]), float(row["volume"])
 
 
 def ordinary_case(seed: int) -> tuple[Design, FloatArray]:
-    """Return a design with every kind of limit but cones, its home within, and a rotation.
+    """Return a design with every kind of limit but cones, its home within them, and a rotation.
 
-    No limit is tied to another, so that each can be varied on its own.
+    Limits are independent of each other, so each can be varied alone.
     """
     rng = np.random.default_rng(seed)
     x = rng.uniform(0.3, 1.0, 6) * rng.choice([-1.0, 1.0], 6) * 10.0
@@ -98,9 +98,9 @@ def ordinary_case(seed: int) -> tuple[Design, FloatArray]:
 
 
 def shell_case(seed: int) -> tuple[Design, FloatArray]:
-    """Return a design whose minimum lengths often leave thin shells, and a rotation.
+    """Return a design whose minimum lengths often make thin shells, and a rotation.
 
-    Guides, boxes and margins come and go; a quarter of the rotations turn about z alone.
+    Some designs have guides, boxes and margins; a quarter of the rotations are about z alone.
     """
     rng = np.random.default_rng([7, seed])
     size = float(rng.choice([1.0, 10.0, 1e-6, 1e3]))
@@ -136,7 +136,7 @@ def shell_case(seed: int) -> tuple[Design, FloatArray]:
 
 
 def thin_case(seed: int) -> tuple[Design, FloatArray]:
-    """Return a design whose legs may be little shorter or longer than at home, and a rotation."""
+    """Return a design whose lengths may differ little from those at home, and a rotation."""
     from explorer import inverse
 
     design, rotation = ordinary_case(seed)

@@ -1,11 +1,13 @@
-"""What tests ask of meshes: area, genus, and whether a position is inside."""
+"""Checks of meshes: topology, and distances from limit surfaces."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from explorer.numerics.arrays import BoolArray, FloatArray
+from explorer import Design
+from explorer.numerics.arrays import FloatArray
+from explorer.workspace.limits.constraints import Cone, HalfSpace, Never, constraints
 from explorer.workspace.solids.solid import Solid
 
 
@@ -14,32 +16,37 @@ def corners_of(solid: Solid) -> tuple[FloatArray, FloatArray, FloatArray]:
     return a, b, c
 
 
-def area_of(solid: Solid) -> float:
-    a, b, c = corners_of(solid)
-    return float(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
-
-
 def euler_characteristic(solid: Solid) -> int:
-    """Return V - E + F: two for each ball, none for a ring."""
+    """Return V - E + F: 2 for each ball, 0 for a ring."""
     return len(np.unique(solid.faces)) - len(solid.faces) // 2
 
 
-def contains(solid: Solid, points: FloatArray) -> BoolArray:
-    """Return whether points (n, 3) are inside, by the solid angle of all faces, shape (n,)."""
-    angles = np.zeros(len(points))
-    for index, point in enumerate(points):
-        a, b, c = (corner - point for corner in corners_of(solid))
-        la, lb, lc = (np.linalg.norm(each, axis=1) for each in (a, b, c))
-        above = np.einsum("ij,ij->i", a, np.cross(b, c))
-        below = la * lb * lc + lc * (a * b).sum(1) + lb * (a * c).sum(1) + la * (b * c).sum(1)
-        angles[index] = float(np.arctan2(above, below).sum()) / (2.0 * np.pi)
-    return angles > 0.5
-
-
 def edges_are_paired(faces: NDArray[np.int32]) -> bool:
-    """Whether each edge is used once in each direction, counted one by one."""
+    """Return whether each edge is used once in each direction."""
     seen: dict[tuple[int, int], int] = {}
     for a, b, c in faces.tolist():
         for edge in ((a, b), (b, c), (c, a)):
             seen[edge] = seen.get(edge, 0) + 1
     return all(count == 1 and seen.get((b, a)) == 1 for (a, b), count in seen.items())
+
+
+def assert_lies_on_its_limits(solid: Solid, design: Design, rotation: FloatArray) -> None:
+    """Check that faces lie on the limits that they name, and that vertices satisfy all limits."""
+    limits = constraints(design, rotation)
+    most = solid.tolerance * (1.0 + 1e-6)
+    for index, name in enumerate(solid.limits):
+        faces = solid.faces[solid.limit_of_face == index]
+        if len(faces):
+            middles = solid.vertices[faces].mean(axis=1)
+            corners = solid.vertices[faces]
+            named = [limit for limit in limits if limit.name == name]
+            off = [np.maximum(x.distance(corners).max(axis=1), x.distance(middles)) for x in named]
+            assert np.min(off, axis=0).max() <= most, name
+    for limit in limits:
+        assert not isinstance(limit, Never)
+        slack = limit.slack(solid.vertices)
+        if isinstance(limit, HalfSpace):
+            slack = slack / float(np.linalg.norm(limit.normal))
+        if isinstance(limit, Cone):
+            slack = np.sign(slack) * limit.distance(solid.vertices)
+        assert float(slack.min()) >= -most, limit.name

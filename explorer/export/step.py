@@ -33,7 +33,13 @@ from explorer.files.writing import write_whole
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import FloatArray
-from explorer.workspace.limits.constraints import Cone, Constraint, HalfSpace, Round, constraints
+from explorer.workspace.limits.constraints import (
+    BallOrCylinder,
+    Cone,
+    Constraint,
+    HalfSpace,
+    constraints,
+)
 from explorer.workspace.limits.region import Region, region_of
 from explorer.workspace.slices.volume import bounds, home_rotation, workspace_volume
 
@@ -168,11 +174,11 @@ class _Primitives:
 
     def _steps(self, limits: tuple[Constraint, ...], region: Region) -> Iterator[tuple[Any, bool]]:
         """Yield the primitives that bound the region, and whether they keep p inside."""
-        planes = [end for end in (region.of_low, region.of_high, *region.of_planes) if end]
+        planes = [end for end in (region.low_limit, region.high_limit, *region.plane_limits) if end]
         for plane in planes:
             if self._heights(plane).max() > plane.offset * self.unit:
                 yield self._half_space(plane.normal, plane.offset), True
-        for each in region.of_rounds:
+        for each in region.circle_limits:
             near, far = self._distances(each)
             if (each.radius * self.unit < far) if each.inside else (each.radius * self.unit > near):
                 yield self._round(each), each.inside
@@ -184,7 +190,7 @@ class _Primitives:
         corners = np.array(np.meshgrid(*zip(self.lows, self.highs, strict=True)))
         return corners.reshape(3, -1).T @ plane.normal
 
-    def _distances(self, each: Round) -> tuple[float, float]:
+    def _distances(self, each: BallOrCylinder) -> tuple[float, float]:
         start = 0 if each.is_ball else 1
         centre = each.centre[start:] * self.unit
         lows, highs = self.lows[start:] - centre, self.highs[start:] - centre
@@ -206,7 +212,7 @@ class _Primitives:
         )
         return occ("BRepPrimAPI_MakeBox")(corner, 2.0 * far, 2.0 * far, 2.0 * far).Shape()
 
-    def _round(self, each: Round) -> Any:
+    def _round(self, each: BallOrCylinder) -> Any:
         radius, centre = each.radius * self.unit, each.centre * self.unit
         if each.is_ball:
             away = self._away(centre)

@@ -126,7 +126,7 @@ def plan_path(
     planner = _Planner(design, start, goal, seed)
     exact = Rules.of(design, ends[0].signs, _order(ends[0]))
     margin, clearance = _preferred(*ends)
-    preferred = exact.with_room(margin, clearance)
+    preferred = exact.tighten(margin, clearance)
     path = planner.plan_straight(preferred, margin, clearance)
     if path is None and search_is_possible():
         # Compiling takes seconds, once on a machine; they do not count as search.

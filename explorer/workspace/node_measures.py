@@ -23,7 +23,7 @@ from explorer.numerics.compiled import kernel
 from explorer.workspace.limits.constraints import constraints
 from explorer.workspace.limits.region import region_of
 from explorer.workspace.limits.valid_poses import LENGTH_LOWS, vector, write_ends
-from explorer.workspace.slices.nodes import keeps_all
+from explorer.workspace.slices.nodes import is_within
 from explorer.workspace.slices.volume import bounds, home_rotation
 
 # Number of nodes on each axis: default, least and largest.
@@ -94,7 +94,7 @@ def node_measures(
         radii = np.where(joined_pairs(design), -math.inf, radii_of_pairs(design))
         measure_nodes(
             nodes**3,
-            region.rounds,
+            region.circles,
             region.planes,
             region.cones,
             lows + 0.5 * step,
@@ -162,7 +162,7 @@ def measure_nodes(  # noqa: PLR0917 - a compiled loop takes plain values
             p[1] = first[1] + j * step[1]
             for k in range(within.shape[2]):
                 p[2] = first[2] + k * step[2]
-                within[i, j, k] = keeps_all(p[0], p[1], p[2], rounds, planes, cones, 0.0)
+                within[i, j, k] = is_within(p[0], p[1], p[2], rounds, planes, cones, 0.0)
                 if not within[i, j, k]:
                     continue
                 found[COUNT] += 1.0

@@ -24,7 +24,8 @@ from explorer.mechanism.pose import (
 )
 from explorer.numerics.arrays import BoolArray, FloatArray, finite_array, for_kernel
 from explorer.numerics.compiled import kernel
-from explorer.workspace.limits.constraints import demanded_order, home_signs, joint_cones
+from explorer.workspace.limits.constraints import demanded_order, home_signs
+from explorer.workspace.limits.joint_cones import joint_cones
 
 # Largest number of orientations in a set.
 MOST_ORIENTATIONS = 1_000_000

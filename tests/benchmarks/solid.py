@@ -12,7 +12,7 @@ from benchmarks.table import Row, seconds, times
 from benchmarks.timing import best_of
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import warm
-from explorer.workspace.limits.constraints import HalfSpace, Round, constraints
+from explorer.workspace.limits.constraints import BallOrCylinder, HalfSpace, constraints
 from explorer.workspace.slices.volume import home_rotation, workspace_volume
 from explorer.workspace.solids.solid import Solid
 from explorer.workspace.solids.solids import workspace_solid
@@ -65,7 +65,7 @@ def _through_trimesh(exact: float) -> tuple[float, int, float]:
         lows, highs = box_of([limit for limit in limits if isinstance(limit, HalfSpace)])
         parts = [creation.box(bounds=[lows, highs])]
         for limit in limits:
-            if not isinstance(limit, Round):
+            if not isinstance(limit, BallOrCylinder):
                 continue
             if limit.is_ball:
                 part = creation.uv_sphere(limit.radius, count=[sections // 2, sections])

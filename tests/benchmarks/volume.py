@@ -50,7 +50,7 @@ def _voxels() -> tuple[float, float]:
     def count() -> None:
         count_nodes(
             int(counts.prod()),
-            region.rounds,
+            region.circles,
             region.planes,
             region.cones,
             np.array([region.low, region.high]),

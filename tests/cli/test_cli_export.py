@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -62,7 +61,7 @@ def test_export_empty_workspace_writes_no_file(
     assert run(argv) == 1
     captured = capsys.readouterr()
     assert captured.out == ""
-    assert re.search("empty: margin .2", captured.err)
+    assert "empty: margin δ2" in captured.err
     assert list(tmp_path.iterdir()) == []
 
 

@@ -171,7 +171,7 @@ def test_colour_of_limits_differs_by_kind_only() -> None:
 @pytest.mark.parametrize("file_format", FORMATS)
 def test_mesh_bytes_empty_or_open_solid_is_refused_with_reason(file_format: str) -> None:
     empty = workspace_solid(OPTIMAL, np.eye(3))
-    with pytest.raises(NoAnswerError, match=r"empty: margin .2"):
+    with pytest.raises(NoAnswerError, match="empty: margin δ2"):
         mesh_bytes(empty, file_format, OPTIMAL, NAME)
     with pytest.raises(ExplorerError, match="not watertight"):
         mesh_bytes(replace(SOLID, faces=SOLID.faces[1:]), file_format, OPTIMAL, NAME)

@@ -339,8 +339,7 @@ def test_format_number_special_values_are_readable() -> None:
 def test_report_empty_workspace_gives_reason() -> None:
     level = Pose((10.0, 5.0, 9.0), (1.0, 0.0, 0.0, 0.0))
     page = page_of(OPTIMAL, level)
-    reason = "The workspace is empty at this orientation because of margin .2"
-    assert re.search(reason, page.text)
+    assert "The workspace is empty at this orientation because of margin δ2" in page.text
     assert "The pose is singular: lines a1a2 and b2b3 meeting" in page.text
     assert "∞" in page.text
     commands = page.one(id="commands").text

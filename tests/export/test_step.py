@@ -117,7 +117,7 @@ def test_step_file_reads_back_names_colours_and_volume(tmp_path: Path) -> None:
 
 
 def test_step_empty_or_oversized_workspace_is_refused() -> None:
-    with pytest.raises(NoAnswerError, match=r"empty: margin .2"):
+    with pytest.raises(NoAnswerError, match=r"empty: margin δ2"):
         workspace_step(OPTIMAL, np.eye(3))
     for unit in (1e-4, 1e7):
         with pytest.raises(InputError, match="choose another unit"):

@@ -135,7 +135,7 @@ def test_lines_that_rounding_alone_keeps_from_being_parallel_leave_no_workspace(
     design = decode_design(json.dumps(PLAIN | {"home": home}).encode(), "x")
     found = workspace_volume(design)
     assert found.volume == 0.0
-    assert "margin κ2" in found.empty_because
+    assert "margin δ2" in found.empty_because
 
 
 @pytest.mark.parametrize("step", [5e-324, 1e-300, 1e-200])

@@ -18,7 +18,7 @@ from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import warm
 from explorer.optimise.problem import OBJECTIVES, ObjectiveName, Problem
 from explorer.optimise.search.model import Evaluation, Model
-from explorer.workspace.limits.constraints import HalfSpace, Round
+from explorer.workspace.limits.constraints import BallOrCylinder, HalfSpace
 
 POINTS = 50
 STEP = 1e-6
@@ -137,7 +137,7 @@ def test_a_slack_is_that_of_its_limit() -> None:
     state = model.at(model.start).state
     p = np.random.default_rng(0).normal(size=(20, 3)) * 10.0
     for limit in state.limits:
-        assert isinstance(limit, Round | HalfSpace)
+        assert isinstance(limit, BallOrCylinder | HalfSpace)
         slack, _, by_p = state.slack(limit, p)
         assert_allclose(slack, limit.slack(p), rtol=0, atol=1e-12)
         for axis, unit in enumerate(np.eye(3)):

@@ -193,10 +193,10 @@ def test_rules_with_room_demand_more_margin_and_clearance() -> None:
         ((1.01 * margin, 0.0), False),
         ((0.0, 1.01 * clearance), False),
     ):
-        demanding = rules.with_room(*room)
+        demanding = rules.tighten(*room)
         assert poses_are_valid(DESIGN, position, rotation, rules=demanding) == valid
     free = Rules.of(limited(DESIGN, margin=None))
-    assert poses_are_valid(DESIGN, position, rotation, rules=free.with_room(2.0 * margin, 0.0))
+    assert poses_are_valid(DESIGN, position, rotation, rules=free.tighten(2.0 * margin, 0.0))
 
 
 @needs_ompl
@@ -236,7 +236,7 @@ def test_plan_path_singular_end_names_its_incidence(height: float, words: str) -
 def test_plan_path_margin_below_the_limit_is_refused() -> None:
     demanding = limited(DESIGN, margin=2.0)
     low = Pose((10.0, 5.0, 1.5), HOME.quaternion)
-    with pytest.raises(InputError, match="margin κ1"):
+    with pytest.raises(InputError, match="margin δ1"):
         plan_path(demanding, HOME, low)
 
 

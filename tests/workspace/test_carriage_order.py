@@ -1,7 +1,7 @@
-"""The carriages keep the order that they have at home, wherever limits are looked at.
+"""The order of the carriages is that of the home pose, for every part of the explorer.
 
 Shares of orientations are compared with those of an independent count over 400,000 random
-orientations; of single poses every part of the explorer has to say the same.
+orientations, and the answers of all parts for single poses with each other.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ import pytest
 from limited_designs import limited, ordinary_case
 from scipy.spatial.transform import Rotation
 
-import explorer
 from explorer import (
     PRESETS,
     Design,
@@ -35,22 +34,18 @@ from explorer import (
     workspace_volume,
 )
 from explorer.mechanism.design import LENGTHS
-from explorer.numerics.compiled import warm
 from explorer.workspace.limits.constraints import CARRIAGE_ORDER, Never, constraints, demanded_order
 from explorer.workspace.orientations import orientations_within, uniform_rotations
 from explorer.workspace.solids.solids import dexterous_solid, reachable_solid, workspace_solid
+
+pytestmark = pytest.mark.usefixtures("warm_kernels")
 
 OPTIMAL = PRESETS["paper-optimal"]
 CASES: list[dict[str, Any]] = json.loads(
     (Path(__file__).parents[1] / "data" / "orientation.json").read_text(encoding="utf-8")
 )["cases"]
-# The platform turned by half a turn about the base's z-axis has the carriages the other way round.
+# Half a turn of the platform about the base's z-axis reverses the order of the carriages.
 MIRRORED = np.diag([-1.0, -1.0, 1.0]) @ home_pose(OPTIMAL).rotation
-
-
-@pytest.fixture(autouse=True, scope="module")
-def _warm_kernels() -> None:  # pyright: ignore[reportUnusedFunction]
-    warm()
 
 
 def case_design(case: dict[str, Any]) -> Design:
@@ -81,13 +76,8 @@ def test_orientation_shares_are_those_of_an_independent_count(index: int) -> Non
         assert share == pytest.approx(case[name], abs=0.004), name
 
 
-def test_orientation_capability_is_a_public_name() -> None:
-    assert explorer.orientation_capability is orientation_capability
-    assert "orientation_capability" in explorer.__all__
-
-
 @pytest.mark.parametrize("seed", range(8))
-def test_order_is_broken_exactly_where_d3_less_d1_has_the_other_sign_than_at_home(
+def test_order_with_d3_less_d1_of_the_other_sign_than_at_home_is_a_violation(
     seed: int,
 ) -> None:
     design, _ = ordinary_case(seed)
@@ -119,7 +109,7 @@ def test_order_is_broken_exactly_where_d3_less_d1_has_the_other_sign_than_at_hom
         assert never == names
 
 
-def test_workspace_with_the_carriages_the_other_way_round_is_empty() -> None:
+def test_workspace_with_the_carriages_in_the_other_order_is_empty() -> None:
     design = limited(OPTIMAL, margin=None)
     found = workspace_volume(design, MIRRORED)
     assert (found.volume, found.empty_because) == (0.0, (CARRIAGE_ORDER,))
@@ -130,7 +120,7 @@ def test_workspace_with_the_carriages_the_other_way_round_is_empty() -> None:
     assert workspace_nodes(plain, MIRRORED).count > 100
 
 
-def test_workspaces_over_orientations_keep_the_order() -> None:
+def test_reachable_and_dexterous_solids_respect_the_order() -> None:
     design = limited(OPTIMAL, margin=None)
     both = np.stack([home_pose(design).rotation, MIRRORED])
     alone = workspace_solid(design).volume
@@ -141,7 +131,7 @@ def test_workspaces_over_orientations_keep_the_order() -> None:
     assert not dexterous_solid(plain, both).is_empty
 
 
-def test_broken_order_is_told_in_words() -> None:
+def test_order_violation_is_worded_with_its_sign_at_home() -> None:
     pose = Pose.of(home_pose(OPTIMAL).position, MIRRORED)
     (broken,) = evaluate(limited(OPTIMAL, margin=None), pose).violations
     assert str(broken) == ("carriage order: d3 − d1 = −0.6694, but it is positive in the home pose")
@@ -155,7 +145,7 @@ def with_home_at(yaw: float) -> Design:
     return limited(msgspec.structs.replace(OPTIMAL, home=yawed(yaw)), margin=None)
 
 
-def test_a_home_with_both_carriages_at_one_place_has_no_order_to_keep() -> None:
+def test_home_with_coincident_carriages_demands_no_order() -> None:
     design = with_home_at(-90.0)
     assert demanded_order(design) == 0
     for yaw in (-60.0, -90.0, -120.0):
@@ -165,7 +155,7 @@ def test_a_home_with_both_carriages_at_one_place_has_no_order_to_keep() -> None:
 
 
 @pytest.mark.parametrize(("beyond", "kept"), [(0.0, True), (1e-12, True), (1e-7, False)])
-def test_carriages_that_meet_keep_their_order_but_for_the_tolerance(
+def test_carriages_that_coincide_satisfy_their_order_to_the_tolerance(
     beyond: float, kept: bool
 ) -> None:
     design = with_home_at(-73.1)
@@ -175,7 +165,7 @@ def test_carriages_that_meet_keep_their_order_but_for_the_tolerance(
     assert (workspace_volume(design, pose.rotation).volume > 0.0) == kept
 
 
-def test_a_design_file_without_the_order_keeps_it_and_one_that_says_so_does_not() -> None:
+def test_design_file_without_the_order_demands_that_of_home() -> None:
     fields: dict[str, Any] = msgspec.json.decode(encode_design(OPTIMAL))
     assert fields["limits"].pop("carriage_order") == "home"
     assert decode_design(msgspec.json.encode(fields), "older") == OPTIMAL
@@ -193,7 +183,7 @@ def test_a_design_file_without_the_order_keeps_it_and_one_that_says_so_does_not(
             Limits(carriage_order=untyped)
 
 
-def test_the_share_at_the_paper_s_home_is_half_of_the_plain_one() -> None:
+def test_orientation_share_with_the_order_at_the_paper_s_home_is_half() -> None:
     home = home_pose(OPTIMAL)
     kept = orientations_within(OPTIMAL, home.position, uniform_rotations(20_000)).mean()
     plain = orientations_within(

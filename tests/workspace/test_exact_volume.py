@@ -1,8 +1,8 @@
 """The exact volume and its gradient over random designs of every kind, against laws.
 
-A volume is the sum of those of its parts, however finely it is cut; the quadrature then has
-hundreds of times the nodes, and finds what lies between those of the whole. Under scaling a
-volume grows with the cube of all lengths, so that its derivatives add up to it by Euler.
+A volume is the sum of the volumes of its parts. The quadrature over many parts has hundreds of
+times the nodes and resolves what lies between those of the whole. Under scaling a volume grows
+with the cube of all lengths, so lengths times derivatives add up to three volumes (Euler).
 """
 
 from __future__ import annotations
@@ -18,15 +18,14 @@ import numpy as np
 import pytest
 from limited_designs import limited, ordinary_case, shell_case, troubled_case
 
-import explorer.workspace.slices.volume as measures
 from explorer import Design
 from explorer.mechanism.design import LENGTHS, VARIABLES, Swing
 from explorer.mechanism.design_file import decode_design
 from explorer.numerics.arrays import FloatArray
 from explorer.workspace.limits.constraints import YAW, constraints
 from explorer.workspace.limits.region import region_of
-from explorer.workspace.slices.integration import integrate_slices
-from explorer.workspace.slices.volume import bounds, home_rotation, workspace_volume
+from explorer.workspace.slices.integration import RESULTS, TOTAL, TOTAL_ERROR, integrate_slices
+from explorer.workspace.slices.volume import bounds, home_rotation, quadrature, workspace_volume
 
 DEFECTS: list[dict[str, Any]] = json.loads(
     (Path(__file__).parents[1] / "data" / "defects_volume.json").read_text(encoding="utf-8")
@@ -65,23 +64,23 @@ def volume_in_parts(design: Design, rotation: FloatArray) -> tuple[float, float]
     lows, highs = bounds(region)
     if region.is_empty or not (lows < highs).all():
         return 0.0, 0.0
-    by_round, by_plane = np.zeros((len(region.rounds), 4)), np.zeros((len(region.planes), 4))
-    result, total, error = np.zeros(6), 0.0, 0.0
+    by_circle, by_plane = np.zeros((len(region.circles), 4)), np.zeros((len(region.planes), 4))
+    result, total, error = np.zeros(RESULTS), 0.0, 0.0
     ends = np.linspace(region.low, region.high, PARTS + 1).tolist()
     for low, high in itertools.pairwise(ends):
         integrate_slices(
             1,
-            region.rounds,
+            region.circles,
             region.planes,
             low,
             high,
-            measures.quadrature(),
+            quadrature(),
             result,
-            by_round,
+            by_circle,
             by_plane,
         )
-        total += float(result[0])
-        error += float(result[5])
+        total += float(result[TOTAL])
+        error += float(result[TOTAL_ERROR])
     return total, error
 
 
@@ -91,7 +90,7 @@ def decoded(case: dict[str, Any]) -> tuple[Design, FloatArray]:
 
 
 @pytest.mark.parametrize("case", DEFECTS)
-def test_volume_with_changes_between_nodes_is_the_true_one(case: dict[str, Any]) -> None:
+def test_volume_with_breaks_between_nodes_is_the_reference_one(case: dict[str, Any]) -> None:
     design, rotation = decoded(case)
     found = workspace_volume(design, rotation)
     assert found.volume == pytest.approx(case["volume"], rel=1e-7)
@@ -101,7 +100,7 @@ def test_volume_with_changes_between_nodes_is_the_true_one(case: dict[str, Any])
 
 
 @pytest.mark.parametrize("kind", CASES)
-def test_volume_is_the_sum_of_its_parts_to_within_its_error(kind: str) -> None:
+def test_volume_in_parts_sums_to_the_whole_within_its_error(kind: str) -> None:
     off: list[tuple[int, float]] = []
     for seed in range(SEEDS):
         design, rotation = CASES[kind](seed)
@@ -114,13 +113,13 @@ def test_volume_is_the_sum_of_its_parts_to_within_its_error(kind: str) -> None:
 
 
 @pytest.mark.parametrize("seed", range(SEEDS))
-def test_error_of_an_ordinary_volume_is_that_of_rounding(seed: int) -> None:
+def test_volume_error_of_ordinary_designs_is_rounding(seed: int) -> None:
     found = workspace_volume(*ordinary_case(seed), explain=False)
     assert found.error <= 1e-11 * found.volume
 
 
 def length_of(design: Design, name: str) -> float:
-    """Return the length that a derivative is by."""
+    """Return the length with respect to which a derivative is taken."""
     if name in VARIABLES:
         return design.variables[VARIABLES.index(name)]
     if name == "margin":
@@ -136,7 +135,7 @@ def length_of(design: Design, name: str) -> float:
 
 
 @pytest.mark.parametrize("kind", CASES)
-def test_lengths_times_derivatives_add_up_to_three_volumes(kind: str) -> None:
+def test_volume_gradient_times_lengths_is_three_volumes(kind: str) -> None:
     off: list[tuple[int, float]] = []
     for seed in range(SEEDS):
         design, rotation = CASES[kind](seed)
@@ -144,7 +143,7 @@ def test_lengths_times_derivatives_add_up_to_three_volumes(kind: str) -> None:
         terms = [
             length_of(design, name) * rate for name, rate in found.gradient.items() if name != YAW
         ]
-        # Of a thin shell they are far larger than the volume, and cancel. A face that begins
+        # For a thin shell the terms are far larger than the volume, and cancel. A face that begins
         # just beyond a piece as a square root costs its derivative more digits than the volume.
         room = 1e-7 * math.fsum(map(abs, terms)) + 3.0 * found.error
         if abs(math.fsum(terms) - 3.0 * found.volume) > room:

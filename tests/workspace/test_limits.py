@@ -1,4 +1,4 @@
-"""Limits: what is broken is what a plain comparison says, and a pose on a limit is within."""
+"""Violations of limits are those of a plain comparison, and a pose on a limit violates none."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ ranges = st.tuples(st.floats(0.0, 20.0), st.floats(0.0, 20.0)).map(
 
 
 @given(ordinary_cases(), st.tuples(*[ranges] * 4))
-def test_a_length_is_broken_exactly_outside_its_range(
+def test_length_outside_its_range_is_a_violation(
     case: Case, bounds: tuple[tuple[float, float], ...]
 ) -> None:
     names = ("l1", "d2", "d4", "l4")
@@ -68,7 +68,7 @@ def test_a_length_is_broken_exactly_outside_its_range(
 
 
 @given(ordinary_cases())
-def test_a_maximum_of_none_is_the_reach(case: Case) -> None:
+def test_maximum_of_none_is_the_reach(case: Case) -> None:
     design = limited(case.design, l1=(0.0, None))
     reach = math.hypot(*case.design.a3)
     l1 = float(inverse(design, case.position, case.rotation)[0])
@@ -78,7 +78,7 @@ def test_a_maximum_of_none_is_the_reach(case: Case) -> None:
 
 
 @given(ordinary_cases(), st.floats(-20.0, 20.0), st.floats(0.0, 30.0))
-def test_the_guide_bounds_each_carriage(case: Case, low: float, width: float) -> None:
+def test_carriage_beyond_the_guide_is_a_violation(case: Case, low: float, width: float) -> None:
     design = limited(case.design, guide=(low, low + width))
     joints = inverse(design, case.position, case.rotation)
     found = {v.limit for v in broken(design, case.position, case.rotation)}
@@ -91,7 +91,7 @@ def test_the_guide_bounds_each_carriage(case: Case, low: float, width: float) ->
 
 
 @given(ordinary_cases(), st.floats(0.0, 20.0))
-def test_the_gap_is_the_least_distance_of_the_carriages(case: Case, gap: float) -> None:
+def test_carriages_closer_than_the_gap_are_a_violation(case: Case, gap: float) -> None:
     design = limited(case.design, gap=gap)
     joints = inverse(design, case.position, case.rotation)
     apart = abs(float(joints[1]) - float(joints[3]))
@@ -105,7 +105,9 @@ def test_the_gap_is_the_least_distance_of_the_carriages(case: Case, gap: float) 
 
 
 @given(ordinary_cases(), st.tuples(*[st.tuples(st.floats(-30, 30), st.floats(-30, 30))] * 3))
-def test_the_box_bounds_each_coordinate(case: Case, sides: tuple[tuple[float, float], ...]) -> None:
+def test_coordinate_outside_the_box_is_a_violation(
+    case: Case, sides: tuple[tuple[float, float], ...]
+) -> None:
     lows = tuple(min(side) for side in sides)
     highs = tuple(max(side) for side in sides)
     design = limited(case.design, box=(lows, highs))
@@ -119,7 +121,7 @@ def test_the_box_bounds_each_coordinate(case: Case, sides: tuple[tuple[float, fl
 
 
 @given(ordinary_cases(), st.floats(0.0, 10.0), st.integers(0, 7))
-def test_the_margin_demands_the_sign_triple_of_home_and_a_distance(
+def test_margin_of_another_sign_or_too_small_is_a_violation(
     case: Case, least: float, mode: int
 ) -> None:
     design = limited(case.design, margin=least)
@@ -128,7 +130,7 @@ def test_the_margin_demands_the_sign_triple_of_home_and_a_distance(
     by_name = {v.limit: v for v in found}
     margin = margins(case.position, case.rotation).tolist()
     for index, (value, sign) in enumerate(zip(margin, signs, strict=True), 1):
-        name = f"margin κ{index}"
+        name = f"margin δ{index}"
         if sign * value < least - 1e-9:
             assert by_name[name].value == value
             assert by_name[name].bound == sign * least
@@ -138,14 +140,14 @@ def test_the_margin_demands_the_sign_triple_of_home_and_a_distance(
 
 
 @given(ordinary_cases())
-def test_a_margin_of_none_demands_nothing(case: Case) -> None:
+def test_margin_of_none_demands_nothing(case: Case) -> None:
     design = limited(case.design, margin=None)
     for mode in range(8):
         assert broken(design, case.position, case.rotation, signs_of(mode)) == ()
 
 
 @given(ordinary_cases())
-def test_a_pose_on_every_limit_at_once_is_within(case: Case) -> None:
+def test_pose_on_every_limit_at_once_violates_none(case: Case) -> None:
     joints = inverse(case.design, case.position, case.rotation)
     l1, d1, d2, d3, d4, l4 = joints.tolist()
     position = tuple(case.position.tolist())
@@ -166,7 +168,7 @@ def test_a_pose_on_every_limit_at_once_is_within(case: Case) -> None:
 
 
 @pytest.mark.parametrize("beyond", [1e-9, 1.0])
-def test_a_pose_just_beyond_a_limit_is_not_within(beyond: float) -> None:
+def test_pose_just_beyond_a_limit_violates_it(beyond: float) -> None:
     base = PRESETS["paper-initial"]
     position, rotation = np.array([3.0, 4.0, 5.0]), np.eye(3)
     l4 = float(inverse(base, position, rotation)[5])
@@ -178,7 +180,7 @@ def test_a_pose_just_beyond_a_limit_is_not_within(beyond: float) -> None:
     assert "below its minimum" in str(below)
 
 
-def test_violations_come_in_the_order_of_the_design_file() -> None:
+def test_violations_are_in_the_order_of_the_design_file() -> None:
     design = limited(
         PRESETS["paper-initial"],
         l1=(0.0, 0.0),
@@ -202,14 +204,14 @@ def test_violations_come_in_the_order_of_the_design_file() -> None:
         "box x",
         "box y",
         "box z",
-        "margin κ1",
-        "margin κ2",
-        "margin κ3",
+        "margin δ1",
+        "margin δ2",
+        "margin δ3",
     ]
 
 
 @pytest.mark.parametrize("name", list(PRESETS))
-def test_the_snapshot_judges_by_the_sign_triple_of_home(name: str) -> None:
+def test_snapshot_violations_use_the_sign_triple_of_home(name: str) -> None:
     design = PRESETS[name]
     home = home_pose(design)
     assert evaluate(design, home).violations == ()
@@ -218,4 +220,4 @@ def test_the_snapshot_judges_by_the_sign_triple_of_home(name: str) -> None:
     found = [v.limit for v in evaluate(design, below).violations]
     # Mirrored in the base plane only b4 has changed sides, and left the box.
     assert "box z" in found
-    assert "margin κ3" in found
+    assert "margin δ3" in found

@@ -42,7 +42,7 @@ def extent(design: explorer.Design, rotation: FloatArray, axis: str) -> tuple[fl
 
 @pytest.mark.parametrize("axis", ["x", "y", "z"])
 @pytest.mark.parametrize("seed", range(8))
-def test_areas_over_all_levels_integrate_to_the_exact_volume(seed: int, axis: str) -> None:
+def test_outline_areas_over_levels_integrate_to_the_exact_volume(seed: int, axis: str) -> None:
     # Even: reference workspaces with minimum lengths, hence holes; odd: every kind of limit.
     design, rotation = reference_case(seed)[:2] if seed % 2 == 0 else ordinary_case(seed)
     low, high = extent(design, rotation, axis)
@@ -59,7 +59,7 @@ def test_areas_over_all_levels_integrate_to_the_exact_volume(seed: int, axis: st
 
 @pytest.mark.parametrize("axis", ["x", "y", "z"])
 @pytest.mark.parametrize("seed", range(6))
-def test_edges_lie_on_their_limits_within_all_others_and_close(seed: int, axis: str) -> None:
+def test_outline_edges_lie_on_their_limits_and_close(seed: int, axis: str) -> None:
     design, rotation = ordinary_case(100 + seed)
     limits = constraints(design, rotation)
     low, high = extent(design, rotation, axis)
@@ -81,7 +81,7 @@ def test_edges_lie_on_their_limits_within_all_others_and_close(seed: int, axis: 
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_a_slice_lies_to_the_left_of_its_edges(seed: int) -> None:
+def test_outline_edges_have_the_slice_on_their_left(seed: int) -> None:
     design, rotation = ordinary_case(200 + seed)
     limits = constraints(design, rotation)
     level = design.home.position[2] if design.home else 0.0
@@ -97,7 +97,7 @@ def test_a_slice_lies_to_the_left_of_its_edges(seed: int) -> None:
         assert inside.tolist() == [True, False]
 
 
-def test_a_minimum_length_leaves_a_hole() -> None:
+def test_outline_minimum_length_leaves_a_hole() -> None:
     # b4 within a ball about a3, and outside a small one about it that lies inside all else.
     design = limited(OPTIMAL, l4=(1.0, 3.0), box=None, margin=None)
     design = limited(design, l1=(0.0, 1e3), d2=(0.0, 1e3), d4=(0.0, 1e3))
@@ -111,7 +111,7 @@ def test_a_minimum_length_leaves_a_hole() -> None:
 
 
 @pytest.mark.parametrize("size", [1e-20, 1e-6, 1e6, 1e20])
-def test_the_outline_scales_with_the_design(size: float) -> None:
+def test_outline_of_a_scaled_design_scales(size: float) -> None:
     rotation = explorer.home_pose(OPTIMAL).rotation
     plain = limited(OPTIMAL, box=None)
     scaled = limited(plain.with_variables([size * x for x in plain.variables]))
@@ -123,7 +123,7 @@ def test_the_outline_scales_with_the_design(size: float) -> None:
     assert other.area == pytest.approx(one.area * size**2, rel=1e-9)
 
 
-def test_beyond_the_workspace_and_in_an_empty_one_there_is_no_outline() -> None:
+def test_outline_outside_a_workspace_has_no_loops() -> None:
     rotation = explorer.home_pose(OPTIMAL).rotation
     beyond = slice_outline(OPTIMAL, rotation, "z", 30.0)
     below = slice_outline(OPTIMAL, rotation, "z", -0.1)
@@ -132,7 +132,7 @@ def test_beyond_the_workspace_and_in_an_empty_one_there_is_no_outline() -> None:
     assert all(each is not None and each.area == 0.0 for each in (beyond, below, level))
 
 
-def test_cones_have_no_circles_to_outline_and_axes_have_three_names() -> None:
+def test_outline_with_cones_is_none_and_unknown_axes_are_refused() -> None:
     swung = limited(OPTIMAL, swing=Swing(a1=60.0))
     rotation = explorer.home_pose(OPTIMAL).rotation
     assert slice_outline(swung, rotation, "z", 9.0) is None

@@ -1,7 +1,7 @@
-"""Every limit has one tolerance: what touches a limit keeps it, wherever that is asked.
+"""Every limit has one tolerance, for every part of the explorer.
 
-Limits are set to just what a random pose has, so that rounding alone decides, and to a little
-less. The optimiser ends on limits, too; its outcomes are looked at as their files are read.
+Limits are set to the values of a random pose, so that only rounding decides, and to a little less.
+The optimiser ends on limits too; the designs of its outcomes are checked as read from their files.
 """
 
 from __future__ import annotations
@@ -37,26 +37,23 @@ from explorer import (
 )
 from explorer.mechanism.design import LENGTHS, Swing
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.compiled import warm
 from explorer.optimise.problem import SHIFTS, Box
 from explorer.optimise.search.demands import corners_of
-from explorer.workspace.limits.constraints import angle_between, constraints, legs, slacks
+from explorer.workspace.limits.constraints import constraints, slacks
+from explorer.workspace.limits.joint_cones import angle_between, legs
 from explorer.workspace.orientations import orientations_within
+
+pytestmark = pytest.mark.usefixtures("warm_kernels")
 
 DEFECTS: list[dict[str, Any]] = json.loads(
     (Path(__file__).parents[1] / "data" / "defects_optimise.json").read_text(encoding="utf-8")
 )["optimise"]
-# A share of the reach: far more than rounding, far less than anybody makes.
+# A share of the reach: far more than rounding, far less than a manufacturing tolerance.
 LITTLE = 1e-7
 
 
-@pytest.fixture(autouse=True, scope="module")
-def _warm_kernels() -> None:  # pyright: ignore[reportUnusedFunction]
-    warm()
-
-
 def free_case(seed: int) -> tuple[Design, Pose]:
-    """Return a design that a pose on nodes of a grid of step 1 is far within the limits of."""
+    """Return a design, and a pose on a node of a grid of step 1 that satisfies its limits."""
     rng = np.random.default_rng(seed)
     x = (rng.uniform(2.0, 9.0, 6) * rng.choice([-1.0, 1.0], 6)).tolist()
     lengths: dict[str, Any] = dict.fromkeys(LENGTHS, (0.0, 60.0))
@@ -81,7 +78,7 @@ def free_case(seed: int) -> tuple[Design, Pose]:
 
 
 def touching(design: Design, pose: Pose, little: float) -> Iterator[tuple[str, Design]]:
-    """Yield designs with one limit that the pose just touches, or misses by so much."""
+    """Yield designs with one limit that a pose just touches, or violates by a little."""
     joints = inverse(design, pose.position, pose.rotation).tolist()
     q = dict(zip(("l1", "d1", "d2", "d3", "d4", "l4"), joints, strict=True))
     for name in LENGTHS:
@@ -126,27 +123,27 @@ def boxed(design: Design, lows: FloatArray, highs: FloatArray) -> Design:
     return limited(design, box=(tuple(lows.tolist()), tuple(highs.tolist())))
 
 
-def says_within(design: Design, pose: Pose) -> dict[str, bool]:
-    """Return what each part of the explorer says of a pose, which lies on nodes of step 1."""
+def answers_of(design: Design, pose: Pose) -> dict[str, bool]:
+    """Return by part of the explorer whether a pose on a node of step 1 satisfies the limits."""
     place, turn = np.array(pose.position), pose.rotation
-    kept = slacks(constraints(design, turn), place)
-    around = limited(design, box=design.limits.box or both(place - 1.0, place + 1.0))
+    left = slacks(constraints(design, turn), place)
+    around = limited(design, box=design.limits.box or box_between(place - 1.0, place + 1.0))
     return {
         "limits of a pose": not evaluate(design, pose).violations,
         "validity": bool(poses_are_valid(design, place, turn)),
         "orientations": bool(orientations_within(design, place, turn[None])[0]),
-        "constraints": bool((kept >= -0.1 * LITTLE).all()),
+        "constraints": bool((left >= -0.1 * LITTLE).all()),
         "nodes": has_node(around, place, turn),
     }
 
 
-def both(lows: FloatArray, highs: FloatArray) -> Box:
+def box_between(lows: FloatArray, highs: FloatArray) -> Box:
     (x, y, z), (u, v, w) = lows.tolist(), highs.tolist()
     return (x, y, z), (u, v, w)
 
 
 def has_node(design: Design, place: FloatArray, rotation: FloatArray) -> bool:
-    """Return whether the paper's nodes hold a position: taking it out of the box loses one."""
+    """Return whether a position is one of the paper's nodes, the only one in a small box."""
     lows, highs = (np.array(end) for end in design.limits.box or pytest.fail("no box"))
     only = boxed(design, np.maximum(lows, place - 0.25), np.minimum(highs, place + 0.25))
     if (np.array(only.limits.box)[0] > np.array(only.limits.box)[1]).any():
@@ -155,24 +152,24 @@ def has_node(design: Design, place: FloatArray, rotation: FloatArray) -> bool:
 
 
 @pytest.mark.parametrize("seed", range(10))
-def test_a_pose_that_touches_a_limit_is_within_it_wherever_that_is_asked(seed: int) -> None:
+def test_pose_on_a_limit_satisfies_it_everywhere(seed: int) -> None:
     design, pose = free_case(seed)
     for name, touched in touching(design, pose, 0.0):
-        assert says_within(touched, pose) == dict.fromkeys(PARTS, True), name
+        assert answers_of(touched, pose) == dict.fromkeys(PARTS, True), name
 
 
 @pytest.mark.parametrize("seed", range(10))
-def test_a_pose_a_little_beyond_a_limit_is_outside_wherever_that_is_asked(seed: int) -> None:
+def test_pose_a_little_beyond_a_limit_violates_it_everywhere(seed: int) -> None:
     design, pose = free_case(seed)
     for name, touched in touching(design, pose, LITTLE * design.reach):
-        assert says_within(touched, pose) == dict.fromkeys(PARTS, False), name
+        assert answers_of(touched, pose) == dict.fromkeys(PARTS, False), name
 
 
 PARTS = ("limits of a pose", "validity", "orientations", "constraints", "nodes")
 
 
 @pytest.mark.parametrize("seed", range(10))
-def test_a_gap_that_is_just_kept_empties_no_workspace(seed: int) -> None:
+def test_gap_just_satisfied_empties_no_workspace(seed: int) -> None:
     design, _ = free_case(seed)
     rotation = home_pose(design).rotation
     gap = abs((design.b3 - design.b2) * float(rotation[0, 0]))
@@ -184,11 +181,8 @@ def test_a_gap_that_is_just_kept_empties_no_workspace(seed: int) -> None:
     assert workspace_volume(limited(design, gap=gap + LITTLE * design.reach)).volume == 0.0
 
 
-# Outcomes of the optimiser
-
-
-def assert_is_kept_as_written(outcome: Outcome) -> None:
-    """Check that the design of a converged outcome, read from its file, keeps every demand."""
+def assert_file_meets_demands(outcome: Outcome) -> None:
+    """Check that the design of a converged outcome, read from its file, meets every demand."""
     if not outcome.converged:
         return
     problem, demands = outcome.problem, outcome.problem.demands
@@ -209,19 +203,19 @@ def assert_is_kept_as_written(outcome: Outcome) -> None:
 
 
 @pytest.mark.parametrize("index", range(len(DEFECTS)))
-def test_an_optimum_on_the_limit_of_the_gap_has_a_workspace(index: int) -> None:
+def test_optimum_on_the_gap_has_a_workspace(index: int) -> None:
     row = DEFECTS[index]
     design = decode_design(json.dumps(row["design"]).encode(), "the start")
     arguments: dict[str, Any] = row["arguments"]
     problem = make_problem(design, row["objective"], free=row["free"], **arguments)
     outcome = optimise_design(problem)
     assert outcome.best.volume > 0.0
-    assert_is_kept_as_written(outcome)
+    assert_file_meets_demands(outcome)
     assert outcome.converged or index > 0
 
 
 @pytest.mark.parametrize("seed", range(10))
-def test_optima_on_limits_keep_them_as_their_files_are_read(seed: int) -> None:
+def test_optimum_on_limits_read_from_its_file_satisfies_them(seed: int) -> None:
     rng = np.random.default_rng(seed)
     design = decode_design(json.dumps(DEFECTS[0]["design"]).encode(), "the start")
     x = np.array(design.variables) * rng.uniform(0.7, 1.4, 6)
@@ -237,7 +231,7 @@ def test_optima_on_limits_keep_them_as_their_files_are_read(seed: int) -> None:
         "largest-margin",
         free=["yaw", *(SHIFTS if seed % 2 else ())],
         reach=float(1.1 * design.reach) if seed % 3 else None,
-        required_box=both(middle - half, middle + half),
+        required_box=box_between(middle - half, middle + half),
     )
     outcome = optimise_design(problem, iterations=150)
-    assert_is_kept_as_written(outcome)
+    assert_file_meets_demands(outcome)

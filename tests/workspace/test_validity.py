@@ -1,4 +1,4 @@
-"""The compiled yes or no over poses and moves, beside what names each limit and clearance."""
+"""Compiled validity of poses and moves, against the named violations and clearances."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from explorer import (
 from explorer.mechanism.design import Swing
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import MANY_ROWS
-from explorer.workspace.limits.valid_moves import moves_are_valid, write_at, write_turn
+from explorer.workspace.limits.valid_moves import moves_are_valid, write_pose_at, write_turn
 from explorer.workspace.limits.valid_poses import Rules, poses_are_valid
 
 OPTIMAL = PRESETS["paper-optimal"]
@@ -34,15 +34,15 @@ RADIUS = 0.2
 THICK = limited(OPTIMAL, leg_radii=(RADIUS,) * 4)
 
 
-def named(design: Design, pose: Pose) -> tuple[bool, float]:
-    """Return what names each limit says, and how far from a change of its mind it is."""
+def verdict_of(design: Design, pose: Pose) -> tuple[bool, float]:
+    """Return whether a pose has no violation and no collision, and its smallest |clearance|."""
     snapshot = evaluate(design, pose)
-    keeps = not snapshot.violations and bool((snapshot.clearances.clearance > 0.0).all())
-    return keeps, float(np.abs(snapshot.clearances.clearance).min())
+    is_valid = not snapshot.violations and bool((snapshot.clearances.clearance > 0.0).all())
+    return is_valid, float(np.abs(snapshot.clearances.clearance).min())
 
 
 def poses_about(design: Design, seed: int, count: int) -> list[Pose]:
-    """Return poses from the home's near neighbourhood to anywhere."""
+    """Return random poses at distances from near the home to far from it."""
     rng = np.random.default_rng(seed)
     home, size = home_pose(design), design.reach
     spread = rng.choice([1e-3, 0.1, 0.5], (count, 1))
@@ -59,7 +59,7 @@ def with_swing(design: Design, seed: int) -> Design:
 
 
 @given(st.integers(0, 2**32))
-def test_a_pose_is_valid_where_no_limit_is_named_and_no_legs_collide(seed: int) -> None:
+def test_pose_without_violations_or_collisions_is_valid(seed: int) -> None:
     kind = seed % 4
     if kind == 0:
         design = troubled_case(seed)[0]
@@ -74,12 +74,12 @@ def test_a_pose_is_valid_where_no_limit_is_named_and_no_legs_collide(seed: int) 
         design, [each.position for each in poses], [each.rotation for each in poses]
     )
     for pose, valid in zip(poses, found.tolist(), strict=True):
-        expected, nearness = named(design, pose)
+        expected, nearness = verdict_of(design, pose)
         if nearness > 1e-12 * design.reach:
             assert valid == expected, (design, pose)
 
 
-def test_valid_and_invalid_poses_are_both_among_the_random_ones() -> None:
+def test_random_poses_are_valid_and_invalid() -> None:
     poses = poses_about(THICK, 1, 400)
     found = poses_are_valid(
         THICK, [each.position for each in poses], [each.rotation for each in poses]
@@ -88,7 +88,7 @@ def test_valid_and_invalid_poses_are_both_among_the_random_ones() -> None:
 
 
 @pytest.mark.parametrize("bound", ["l1", "d2", "d4", "l4"])
-def test_a_pose_on_a_limit_is_within_it(bound: str) -> None:
+def test_pose_on_a_limit_is_valid(bound: str) -> None:
     home = home_pose(OPTIMAL)
     length = float(evaluate(OPTIMAL, home).joints[JOINTS.index(bound)])
     for low, high, expected in (
@@ -101,14 +101,14 @@ def test_a_pose_on_a_limit_is_within_it(bound: str) -> None:
         assert poses_are_valid(design, home.position, home.rotation) == expected
 
 
-def test_a_leg_without_a_direction_at_home_keeps_no_cone() -> None:
+def test_leg_without_a_direction_at_home_violates_its_cone() -> None:
     home = Pose((*OPTIMAL.a3, 0.0), home_pose(OPTIMAL).quaternion)
     free = limited(OPTIMAL, box=None, margin=None)
     design = msgspec.structs.replace(limited(free, swing=Swing(a3=90.0)), home=home)
     pose = home_pose(OPTIMAL)
     assert poses_are_valid(free, pose.position, pose.rotation)
     assert not poses_are_valid(design, pose.position, pose.rotation)
-    assert not named(design, pose)[0]
+    assert not verdict_of(design, pose)[0]
     assert not moves_are_valid(design, pose.position, pose.rotation, pose.position, pose.rotation)
 
 
@@ -125,7 +125,7 @@ def random_moves(seed: int, count: int, share: float) -> tuple[FloatArray, ...]:
 
 
 @pytest.mark.parametrize("share", [1.0, 0.2, 0.0])
-def test_a_valid_move_keeps_everything_all_along(share: float) -> None:
+def test_move_valid_has_valid_poses_all_along(share: float) -> None:
     moves = random_moves(7, 300, share)
     found = moves_are_valid(THICK, *moves)
     assert moves_are_clear(THICK, *moves)[found].all()
@@ -142,7 +142,7 @@ def test_a_valid_move_keeps_everything_all_along(share: float) -> None:
 
 
 @given(positions(), uniform_rotations(), st.sampled_from((0.0, 1e-12, 1e-6, 1.0, 3.0, 3.14159265)))
-def test_moves_are_those_of_the_move_model(
+def test_move_poses_are_those_between_its_ends(
     axis: FloatArray, rotation: FloatArray, angle: float
 ) -> None:
     axis = axis / (float(np.linalg.norm(axis)) or 1.0)
@@ -152,13 +152,15 @@ def test_moves_are_those_of_the_move_model(
     found = write_turn(start.rotation, end.rotation, found_axis)
     step = np.array(end.position) - np.array(start.position)
     for share in (0.0, 0.3, 1.0):
-        write_at(share, np.array(start.position), start.rotation, step, found_axis, found, p, r)
+        write_pose_at(
+            share, np.array(start.position), start.rotation, step, found_axis, found, p, r
+        )
         expected = poses_between(start, end, share)
         np.testing.assert_allclose(p, expected[0], atol=1e-14)
         np.testing.assert_allclose(r, expected[1], atol=1e-9)
 
 
-def test_a_move_along_a_limit_is_valid_to_the_tolerance() -> None:
+def test_move_along_a_limit_is_valid_to_the_tolerance() -> None:
     home = home_pose(OPTIMAL)
     top = limited(OPTIMAL, box=((0, -12, 0), (20, 22, home.position[2])))
     x, y, z = home.position
@@ -184,14 +186,14 @@ def test_a_move_along_a_limit_is_valid_to_the_tolerance() -> None:
     assert moves_are_valid(bounded, *ways, tolerance=2.5 * (ends - least))
 
 
-def test_a_move_to_another_mode_is_not_valid() -> None:
+def test_move_to_another_mode_is_invalid() -> None:
     home = home_pose(OPTIMAL)
     free = limited(OPTIMAL, box=None)
     x, y, z = home.position
     assert not moves_are_valid(free, (x, y, z), home.rotation, (x, y, -z), home.rotation)
 
 
-def test_rules_are_those_of_the_design() -> None:
+def test_rules_given_or_computed_have_the_same_answers() -> None:
     rules = Rules.of(THICK)
     moves = random_moves(2, 5, 1.0)
     assert (moves_are_valid(THICK, *moves, rules=rules) == moves_are_valid(THICK, *moves)).all()
@@ -200,7 +202,7 @@ def test_rules_are_those_of_the_design() -> None:
     ).all()
 
 
-def test_few_and_many_poses_and_moves_have_the_same_answers() -> None:
+def test_poses_and_moves_few_or_many_have_the_same_answers() -> None:
     moves = random_moves(11, MANY_ROWS, 0.5)
     found = moves_are_valid(THICK, *(each.reshape(2, -1, *each.shape[1:]) for each in moves))
     assert found.shape == (2, MANY_ROWS // 2)
@@ -212,7 +214,7 @@ def test_few_and_many_poses_and_moves_have_the_same_answers() -> None:
 
 
 @pytest.mark.parametrize("count", [3, MANY_ROWS])
-def test_many_positions_may_share_a_rotation_and_many_rotations_a_position(count: int) -> None:
+def test_poses_of_broadcast_arrays_have_the_same_answers(count: int) -> None:
     poses = poses_about(THICK, 5, count)
     p, r = (np.array([pose.position for pose in poses]), np.array([q.rotation for q in poses]))
     one = np.broadcast_to(r[0], r.shape).copy()
@@ -225,7 +227,7 @@ def test_many_positions_may_share_a_rotation_and_many_rotations_a_position(count
     )
 
 
-def test_poses_that_are_none_are_refused() -> None:
+def test_poses_not_finite_are_refused() -> None:
     with pytest.raises(InputError, match="position"):
         poses_are_valid(OPTIMAL, [0.0, math.nan, 1.0], np.eye(3))
     with pytest.raises(InputError, match="end position"):

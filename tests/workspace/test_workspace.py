@@ -1,8 +1,8 @@
-"""The constant-orientation workspace: volumes, gradients and nodes, each by another way too.
+"""The constant-orientation workspace: volumes, gradients and nodes against independent methods.
 
 Volumes are compared with reference values (good to 1e-4), with a closed form in y under a
-fine quadrature in x for both rows of Table 1 (converged to 1e-9), with columns that another
-kernel adds up (good to about 1e-4), and with themselves on four times the nodes (1e-10).
+fine quadrature in x for both rows of Table 1 (converged to 1e-9), with the columns of another
+kernel (good to about 1e-4), and with twice as many nodes of the quadrature (1e-12).
 """
 
 from __future__ import annotations
@@ -16,14 +16,13 @@ import pytest
 from limited_designs import REFERENCE, limited, ordinary_case, reference_case, troubled_case
 from scipy.spatial.transform import Rotation
 
-import explorer.workspace.slices.volume as measures
+import explorer.workspace.slices.volume as volumes
 from explorer import PRESETS, Design, InputError, Limits, Pose, home_pose
 from explorer.mechanism.design import LENGTHS, VARIABLES, Swing
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.compiled import warm
 from explorer.workspace.limits.constraints import YAW, constraints
 from explorer.workspace.limits.region import region_of
-from explorer.workspace.slices.integration import integrate_slices
+from explorer.workspace.slices.integration import RESULTS, integrate_slices
 from explorer.workspace.slices.nodes import column_lengths, count_nodes
 from explorer.workspace.slices.volume import (
     bounds,
@@ -32,22 +31,19 @@ from explorer.workspace.slices.volume import (
     workspace_volume,
 )
 
+pytestmark = pytest.mark.usefixtures("warm_kernels")
+
 OPTIMAL = PRESETS["paper-optimal"]
 
 
-@pytest.fixture(autouse=True, scope="module")
-def _warm_kernels() -> None:  # pyright: ignore[reportUnusedFunction]
-    warm()
-
-
 @pytest.mark.parametrize("index", range(len(REFERENCE["workspaces"])))
-def test_volumes_are_those_of_the_reference(index: int) -> None:
+def test_volume_of_reference_workspaces_is_theirs(index: int) -> None:
     design, rotation, volume = reference_case(index)
     assert workspace_volume(design, rotation).volume == pytest.approx(volume, rel=1e-4)
 
 
 def height_field_volume(design: Design, panels: int) -> float:
-    """Return the volume of a level workspace above z = 0 without minima, in its own way.
+    """Return the volume of a level workspace above z = 0 without minima, independently.
 
     Level, every ball and cylinder has its centre in the plane z = 0, so that the height over
     (x, y) is the least of the box and of roots of c - (y - y0)²: in y it has a closed form
@@ -102,7 +98,7 @@ def _root_integral(t: FloatArray, c: FloatArray) -> FloatArray:
 
 
 @pytest.mark.parametrize("row", REFERENCE["table1"], ids=lambda row: str(row["name"]))
-def test_both_rows_of_table_1_have_their_exact_volume(row: dict[str, Any]) -> None:
+def test_volume_of_table_1_rows_is_that_of_a_height_field(row: dict[str, Any]) -> None:
     design = PRESETS[row["name"]]
     independent = height_field_volume(design, 4000)
     assert height_field_volume(design, 2000) == pytest.approx(independent, rel=1e-8)
@@ -112,7 +108,7 @@ def test_both_rows_of_table_1_have_their_exact_volume(row: dict[str, Any]) -> No
 
 
 @pytest.mark.parametrize("row", REFERENCE["table1"], ids=lambda row: str(row["name"]))
-def test_both_rows_of_table_1_have_their_nodes(row: dict[str, Any]) -> None:
+def test_nodes_of_table_1_rows_are_the_reference_ones(row: dict[str, Any]) -> None:
     nodes = workspace_nodes(PRESETS[row["name"]])
     assert nodes.count == row["node_count"]
     assert nodes.step == pytest.approx(row["step"], rel=1e-12)
@@ -120,16 +116,16 @@ def test_both_rows_of_table_1_have_their_nodes(row: dict[str, Any]) -> None:
     np.testing.assert_allclose(nodes.extent or (), row["extent"], rtol=1e-12, atol=1e-12)
 
 
-def test_the_node_volume_of_the_optimum_is_the_paper_s() -> None:
+def test_node_volume_of_the_optimum_is_the_paper_s() -> None:
     assert workspace_nodes(OPTIMAL).volume == 7992.0
-    # What the paper prints of the initial row, to its digits.
+    # The printed extents of the initial row, to their digits.
     lows, highs = workspace_nodes(PRESETS["paper-initial"]).extent or pytest.fail("empty")
     assert [round(end, 3) for end in highs] == [10.052, 10.770, 9.334]
     assert [round(end, 3) for end in lows] == [0.0, -5.026, 0.0]
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_nodes_are_those_that_keep_every_limit(seed: int) -> None:
+def test_nodes_counted_satisfy_every_limit(seed: int) -> None:
     design, rotation = ordinary_case(seed)
     step = 0.7
     nodes = workspace_nodes(design, rotation, step)
@@ -142,7 +138,7 @@ def test_nodes_are_those_that_keep_every_limit(seed: int) -> None:
         np.testing.assert_allclose(nodes.extent, [inside.min(axis=0), inside.max(axis=0)])
 
 
-def test_node_volumes_tend_to_the_exact_volume() -> None:
+def test_node_volume_with_finer_steps_tends_to_the_exact_volume() -> None:
     exact = workspace_volume(OPTIMAL).volume
     excess = [
         workspace_nodes(OPTIMAL, step=step).volume / exact - 1.0 for step in (2.0, 0.5, 0.125)
@@ -154,19 +150,19 @@ def test_node_volumes_tend_to_the_exact_volume() -> None:
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_more_nodes_of_the_quadrature_change_nothing(
+def test_volume_with_twice_the_quadrature_nodes_is_the_same(
     seed: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     design, rotation = ordinary_case(seed)
     volume = workspace_volume(design, rotation).volume
-    monkeypatch.setattr(measures, "NODES", 2 * measures.NODES)
-    finer = measures.quadrature.__wrapped__()
-    monkeypatch.setattr(measures, "quadrature", lambda: finer)
+    monkeypatch.setattr(volumes, "NODES", 2 * volumes.NODES)
+    finer = volumes.quadrature.__wrapped__()
+    monkeypatch.setattr(volumes, "quadrature", lambda: finer)
     assert workspace_volume(design, rotation).volume == pytest.approx(volume, rel=1e-12)
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_columns_add_up_to_the_volume(seed: int) -> None:
+def test_volume_is_the_sum_of_columns(seed: int) -> None:
     design, rotation = ordinary_case(seed)
     region = region_of(constraints(design, rotation))
     assert _columns(design, rotation, 500) == pytest.approx(
@@ -180,7 +176,7 @@ def _columns(design: Design, rotation: FloatArray, many: int) -> float:
     lows, highs = bounds(region)
     total = np.zeros(1)
     column_lengths(
-        many * many, region.rounds, region.planes, region.cones, lows, highs, many, total
+        many * many, region.circles, region.planes, region.cones, lows, highs, many, total
     )
     return float(total[0] * (highs[0] - lows[0]) * (highs[1] - lows[1])) / many**2
 
@@ -189,7 +185,7 @@ def varied(design: Design, rotation: FloatArray, name: str, by: float) -> tuple[
     """Return the design or the rotation with one parameter of a gradient changed."""
     limits = design.limits
     if name in VARIABLES:
-        return design.with_variable(name, getattr_of(design, name) + by), rotation
+        return design.with_variable(name, variable_of(design, name) + by), rotation
     if name == YAW:
         return design, Rotation.from_rotvec([0.0, 0.0, by]).as_matrix() @ rotation
     if name == "margin":
@@ -206,12 +202,12 @@ def varied(design: Design, rotation: FloatArray, name: str, by: float) -> tuple[
     return limited(design, box=(tuple(box[0]), tuple(box[1]))), rotation
 
 
-def getattr_of(design: Design, variable: str) -> float:
+def variable_of(design: Design, variable: str) -> float:
     return design.variables[VARIABLES.index(variable)]
 
 
 @pytest.mark.parametrize("seed", range(30))
-def test_the_gradient_is_that_of_central_differences(seed: int) -> None:
+def test_volume_gradient_is_that_of_central_differences(seed: int) -> None:
     design, rotation = ordinary_case(seed)
     found = workspace_volume(design, rotation)
     assert {*VARIABLES, YAW, "margin", "l1 maximum", "d2 minimum"} <= set(found.gradient)
@@ -224,19 +220,19 @@ def test_the_gradient_is_that_of_central_differences(seed: int) -> None:
 
 
 @pytest.mark.parametrize("name", ["a3x", "a3y"])
-def test_the_gradient_knows_maxima_that_are_tied_to_the_reach(name: str) -> None:
+def test_volume_gradient_by_a3_includes_maxima_at_the_reach(name: str) -> None:
     home = home_pose(OPTIMAL)
     design = msgspec.structs.replace(OPTIMAL, home=home)
     rate, step = workspace_volume(design).gradient[name], 1e-4
     volumes = [
-        workspace_volume(design.with_variable(name, getattr_of(design, name) + by)).volume
+        workspace_volume(design.with_variable(name, variable_of(design, name) + by)).volume
         for by in (step, -step)
     ]
     assert rate == pytest.approx((volumes[0] - volumes[1]) / (2.0 * step), rel=1e-6)
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_kernels_say_the_same_interpreted_and_compiled(seed: int) -> None:
+def test_kernels_interpreted_and_compiled_have_the_same_results(seed: int) -> None:
     design, rotation = ordinary_case(seed)
     region = region_of(constraints(limited(design, swing=Swing(a1=50.0, b2=60.0)), rotation))
     lows, highs = bounds(region)
@@ -246,27 +242,27 @@ def test_kernels_say_the_same_interpreted_and_compiled(seed: int) -> None:
 
     def run(*, compiled: bool) -> list[FloatArray]:
         plain: Any = "__wrapped__"
-        volume, grid, lengths = np.zeros(6), np.zeros(7, dtype=np.int64), np.zeros(1)
-        by_round = np.zeros((len(region.rounds), 4))
+        volume, grid, lengths = np.zeros(RESULTS), np.zeros(7, dtype=np.int64), np.zeros(1)
+        by_circle = np.zeros((len(region.circles), 4))
         by_plane = np.zeros((len(region.planes), 4))
         for kernel, arguments in (
             (
                 integrate_slices,
                 (
-                    *(region.rounds, region.planes, region.low, region.high),
-                    *(measures.quadrature(), volume, by_round, by_plane),
+                    *(region.circles, region.planes, region.low, region.high),
+                    *(volumes.quadrature(), volume, by_circle, by_plane),
                 ),
             ),
             (
                 count_nodes,
                 (
-                    *(region.rounds, region.planes, region.cones),
+                    *(region.circles, region.planes, region.cones),
                     *(np.array([region.low, region.high]), 1e-9, first, counts, step, grid),
                 ),
             ),
             (
                 column_lengths,
-                (region.rounds, region.planes, region.cones, lows, highs, 12, lengths),
+                (region.circles, region.planes, region.cones, lows, highs, 12, lengths),
             ),
         ):
             untyped: Any = kernel
@@ -275,7 +271,7 @@ def test_kernels_say_the_same_interpreted_and_compiled(seed: int) -> None:
                 untyped(1, *arguments)
             else:
                 getattr(untyped, plain)(*arguments)
-        return [volume, by_round, by_plane, grid.astype(np.float64), lengths]
+        return [volume, by_circle, by_plane, grid.astype(np.float64), lengths]
 
     for one, other in zip(run(compiled=True), run(compiled=False), strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-12 * np.abs(one).max())
@@ -303,7 +299,7 @@ def scaled(design: Design, s: float) -> Design:
 
 @pytest.mark.parametrize("s", [1e-9, 1e-3, 1e3, 1e9])
 @pytest.mark.parametrize("seed", range(4))
-def test_volumes_scale_with_the_cube_of_lengths(seed: int, s: float) -> None:
+def test_volume_of_a_scaled_design_scales_with_the_cube(seed: int, s: float) -> None:
     design, rotation = ordinary_case(seed)
     found, large = (workspace_volume(each, rotation) for each in (design, scaled(design, s)))
     assert large.volume == pytest.approx(found.volume * s**3, rel=1e-9)
@@ -321,7 +317,7 @@ def test_volumes_scale_with_the_cube_of_lengths(seed: int, s: float) -> None:
     ("limits", "because"),
     [
         ({"gap": 50.0}, ("gap |d1 − d3|",)),
-        ({"margin": 19.0}, ("box z maximum", "margin κ3")),
+        ({"margin": 19.0}, ("box z maximum", "margin δ3")),
         ({"l1": (5.0, 5.0)}, ("l1 minimum", "l1 maximum")),
         ({"l1": (30.0, 40.0)}, ("l1 minimum", "box x maximum")),
         ({"d4": (0.0, 0.0)}, ("d4 maximum",)),
@@ -331,7 +327,7 @@ def test_volumes_scale_with_the_cube_of_lengths(seed: int, s: float) -> None:
         ({"swing": Swing(a1=1.0, b4=1.0), "l1": (13.0, None)}, None),
     ],
 )
-def test_an_empty_workspace_names_what_empties_it(
+def test_workspace_empty_names_the_limits_that_empty_it(
     limits: dict[str, Any], because: tuple[str, ...] | None
 ) -> None:
     design = limited(OPTIMAL, **limits)
@@ -346,17 +342,17 @@ def test_an_empty_workspace_names_what_empties_it(
     assert workspace_nodes(design).count == 0 or because == ("box x minimum", "box x maximum")
 
 
-def test_parallel_lines_leave_nothing_but_without_a_margin() -> None:
+def test_workspace_of_parallel_lines_is_empty_unless_no_margin_is_demanded() -> None:
     level = np.eye(3)
-    assert workspace_volume(OPTIMAL, level).empty_because == ("margin κ2",)
+    assert workspace_volume(OPTIMAL, level).empty_because == ("margin δ2",)
     assert workspace_volume(limited(OPTIMAL, margin=None), level).volume > 1000.0
 
 
 @pytest.mark.parametrize("seed", range(10))
-def test_a_limit_that_is_there_twice_counts_once(seed: int) -> None:
+def test_limit_that_is_there_twice_counts_once(seed: int) -> None:
     design, rotation = ordinary_case(seed)
     lows, highs = design.limits.box or pytest.fail("no box")
-    # The box may start where κ3 is zero, and then says the same as the margin.
+    # The box may start where δ3 is zero, and then says the same as the margin.
     upper = limited(design, margin=0.0, box=((lows[0], lows[1], 0.0), highs))
     sign = 1.0 if design.home is not None and design.home.position[2] > 0.0 else -1.0
     if sign > 0.0:
@@ -365,7 +361,7 @@ def test_a_limit_that_is_there_twice_counts_once(seed: int) -> None:
         assert one.volume == pytest.approx(other.volume, rel=1e-12)
 
 
-def test_equal_balls_count_once() -> None:
+def test_balls_that_are_equal_count_once() -> None:
     rotation = home_rotation(OPTIMAL)
     # The centre of l1 is -R b1: put a3 there, and the balls of l1 and l4 are one.
     b1x, b1y = (-(rotation.T @ [*OPTIMAL.a3, 0.0]))[:2].tolist()
@@ -376,13 +372,13 @@ def test_equal_balls_count_once() -> None:
     )
 
 
-def test_a_minimum_that_is_its_maximum_leaves_nothing() -> None:
+def test_volume_with_a_minimum_equal_to_its_maximum_is_zero() -> None:
     for name in LENGTHS:
         assert workspace_volume(limited(OPTIMAL, **{name: (9.0, 9.0)})).volume == 0.0
 
 
 @pytest.mark.parametrize("seed", range(150))
-def test_a_volume_in_trouble_is_that_of_random_positions(seed: int) -> None:
+def test_volume_of_extreme_designs_is_that_of_random_positions(seed: int) -> None:
     design, rotation = troubled_case(seed)
     r = home_rotation(design) if rotation is None else rotation
     limits = constraints(design, r)
@@ -404,17 +400,17 @@ def test_a_volume_in_trouble_is_that_of_random_positions(seed: int) -> None:
 
 
 @pytest.mark.parametrize("step", [0.0, -1.0, math.nan, math.inf, 1e-3])
-def test_unusable_steps_are_refused(step: float) -> None:
+def test_nodes_with_an_unusable_step_are_refused(step: float) -> None:
     with pytest.raises(InputError, match="node"):
         workspace_nodes(OPTIMAL, step=step)
 
 
-def test_what_is_no_rotation_is_refused() -> None:
+def test_workspace_with_an_invalid_rotation_is_refused() -> None:
     for measure in (workspace_volume, workspace_nodes):
         with pytest.raises(InputError, match="rotation"):
             measure(OPTIMAL, 2.0 * np.eye(3))
 
 
-def test_a_design_without_a_home_has_a_workspace() -> None:
+def test_volume_of_a_design_without_a_home_is_positive() -> None:
     design = Design(a3=(10.0, 4.0), b1=(4.0, -1.0), b2=3.0, b3=1.5, limits=Limits())
     assert workspace_volume(design).volume > 0.0

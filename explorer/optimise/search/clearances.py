@@ -17,7 +17,7 @@ from explorer.legs.clearance import PAIRS, joined_pairs, leg_axes, pair_rows, ra
 from explorer.numerics.arrays import FloatArray
 from explorer.optimise.search.demands import Measured
 from explorer.optimise.search.state import State
-from explorer.workspace.limits.constraints import YAW, HalfSpace, Round
+from explorer.workspace.limits.constraints import YAW, BallOrCylinder, HalfSpace
 
 # Sharpness of the smooth extremes, over the clearance demanded.
 SHARPNESS = 60.0
@@ -90,7 +90,7 @@ class ClearanceDemand:
         """Return the derivatives of `_outside`, w of shape (k, n)."""
         slopes: list[FloatArray] = []
         for limit in state.limits:
-            if isinstance(limit, Round | HalfSpace):
+            if isinstance(limit, BallOrCylinder | HalfSpace):
                 slopes.append(-state.slack(limit, p)[1])
             else:
                 slopes.append(np.zeros((len(p), len(state.u))))

@@ -15,7 +15,7 @@ from explorer.mechanism.margins import margins
 from explorer.numerics.arrays import FloatArray
 from explorer.optimise.problem import SHIFTS, Box
 from explorer.optimise.search.state import State
-from explorer.workspace.limits.constraints import GAP, YAW, Constraint, HalfSpace, Round
+from explorer.workspace.limits.constraints import GAP, YAW, BallOrCylinder, Constraint, HalfSpace
 
 # How far a demand that is no limit may be missed and is still met, dimensionless.
 MET = 1e-8
@@ -182,7 +182,7 @@ class BoxDemand:
         gradients: list[FloatArray] = []
         for name, count in self.counts.items():
             limit = found.get(name)
-            if isinstance(limit, Round | HalfSpace):
+            if isinstance(limit, BallOrCylinder | HalfSpace):
                 value, by_u, by_p = _slack_of_box(state, limit)
                 for axis, shift in enumerate(SHIFTS):
                     by_u = by_u + np.outer(by_p[:, axis], state.along({shift: 1.0}))
@@ -197,13 +197,13 @@ class BoxDemand:
 
 def _points_that_tell(limit: Constraint) -> int:
     """Return how many points of a box tell whether it keeps a limit."""
-    if isinstance(limit, Round) and limit.inside:
+    if isinstance(limit, BallOrCylinder) and limit.inside:
         return 8 if limit.is_ball else 4
     return 1
 
 
 def _slack_of_box(
-    state: State, limit: Round | HalfSpace
+    state: State, limit: BallOrCylinder | HalfSpace
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return what `State.slack` does, of the points of the required box that tell."""
     corners = corners_of(state.box)
@@ -216,7 +216,9 @@ def _slack_of_box(
     return _outside(state, limit, state.box)
 
 
-def _outside(state: State, limit: Round, box: Box) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _outside(
+    state: State, limit: BallOrCylinder, box: Box
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return what `State.slack` does, of the point of a box that is nearest to a centre."""
     lows, highs = np.array(box)
     centre = limit.centre.copy()

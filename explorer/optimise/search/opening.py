@@ -17,7 +17,7 @@ from explorer.optimise.problem import Problem
 from explorer.optimise.search.demands import DegenerateDemand, GapDemand
 from explorer.optimise.search.sqp import slsqp
 from explorer.optimise.search.state import State, scales
-from explorer.workspace.limits.constraints import HalfSpace, Round
+from explorer.workspace.limits.constraints import BallOrCylinder, HalfSpace
 
 # Positions an axis among which the least broken one is where to begin.
 SEARCHED = 13
@@ -51,7 +51,7 @@ def opened(
         sides.append(DegenerateDemand(problem.demands.least, here))
     if here.design.limits.gap > 0.0:
         sides.append(GapDemand(here))
-    names = [each.name for each in here.limits if isinstance(each, Round | HalfSpace)]
+    names = [each.name for each in here.limits if isinstance(each, BallOrCylinder | HalfSpace)]
     labels = [*names, *(name for side in sides for name in side.names)]
     count = len(labels)
     place = _least_broken(here) / size
@@ -70,7 +70,7 @@ def opened(
             return np.full(count, NO_DESIGN), np.zeros((count, len(x)))
         for name in names:
             limit = found.get(name)
-            if not isinstance(limit, Round | HalfSpace):
+            if not isinstance(limit, BallOrCylinder | HalfSpace):
                 # One that can never be kept where it is now.
                 values.append(NO_DESIGN)
                 rows.append(np.zeros(len(x)))
@@ -117,5 +117,7 @@ def _least_broken(state: State) -> FloatArray:
     shares = np.linspace(0.0, 1.0, SEARCHED + 2)[1:-1]
     axes = [low + (high - low) * shares for low, high in zip(lows, highs, strict=True)]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    slack = [each.slack(grid) for each in state.limits if isinstance(each, Round | HalfSpace)]
+    slack = [
+        each.slack(grid) for each in state.limits if isinstance(each, BallOrCylinder | HalfSpace)
+    ]
     return grid[int(np.min(slack, axis=0).argmax())]

@@ -33,7 +33,7 @@ from explorer.optimise.search.optimality import optimality
 from explorer.optimise.search.sqp import Stop, solve
 from explorer.optimise.search.state import State, scales
 from explorer.optimise.search.trail import Trail
-from explorer.workspace.slices.volume import what_empties
+from explorer.workspace.slices.volume import find_emptying_limits
 
 # F = |1 − V/V′| from which on a volume is matched.
 MATCHED = 1e-10
@@ -140,7 +140,7 @@ class Search:
             if self._is_closed(u):
                 found = opened(problem, u, see=self._see_opening)
                 if found is None:
-                    because = what_empties(State(problem, u).limits)
+                    because = find_emptying_limits(State(problem, u).limits)
                     words = (
                         f"the workspace is empty because of {', '.join(because)}, and no "
                         "design nearby opens it"
@@ -305,7 +305,7 @@ class Search:
         if spare < 0.0 or self._is_short(at.state):
             return Attempt("infeasible", worst if spare < 0.0 else holding, "", best)
         if at.state.volume <= 0.0:
-            because = ", ".join(what_empties(at.state.limits))
+            because = ", ".join(find_emptying_limits(at.state.limits))
             words = f"the workspace of the best design found is empty because of {because}"
             return Attempt("infeasible", because, words, best)
         return Attempt("stalled", holding, "", best)

@@ -19,9 +19,9 @@ from explorer.numerics.arrays import FloatArray
 from explorer.optimise.problem import REACH, YAW, Box, Problem
 from explorer.workspace.limits.constraints import (
     YAW as YAW_PARAMETER,
+    BallOrCylinder,
     Constraint,
     HalfSpace,
-    Round,
     constraints,
 )
 from explorer.workspace.slices.volume import Volume, workspace_volume
@@ -135,7 +135,7 @@ class State:
         return total
 
     def slack(
-        self, limit: Round | HalfSpace, p: FloatArray
+        self, limit: BallOrCylinder | HalfSpace, p: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return by how much positions keep a limit, in design units, and derivatives.
 
@@ -149,7 +149,7 @@ class State:
         """
         own = np.zeros((len(p), 4))
         match limit:
-            case Round():
+            case BallOrCylinder():
                 off = p - limit.centre
                 if not limit.is_ball:
                     off[:, 0] = 0.0

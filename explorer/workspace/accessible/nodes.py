@@ -18,7 +18,7 @@ from explorer.legs.clearance import PAIRS, leg_clearances
 from explorer.legs.moves import pairs_are_clear
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
-from explorer.workspace.limits.constraints import constraints, keeps
+from explorer.workspace.limits.constraints import constraints, satisfies
 
 ALL_PAIRS = tuple(range(len(PAIRS)))
 # Clearance, over the reach, below which legs touch at a node.
@@ -157,7 +157,7 @@ def survey(design: Design, rotation: FloatArray, grid: Grid) -> Survey:
     """
     positions = grid.positions
     slack = SLACK * design.reach
-    kept = keeps(design, constraints(design, rotation), positions)
+    kept = satisfies(design, constraints(design, rotation), positions)
     clearance = leg_clearances(design, positions, rotation).clearance
     index = np.arange(math.prod(grid.counts)).reshape(grid.counts)
     ends = [

@@ -1,4 +1,4 @@
-"""Which of a design's limits a pose breaks (design.md, section 6, but for interference)."""
+"""The limits of a design that a pose violates, other than the clearances of the legs."""
 
 from __future__ import annotations
 
@@ -7,26 +7,20 @@ from dataclasses import dataclass
 
 from explorer.mechanism.design import JOINTS, LENGTHS, TOLERANCE, Design
 from explorer.numerics.arrays import FloatArray
-from explorer.workspace.limits.constraints import (
-    CARRIAGE_ORDER,
-    GAP,
-    angle_between,
-    demanded_order,
-    joint_cones,
-    legs,
-)
+from explorer.workspace.limits.constraints import CARRIAGE_ORDER, GAP, demanded_order
+from explorer.workspace.limits.joint_cones import angle_between, joint_cones, legs
 
 
 @dataclass(frozen=True)
 class Violation:
-    """A broken limit.
+    """A limit that a pose violates.
 
     Attributes:
-        limit: What is limited: a joint, "gap |d1 − d3|", "carriage order", "box x",
-            "margin κ1", "swing a1", ….
-        value: What it is, in design units; of a swing in degrees, of the order d3 − d1.
-        bound: What it may be at the most, or at the least.
-        above: Whether the value exceeds the bound, rather than falling short of it.
+        limit: Name of the limited quantity: a joint, "gap |d1 − d3|", "carriage order", "box x",
+            "margin δ1", "swing a1", ….
+        value: Value in design units, of a swing in degrees; of the carriage order d3 − d1.
+        bound: Maximum or minimum of the value.
+        above: Whether the value exceeds a maximum, rather than falling below a minimum.
     """
 
     limit: str
@@ -58,26 +52,25 @@ def violations(
     home_signs: tuple[int, int, int],
     order: int | None = None,
 ) -> tuple[Violation, ...]:
-    """Return the limits that a pose breaks, in the order of the design file; none if ().
+    """Return the limits that a pose violates, in the order of the design file.
 
     Args:
         design: The manipulator.
-        position: b4 in the base frame, shape (3,).
+        position: b4 in the base frame, shape (3,), in design units.
         rotation: Platform to base, shape (3, 3).
-        joints: Those of the pose, shape (6,).
-        margin: Those of the pose, shape (3,).
-        home_signs: The sign triple of the home pose.
-        order: The sign of d3 − d1 to demand, 0 for either; the one that the design demands
-            if None.
+        joints: Joint values of the pose, shape (6,).
+        margin: Margins (δ1, δ2, δ3) of the pose, shape (3,).
+        home_signs: Sign triple of the home pose.
+        order: Sign of d3 − d1 to demand, 0 for either; that which the design demands if None.
     """
     limits, tolerance = design.limits, design.tolerance
-    found: list[Violation] = []
+    broken: list[Violation] = []
 
     def check(name: str, value: float, low: float | None, high: float | None) -> None:
         if low is not None and value < low - tolerance:
-            found.append(Violation(name, value, low, above=False))
+            broken.append(Violation(name, value, low, above=False))
         if high is not None and value > high + tolerance:
-            found.append(Violation(name, value, high, above=True))
+            broken.append(Violation(name, value, high, above=True))
 
     q = dict(zip(JOINTS, joints.tolist(), strict=True))
     for name in LENGTHS:
@@ -95,19 +88,18 @@ def violations(
             check(f"box {axis}", value, low, high)
     if limits.margin is not None:
         for index, (value, sign) in enumerate(zip(margin.tolist(), home_signs, strict=True), 1):
-            # In the home mode a margin lies on the home's side of zero.
             low, high = (limits.margin, None) if sign > 0 else (None, -limits.margin)
-            check(f"margin κ{index}", value, low, high)
+            check(f"margin δ{index}", value, low, high)
     cones = joint_cones(design)
     if cones:
         vectors = legs(design, position, rotation)
         for cone in cones:
-            # A leg without a length at home has no direction to swing about.
+            # A leg without a length at home violates its cone in every pose.
             angle = math.pi
             if cone.axis is not None:
                 axis = rotation @ cone.axis if cone.in_platform else cone.axis
                 angle = float(angle_between(vectors[cone.leg - 1], axis))
             if angle > cone.half_angle + TOLERANCE or cone.axis is None:
-                swing, most = math.degrees(angle), math.degrees(cone.half_angle)
-                found.append(Violation(f"swing {cone.joint}", swing, most, above=True))
-    return tuple(found)
+                swing, largest = math.degrees(angle), math.degrees(cone.half_angle)
+                broken.append(Violation(f"swing {cone.joint}", swing, largest, above=True))
+    return tuple(broken)

@@ -1,9 +1,9 @@
-"""The limits of a design as primitive solids in the space of p, at one orientation.
+"""The limits of a design as primitive solids of positions p of b4, at one orientation.
 
-At a fixed rotation each limit is a ball, a cylinder along x, a half-space or a cone of
-positions (design.md, section 6), and the constant-orientation workspace their intersection. Every
-primitive carries how its own parameters move with the design variables, the yaw and its
-limit, so that derivatives of volumes follow by the chain rule.
+At a fixed rotation the positions that satisfy a limit form a ball, a cylinder along x, a
+half-space, a cone, or the outside of one of these. The constant-orientation workspace is their
+intersection. Each primitive has the derivatives of its own parameters with respect to the design
+variables, the yaw and its limit, so that derivatives of volumes follow by the chain rule.
 """
 
 from __future__ import annotations
@@ -16,37 +16,37 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from explorer.mechanism.design import TOLERANCE, VARIABLES, Design, Swing
+from explorer.mechanism.design import TOLERANCE, Design
 from explorer.mechanism.home import home_pose
-from explorer.mechanism.kinematics import attachment_points
 from explorer.mechanism.margins import margins, mode_of, signs_of
 from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import BoolArray, FloatArray, finite_array
+from explorer.workspace.limits.joint_cones import angle_between, joint_cones
 
 YAW = "yaw"
-"""The parameter of a rotation of the platform about the base's z-axis, in radians."""
+"""The name of the platform's rotation about the base's z-axis, in radians, as a parameter."""
 
 Rates: TypeAlias = Mapping[str, FloatArray]
-"""By parameter: the rates of a primitive's own parameters, centre or normal first."""
+"""Derivatives of a primitive's centre and radius, or normal and offset, by parameter, (4,) each."""
 
 X, Y, Z = np.eye(3)
 GAP = "gap |d1 − d3|"
 CARRIAGE_ORDER = "carriage order"
-# The sine of the angle between two lines that only rounding keeps from being parallel.
+# Lines at an angle with a smaller sine are parallel but for rounding.
 PARALLEL = 1e-15
 
 
 @dataclass(frozen=True)
-class Round:
-    """A ball, or a cylinder along x, of positions.
+class BallOrCylinder:
+    """A limit on the distance of p from a point (a ball) or from a line along x (a cylinder).
 
     Attributes:
-        name: The limit, such as "l1 maximum".
-        centre: Shape (3,); of a cylinder x counts for nothing.
-        radius: In design units.
-        is_ball: A ball, or else a cylinder.
-        inside: Whether the limit keeps p inside, or else outside.
-        rates: Of (centre, radius), shape (4,) each.
+        name: Name of the limit, such as "l1 maximum".
+        centre: Centre of the ball, or a point of the cylinder's axis, shape (3,).
+        radius: Radius in design units.
+        is_ball: Whether it is a ball rather than a cylinder.
+        inside: Whether positions inside satisfy the limit, rather than those outside.
+        rates: Derivatives of (centre, radius), shape (4,) each.
     """
 
     name: str
@@ -57,7 +57,7 @@ class Round:
     rates: Rates = field(default_factory=dict[str, FloatArray])
 
     def slack(self, p: FloatArray) -> FloatArray:
-        """Return by how much positions (..., 3) keep the limit; negative where they do not."""
+        """Return the slack of positions (..., 3) in design units; negative where violated."""
         off = p - self.centre
         distance = np.sqrt(
             off[..., 1] ** 2 + off[..., 2] ** 2 + (off[..., 0] ** 2 if self.is_ball else 0.0)
@@ -74,10 +74,10 @@ class HalfSpace:
     """The positions with normal · p <= offset.
 
     Attributes:
-        name: The limit, such as "box z minimum".
-        normal: Shape (3,), of unit length but for those of κ2.
-        offset: In design units.
-        rates: Of (normal, offset), shape (4,) each.
+        name: Name of the limit, such as "box z minimum".
+        normal: Outward normal, shape (3,), of unit length except for δ2.
+        offset: Offset in design units, times the length of the normal.
+        rates: Derivatives of (normal, offset), shape (4,) each.
     """
 
     name: str
@@ -86,7 +86,7 @@ class HalfSpace:
     rates: Rates = field(default_factory=dict[str, FloatArray])
 
     def slack(self, p: FloatArray) -> FloatArray:
-        """Return by how much positions (..., 3) keep the limit; negative where they do not."""
+        """Return the slack of positions (..., 3) in design units; negative where violated."""
         return self.offset - p @ self.normal
 
     def distance(self, p: FloatArray) -> FloatArray:
@@ -96,13 +96,13 @@ class HalfSpace:
 
 @dataclass(frozen=True)
 class Cone:
-    """The positions in which a leg keeps to the cone of a joint.
+    """The positions at which a leg lies within the cone of a joint.
 
     Attributes:
-        name: The limit, such as "swing a1".
-        apex: Shape (3,).
-        axis: Shape (3,), of unit length.
-        half_angle: In radians.
+        name: Name of the limit, such as "swing a1".
+        apex: Position at which the leg has no length, shape (3,).
+        axis: Unit axis, shape (3,).
+        half_angle: Half-angle in radians.
         flat: Whether only the yz-part of p counts, as for the legs on the guide.
     """
 
@@ -113,11 +113,11 @@ class Cone:
     flat: bool
 
     def slack(self, p: FloatArray) -> FloatArray:
-        """Return the angle left to the cone at positions (..., 3), in radians."""
+        """Return the slack of positions (..., 3): the angle left to the cone, in radians."""
         return self.half_angle - angle_between(self._leg(p), self.axis)
 
     def distance(self, p: FloatArray) -> FloatArray:
-        """Return the distances of positions (..., 3) from the surface, near it."""
+        """Return the distances of positions (..., 3) near the surface from it, to first order."""
         return np.abs(self.slack(p)) * np.linalg.norm(self._leg(p), axis=-1)
 
     def _leg(self, p: FloatArray) -> FloatArray:
@@ -126,7 +126,7 @@ class Cone:
 
 @dataclass(frozen=True)
 class Never:
-    """A limit that no position keeps, at this orientation."""
+    """A limit that no position satisfies at this orientation."""
 
     name: str
 
@@ -135,11 +135,11 @@ class Never:
         return np.full(p.shape[:-1], -math.inf)
 
     def distance(self, p: FloatArray) -> FloatArray:
-        """Return infinity for positions (..., 3): it has no surface."""
+        """Return infinity for positions (..., 3), since the limit has no surface."""
         return np.full(p.shape[:-1], math.inf)
 
 
-Constraint: TypeAlias = Round | HalfSpace | Cone | Never
+Constraint: TypeAlias = BallOrCylinder | HalfSpace | Cone | Never
 
 
 def constraints(design: Design, rotation: ArrayLike) -> tuple[Constraint, ...]:
@@ -163,22 +163,22 @@ def constraints(design: Design, rotation: ArrayLike) -> tuple[Constraint, ...]:
 
 
 def slacks(limits: tuple[Constraint, ...], position: ArrayLike) -> FloatArray:
-    """Return by how much positions (..., 3) keep each of n limits, shape (..., n).
+    """Return the slacks of n limits at positions (..., 3), shape (..., n); negative if violated.
 
-    In design units, but for cones in radians.
+    Slacks are in design units, those of cones in radians.
     """
     p = finite_array("position", position, (3,))
     return np.stack([limit.slack(p) for limit in limits], axis=-1)
 
 
-def keeps(design: Design, limits: tuple[Constraint, ...], position: ArrayLike) -> BoolArray:
-    """Return which of n limits positions (..., 3) keep, to the tolerance, shape (..., n)."""
-    allowed = [TOLERANCE if isinstance(each, Cone) else design.tolerance for each in limits]
+def satisfies(design: Design, limits: tuple[Constraint, ...], position: ArrayLike) -> BoolArray:
+    """Return whether positions (..., 3) satisfy each of n limits to its tolerance, (..., n)."""
+    allowed = [TOLERANCE if isinstance(limit, Cone) else design.tolerance for limit in limits]
     return slacks(limits, position) >= -np.array(allowed)
 
 
 def _turning(vector: FloatArray) -> FloatArray:
-    """Return the rate of a vector that turns about z with the platform."""
+    """Return the derivative of a vector that turns about z with the platform, by the yaw."""
     return np.array([-vector[1], vector[0], 0.0])
 
 
@@ -204,15 +204,15 @@ def _lengths(design: Design, r: FloatArray) -> Iterator[Constraint]:
         if low > 0.0:
             least = f"{name} minimum"
             own = {**rates, least: _four(np.zeros(3), 1.0)}
-            yield Round(least, centre, low, is_ball, inside=False, rates=own)
+            yield BallOrCylinder(least, centre, low, is_ball, inside=False, rates=own)
         most = f"{name} maximum"
         own = {**rates, most: _four(np.zeros(3), 1.0)}
         if getattr(design.limits, name)[1] is None:
-            # Tied to the reach, which moves with a3 and has no parameter of its own.
+            # A maximum at the reach follows a3 and has no parameter of its own.
             del own[most]
             for key, share in zip(("a3x", "a3y"), a3 / design.reach, strict=False):
                 own[key] = own.get(key, np.zeros(4)) + _four(np.zeros(3), float(share))
-        yield Round(most, centre, high, is_ball, inside=True, rates=own)
+        yield BallOrCylinder(most, centre, high, is_ball, inside=True, rates=own)
 
 
 def _guide(design: Design, r: FloatArray) -> Iterator[Constraint]:
@@ -241,7 +241,7 @@ def _guide(design: Design, r: FloatArray) -> Iterator[Constraint]:
                     "guide maximum": _four(np.zeros(3), 1.0),
                 },
             )
-    # d3 - d1 is the same in every position.
+    # d3 - d1 is the same at every position.
     apart = (design.b3 - design.b2) * float(u[0])
     if abs(apart) < design.limits.gap - design.tolerance:
         yield Never(GAP)
@@ -263,14 +263,14 @@ def _margins(design: Design, r: FloatArray) -> Iterator[Constraint]:
     if least is None:
         return
     u, n = r[:, 0], r[:, 2]
-    # κ = k·p; the home's sign triple says on which side of zero it lies.
+    # δ = k·p, on the side of zero that the home's sign triple demands.
     gradients = (
-        ("margin κ1", -n, -_turning(n)),
-        ("margin κ2", np.cross(X, u), np.cross(X, _turning(u))),
-        ("margin κ3", Z, np.zeros(3)),
+        ("margin δ1", -n, -_turning(n)),
+        ("margin δ2", np.cross(X, u), np.cross(X, _turning(u))),
+        ("margin δ3", Z, np.zeros(3)),
     )
     for (name, k, turning), sign in zip(gradients, home_signs(design), strict=True):
-        # The lines are parallel, and the margin is nothing wherever b4 is.
+        # The lines are parallel, and the margin is zero at every position.
         if float(np.linalg.norm(k)) <= PARALLEL:
             yield Never(name)
             continue
@@ -278,82 +278,22 @@ def _margins(design: Design, r: FloatArray) -> Iterator[Constraint]:
         yield HalfSpace(name, -sign * k, -least, rates)
 
 
-@dataclass(frozen=True)
-class JointCone:
-    """The cone that a universal or ball joint keeps its leg in, about the home's direction.
-
-    Attributes:
-        joint: Such as "a1".
-        leg: 1 to 4.
-        axis: The leg's direction in the home pose, from base to platform, of unit length;
-            in the platform frame for the ball joints, else in the base's. None where the
-            leg has no length at home: no pose keeps such a cone.
-        half_angle: In radians.
-        in_platform: In which frame the axis is.
-    """
-
-    joint: str
-    leg: int
-    axis: FloatArray | None
-    half_angle: float
-    in_platform: bool
-
-
-def joint_cones(design: Design) -> tuple[JointCone, ...]:
-    """Return the cones of the joints that a design bounds."""
-    swing = design.limits.swing
-    if swing == Swing():
-        return ()
-    home = home_pose(design)
-    at_home = legs(design, np.array(home.position), home.rotation)
-    found: list[JointCone] = []
-    for joint in swing.__struct_fields__:
-        degrees = getattr(swing, joint)
-        if degrees is None:
-            continue
-        leg = 4 if joint == "a3" else int(joint[1])
-        direction = at_home[leg - 1]
-        length = float(np.linalg.norm(direction))
-        in_platform = joint.startswith("b")
-        axis = direction / length if length > 0.0 else None
-        if axis is not None and in_platform:
-            axis = home.rotation.T @ axis
-        found.append(JointCone(joint, leg, axis, math.radians(degrees), in_platform))
-    return tuple(found)
-
-
-def legs(design: Design, position: FloatArray, rotation: FloatArray) -> FloatArray:
-    """Return the four legs of a pose as vectors from base to platform, shape (4, 3).
-
-    Those on the guide are perpendicular to it.
-    """
-    points = attachment_points(design, position, rotation)
-    across = np.array([0.0, 1.0, 1.0])
-    return np.array([points.b1, points.b2 * across, points.b3 * across, points.b4 - points.a3])
-
-
-def angle_between(vector: FloatArray, axis: FloatArray) -> FloatArray:
-    """Return the angles (...) of vectors (..., 3) and an axis (3,), in radians."""
-    across = np.linalg.norm(np.cross(vector, axis), axis=-1)
-    return np.asarray(np.arctan2(across, vector @ axis))
-
-
 def _swings(design: Design, r: FloatArray) -> Iterator[Constraint]:
     b1x, b1y = design.b1
-    # Where in p each leg has no length.
+    # The position p at which each leg has no length.
     apexes = (
         -(b1x * r[:, 0] + b1y * r[:, 1]),
         -design.b2 * r[:, 0],
         -design.b3 * r[:, 0],
         np.array([*design.a3, 0.0]),
     )
-    for each in joint_cones(design):
-        name = f"swing {each.joint}"
-        if each.axis is None:
+    for cone in joint_cones(design):
+        name = f"swing {cone.joint}"
+        if cone.axis is None:
             yield Never(name)
             continue
-        axis = r @ each.axis if each.in_platform else each.axis
-        yield Cone(name, apexes[each.leg - 1], axis, each.half_angle, each.leg in (2, 3))
+        axis = r @ cone.axis if cone.in_platform else cone.axis
+        yield Cone(name, apexes[cone.leg - 1], axis, cone.half_angle, cone.leg in (2, 3))
 
 
 def home_signs(design: Design) -> tuple[int, int, int]:
@@ -363,9 +303,10 @@ def home_signs(design: Design) -> tuple[int, int, int]:
 
 
 def demanded_order(design: Design) -> int:
-    """Return the sign of d3 − d1 that a design's limits demand, that of its home; 0 for either.
+    """Return the sign of d3 − d1 that a design demands, which is that of its home pose.
 
-    Where the carriages coincide in the home pose, to the tolerance, there is no order to keep.
+    The sign is 0, for either order, if the limits allow any order or if the carriages coincide in
+    the home pose to the tolerance.
     """
     if design.limits.carriage_order == "any":
         return 0
@@ -373,7 +314,3 @@ def demanded_order(design: Design) -> int:
     if abs(apart) <= design.tolerance:
         return 0
     return 1 if apart > 0.0 else -1
-
-
-PARAMETERS = (*VARIABLES, YAW)
-"""What every workspace depends on, besides its limits."""

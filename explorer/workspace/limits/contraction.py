@@ -1,7 +1,8 @@
-"""A box drawn in around what keeps all limits, with certainty.
+"""Contraction of a box around the positions that satisfy all limits, with certainty.
 
-The box is divided into cells. At the best place of a cell a limit is kept by no more than at its
-middle and half its diagonal, so that cells that break a limit even so are out (branch and prune).
+The box is divided into cells. The slack of a limit anywhere in a cell exceeds the slack at the
+middle of the cell by at most half its diagonal, so cells whose slack remains negative are
+discarded (branch and prune).
 """
 
 from __future__ import annotations
@@ -13,34 +14,39 @@ import numpy as np
 from explorer.numerics.arrays import FloatArray
 from explorer.workspace.limits.constraints import Cone, Constraint, HalfSpace
 
-# About as many cells are looked at in each round.
+# The approximate count of cells in each round.
 CELLS = 4096
 MOST_ROUNDS = 60
-# A round that leaves more of the box than this share is the last.
+# A round that leaves more than this share of the box's volume is the last.
 WORTH_WHILE = 0.8
 
 
-def contracted(
+def contract_box(
     limits: Sequence[Constraint], lows: FloatArray, highs: FloatArray
 ) -> tuple[FloatArray, FloatArray] | None:
-    """Return (lows, highs) of a smaller box with all of a box that keeps all limits, each (3,).
+    """Return (lows, highs) of a smaller box with all positions of a box that satisfy all limits.
 
-    None if nothing in it does. Cones count for nothing.
+    None if no position in the box satisfies them. Cones are ignored.
+
+    Args:
+        limits: Limits of one workspace.
+        lows: Lower ends of the box, shape (3,), in design units.
+        highs: Upper ends of the box, shape (3,).
     """
     for _ in range(MOST_ROUNDS):
         size, volume = float((highs - lows).max()), float(np.prod(highs - lows))
         edge = max(volume / CELLS, (size / CELLS) ** 3) ** (1.0 / 3.0)
-        many = np.maximum(1, np.ceil((highs - lows) / edge)).astype(np.int64)
-        step = (highs - lows) / many
-        cells = np.indices(tuple(many.tolist())).reshape(3, -1).T
+        counts = np.maximum(1, np.ceil((highs - lows) / edge)).astype(np.int64)
+        step = (highs - lows) / counts
+        cells = np.indices(tuple(counts.tolist())).reshape(3, -1).T
         middles, half = lows + (cells + 0.5) * step, 0.5 * float(np.linalg.norm(step))
-        # Rounding must not discard a cell whose very corner keeps the limits.
+        # Rounding must not discard a cell of which only a corner satisfies the limits.
         half += 1e-12 * (size + float(np.abs([lows, highs]).max()))
         for limit in limits:
             if not isinstance(limit, Cone):
                 steepest = np.linalg.norm(limit.normal) if isinstance(limit, HalfSpace) else 1.0
-                kept = limit.slack(middles) >= -half * float(steepest)
-                cells, middles = cells[kept], middles[kept]
+                left = limit.slack(middles) >= -half * float(steepest)
+                cells, middles = cells[left], middles[left]
         if not len(cells):
             return None
         highs = lows + (cells.max(axis=0) + 1) * step

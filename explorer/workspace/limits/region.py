@@ -1,7 +1,7 @@
-"""The constant-orientation workspace as rows of numbers, ready for the kernels.
+"""Regions: intersections of limits as rows of numbers for kernels.
 
-The same surface may be named twice (the box may start where κ3 is zero): of each only the
-tighter limit is kept. Planes perpendicular to x become ends of the x-range.
+Two limits may have the same surface (the box may start where δ3 is zero); only the tighter of
+them has a row. Planes perpendicular to x become ends of the x-range.
 """
 
 from __future__ import annotations
@@ -13,113 +13,114 @@ from dataclasses import dataclass
 import numpy as np
 
 from explorer.numerics.arrays import FloatArray
-from explorer.workspace.limits.constraints import Cone, Constraint, HalfSpace, Never, Round
+from explorer.workspace.limits.columns import CONE_COLUMNS, PLANE_COLUMNS
+from explorer.workspace.limits.constraints import BallOrCylinder, Cone, Constraint, HalfSpace, Never
 
-# Surfaces that differ by less than this share of the region's size are one.
+# Surfaces that differ by less than this share of the region's size are the same.
 SAME = 1e-12
 
 
 @dataclass(frozen=True)
 class Region:
-    """An intersection of limits.
+    """An intersection of limits; rows are those of `explorer.workspace.limits.columns`.
 
     Attributes:
-        rounds: Balls and cylinders, as rows (x, y, z, radius, is_ball, side), shape (n, 6).
-        planes: Half-spaces not perpendicular to x, as rows (normal, offset), shape (m, 4).
-        cones: As rows (apex, axis, cosine of the half-angle, flat), shape (k, 8).
-        low, high: The range of x; no position if low exceeds high.
-        of_rounds, of_planes: The limits that the rows stand for.
-        of_low, of_high: The limits that are the ends, None where a ball ends the region.
-        is_flat: Whether one surface is to be kept both inside and outside, so that the region
-            has no volume, although positions on the surface keep all limits.
+        circles: Rows of balls and cylinders, whose slices at constant x are circles, shape (n, 6).
+        planes: Rows of half-spaces whose surfaces are not perpendicular to x, shape (m, 4).
+        cones: Rows of cones, shape (k, 8).
+        low, high: Range of x; empty if low exceeds high.
+        circle_limits, plane_limits: Limits of the rows.
+        low_limit, high_limit: Limits at the ends of the range, None where a ball is the end.
+        is_flat: Whether a ball or cylinder is to be satisfied both inside and outside, so that
+            the region has no volume, although positions on the surface satisfy all limits.
     """
 
-    rounds: FloatArray
+    circles: FloatArray
     planes: FloatArray
     cones: FloatArray
     low: float
     high: float
-    of_rounds: tuple[Round, ...]
-    of_planes: tuple[HalfSpace, ...]
-    of_low: HalfSpace | None
-    of_high: HalfSpace | None
+    circle_limits: tuple[BallOrCylinder, ...]
+    plane_limits: tuple[HalfSpace, ...]
+    low_limit: HalfSpace | None
+    high_limit: HalfSpace | None
     is_flat: bool
 
     @property
     def is_empty(self) -> bool:
-        """Whether it is known to have no volume without looking closer."""
+        """Whether the range of x or a single surface already shows that there is no volume."""
         return self.is_flat or not self.low < self.high
 
 
 def region_of(limits: Sequence[Constraint]) -> Region:
-    """Return the region that keeps all limits; one ball with an inside must be among them."""
-    balls = [c for c in limits if isinstance(c, Round)]
+    """Return the region that satisfies all limits; at least one must be the inside of a ball."""
+    balls = [c for c in limits if isinstance(c, BallOrCylinder)]
     size = max(ball.radius + float(np.abs(ball.centre).max()) for ball in balls)
     same = SAME * max(size, 1e-300)
-    rounds, is_flat = _distinct(balls, same)
+    circles, is_flat = _distinct(balls, same)
     low, high = -math.inf, math.inf
-    of_low: HalfSpace | None = None
-    of_high: HalfSpace | None = None
-    for each in rounds:
-        if each.is_ball and each.inside:
-            low = max(low, float(each.centre[0]) - each.radius)
-            high = min(high, float(each.centre[0]) + each.radius)
+    low_limit: HalfSpace | None = None
+    high_limit: HalfSpace | None = None
+    for limit in circles:
+        if limit.is_ball and limit.inside:
+            low = max(low, float(limit.centre[0]) - limit.radius)
+            high = min(high, float(limit.centre[0]) + limit.radius)
     planes: list[HalfSpace] = []
-    for each in limits:
-        if not isinstance(each, HalfSpace):
+    for limit in limits:
+        if not isinstance(limit, HalfSpace):
             continue
-        across = math.hypot(each.normal[1], each.normal[2])
-        if across > SAME * abs(float(each.normal[0])):
-            planes = _with_plane(planes, each, same)
+        across = math.hypot(limit.normal[1], limit.normal[2])
+        if across > SAME * abs(float(limit.normal[0])):
+            planes = _with_plane(planes, limit, same)
             continue
-        end = each.offset / float(each.normal[0])
-        if each.normal[0] > 0.0 and end < high:
-            high, of_high = end, each
-        elif each.normal[0] < 0.0 and end > low:
-            low, of_low = end, each
-    if any(isinstance(each, Never) for each in limits):
+        end = limit.offset / float(limit.normal[0])
+        if limit.normal[0] > 0.0 and end < high:
+            high, high_limit = end, limit
+        elif limit.normal[0] < 0.0 and end > low:
+            low, low_limit = end, limit
+    if any(isinstance(limit, Never) for limit in limits):
         high = -math.inf
     return Region(
-        rounds=np.array(
-            [[*c.centre, c.radius, float(c.is_ball), 1.0 if c.inside else -1.0] for c in rounds]
+        circles=np.array(
+            [[*c.centre, c.radius, float(c.is_ball), 1.0 if c.inside else -1.0] for c in circles]
         ),
-        planes=np.array([[*c.normal, c.offset] for c in planes]).reshape(-1, 4),
+        planes=np.array([[*c.normal, c.offset] for c in planes]).reshape(-1, PLANE_COLUMNS),
         cones=np.array(
             [
                 [*c.apex, *c.axis, math.cos(c.half_angle), float(c.flat)]
                 for c in limits
                 if isinstance(c, Cone)
             ]
-        ).reshape(-1, 8),
+        ).reshape(-1, CONE_COLUMNS),
         low=low,
         high=high,
-        of_rounds=tuple(rounds),
-        of_planes=tuple(planes),
-        of_low=of_low,
-        of_high=of_high,
+        circle_limits=tuple(circles),
+        plane_limits=tuple(planes),
+        low_limit=low_limit,
+        high_limit=high_limit,
         is_flat=is_flat,
     )
 
 
-def _distinct(balls: list[Round], same: float) -> tuple[list[Round], bool]:
-    """Return the surfaces once for each side, and whether one is to be kept on both sides."""
-    kept: list[Round] = []
+def _distinct(balls: list[BallOrCylinder], same: float) -> tuple[list[BallOrCylinder], bool]:
+    """Return each surface once for each side, and whether one is to be satisfied on both sides."""
+    distinct: list[BallOrCylinder] = []
     is_flat = False
-    for each in balls:
-        twins = [other for other in kept if _is_same(each, other, same)]
-        is_flat = is_flat or any(twin.inside != each.inside for twin in twins)
-        if all(twin.inside != each.inside for twin in twins):
-            kept.append(each)
-    return kept, is_flat
+    for limit in balls:
+        twins = [other for other in distinct if _is_same(limit, other, same)]
+        is_flat = is_flat or any(twin.inside != limit.inside for twin in twins)
+        if all(twin.inside != limit.inside for twin in twins):
+            distinct.append(limit)
+    return distinct, is_flat
 
 
-def _is_same(a: Round, b: Round, same: float) -> bool:
+def _is_same(a: BallOrCylinder, b: BallOrCylinder, same: float) -> bool:
     off = np.abs(a.centre - b.centre)[0 if a.is_ball else 1 :]
     return a.is_ball == b.is_ball and float(off.max()) <= same and abs(a.radius - b.radius) <= same
 
 
 def _with_plane(planes: list[HalfSpace], new: HalfSpace, same: float) -> list[HalfSpace]:
-    """Return the planes with another, of which only the tighter counts if it is parallel."""
+    """Return the planes with another one; of parallel ones only the tighter remains."""
     norm = float(np.linalg.norm(new.normal))
     for index, old in enumerate(planes):
         scale = float(np.linalg.norm(old.normal))

@@ -1,8 +1,8 @@
-"""Whether poses keep everything that a design demands, as a compiled yes or no.
+"""Validity of poses: whether they satisfy all demands of a design, in compiled loops.
 
-Limits, the home's sign triple and the clearances of all pairs of legs together, without
-saying which is broken: for that see `explorer.workspace.limits.broken` and
-`explorer.legs.clearance`, with which this agrees.
+The demands are the limits, the home's sign triple and the clearances of all pairs of legs. For
+which of them a pose violates, see `explorer.workspace.limits.broken` and
+`explorer.legs.clearance`, with which this module agrees.
 """
 
 from __future__ import annotations
@@ -19,28 +19,32 @@ from explorer.mechanism.design import LENGTHS, TOLERANCE, Design
 from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import BoolArray, FloatArray, batch_shape, finite_array, for_kernel
 from explorer.numerics.compiled import helper, kernel
-from explorer.workspace.limits.constraints import demanded_order, home_signs, joint_cones
+from explorer.workspace.limits.constraints import demanded_order, home_signs
+from explorer.workspace.limits.joint_cones import joint_cones
 
-# Where in the row of rules what is; see `Rules.of`.
+# Columns of the row of rules; see `Rules.of`.
 A3, B1, B2, B3 = 0, 2, 4, 5
 LENGTH_LOWS, LENGTH_HIGHS = 6, 10
 GUIDE_LOW, GUIDE_HIGH, GAP = 14, 15, 16
 BOX_LOWS, BOX_HIGHS = 17, 20
 MARGIN, SIGNS, ORDER = 23, 24, 27
 RADII = 28
-COUNT = 34
+RULE_COLUMNS = 34
+# Columns of the rows of cones.
+LEG, AXIS_X, AXIS_Y, AXIS_Z, COSINE, SINE, TURNS, CONE_COLUMNS = range(8)
 
 
 @dataclass(frozen=True)
 class Rules:
-    """What a design demands of a pose, as the kernels take it.
+    """The demands of a design on a pose, as kernels take them.
 
     Attributes:
-        row: Design variables, limits with their tolerance, signs of the home, the order of
-            the carriages and radii, shape (COUNT,); what is not demanded is infinite, the
-            order then 0.
-        cones: Of the joints, as rows (leg, axis, cosine and sine of the half-angle, whether
-            the axis turns with the platform), shape (n, 7). A row of leg 0 is never kept.
+        row: Design variables, limits widened by their tolerance, signs of the home, order of the
+            carriages and sums of radii, shape (RULE_COLUMNS,). A limit that is not demanded is
+            infinite, an order that is not demanded 0.
+        cones: Rows of the joints' cones: leg, axis, cosine and sine of the half-angle, and whether
+            the axis turns with the platform, shape (n, CONE_COLUMNS). No pose satisfies a row
+            whose leg is 0.
     """
 
     row: FloatArray
@@ -54,12 +58,12 @@ class Rules:
 
         Args:
             design: The manipulator.
-            signs: The sign triple to demand instead of the home's, and at all events.
-            order: The sign of d3 − d1 to demand, 0 for either; the one that the design
-                demands if None.
+            signs: Sign triple to demand instead of the home's, even if no margin is demanded.
+            order: Sign of d3 − d1 to demand, 0 for either; that which the design demands if
+                None.
         """
         limits, slack = design.limits, design.tolerance
-        row = np.empty(COUNT)
+        row = np.empty(RULE_COLUMNS)
         row[:LENGTH_LOWS] = design.variables
         for index, name in enumerate(LENGTHS):
             low, high = design.length_range(name)
@@ -75,29 +79,29 @@ class Rules:
             row[MARGIN] = (limits.margin or 0.0) - slack
         row[SIGNS:ORDER] = signs or home_signs(design)
         row[ORDER] = demanded_order(design) if order is None else order
-        # A pair that shares a joint has no clearance to keep.
+        # No clearance is demanded of a pair that shares a joint.
         row[RADII:] = np.where(joined_pairs(design), -1.0, radii_of_pairs(design))
         cones = [
-            (0.0,) * 7
-            if each.axis is None
+            (0.0,) * CONE_COLUMNS
+            if cone.axis is None
             else (
-                float(each.leg),
-                *each.axis.tolist(),
-                # As the limits count it; half a turn is no bound.
-                math.cos(min(math.pi, each.half_angle + TOLERANCE)),
-                math.sin(min(math.pi, each.half_angle + TOLERANCE)),
-                float(each.in_platform),
+                float(cone.leg),
+                *cone.axis.tolist(),
+                # The tolerance is that of the limits; half a turn is no bound.
+                math.cos(min(math.pi, cone.half_angle + TOLERANCE)),
+                math.sin(min(math.pi, cone.half_angle + TOLERANCE)),
+                float(cone.in_platform),
             )
-            for each in joint_cones(design)
+            for cone in joint_cones(design)
         ]
-        return Rules(row, np.array(cones, dtype=np.float64).reshape(-1, 7))
+        return Rules(row, np.array(cones, dtype=np.float64).reshape(-1, CONE_COLUMNS))
 
-    def with_room(self, margin: float, clearance: float) -> Rules:
-        """Return the rules with margins and clearances of at least so much, or what they were.
+    def tighten(self, margin: float, clearance: float) -> Rules:
+        """Return rules that demand at least a margin and a clearance.
 
         Args:
-            margin: In design units; where no margin is demanded, none is.
-            clearance: In design units, beyond the radii.
+            margin: Least margin in design units; ignored if the rules demand no margin.
+            clearance: Clearance beyond the radii, in design units.
         """
         row = self.row.copy()
         if row[MARGIN] > -math.inf:
@@ -109,7 +113,7 @@ class Rules:
 def poses_are_valid(
     design: Design, position: ArrayLike, rotation: ArrayLike, *, rules: Rules | None = None
 ) -> BoolArray:
-    """Return whether poses keep all limits and clearances, shape (...).
+    """Return whether poses satisfy all limits and clearances, shape (...).
 
     A clearance of zero is a collision, as for `explorer.tetrahedra_overlap`.
 
@@ -117,7 +121,7 @@ def poses_are_valid(
         design: The manipulator.
         position: b4 in the base frame, shape (..., 3), in design units.
         rotation: Platform to base, shape (..., 3, 3).
-        rules: Those of the design, to save making them for each call.
+        rules: Rules of the design, if they have been computed before.
 
     Raises:
         InputError: a pose that is not finite or not a rotation.
@@ -141,13 +145,13 @@ def poses_are_valid(
 
 @helper
 def within(square: float, low: float, high: float) -> bool:
-    """Return whether the root of a square lies within bounds; a low one may be negative."""
+    """Return whether the root of a square lies within bounds, of which `low` may be negative."""
     return square <= high * high and (low <= 0.0 or square >= low * low)
 
 
 @helper
 def carriages_apart(row: FloatArray, d1: float, d3: float) -> float:
-    """Return how far apart the carriages are; negative where they are not in their order."""
+    """Return the distance of the carriages; negative if they are not in the demanded order."""
     return row[ORDER] * (d3 - d1) if row[ORDER] != 0.0 else abs(d3 - d1)
 
 
@@ -167,18 +171,22 @@ def write_ends(
 
 
 @helper
-def keeps_limits(
+def satisfies_limits(
     row: FloatArray, p: FloatArray, r: FloatArray, base: FloatArray, ends: FloatArray
 ) -> bool:
-    """Return whether a pose keeps lengths, guide, gap, the carriages' order, box and margins."""
+    """Return whether a pose satisfies the limits, other than cones and clearances."""
     for i in range(3):
         if not row[BOX_LOWS + i] <= p[i] <= row[BOX_HIGHS + i]:
             return False
     least = row[MARGIN]
     if least > -math.inf:
-        k1 = -(r[0, 2] * p[0] + r[1, 2] * p[1] + r[2, 2] * p[2])
-        k2 = r[1, 0] * p[2] - r[2, 0] * p[1]
-        if row[SIGNS] * k1 < least or row[SIGNS + 1] * k2 < least or row[SIGNS + 2] * p[2] < least:
+        delta1 = -(r[0, 2] * p[0] + r[1, 2] * p[1] + r[2, 2] * p[2])
+        delta2 = r[1, 0] * p[2] - r[2, 0] * p[1]
+        if (
+            row[SIGNS] * delta1 < least
+            or row[SIGNS + 1] * delta2 < least
+            or row[SIGNS + 2] * p[2] < least
+        ):
             return False
     d1, d3 = ends[1, 0], ends[2, 0]
     if min(d1, d3) < row[GUIDE_LOW] or max(d1, d3) > row[GUIDE_HIGH]:
@@ -195,14 +203,14 @@ def keeps_limits(
 
 
 @helper
-def keeps_cones(cones: FloatArray, r: FloatArray, base: FloatArray, ends: FloatArray) -> bool:
-    """Return whether a pose keeps the cones of its joints."""
+def satisfies_cones(cones: FloatArray, r: FloatArray, base: FloatArray, ends: FloatArray) -> bool:
+    """Return whether a pose satisfies the cones of its joints."""
     for index in range(cones.shape[0]):
-        leg = int(cones[index, 0]) - 1
+        leg = int(cones[index, LEG]) - 1
         if leg < 0:
             return False
-        x, y, z = cones[index, 1], cones[index, 2], cones[index, 3]
-        if cones[index, 6] > 0.0:
+        x, y, z = cones[index, AXIS_X], cones[index, AXIS_Y], cones[index, AXIS_Z]
+        if cones[index, TURNS] > 0.0:
             x, y, z = (
                 r[0, 0] * x + r[0, 1] * y + r[0, 2] * z,
                 r[1, 0] * x + r[1, 1] * y + r[1, 2] * z,
@@ -213,8 +221,8 @@ def keeps_cones(cones: FloatArray, r: FloatArray, base: FloatArray, ends: FloatA
         c = ends[leg, 2] - base[leg, 2]
         along = a * x + b * y + c * z
         across = math.sqrt((b * z - c * y) ** 2 + (c * x - a * z) ** 2 + (a * y - b * x) ** 2)
-        # The sine of the cone's angle less the leg's, times the length.
-        if cones[index, 5] * along < cones[index, 4] * across:
+        # The difference is the length times the sine of the cone's angle less the leg's.
+        if cones[index, SINE] * along < cones[index, COSINE] * across:
             return False
     return True
 
@@ -227,10 +235,10 @@ def vector(points: FloatArray, index: int) -> Vector:
 
 @helper
 def is_clear(i: int, j: int, radius: float, base: FloatArray, ends: FloatArray) -> bool:
-    """Return whether two legs are farther apart than a sum of radii."""
+    """Return whether the axes of two legs are farther apart than a sum of radii."""
     if radius < 0.0:
         return True
-    # Most pairs are apart on an axis of the base already.
+    # The projections on an axis of the base already separate most pairs.
     for axis in range(3):
         a, b = base[i, axis], ends[i, axis]
         c, d = base[j, axis], ends[j, axis]
@@ -244,7 +252,7 @@ def is_clear(i: int, j: int, radius: float, base: FloatArray, ends: FloatArray) 
 
 
 @helper
-def keeps_all(
+def is_valid(
     row: FloatArray,
     cones: FloatArray,
     p: FloatArray,
@@ -252,11 +260,11 @@ def keeps_all(
     base: FloatArray,
     ends: FloatArray,
 ) -> bool:
-    """Return whether a pose keeps everything; the ends of the legs are written."""
+    """Return whether a pose satisfies all rules; the ends of the legs are written."""
     write_ends(row, p, r, base, ends)
-    if not keeps_limits(row, p, r, base, ends):
+    if not satisfies_limits(row, p, r, base, ends):
         return False
-    if not keeps_cones(cones, r, base, ends):
+    if not satisfies_cones(cones, r, base, ends):
         return False
     pair = RADII
     for i in range(3):
@@ -275,15 +283,15 @@ def valid_rows(
     rotation: FloatArray,
     valid: BoolArray,
 ) -> None:
-    """Write for each pose whether it keeps everything.
+    """Write whether each pose satisfies all rules.
 
     Args:
-        row: Of the rules.
-        cones: Of the rules.
-        position: Shape (n, 3).
-        rotation: Shape (n, 3, 3).
+        row: Row of the rules.
+        cones: Cones of the rules.
+        position: Positions of b4, shape (n, 3).
+        rotation: Rotations, platform to base, shape (n, 3, 3).
         valid: Written, shape (n,).
     """
     base, ends = np.zeros((4, 3)), np.zeros((4, 3))
     for index in range(position.shape[0]):
-        valid[index] = keeps_all(row, cones, position[index], rotation[index], base, ends)
+        valid[index] = is_valid(row, cones, position[index], rotation[index], base, ends)

@@ -1,1 +1,1 @@
-"""Sections of a workspace at constant x: exact areas and volumes, outlines and grids."""
+"""Slices of a workspace: exact areas and volumes, outlines, node counts and fields."""

@@ -1,4 +1,4 @@
-"""Maps over a slice of the workspace: how near to singularity and how well conditioned it is.
+"""Fields over a slice of the workspace: distances to singularities, and conditioning.
 
 A slice is a grid of positions on a plane across one of the base's axes, at one orientation.
 """
@@ -21,16 +21,17 @@ from explorer.singularity.jacobian import inverse_condition, jacobian
 from explorer.singularity.nearest import nearest_singular_poses
 from explorer.workspace.limits.constraints import constraints, slacks
 from explorer.workspace.limits.region import region_of
+from explorer.workspace.slices.axes import axes_of_slice
 from explorer.workspace.slices.volume import bounds
 
-AXES = "xyz"
 MOST_STEPS = 2000
 
 Field = Literal["margin", "condition", "ball", "distance"]
 
 FIELDS: tuple[Field, ...] = ("margin", "condition", "ball", "distance")
-"""What can be mapped: the smallest |κ|; the inverse condition, 0 to 1; the radius of the
-largest singularity-free ball of positions; the least root-mean-square way to a singular pose."""
+"""The fields: the smallest margin |δ|; the inverse condition number, 0 to 1; the radius of the
+largest singularity-free ball of positions; the root-mean-square distance to the nearest singular
+pose."""
 
 
 @dataclass(frozen=True)
@@ -38,13 +39,13 @@ class SliceField:
     """A field over a slice.
 
     Attributes:
-        field: What is mapped.
-        axis: Across which the slice is cut.
-        level: Where.
-        columns: The coordinates on the first other axis, ascending, shape (n,).
-        rows: Those on the second, ascending, shape (m,).
-        values: Shape (m, n), in design units but for the condition.
-        inside: Whether the position keeps the limits of the design, shape (m, n).
+        field: Name of the field.
+        axis: Axis across which the slice is cut.
+        level: Coordinate of the slice on this axis, in design units.
+        columns: Coordinates on the first other axis, ascending, shape (n,).
+        rows: Coordinates on the second other axis, ascending, shape (m,).
+        values: Values of the field, shape (m, n), in design units except for the condition.
+        inside: Whether each position satisfies the limits of the design, shape (m, n).
     """
 
     field: Field
@@ -72,26 +73,23 @@ def slice_field(
         design: The manipulator.
         rotation: Platform to base, shape (3, 3).
         field: One of `FIELDS`.
-        axis: "x", "y" or "z": across which to cut.
-        level: Where on this axis, in design units.
-        steps: Positions on the longer side.
-        extent: Lows and highs of the positions, (3,) each, instead of the workspace's.
+        axis: Axis across which to cut: "x", "y" or "z".
+        level: Coordinate on this axis, in design units.
+        steps: Number of positions on the longer side.
+        extent: Lows and highs of the positions, (3,) each; those of the workspace if None.
 
     Raises:
-        InputError: no such field or axis, too few or too many steps, a workspace that is
-            empty without an extent to take instead, or not a rotation.
+        InputError: an unknown field or axis, too few or too many steps, an empty workspace
+            without an extent, or not a rotation.
     """
     r = checked_rotation(rotation)
     if field not in FIELDS:
         raise InputError(f"no field {field!r}; there are {', '.join(FIELDS)}")
-    if axis not in AXES or len(axis) != 1:
-        raise InputError(f"a slice is cut across x, y or z; got {axis!r}")
+    cut, first, second = axes_of_slice(axis)
     if not 2 <= steps <= MOST_STEPS:
         raise InputError(f"a slice has 2 to {MOST_STEPS} steps; got {steps}")
     limits = constraints(design, r)
     lows, highs = bounds(region_of(limits)) if extent is None else map(np.asarray, extent)
-    cut = AXES.index(axis)
-    first, second = (each for each in range(3) if each != cut)
     sides = np.array(highs - lows, dtype=np.float64)[[first, second]]
     if not np.isfinite(sides).all() or not (sides > 0.0).all():
         raise InputError(
@@ -115,7 +113,7 @@ def slice_field(
 
 
 def field_at(design: Design, position: ArrayLike, rotation: ArrayLike, field: Field) -> FloatArray:
-    """Return a field at poses, shape (...).
+    """Return a field at poses, shape (...), in design units except for the condition.
 
     Args:
         design: The manipulator.

@@ -1,10 +1,10 @@
 """Exact volumes of regions bounded by spheres, cylinders along x, and planes.
 
 The area of the slices is integrated along x, piece by piece between its breaks, by
-Gauss-Legendre quadrature, which converges to rounding since the pieces are analytic. How fast
-depends on what the curves do just beyond a piece, so the worst piece is halved until the
-estimated error of all is rounding. Rows of circles and planes as in
-`explorer.workspace.slices.arcs`.
+Gauss-Legendre quadrature. It converges to rounding, since the area is analytic on each piece. The
+rate of convergence depends on singularities just beyond the piece, so the piece with the largest
+error is halved until the estimated error of all pieces is rounding. Circles and planes are rows
+of `explorer.workspace.limits.columns`.
 """
 
 from __future__ import annotations
@@ -15,48 +15,51 @@ import numpy as np
 
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import helper, kernel
-from explorer.workspace.slices.arcs import slice_area
+from explorer.workspace.limits.columns import IS_BALL, OFFSET, RADIUS, SIDE, X, Y, Z
+from explorer.workspace.slices.arcs import LENGTH, MOMENT_Y, MOMENT_Z, slice_area
 from explorer.workspace.slices.break_points import region_size
 from explorer.workspace.slices.breaks import find_breaks
 
-# Breaks that one region has at the most, and pieces.
+# The most breaks of one region, and the most pieces.
 MOST_BREAKS, MOST_PIECES = 1000, 1100
-# Arcs that the other curves may forbid on one curve, each twice if it passes angle zero.
+# The most arcs that other curves forbid on one curve; an arc through angle zero counts twice.
 MOST_ARCS = 64
-# Slices from which on no piece is halved.
+# The count of slices from which on no piece is halved.
 MOST_SLICES = 2000
-# Errors, as shares of the volume and of the surface, down to which pieces are halved.
+# Pieces are halved down to these errors, as shares of the volume and of the surface.
 VOLUME_TOLERANCE, SURFACE_TOLERANCE = 1e-13, 1e-9
-# Where halving leaves more than this share of an error, so many times, it is rounding.
+# If halving leaves more than this share of an error this many times, the error is rounding.
 STALLED, MOST_STALLS = 0.8, 3
-# The fastest decay of four coefficients that is extrapolated.
+# The fastest decay over four coefficients that is extrapolated.
 FASTEST = 0.3
-# Rounding, as a share of the terms of a sum, and of the size by which surfaces are displaced.
+# Rounding error, as a share of the summed terms and of the size of the region's coordinates.
 ROUNDING = 2.0**-48
-# What the row of a piece begins with: its ends, how often halving it has not helped, its volume
-# and weighted surface, the errors of both, and the sizes of the terms that its areas sum.
+# Columns of a piece: its ends, how often halving did not help, its volume and weighted surface,
+# the errors of both, and the summed absolute terms of its areas. From HEAD on, derivatives follow.
 START, END, STALLS, VOLUME, SURFACE, VOLUME_ERROR, SURFACE_ERROR, TERMS, HEAD = range(9)
+# Entries of the result of `integrate_slices`.
+TOTAL, AREA_AT_LOW, AREA_AT_HIGH, SLICES, PIECES, TOTAL_ERROR, RESULTS = range(7)
 
 
 @helper
 def largest(values: FloatArray, start: int) -> float:
-    """Return the largest size among four values."""
-    found = 0.0
+    """Return the largest absolute value among four."""
+    size = 0.0
     for k in range(start, start + 4):
-        found = max(found, abs(values[k]))
-    return found
+        size = max(size, abs(values[k]))
+    return size
 
 
 @helper
-def quadrature_error(last: FloatArray, many: int) -> float:
-    """Return what a quadrature of so many nodes misses, from its last eight coefficients.
+def quadrature_error(last: FloatArray, nodes: int) -> float:
+    """Return the estimated error of a quadrature with a number of nodes.
 
-    The coefficients of an analytic integrand decay geometrically on the whole, four by four;
-    the quadrature misses those of twice as many degrees as it has nodes.
+    The Legendre coefficients of an analytic integrand decay geometrically. The decay is taken
+    from the last eight of them, and the error from the degree of twice the number of nodes.
     """
     before, after = largest(last, 0), largest(last, 4)
     decay = min(1.0, max(FASTEST, after / before)) if before > 0.0 else 1.0
-    return after * decay ** (0.25 * many)
+    return after * decay ** (0.25 * nodes)
 
 
 @helper
@@ -71,7 +74,7 @@ def integrate_piece(
     span: FloatArray,
     moments: FloatArray,
 ) -> int:
-    """Integrate over one piece, from its start to its end, and return the slices computed."""
+    """Integrate over one piece, from its start to its end; return the count of slices computed."""
     n, m, g = circles.shape[0], planes.shape[0], quadrature.shape[1]
     a, b = piece[START], piece[END]
     for k in range(VOLUME, piece.shape[0]):
@@ -79,34 +82,34 @@ def integrate_piece(
     of_area, of_surface = np.zeros(8), np.zeros(8)
     for i in range(g):
         t = quadrature[0, i]
-        # Smooth to both ends, where areas begin as powers of 3/2.
+        # This substitution makes powers of 3/2, as which areas begin at both ends, smooth.
         x = a + (b - a) * t * t * (3.0 - 2.0 * t)
         rate = quadrature[1, i] * (b - a) * 6.0 * t * (1.0 - t)
         area, terms = slice_area(x, circles, planes, bearings, radii, arcs, span, moments)
         if i == 0 and terms == 0.0:
-            # What is empty in the middle of a piece is empty.
+            # A piece whose middle slice is empty is empty.
             return 1
-        # Where one face begins to take the place of another, their sum hides it: each has a
-        # weight of its own, from one to two.
+        # The sum of two faces may be smooth where one replaces the other. Distinct weights, from
+        # one to two, keep such a change visible.
         surface = 0.0
         for k in range(n):
             at = HEAD + 4 * k
-            angle, r = rate * circles[k, 5] * moments[k, 0], radii[k]
-            piece[at] += angle * circles[k, 4] * (x - circles[k, 0])
-            piece[at + 1] += rate * circles[k, 5] * r * moments[k, 1]
-            piece[at + 2] += rate * circles[k, 5] * r * moments[k, 2]
-            piece[at + 3] += angle * circles[k, 3]
-            surface += (1.0 + k / (n + m)) * moments[k, 0] * circles[k, 3]
+            angle, r = rate * circles[k, SIDE] * moments[k, LENGTH], radii[k]
+            piece[at + X] += angle * circles[k, IS_BALL] * (x - circles[k, X])
+            piece[at + Y] += rate * circles[k, SIDE] * r * moments[k, MOMENT_Y]
+            piece[at + Z] += rate * circles[k, SIDE] * r * moments[k, MOMENT_Z]
+            piece[at + RADIUS] += angle * circles[k, RADIUS]
+            surface += (1.0 + k / (n + m)) * moments[k, LENGTH] * circles[k, RADIUS]
         for k in range(m):
             at = HEAD + 4 * (n + k)
-            square = planes[k, 1] * planes[k, 1] + planes[k, 2] * planes[k, 2]
+            square = planes[k, Y] * planes[k, Y] + planes[k, Z] * planes[k, Z]
             per = rate / math.sqrt(square)
-            piece[at] -= per * moments[n + k, 0] * x
-            piece[at + 1] -= per * moments[n + k, 1]
-            piece[at + 2] -= per * moments[n + k, 2]
-            piece[at + 3] += per * moments[n + k, 0]
-            tilt = math.sqrt(1.0 + planes[k, 0] * planes[k, 0] / square)
-            surface += (1.0 + (n + k) / (n + m)) * moments[n + k, 0] * tilt
+            piece[at + X] -= per * moments[n + k, LENGTH] * x
+            piece[at + Y] -= per * moments[n + k, MOMENT_Y]
+            piece[at + Z] -= per * moments[n + k, MOMENT_Z]
+            piece[at + OFFSET] += per * moments[n + k, LENGTH]
+            tilt = math.sqrt(1.0 + planes[k, X] * planes[k, X] / square)
+            surface += (1.0 + (n + k) / (n + m)) * moments[n + k, LENGTH] * tilt
         piece[VOLUME] += rate * area
         piece[SURFACE] += rate * surface
         piece[TERMS] += rate * terms
@@ -114,20 +117,20 @@ def integrate_piece(
             of_area[k] += rate * quadrature[2 + k, i] * area
             of_surface[k] += rate * quadrature[2 + k, i] * surface
     piece[VOLUME_ERROR] = quadrature_error(of_area, g)
-    # Faces begin as square roots, whose coefficients need not go on as they have decayed.
+    # Faces begin as square roots, whose coefficients need not decay geometrically.
     piece[SURFACE_ERROR] = largest(of_surface, 4)
     return g
 
 
 @helper
 def excess(piece: FloatArray, volume_error: float, surface_error: float) -> float:
-    """Return the errors of a piece over those that are allowed, whichever is larger."""
+    """Return the larger of a piece's two errors, each over the allowed one."""
     return max(piece[VOLUME_ERROR] / volume_error, piece[SURFACE_ERROR] / surface_error)
 
 
 @helper
 def worst_piece(pieces: FloatArray, count: int, volume_error: float, surface_error: float) -> int:
-    """Return the piece to halve next, -1 if what can be mended of all is within the errors."""
+    """Return the piece to halve next, or -1 if the errors that halving can reduce are allowed."""
     worst, most, of_volume, of_surface = -1, 0.0, 0.0, 0.0
     for i in range(count):
         start, end = pieces[i, START], pieces[i, END]
@@ -155,16 +158,16 @@ def integrate_slices(
     """Integrate the area of the slices from low to high, and its derivatives.
 
     Args:
-        circles: Shape (n, 6), see the module; the region is bounded by one at least.
-        planes: Shape (m, 4), see the module, none of them perpendicular to x.
-        low: Where the region starts along x.
-        high: Where it ends.
-        quadrature: Of g nodes on [0, 1], the middle first: nodes, weights, and the factors that
+        circles: Rows, shape (n, 6); at least one of them bounds the region.
+        planes: Rows, shape (m, 4), none of them perpendicular to x.
+        low: Start of the region along x.
+        high: End of the region along x.
+        quadrature: g nodes on [0, 1] with the middle first, their weights, and the factors that
             give the last eight Legendre coefficients of an integrand, shape (10, g).
-        result: Written: volume, area at low, area at high, slices computed, pieces, and an
-            estimate of the error of the volume, rounding included; shape (6,).
+        result: Written: the volume, the areas at low and high, the counts of slices and pieces,
+            and the estimated error of the volume, rounding included; shape (6,).
         by_circle: Written: derivatives by (x, y, z, radius), shape (n, 4).
-        by_plane: Written: derivatives by (ax, ay, az, c), shape (m, 4).
+        by_plane: Written: derivatives by (x, y, z, offset), shape (m, 4).
     """
     n, m = circles.shape[0], planes.shape[0]
     radii, span = np.zeros(n), np.zeros(6)
@@ -173,10 +176,10 @@ def integrate_slices(
     for k in range(n):
         for j in range(n):
             bearings[k, j] = math.atan2(
-                circles[k, 2] - circles[j, 2], circles[k, 1] - circles[j, 1]
+                circles[k, Z] - circles[j, Z], circles[k, Y] - circles[j, Y]
             )
         for j in range(m):
-            bearings[k, n + j] = math.atan2(planes[j, 2], planes[j, 1])
+            bearings[k, n + j] = math.atan2(planes[j, Z], planes[j, Y])
     breaks = np.zeros(MOST_BREAKS)
     count = find_breaks(circles, planes, low, high, breaks) - 1
     pieces = np.zeros((MOST_PIECES, HEAD + 4 * (n + m)))
@@ -222,7 +225,9 @@ def integrate_slices(
             by_circle[k // 4, k % 4] = total[HEAD + k]
         else:
             by_plane[k // 4 - n, k % 4] = total[HEAD + k]
-    result[0], result[3], result[4] = total[VOLUME], slices, count
-    result[1], _ = slice_area(low, circles, planes, bearings, radii, arcs, span, moments)
-    result[2], _ = slice_area(high, circles, planes, bearings, radii, arcs, span, moments)
-    result[5] = total[VOLUME_ERROR] + rounding
+    result[TOTAL], result[SLICES], result[PIECES] = total[VOLUME], slices, count
+    result[AREA_AT_LOW], _ = slice_area(low, circles, planes, bearings, radii, arcs, span, moments)
+    result[AREA_AT_HIGH], _ = slice_area(
+        high, circles, planes, bearings, radii, arcs, span, moments
+    )
+    result[TOTAL_ERROR] = total[VOLUME_ERROR] + rounding

@@ -1,6 +1,6 @@
-"""Kernels that look at positions one by one, or at columns of them: nodes and cones.
+"""Kernels over single positions (node counts) and over columns of them (volumes within cones).
 
-Rows of balls, cylinders, planes and cones as in `explorer.workspace.limits.region`.
+Circles, planes and cones are rows of `explorer.workspace.limits.columns`.
 """
 
 from __future__ import annotations
@@ -11,49 +11,64 @@ import numpy as np
 
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.numerics.compiled import helper, kernel
+from explorer.workspace.limits.columns import (
+    AXIS_X,
+    AXIS_Y,
+    AXIS_Z,
+    COSINE,
+    IS_BALL,
+    IS_FLAT,
+    OFFSET,
+    RADIUS,
+    SIDE,
+    X,
+    Y,
+    Z,
+)
 
-# Ends of z-intervals in one column: two a surface and two of the column.
+# The most ends of z-intervals in one column: two for each surface and two of the column.
 ENDS = 64
+# A discriminant that is negative by less than this share of b² counts as zero.
 DOUBLE_ROOT = 1e-12
 
 
 @helper
-def keeps_all(
+def is_within(
     x: float,
     y: float,
     z: float,
-    rounds: FloatArray,
+    circles: FloatArray,
     planes: FloatArray,
     cones: FloatArray,
     slack: float,
 ) -> bool:
-    """Whether a position keeps all limits, to within a slack."""
-    for k in range(rounds.shape[0]):
-        dy, dz = y - rounds[k, 1], z - rounds[k, 2]
+    """Return whether a position satisfies all limits, to within a slack in design units."""
+    for k in range(circles.shape[0]):
+        dy, dz = y - circles[k, Y], z - circles[k, Z]
         square = dy * dy + dz * dz
-        if rounds[k, 4] > 0.0:
-            dx = x - rounds[k, 0]
+        if circles[k, IS_BALL] > 0.0:
+            dx = x - circles[k, X]
             square += dx * dx
-        edge = rounds[k, 3] + (slack if rounds[k, 5] > 0.0 else -slack)
-        if edge > 0.0 and (square - edge * edge) * rounds[k, 5] > 0.0:
+        edge = circles[k, RADIUS] + (slack if circles[k, SIDE] > 0.0 else -slack)
+        if edge > 0.0 and (square - edge * edge) * circles[k, SIDE] > 0.0:
             return False
-        if edge <= 0.0 and rounds[k, 5] > 0.0:
+        if edge <= 0.0 and circles[k, SIDE] > 0.0:
             return False
     for k in range(planes.shape[0]):
-        if planes[k, 0] * x + planes[k, 1] * y + planes[k, 2] * z > planes[k, 3] + slack:
+        if planes[k, X] * x + planes[k, Y] * y + planes[k, Z] * z > planes[k, OFFSET] + slack:
             return False
     for k in range(cones.shape[0]):
-        dx = 0.0 if cones[k, 7] > 0.0 else x - cones[k, 0]
-        dy, dz = y - cones[k, 1], z - cones[k, 2]
-        along = dx * cones[k, 3] + dy * cones[k, 4] + dz * cones[k, 5]
-        if along < cones[k, 6] * math.sqrt(dx * dx + dy * dy + dz * dz) - slack:
+        dx = 0.0 if cones[k, IS_FLAT] > 0.0 else x - cones[k, X]
+        dy, dz = y - cones[k, Y], z - cones[k, Z]
+        along = dx * cones[k, AXIS_X] + dy * cones[k, AXIS_Y] + dz * cones[k, AXIS_Z]
+        if along < cones[k, COSINE] * math.sqrt(dx * dx + dy * dy + dz * dz) - slack:
             return False
     return True
 
 
 @kernel("void(f8[:,::1], f8[:,::1], f8[:,::1], f8[::1], f8, f8[::1], i8[::1], f8, i8[::1])")
 def count_nodes(
-    rounds: FloatArray,
+    circles: FloatArray,
     planes: FloatArray,
     cones: FloatArray,
     ends: FloatArray,
@@ -61,22 +76,22 @@ def count_nodes(
     first: FloatArray,
     counts: IntArray,
     step: float,
-    found: IntArray,
+    result: IntArray,
 ) -> None:
-    """Count the nodes of a grid that keep all limits.
+    """Count the nodes of a grid that satisfy all limits.
 
     Args:
-        rounds: Shape (n, 6).
-        planes: Shape (m, 4).
-        cones: Shape (k, 8).
-        ends: Of the x-range, shape (2,).
-        slack: Within which a limit counts as kept.
+        circles: Rows, shape (n, 6).
+        planes: Rows, shape (m, 4).
+        cones: Rows, shape (k, 8).
+        ends: Ends of the x-range, shape (2,).
+        slack: Excess by which a limit may be violated.
         first: Index of the first node on each axis, shape (3,); a node is index times step.
-        counts: Nodes on each axis, shape (3,).
-        step: Of the grid.
-        found: Written: their number, and the lowest and highest indices, shape (7,).
+        counts: Number of nodes on each axis, shape (3,).
+        step: Spacing of the grid.
+        result: Written: the number of nodes, then their lowest and highest indices, shape (7,).
     """
-    found[0] = 0
+    result[0] = 0
     for i in range(counts[0]):
         x = (first[0] + i) * step
         if x < ends[0] or x > ends[1]:
@@ -85,27 +100,27 @@ def count_nodes(
             y = (first[1] + j) * step
             for k in range(counts[2]):
                 z = (first[2] + k) * step
-                if not keeps_all(x, y, z, rounds, planes, cones, slack):
+                if not is_within(x, y, z, circles, planes, cones, slack):
                     continue
                 at = (int(first[0]) + i, int(first[1]) + j, int(first[2]) + k)
                 for axis in range(3):
-                    if found[0] == 0 or at[axis] < found[1 + axis]:
-                        found[1 + axis] = at[axis]
-                    if found[0] == 0 or at[axis] > found[4 + axis]:
-                        found[4 + axis] = at[axis]
-                found[0] += 1
+                    if result[0] == 0 or at[axis] < result[1 + axis]:
+                        result[1 + axis] = at[axis]
+                    if result[0] == 0 or at[axis] > result[4 + axis]:
+                        result[4 + axis] = at[axis]
+                result[0] += 1
 
 
 @helper
 def add_crossings(a: float, b: float, c: float, ends: FloatArray, count: int) -> int:
-    """Add the real roots of a z² + 2 b z + c to the ends and return how many there are."""
+    """Add the real roots of a z² + 2 b z + c to the ends and return the count of ends."""
     if a == 0.0:
         if b != 0.0:
             ends[count] = -0.5 * c / b
             count += 1
         return count
     square = b * b - a * c
-    # Rounding may hide a double root, which a cone of 90° has; one too many does no harm.
+    # Rounding may hide a double root, which a cone of 90° has; a superfluous end does no harm.
     if square > -DOUBLE_ROOT * b * b:
         root = math.sqrt(max(0.0, square))
         ends[count], ends[count + 1] = (-b - root) / a, (-b + root) / a
@@ -115,53 +130,53 @@ def add_crossings(a: float, b: float, c: float, ends: FloatArray, count: int) ->
 
 @kernel("void(f8[:,::1], f8[:,::1], f8[:,::1], f8[::1], f8[::1], i8, f8[::1])")
 def column_lengths(
-    rounds: FloatArray,
+    circles: FloatArray,
     planes: FloatArray,
     cones: FloatArray,
     lows: FloatArray,
     highs: FloatArray,
-    many: int,
+    per_axis: int,
     total: FloatArray,
 ) -> None:
-    """Add up the exact z-lengths of the region in columns at the centres of many² cells.
+    """Add up the exact z-lengths of the region in columns at the centres of per_axis² cells.
 
     Args:
-        rounds: Shape (n, 6).
-        planes: Shape (m, 4).
-        cones: Shape (k, 8).
-        lows: Of a box that holds the region, shape (3,).
-        highs: Of that box, shape (3,).
-        many: Cells on each of x and y.
+        circles: Rows, shape (n, 6).
+        planes: Rows, shape (m, 4).
+        cones: Rows, shape (k, 8).
+        lows: Lower ends of a box that holds the region, shape (3,).
+        highs: Upper ends of that box, shape (3,).
+        per_axis: Number of cells on each of x and y.
         total: Written: the sum of the lengths, shape (1,).
     """
     ends = np.zeros(ENDS)
     total[0] = 0.0
-    for i in range(many):
-        x = lows[0] + (highs[0] - lows[0]) * (i + 0.5) / many
-        for j in range(many):
-            y = lows[1] + (highs[1] - lows[1]) * (j + 0.5) / many
+    for i in range(per_axis):
+        x = lows[0] + (highs[0] - lows[0]) * (i + 0.5) / per_axis
+        for j in range(per_axis):
+            y = lows[1] + (highs[1] - lows[1]) * (j + 0.5) / per_axis
             ends[0], ends[1] = lows[2], highs[2]
             count = 2
-            for k in range(rounds.shape[0]):
-                dy, dx = y - rounds[k, 1], rounds[k, 4] * (x - rounds[k, 0])
-                rest = dx * dx + dy * dy - rounds[k, 3] * rounds[k, 3]
-                zc = rounds[k, 2]
+            for k in range(circles.shape[0]):
+                dy, dx = y - circles[k, Y], circles[k, IS_BALL] * (x - circles[k, X])
+                rest = dx * dx + dy * dy - circles[k, RADIUS] * circles[k, RADIUS]
+                zc = circles[k, Z]
                 count = add_crossings(1.0, -zc, zc * zc + rest, ends, count)
             for k in range(planes.shape[0]):
-                rest = planes[k, 0] * x + planes[k, 1] * y - planes[k, 3]
-                count = add_crossings(0.0, 0.5 * planes[k, 2], rest, ends, count)
+                rest = planes[k, X] * x + planes[k, Y] * y - planes[k, OFFSET]
+                count = add_crossings(0.0, 0.5 * planes[k, Z], rest, ends, count)
             for k in range(cones.shape[0]):
-                dx = 0.0 if cones[k, 7] > 0.0 else x - cones[k, 0]
-                dy, zc = y - cones[k, 1], cones[k, 2]
+                dx = 0.0 if cones[k, IS_FLAT] > 0.0 else x - cones[k, X]
+                dy, zc = y - cones[k, Y], cones[k, Z]
                 # (off·axis)² = cos² |off|², as a polynomial in z - zc.
-                flat = dx * cones[k, 3] + dy * cones[k, 4]
-                square = cones[k, 6] * cones[k, 6]
-                a = cones[k, 5] * cones[k, 5] - square
-                b = flat * cones[k, 5]
+                flat = dx * cones[k, AXIS_X] + dy * cones[k, AXIS_Y]
+                square = cones[k, COSINE] * cones[k, COSINE]
+                a = cones[k, AXIS_Z] * cones[k, AXIS_Z] - square
+                b = flat * cones[k, AXIS_Z]
                 c = flat * flat - square * (dx * dx + dy * dy)
                 count = add_crossings(a, b - a * zc, a * zc * zc - 2.0 * b * zc + c, ends, count)
-            kept = np.sort(ends[:count])
+            stops = np.sort(ends[:count])
             for k in range(count - 1):
-                low, high = max(kept[k], lows[2]), min(kept[k + 1], highs[2])
-                if high > low and keeps_all(x, y, 0.5 * (low + high), rounds, planes, cones, 0.0):
+                low, high = max(stops[k], lows[2]), min(stops[k + 1], highs[2])
+                if high > low and is_within(x, y, 0.5 * (low + high), circles, planes, cones, 0.0):
                     total[0] += high - low

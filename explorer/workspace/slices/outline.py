@@ -1,9 +1,9 @@
-"""The outline of a slice of the workspace, exactly: arcs of circles and straight edges.
+"""The exact outline of a slice of the workspace: arcs of circles and straight edges.
 
 At one orientation the limits are balls, cylinders along x and half-spaces, so a plane across
 an axis cuts each in a circle, in a pair of lines or in a line. Each of these curves is split
-where it meets the others; the parts that keep all other limits are joined to closed loops. An
-independent way to the areas that `explorer.workspace.slices.arcs` integrates.
+where it meets the others, and the parts that satisfy all other limits are joined to closed loops.
+Their areas are independent of those in `explorer.workspace.slices.arcs`.
 """
 
 from __future__ import annotations
@@ -15,18 +15,16 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from explorer.errors import InputError
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import BoolArray, FloatArray
-from explorer.workspace.limits.constraints import Cone, Constraint, HalfSpace, Round, constraints
+from explorer.workspace.limits.constraints import BallOrCylinder, Cone, HalfSpace, constraints
 from explorer.workspace.limits.region import region_of
+from explorer.workspace.slices.axes import axes_of_slice
 from explorer.workspace.slices.volume import bounds
 
-AXES = "xyz"
-
-# Shares of the size of the region: curves that differ by less are one; ends of edges that are
-# nearer are one corner; edges that are shorter are none.
+# Shares of the size of the region: curves that differ by less than SAME are the same, ends of edges
+# closer than CORNER are one corner, and edges shorter than SHORT are dropped.
 SAME = 1e-11
 CORNER = 1e-6
 SHORT = 1e-9
@@ -39,10 +37,10 @@ class Edge:
     """A part of an outline, with the slice on its left.
 
     Attributes:
-        start, end: Its ends, on the two axes of the slice.
-        centre: Of the circle that it is an arc of; None for a straight edge.
-        turn: The angle that an arc turns by, in radians: positive counter-clockwise.
-        limit: Which bounds the slice here, such as "l1 maximum".
+        start, end: Ends on the two axes of the slice, in design units.
+        centre: Centre of the circle of an arc; None for a straight edge.
+        turn: Angle of an arc in radians, positive counter-clockwise; 0 for a straight edge.
+        limit: Name of the limit that bounds the slice here, such as "l1 maximum".
     """
 
     start: Point
@@ -53,12 +51,12 @@ class Edge:
 
     @property
     def radius(self) -> float:
-        """Of the arc, 0 for a straight edge."""
+        """The radius of an arc, 0 for a straight edge."""
         return 0.0 if self.centre is None else math.dist(self.centre, self.start)
 
     @property
     def area(self) -> float:
-        """What the edge contributes to the area by Green's theorem, ½ ∮ (u dv − v du)."""
+        """The edge's part of the area of the slice by Green's theorem, ½ ∮ (u dv − v du)."""
         (u0, v0), (u1, v1) = self.start, self.end
         if self.centre is None:
             return 0.5 * (u0 * v1 - u1 * v0)
@@ -71,8 +69,8 @@ class Outline:
     """The outline of a slice.
 
     Attributes:
-        axis: Across which the slice is cut: "x", "y" or "z".
-        level: Where, in design units.
+        axis: Axis across which the slice is cut: "x", "y" or "z".
+        level: Coordinate of the slice on this axis, in design units.
         loops: Closed loops of edges; those about holes run clockwise. () for an empty slice.
     """
 
@@ -82,13 +80,13 @@ class Outline:
 
     @property
     def area(self) -> float:
-        """That of the slice, in squared design units."""
+        """The area of the slice, in squared design units."""
         return math.fsum(edge.area for loop in self.loops for edge in loop)
 
 
 @dataclass(frozen=True)
 class _Curve:
-    """A circle, or a line n·q = offset with |n| = 1; what is kept locally lies on one side."""
+    """A circle, or a line n·q = offset with |n| = 1, with the slice on one side of it."""
 
     centre: Point
     radius: float
@@ -96,7 +94,7 @@ class _Curve:
     offset: float
     side: float
     limit: str
-    # Of the limit that it belongs to; a cylinder has two lines.
+    # The index of its limit; a cylinder has two lines.
     owner: int
 
     @property
@@ -116,20 +114,19 @@ class _Curve:
 def slice_outline(design: Design, rotation: ArrayLike, axis: str, level: float) -> Outline | None:
     """Return the outline of a slice of the constant-orientation workspace.
 
-    None where a limit on a swing bounds it, whose cone is cut in no circle, or where edges
-    cannot be told apart in double precision.
+    None if a limit on a swing bounds it, since a plane does not cut a cone in circles, or if
+    edges cannot be distinguished in double precision.
 
     Args:
         design: The manipulator.
         rotation: Platform to base, shape (3, 3).
-        axis: "x", "y" or "z": across which to cut. The slice's own axes are the other two.
-        level: Where on this axis, in design units.
+        axis: Axis across which to cut, "x", "y" or "z". The slice's own axes are the other two.
+        level: Coordinate on this axis, in design units.
 
     Raises:
         InputError: no such axis, or not a rotation.
     """
-    if axis not in AXES or len(axis) != 1:
-        raise InputError(f"a slice is cut across x, y or z; got {axis!r}")
+    axes = axes_of_slice(axis)
     limits = constraints(design, checked_rotation(rotation))
     if any(isinstance(limit, Cone) for limit in limits):
         return None
@@ -138,28 +135,27 @@ def slice_outline(design: Design, rotation: ArrayLike, axis: str, level: float) 
     lows, highs = bounds(region)
     if region.is_empty or not (lows < highs).all():
         return empty
-    kept = _kept(limits)
     size = float(max(np.abs(lows).max(), np.abs(highs).max()))
     curves: list[_Curve] = []
-    for owner, limit in enumerate(kept):
-        found = _curves_of(limit, AXES.index(axis), level, owner)
-        if found is None:
+    for owner, limit in enumerate(limits):
+        if not isinstance(limit, BallOrCylinder | HalfSpace):
+            continue
+        limit_curves = _curves_of(limit, axes, level, owner)
+        if limit_curves is None:
             return empty
-        for curve in found:
+        for curve in limit_curves:
             if not any(curve.is_same(other, SAME * size) for other in curves):
                 curves.append(curve)
     edges = [edge for curve in curves for edge in _edges_of(curve, curves, size)]
-    loops = _joined(edges, CORNER * size)
+    loops = _join(edges, CORNER * size)
     return None if loops is None else replace(empty, loops=loops)
 
 
-def _kept(limits: tuple[Constraint, ...]) -> list[Round | HalfSpace]:
-    return [limit for limit in limits if isinstance(limit, Round | HalfSpace)]
-
-
-def _curves_of(limit: Round | HalfSpace, cut: int, level: float, owner: int) -> list[_Curve] | None:
-    """Return the curves that a plane cuts a limit's surface in; None if it keeps nothing of it."""
-    first, second = (each for each in range(3) if each != cut)
+def _curves_of(
+    limit: BallOrCylinder | HalfSpace, axes: tuple[int, int, int], level: float, owner: int
+) -> list[_Curve] | None:
+    """Return the curves in which a plane cuts a limit surface; None if no point satisfies it."""
+    cut, first, second = axes
     if isinstance(limit, HalfSpace):
         n = limit.normal[[first, second]]
         offset = limit.offset - float(limit.normal[cut]) * level
@@ -186,10 +182,10 @@ def _curves_of(limit: Round | HalfSpace, cut: int, level: float, owner: int) -> 
 
 
 def _edges_of(curve: _Curve, curves: list[_Curve], size: float) -> list[Edge]:
-    """Return the parts of a curve that keep all limits but its own."""
+    """Return the parts of a curve that satisfy all limits but its own."""
     others = [other for other in curves if other.owner != curve.owner]
-    # Two lines of a cylinder are parallel, so curves of one limit never meet.
-    stops = sorted(stop for other in others for stop in _meetings(curve, other))
+    # The two lines of a cylinder are parallel, so curves of one limit never meet.
+    stops = sorted(stop for other in others for stop in _find_meetings(curve, other))
     if curve.is_circle:
         if not stops:
             stops = [0.0, math.pi]
@@ -199,9 +195,10 @@ def _edges_of(curve: _Curve, curves: list[_Curve], size: float) -> list[Edge]:
     low, high = np.array(stops[:-1]), np.array(stops[1:])
     long = (high - low) * (curve.radius or 1.0) > SHORT * size
     low, high = low[long], high[long]
-    kept = _keeps(_at(curve, 0.5 * (low + high)), others)
-    starts, ends = _at(curve, low[kept]).tolist(), _at(curve, high[kept]).tolist()
-    turns = (high - low)[kept].tolist() if curve.is_circle else [0.0] * len(starts)
+    inside = _are_inside(_points_at(curve, 0.5 * (low + high)), others)
+    low, high = low[inside], high[inside]
+    starts, ends = _points_at(curve, low).tolist(), _points_at(curve, high).tolist()
+    turns = (high - low).tolist() if curve.is_circle else [0.0] * len(starts)
     centre = curve.centre if curve.is_circle else None
     edges = [
         Edge((a[0], a[1]), (b[0], b[1]), centre, turn, curve.limit)
@@ -212,25 +209,25 @@ def _edges_of(curve: _Curve, curves: list[_Curve], size: float) -> list[Edge]:
     return edges
 
 
-def _at(curve: _Curve, parameter: FloatArray) -> FloatArray:
+def _points_at(curve: _Curve, parameter: FloatArray) -> FloatArray:
     """Return the points of a curve at angles, or at lengths along a line, shape (n, 2)."""
     if curve.is_circle:
         along = np.stack([np.cos(parameter), np.sin(parameter)], axis=-1)
         return np.array(curve.centre) + curve.radius * along
     u, v = curve.normal
-    # What is kept lies to the left of this direction.
+    # The slice lies to the left of this direction.
     return np.array([u, v]) * curve.offset + parameter[:, None] * np.array([-v, u])
 
 
-def _keeps(points: FloatArray, others: list[_Curve]) -> BoolArray:
-    """Return which points (n, 2) keep the limits of some curves."""
-    keeps = np.ones(len(points), dtype=np.bool_)
+def _are_inside(points: FloatArray, others: list[_Curve]) -> BoolArray:
+    """Return whether points (n, 2) satisfy the limits of curves, shape (n,)."""
+    inside = np.ones(len(points), dtype=np.bool_)
     for owner in {other.owner for other in others}:
         own = [other for other in others if other.owner == owner]
         within = np.stack([_slack(other, points) > 0.0 for other in own])
-        # Outside a cylinder is above the one line or below the other.
-        keeps &= within.any(axis=0) if own[0].side < 0.0 else within.all(axis=0)
-    return keeps
+        # A point outside a cylinder is above one of its lines or below the other.
+        inside &= within.any(axis=0) if own[0].side < 0.0 else within.all(axis=0)
+    return inside
 
 
 def _slack(curve: _Curve, points: FloatArray) -> FloatArray:
@@ -240,10 +237,10 @@ def _slack(curve: _Curve, points: FloatArray) -> FloatArray:
     return curve.offset - points @ np.array(curve.normal)
 
 
-def _meetings(curve: _Curve, other: _Curve) -> list[float]:
-    """Return where a curve meets another, by its own parameter."""
+def _find_meetings(curve: _Curve, other: _Curve) -> list[float]:
+    """Return the parameters of a curve at which it meets another."""
     if not curve.is_circle:
-        return _on_line(curve, other)
+        return _find_meetings_on_line(curve, other)
     if other.is_circle:
         du, dv = other.centre[0] - curve.centre[0], other.centre[1] - curve.centre[1]
         distance = math.hypot(du, dv)
@@ -259,7 +256,7 @@ def _meetings(curve: _Curve, other: _Curve) -> list[float]:
     return [(bearing + sign * half) % (2.0 * math.pi) for sign in (-1.0, 1.0)]
 
 
-def _on_line(line: _Curve, other: _Curve) -> list[float]:
+def _find_meetings_on_line(line: _Curve, other: _Curve) -> list[float]:
     (u, v), offset = line.normal, line.offset
     if other.is_circle:
         cu, cv = other.centre
@@ -276,8 +273,8 @@ def _on_line(line: _Curve, other: _Curve) -> list[float]:
     return [(other.offset - along * offset) / slope]
 
 
-def _joined(edges: list[Edge], corner: float) -> tuple[tuple[Edge, ...], ...] | None:
-    """Return edges as closed loops; None if some end has no start beside it."""
+def _join(edges: list[Edge], corner: float) -> tuple[tuple[Edge, ...], ...] | None:
+    """Return edges joined to closed loops; None if an end has no start nearby."""
     left, loops = list(edges), list[tuple[Edge, ...]]()
     while left:
         loop = [left.pop()]

@@ -1,9 +1,10 @@
 """Vertices of a region bounded by spheres, cylinders along x, and planes: three surfaces meet.
 
 Two planes meet in a line, and two cylinders, or a cylinder and a plane along x, in two lines
-along x; what crosses these lines has a closed form. Two balls, or a ball and a plane, meet in
-a circle; where it crosses a plane or a ball has a closed form too, where it crosses a cylinder
-is a quartic. Rows as in `explorer.workspace.slices.arcs`.
+along x. Their intersections with a third surface have closed forms. Two spheres, or a sphere and
+a plane, meet in a circle, whose intersections with a plane or a sphere have closed forms too, and
+those with a cylinder are roots of a quartic. Circles and planes are rows of
+`explorer.workspace.limits.columns`; a line is (x, y, z, axis), a point and a unit direction.
 """
 
 from __future__ import annotations
@@ -14,16 +15,24 @@ import numpy as np
 
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import helper
-from explorer.workspace.slices.break_points import add_break, breaks_at_height, real_roots, slack_at
+from explorer.workspace.limits.columns import IS_BALL, OFFSET, RADIUS, X, Y, Z
+from explorer.workspace.slices.break_points import (
+    add_break,
+    add_breaks_at_height,
+    real_roots,
+    slack_at,
+)
 
-# Newton's method halves its interval wherever it leaves it, and then ends in so many steps.
-STEPS = 100
-# Planes and lines whose angle has a smaller sine are parallel.
+# The most steps of Newton's method, which bisects its interval where a step would leave it.
+MOST_STEPS = 100
+# Planes and lines at an angle with a smaller sine count as parallel.
 PARALLEL = 1e-14
+# Columns of the direction of a line.
+DX, DY, DZ = 3, 4, 5
 
 
 @helper
-def breaks_of_fixed_line(
+def add_breaks_of_fixed_line(
     circles: FloatArray,
     planes: FloatArray,
     y: float,
@@ -32,32 +41,32 @@ def breaks_of_fixed_line(
     breaks: FloatArray,
     count: int,
 ) -> int:
-    """Add where the line along x through (y, z) meets balls."""
+    """Add vertices where the line along x through (y, z) meets spheres."""
     for k in range(circles.shape[0]):
-        if circles[k, 4] > 0.0:
-            count = breaks_at_height(circles, planes, k, y, z, slack, breaks, count)
+        if circles[k, IS_BALL] > 0.0:
+            count = add_breaks_at_height(circles, planes, k, y, z, slack, breaks, count)
     return count
 
 
 @helper
-def breaks_on_cylinders(
+def add_breaks_on_cylinders(
     circles: FloatArray, planes: FloatArray, size: float, breaks: FloatArray, count: int
 ) -> int:
-    """Add the vertices on lines along x in which a cylinder meets another, or a plane."""
+    """Add vertices on the lines along x in which a cylinder meets another, or a plane."""
     n, m = circles.shape[0], planes.shape[0]
     for j in range(n):
-        if circles[j, 4] > 0.0:
+        if circles[j, IS_BALL] > 0.0:
             continue
-        yj, zj, rj = circles[j, 1], circles[j, 2], circles[j, 3]
+        yj, zj, rj = circles[j, Y], circles[j, Z], circles[j, RADIUS]
         for k in range(j + 1, n):
-            if circles[k, 4] > 0.0:
+            if circles[k, IS_BALL] > 0.0:
                 continue
-            dy, dz = circles[k, 1] - yj, circles[k, 2] - zj
+            dy, dz = circles[k, Y] - yj, circles[k, Z] - zj
             square = dy * dy + dz * dz
             if square == 0.0:
                 continue
             slack = slack_at(size, math.sqrt(square) / size)
-            rk = circles[k, 3]
+            rk = circles[k, RADIUS]
             along = 0.5 * (square + (rj - rk) * (rj + rk)) / square
             rest = rj * rj / square - along * along
             if rest < 0.0:
@@ -65,29 +74,29 @@ def breaks_on_cylinders(
             up = math.sqrt(rest)
             for sign in (-up, up):
                 y, z = yj + along * dy - sign * dz, zj + along * dz + sign * dy
-                count = breaks_of_fixed_line(circles, planes, y, z, slack, breaks, count)
+                count = add_breaks_of_fixed_line(circles, planes, y, z, slack, breaks, count)
                 for i in range(m):
-                    if planes[i, 0] != 0.0:
-                        x = (planes[i, 3] - planes[i, 1] * y - planes[i, 2] * z) / planes[i, 0]
+                    if planes[i, X] != 0.0:
+                        x = (planes[i, OFFSET] - planes[i, Y] * y - planes[i, Z] * z) / planes[i, X]
                         count = add_break(circles, planes, x, y, z, slack, breaks, count)
         for k in range(m):
-            if planes[k, 0] != 0.0:
+            if planes[k, X] != 0.0:
                 continue
-            ay, az = planes[k, 1], planes[k, 2]
+            ay, az = planes[k, Y], planes[k, Z]
             square = ay * ay + az * az
-            level = (planes[k, 3] - ay * yj - az * zj) / square
+            level = (planes[k, OFFSET] - ay * yj - az * zj) / square
             rest = rj * rj / square - level * level
             if rest < 0.0:
                 continue
             up, slack = math.sqrt(rest), slack_at(size, 1.0)
             for sign in (-up, up):
                 y, z = yj + level * ay - sign * az, zj + level * az + sign * ay
-                count = breaks_of_fixed_line(circles, planes, y, z, slack, breaks, count)
+                count = add_breaks_of_fixed_line(circles, planes, y, z, slack, breaks, count)
     return count
 
 
 @helper
-def line_of_planes(
+def write_line_of_planes(
     p: FloatArray, q: FloatArray, x: float, y: float, z: float, line: FloatArray
 ) -> float:
     """Write the line in which two planes with unit normals meet, as (point, direction).
@@ -97,25 +106,25 @@ def line_of_planes(
     Returns:
         The sine of the angle between the planes, 0 where they are parallel.
     """
-    dx, dy = p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2]
-    dz = p[0] * q[1] - p[1] * q[0]
+    dx, dy = p[Y] * q[Z] - p[Z] * q[Y], p[Z] * q[X] - p[X] * q[Z]
+    dz = p[X] * q[Y] - p[Y] * q[X]
     sine = math.sqrt(dx * dx + dy * dy + dz * dz)
     if sine <= PARALLEL:
         return 0.0
-    cosine = p[0] * q[0] + p[1] * q[1] + p[2] * q[2]
-    off_p = p[3] - p[0] * x - p[1] * y - p[2] * z
-    off_q = q[3] - q[0] * x - q[1] * y - q[2] * z
+    cosine = p[X] * q[X] + p[Y] * q[Y] + p[Z] * q[Z]
+    off_p = p[OFFSET] - p[X] * x - p[Y] * y - p[Z] * z
+    off_q = q[OFFSET] - q[X] * x - q[Y] * y - q[Z] * z
     by_p = (off_p - cosine * off_q) / (sine * sine)
     by_q = (off_q - cosine * off_p) / (sine * sine)
-    line[0] = x + by_p * p[0] + by_q * q[0]
-    line[1] = y + by_p * p[1] + by_q * q[1]
-    line[2] = z + by_p * p[2] + by_q * q[2]
-    line[3], line[4], line[5] = dx / sine, dy / sine, dz / sine
+    line[X] = x + by_p * p[X] + by_q * q[X]
+    line[Y] = y + by_p * p[Y] + by_q * q[Y]
+    line[Z] = z + by_p * p[Z] + by_q * q[Z]
+    line[DX], line[DY], line[DZ] = dx / sine, dy / sine, dz / sine
     return sine
 
 
 @helper
-def breaks_on_line(
+def add_breaks_on_line(
     circles: FloatArray,
     planes: FloatArray,
     line: FloatArray,
@@ -124,22 +133,22 @@ def breaks_on_line(
     breaks: FloatArray,
     count: int,
 ) -> int:
-    """Add where a line meets ball or cylinder k."""
-    ball = circles[k, 4]
-    ox, oy, oz = ball * (line[0] - circles[k, 0]), line[1] - circles[k, 1], line[2] - circles[k, 2]
-    dx, dy, dz = ball * line[3], line[4], line[5]
+    """Add vertices where a line meets sphere or cylinder k."""
+    ball = circles[k, IS_BALL]
+    ox, oy, oz = ball * (line[X] - circles[k, X]), line[Y] - circles[k, Y], line[Z] - circles[k, Z]
+    dx, dy, dz = ball * line[DX], line[DY], line[DZ]
     for t in real_roots(
         dx * dx + dy * dy + dz * dz,
         2.0 * (ox * dx + oy * dy + oz * dz),
-        ox * ox + oy * oy + oz * oz - circles[k, 3] * circles[k, 3],
+        ox * ox + oy * oy + oz * oz - circles[k, RADIUS] * circles[k, RADIUS],
     ):
-        x, y, z = line[0] + t * line[3], line[1] + t * line[4], line[2] + t * line[5]
+        x, y, z = line[X] + t * line[DX], line[Y] + t * line[DY], line[Z] + t * line[DZ]
         count = add_break(circles, planes, x, y, z, slack, breaks, count)
     return count
 
 
 @helper
-def breaks_of_planes(
+def add_breaks_of_planes(
     circles: FloatArray,
     planes: FloatArray,
     cuts: FloatArray,
@@ -147,40 +156,44 @@ def breaks_of_planes(
     breaks: FloatArray,
     count: int,
 ) -> int:
-    """Add the vertices on the lines in which two planes meet."""
+    """Add vertices on the lines in which two planes meet."""
     n, m = circles.shape[0], planes.shape[0]
     line = np.zeros(6)
     for p in range(m):
         for q in range(p + 1, m):
-            x, y, z = circles[0, 0], circles[0, 1], circles[0, 2]
-            sine = line_of_planes(cuts[p], cuts[q], x, y, z, line)
+            x, y, z = circles[0, X], circles[0, Y], circles[0, Z]
+            sine = write_line_of_planes(cuts[p], cuts[q], x, y, z, line)
             if sine == 0.0:
                 continue
             slack = slack_at(size, sine)
-            if abs(line[3]) <= PARALLEL:
+            if abs(line[DX]) <= PARALLEL:
                 # The whole line lies in one slice.
-                x, y, z = line[0], line[1], line[2]
+                x, y, z = line[X], line[Y], line[Z]
                 count = add_break(circles, planes, x, y, z, math.inf, breaks, count)
             for k in range(n):
-                count = breaks_on_line(circles, planes, line, k, slack, breaks, count)
+                count = add_breaks_on_line(circles, planes, line, k, slack, breaks, count)
             for k in range(q + 1, m):
-                steep = cuts[k, 0] * line[3] + cuts[k, 1] * line[4] + cuts[k, 2] * line[5]
+                steep = cuts[k, X] * line[DX] + cuts[k, Y] * line[DY] + cuts[k, Z] * line[DZ]
                 if abs(steep) > PARALLEL:
-                    rest = cuts[k, 3] - (
-                        cuts[k, 0] * line[0] + cuts[k, 1] * line[1] + cuts[k, 2] * line[2]
+                    rest = cuts[k, OFFSET] - (
+                        cuts[k, X] * line[X] + cuts[k, Y] * line[Y] + cuts[k, Z] * line[Z]
                     )
                     t, near = rest / steep, slack_at(size, sine * abs(steep))
-                    x, y, z = line[0] + t * line[3], line[1] + t * line[4], line[2] + t * line[5]
+                    x, y, z = (
+                        line[X] + t * line[DX],
+                        line[Y] + t * line[DY],
+                        line[Z] + t * line[DZ],
+                    )
                     count = add_break(circles, planes, x, y, z, near, breaks, count)
     return count
 
 
 @helper
-def root_between(a: FloatArray, low: float, high: float) -> float:
-    """Return the root of a polynomial (lowest power first) between ends of unlike signs."""
+def find_root(a: FloatArray, low: float, high: float) -> float:
+    """Return the root of a quartic (lowest power first) between ends where its signs differ."""
     rises = a[0] + high * (a[1] + high * (a[2] + high * (a[3] + high * a[4]))) > 0.0
     t = 0.5 * (low + high)
-    for _ in range(STEPS):
+    for _ in range(MOST_STEPS):
         value = a[0] + t * (a[1] + t * (a[2] + t * (a[3] + t * a[4])))
         slope = a[1] + t * (2.0 * a[2] + t * (3.0 * a[3] + t * 4.0 * a[4]))
         if (value > 0.0) == rises:
@@ -198,10 +211,10 @@ def root_between(a: FloatArray, low: float, high: float) -> float:
 
 
 @helper
-def quartic_roots(a: FloatArray, roots: FloatArray) -> int:
-    """Write the real roots of a quartic (lowest power first) in [-1, 1]; their count.
+def write_quartic_roots(a: FloatArray, roots: FloatArray) -> int:
+    """Write the real roots of a quartic (lowest power first) in [-1, 1]; return their count.
 
-    Those of each derivative part those of the one before.
+    The roots of each derivative separate those of the polynomial before it.
     """
     stops, derived = np.zeros(6), np.zeros((5, 5))
     for power in range(5):
@@ -210,27 +223,27 @@ def quartic_roots(a: FloatArray, roots: FloatArray) -> int:
         for power in range(4):
             derived[k, power] = (power + 1) * derived[k - 1, power + 1]
     stops[0], stops[1] = -1.0, 1.0
-    many = 0
+    count = 0
     for k in range(3, -1, -1):
-        found = 0
+        new_count = 0
         b = derived[k]
         before = b[0] - b[1] + b[2] - b[3] + b[4]
-        for i in range(many + 1):
+        for i in range(count + 1):
             low, high = stops[i], stops[i + 1]
             after = b[0] + high * (b[1] + high * (b[2] + high * (b[3] + high * b[4])))
             if (before > 0.0) != (after > 0.0):
-                roots[found] = root_between(b, low, high)
-                found += 1
+                roots[new_count] = find_root(b, low, high)
+                new_count += 1
             before = after
-        many = found
-        for i in range(many):
+        count = new_count
+        for i in range(count):
             stops[i + 1] = roots[i]
-        stops[many + 1] = 1.0
-    return many
+        stops[count + 1] = 1.0
+    return count
 
 
 @helper
-def breaks_of_circle(
+def add_breaks_of_circle(
     circles: FloatArray,
     planes: FloatArray,
     ball: int,
@@ -239,39 +252,39 @@ def breaks_of_circle(
     breaks: FloatArray,
     count: int,
 ) -> int:
-    """Add where the circle in which a plane cuts a ball crosses cylinders."""
-    nx, ny, nz = cut[0], cut[1], cut[2]
+    """Add vertices where the circle in which a plane cuts a sphere meets cylinders."""
+    nx, ny, nz = cut[X], cut[Y], cut[Z]
     across = math.sqrt(ny * ny + nz * nz)
-    level = cut[3] - nx * circles[ball, 0] - ny * circles[ball, 1] - nz * circles[ball, 2]
-    square = (circles[ball, 3] - level) * (circles[ball, 3] + level)
+    level = cut[OFFSET] - nx * circles[ball, X] - ny * circles[ball, Y] - nz * circles[ball, Z]
+    square = (circles[ball, RADIUS] - level) * (circles[ball, RADIUS] + level)
     if across <= PARALLEL or square <= 0.0:
         return count
     r = math.sqrt(square)
     cx, cy, cz = (
-        circles[ball, 0] + level * nx,
-        circles[ball, 1] + level * ny,
-        circles[ball, 2] + level * nz,
+        circles[ball, X] + level * nx,
+        circles[ball, Y] + level * ny,
+        circles[ball, Z] + level * nz,
     )
     # Seen along x it is an ellipse: r along e, and r |nx| along f.
     fy, fz = ny / across, nz / across
     ey, ez = fz, -fy
     a, roots = np.zeros(5), np.zeros(4)
     for k in range(circles.shape[0]):
-        if circles[k, 4] > 0.0:
+        if circles[k, IS_BALL] > 0.0:
             continue
-        dy, dz, radius = circles[k, 1] - cy, circles[k, 2] - cz, circles[k, 3]
+        dy, dz, radius = circles[k, Y] - cy, circles[k, Z] - cz, circles[k, RADIUS]
         u, v = dy * ey + dz * ez, dy * fy + dz * fz
         if abs(math.sqrt(u * u + v * v) - radius) > r:
             continue
         rest = u * u + v * v - radius * radius
-        # Half the circle each, as (2t, 1 - t²) / (1 + t²), so that t stays within one.
+        # Each half of the circle is (2t, 1 - t²) / (1 + t²), so that t stays within [-1, 1].
         for half in (-1.0, 1.0):
             tall = -half * nx * r
             a[0] = tall * tall - 2.0 * tall * v + rest
             a[4] = tall * tall + 2.0 * tall * v + rest
             a[2] = 4.0 * r * r - 2.0 * tall * tall + 2.0 * rest
             a[1] = a[3] = -4.0 * r * u
-            for i in range(quartic_roots(a, roots)):
+            for i in range(write_quartic_roots(a, roots)):
                 t = roots[i]
                 sine, cosine = 2.0 * t / (1.0 + t * t), half * (1.0 - t * t) / (1.0 + t * t)
                 x = cx + r * across * cosine
@@ -282,7 +295,7 @@ def breaks_of_circle(
 
 
 @helper
-def breaks_on_balls(
+def add_breaks_on_spheres(
     circles: FloatArray,
     planes: FloatArray,
     cuts: FloatArray,
@@ -290,56 +303,58 @@ def breaks_on_balls(
     breaks: FloatArray,
     count: int,
 ) -> int:
-    """Add the vertices on the circles in which two balls, or a ball and a plane, meet."""
+    """Add vertices on the circles in which two spheres, or a sphere and a plane, meet."""
     n, m = circles.shape[0], planes.shape[0]
     line = np.zeros(6)
     sines = np.ones(m + n)
     for i in range(n):
-        if circles[i, 4] == 0.0:
+        if circles[i, IS_BALL] == 0.0:
             continue
-        x, y, z = circles[i, 0], circles[i, 1], circles[i, 2]
+        x, y, z = circles[i, X], circles[i, Y], circles[i, Z]
         for j in range(i + 1, n):
-            # The plane that holds the circle of two balls.
-            dx, dy, dz = circles[j, 0] - x, circles[j, 1] - y, circles[j, 2] - z
+            # The plane of the circle in which two spheres meet.
+            dx, dy, dz = circles[j, X] - x, circles[j, Y] - y, circles[j, Z] - z
             distance = math.sqrt(dx * dx + dy * dy + dz * dz)
-            sines[m + j] = distance / size if circles[j, 4] > 0.0 else 0.0
+            sines[m + j] = distance / size if circles[j, IS_BALL] > 0.0 else 0.0
             if sines[m + j] > 0.0:
-                powers = (circles[i, 3] - circles[j, 3]) * (circles[i, 3] + circles[j, 3])
+                powers = (circles[i, RADIUS] - circles[j, RADIUS]) * (
+                    circles[i, RADIUS] + circles[j, RADIUS]
+                )
                 cut = cuts[m + j]
-                cut[0], cut[1], cut[2] = dx / distance, dy / distance, dz / distance
-                cut[3] = 0.5 * (distance + powers / distance)
-                cut[3] += cut[0] * x + cut[1] * y + cut[2] * z
+                cut[X], cut[Y], cut[Z] = dx / distance, dy / distance, dz / distance
+                cut[OFFSET] = 0.5 * (distance + powers / distance)
+                cut[OFFSET] += cut[X] * x + cut[Y] * y + cut[Z] * z
         for p in range(m + n):
-            if (p < m and planes[p, 0] == 0.0) or m <= p <= m + i or sines[p] == 0.0:
+            if (p < m and planes[p, X] == 0.0) or m <= p <= m + i or sines[p] == 0.0:
                 continue
             slack = slack_at(size, sines[p])
-            count = breaks_of_circle(circles, planes, i, cuts[p], slack, breaks, count)
+            count = add_breaks_of_circle(circles, planes, i, cuts[p], slack, breaks, count)
             if p < m:
                 continue
-            # The planes through the circle with other planes, and with other balls.
+            # The plane of the circle meets other planes, and those of circles with other spheres.
             for q in range(m + n):
                 if m <= q <= p or sines[q] == 0.0:
                     continue
-                sine = line_of_planes(cuts[p], cuts[q], x, y, z, line)
+                sine = write_line_of_planes(cuts[p], cuts[q], x, y, z, line)
                 if sine > 0.0:
                     near = slack_at(size, sine * sines[p] * sines[q])
-                    count = breaks_on_line(circles, planes, line, i, near, breaks, count)
+                    count = add_breaks_on_line(circles, planes, line, i, near, breaks, count)
     return count
 
 
 @helper
-def breaks_at_vertices(
+def add_breaks_at_vertices(
     circles: FloatArray, planes: FloatArray, size: float, breaks: FloatArray, count: int
 ) -> int:
-    """Add the vertices of a region and return how many breaks there are."""
+    """Add breaks at the vertices of a region and return the count of breaks."""
     n, m = circles.shape[0], planes.shape[0]
-    # Planes with unit normals, then those through the circles that one ball makes with others.
+    # Planes with unit normals, then the planes of the circles in which one sphere meets others.
     cuts = np.zeros((m + n, 4))
     for k in range(m):
-        ax, ay, az = planes[k, 0], planes[k, 1], planes[k, 2]
+        ax, ay, az = planes[k, X], planes[k, Y], planes[k, Z]
         norm = math.sqrt(ax * ax + ay * ay + az * az)
-        cuts[k, 0], cuts[k, 1], cuts[k, 2] = ax / norm, ay / norm, az / norm
-        cuts[k, 3] = planes[k, 3] / norm
-    count = breaks_on_cylinders(circles, planes, size, breaks, count)
-    count = breaks_of_planes(circles, planes, cuts, size, breaks, count)
-    return breaks_on_balls(circles, planes, cuts, size, breaks, count)
+        cuts[k, X], cuts[k, Y], cuts[k, Z] = ax / norm, ay / norm, az / norm
+        cuts[k, OFFSET] = planes[k, OFFSET] / norm
+    count = add_breaks_on_cylinders(circles, planes, size, breaks, count)
+    count = add_breaks_of_planes(circles, planes, cuts, size, breaks, count)
+    return add_breaks_on_spheres(circles, planes, cuts, size, breaks, count)

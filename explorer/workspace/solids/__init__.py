@@ -1,1 +1,1 @@
-"""Workspaces as closed meshes; the only room that imports manifold3d."""
+"""Workspaces as closed meshes, made by booleans of manifold3d."""

@@ -1,6 +1,6 @@
-"""Meshes as the bodies of manifold3d, whose booleans combine them, and back.
+"""Conversion between meshes and the bodies of manifold3d, and unions of bodies.
 
-Faces of a body have an id each, which booleans keep.
+Each face of a body has an id, which booleans preserve.
 """
 
 from __future__ import annotations
@@ -20,7 +20,13 @@ if TYPE_CHECKING:
 
 
 def manifold_of(shape: Facets, ids: tuple[int, ...], counts: tuple[int, ...]) -> Manifold:
-    """Return a body; so many of its faces, in their order, have each of the ids."""
+    """Return a mesh as a body.
+
+    Args:
+        shape: Vertices and faces.
+        ids: Ids of the faces.
+        counts: Number of consecutive faces with each id.
+    """
     from manifold3d import Manifold, Mesh64
 
     vertices, faces = shape
@@ -35,7 +41,7 @@ def manifold_of(shape: Facets, ids: tuple[int, ...], counts: tuple[int, ...]) ->
 
 
 def mesh_of(body: Manifold) -> tuple[FloatArray, NDArray[np.int32], NDArray[np.uint32]]:
-    """Return vertices, faces, and of each face the id of the body that it comes from.
+    """Return the vertices, faces and ids of the faces of a body.
 
     Raises:
         ExplorerError: a boolean failed.
@@ -57,10 +63,10 @@ def mesh_of(body: Manifold) -> tuple[FloatArray, NDArray[np.int32], NDArray[np.u
 
 
 def union(bodies: Sequence[Manifold]) -> Manifold:
-    """Return the union, in pairs and pairs of pairs.
+    """Return the union of bodies, formed in pairs and pairs of pairs.
 
-    Surfaces that bodies share are cut along all their other surfaces. Without what a body
-    was made of those cuts heal, and without healing the faces of 64 bodies are millions.
+    Each boolean cuts surfaces that bodies share along their other surfaces. After `as_original`
+    the cuts can be simplified away; otherwise the union of 64 bodies has millions of faces.
     """
     while len(bodies) > 1:
         pairs = zip(bodies[::2], bodies[1::2], strict=False)

@@ -1,8 +1,8 @@
-"""Closed triangle meshes that stand for primitive solids where they meet a box.
+"""Tessellations of primitive solids near a box, as closed triangle meshes.
 
-Only the part of a ball or cylinder that faces the box is made, closed by a flat base
-beyond it. Facets keep within a chord tolerance of the true surface, and lie outside it as
-much as inside: corners are moved out, so that what inscribed facets lose is no volume lost.
+Only the part of a ball or cylinder that faces the box is tessellated, closed by a flat base
+beyond the box. Facets are within a chord tolerance of the true surface. Their corners are moved
+outwards until the volume is that of the true solid, which inscribed facets would fall short of.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 Facets: TypeAlias = tuple[FloatArray, IntArray]
 """Vertices (n, 3) and faces (m, 3), counter-clockwise from outside."""
 
-# No angle between neighbouring corners exceeds this, however coarse the tolerance.
+# The largest angle between neighbouring corners, however coarse the tolerance.
 WIDEST = math.radians(30.0)
-# Bases lie this share of the box's size beyond it.
+# The distance of bases from the box, as a share of its size.
 BEYOND = 0.05
-# The circumradius of a facet of a ball over the distance of its rings.
+# The circumradius of a facet of a ball over the distance of rings of corners.
 CIRCUMRADIUS = 0.78
-# Parts of a ball come in sizes of this ratio, so that one mesh serves many.
+# The ratio of the sizes of parts of a ball, so that one mesh serves many angles.
 RATIO = 2.0**0.125
 
 _CORNERS: BoolArray = np.array([[k >> 2 & 1, k >> 1 & 1, k & 1] for k in range(8)], dtype=np.bool_)
@@ -41,10 +41,10 @@ class Box:
     """An axis-aligned box.
 
     Attributes:
-        lows, highs: Its ends, shape (3,).
-        corners: Shape (8, 3).
-        middle: Shape (3,).
-        size: Its diagonal.
+        lows, highs: Ends, shape (3,).
+        corners: Corners, shape (8, 3).
+        middle: Middle, shape (3,).
+        size: Length of the diagonal.
     """
 
     def __init__(self, lows: FloatArray, highs: FloatArray) -> None:
@@ -71,22 +71,22 @@ class Box:
 
 
 def step_of(radius: float, tolerance: float) -> float:
-    """Return the angle between neighbouring corners whose chord is within the tolerance."""
+    """Return the angle in radians between neighbouring corners whose chord is within tolerance."""
     return min(WIDEST, 4.0 * math.asin(math.sqrt(min(0.25, 0.5 * tolerance / radius))))
 
 
 def facing(
     centre: FloatArray, radius: float, box: Box, tolerance: float
 ) -> tuple[FloatArray, float]:
-    """Return the direction from a centre to a box, and the angle about it that is needed.
+    """Return the unit direction from a centre to a box, and the angle about it to tessellate.
 
-    Beyond this angle the sphere is out of the box; π if all of it may be in.
+    Beyond this angle, in radians, the sphere is outside the box; it is π if all may be inside.
 
     Args:
-        centre: Shape (3,), or (2,) of a circle in y and z.
-        radius: Of the sphere or circle.
-        box: Which it may meet.
-        tolerance: By which facets may lie outside.
+        centre: Centre of a sphere, shape (3,), or of a circle in y and z, shape (2,).
+        radius: Radius of the sphere or circle.
+        box: Box near which facets are needed.
+        tolerance: Distance by which facets may lie outside the sphere.
     """
     corners = box.corners[:, 3 - len(centre) :]
     axes = np.eye(len(centre))
@@ -105,11 +105,11 @@ def ball(
     """Return the part of a ball within an angle of a direction, closed by a flat base.
 
     Args:
-        centre: Shape (3,).
-        radius: Of the ball.
-        towards: The direction, a unit vector (3,).
-        angle: What is needed at the least; π for the whole ball.
-        step: Between neighbouring corners, see `step_of`.
+        centre: Centre of the ball, shape (3,).
+        radius: Radius of the ball.
+        towards: Unit direction, shape (3,).
+        angle: Least angle in radians; π for the whole ball.
+        step: Angle between neighbouring corners, see `step_of`.
     """
     points, faces, outward = _unit_cap(*_cap_of(angle, step))
     frame = _frame(towards)
@@ -117,10 +117,10 @@ def ball(
 
 
 def ball_faces(angle: float, step: float) -> int:
-    """Return about how many faces such a part of a ball has."""
+    """Return the approximate number of faces of `ball` at an angle and a step."""
     size, rings = _cap_of(angle, step)
     widest = math.pi * RATIO**-size
-    # Facets are about equilateral, of a height that is the distance of the rings.
+    # Facets are about equilateral triangles whose height is the distance of the rings.
     return int(4.0 * math.pi * (1.0 - math.cos(widest)) / (widest / rings) ** 2 / 1.1547) + 8
 
 
@@ -130,19 +130,19 @@ def cylinder(
     """Return the part of a cylinder along x within an angle of a direction in y and z.
 
     Args:
-        centre: (y, z), shape (2,).
-        radius: Of the cylinder.
-        towards: The direction, a unit vector (2,).
-        angle: What is needed at the least; π for the whole cylinder.
-        step: Between neighbouring corners, see `step_of`.
-        box: Along which it reaches.
+        centre: (y, z) of the axis, shape (2,).
+        radius: Radius of the cylinder.
+        towards: Unit direction in y and z, shape (2,).
+        angle: Least angle in radians; π for the whole cylinder.
+        step: Angle between neighbouring corners, see `step_of`.
+        box: Box whose length along x the cylinder exceeds.
     """
     whole = angle >= math.pi
     count = max(3, math.ceil(2.0 * angle / step))
     turns = math.atan2(towards[1], towards[0]) + np.linspace(-angle, angle, count + 1)
     if whole:
         turns = turns[:-1]
-    outline = centre + radius * _outward(2.0 * angle / count) * np.column_stack(
+    outline = centre + radius * _outward_scale(2.0 * angle / count) * np.column_stack(
         [np.cos(turns), np.sin(turns)]
     )
     return prism(outline, box)
@@ -173,7 +173,7 @@ def prism(outline: FloatArray, box: Box) -> Facets:
 
 
 def half_space(normal: FloatArray, offset: float, box: Box) -> Facets:
-    """Return a block that holds what of the box, and around it, has normal · p <= offset."""
+    """Return a block that fills the half-space normal · p <= offset in and around a box."""
     length = float(np.linalg.norm(normal))
     unit = normal / length
     off = box.middle - (float(unit @ box.middle) - offset / length) * unit
@@ -183,13 +183,13 @@ def half_space(normal: FloatArray, offset: float, box: Box) -> Facets:
 
 
 def wedge(apex: FloatArray, axis: FloatArray, half_angle: float, box: Box) -> Facets:
-    """Return what of a wedge along x may lie in the box.
+    """Return the part of a wedge along x in and around a box.
 
     Args:
-        apex: Its edge, (y, z), shape (2,).
-        axis: Along its middle, a unit vector (2,).
-        half_angle: In radians, below a right angle.
-        box: Which it may meet.
+        apex: (y, z) of the edge, shape (2,).
+        axis: Unit direction of the middle plane in y and z, shape (2,).
+        half_angle: Half-angle in radians, below a right angle.
+        box: Box near which facets are needed.
     """
     width, height, wall = _far_rim(apex, half_angle, box)
     along, across = height * axis, width * np.array([-axis[1], axis[0]])
@@ -199,18 +199,18 @@ def wedge(apex: FloatArray, axis: FloatArray, half_angle: float, box: Box) -> Fa
 
 
 def cone(apex: FloatArray, axis: FloatArray, half_angle: float, step: float, box: Box) -> Facets:
-    """Return what of a cone may lie in the box.
+    """Return the part of a cone in and around a box.
 
     Args:
-        apex: Shape (3,).
-        axis: A unit vector (3,).
-        half_angle: In radians, below a right angle.
-        step: Between neighbouring corners of its rim, see `step_of`.
-        box: Which it may meet.
+        apex: Apex, shape (3,).
+        axis: Unit axis, shape (3,).
+        half_angle: Half-angle in radians, below a right angle.
+        step: Angle between neighbouring corners of the rim, see `step_of`.
+        box: Box near which facets are needed.
     """
     count = max(8, math.ceil(2.0 * math.pi / step))
     width, height, wall = _far_rim(apex, half_angle, box)
-    width *= _outward(2.0 * math.pi / count)
+    width *= _outward_scale(2.0 * math.pi / count)
     turns = 2.0 * math.pi / count * np.arange(count)
     rim = np.column_stack([width * np.cos(turns), width * np.sin(turns), np.full(count, height)])
     points = np.concatenate([[[0.0, 0.0, 0.0]], rim, rim + [0.0, 0.0, wall]])
@@ -229,7 +229,7 @@ def cone(apex: FloatArray, axis: FloatArray, half_angle: float, step: float, box
 
 
 def _far_rim(apex: FloatArray, half_angle: float, box: Box) -> tuple[float, float, float]:
-    """Return how wide and how far along a cone's rim is, and how long the wall beyond it.
+    """Return the radius and the height of a cone's rim, and the length of the wall beyond it.
 
     Wide cones need the wall, since a flat base beyond the box would be far too wide.
     """
@@ -238,13 +238,13 @@ def _far_rim(apex: FloatArray, half_angle: float, box: Box) -> tuple[float, floa
     return length * math.sin(half_angle), length * math.cos(half_angle), length
 
 
-def _outward(step: float) -> float:
-    """Return by how much to move the corners of a polygon out for the area of its circle."""
+def _outward_scale(step: float) -> float:
+    """Return the factor by which to scale a regular polygon to the area of its circle."""
     return math.sqrt(step / math.sin(step))
 
 
 def _frame(axis: FloatArray) -> FloatArray:
-    """Return a right-handed frame, as rows, whose third vector is a unit vector (3,)."""
+    """Return a right-handed frame, as rows, whose third row is a given unit vector (3,)."""
     first = np.zeros(3)
     first[int(np.argmin(np.abs(axis)))] = 1.0
     first -= float(first @ axis) * axis
@@ -253,7 +253,7 @@ def _frame(axis: FloatArray) -> FloatArray:
 
 
 def _cap_of(angle: float, step: float) -> tuple[int, int]:
-    """Return which size of cap holds an angle, and the number of its rings."""
+    """Return the size of the cap that holds an angle, and the number of its rings."""
     size = max(0, math.floor(math.log(math.pi / angle) / math.log(RATIO)))
     rings = math.ceil(math.pi * RATIO**-size * 2.0 * CIRCUMRADIUS / step)
     return size, max(rings, 3)
@@ -261,7 +261,7 @@ def _cap_of(angle: float, step: float) -> tuple[int, int]:
 
 @functools.lru_cache(maxsize=64)
 def _unit_cap(size: int, rings: int) -> tuple[FloatArray, IntArray, float]:
-    """Return points and faces of a cap about z, and by how much to move its corners out."""
+    """Return points and faces of a cap about z, and the factor to scale it to its volume."""
     widest = math.pi * RATIO**-size
     height = widest / rings
     tilts = height * np.arange(rings + 1)
@@ -273,15 +273,15 @@ def _unit_cap(size: int, rings: int) -> tuple[FloatArray, IntArray, float]:
         counts[-1] = 1
     first: IntArray = np.concatenate([[0], np.cumsum(counts)])
     tilt = np.repeat(tilts, counts)
-    turn = 2.0 * math.pi * _within(counts) / np.repeat(counts, counts)
+    turn = 2.0 * math.pi * _positions_in_groups(counts) / np.repeat(counts, counts)
     points = np.column_stack(
         [np.sin(tilt) * np.cos(turn), np.sin(tilt) * np.sin(turn), np.cos(tilt)]
     )
-    faces = _stitched(counts, first)
+    faces = _stitch_rings(counts, first)
     a, b, c = points[faces[:, 0]], points[faces[:, 1]], points[faces[:, 2]]
     squares = ((a - b) ** 2 + (b - c) ** 2 + (c - a) ** 2).sum(axis=1)
     areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    # A flat triangle on a sphere of radius one lies this deep on the average.
+    # Flat triangles lie below a sphere of radius one by this much on average.
     outward = 1.0 + float((areas * squares).sum() / areas.sum()) / 24.0
     if size > 0:
         last = int(counts[-1])
@@ -292,20 +292,24 @@ def _unit_cap(size: int, rings: int) -> tuple[FloatArray, IntArray, float]:
     return points, faces, outward
 
 
-def _stitched(counts: IntArray, first: IntArray) -> IntArray:
-    """Return the faces between neighbouring rings of evenly spread points.
+def _stitch_rings(counts: IntArray, first: IntArray) -> IntArray:
+    """Return the faces between neighbouring rings of evenly spaced points.
 
-    Walking around a pair of rings, the edge whose middle comes next makes a triangle with
-    the point that has been reached on the other ring.
+    Around a pair of rings, edges of both are taken in the order of their middles. Each makes a
+    triangle with the current point of the other ring.
     """
     pairs = np.arange(len(counts) - 1)
     edges = np.where(counts > 1, counts, 0)
     sides: list[tuple[IntArray, FloatArray, IntArray]] = []
     for side in (0, 1):
-        many = edges[pairs + side]
-        pair = np.repeat(pairs, many)
+        edge_counts = edges[pairs + side]
+        pair = np.repeat(pairs, edge_counts)
         sides.append(
-            (pair, (_within(many) + 0.5) / np.repeat(many, many), np.full(len(pair), side))
+            (
+                pair,
+                (_positions_in_groups(edge_counts) + 0.5) / np.repeat(edge_counts, edge_counts),
+                np.full(len(pair), side),
+            )
         )
     pair, middle, side = (np.concatenate(both) for both in zip(*sides, strict=True))
     order = np.lexsort((side, middle, pair))
@@ -326,7 +330,7 @@ def _stitched(counts: IntArray, first: IntArray) -> IntArray:
     return np.column_stack([at_inner, at_outer, beyond])
 
 
-def _within(counts: IntArray) -> IntArray:
-    """Return 0, 1, … of each group in turn, as many as it counts."""
+def _positions_in_groups(counts: IntArray) -> IntArray:
+    """Return 0, 1, …, count - 1 for each count, concatenated."""
     total = np.cumsum(counts)
     return np.asarray(np.arange(total[-1]) - np.repeat(total - counts, counts), dtype=np.int64)

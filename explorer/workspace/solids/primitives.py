@@ -1,7 +1,8 @@
-"""From limits to closed meshes: what of each limit's primitive solid meets the workspace.
+"""Primitives: the parts of the limits' solids near the workspace, to be tessellated.
 
-Everything is done in a frame in which the workspace has size one, so that designs of any
-size are tessellated alike. The limits cut a block, and those that hold all over it are left out.
+All lengths are in a frame in which the workspace has size one, so that designs of any size are
+tessellated alike. The primitives cut a block around the workspace; limits that hold everywhere in
+the block have no primitive.
 """
 
 from __future__ import annotations
@@ -15,8 +16,8 @@ import numpy as np
 
 from explorer.errors import InputError
 from explorer.numerics.arrays import FloatArray
-from explorer.workspace.limits.constraints import Cone, Constraint, HalfSpace, Round
-from explorer.workspace.limits.contraction import contracted
+from explorer.workspace.limits.constraints import BallOrCylinder, Cone, Constraint, HalfSpace
+from explorer.workspace.limits.contraction import contract_box
 from explorer.workspace.limits.region import region_of
 from explorer.workspace.slices.volume import bounds
 from explorer.workspace.solids.facets import (
@@ -32,42 +33,42 @@ from explorer.workspace.solids.facets import (
     wedge,
 )
 
-# Chords may be off by this share of the size of the workspace unless told otherwise.
+# The default tolerance of chords, as a share of the size of the workspace.
 DEFAULT_TOLERANCE = 1.0 / 500.0
-# They are never off by more than this share of it: coarser, facets would miss it.
+# The largest tolerance as such a share, since coarser facets would miss the workspace.
 COARSEST = 1.0 / 4.0
-# The most faces that primitives may have together.
+# The most faces of all primitives together.
 MOST_FACES = 2_000_000
-# A cone that is off a plane by less than this share of the tolerance is that plane.
+# A cone within this share of the tolerance of a plane is tessellated as the plane.
 FLAT = 1e-3
 
 
 @dataclass(frozen=True)
-class Piece:
-    """A primitive solid that is yet to be tessellated, in the frame of a workspace.
+class Primitive:
+    """A primitive solid, before its tessellation, in the frame of a workspace.
 
     Attributes:
-        name: Its limit, "" for the surroundings.
-        cuts: Whether the limit keeps p outside, or else inside.
-        faces: About how many it will have.
-        make: Makes them.
+        name: Name of the limit, "" for the block around the workspace.
+        is_cut: Whether positions outside satisfy the limit, rather than those inside.
+        faces: Approximate number of faces.
+        tessellate: Function that returns the vertices and faces.
     """
 
     name: str
-    cuts: bool
+    is_cut: bool
     faces: int
-    make: Callable[[], Facets]
+    tessellate: Callable[[], Facets]
 
 
 @dataclass(frozen=True)
 class Frame:
-    """Where workspaces are tessellated, and how finely.
+    """The frame in which workspaces are tessellated, and the tolerance.
 
     Attributes:
-        middle: Of the workspaces, in design units, shape (3,).
-        scale: Their largest extent, in design units.
+        middle: Middle of the workspaces in design units, shape (3,).
+        scale: Largest extent of the workspaces in design units; the unit of this frame.
         tolerance: Largest distance of a face from the true surface, in design units.
-        box: Holds them, in this frame.
+        box: Box that holds the workspaces, in this frame.
     """
 
     middle: FloatArray
@@ -81,25 +82,31 @@ class Frame:
         return self.tolerance / self.scale
 
     def finer(self, ratio: float) -> Frame:
-        """Return the same frame with a tolerance that is smaller by a ratio."""
+        """Return this frame with the tolerance divided by a ratio."""
         return replace(self, tolerance=self.tolerance / ratio)
 
-    def contracted(self, limits: Sequence[Constraint]) -> Frame | None:
-        """Return a frame around less that still holds what keeps all limits, as fine as if new.
+    def contract(self, limits: Sequence[Constraint]) -> Frame | None:
+        """Return a frame of a smaller box that still holds a workspace, at most as coarse.
 
-        None if nothing keeps them.
+        Its tolerance is the default of the smaller box if that is finer. None if no position
+        satisfies the limits of the workspace.
         """
-        ends = contracted(limits, self.back(self.box.lows), self.back(self.box.highs))
+        ends = contract_box(limits, *self.ends)
         if ends is None:
             return None
         scale = float((ends[1] - ends[0]).max())
         return frame_around(*ends, min(self.tolerance, DEFAULT_TOLERANCE * scale))
 
-    def to(self, points: FloatArray) -> FloatArray:
-        """Return points (..., 3) in this frame."""
+    @property
+    def ends(self) -> tuple[FloatArray, FloatArray]:
+        """(lows, highs) of the box in design units, each (3,)."""
+        return self.to_design(self.box.lows), self.to_design(self.box.highs)
+
+    def to_frame(self, points: FloatArray) -> FloatArray:
+        """Return points (..., 3) in design units as points of this frame."""
         return (points - self.middle) / self.scale
 
-    def back(self, points: FloatArray) -> FloatArray:
+    def to_design(self, points: FloatArray) -> FloatArray:
         """Return points (..., 3) of this frame in design units."""
         return points * self.scale + self.middle
 
@@ -107,13 +114,13 @@ class Frame:
 def frame_of(
     families: Sequence[Sequence[Constraint]], reach: float, tolerance: float | None
 ) -> Frame:
-    """Return the frame for the workspaces of families of limits.
+    """Return the frame for workspaces.
 
     Args:
-        families: Each with the limits of one workspace.
-        reach: Of the design, in design units.
-        tolerance: In design units; a 500th of the reach, or of the largest extent if that
-            is smaller, if None; a quarter of the largest extent at the most.
+        families: Limits of each workspace.
+        reach: Reach of the design, in design units.
+        tolerance: Tolerance in design units, at most a quarter of the largest extent; a 500th of
+            the reach or of the largest extent, whichever is smaller, if None.
 
     Raises:
         InputError: the tolerance is not positive.
@@ -121,7 +128,7 @@ def frame_of(
     if tolerance is not None and not (math.isfinite(tolerance) and tolerance > 0.0):
         raise InputError(f"the tolerance must be positive; got {tolerance:g}")
     boxes = [box for box in map(_box_of, families) if box is not None]
-    # Where all are empty any frame will do.
+    # If all workspaces are empty, any frame will do.
     lows = np.min([low for low, _ in boxes], axis=0) if boxes else np.zeros(3)
     highs = np.max([high for _, high in boxes], axis=0) if boxes else np.full(3, reach)
     scale = float((highs - lows).max())
@@ -130,43 +137,48 @@ def frame_of(
 
 
 def frame_around(lows: FloatArray, highs: FloatArray, tolerance: float) -> Frame:
-    """Return the frame for what lies in a box; all in design units."""
+    """Return the frame around a box; all arguments are in design units."""
     middle, scale = 0.5 * (lows + highs), float((highs - lows).max())
     return Frame(middle, scale, tolerance, Box((lows - middle) / scale, (highs - middle) / scale))
 
 
-def pieces_of(
+def primitives_of(
     limits: Sequence[Constraint], frame: Frame, *, contracted: bool = False
-) -> list[Piece]:
-    """Return the primitives whose intersection, less those that cut, keeps all limits.
+) -> list[Primitive]:
+    """Return the primitives of a workspace: their intersection, less those that are cut.
 
-    () if nothing does, as far as that is seen at once.
+    The list is empty if the boxes around the primitives already show that the workspace is.
 
     Args:
-        limits: Of one workspace.
-        frame: In which they are made.
-        contracted: Whether the frame's box holds this workspace more tightly than its limits say.
+        limits: Limits of the workspace.
+        frame: Frame of the primitives.
+        contracted: Whether the frame's box holds this workspace more tightly than the box of its
+            region.
     """
     ends = _box_of(limits)
     if ends is None:
         return []
     region = region_of(limits)
-    box = frame.box if contracted else Box(frame.to(ends[0]), frame.to(ends[1]))
-    # The box ends on surfaces of limits, on which side of them is up to rounding. The block
-    # goes beyond them, so that whether it keeps a limit is no question of rounding.
+    box = frame.box if contracted else Box(frame.to_frame(ends[0]), frame.to_frame(ends[1]))
+    # The box ends on surfaces of limits, to rounding. The block extends beyond them, so that
+    # rounding does not decide whether all of the block satisfies a limit.
     block = box.surroundings()
-    planes = [end for end in (region.of_low, region.of_high, *region.of_planes) if end is not None]
-    found = [Piece("", False, 12, block.mesh)]
-    for each in (
+    planes = [
+        end
+        for end in (region.low_limit, region.high_limit, *region.plane_limits)
+        if end is not None
+    ]
+    primitives = [Primitive("", False, 12, block.mesh)]
+    for primitive in (
         *(_half_space(plane, box, block, frame) for plane in planes),
-        *_rounds(region.of_rounds, box, block, frame),
+        *_balls_and_cylinders(region.circle_limits, box, block, frame),
         *(_cone(limit, frame) for limit in limits if isinstance(limit, Cone)),
     ):
-        if each is False:
+        if primitive is False:
             return []
-        if each is not True:
-            found.append(each)
-    return found
+        if primitive is not True:
+            primitives.append(primitive)
+    return primitives
 
 
 def _box_of(limits: Sequence[Constraint]) -> tuple[FloatArray, FloatArray] | None:
@@ -175,8 +187,8 @@ def _box_of(limits: Sequence[Constraint]) -> tuple[FloatArray, FloatArray] | Non
     return None if region.is_empty or not (lows < highs).all() else (lows, highs)
 
 
-def _half_space(plane: HalfSpace, box: Box, block: Box, frame: Frame) -> Piece | bool:
-    """Return the piece, True if all the block keeps it, or False if all the box breaks it."""
+def _half_space(plane: HalfSpace, box: Box, block: Box, frame: Frame) -> Primitive | bool:
+    """Return the primitive; True if the whole block satisfies it, False if the box violates it."""
     length = float(np.linalg.norm(plane.normal))
     normal = plane.normal / length
     offset = (plane.offset / length - float(normal @ frame.middle)) / frame.scale
@@ -184,66 +196,68 @@ def _half_space(plane: HalfSpace, box: Box, block: Box, frame: Frame) -> Piece |
         return True
     if float((box.corners @ normal).min()) >= offset:
         return False
-    return Piece(plane.name, False, 12, partial(half_space, normal, offset, frame.box))
+    return Primitive(plane.name, False, 12, partial(half_space, normal, offset, frame.box))
 
 
-def _rounds(rounds: Sequence[Round], box: Box, block: Box, frame: Frame) -> Iterator[Piece | bool]:
-    """Yield the pieces, True if all the block keeps one, or False if all the box breaks it."""
-    kin: dict[tuple[bool, bytes], list[Round]] = {}
-    for each in rounds:
-        kin.setdefault((each.is_ball, each.centre.tobytes()), []).append(each)
-    for group in kin.values():
-        # Concentric surfaces share a pattern, so that shells thinner than a chord are whole.
+def _balls_and_cylinders(
+    limits: Sequence[BallOrCylinder], box: Box, block: Box, frame: Frame
+) -> Iterator[Primitive | bool]:
+    """Yield each primitive; True if the whole block satisfies it, False if the box violates it."""
+    concentric: dict[tuple[bool, bytes], list[BallOrCylinder]] = {}
+    for limit in limits:
+        concentric.setdefault((limit.is_ball, limit.centre.tobytes()), []).append(limit)
+    for group in concentric.values():
+        # Concentric surfaces share a pattern of facets, so that thin shells have no holes.
         start = 0 if group[0].is_ball else 1
-        centre = frame.to(group[0].centre)[start:]
+        centre = frame.to_frame(group[0].centre)[start:]
         (near, far), beyond = box.distances(centre), block.distances(centre)[1]
-        bounding: list[tuple[Round, float]] = []
-        for each in group:
-            radius = each.radius / frame.scale
-            if radius <= near or radius > (beyond if each.inside else far):
-                yield (radius <= near) != each.inside
+        bounding: list[tuple[BallOrCylinder, float]] = []
+        for limit in group:
+            radius = limit.radius / frame.scale
+            if radius <= near or radius > (beyond if limit.inside else far):
+                yield (radius <= near) != limit.inside
             else:
-                bounding.append((each, radius))
+                bounding.append((limit, radius))
         if not bounding:
             continue
         parts = [facing(centre, radius, frame.box, frame.chord) for _, radius in bounding]
         angle = max(part[1] for part in parts)
         step = step_of(max(radius for _, radius in bounding), frame.chord)
-        for each, radius in bounding:
+        for limit, radius in bounding:
             towards = parts[0][0]
-            if each.is_ball:
+            if limit.is_ball:
                 faces = ball_faces(angle, step)
-                make = partial(ball, centre, radius, towards, angle, step)
+                tessellate = partial(ball, centre, radius, towards, angle, step)
             else:
                 faces = math.ceil(8.0 * angle / step)
-                make = partial(cylinder, centre, radius, towards, angle, step, frame.box)
-            yield Piece(each.name, not each.inside, faces, make)
+                tessellate = partial(cylinder, centre, radius, towards, angle, step, frame.box)
+            yield Primitive(limit.name, not limit.inside, faces, tessellate)
 
 
-def _cone(limit: Cone, frame: Frame) -> Piece | bool:
-    """Return the piece, or whether all positions or none keep the limit."""
-    apex, axis, angle = frame.to(limit.apex), limit.axis, limit.half_angle
+def _cone(limit: Cone, frame: Frame) -> Primitive | bool:
+    """Return the primitive; True if all positions satisfy the limit, False if none does."""
+    apex, axis, angle = frame.to_frame(limit.apex), limit.axis, limit.half_angle
     if limit.flat:
-        # The leg is perpendicular to x, so that only a section of its cone counts: a wedge.
+        # The leg is perpendicular to x, so only a section of its cone counts: a wedge.
         across = math.hypot(axis[1], axis[2])
         cosine = math.cos(angle)
         if abs(cosine) >= across:
             return cosine <= 0.0
         axis, angle = np.array([0.0, axis[1], axis[2]]) / across, math.acos(cosine / across)
-        # Its edge is a line along x: that point of it counts which is nearest.
+        # The edge of the wedge is a line along x, represented by its nearest point.
         apex = np.array([frame.box.middle[0], apex[1], apex[2]])
     if angle >= math.pi:
         return True
     farthest = frame.box.distances(apex)[1]
     if abs(math.cos(angle)) * farthest <= FLAT * frame.chord:
         offset = -float(axis @ apex)
-        return Piece(limit.name, False, 12, partial(half_space, -axis, offset, frame.box))
-    cuts = angle > 0.5 * math.pi
-    if cuts:
+        return Primitive(limit.name, False, 12, partial(half_space, -axis, offset, frame.box))
+    is_cut = angle > 0.5 * math.pi
+    if is_cut:
         axis, angle = -axis, math.pi - angle
     if limit.flat:
-        make = partial(wedge, apex[1:], axis[1:], angle, frame.box)
-        return Piece(limit.name, cuts, 16, make)
+        tessellate = partial(wedge, apex[1:], axis[1:], angle, frame.box)
+        return Primitive(limit.name, is_cut, 16, tessellate)
     step = step_of(farthest, frame.chord)
     faces = math.ceil(12.0 * math.pi / step)
-    return Piece(limit.name, cuts, faces, partial(cone, apex, axis, angle, step, frame.box))
+    return Primitive(limit.name, is_cut, faces, partial(cone, apex, axis, angle, step, frame.box))

@@ -1,4 +1,4 @@
-"""A closed mesh, such as of a workspace, whose faces remember what they come from."""
+"""Solids: closed meshes, such as those of workspaces, with the limit of each face."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ class Solid:
     """A closed mesh, in design units.
 
     Attributes:
-        vertices: Shape (n, 3).
+        vertices: Positions of the vertices, shape (n, 3).
         faces: Indices of vertices, counter-clockwise from outside, shape (m, 3).
-        limit_of_face: Which of the limits each face comes from, shape (m,); -1 for none, of which
-            there are only in a mesh that does not agree.
+        limit_of_face: Index in `limits` of the limit of each face, shape (m,). It is -1 for a face
+            that comes from no limit, which only a mesh that does not agree has.
         limits: Names of limits, such as "l1 maximum".
         tolerance: Largest distance of the faces from the true surface.
-        empty_because: The limits that empty it, see `explorer.workspace.slices.volume.Volume`; ()
-            if it is not empty.
-        agrees: Whether its volume agrees with the exact one, see
-            `explorer.workspace.solids.agreement`; of a part or hull whether that of the whole
-            does. None where no exact volume is known.
+        empty_because: Names of the limits that empty the workspace, see
+            `explorer.workspace.slices.volume.Volume`; () if the solid is not empty.
+        agrees: Whether the volume agrees with the exact one, see
+            `explorer.workspace.solids.agreement`. A part or hull takes the value of the whole.
+            None if no exact volume is known.
     """
 
     vertices: FloatArray
@@ -39,7 +39,7 @@ class Solid:
 
     @property
     def is_empty(self) -> bool:
-        """Whether it has no face; a workspace thinner than the tolerance may have none."""
+        """Whether the mesh has no face, as a workspace thinner than the tolerance may have."""
         return len(self.faces) == 0
 
     @cached_property
@@ -63,14 +63,14 @@ class Solid:
         if self.is_empty:
             return False
         edges = self.faces.astype(np.int64)[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-        many = len(self.vertices)
-        there, back = np.sort(edges @ [many, 1]), np.sort(edges @ [1, many])
+        count = len(self.vertices)
+        there, back = np.sort(edges @ [count, 1]), np.sort(edges @ [1, count])
         return bool((np.diff(there) > 0).all() and (there == back).all())
 
     def winding(self, point: FloatArray) -> float:
-        """Return how often the faces go around a point (3,): 1 within, 0 outside.
+        """Return the winding number of the faces about a point (3,): 1 inside, 0 outside.
 
-        By the solid angles of the faces: A. Van Oosterom and J. Strackee (1983).
+        It is the sum of the solid angles of the faces (A. Van Oosterom and J. Strackee, 1983).
         """
         if self.is_empty:
             return 0.0

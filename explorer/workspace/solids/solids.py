@@ -1,7 +1,6 @@
-"""Workspaces as watertight meshes: the limits' primitive solids, combined by booleans.
+"""Workspaces as watertight meshes: booleans of primitive solids by manifold3d.
 
-With `explorer.workspace.solids.booleans` the only module that uses manifold3d, but for
-`explorer.prototype.shapes`. Each face remembers the limit that it comes from.
+Each face of a mesh has the limit that it comes from.
 """
 
 from __future__ import annotations
@@ -20,16 +19,16 @@ from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.numerics.isosurface import surface_below_zero
 from explorer.workspace.limits.constraints import Constraint, HalfSpace, constraints
-from explorer.workspace.slices.volume import Volume, home_rotation, what_empties
-from explorer.workspace.solids.agreement import Exact, exact_of, exact_within
+from explorer.workspace.slices.volume import Volume, find_emptying_limits, home_rotation
+from explorer.workspace.solids.agreement import ExactVolume, exact_volume, exact_volume_within
 from explorer.workspace.solids.booleans import manifold_of, mesh_of, union
 from explorer.workspace.solids.primitives import (
     MOST_FACES,
     Frame,
-    Piece,
+    Primitive,
     frame_around,
     frame_of,
-    pieces_of,
+    primitives_of,
 )
 from explorer.workspace.solids.solid import Solid
 
@@ -38,14 +37,14 @@ if TYPE_CHECKING:
 
 CORNERS = np.array(list(itertools.product((0, 1), repeat=3)))
 
-# So many times finer is a mesh made again whose volume is not the exact one,
+# A mesh that does not agree is refined: its tolerance is divided by this,
 FINER = 4.0
-# as often as this, and as long as its primitives have no more faces than this together.
+# in at most so many rounds, as long as its primitives have at most so many faces together.
 MOST_ROUNDS = 10
 MOST_REFINED = 60_000
 
 HULL = "convex hull"
-"""What the faces of a convex hull come from."""
+"""The name in `Solid.limits` for the faces of a convex hull."""
 
 
 def workspace_solid(
@@ -57,16 +56,15 @@ def workspace_solid(
 ) -> Solid:
     """Return the constant-orientation workspace as a mesh.
 
-    Its volume is compared with the exact one. Where they disagree the mesh is made finer than
-    the tolerance asks for; `Solid.agrees` is False if they still disagree at `MOST_REFINED`
-    faces.
+    Its volume is compared with the exact one. If they disagree, the mesh is refined beyond the
+    tolerance; `Solid.agrees` is False if they still disagree at `MOST_REFINED` faces.
 
     Args:
         design: The manipulator.
         rotation: Platform to base, shape (3, 3); that of the home pose if None.
-        tolerance: Largest distance of a face from the true surface, in design units; a
-            500th of the reach, or of the workspace if that is smaller, if None.
-        volume: The exact volume if it is known already.
+        tolerance: Largest distance of a face from the true surface, in design units; a 500th of
+            the reach or of the workspace's extent, whichever is smaller, if None.
+        volume: The exact volume, if it has been computed before.
 
     Raises:
         InputError: not a rotation, or a tolerance that is not positive or too small.
@@ -74,22 +72,24 @@ def workspace_solid(
     """
     r = home_rotation(design) if rotation is None else checked_rotation(rotation)
     limits = constraints(design, r)
-    solid = _agreeing(limits, frame_of([limits], design.reach, tolerance), exact_of(limits, volume))
-    return replace(solid, empty_because=what_empties(limits)) if solid.is_empty else solid
+    solid = _make_agreeing_solid(
+        limits, frame_of([limits], design.reach, tolerance), exact_volume(limits, volume)
+    )
+    return replace(solid, empty_because=find_emptying_limits(limits)) if solid.is_empty else solid
 
 
 @dataclass(frozen=True)
 class Surface:
-    """Where a value on a grid of positions is zero; what is below zero is cut out.
+    """The zero level of a function that is known on a grid of positions.
 
     Attributes:
-        values: At the nodes, shape (nx, ny, nz).
-        lows: Of the first node, in design units, shape (3,).
-        step: Between nodes on each axis, in design units, shape (3,).
-        settle: Takes points of the interpolated surface and for each a kept node beside
-            it, both of shape (n, 3), and returns the points on the true surface.
-        names: What faces of it come from.
-        name_of: Takes points (n, 3) and returns the indices of their names, shape (n,).
+        values: Values at the nodes, shape (nx, ny, nz); the set below zero is removed.
+        lows: Position of the first node, in design units, shape (3,).
+        step: Distance of nodes on each axis, in design units, shape (3,).
+        settle: Function of points on the interpolated surface and of a remaining node beside each,
+            both of shape (n, 3), that returns points on the true surface.
+        names: Names in `Solid.limits` for faces of the surface.
+        name_of: Function of points (n, 3) that returns the indices of their names, shape (n,).
     """
 
     values: FloatArray
@@ -101,12 +101,12 @@ class Surface:
 
 
 def carved_solid(whole: Solid, surface: Surface | None, seed: FloatArray) -> Solid:
-    """Return the connected part that holds a position of what a surface leaves of a workspace.
+    """Return the connected part of a workspace that holds a position, cut by a surface.
 
     Args:
-        whole: What keeps the limits, as of `workspace_solid`.
-        surface: What else bounds it, if anything; it keeps to its own grid.
-        seed: The position, shape (3,).
+        whole: The workspace, as returned by `workspace_solid`.
+        surface: Surface that removes a part of the workspace, if any.
+        seed: Position in the part to return, shape (3,).
 
     Raises:
         ExplorerError: a boolean fails.
@@ -118,16 +118,16 @@ def carved_solid(whole: Solid, surface: Surface | None, seed: FloatArray) -> Sol
     names = whole.limits
     body, frame, origins = _body_of(whole)
     if surface is not None:
-        own = Manifold.reserve_ids(1)
-        origins[own] = len(names)
-        body = body - _below_zero(surface, frame, own)
-    made = [_solid(part, origins, frame, names) for part in body.decompose()]
-    parts = [replace(part, agrees=whole.agrees) for part in made]
-    if not parts:
-        return replace(_solid(body, origins, frame, names), agrees=whole.agrees)
+        face_id = Manifold.reserve_ids(1)
+        origins[face_id] = len(names)
+        body = body - _below_zero(surface, frame, face_id)
+    parts = [
+        replace(_solid_of(part, origins, frame, names), agrees=whole.agrees)
+        for part in body.decompose() or [body]
+    ]
 
     def nearness(part: Solid) -> tuple[float, float]:
-        # A seed on the surface is half within; one off by rounding goes to the nearest.
+        # Rounding may put a seed on the surface, or outside; the nearest vertex then decides.
         off = float(np.linalg.norm(part.vertices - seed, axis=1).min())
         return round(part.winding(seed), 1), -off
 
@@ -141,8 +141,8 @@ def carved_solid(whole: Solid, surface: Surface | None, seed: FloatArray) -> Sol
     return replace(solid, limit_of_face=of_face, limits=(*names, *surface.names))
 
 
-def _below_zero(surface: Surface, frame: Frame, own: int) -> Manifold:
-    """Return what a surface cuts out, as a body in a frame with an id of its own."""
+def _below_zero(surface: Surface, frame: Frame, face_id: int) -> Manifold:
+    """Return the set below zero of a surface as a body in a frame, with one id for its faces."""
     from manifold3d import Manifold
 
     below = np.argwhere(surface.values < 0.0)
@@ -155,14 +155,14 @@ def _below_zero(surface: Surface, frame: Frame, own: int) -> Manifold:
     where, faces = surface_below_zero(values)
     most = np.array(values.shape) - 2
     corners = np.clip(np.floor(where), 0, most).astype(np.int64)[:, None, :] + CORNERS
-    kept = values[corners[..., 0], corners[..., 1], corners[..., 2]].argmax(axis=1)
-    beside = corners[np.arange(len(where)), kept]
+    highest = values[corners[..., 0], corners[..., 1], corners[..., 2]].argmax(axis=1)
+    beside = corners[np.arange(len(where)), highest]
     points = surface.settle(lows + where * surface.step, lows + beside * surface.step)
-    return manifold_of((frame.to(points), faces), (own,), (len(faces),))
+    return manifold_of((frame.to_frame(points), faces), (face_id,), (len(faces),))
 
 
 def reachable_solid(design: Design, rotations: ArrayLike, tolerance: float | None = None) -> Solid:
-    """Return the positions that the platform can have in some of the orientations, as a mesh.
+    """Return the reachable workspace of some orientations, their union, as a mesh.
 
     Args:
         design: The manipulator.
@@ -176,19 +176,21 @@ def reachable_solid(design: Design, rotations: ArrayLike, tolerance: float | Non
     families = _families(design, rotations)
     frame = frame_of(families, design.reach, tolerance)
     names = _names(families)
-    bodies, _ = _bodies(families, frame, names)
+    bodies, _ = _make_bodies(families, frame, names)
     vertices, faces, _ = mesh_of(union(bodies))
-    points = frame.back(vertices)
+    points = frame.to_design(vertices)
     limits = [limit for family in families for limit in family]
-    solid = Solid(points, faces, _nearest(limits, points, faces, names), names, frame.tolerance)
+    solid = Solid(
+        points, faces, _nearest_limits(limits, points, faces, names), names, frame.tolerance
+    )
     if not solid.is_empty:
         return solid
-    because = dict.fromkeys(name for family in families for name in what_empties(family))
+    because = dict.fromkeys(name for family in families for name in find_emptying_limits(family))
     return replace(solid, empty_because=tuple(because))
 
 
 def dexterous_solid(design: Design, rotations: ArrayLike, tolerance: float | None = None) -> Solid:
-    """Return the positions that the platform can have in all of the orientations, as a mesh.
+    """Return the dexterous workspace of some orientations, their intersection, as a mesh.
 
     Args:
         design: The manipulator.
@@ -200,20 +202,20 @@ def dexterous_solid(design: Design, rotations: ArrayLike, tolerance: float | Non
         ExplorerError: a boolean fails.
     """
     limits = [limit for family in _families(design, rotations) for limit in family]
-    solid = _common(design, limits, tolerance)
+    solid = _make_common_solid(design, limits, tolerance)
     if not solid.is_empty:
         return solid
     names = _names([limits])
     alone = tuple(
         name
         for name in names
-        if not _common(design, [x for x in limits if x.name != name], tolerance).is_empty
+        if not _make_common_solid(design, [x for x in limits if x.name != name], tolerance).is_empty
     )
     return replace(solid, empty_because=alone or names)
 
 
 def convex_hull(solid: Solid) -> Solid:
-    """Return the convex hull of a mesh; every face of it comes from `HULL`.
+    """Return the convex hull of a mesh; the limit of all its faces is `HULL`.
 
     Raises:
         ExplorerError: the hull fails.
@@ -233,7 +235,7 @@ def convex_hull(solid: Solid) -> Solid:
 
 
 def cut_solid(solid: Solid, half_space: HalfSpace) -> Solid:
-    """Return what of a mesh lies in a half-space; faces in its plane come from its name.
+    """Return the part of a mesh in a half-space; the limit of faces in its plane is its name.
 
     Raises:
         ExplorerError: the boolean fails.
@@ -245,13 +247,13 @@ def cut_solid(solid: Solid, half_space: HalfSpace) -> Solid:
     x, y, z = (-half_space.normal / length).tolist()
     offset = (half_space.offset - float(half_space.normal @ frame.middle)) / (length * frame.scale)
     names = (*solid.limits, half_space.name)
-    part = _solid(body.trim_by_plane((x, y, z), -offset), origins, frame, names)
+    part = _solid_of(body.trim_by_plane((x, y, z), -offset), origins, frame, names)
     of_face = np.where(part.limit_of_face < 0, len(solid.limits), part.limit_of_face)
     return replace(part, limit_of_face=of_face, agrees=solid.agrees)
 
 
 def _body_of(solid: Solid) -> tuple[Manifold, Frame, dict[int, int]]:
-    """Return a mesh as a body, its frame, and the limits by the ids of its faces."""
+    """Return a mesh as a body, its frame, and the indices of limits by the ids of faces."""
     from manifold3d import Manifold
 
     lows, highs = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
@@ -259,7 +261,7 @@ def _body_of(solid: Solid) -> tuple[Manifold, Frame, dict[int, int]]:
     order = np.argsort(solid.limit_of_face, kind="stable")
     used, counts = np.unique(solid.limit_of_face, return_counts=True)
     first = Manifold.reserve_ids(len(used))
-    shape = frame.to(solid.vertices), solid.faces[order].astype(np.int64)
+    shape = frame.to_frame(solid.vertices), solid.faces[order].astype(np.int64)
     ids = tuple(range(first, first + len(used)))
     body = manifold_of(shape, ids, tuple(counts.tolist()))
     return body, frame, dict(zip(ids, used.tolist(), strict=True))
@@ -276,105 +278,114 @@ def _names(families: Sequence[Sequence[Constraint]]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(limit.name for limits in families for limit in limits))
 
 
-def _common(design: Design, limits: Sequence[Constraint], tolerance: float | None) -> Solid:
-    """Return what keeps all limits."""
-    return _mesh_within(limits, frame_of([limits], design.reach, tolerance))
+def _make_common_solid(
+    design: Design, limits: Sequence[Constraint], tolerance: float | None
+) -> Solid:
+    """Return the positions that satisfy all limits as a mesh."""
+    return _make_solid(limits, frame_of([limits], design.reach, tolerance))
 
 
-def _mesh_within(limits: Sequence[Constraint], frame: Frame, *, contracted: bool = False) -> Solid:
+def _make_solid(limits: Sequence[Constraint], frame: Frame, *, contracted: bool = False) -> Solid:
     names = _names([limits])
-    bodies, origins = _bodies([limits], frame, names, contracted=contracted)
-    return _solid(bodies[0], origins, frame, names)
+    bodies, origins = _make_bodies([limits], frame, names, contracted=contracted)
+    return _solid_of(bodies[0], origins, frame, names)
 
 
-def _agreeing(limits: Sequence[Constraint], frame: Frame, exact: Exact) -> Solid:
-    """Return what keeps all limits, as finely as the exact volume asks for."""
-    best = _mesh_within(limits, frame)
+def _make_agreeing_solid(limits: Sequence[Constraint], frame: Frame, exact: ExactVolume) -> Solid:
+    """Return a workspace as a mesh that agrees with the exact volume, if that is possible."""
+    best = _make_solid(limits, frame)
     if exact.is_settled_by(best):
         return replace(best, agrees=True)
-    # Facets are fine enough for the workspace if they are so for the smallest box around it.
-    finer = frame.contracted(limits)
+    # The tolerance has to suit the smallest box around the workspace.
+    finer = frame.contract(limits)
     if finer is None:
-        return _nothing(limits, frame)
-    exact = exact_within(limits, finer.back(finer.box.lows), finer.back(finer.box.highs))
+        return _empty_solid(limits, frame)
+    exact = exact_volume_within(limits, *finer.ends)
     for _ in range(MOST_ROUNDS):
-        pieces = pieces_of(limits, finer, contracted=True)
-        if exact.is_settled_by(best) or sum(piece.faces for piece in pieces) > MOST_REFINED:
+        primitives = primitives_of(limits, finer, contracted=True)
+        if (
+            exact.is_settled_by(best)
+            or sum(primitive.faces for primitive in primitives) > MOST_REFINED
+        ):
             break
-        solid = _mesh_within(limits, finer, contracted=True)
+        solid = _make_solid(limits, finer, contracted=True)
         if best.is_empty or exact.excess(solid) < exact.excess(best):
             best = solid
         finer = finer.finer(FINER)
     if exact.is_artefact(best):
-        return _nothing(limits, frame)
+        return _empty_solid(limits, frame)
     return replace(best, agrees=exact.excess(best) <= 0.0)
 
 
-def _nothing(limits: Sequence[Constraint], frame: Frame) -> Solid:
-    """Return an empty solid that is known to be right."""
+def _empty_solid(limits: Sequence[Constraint], frame: Frame) -> Solid:
+    """Return an empty solid that agrees with the exact volume."""
     faces, of_face = np.zeros((0, 3), dtype=np.int32), np.zeros(0, dtype=np.int64)
     names = _names([limits])
     return Solid(np.zeros((0, 3)), faces, of_face, names, frame.tolerance, agrees=True)
 
 
-def _bodies(
+def _make_bodies(
     families: Sequence[Sequence[Constraint]],
     frame: Frame,
     names: tuple[str, ...],
     *,
     contracted: bool = False,
 ) -> tuple[list[Manifold], dict[int, int]]:
-    """Return what keeps all limits of each family, and the limits by the ids of bodies."""
-    everything = [pieces_of(limits, frame, contracted=contracted) for limits in families]
-    faces = sum(piece.faces for pieces in everything for piece in pieces)
+    """Return each family's workspace as a body, and the indices of names by the ids of faces."""
+    everything = [primitives_of(limits, frame, contracted=contracted) for limits in families]
+    faces = sum(primitive.faces for primitives in everything for primitive in primitives)
     if faces > MOST_FACES:
-        # Faces of balls are as many as the tolerance is small, others fewer.
+        # The number of faces of a ball is inverse to the tolerance; other solids have fewer.
         least = frame.tolerance * faces / MOST_FACES
-        fewer = ", or the orientations fewer" if len(families) > 1 else ""
+        fewer = ", or there must be fewer orientations" if len(families) > 1 else ""
         raise InputError(
             f"a tolerance of {frame.tolerance:g} takes about {faces:.2g} triangles; at most "
             f"{MOST_FACES:,} are made, so it must be at least about {least:.2g}{fewer}"
         )
     origins: dict[int, int] = {}
-    return [_body(pieces, origins, names) for pieces in everything], origins
+    return [_make_body(primitives, origins, names) for primitives in everything], origins
 
 
-def _body(pieces: Sequence[Piece], origins: dict[int, int], names: tuple[str, ...]) -> Manifold:
+def _make_body(
+    primitives: Sequence[Primitive], origins: dict[int, int], names: tuple[str, ...]
+) -> Manifold:
     from manifold3d import Manifold, OpType
 
-    if not pieces:
+    if not primitives:
         return Manifold()
-    kept: list[Manifold] = []
+    common: list[Manifold] = []
     cut: list[Manifold] = []
-    for piece in pieces:
-        own = Manifold.reserve_ids(1)
-        if piece.name:
-            origins[own] = names.index(piece.name)
-        shape = piece.make()
-        made = manifold_of(shape, (own,), (len(shape[1]),))
-        (cut if piece.cuts else kept).append(made)
-    common = Manifold.batch_boolean(kept, OpType.Intersect)
-    return Manifold.batch_boolean([common, *cut], OpType.Subtract)
+    for primitive in primitives:
+        face_id = Manifold.reserve_ids(1)
+        if primitive.name:
+            origins[face_id] = names.index(primitive.name)
+        shape = primitive.tessellate()
+        body = manifold_of(shape, (face_id,), (len(shape[1]),))
+        (cut if primitive.is_cut else common).append(body)
+    whole = Manifold.batch_boolean(common, OpType.Intersect)
+    return Manifold.batch_boolean([whole, *cut], OpType.Subtract)
 
 
-def _nearest(
+def _nearest_limits(
     limits: Sequence[Constraint],
     vertices: FloatArray,
     faces: NDArray[np.int32],
     names: tuple[str, ...],
 ) -> IntArray:
-    """Return the limits on whose surfaces the faces lie, as indices of names, shape (m,)."""
-    found = np.zeros(len(faces), dtype=np.int64)
+    """Return the indices of the names of the limits on whose surfaces faces lie, shape (m,)."""
+    nearest = np.zeros(len(faces), dtype=np.int64)
     least = np.full(len(faces), np.inf)
     for limit in limits:
         off = limit.distance(vertices)[faces].max(axis=1)
-        found[off < least] = names.index(limit.name)
+        nearest[off < least] = names.index(limit.name)
         least = np.minimum(off, least)
-    return found
+    return nearest
 
 
-def _solid(body: Manifold, origins: dict[int, int], frame: Frame, names: tuple[str, ...]) -> Solid:
+def _solid_of(
+    body: Manifold, origins: dict[int, int], frame: Frame, names: tuple[str, ...]
+) -> Solid:
     vertices, faces, ids = mesh_of(body)
     which, inverse = np.unique(ids, return_inverse=True)
-    of_id = np.array([origins.get(int(each), -1) for each in which], dtype=np.int64)
-    return Solid(frame.back(vertices), faces, of_id[inverse], names, frame.tolerance)
+    of_id = np.array([origins.get(int(face_id), -1) for face_id in which], dtype=np.int64)
+    return Solid(frame.to_design(vertices), faces, of_id[inverse], names, frame.tolerance)

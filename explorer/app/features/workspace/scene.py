@@ -19,7 +19,13 @@ from explorer.app.widgets.colours import OUTLINE, Rgb, proximity_colour
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import scientific
 from explorer.singularity.colours import band_colours
-from explorer.workspace.limits.constraints import Cone, HalfSpace, Never, Round, constraints
+from explorer.workspace.limits.constraints import (
+    BallOrCylinder,
+    Cone,
+    HalfSpace,
+    Never,
+    constraints,
+)
 
 ArrayPair: TypeAlias = tuple[NDArray[np.float32], NDArray[np.uint32]]
 
@@ -186,7 +192,7 @@ def _scaled(shell: Shell, scale: float) -> ArrayPair:
     return vertices, np.asarray(shell.faces, dtype=np.uint32)
 
 
-def _nearest(limit: Round | HalfSpace, p: FloatArray) -> FloatArray:
+def _nearest(limit: BallOrCylinder | HalfSpace, p: FloatArray) -> FloatArray:
     """Return the place nearest to p on the surface of a limit."""
     if isinstance(limit, HalfSpace):
         excess = float(limit.normal @ p) - limit.offset

@@ -10,7 +10,7 @@ from explorer.export.report.drawings.mechanism import WIDTH, round_length, svg_d
 from explorer.export.report.drawings.slices import Slices
 from explorer.export.report.markup import coordinate, drawing_text, element, format_number
 from explorer.singularity.colours import BAND_EDGES, OUTLINE, band_colours, css
-from explorer.workspace.slices.fields import AXES
+from explorer.workspace.slices.axes import AXES
 
 # The space around a map that has ticks, and between maps.
 LEFT, RIGHT, TOP, BOTTOM = 42.0, 12.0, 26.0, 38.0

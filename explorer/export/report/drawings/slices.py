@@ -24,7 +24,8 @@ from explorer.singularity.colours import BAND_EDGES, OUTLINE, WARN_SHARE, band_c
 from explorer.singularity.ellipsoids import planes_of_singularity
 from explorer.workspace.limits.constraints import constraints
 from explorer.workspace.limits.region import region_of
-from explorer.workspace.slices.fields import AXES, slice_field
+from explorer.workspace.slices.axes import AXES
+from explorer.workspace.slices.fields import slice_field
 from explorer.workspace.slices.outline import Edge, Outline, slice_outline
 from explorer.workspace.slices.volume import bounds
 

@@ -1,0 +1,224 @@
+"""Safe shares of a move: up to which share of it no limit and no clearance can be violated.
+
+The slack of each limit and each clearance shrinks no faster than points of the platform move, and
+`write_speeds` bounds their speeds over the whole move.
+"""
+
+from __future__ import annotations
+
+import math
+
+from explorer.legs.segments import closest_shares, minus, square_at
+from explorer.numerics.arrays import FloatArray
+from explorer.numerics.compiled import helper
+from explorer.workspace.limits.valid_poses import (
+    AXIS_X,
+    AXIS_Y,
+    AXIS_Z,
+    B1,
+    B2,
+    B3,
+    BOX_HIGHS,
+    BOX_LOWS,
+    COSINE,
+    GAP,
+    GUIDE_HIGH,
+    GUIDE_LOW,
+    LEG,
+    LENGTH_HIGHS,
+    LENGTH_LOWS,
+    MARGIN,
+    RADII,
+    SIGNS,
+    SINE,
+    TURNS,
+    carriages_apart,
+    vector,
+)
+
+# The share of the tolerance by which signs and clearances must hold on the way, to be certain.
+LEAST_SHARE = 0.01
+# Columns of the speeds over a move: of the platform ends of the four legs, the angle, the three
+# margins, b4 on each axis, and the distance of the carriages.
+LEG_SPEEDS, TURN_SPEED, MARGIN_SPEEDS, BOX_SPEEDS, GAP_SPEED, SPEEDS = 0, 4, 5, 8, 11, 12
+
+
+@helper
+def lasting_share(slack: float, rate: float) -> float:
+    """Return the share of a move after which a slack that shrinks at a rate is zero."""
+    return slack / rate if rate > 0.0 else math.inf
+
+
+@helper
+def safe_share(left: float, rate: float, tolerance: float) -> float:
+    """Return the share of a move over which a limit holds to a tolerance; −1 if it fails here."""
+    # Half of the tolerance remains for a step.
+    if left < -0.5 * tolerance:
+        return -1.0
+    return lasting_share(left + tolerance, rate)
+
+
+@helper
+def safe_share_of_limits(
+    row: FloatArray,
+    p: FloatArray,
+    r: FloatArray,
+    base: FloatArray,
+    ends: FloatArray,
+    speeds: FloatArray,
+    tolerance: float,
+) -> float:
+    """Return the share of a move from here on over which all limits are certain to hold.
+
+    Args:
+        row: Row of the rules.
+        p: Position here, shape (3,).
+        r: Rotation here, shape (3, 3).
+        base: Base ends of the legs here, shape (4, 3).
+        ends: Platform ends of the legs here, shape (4, 3).
+        speeds: Bounds of the speeds, see `write_speeds`.
+        tolerance: Length by which limits may be exceeded.
+
+    Returns:
+        The share; −1 if a limit fails here.
+    """
+    share = math.inf
+    for i in range(3):
+        left = min(p[i] - row[BOX_LOWS + i], row[BOX_HIGHS + i] - p[i])
+        share = min(share, safe_share(left, speeds[BOX_SPEEDS + i], tolerance))
+    least = row[MARGIN]
+    if least > -math.inf:
+        delta1 = -(r[0, 2] * p[0] + r[1, 2] * p[1] + r[2, 2] * p[2])
+        delta2 = r[1, 0] * p[2] - r[2, 0] * p[1]
+        left1, left2 = row[SIGNS] * delta1 - least, row[SIGNS + 1] * delta2 - least
+        left3 = row[SIGNS + 2] * p[2] - least
+        if least < 2.0 * tolerance:
+            # Only the signs are demanded, and they must be certain.
+            if min(left1, left2, left3) < LEAST_SHARE * tolerance:
+                return -1.0
+            share = min(share, lasting_share(left1, speeds[MARGIN_SPEEDS]))
+            share = min(
+                share,
+                lasting_share(left2, speeds[MARGIN_SPEEDS + 1]),
+                lasting_share(left3, speeds[MARGIN_SPEEDS + 2]),
+            )
+        else:
+            share = min(share, safe_share(left1, speeds[MARGIN_SPEEDS], tolerance))
+            share = min(share, safe_share(left2, speeds[MARGIN_SPEEDS + 1], tolerance))
+            share = min(share, safe_share(left3, speeds[MARGIN_SPEEDS + 2], tolerance))
+    d1, d3 = ends[1, 0], ends[2, 0]
+    left = min(d1 - row[GUIDE_LOW], row[GUIDE_HIGH] - d1)
+    share = min(share, safe_share(left, speeds[LEG_SPEEDS + 1], tolerance))
+    left = min(d3 - row[GUIDE_LOW], row[GUIDE_HIGH] - d3)
+    share = min(share, safe_share(left, speeds[LEG_SPEEDS + 2], tolerance))
+    share = min(
+        share, safe_share(carriages_apart(row, d1, d3) - row[GAP], speeds[GAP_SPEED], tolerance)
+    )
+    for leg in range(4):
+        square = 0.0
+        for i in range(3):
+            square += (ends[leg, i] - base[leg, i]) ** 2
+        length = math.sqrt(square)
+        left = min(length - row[LENGTH_LOWS + leg], row[LENGTH_HIGHS + leg] - length)
+        share = min(share, safe_share(left, speeds[LEG_SPEEDS + leg], tolerance))
+    return share
+
+
+@helper
+def safe_share_of_cones(
+    cones: FloatArray,
+    r: FloatArray,
+    base: FloatArray,
+    ends: FloatArray,
+    speeds: FloatArray,
+    slack: float,
+) -> float:
+    """Return the share of a move over which all cones hold to a slack in radians; −1 if none."""
+    share = math.inf
+    for index in range(cones.shape[0]):
+        leg = int(cones[index, LEG]) - 1
+        if leg < 0:
+            return -1.0
+        x, y, z = cones[index, AXIS_X], cones[index, AXIS_Y], cones[index, AXIS_Z]
+        turning = 0.0
+        if cones[index, TURNS] > 0.0:
+            turning = speeds[TURN_SPEED]
+            x, y, z = (
+                r[0, 0] * x + r[0, 1] * y + r[0, 2] * z,
+                r[1, 0] * x + r[1, 1] * y + r[1, 2] * z,
+                r[2, 0] * x + r[2, 1] * y + r[2, 2] * z,
+            )
+        a, b = ends[leg, 0] - base[leg, 0], ends[leg, 1] - base[leg, 1]
+        c = ends[leg, 2] - base[leg, 2]
+        length = math.sqrt(a * a + b * b + c * c)
+        across = math.sqrt((b * z - c * y) ** 2 + (c * x - a * z) ** 2 + (a * y - b * x) ** 2)
+        angle = math.atan2(across, a * x + b * y + c * z)
+        left = math.atan2(cones[index, SINE], cones[index, COSINE]) - angle
+        # Until its length has halved, the leg turns at most twice as fast.
+        if length == 0.0:
+            return -1.0
+        share = min(share, lasting_share(0.5 * length, speeds[LEG_SPEEDS + leg]))
+        share = min(
+            share, safe_share(left, turning + 2.0 * speeds[LEG_SPEEDS + leg] / length, slack)
+        )
+    return share
+
+
+@helper
+def safe_share_of_clearances(
+    row: FloatArray, base: FloatArray, ends: FloatArray, speeds: FloatArray, least: float
+) -> float:
+    """Return the share of a move over which no legs collide; −1 if they are closer than `least`."""
+    share = math.inf
+    pair = RADII
+    for i in range(3):
+        for j in range(i + 1, 4):
+            radius = row[pair]
+            pair += 1
+            if radius < 0.0:
+                continue
+            start, other = vector(base, i), vector(base, j)
+            u, v = minus(vector(ends, i), start), minus(vector(ends, j), other)
+            w = minus(start, other)
+            s, t = closest_shares(u, v, w)
+            left = math.sqrt(square_at(s, t, u, v, w)) - radius
+            if left < least:
+                return -1.0
+            share = min(share, lasting_share(left, speeds[LEG_SPEEDS + i] + speeds[LEG_SPEEDS + j]))
+    return share
+
+
+@helper
+def write_speeds(
+    row: FloatArray,
+    p: FloatArray,
+    r: FloatArray,
+    step: FloatArray,
+    axis: FloatArray,
+    angle: float,
+    speeds: FloatArray,
+) -> None:
+    """Write upper bounds of the speeds over a move, per share of it, shape (SPEEDS,)."""
+    forward = math.sqrt(step[0] ** 2 + step[1] ** 2 + step[2] ** 2)
+    ends = ((row[B1], row[B1 + 1]), (row[B2], 0.0), (row[B3], 0.0), (0.0, 0.0))
+    for leg in range(4):
+        x = ends[leg][0] * r[0, 0] + ends[leg][1] * r[0, 1]
+        y = ends[leg][0] * r[1, 0] + ends[leg][1] * r[1, 1]
+        z = ends[leg][0] * r[2, 0] + ends[leg][1] * r[2, 1]
+        a = axis[1] * z - axis[2] * y
+        b = axis[2] * x - axis[0] * z
+        c = axis[0] * y - axis[1] * x
+        speeds[LEG_SPEEDS + leg] = forward + angle * math.sqrt(a * a + b * b + c * c)
+    speeds[TURN_SPEED] = angle
+    # On its line b4 is farthest from a1 at one of the ends.
+    far = 0.0
+    for end in range(2):
+        square = 0.0
+        for i in range(3):
+            square += (p[i] + end * step[i]) ** 2
+        far = max(far, math.sqrt(square))
+    speeds[MARGIN_SPEEDS] = speeds[MARGIN_SPEEDS + 1] = forward + angle * far
+    for i in range(3):
+        speeds[BOX_SPEEDS + i] = abs(step[i])
+    speeds[MARGIN_SPEEDS + 2] = speeds[BOX_SPEEDS + 2]
+    speeds[GAP_SPEED] = angle * abs(row[B3] - row[B2])

@@ -1,0 +1,159 @@
+"""Solids made of others: halves, hulls, and workspaces over several orientations."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from limited_designs import ordinary_case
+from meshes import assert_lies_on_its_limits, corners_of, euler_characteristic
+
+from explorer import PRESETS, ExplorerError
+from explorer.mechanism.pose import rotation_from_yaw_pitch_roll
+from explorer.numerics.arrays import FloatArray
+from explorer.workspace.limits.constraints import HalfSpace, constraints
+from explorer.workspace.slices.volume import home_rotation
+from explorer.workspace.solids.solids import (
+    HULL,
+    Solid,
+    convex_hull,
+    cut_solid,
+    dexterous_solid,
+    reachable_solid,
+    workspace_solid,
+)
+
+pytestmark = pytest.mark.usefixtures("warm_kernels")
+
+OPTIMAL = PRESETS["paper-optimal"]
+YAWS: FloatArray = rotation_from_yaw_pitch_roll([(yaw, 4.0, -3.0) for yaw in (-85.0, -73.1, -60.0)])
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_cut_divides_a_solid_in_two(seed: int) -> None:
+    design, rotation = ordinary_case(seed)
+    solid = workspace_solid(design, rotation)
+    rng = np.random.default_rng(seed)
+    normal: FloatArray = 3.0 * rng.normal(size=3)
+    heights = solid.vertices @ normal
+    level = float(rng.uniform(float(heights.min()), float(heights.max())))
+    below = cut_solid(solid, HalfSpace("cut", normal, level))
+    above = cut_solid(solid, HalfSpace("cut", -normal, -level))
+    assert below.volume + above.volume == pytest.approx(solid.volume, rel=1e-9)
+    for part, sign in ((below, 1.0), (above, -1.0)):
+        assert part.is_watertight
+        assert (sign * (part.vertices @ normal - level) <= 1e-9 * np.abs(heights).max()).all()
+        # Faces in the plane are the cut's, and the others those of the limits as before.
+        assert part.limits == (*solid.limits, "cut")
+        in_plane = (np.abs(part.vertices @ normal - level) <= 1e-9 * np.abs(heights).max())[
+            part.faces
+        ].all(axis=1)
+        np.testing.assert_array_equal(part.limit_of_face == len(solid.limits), in_plane)
+        kept = Solid(
+            part.vertices,
+            part.faces[~in_plane],
+            part.limit_of_face[~in_plane],
+            solid.limits,
+            solid.tolerance,
+        )
+        assert_lies_on_its_limits(kept, design, rotation)
+
+
+def test_cut_beside_a_solid_returns_all_of_it_or_nothing() -> None:
+    solid = workspace_solid(OPTIMAL)
+    up = np.array([0.0, 0.0, 1.0])
+    assert cut_solid(solid, HalfSpace("cut", up, 30.0)).volume == pytest.approx(solid.volume)
+    nothing = cut_solid(solid, HalfSpace("cut", up, -1.0))
+    assert nothing.is_empty
+    assert cut_solid(nothing, HalfSpace("cut", up, 1.0)).is_empty
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_hull_is_convex_and_contains_the_solid(seed: int) -> None:
+    design, rotation = ordinary_case(seed)
+    solid = workspace_solid(design, rotation)
+    hull = convex_hull(solid)
+    assert hull.is_watertight
+    assert euler_characteristic(hull) == 2
+    assert hull.limits == (HULL,)
+    assert not hull.limit_of_face.any()
+    assert hull.volume >= solid.volume * (1.0 - 1e-12)
+    a, b, c = corners_of(hull)
+    normals = np.cross(b - a, c - a)
+    lengths = np.linalg.norm(normals, axis=1)
+    wide = lengths > 1e-9 * lengths.max()
+    normals = normals[wide] / lengths[wide, None]
+    heights = solid.vertices @ normals.T - (a[wide] * normals).sum(axis=1)
+    assert float(heights.max()) < 1e-6 * design.reach
+
+
+def test_reachable_and_dexterous_solids_are_union_and_intersection() -> None:
+    tolerance = 0.1
+    each = [workspace_solid(OPTIMAL, r, tolerance) for r in YAWS]
+    reachable = reachable_solid(OPTIMAL, YAWS, tolerance)
+    dexterous = dexterous_solid(OPTIMAL, YAWS, tolerance)
+    assert reachable.is_watertight
+    assert dexterous.is_watertight
+    rng = np.random.default_rng(0)
+    points = rng.uniform([-1.0, -13.0, -1.0], [21.0, 23.0, 19.0], (400, 3))
+    slack = np.stack(
+        [np.min([x.slack(points) for x in constraints(OPTIMAL, r)], axis=0) for r in YAWS]
+    )
+    clear = (np.abs(slack) > 2.0 * tolerance).all(axis=0)
+    points, kept = points[clear], slack[:, clear] > 0.0
+    assert kept.any(axis=0).sum() > 50
+    for solid, expected in ((reachable, kept.any(axis=0)), (dexterous, kept.all(axis=0))):
+        windings = [solid.winding(point) for point in points]
+        np.testing.assert_allclose(windings, expected, atol=1e-6)
+    volumes = [solid.volume for solid in each]
+    assert reachable.volume > max(volumes)
+    assert dexterous.volume < min(volumes)
+
+
+def test_reachable_and_dexterous_solids_of_one_orientation_are_its_workspace() -> None:
+    one = workspace_solid(OPTIMAL)
+    same = np.array([home_rotation(OPTIMAL)] * 3)
+    for family in (reachable_solid(OPTIMAL, same), dexterous_solid(OPTIMAL, same)):
+        assert family.volume == pytest.approx(one.volume, rel=1e-9)
+        assert {family.limits[k] for k in family.limit_of_face} == {
+            one.limits[k] for k in one.limit_of_face
+        }
+
+
+def test_reachable_and_dexterous_solids_lie_on_their_limits() -> None:
+    everything = [x for r in YAWS for x in constraints(OPTIMAL, r)]
+    for solid in (reachable_solid(OPTIMAL, YAWS), dexterous_solid(OPTIMAL, YAWS)):
+        for index, name in enumerate(solid.limits):
+            faces = solid.faces[solid.limit_of_face == index]
+            if len(faces):
+                corners = solid.vertices[faces]
+                off = [x.distance(corners).max(axis=1) for x in everything if x.name == name]
+                assert np.min(off, axis=0).max() <= solid.tolerance * (1.0 + 1e-6)
+
+
+def test_reachable_solid_of_many_orientations_has_few_faces() -> None:
+    angles = [
+        (yaw, pitch, roll)
+        for yaw in (-81.0, -73.0, -65.0)
+        for pitch in (-8.0, 0.0, 8.0)
+        for roll in (-8.0, 0.0, 8.0)
+    ]
+    solid = reachable_solid(OPTIMAL, rotation_from_yaw_pitch_roll(angles), 0.2)
+    assert solid.is_watertight
+    assert len(solid.faces) < 2000
+
+
+def test_reachable_and_dexterous_solids_empty_name_limits() -> None:
+    opposite = rotation_from_yaw_pitch_roll([(-73.1, 0.0, 0.0), (73.1, 0.0, 0.0)])
+    nothing = dexterous_solid(OPTIMAL, opposite)
+    assert nothing.is_empty
+    assert nothing.empty_because == ("margin δ2",)
+    assert not reachable_solid(OPTIMAL, opposite).is_empty
+    level = np.eye(3)[None]
+    assert reachable_solid(OPTIMAL, level).empty_because == ("margin δ2",)
+
+
+def test_solids_over_invalid_rotations_are_refused() -> None:
+    for rotations in (np.eye(3), np.zeros((0, 3, 3)), 2.0 * np.eye(3)[None], "x"):
+        for make in (reachable_solid, dexterous_solid):
+            with pytest.raises(ExplorerError):
+                make(OPTIMAL, rotations)
