@@ -1,4 +1,4 @@
-"""The files that come with the explorer, and the folder that it is imported from."""
+"""The files that are part of the explorer, and the folder of its sources."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from importlib.resources.abc import Traversable
 from pathlib import Path
 
 SOURCES = Path(__file__).parents[2]
-"""The folder of the package `explorer`, for processes that must import these very sources."""
+"""The folder that holds the package `explorer`, for processes that must import the same sources."""
 
 
 def packaged_files(folder: str, suffix: str) -> list[Traversable]:
-    """Return the files with a suffix in one of the folders that come along, ordered by name."""
+    """Return the files with a suffix in one of the explorer's folders, ordered by name."""
     # In a wheel the folders lie inside the package, in a checkout beside it.
     packaged = resources.files("explorer").joinpath(folder)
     place = packaged if packaged.is_dir() else SOURCES / "assets" / folder

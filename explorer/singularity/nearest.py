@@ -3,7 +3,7 @@
 The distance is the root-mean-square way of the platform's four points, see
 `explorer.mechanism.displacement`: it is in design units and asks for no length to weigh angles
 with. Each of the three is a global least with a proof beside it, see
-`explorer.singularity.nearest_plane` for κ1 and κ3 and `explorer.singularity.nearest_lines` for κ2.
+`explorer.singularity.nearest_plane` for δ1 and δ3 and `explorer.singularity.nearest_lines` for δ2.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ ROUNDING = 1e-14
 
 
 class NearestPoses(NamedTuple):
-    """The nearest singular poses of a batch of poses, in the order κ1, κ2, κ3.
+    """The nearest singular poses of a batch of poses, in the order δ1, δ2, δ3.
 
     Attributes:
         distance: The root-mean-square way of b1 to b4, shape (..., 3), in design units.
@@ -51,7 +51,7 @@ class NearestSingularity:
     """The nearest pose with one of the three incidences.
 
     Attributes:
-        incidence: 1, 2 or 3, for κ1, κ2 or κ3.
+        incidence: 1, 2 or 3, for δ1, δ2 or δ3.
         distance: The root-mean-square way of b1 to b4 to it, in design units; 0 for a pose
             that has the incidence, which is then its own nearest.
         bound: What the distance is proved not to undercut, see `NearestPoses`.
@@ -72,7 +72,7 @@ class NearestSingularity:
 def nearest_singularities(
     design: Design, pose: Pose
 ) -> tuple[NearestSingularity, NearestSingularity, NearestSingularity]:
-    """Return the nearest singular pose of each incidence, in the order κ1, κ2, κ3.
+    """Return the nearest singular pose of each incidence, in the order δ1, δ2, δ3.
 
     Args:
         design: The manipulator.
@@ -84,7 +84,7 @@ def nearest_singularities(
 def each_singularity(
     found: NearestPoses, pose: Pose
 ) -> tuple[NearestSingularity, NearestSingularity, NearestSingularity]:
-    """Return the nearest singular pose of each incidence, in the order κ1, κ2, κ3.
+    """Return the nearest singular pose of each incidence, in the order δ1, δ2, δ3.
 
     Args:
         found: The nearest singular poses of one pose.
@@ -164,7 +164,7 @@ def mean_way(
 def write_a1_on_plane(
     g: FloatArray, r: FloatArray, c: FloatArray, forms: FloatArray, q: FloatArray, s: FloatArray
 ) -> float:
-    """Write the nearest pose (q, s) with κ1 = 0 and return a bound of its square.
+    """Write the nearest pose (q, s) with δ1 = 0 and return a bound of its square.
 
     Args:
         g: The centroid in the base frame, shape (3,).
@@ -196,7 +196,7 @@ def write_a1_on_plane(
 def write_b4_on_plane(
     g: FloatArray, r: FloatArray, c: FloatArray, forms: FloatArray, q: FloatArray, s: FloatArray
 ) -> float:
-    """Write the nearest pose with κ3 = 0, as `write_a1_on_plane` does for κ1."""
+    """Write the nearest pose with δ3 = 0, as `write_a1_on_plane` does for δ1."""
     # x is the height of b4 with the centroid where it was.
     linear = forms[4]
     for i in range(3):

@@ -17,7 +17,7 @@ import explorer
 from explorer.legs import clearance, segments
 from explorer.numerics import kernel_cache
 from explorer.numerics.compiled import Kernel
-from explorer.numerics.kernel_cache import Cacheable, compile_all, fingerprint_of, when_cached
+from explorer.numerics.kernel_cache import Cacheable, await_cached, compile_all, fingerprint_of
 from explorer.optimise.defaults import make_problem
 from explorer.optimise.solver import optimise_design
 from explorer.workspace.slices import nodes
@@ -140,7 +140,7 @@ def test_kernel_compiled_by_another_process_is_awaited_not_compiled_again(
     ready: list[Stand] = []
     with lock.acquire():
         assert compile_all([stand.entry.label]) == kernel_cache.BUSY
-        waiter = threading.Thread(target=lambda: ready.extend(when_cached([stand], urgent=True)))
+        waiter = threading.Thread(target=lambda: ready.extend(await_cached([stand], urgent=True)))
         waiter.start()
         while not any((empty_cache / "requests").glob("*")):
             waiter.join(0.01)

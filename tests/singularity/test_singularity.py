@@ -75,7 +75,7 @@ def test_margins_have_the_derivative_that_their_planes_say(case: Case) -> None:
     p, r = case.position, case.rotation
     u, n = r[:, 0], r[:, 2]
     x, z = np.eye(3)[0], np.eye(3)[2]
-    # κ1 = -n·p, κ2 = (x̂ × u)·p = u·(p × x̂), κ3 = ẑ·p, with u' = ω × u and n' = ω × n.
+    # δ1 = -n·p, δ2 = (x̂ × u)·p = u·(p × x̂), δ3 = ẑ·p, with u' = ω × u and n' = ω × n.
     derivative = np.array(
         [
             [*(-n), *np.cross(p, n)],
@@ -174,7 +174,7 @@ def test_margins_are_the_incidence_distances(case: Case) -> None:
     sine = math.hypot(u[1], u[2])
     assume(sine > 1e-3)
     margin = np.abs(margins(case.position, case.rotation))
-    # κ2 is the distance of the lines times the sine between them.
+    # δ2 is the distance of the lines times the sine between them.
     expected = np.array(distances(case)) * np.array([1.0, sine, 1.0])
     assert_allclose(margin, expected, rtol=1e-8, atol=1e-10 * case.size)
 

@@ -11,7 +11,7 @@ from explorer.app.state.view import SingularView
 from explorer.errors import InputError
 from explorer.mechanism.margins import INCIDENCES
 from explorer.mechanism.pose import Pose
-from explorer.singularity.bruhat import Stratum, codimension, words
+from explorer.singularity.bruhat import Stratum, codimension, describe_stratum
 from explorer.singularity.nearest import nearest_singularities
 from explorer.singularity.nearest_stratum import nearest_in_stratum, seen_stratum
 
@@ -77,7 +77,9 @@ class GoToStratum:
             )
         here = seen_stratum(state.design, state.pose)
         if here == asked:
-            raise InputError(f"the pose lies in {name_of(asked)} already: {words(asked)}")
+            raise InputError(
+                f"the pose lies in {name_of(asked)} already: {describe_stratum(asked)}"
+            )
         if found.distance == 0.0:
             raise InputError(
                 f"the pose lies in {name_of(here)}, which {name_of(asked)} borders on: its poses "

@@ -30,7 +30,7 @@ from explorer.app.widgets.markup import BEYOND, CLOSE, DIM, WITHIN, fitted, scie
 from explorer.app.widgets.ranges import length_span
 from explorer.measures.snapshot import Snapshot
 from explorer.measures.verdict import DISTANCE_SHARE
-from explorer.mechanism.margins import INCIDENCES, mode_name, mode_words
+from explorer.mechanism.margins import INCIDENCES, describe_modes, mode_name
 from explorer.singularity.strata import GENERIC
 
 VERDICT_HINT = (
@@ -184,7 +184,7 @@ def _mode_rows(frame: Frame) -> tuple[tuple[str, str, str], ...]:
     between = "At a singular pose the modes meet whose signs differ where a margin is 0"
     return (
         ("Mode", snapshot.sign_words, hint),
-        ("", mode_words(snapshot.bordering_modes), between),
+        ("", describe_modes(snapshot.bordering_modes), between),
     )
 
 

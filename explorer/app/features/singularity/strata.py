@@ -25,8 +25,8 @@ from explorer.singularity.bruhat import (
     OF_INCIDENCES,
     Stratum,
     codimension,
+    describe_stratum,
     incidences,
-    words,
 )
 from explorer.singularity.strata import GENERIC, STRATA, inversions
 
@@ -53,7 +53,7 @@ class StrataPanel:
         self.buttons: dict[Stratum, viser.GuiButtonHandle] = {}
         for stratum in STRATA:
             if stratum != GENERIC:
-                label = f"Go to {name_of(stratum)}: {words(stratum)}"
+                label = f"Go to {name_of(stratum)}: {describe_stratum(stratum)}"
                 self.buttons[stratum] = self._controls.button(
                     label, f"{label}.", lambda w=stratum: GoToStratum(w)
                 )
@@ -148,7 +148,7 @@ def _sentence(stratum: Stratum) -> str:
     if stratum == GENERIC:
         return "Generic: no incidence, not singular."
     zero = ", ".join(f"κ{index}" for index in incidences(stratum))
-    return f"{zero} = 0: {words(stratum)}"
+    return f"{zero} = 0: {describe_stratum(stratum)}"
 
 
 def _distance(distance: float | None, digits: int, frame: Frame) -> str:
