@@ -111,7 +111,7 @@ def test_compiling_takes_requested_kernels_first_then_the_shortest(
     assert len(order) == len(stands)
 
 
-def test_request_of_another_version_is_left_to_it(
+def test_request_of_another_version_is_ignored(
     empty_cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (stand,), order = stand_in(monkeypatch, empty_cache, clearance.pair_rows)
@@ -175,7 +175,7 @@ np.testing.assert_allclose(found, same, rtol=1e-12)
     assert not any("pair_rows" in path.name for path in tmp_path.rglob("*"))
 
 
-def test_kernel_is_compiled_where_nothing_can_be_kept(tmp_path: Path) -> None:
+def test_kernel_is_compiled_if_the_cache_cannot_be_written(tmp_path: Path) -> None:
     blocked = tmp_path / "file"
     blocked.touch()
     program = """

@@ -24,7 +24,7 @@ NEGATIVE_ZERO = re.compile(r"(?<![\d.])[-−]0(\.0*)?(?![\d.e])")
 
 
 @given(st.floats(-1e6, 1e6), st.floats(1e-20, 1e20), st.integers(1, 8))
-def test_no_zero_has_a_sign(value: float, size: float, digits: int) -> None:
+def test_number_text_of_zero_has_no_sign(value: float, size: float, digits: int) -> None:
     for text in (
         fixed(value, digits),
         significant(value, digits, size=size),
@@ -38,7 +38,7 @@ def test_no_zero_has_a_sign(value: float, size: float, digits: int) -> None:
 
 
 @given(st.floats(1e-20, 1e20), st.floats(-1.0, 1.0))
-def test_rounding_beside_its_size_reads_zero_in_every_unit(size: float, share: float) -> None:
+def test_number_text_of_rounding_reads_zero_in_every_unit(size: float, share: float) -> None:
     rounding = 1e-15 * share * size
     assert scientific(rounding, size=size) == "0"
     assert settled(rounding, size) == 0.0
@@ -47,7 +47,7 @@ def test_rounding_beside_its_size_reads_zero_in_every_unit(size: float, share: f
 
 
 @given(st.floats(1e-20, 1e20))
-def test_small_numbers_that_are_no_rounding_are_kept(size: float) -> None:
+def test_number_text_of_small_number_above_rounding_is_kept(size: float) -> None:
     assert scientific(1e-9 * size, size=size) != "0"
     assert scientific(1e-30 * size) != "0"
     assert share(1.651e-9) == "1.65e−09"

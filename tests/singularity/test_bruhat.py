@@ -45,7 +45,7 @@ def test_the_edges_are_the_swaps_that_lower_the_dimension_by_one() -> None:
     assert sum(map(len, COVERED.values())) == 58
 
 
-def test_the_order_is_what_the_edges_lead_to() -> None:
+def test_order_is_the_transitive_closure_of_the_edges() -> None:
     def reached(w: Stratum) -> set[Stratum]:
         return {w}.union(*(reached(each) for each in COVERED[w]))
 
@@ -69,7 +69,7 @@ def test_the_essential_conditions_hold_in_the_closure_and_nowhere_else(w: Stratu
     assert all(each in WORDS for each in conditions(w))
 
 
-def test_every_stratum_has_words_of_its_own() -> None:
+def test_description_of_every_stratum_is_distinct() -> None:
     assert describe_stratum(GENERIC) == "generic"
     assert len({describe_stratum(w) for w in STRATA}) == 24
     assert describe_stratum((3, 4, 1, 2)) == "a1 on the platform plane, b4 on the base plane"

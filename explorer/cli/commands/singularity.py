@@ -110,8 +110,10 @@ def _measures(snapshot: Snapshot) -> str:
             ),
             (
                 "stratum",
-                f"{stratum}, dimension {snapshot.stratum_dimension}: "
-                f"{describe_stratum(snapshot.stratum)}",
+                (
+                    f"{stratum}, dimension {snapshot.stratum_dimension}: "
+                    f"{describe_stratum(snapshot.stratum)}"
+                ),
             ),
             ("det J", figure(snapshot.determinant, snapshot.determinant_size)),
             (
