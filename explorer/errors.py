@@ -47,7 +47,7 @@ class NoAnswerError(ExplorerError):
 
 
 class MissingExtraError(ExplorerError):
-    """An optional dependency that is not installed; the message says how to get it."""
+    """An optional dependency that is not installed; the message says how to install it."""
 
 
 class ServerError(ExplorerError):

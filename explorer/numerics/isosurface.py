@@ -64,8 +64,8 @@ def surface_below_zero(values: FloatArray) -> tuple[FloatArray, IntArray]:
     below = values < 0.0
     corners = np.array(list(itertools.product((0, 1), repeat=3)))
     last = shape - 1
-    seen = np.stack([below[tuple(map(slice, c, c + last))] for c in corners], axis=-1)
-    cells = np.argwhere(seen.any(axis=-1) & ~seen.all(axis=-1)) @ strides
+    corner_below = np.stack([below[tuple(map(slice, c, c + last))] for c in corners], axis=-1)
+    cells = np.argwhere(corner_below.any(axis=-1) & ~corner_below.all(axis=-1)) @ strides
     flat, level = below.ravel(), values.ravel()
     edges: list[IntArray] = []
     for axes in itertools.permutations(range(3)):

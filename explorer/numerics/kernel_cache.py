@@ -120,7 +120,7 @@ def fingerprint_of(
     """
     digest = hashlib.sha256(repr(options).encode())
     effort = 0
-    seen: set[Callable[..., Any]] = {function}
+    visited: set[Callable[..., Any]] = {function}
     waiting = [function]
     while waiting:
         called = waiting.pop()
@@ -133,8 +133,8 @@ def fingerprint_of(
         for name in code.co_names:
             value = called.__globals__.get(name)
             if isinstance(value, FunctionType) and value in helpers:
-                if value not in seen:
-                    seen.add(value)
+                if value not in visited:
+                    visited.add(value)
                     waiting.append(value)
             elif isinstance(value, bool | int | float | tuple):
                 digest.update(f"{name}={value!r}".encode())
@@ -218,13 +218,13 @@ def await_cached(kernels: Iterable[Kind], *, urgent: bool = False) -> Iterator[K
     try:
         while True:
             compiled = _compiled()
-            for kernel in [each for each in waiting if each.entry.fingerprint in compiled]:
+            for kernel in [k for k in waiting if k.entry.fingerprint in compiled]:
                 waiting.remove(kernel)
                 yield kernel
             if not waiting:
                 return
             if urgent and not requested:
-                requested = [each.entry for each in waiting]
+                requested = [kernel.entry for kernel in waiting]
                 for entry in requested:
                     entry.request()
             if child is not None and child.poll() not in (None, BUSY):
@@ -276,7 +276,7 @@ def main() -> None:
 
 def _compile_by_urgency(labels: Iterable[str]) -> None:
     kernels = [_kernel_named(label) for label in labels]
-    rest = sorted((each for each in kernels if each), key=lambda each: each.entry.effort)
+    rest = sorted((kernel for kernel in kernels if kernel), key=lambda kernel: kernel.entry.effort)
     while True:
         chosen = next(iter(_requested()), None)
         while chosen is None and rest:
@@ -319,7 +319,7 @@ def _start_compiling(kernels: Iterable[Cacheable]) -> subprocess.Popen[bytes]:
         [
             *(sys.executable, "-P", "-c"),
             f"from {__name__} import main; main()",
-            *(each.entry.label for each in kernels),
+            *(kernel.entry.label for kernel in kernels),
         ],
         stdin=subprocess.PIPE,
         stdout=subprocess.DEVNULL,

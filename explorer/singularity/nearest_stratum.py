@@ -122,15 +122,15 @@ def nearest_in_stratum(design: Design, pose: Pose, asked: Stratum) -> NearestInS
         return NearestInStratum(w, here, 0.0, pose)
     if codimension(w) == 1:
         singular = nearest_singularities(design, pose)[OF_INCIDENCES.index(w)]
-        found, distance = singular.pose, singular.distance
+        nearest, distance = singular.pose, singular.distance
     else:
-        found = _nearest(design, pose, _CLOSURES[w])
+        nearest = _nearest(design, pose, _CLOSURES[w])
         distance = float(
-            displacement(design, pose.position, pose.rotation, found.position, found.rotation)
+            displacement(design, pose.position, pose.rotation, nearest.position, nearest.rotation)
         )
-    seen = seen_stratum(design, found)
+    seen = seen_stratum(design, nearest)
     # At the tolerance of incidences a pose may lack one that its other incidences imply.
-    return NearestInStratum(w, seen if is_below(seen, w) else w, distance, found)
+    return NearestInStratum(w, seen if is_below(seen, w) else w, distance, nearest)
 
 
 def nearest_in_strata(design: Design, pose: Pose) -> Mapping[Stratum, NearestInStratum]:

@@ -1,4 +1,4 @@
-"""Files written whole or not at all: what is forced to the disk, and what is said when it fails."""
+"""Atomic writing of files: what is forced to the disk, and the messages of failures."""
 
 from __future__ import annotations
 

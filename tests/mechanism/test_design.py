@@ -1,4 +1,4 @@
-"""Designs and their files: what comes in is usable or refused with one line."""
+"""Designs and their files: every input is usable or refused with one line."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def message_of(action: Callable[[], object]) -> str:
     return text
 
 
-# What files can hold, and words of the message that it must give.
+# Contents of files, and words of the message with which each is refused.
 BAD_FIELDS: dict[str, tuple[dict[str, Any], str]] = {
     "a3y zero": (changed(a3=[8, 0]), "a3y = 0"),
     "b1y zero": (changed(b1=[3, 0]), "b1y = 0"),

@@ -1,4 +1,4 @@
-"""The strict door for design files: schemas, fields given twice, names, and fuzz."""
+"""Strict reading of design files: schemas, repeated fields, names, and fuzzing."""
 
 from __future__ import annotations
 

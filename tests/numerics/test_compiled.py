@@ -1,4 +1,4 @@
-"""Kernels: compiled once on a machine, urgent ones first, and nobody waits for others."""
+"""Kernels: each is compiled once on a machine, requested ones first."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def test_kernels_have_fingerprints_of_their_own() -> None:
 
 
 class Stand:
-    """A kernel that is compiled by writing a file, and tells when."""
+    """A kernel whose compilation writes a file and records the order."""
 
     def __init__(self, kernel: Cacheable, folder: Path, order: list[str]) -> None:
         self.entry = kernel.entry

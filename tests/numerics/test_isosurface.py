@@ -1,4 +1,4 @@
-"""The surface around what is below zero: closed and on the right side, whatever the values."""
+"""The surface around negative values: closed and correctly oriented for any values."""
 
 from __future__ import annotations
 

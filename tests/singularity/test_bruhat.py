@@ -1,4 +1,4 @@
-"""The order of the strata, by other definitions of it, and what they are in words."""
+"""The closure order of the strata against other definitions of it, and their descriptions."""
 
 from __future__ import annotations
 

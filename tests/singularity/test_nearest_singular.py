@@ -1,4 +1,4 @@
-"""The nearest singular poses: on the singular set, nearest of all, and safe where degenerate."""
+"""The nearest singular poses: singular, globally nearest, and finite where degenerate."""
 
 from __future__ import annotations
 

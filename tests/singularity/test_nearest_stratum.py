@@ -1,4 +1,4 @@
-"""The nearest pose in each stratum: in it or its closure, and nearest of all."""
+"""The nearest pose in each stratum: in its closure, and globally nearest."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Ellipsoids of speed and force, balls without singularity, and maps over a slice."""
+"""Velocity and force ellipsoids, singularity-free balls, and maps over a slice."""
 
 from __future__ import annotations
 

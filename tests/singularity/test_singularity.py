@@ -1,4 +1,4 @@
-"""Singularities: margins are incidences, and the Jacobian fails exactly where one vanishes."""
+"""Singularities: margins are incidences, and the Jacobian is singular where one vanishes."""
 
 from __future__ import annotations
 

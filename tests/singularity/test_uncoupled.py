@@ -1,4 +1,4 @@
-"""The six motions that move one margin each: what they move, and how far they go."""
+"""The six motions that change one margin each: rates and travel."""
 
 from __future__ import annotations
 
