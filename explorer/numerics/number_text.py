@@ -10,7 +10,7 @@ from __future__ import annotations
 ROUNDING = 1e-12
 
 
-def settled(value: float, size: float) -> float:
+def drop_rounding(value: float, size: float) -> float:
     """Return a number, or 0 if it is a rounding error; never −0.
 
     Args:
@@ -20,7 +20,7 @@ def settled(value: float, size: float) -> float:
     return 0.0 if abs(value) <= ROUNDING * size else value
 
 
-def significant(value: float, digits: int, *, size: float = 0.0, padded: bool = False) -> str:
+def format_ascii(value: float, digits: int, *, size: float = 0.0, padded: bool = False) -> str:
     """Return a number with at most `digits` significant digits and an ASCII minus sign.
 
     The text has a power of ten where that is below −4 or not below `digits`, as in Python's
@@ -29,22 +29,22 @@ def significant(value: float, digits: int, *, size: float = 0.0, padded: bool = 
     Args:
         value: The number.
         digits: Number of significant digits.
-        size: Magnitude of the numbers from which it was computed, see `settled`.
+        size: Magnitude of the numbers from which it was computed, see `drop_rounding`.
         padded: Whether trailing zeros stay.
     """
-    return f"{settled(value, size):{'#' if padded else ''}.{digits}g}"
+    return f"{drop_rounding(value, size):{'#' if padded else ''}.{digits}g}"
 
 
-def fixed(value: float, decimals: int) -> str:
+def format_fixed(value: float, decimals: int) -> str:
     """Return a number with a fixed number of decimals; one that rounds to zero has no sign."""
     return f"{value:z.{decimals}f}"
 
 
-def with_true_minus(text: str) -> str:
+def set_true_minus(text: str) -> str:
     """Return text with a minus sign (U+2212) in place of each hyphen."""
     return text.replace("-", "−")
 
 
-def scientific(value: float, digits: int = 4, *, size: float = 0.0) -> str:
-    """Return the text of `significant` with true minus signs (U+2212)."""
-    return with_true_minus(significant(value, digits, size=size))
+def format_number(value: float, digits: int = 4, *, size: float = 0.0) -> str:
+    """Return the text of `format_ascii` with true minus signs (U+2212)."""
+    return set_true_minus(format_ascii(value, digits, size=size))

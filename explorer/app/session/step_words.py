@@ -63,7 +63,7 @@ from explorer.app.state.state import State
 from explorer.app.state.studies import spoken
 from explorer.mechanism.design import JOINTS
 from explorer.mechanism.margins import mode_name
-from explorer.numerics.number_text import significant
+from explorer.numerics.number_text import format_ascii
 from explorer.singularity.uncoupled import UNCOUPLED
 
 # So many changes are named; the others are left to the eye.
@@ -132,20 +132,20 @@ def words(action: object, before: State, after: State) -> str:
 def _of_value(action: object) -> str:
     match action:
         case SetJoint(joint, value):
-            said = f"{JOINTS[joint]} = {significant(value, 6)}"
+            said = f"{JOINTS[joint]} = {format_ascii(value, 6)}"
         case SetPosition(axis, value):
-            said = f"{'xyz'[axis]} = {significant(value, 6)}"
+            said = f"{'xyz'[axis]} = {format_ascii(value, 6)}"
         case SetAngle(axis, value):
-            said = f"{ANGLES[axis]} = {significant(value, 6)}°"
+            said = f"{ANGLES[axis]} = {format_ascii(value, 6)}°"
         case SetPose(pose):
             size = max(map(abs, pose.position))
-            said = f"Move b4 to {', '.join(significant(x, 4, size=size) for x in pose.position)}"
+            said = f"Move b4 to {', '.join(format_ascii(x, 4, size=size) for x in pose.position)}"
         case SetMode(mode):
             said = f"Assembly mode {mode} ({mode_name(mode)})"
         case Jog(number, amount):
             motion = UNCOUPLED[number]
             unit = "°" if motion.kind == "rotation" else ""
-            said = f"κ{motion.incidence} alone, by {significant(amount, 4)}{unit}"
+            said = f"κ{motion.incidence} alone, by {format_ascii(amount, 4)}{unit}"
         case GoToStratum(stratum):
             said = f"Go to stratum {name_of(stratum)}"
         case OpenStudy(None):
@@ -196,7 +196,7 @@ def _value(value: object) -> str:
     if isinstance(value, bool):
         return "on" if value else "off"
     if isinstance(value, float):
-        return significant(value, 6)
+        return format_ascii(value, 6)
     if isinstance(value, tuple):
         return " ".join(_value(each) for each in cast("tuple[object, ...]", value))
     return str(value)

@@ -18,7 +18,7 @@ from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.colours import css, proximity_colour
 from explorer.app.widgets.controls import Controls
 from explorer.app.widgets.labels import out_of_sight
-from explorer.app.widgets.markup import DIM, scientific
+from explorer.app.widgets.markup import DIM, format_number
 from explorer.measures.verdict import DISTANCE_SHARE
 from explorer.singularity.bruhat import (
     COVERED,
@@ -154,7 +154,7 @@ def _sentence(stratum: Stratum) -> str:
 def _distance(distance: float | None, digits: int, frame: Frame) -> str:
     if distance is None:
         return "…"
-    return scientific(distance, digits, size=frame.state.design.reach)
+    return format_number(distance, digits, size=frame.state.design.reach)
 
 
 def _neighbour(stratum: Stratum, value: str) -> str:
