@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from explorer.cli.streams import write
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose, yaw_pitch_roll_from_rotation
-from explorer.numerics.number_text import fixed, significant
+from explorer.numerics.number_text import format_ascii, format_fixed
 
 if TYPE_CHECKING:
     from explorer.workspace.solids.solid import Solid
@@ -55,7 +55,7 @@ def figure(value: float, size: float = 0.0) -> str:
         value: Number to write.
         size: Magnitude of the terms that it is computed from; rounding errors of it read 0.
     """
-    return significant(value, 6, size=size, padded=True)
+    return format_ascii(value, 6, size=size, padded=True)
 
 
 def figures(values: Iterable[float]) -> list[str]:
@@ -66,15 +66,15 @@ def figures(values: Iterable[float]) -> list[str]:
 
 
 def degrees(values: Iterable[float]) -> list[str]:
-    """Return angles in degrees with three decimals, never a negative zero."""
-    return [f"{fixed(value, 3)}°" for value in values]
+    """Return angles in degrees with three decimals each, never a negative zero."""
+    return [f"{format_fixed(value, 3)}°" for value in values]
 
 
 def millimetres(design: Design, values: Iterable[float]) -> str:
     """Return lengths in design units as millimetres in brackets."""
     listed = [value * design.unit_mm for value in values]
     size = max(map(abs, listed), default=0.0)
-    return f"[{', '.join(significant(value, 6, size=size) for value in listed)} mm]"
+    return f"[{', '.join(format_ascii(value, 6, size=size) for value in listed)} mm]"
 
 
 def heading(design: Design) -> str:

@@ -1,1 +1,1 @@
-"""Files written whole, text in JSON, and the versions that results depend on."""
+"""Atomic writing of files, strict reading of JSON, and the versions on which results depend."""

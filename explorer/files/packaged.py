@@ -1,4 +1,4 @@
-"""The files that come with the explorer, and the folder that it is imported from."""
+"""The files that are part of the explorer, and the folder of its sources."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from importlib.resources.abc import Traversable
 from pathlib import Path
 
 SOURCES = Path(__file__).parents[2]
-"""The folder of the package `explorer`, for processes that must import these very sources."""
+"""The folder that holds the package `explorer`, for processes that must import the same sources."""
 
 
 def packaged_file(folder: str, name: str) -> Traversable:
@@ -16,7 +16,7 @@ def packaged_file(folder: str, name: str) -> Traversable:
 
 
 def packaged_files(folder: str, suffix: str) -> list[Traversable]:
-    """Return the files with a suffix in one of the folders that come along, ordered by name."""
+    """Return the files with a suffix in one of the explorer's folders, ordered by name."""
     files = (file for file in _place(folder).iterdir() if file.name.endswith(suffix))
     return sorted(files, key=lambda file: file.name)
 

@@ -1,4 +1,4 @@
-"""The versions of Python and of the libraries that results depend on."""
+"""The versions of Python and of the libraries on which results depend."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ LIBRARIES = ("flagged-explorer", "numpy", "scipy", "numba")
 
 def versions() -> dict[str, str]:
     """Return the versions of Python and of `LIBRARIES`, by name."""
-    return dict(_found())
+    return dict(_read_versions())
 
 
 @functools.cache
-def _found() -> dict[str, str]:
-    # Read from files, which takes milliseconds.
-    found = {"python": platform.python_version()}
+def _read_versions() -> dict[str, str]:
+    # The metadata are files, and reading them takes milliseconds.
+    versions = {"python": platform.python_version()}
     for name in LIBRARIES:
         try:
-            found[name] = metadata.version(name)
+            versions[name] = metadata.version(name)
         except metadata.PackageNotFoundError:
-            # A checkout that was never installed has no metadata of its own.
+            # A checkout that was never installed has no metadata.
             from explorer import __version__
 
-            found[name] = __version__
-    return found
+            versions[name] = __version__
+    return versions

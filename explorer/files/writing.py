@@ -1,8 +1,8 @@
-"""Files written whole or not at all, and folders made for them.
+"""Atomic writing and moving of files, and the folders for them.
 
-A file is written beside its place, forced to the disk and moved there in one step, and the
-move is forced to the disk too: a kill or a power failure at any moment leaves the old file
-or the new one.
+A file is written to a scratch file in the same folder, forced to the disk and renamed in one
+step, and the folder's entry is forced to the disk too: a kill or a power failure at any moment
+leaves either the old file or the new one.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from pathlib import Path
 
 from explorer.errors import StorageError
 
-# What would work, by what the system says.
+# Remedy for each error of the system.
 _REMEDIES = {
     errno.ENOSPC: "make room on that disk, or write elsewhere",
     errno.EDQUOT: "make room within your quota, or write elsewhere",
@@ -34,39 +34,39 @@ _REMEDIES = {
 # Windows refuses to replace a file while anything else, such as a virus scanner, reads it.
 _TRIES, _PAUSE_SECONDS = (20, 0.05) if sys.platform == "win32" else (1, 0.0)
 
-# Characters of a file's name that its scratch file begins with.
-_BEGINNING = 32
+# Number of characters of a file's name in the name of its scratch file.
+_SCRATCH_CHARACTERS = 32
 
 
 def check_writable(path: Path) -> None:
-    """Find out before the work whether a file can be written.
+    """Check that a file can be written, for use before long work.
 
     Raises:
-        StorageError: no such folder, one that takes no file, or no plain file.
+        StorageError: The folder does not exist or takes no file, or the path is no plain file.
     """
-    with _refusing("write", path):
-        _refuse_odd(path)
-        scratch = _beside(path)
-        # Permission bits tell less than trying: superusers and read-only disks.
+    with _storage_errors("write", path):
+        _check_target(path)
+        scratch = _scratch_path(path)
+        # Only a trial is sure: superusers and read-only disks make permission bits misleading.
         scratch.open("xb").close()
         scratch.unlink()
 
 
 def write_whole(path: Path, data: bytes) -> None:
-    """Write a file, or replace one: it is never seen with only a part of its contents.
+    """Write or replace a file atomically: no reader sees a part of its contents.
 
     Raises:
-        StorageError: it cannot be written; what was there before is unchanged.
+        StorageError: The file cannot be written; one that existed is unchanged.
     """
-    with _refusing("write", path):
-        _refuse_odd(path)
-        scratch = _beside(path)
+    with _storage_errors("write", path):
+        _check_target(path)
+        scratch = _scratch_path(path)
         try:
             with scratch.open("xb") as file:
                 file.write(data)
                 file.flush()
                 os.fsync(file.fileno())
-            # A link stays one, and what it points to is replaced.
+            # A link stays a link, and its target is replaced.
             target = path.resolve()
             _replace(scratch, target)
             _sync_folder(target.parent)
@@ -79,14 +79,14 @@ def read_at_most(path: Path, largest: int) -> bytes:
     """Return the contents of a plain file.
 
     Args:
-        path: The file.
-        largest: Number of bytes that it may have.
+        path: Path of the file.
+        largest: Largest accepted size in bytes.
 
     Raises:
-        StorageError: it cannot be read, is no plain file, or is larger.
+        StorageError: The file cannot be read, is no plain file, or is larger.
     """
-    with _refusing("read", path):
-        # To open a pipe would wait for someone to write to it.
+    with _storage_errors("read", path):
+        # Opening a pipe would block until another process writes to it.
         if path.exists() and not path.is_file():
             raise StorageError(f"cannot read {str(path)!r}: it is no plain file")
         with path.open("rb") as file:
@@ -97,28 +97,30 @@ def read_at_most(path: Path, largest: int) -> bytes:
 
 
 def make_folder(path: Path) -> None:
-    """Make a folder for its owner alone, and those above it, unless it is there.
+    """Make a folder, and missing ones above it, accessible to its owner alone.
+
+    A folder that exists is left unchanged.
 
     Raises:
-        StorageError: it cannot be made.
+        StorageError: The folder cannot be made.
     """
-    with _refusing("make the folder", path):
+    with _storage_errors("make the folder", path):
         path.mkdir(mode=0o700, parents=True, exist_ok=True)
 
 
 def move(source: Path, target: Path) -> None:
-    """Move a file within a disk in one step; a file in its place is replaced.
+    """Move a file within a disk in one step; a file at the target is replaced.
 
     Raises:
-        StorageError: it cannot be moved; both are unchanged.
+        StorageError: The file cannot be moved; source and target are unchanged.
     """
-    with _refusing("write", target):
+    with _storage_errors("write", target):
         _replace(source, target)
         _sync_folder(target.parent)
 
 
 def _replace(source: Path, target: Path) -> None:
-    """Move a file in one step, waiting for readers where the system cannot do without."""
+    """Move a file in one step; retry on a system that refuses while the target is being read."""
     for last in range(1, _TRIES + 1):
         try:
             source.replace(target)
@@ -131,10 +133,10 @@ def _replace(source: Path, target: Path) -> None:
 
 
 def _sync_folder(folder: Path) -> None:
-    """Force the entries of a folder to the disk, where the system can."""
+    """Force the entries of a folder to the disk, if the system supports it."""
     if sys.platform == "win32":
         return
-    # Some network file systems cannot, and what was moved is there all the same.
+    # Some network file systems do not support it; the file has been moved all the same.
     with contextlib.suppress(OSError):
         descriptor = os.open(folder, os.O_RDONLY)
         try:
@@ -143,35 +145,35 @@ def _sync_folder(folder: Path) -> None:
             os.close(descriptor)
 
 
-def refusal(doing: str, path: Path, error: OSError) -> StorageError:
-    """Return in one line what could not be done with a path, why, and what would work."""
+def storage_error(operation: str, path: Path, error: OSError) -> StorageError:
+    """Return the error, in one line: the failed operation, the path, the reason and the remedy."""
     remedy = _REMEDIES.get(error.errno or 0)
     reason = error.strerror or str(error) or type(error).__name__
     return StorageError(
-        f"cannot {doing} {str(path)!r}: {reason}" + (f"; {remedy}" if remedy else "")
+        f"cannot {operation} {str(path)!r}: {reason}" + (f"; {remedy}" if remedy else "")
     )
 
 
 @contextlib.contextmanager
-def _refusing(doing: str, path: Path) -> Generator[None]:
-    """Tell what fails in one line for people."""
+def _storage_errors(operation: str, path: Path) -> Generator[None]:
+    """Raise the errors of an operation on a path as `StorageError` with one line."""
     try:
         yield
     except OSError as error:
-        raise refusal(doing, path, error) from None
+        raise storage_error(operation, path, error) from None
     except StorageError:
         raise
     except ValueError as error:
-        # A name with null characters, which no system gets to see.
-        raise StorageError(f"cannot {doing} {str(path)!r}: {error}") from None
+        # Python refuses a name with null characters before the system does.
+        raise StorageError(f"cannot {operation} {str(path)!r}: {error}") from None
 
 
-def _beside(path: Path) -> Path:
-    """Return an unused name in the same folder, since only there replacing is atomic."""
-    return path.resolve().parent / f".{path.name[:_BEGINNING]}.{uuid.uuid4().hex}.part"
+def _scratch_path(path: Path) -> Path:
+    """Return an unused path in the same folder, because only there a rename is atomic."""
+    return path.resolve().parent / f".{path.name[:_SCRATCH_CHARACTERS]}.{uuid.uuid4().hex}.part"
 
 
-def _refuse_odd(path: Path) -> None:
+def _check_target(path: Path) -> None:
     if path.is_dir():
         raise StorageError(f"cannot write {str(path)!r}: it is a folder")
     if path.exists() and not path.is_file():

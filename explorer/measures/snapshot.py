@@ -34,8 +34,8 @@ from explorer.singularity.jacobian import (
 from explorer.singularity.nearest import (
     NearestPoses,
     NearestSingularity,
-    each_singularity,
     nearest_singular_poses,
+    singularities_of,
 )
 from explorer.singularity.strata import inversions, stratum
 from explorer.workspace.limits.broken import Violation, violations
@@ -167,7 +167,7 @@ class Snapshot:
     @cached_property
     def nearest(self) -> tuple[NearestSingularity, NearestSingularity, NearestSingularity]:
         """The nearest singular pose of each incidence, in the order δ1, δ2, δ3."""
-        return each_singularity(self._nearest_poses, self.pose)
+        return singularities_of(self._nearest_poses, self.pose)
 
     @cached_property
     def _nearest_poses(self) -> NearestPoses:

@@ -26,10 +26,10 @@ from explorer.numerics.checks import (
 )
 
 JOINTS = ("l1", "d1", "d2", "d3", "d4", "l4")
-"""The joint variables in their one order; the array axis of six everywhere."""
+"""The joint variables, in the order of every array axis of six."""
 
 LENGTHS = ("l1", "d2", "d4", "l4")
-"""The joints that are lengths of actuators, hence not negative; in the order of the legs."""
+"""The joints that are lengths of actuators, hence not negative, in the order of the legs."""
 
 VARIABLES = ("a3x", "a3y", "b1x", "b1y", "b2", "b3")
 """The design variables X in the paper's order."""
@@ -38,13 +38,13 @@ Pair = tuple[float, float]
 Range = tuple[float, float | None]
 
 CarriageOrder = Literal["home", "any"]
-"""Which carriage comes first on the guide: as in the home pose, or either."""
+"""The allowed order of the carriages on the guide: that of the home pose, or any."""
 
 TOLERANCE = 1e-11
-"""How far a pose may exceed a limit and still keep it, so that rounding breaks none: a share
-of the reach for limits of lengths, in radians for limits of angles. Every limit has this one."""
+"""Tolerance of every limit, so that rounding violates none: a share of the reach for lengths,
+radians for angles."""
 
-# Below this share of the design's size a3y, b1y and b3 - b2 are rounding noise.
+# Share of the design's size up to which a3y, b1y and b3 - b2 are rounding noise.
 DEGENERATE_RATIO = 1e-12
 # The determinant of the Jacobian grows with the seventh power of the size.
 SMALLEST_SIZE, LARGEST_SIZE = 1e-30, 1e30
@@ -55,13 +55,16 @@ def _set(struct: msgspec.Struct, name: str, value: object) -> None:
 
 
 class Swing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """How far a leg may swing in its universal and ball joints; None for no bound.
+    """Swing limits of the universal and ball joints; None for no limit.
 
-    Each is the half-angle, in degrees, of a cone about the leg's direction in the home
-    pose: fixed in the base for the universal joints, in the platform for the ball joints.
+    Attributes:
+        a1, a3: Half-angle, in degrees, of a cone that is fixed in the base.
+        b1, b2, b3, b4: Half-angle, in degrees, of a cone that is fixed in the platform.
+
+    The axis of each cone is the leg's direction in the home pose.
 
     Raises:
-        DesignError: not between 0 and 180.
+        DesignError: A half-angle is not above 0 or exceeds 180.
     """
 
     a1: float | None = None
@@ -85,24 +88,23 @@ class Swing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Limits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What the actuators, the guide and the user allow, all in design units.
+    """Limits of the actuators, the guide, the joints and the workspace, in design units.
 
     Attributes:
         l1, d2, d4, l4: (minimum, maximum) length; a maximum of None is the reach |a3|.
-        guide: (lowest, highest) carriage position; None for no bound.
-        gap: smallest |d1 - d3| between the carriages.
-        carriage_order: "home" demands that d3 - d1 keeps the sign that it has in the design's
-            own home pose, since at d1 = d3 legs 2 and 3 share a point; "any" demands
-            nothing, which is the plain geometry.
-        box: (lows, highs) of p; None for no bound.
-        margin: smallest |margin| together with the home's sign triple; 0 demands only
-            the sign triple, None nothing.
-        leg_radii: radii of the four capsule legs, in the order of the legs.
-        swing: half-angles of the cones that the joints keep the legs in.
+        guide: (lowest, highest) carriage position; None for no limit.
+        gap: Smallest distance |d1 - d3| between the carriages.
+        carriage_order: "home" demands that d3 - d1 has the sign of the design's home pose,
+            since at d1 = d3 legs 2 and 3 share a point; "any" demands nothing.
+        box: (lows, highs) of b4 in the base frame; None for no limit.
+        margin: Smallest |δ| of the three margins, with the sign triple of the home pose; 0
+            demands only the sign triple, None nothing.
+        leg_radii: Radii of the four legs, which are capsules, in the order of the legs.
+        swing: Half-angles of the cones that contain the legs at their joints, in degrees.
 
     Raises:
-        DesignError: not finite, negative where a length is meant, reversed, or a
-            carriage order other than "home" and "any".
+        DesignError: A value is not finite, a length is negative, a range is reversed, or the
+            carriage order is neither "home" nor "any".
     """
 
     l1: Range = (0.0, None)
@@ -154,23 +156,23 @@ class Limits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Design(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A flagged 4-4 manipulator, ready for use: degenerate ones cannot be made.
+    """A flagged 4-4 manipulator that is not degenerate.
 
     Attributes:
-        schema: version of the file format.
-        name: what people call it.
-        unit_mm: millimetres in one design unit.
-        node_step: grid step of the paper's node counting; None is reach / 15.
-        a3: (x, y) of a3 in the base frame.
-        b1: (x, y) of b1 in the platform frame.
-        b2, b3: x of b2 and b3 in the platform frame.
-        limits: what the mechanism may do.
-        home: the pose it opens with, whose orientation and sign triple the workspace
-            has; None for a sensible one, see `explorer.mechanism.home`.
+        schema: Version of the file format.
+        name: Name of the design, one printable line.
+        unit_mm: Millimetres in one design unit.
+        node_step: Grid step of the paper's node counting, in design units; None is reach / 15.
+        a3: (x, y) of a3 in the base frame, in design units.
+        b1: (x, y) of b1 in the platform frame, in design units.
+        b2, b3: x of b2 and b3 in the platform frame, in design units.
+        limits: Limits of the mechanism.
+        home: Home pose, whose orientation and sign triple are those of the workspace; None
+            for the one that `explorer.mechanism.home` chooses.
 
     Raises:
-        DesignError: not finite, degenerate (a3y = 0, b1y = 0 or b2 = b3), or beyond the
-            sizes that double precision carries.
+        DesignError: A value is not finite, the design is degenerate (a3y = 0, b1y = 0 or
+            b2 = b3), or its size exceeds the range of double precision.
     """
 
     schema: Literal[1] = 1
@@ -219,27 +221,27 @@ class Design(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
     @property
     def variables(self) -> tuple[float, float, float, float, float, float]:
-        """X = (a3x, a3y, b1x, b1y, b2, b3)."""
+        """The design variables X = (a3x, a3y, b1x, b1y, b2, b3), in design units."""
         return (*self.a3, *self.b1, self.b2, self.b3)
 
     @property
     def reach(self) -> float:
-        """The characteristic length |a3|."""
+        """The characteristic length |a3|, in design units."""
         return math.hypot(*self.a3)
 
     @property
     def tolerance(self) -> float:
-        """How far a limit of a length may be exceeded and is still kept, in design units."""
+        """The tolerance of limits of lengths, in design units."""
         return TOLERANCE * self.reach
 
     @property
     def a2x(self) -> float:
-        """Where a2 is drawn on the guide: at its end. No result depends on it."""
+        """The x of a2, drawn at the end of the guide, in design units; no joint depends on it."""
         ends = self.limits.guide or (0.0, self.reach)
         return ends[1] or ends[0] or self.reach
 
     def length_range(self, name: str) -> tuple[float, float]:
-        """Return (minimum, maximum) of l1, d2, d4 or l4 with the tie to the reach resolved."""
+        """Return (minimum, maximum) of l1, d2, d4 or l4; a maximum of None becomes the reach."""
         low, high = cast("Range", getattr(self.limits, name))
         return low, self.reach if high is None else high
 
@@ -247,13 +249,17 @@ class Design(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         """Return this design with other values of X.
 
         Raises:
-            DesignError: the values make a degenerate design.
+            DesignError: The values are not six finite numbers or make a degenerate design.
         """
         a3x, a3y, b1x, b1y, b2, b3 = numbers("design variables", values, 6)
         return msgspec.structs.replace(self, a3=(a3x, a3y), b1=(b1x, b1y), b2=b2, b3=b3)
 
     def with_variable(self, name: str, value: float) -> Design:
-        """Return this design with one variable, named as in `VARIABLES`, changed."""
+        """Return this design with another value of one variable, named as in `VARIABLES`.
+
+        Raises:
+            DesignError: There is no such variable, or the value makes a degenerate design.
+        """
         if name not in VARIABLES:
             raise DesignError(f"no design variable {name!r}; there are {', '.join(VARIABLES)}")
         values = list(self.variables)

@@ -1,8 +1,8 @@
-"""Design files: JSON, read strictly, and the designs that come along.
+"""Design files: JSON, read strictly, and the presets.
 
 Unknown fields are refused, so that a misspelt limit is never silently ignored, and so are
-fields given twice. A file of an older schema is brought up to date first, one of a newer
-schema is refused. The presets are both rows of the paper's Table 1.
+repeated fields. A file of an older schema is converted to the present one first; a file of a
+newer schema is refused. The presets are both rows of the paper's Table 1.
 """
 
 from __future__ import annotations
@@ -15,20 +15,20 @@ from typing import Any
 import msgspec
 
 from explorer.errors import DesignError
-from explorer.files.json_text import check_each_once, refusing
+from explorer.files.json_text import check_unique_fields, one_line_errors
 from explorer.files.packaged import packaged_files
 from explorer.mechanism.design import Design
 
-# No honest design file comes near this size, in bytes.
+# Largest accepted size of a design file, in bytes.
 LARGEST_FILE = 1_000_000
 SCHEMA = 1
 
 MIGRATIONS: dict[int, Callable[[dict[str, Any]], dict[str, Any]]] = {}
-"""By schema: what turns the fields of a file into those of the next schema."""
+"""Conversions of a file's fields to those of the next schema, by schema."""
 
 
-class _Dated(msgspec.Struct):
-    """What every schema has; a file that does not tell is of the first one."""
+class _Versioned(msgspec.Struct):
+    """The field of every schema; a file without it is of the first schema."""
 
     schema: int = 1
 
@@ -38,18 +38,18 @@ def decode_design(data: bytes, source: str) -> Design:
 
     Args:
         data: The text, UTF-8.
-        source: What to call it in an error message.
+        source: Name of the text in an error message.
 
     Raises:
-        DesignError: not JSON, of a newer schema, with unknown fields, fields given twice or
-            unusable values.
+        DesignError: The text is not JSON, is of a newer schema, or has unknown fields,
+            repeated fields or unusable values.
     """
     if len(data) > LARGEST_FILE:
         raise DesignError(
             f"{source}: {len(data)} bytes is no design file; they stay below {LARGEST_FILE}"
         )
-    with refusing(source, DesignError):
-        schema = msgspec.json.decode(data, type=_Dated).schema
+    with one_line_errors(source, DesignError):
+        schema = msgspec.json.decode(data, type=_Versioned).schema
         if schema > SCHEMA:
             raise DesignError(
                 f"schema {schema} was made by a newer explorer; this one reads up to {SCHEMA}"
@@ -59,12 +59,12 @@ def decode_design(data: bytes, source: str) -> Design:
             design = msgspec.convert(up_to_date(fields), Design)
         else:
             design = msgspec.json.decode(data, type=Design)
-        check_each_once(data)
+        check_unique_fields(data)
         return design
 
 
 def up_to_date(fields: dict[str, Any]) -> dict[str, Any]:
-    """Return the fields of a design, of this schema or an older one, as those of this one."""
+    """Return the fields of a design of this schema or an older one, converted to this schema."""
     for older in range(fields.get("schema", 1), SCHEMA):
         fields = MIGRATIONS[older](fields)
     return fields | {"schema": SCHEMA}
@@ -79,7 +79,7 @@ def load_design(preset_or_file: str) -> Design:
     """Return a preset by name, or the design in a file.
 
     Raises:
-        DesignError: no such preset or file, or a file that holds no design.
+        DesignError: There is no such preset or file, or the file holds no design.
     """
     preset = PRESETS.get(preset_or_file)
     if preset is not None:
@@ -105,4 +105,4 @@ def _load_presets() -> Mapping[str, Design]:
 
 
 PRESETS: Mapping[str, Design] = _load_presets()
-"""The designs that come along, by name: both rows of the paper's Table 1."""
+"""The designs of both rows of the paper's Table 1, by name."""

@@ -1,8 +1,8 @@
-"""For which values of each joint, the others held, the lengths can close: exact intervals.
+"""The exact intervals of each joint in which the joints close, with the other joints fixed.
 
-Each of the three discriminants of `explorer.mechanism.trilateration` is a polynomial of degree at
-most four in a carriage position or in the square of a length. Their real roots bound the
-intervals, so nothing is sampled: one trial in each gap says whether the lengths close.
+Each of the three discriminants of `explorer.mechanism.trilateration` is a polynomial of degree
+at most four in a carriage position or in the square of a length. Their real roots bound the
+intervals, and one trial between two neighbouring roots shows whether the joints close there.
 """
 
 from __future__ import annotations
@@ -22,16 +22,23 @@ _IS_LENGTH = tuple(name in LENGTHS for name in JOINTS)
 
 
 def feasible_intervals(design: Design, joints: FloatArray) -> tuple[tuple[Interval, ...], ...]:
-    """Return, per joint, the disjoint ascending intervals in which the lengths close.
+    """Return, for each joint, the disjoint ascending intervals in which the joints close.
 
     Args:
         design: The manipulator.
-        joints: (l1, d1, d2, d3, d4, l4), shape (6,); for each joint the other five count.
+        joints: (l1, d1, d2, d3, d4, l4), shape (6,), in design units; the intervals of a joint
+            depend on the other five.
+
+    Returns:
+        Intervals (low, high) in design units, in the order of `JOINTS`.
+
+    Raises:
+        InputError: The joints are not usable, see `checked_joints`.
     """
-    held = checked_joints(design, joints)
+    q = checked_joints(design, joints)
     # Dividing by the largest length keeps the roots near one, whatever the units.
-    scale = max(map(abs, (*design.variables, *held.tolist())))
-    polynomials, joint_of = _discriminants(design, held / scale, scale)
+    scale = max(map(abs, (*design.variables, *q.tolist())))
+    polynomials, joint_of = _discriminants(design, q / scale, scale)
     largest = LARGEST_RATIO * max(map(abs, design.variables))
     breaks = [
         _breaks(offset + slope * np.array(roots), scale, largest, is_length)
@@ -39,29 +46,29 @@ def feasible_intervals(design: Design, joints: FloatArray) -> tuple[tuple[Interv
             _real_roots(polynomials), joint_of.tolist(), _IS_LENGTH, strict=True
         )
     ]
-    return _between(design, held, breaks)
+    return _closing_intervals(design, q, breaks)
 
 
 def nearest_feasible(
     design: Design, joints: FloatArray, joint: int, intervals: Sequence[Interval]
 ) -> float | None:
-    """Return the value of one joint nearest to the present one that closes; None if none.
+    """Return the nearest value of one joint at which the joints close; None if there is none.
 
     Args:
         design: The manipulator.
-        joints: Shape (6,).
-        joint: Its index in `JOINTS`.
-        intervals: What `feasible_intervals` gives for it.
+        joints: The present values, shape (6,), in design units.
+        joint: Index of the joint in `JOINTS`.
+        intervals: Its intervals, from `feasible_intervals`.
     """
     value = float(joints[joint])
     ends = [(min(max(value, low), high), low, high) for low, high in intervals]
     if not ends:
         return None
     nearest, low, high = min(ends, key=lambda end: abs(end[0] - value))
-    # The last bits of a root may lie outside: step inwards until the lengths do close.
-    towards = 0.5 * (low + high)
+    # The last bits of a root may lie outside: step inwards until the joints close.
+    middle = 0.5 * (low + high)
     for share in (0.0, *(10.0**-k for k in range(15, 2, -1))):
-        candidate = nearest + share * (towards - nearest)
+        candidate = nearest + share * (middle - nearest)
         trial = joints.copy()
         trial[joint] = candidate
         if forward(design, trial).feasible:
@@ -72,19 +79,20 @@ def nearest_feasible(
 def _discriminants(
     design: Design, joints: FloatArray, scale: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Return κ1², κ2², κ3² over scale², shape (3, 6, 5), and the joints, shape (6, 2).
+    """Return δ1², δ2², δ3² as polynomials, shape (3, 6, 5), and the joints, shape (6, 2).
 
-    Row j of the middle axis leaves one unknown, which is moderate even where joint j can
-    hardly move; the last axis holds ascending coefficients of it. Row j of the joints is
-    (offset, slope): joint j over scale, or its square, is offset + slope * unknown. The
-    algebra is that of `trilateration.solve_rows`.
+    The polynomials are divided by scale². Those of index j on the middle axis have joint j as
+    their variable, by way of an unknown that is of moderate size even where joint j can hardly
+    move; the last axis holds ascending coefficients. Row j of the joints is (offset, slope):
+    joint j over scale, or its square for a length, is offset + slope * unknown. The algebra is
+    that of `trilateration.solve_rows`.
     """
     values, squares = np.zeros((6, 6, 3)), np.zeros((6, 6, 3))
     values[:, :, 0], squares[:, :, 0] = joints[:, None], joints[:, None] ** 2
     a3x, a3y, b1x, b1y, b2, b3 = (v / scale for v in design.variables)
     one, unknown = np.eye(3)[:2]
 
-    # The carriages move within b2b3 of each other, and the radii differ by as much at most.
+    # |d1 - d3| and |d2 - d4| do not exceed |b3 - b2|, so these unknowns are moderate.
     span = b3 - b2
     values[1, 1] = values[3, 1] - span * unknown
     values[3, 3] = values[1, 3] + span * unknown
@@ -129,7 +137,7 @@ def _discriminants(
 
 
 def _product(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Return the products of quadratics (n, 3), shape (n, 5)."""
+    """Return the products of quadratics, shape (n, 5), from coefficients (n, 3)."""
     out = np.zeros((len(a), 5))
     for power in range(3):
         out[:, power : power + 3] += a[:, power, None] * b
@@ -137,10 +145,10 @@ def _product(a: FloatArray, b: FloatArray) -> FloatArray:
 
 
 def _real_roots(polynomials: FloatArray) -> list[list[float]]:
-    """Return the real roots of the polynomials (3, 6, 5), for each of the six."""
-    found: list[list[float]] = [[] for _ in JOINTS]
+    """Return the real roots of polynomials (3, 6, 5) for each of the six joints."""
+    roots_of_joint: list[list[float]] = [[] for _ in JOINTS]
     rows = polynomials.reshape(-1, 5)
-    # Coefficients that are rounding noise beside the largest have no say in the degree.
+    # Coefficients that are rounding noise beside the largest do not count for the degree.
     significant = np.abs(rows) > 1e-14 * np.abs(rows).max(axis=1, keepdims=True)
     degrees = np.where(significant, np.arange(5), 0).max(axis=1)
     for degree in range(1, 5):
@@ -151,18 +159,24 @@ def _real_roots(polynomials: FloatArray) -> list[list[float]]:
         companion[:, range(1, degree), range(degree - 1)] = 1.0
         companion[:, :, -1] = -rows[chosen, :degree] / rows[chosen, degree, None]
         values = np.linalg.eigvals(companion)
-        # A double root comes back as a close complex pair; a needless break does no harm.
+        # A double root may be computed as a close complex pair; a needless break is harmless.
         real = np.abs(values.imag) <= 1e-6 * (1.0 + np.abs(values))
         for row, roots, keep in zip(chosen.tolist(), values.real, real, strict=True):
-            found[row % len(JOINTS)].extend(roots[keep].tolist())
-    return found
+            roots_of_joint[row % len(JOINTS)].extend(roots[keep].tolist())
+    return roots_of_joint
 
 
 def _breaks(ends: FloatArray, scale: float, largest: float, is_length: bool) -> list[float]:
-    """Return where the lengths may begin or cease to close, ascending, from scaled ends.
+    """Return the ascending values at which the joints may begin or cease to close.
 
-    |d1 - d3| and with it every length is bounded by a few times the largest of the others,
-    so nothing closes beyond the ends, and one far off is that of a vanishing term.
+    |d1 - d3|, and with it every length, is bounded by a few times the largest of the others, so
+    no joints close beyond the outer values; a very large value belongs to a vanishing term.
+
+    Args:
+        ends: Roots for one joint, or for its square if it is a length, over `scale`.
+        scale: Length by which the joints were divided.
+        largest: Largest value that is returned.
+        is_length: Whether the joint is a length.
     """
     values = np.sort(ends)
     if is_length:
@@ -171,13 +185,13 @@ def _breaks(ends: FloatArray, scale: float, largest: float, is_length: bool) -> 
     return values[np.abs(values) <= largest].tolist()
 
 
-def _between(
+def _closing_intervals(
     design: Design, joints: FloatArray, breaks: list[list[float]]
 ) -> tuple[tuple[Interval, ...], ...]:
-    """Return, per joint, the intervals between breaks in whose middle the lengths close.
+    """Return, for each joint, the intervals between breaks in whose middle the joints close.
 
-    The forward kinematics decides, so that a discriminant that is zero but for rounding,
-    as in every singular pose, counts as closing here as it does there.
+    The forward kinematics decides, so that a discriminant that is zero but for rounding, as in
+    every singular pose, counts as closing here and there alike.
     """
     gaps = [
         (joint, low, high)
@@ -188,11 +202,11 @@ def _between(
     trials = np.repeat(joints[None, :], len(gaps), axis=0)
     for trial, (joint, low, high) in zip(trials, gaps, strict=True):
         trial[joint] = 0.5 * (low + high)
-    found: list[list[Interval]] = [[] for _ in JOINTS]
+    intervals: list[list[Interval]] = [[] for _ in JOINTS]
     closes = forward(design, trials).feasible.tolist()
     for joint, low, high in itertools.compress(gaps, closes):
         start = low
-        if found[joint] and found[joint][-1][1] == low:
-            start = found[joint].pop()[0]
-        found[joint].append((start, high))
-    return tuple(tuple(intervals) for intervals in found)
+        if intervals[joint] and intervals[joint][-1][1] == low:
+            start = intervals[joint].pop()[0]
+        intervals[joint].append((start, high))
+    return tuple(map(tuple, intervals))

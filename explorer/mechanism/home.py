@@ -1,7 +1,8 @@
-"""The home pose: the one in the design file, or a sensible one found for it.
+"""The home pose: the one in the design file, or the best of a grid of poses.
 
-Its orientation is that of the constant-orientation workspace, its sign triple the home
-mode. At the identity orientation the two lines are parallel, so home is always yawed.
+Its orientation is that of the constant-orientation workspace, and its sign triple is the home
+mode. At the identity orientation the lines a1a2 and b2b3 are parallel, so every candidate is
+yawed.
 """
 
 from __future__ import annotations
@@ -17,30 +18,30 @@ from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose, rotation_from_yaw_pitch_roll
 from explorer.numerics.arrays import FloatArray
 
-# The yaw that reproduces Table 1 (degrees), and its mirror images.
+# The yaw that reproduces the paper's Table 1 in our reading, and its mirror images (degrees).
 YAWS = (-73.1, 73.1, -106.9, 106.9)
-# Shares of the reach, or of the box, between which home is looked for on each axis.
+# Number of grid positions on each axis.
 STEPS = 9
 
 
 def home_pose(design: Design) -> Pose:
-    """Return the design's home, else the level pose that is farthest from any trouble.
+    """Return the design's home pose, or the best pose of a grid if the design has none.
 
-    Sought on a grid over the box (or the reach) with the platform level and yawed: of
-    those within the limits the one with the largest smallest margin, or where none is,
-    the one that exceeds its lengths the least.
+    The grid spans the box (or the reach) with the platform level and yawed. The best pose has
+    the largest smallest margin of those within the limits of the lengths and the guide; if
+    none is, it is the pose that exceeds these limits the least.
     """
-    return design.home or _sought(design)
+    return design.home or _search_grid(design)
 
 
 @lru_cache(64)
-def _sought(design: Design) -> Pose:
+def _search_grid(design: Design) -> Pose:
     rotations = rotation_from_yaw_pitch_roll([(yaw, 0.0, 0.0) for yaw in YAWS])
     positions = _candidates(design)
     p, r = positions[None, :, :], rotations[:, None, :, :]
-    nearness = np.abs(margins(p, r)).min(axis=-1)
+    least_margin = np.abs(margins(p, r)).min(axis=-1)
     joints = inverse(design, p, r)
-    excess = np.zeros(nearness.shape)
+    excess = np.zeros(least_margin.shape)
     for name in LENGTHS:
         low, high = design.length_range(name)
         value = joints[..., JOINTS.index(name)]
@@ -50,7 +51,7 @@ def _sought(design: Design) -> Pose:
         for name in ("d1", "d3"):
             value = joints[..., JOINTS.index(name)]
             excess += np.maximum(0.0, low - value) + np.maximum(0.0, value - high)
-    order = np.lexsort((-nearness.ravel(), np.round(excess / design.reach, 12).ravel()))
+    order = np.lexsort((-least_margin.ravel(), np.round(excess / design.reach, 12).ravel()))
     yaw, place = divmod(int(order[0]), len(positions))
     return Pose.of(positions[place], rotations[yaw])
 
@@ -58,7 +59,7 @@ def _sought(design: Design) -> Pose:
 def _candidates(design: Design) -> FloatArray:
     reach = design.reach
     lows, highs = design.limits.box or ((-reach, -reach, 0.0), (reach, reach, reach))
-    # Ends are left out: there a margin or a limit is nothing.
+    # The ends are left out: there a margin or a distance to a limit is zero.
     shares = np.linspace(0.0, 1.0, STEPS + 2)[1:-1]
     axes = [low + (high - low) * shares for low, high in zip(lows, highs, strict=True)]
     return np.array(list(itertools.product(*axes)))

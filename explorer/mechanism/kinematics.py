@@ -1,7 +1,7 @@
-"""Inverse and forward kinematics, closed form, over any batch (design.md's joint order).
+"""Inverse and forward kinematics in closed form, over any batch, in the order of `JOINTS`.
 
-The inverse takes four distances and two projections. The forward takes the three
-trilaterations of `explorer.mechanism.trilateration` and returns all eight assembly modes.
+The inverse kinematics is four distances and two projections. The forward kinematics is the
+three trilaterations of `explorer.mechanism.trilateration` and has eight assembly modes.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from explorer.mechanism.pose import checked_rotation
 from explorer.mechanism.trilateration import solve_rows
 from explorer.numerics.arrays import BoolArray, FloatArray, batch_shape, finite_array, for_kernel
 
-# Beyond this multiple of the design's size its points are one point in double precision.
+# Largest joint over the design's size; beyond it double precision cannot tell its points apart.
 LARGEST_RATIO = 1e15
 
 
@@ -36,13 +36,13 @@ class AttachmentPoints(NamedTuple):
 class ForwardKinematics(NamedTuple):
     """The eight assembly modes; mode k has the sign triple of the bits of k.
 
-    Bit 2 is set where κ1 is positive, bit 1 where κ2 is, bit 0 where κ3 is.
+    Bit 2 of k is set if δ1 is positive, bit 1 if δ2 is, bit 0 if δ3 is.
 
     Attributes:
-        position: b4 in the base frame, shape (..., 8, 3).
+        position: b4 in the base frame, shape (..., 8, 3), in design units.
         rotation: Platform to base, shape (..., 8, 3, 3).
-        feasible: Whether the lengths close, shape (...); all eight modes or none. Where
-            they do not, the poses are finite but have other lengths.
+        feasible: Whether the joints close, shape (...), in all eight modes or in none. If they
+            do not, the poses are finite but have other joints.
     """
 
     position: FloatArray
@@ -55,11 +55,11 @@ def attachment_points(design: Design, position: ArrayLike, rotation: ArrayLike) 
 
     Args:
         design: The manipulator.
-        position: b4 in the base frame, shape (..., 3).
+        position: b4 in the base frame, shape (..., 3), in design units.
         rotation: Platform to base, shape (..., 3, 3).
 
     Raises:
-        InputError: a pose that is not finite or not a rotation.
+        InputError: The position is not finite, or the rotation is not one.
     """
     p = finite_array("position", position, (3,))
     r = checked_rotation(rotation)
@@ -86,7 +86,7 @@ def inverse(design: Design, position: ArrayLike, rotation: ArrayLike) -> FloatAr
         rotation: Platform to base, shape (..., 3, 3).
 
     Raises:
-        InputError: a pose that is not finite or not a rotation.
+        InputError: The position is not finite, or the rotation is not one.
     """
     points = attachment_points(design, position, rotation)
     return np.stack(
@@ -110,30 +110,34 @@ def forward(design: Design, joints: ArrayLike) -> ForwardKinematics:
         joints: (l1, d1, d2, d3, d4, l4), shape (..., 6), in design units.
 
     Raises:
-        InputError: not six finite numbers, a negative length, or one beyond precision.
+        InputError: The joints are not usable, see `checked_joints`.
     """
     position, rotation, feasible, _ = _solve(design, joints)
     return ForwardKinematics(position, rotation, feasible)
 
 
 def discriminants(design: Design, joints: ArrayLike) -> FloatArray:
-    """Return κ1², κ2², κ3² of the joints, shape (..., 3), in squared design units.
+    """Return δ1², δ2², δ3² of the joints, shape (..., 3), in squared design units.
 
-    The lengths close where none is negative (to rounding). One that is negative names the
-    trilateration that fails, and by how much.
+    The joints close if none is negative (to rounding); a negative one shows which trilateration
+    fails, and by how much.
+
+    Args:
+        design: The manipulator.
+        joints: (l1, d1, d2, d3, d4, l4), shape (..., 6), in design units.
 
     Raises:
-        InputError: not six finite numbers, a negative length, or one beyond precision.
+        InputError: The joints are not usable, see `checked_joints`.
     """
     return _solve(design, joints)[3]
 
 
 def checked_joints(design: Design, joints: ArrayLike) -> FloatArray:
-    """Return joints (..., 6) once they are known to be usable.
+    """Return joints (..., 6) as float64 after checking them.
 
     Raises:
-        InputError: not six finite numbers, a negative length, or so large that double
-            precision cannot tell the design's points apart.
+        InputError: The joints are not six finite numbers, a length is negative, or a joint is
+            so large that double precision cannot tell the design's points apart.
     """
     array = finite_array(f"joints ({', '.join(JOINTS)})", joints, (6,))
     for index, name in enumerate(JOINTS):

@@ -20,7 +20,7 @@ from explorer.numerics.checks import LARGEST_NUMBER
 Triple = tuple[float, float, float]
 Quadruple = tuple[float, float, float, float]
 
-# A rotation is accepted when it is orthonormal to this, then used as it was given.
+# Largest entry of R Rᵀ − I of an accepted rotation, which is then used unchanged.
 ORTHONORMAL_TOLERANCE = 1e-6
 
 
@@ -29,11 +29,11 @@ class Pose(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         position: b4 in the base frame, in design units.
-        quaternion: (w, x, y, z), platform to base; kept at unit length.
+        quaternion: (w, x, y, z), platform to base, normalised.
 
     Raises:
-        InputError: not three and four finite numbers, a position beyond 1e40, or a
-            quaternion of length zero.
+        InputError: The position or the quaternion is not of three or four finite numbers, the
+            position exceeds 1e40, or the quaternion is zero.
     """
 
     position: Triple
@@ -54,7 +54,7 @@ class Pose(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             raise InputError("quaternion must not be all zeros; no rotation is (1, 0, 0, 0)")
         unit = quaternion / size
         norm = float(np.linalg.norm(unit))
-        # One already of unit length is kept to the last bit, so that files round-trip.
+        # A quaternion of unit length stays the same to the last bit, so that files round-trip.
         if abs(norm * size - 1.0) > 4e-16:
             w, x, y, z = (unit / norm).tolist()
             msgspec.structs.force_setattr(self, "quaternion", (w, x, y, z))
@@ -78,7 +78,14 @@ class Pose(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def rotation_from_quaternion(quaternion: ArrayLike) -> FloatArray:
-    """Return rotation matrices (..., 3, 3) of quaternions (..., 4), of any length but zero."""
+    """Return rotation matrices (..., 3, 3) of quaternions (w, x, y, z) of any length but zero.
+
+    Args:
+        quaternion: Shape (..., 4).
+
+    Raises:
+        InputError: A quaternion is not finite, or it is zero.
+    """
     array = finite_array("quaternion", quaternion, (4,))
     if not np.abs(array).max(axis=-1).all():
         raise InputError("quaternion must not be all zeros; no rotation is (1, 0, 0, 0)")
@@ -86,13 +93,23 @@ def rotation_from_quaternion(quaternion: ArrayLike) -> FloatArray:
 
 
 def quaternion_from_rotation(rotation: ArrayLike) -> FloatArray:
-    """Return unit quaternions (..., 4), w not negative, of rotation matrices (..., 3, 3)."""
+    """Return unit quaternions (w, x, y, z), shape (..., 4), of rotation matrices (..., 3, 3).
+
+    The scalar part w is not negative.
+
+    Raises:
+        InputError: A matrix is not a rotation.
+    """
     matrix = checked_rotation(rotation)
     return Rotation.from_matrix(matrix).as_quat(canonical=True, scalar_first=True)
 
 
 def rotation_from_yaw_pitch_roll(yaw_pitch_roll: ArrayLike) -> FloatArray:
-    """Return rotation matrices (..., 3, 3) of angles (..., 3), in degrees."""
+    """Return rotation matrices (..., 3, 3) of yaw, pitch and roll (..., 3) in degrees.
+
+    Raises:
+        InputError: An angle is not finite.
+    """
     angles = finite_array("yaw, pitch and roll", yaw_pitch_roll, (3,))
     return Rotation.from_euler("ZYX", angles, degrees=True).as_matrix()
 
@@ -101,19 +118,22 @@ def yaw_pitch_roll_from_rotation(rotation: ArrayLike) -> FloatArray:
     """Return yaw, pitch and roll (..., 3) in degrees, pitch within ±90°.
 
     At a pitch of ±90° only yaw ∓ roll is determined; roll is then zero.
+
+    Raises:
+        InputError: A matrix is not a rotation.
     """
     matrix = checked_rotation(rotation)
     return Rotation.from_matrix(matrix).as_euler("ZYX", degrees=True, suppress_warnings=True)
 
 
 def checked_rotation(rotation: ArrayLike) -> FloatArray:
-    """Return rotation matrices (..., 3, 3) once they are known to be proper rotations.
+    """Return rotation matrices (..., 3, 3) as float64 after checking them.
 
     Raises:
-        InputError: not orthonormal to 1e-6, or a reflection.
+        InputError: A matrix is not orthonormal to 1e-6, or is a reflection.
     """
     matrix = finite_array("rotation", rotation, (3, 3))
-    off, is_reflection = _flaws_of_one(matrix) if matrix.ndim == 2 else _flaws(matrix)
+    off, is_reflection = _deviation_of_one(matrix) if matrix.ndim == 2 else _deviation(matrix)
     if off > ORTHONORMAL_TOLERANCE:
         raise InputError(
             f"rotation must be orthonormal to {ORTHONORMAL_TOLERANCE:g}; "
@@ -124,14 +144,14 @@ def checked_rotation(rotation: ArrayLike) -> FloatArray:
     return matrix
 
 
-def _flaws(matrices: FloatArray) -> tuple[float, bool]:
-    """Return how far R Rᵀ is off the identity at the most, and whether any is a reflection."""
+def _deviation(matrices: FloatArray) -> tuple[float, bool]:
+    """Return the largest entry of |R Rᵀ − I|, and whether any matrix is a reflection."""
     residual = np.abs(matrices @ np.swapaxes(matrices, -1, -2) - np.eye(3))
     return float(residual.max(initial=0.0)), bool((np.linalg.det(matrices) < 0.0).any())
 
 
-def _flaws_of_one(matrix: FloatArray) -> tuple[float, bool]:
-    """Return the same of one matrix, in plain numbers: a tenth of the time."""
+def _deviation_of_one(matrix: FloatArray) -> tuple[float, bool]:
+    """Return the same of one matrix, with Python's floats in a tenth of the time."""
     (ax, ay, az), (bx, by, bz), (cx, cy, cz) = matrix.tolist()
     off = max(
         abs(ax * ax + ay * ay + az * az - 1.0),
@@ -148,6 +168,6 @@ def _flaws_of_one(matrix: FloatArray) -> tuple[float, bool]:
 @functools.lru_cache(64)
 def _rotation(quaternion: Quadruple) -> FloatArray:
     rotation = rotation_from_quaternion(quaternion)
-    # It is shared between all who ask.
+    # All callers share the cached array.
     rotation.flags.writeable = False
     return rotation

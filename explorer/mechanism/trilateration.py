@@ -1,14 +1,15 @@
 """The three trilaterations in closed form (the paper's section 2, Figure 2).
 
-With u, v, n the platform's axes in the base frame, every length enters through a scalar:
-c = u·x̂, the yz-radius r of b4, w = the yz-product of b4 and u, X = u·p and Y = v·p. Then
+With u, v, n the platform's axes in the base frame and p the position of b4, the joints
+determine the scalars c = u·x̂, the yz-radius r of b4, w = uy py + uz pz, X = u·p and Y = v·p.
+Then
 
-    trilateration 1 (b1 b2 b3 a1):  κ1² = |p|² − X² − Y²
-    trilateration 2 (a1 a2 b2 b3):  κ2² = (1 − c²) r² − w²
-    trilateration 3 (b4 a1 a2 a3):  κ3² = r² − py²
+    trilateration 1 (b1 b2 b3 a1):  δ1² = |p|² − X² − Y²
+    trilateration 2 (a1 a2 b2 b3):  δ2² = (1 − c²) r² − w²
+    trilateration 3 (b4 a1 a2 a3):  δ3² = r² − py²
 
-so the three discriminants are the squared margins, the same in all eight modes, and the
-signs of the three roots are the mode.
+so the three discriminants are the squared margins, equal in all eight modes, and the signs of
+the three roots are those of the mode.
 """
 
 from __future__ import annotations
@@ -18,14 +19,14 @@ import math
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.numerics.compiled import kernel
 
-# Rounding of one operation; the kernel carries a first-order bound of what it grows to.
+# Relative rounding of one operation; the kernel propagates first-order bounds of the errors.
 EPSILON = 2.0**-52
-# A discriminant within this many rounding bounds below zero counts as zero.
+# Number of error bounds below zero within which a discriminant counts as zero.
 ROUNDINGS = 8.0
-# The square of a length that is nothing beside one, yet far from where squares underflow.
-NOTHING = 1e-200
-# The square of an angle that is more than rounding.
-LEANING = 1e-29
+# Square of a length that is negligible beside one and far from underflow.
+NEGLIGIBLE_SQUARE = 1e-200
+# Square of the least angle that is more than rounding.
+LEAST_SQUARED_ANGLE = 1e-29
 
 
 @kernel("void(f8[::1], f8[:,::1], f8[:,:,::1], f8[:,:,:,::1], b1[::1], f8[:,::1])")
@@ -39,16 +40,16 @@ def solve_rows(  # noqa: PLR0915 - one loop body, so that nothing is stored betw
 ) -> None:
     """Solve the forward kinematics of each row of joints.
 
-    Where the lengths cannot close, the poses are those of the nearest closing scalars:
-    finite and rigid, but with other lengths than asked for.
+    Joints that do not close yield the poses of the nearest scalars that do: finite and rigid,
+    but with other joints.
 
     Args:
-        variables: X, shape (6,).
+        variables: Design variables X, shape (6,).
         joints: (l1, d1, d2, d3, d4, l4), shape (n, 6).
-        positions: Written: b4 in the base frame, shape (n, 8, 3).
-        rotations: Written: platform to base, shape (n, 8, 3, 3).
-        feasible: Written: whether the lengths close, shape (n,).
-        discriminants: Written: κ1², κ2², κ3², negative where they fail, shape (n, 3).
+        positions: Output, b4 in the base frame, shape (n, 8, 3).
+        rotations: Output, platform to base, shape (n, 8, 3, 3).
+        feasible: Output, whether the joints close, shape (n,).
+        discriminants: Output, δ1², δ2², δ3², negative if a trilateration fails, shape (n, 3).
     """
     for row in range(joints.shape[0]):
         # Lengths are divided by the largest, so that no square over- or underflows.
@@ -100,7 +101,7 @@ def solve_rows(  # noqa: PLR0915 - one loop body, so that nothing is stored betw
             ep2 + 2.0 * abs(b1x) * ealong + EPSILON * (l1 * l1 + abs(p2) + b1x * b1x + b1y * b1y)
         ) / (2.0 * abs(b1y))
 
-        # The discriminants. Of κ2² the Gram determinant is PSD only if 1 - c² and r² are.
+        # The discriminants. Of δ2² the Gram determinant is PSD only if 1 - c² and r² are.
         k3 = r2 - py * py
         ek3 = er2 + 2.0 * abs(py) * epy + epy * epy
         k2 = s2 * r2 - w * w
@@ -126,23 +127,23 @@ def solve_rows(  # noqa: PLR0915 - one loop body, so that nothing is stored betw
         discriminants[row, 1] = k2 * unit
         discriminants[row, 2] = k3 * unit
 
-        # Where a discriminant is negative, the nearest scalars that close take over.
+        # If a discriminant is negative, the nearest scalars that close replace the given ones.
         c = min(1.0, max(-1.0, c))
         s = math.sqrt(max(0.0, (1.0 - c) * (1.0 + c)))
         r = math.sqrt(max(0.0, r2))
         py = min(r, max(-r, py))
         w = min(s * r, max(-s * r, w))
-        kappa3 = math.sqrt(max(0.0, (r - py) * (r + py)))
-        kappa2 = math.sqrt(max(0.0, (s * r - w) * (s * r + w)))
+        delta3 = math.sqrt(max(0.0, (r - py) * (r + py)))
+        delta2 = math.sqrt(max(0.0, (s * r - w) * (s * r + w)))
         along = c * px + w
 
         for lower in range(4):
-            pz = kappa3 if lower & 1 else -kappa3
-            turn = kappa2 if lower & 2 else -kappa2
+            pz = delta3 if lower & 1 else -delta3
+            turn = delta2 if lower & 2 else -delta2
             uy, uz = w * py + turn * pz, w * pz - turn * py
             square = uy * uy + uz * uz
-            # Of length s by construction, but near the guide only after dividing by it.
-            if square > NOTHING:
+            # Its length is s by construction, but near the guide only after this scaling.
+            if square > NEGLIGIBLE_SQUARE:
                 stretch = s / math.sqrt(square)
                 uy, uz = uy * stretch, uz * stretch
             else:
@@ -152,13 +153,13 @@ def solve_rows(  # noqa: PLR0915 - one loop body, so that nothing is stored betw
             ex, ey, ez = px - along * c, py - along * uy, pz - along * uz
             square_h = ex * ex + ey * ey + ez * ez
             lean = ex * c + ey * uy + ez * uz
-            on_line = square_h < NOTHING
-            if lean * lean > LEANING * square_h:
-                # Near the line cancellation leaves e leaning along u, so project once more. If
-                # little is left it was all rounding: a1 is on the line, any normal of u does.
+            on_line = square_h < NEGLIGIBLE_SQUARE
+            if lean * lean > LEAST_SQUARED_ANGLE * square_h:
+                # Near the line, cancellation leaves a part of e along u, so project once more.
+                # If little is left it is rounding: a1 is on the line, and e is any normal of u.
                 ex, ey, ez = ex - lean * c, ey - lean * uy, ez - lean * uz
                 rough, square_h = square_h, ex * ex + ey * ey + ez * ez
-                on_line = square_h <= max(0.25 * rough, NOTHING)
+                on_line = square_h <= max(0.25 * rough, NEGLIGIBLE_SQUARE)
             cosine, sine = 1.0, 0.0
             if not on_line:
                 inverse = 1.0 / math.sqrt(square_h)
@@ -175,7 +176,7 @@ def solve_rows(  # noqa: PLR0915 - one loop body, so that nothing is stored betw
 
             for upper in range(2):
                 mode = lower + 4 * upper
-                # κ1 = -(n·p): a positive one turns n away from p.
+                # δ1 = -(n·p): a positive one turns n away from p.
                 sin = -sine if upper else sine
                 positions[row, mode, 0] = px * scale
                 positions[row, mode, 1] = py * scale

@@ -1,1 +1,1 @@
-"""Arrays, checks, compiled kernels and other numerical tools; nothing of the mechanism."""
+"""Arrays, checks, compiled kernels and other numerical tools that do not know the mechanism."""

@@ -1,6 +1,6 @@
-"""Array types, and the one place where outside numbers become float64 arrays.
+"""Array types, and the conversion of a caller's numbers to checked float64 arrays.
 
-Leading axes are batch axes everywhere; the shapes in docstrings name the trailing ones.
+Leading axes are batch axes everywhere; docstrings give the shapes of the trailing axes.
 """
 
 from __future__ import annotations
@@ -21,46 +21,47 @@ def finite_array(name: str, value: ArrayLike, shape: tuple[int, ...]) -> FloatAr
     """Return `value` as float64 with the trailing `shape`, every entry finite.
 
     Args:
-        name: What the value is called in the error message.
-        value: Anything NumPy can read, shape (..., *shape).
-        shape: The trailing axes that are required.
+        name: Name of the value in the error message.
+        value: Numbers that NumPy can read, shape (..., *shape).
+        shape: Required trailing axes.
 
     Raises:
-        InputError: not numeric, of another shape, or with NaN or infinite entries.
+        InputError: The value is not numeric, has another shape, or has an entry that is NaN
+            or infinite.
     """
     try:
         array = np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise InputError(f"{name} must be numbers of shape {_shown(shape)}: {error}") from None
+        raise InputError(f"{name} must be numbers of shape {_shape_text(shape)}: {error}") from None
     if array.ndim < len(shape) or array.shape[array.ndim - len(shape) :] != shape:
         raise InputError(
-            f"{name} must have the shape {_shown(shape)}, leading batch axes allowed; "
+            f"{name} must have the shape {_shape_text(shape)}, leading batch axes allowed; "
             f"got {array.shape}"
         )
     if not np.isfinite(array).all():
-        raise InputError(f"{name} must be finite numbers; got {_first_odd(array)}")
+        raise InputError(f"{name} must be finite numbers; got {_first_not_finite(array)}")
     return array
 
 
-def _shown(shape: tuple[int, ...]) -> str:
+def _shape_text(shape: tuple[int, ...]) -> str:
     return f"(..., {', '.join(map(str, shape))})" if shape else "(...)"
 
 
-def _first_odd(array: FloatArray) -> str:
+def _first_not_finite(array: FloatArray) -> str:
     return str(float(array[~np.isfinite(array)].flat[0]))
 
 
 def for_kernel(array: FloatArray) -> FloatArray:
-    """Return the array as compiled kernels take it: contiguous, and not read-only."""
+    """Return the array contiguous and writeable, as the signatures of compiled kernels require."""
     contiguous = np.ascontiguousarray(array)
     return contiguous if contiguous.flags.writeable else contiguous.copy()
 
 
 def batch_shape(*arrays: tuple[FloatArray, int]) -> tuple[int, ...]:
-    """Return the common leading shape of arrays given with their number of trailing axes.
+    """Return the common batch shape of arrays, each given with its number of trailing axes.
 
     Raises:
-        InputError: the batch axes do not broadcast.
+        InputError: The batch axes do not broadcast.
     """
     shapes = [array.shape[: array.ndim - trailing] for array, trailing in arrays]
     try:

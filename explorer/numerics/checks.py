@@ -1,6 +1,6 @@
-"""Checks of the numbers in a design; each failure names the field and what it must be.
+"""Checks of the values in a design.
 
-All of them raise `DesignError`.
+Every function raises `DesignError` with one line: the field, what it must be, and the value.
 """
 
 from __future__ import annotations
@@ -11,17 +11,17 @@ from typing import Any, cast
 
 from explorer.errors import DesignError
 
-# The determinant multiplies seven numbers, which must not overflow.
+# The Jacobian's determinant is a product of seven numbers, which must not overflow.
 LARGEST_NUMBER = 1e40
 
-# What Python would read as numbers, or as several, but no person means so.
+# Types that Python converts to a number or a sequence although no caller means one.
 _NOT_A_NUMBER = (str, bytes, bytearray, bool)
 _NOT_A_SEQUENCE = (str, bytes, bytearray, Set, Mapping)
 
 
 def number(name: str, value: object) -> float:
-    """Return the value as a finite float."""
-    refusal = DesignError(f"{name} must be a number; got {_shown(value)}", name)
+    """Return the value as a finite float of at most `LARGEST_NUMBER` in magnitude."""
+    refusal = DesignError(f"{name} must be a number; got {_short_repr(value)}", name)
     if isinstance(value, _NOT_A_NUMBER):
         raise refusal
     try:
@@ -65,7 +65,7 @@ def two(name: str, value: Any) -> tuple[Any, Any]:
     """Return the two entries of the value."""
     entries = _entries(value)
     if len(entries) != 2:
-        raise DesignError(f"{name} must be two values; got {_shown(value)}", name)
+        raise DesignError(f"{name} must be two values; got {_short_repr(value)}", name)
     return entries[0], entries[1]
 
 
@@ -73,22 +73,22 @@ def numbers(name: str, value: Any, count: int) -> list[float]:
     """Return the entries of the value, `count` finite floats."""
     entries = _entries(value)
     if len(entries) != count:
-        raise DesignError(f"{name} must be {count} numbers; got {_shown(value)}", name)
+        raise DesignError(f"{name} must be {count} numbers; got {_short_repr(value)}", name)
     return [number(name, entry) for entry in entries]
 
 
 def one_of(name: str, value: object, allowed: Sequence[str]) -> None:
-    """Check that the value is one of the words that are allowed."""
+    """Check that the value is one of the allowed words."""
     if value not in allowed:
         words = " or ".join(f'"{word}"' for word in allowed)
-        raise DesignError(f"{name} must be {words}; got {_shown(value)}", name)
+        raise DesignError(f"{name} must be {words}; got {_short_repr(value)}", name)
 
 
 def instance(name: str, value: object, *kinds: type) -> None:
-    """Check that the value is of one of the kinds, which files cannot get wrong but code can."""
+    """Check that a value given by code is of one of the types; a file's decoder does so itself."""
     if not isinstance(value, kinds):
         wanted = " or ".join(kind.__name__ for kind in kinds)
-        raise DesignError(f"{name} must be of type {wanted}; got {_shown(value)}", name)
+        raise DesignError(f"{name} must be of type {wanted}; got {_short_repr(value)}", name)
 
 
 def _entries(value: Any) -> list[Any]:
@@ -100,8 +100,8 @@ def _entries(value: Any) -> list[Any]:
         return []
 
 
-def _shown(value: object) -> str:
-    """Return the value on one line, in short."""
+def _short_repr(value: object) -> str:
+    """Return the value's representation on one line of at most 80 characters."""
     try:
         text = " ".join(repr(value).split())
     except ValueError:

@@ -1,9 +1,9 @@
-"""Kernels: plain Python loops over arrays that Numba compiles, late and out of the way.
+"""Kernels: plain Python loops over arrays, which Numba compiles when they are needed.
 
-A kernel called with many rows is compiled first. One called with few runs as it is until
-it has been compiled in the background, since compiling takes seconds and importing Numba
-half a second, which a single pose does not repay. For where compiled code is kept, see
-`explorer.numerics.kernel_cache`.
+A call with many rows compiles the kernel first. A call with few rows runs the plain Python
+until the kernel has been compiled in the background: compiling takes seconds and importing
+Numba half a second, too long for a single pose. `explorer.numerics.kernel_cache` stores the
+compiled code.
 """
 
 from __future__ import annotations
@@ -14,32 +14,32 @@ from collections.abc import Callable
 from types import FunctionType
 from typing import Any, Generic, ParamSpec, TypeVar
 
-from explorer.numerics.kernel_cache import Entry, Locator, fingerprint_of, is_writable, when_cached
+from explorer.numerics.kernel_cache import Entry, Locator, await_cached, fingerprint_of, is_writable
 
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
 
-# From this many rows on, compiling (or loading from the cache) beats interpreting.
+# Number of rows from which compiling (or loading from the cache) is faster than interpreting.
 MANY_ROWS = 256
-# How Numba compiles all of them.
+# Numba's options for every kernel and helper.
 OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
 
 _kernels: list[Kernel[...]] = []
-# Functions that kernels call, and their compiled forms once there are any.
+# Functions that kernels call, with their compiled forms; None before they are compiled.
 _helpers: dict[Callable[..., Any], Any] = {}
-# Numba is configured, and compiled forms are made, by one thread at a time.
-_loading = threading.RLock()
-# Held by the thread that warms in the background.
-_warming = threading.Lock()
+# One thread at a time configures Numba and compiles.
+_compile_lock = threading.RLock()
+# One thread at a time compiles in the background.
+_warm_lock = threading.Lock()
 
 
 class Kernel(Generic[Arguments]):
     """A function over arrays that runs interpreted or compiled, with the same result.
 
     Args:
-        function: Plain Python in the subset that Numba compiles; it writes its results
-            into arrays that it is given.
-        signature: Numba's type signature, so that compiling needs no call.
+        function: Function in the subset of Python that Numba compiles; it writes its results
+            into arrays among its arguments.
+        signature: Numba's type signature, with which it can compile before any call.
     """
 
     def __init__(self, function: Callable[Arguments, None], signature: str) -> None:
@@ -51,14 +51,14 @@ class Kernel(Generic[Arguments]):
         _kernels.append(self)
 
     def __call__(self, rows: int, *args: Arguments.args, **kwargs: Arguments.kwargs) -> None:
-        """Run over `rows` rows, compiled when that pays or when it is ready anyhow."""
+        """Run over `rows` rows: compiled if they are many or the compiled form is loaded."""
         if self._compiled is None and rows >= MANY_ROWS:
             self.compile()
         (self._compiled or self._function)(*args, **kwargs)
 
     @property
     def entry(self) -> Entry:
-        """The place of the kernel in the cache."""
+        """The kernel's entry in the cache."""
         if self._entry is None:
             self._entry = Entry(self._function, _helpers, (self._signature, OPTIONS))
         return self._entry
@@ -69,14 +69,14 @@ class Kernel(Generic[Arguments]):
         return self._compiled is not None
 
     def compile(self) -> None:
-        """Load the compiled form, waiting until there is one."""
+        """Load the compiled form; wait while another process compiles it."""
         if self._compiled is None:
-            for _ in when_cached([self], urgent=True):
+            for _ in await_cached([self], urgent=True):
                 self.compile_here()
 
     def compile_here(self) -> None:
-        """Load the compiled form, which is made in this process if the cache lacks it."""
-        with _loading:
+        """Load the compiled form; compile it in this process if it is not in the cache."""
+        with _compile_lock:
             if self._compiled is not None:
                 return
             import numba
@@ -86,7 +86,7 @@ class Kernel(Generic[Arguments]):
             before = settings.CACHE_LOCATOR_CLASSES
             settings.CACHE_LOCATOR_CLASSES = f"{Locator.__module__}.{Locator.__qualname__}"
             try:
-                # A full cache that cannot be written is still of use.
+                # A cache that cannot be written can still be read.
                 kept = self.entry.is_filled or is_writable()
                 source = _with_compiled_helpers(self._function, self.entry.fingerprint, kept=kept)
                 self._compiled = numba.njit(self._signature, cache=kept, **OPTIONS)(source)
@@ -105,7 +105,7 @@ def kernel(signature: str) -> Callable[[Callable[Arguments, None]], Kernel[Argum
 
 
 def helper(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
-    """Mark a function that kernels call: plain where they are, compiled where they are."""
+    """Mark a function that kernels call, so that compiled kernels call its compiled form."""
     _helpers[function] = None
     return function
 
@@ -113,12 +113,12 @@ def helper(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]
 def _with_compiled_helpers(
     function: Callable[..., Any], fingerprint: str, *, kept: bool
 ) -> Callable[..., Any]:
-    """Return the function with compiled helpers in the place of the plain ones it names.
+    """Return a copy of a function that calls compiled helpers instead of plain ones.
 
     Args:
-        function: A kernel's or a helper's.
-        fingerprint: Under which its code is kept.
-        kept: Whether code is kept in the cache at all.
+        function: Function of a kernel or a helper.
+        fingerprint: Fingerprint under which the cache stores its code.
+        kept: Whether the cache stores code at all.
     """
     import numba
 
@@ -138,26 +138,26 @@ def _with_compiled_helpers(
 
 
 def fill_cache() -> None:
-    """Have every kernel that has been imported compiled by another process, for all to load."""
-    for _ in when_cached([each for each in _kernels if not each.ready]):
+    """Compile every imported kernel into the cache, in another process."""
+    for _ in await_cached([kernel for kernel in _kernels if not kernel.ready]):
         pass
 
 
 def warm() -> None:
-    """Make every kernel that has been imported compiled, so that small calls are fast too."""
-    for each in when_cached([each for each in _kernels if not each.ready]):
-        each.compile_here()
+    """Load the compiled form of every imported kernel, so that small calls are fast too."""
+    for kernel in await_cached([kernel for kernel in _kernels if not kernel.ready]):
+        kernel.compile_here()
 
 
 def warm_in_background(then: Callable[[], None] | None = None) -> threading.Thread:
-    """Warm in a thread; calls run interpreted until their kernel is compiled.
+    """Call `warm` in a thread; a kernel runs interpreted until its compiled form is loaded.
 
     Args:
-        then: Called there once all is warm.
+        then: Callback in that thread, after every kernel is loaded.
     """
 
     def run() -> None:
-        with _warming:
+        with _warm_lock:
             warm()
         if then is not None:
             then()

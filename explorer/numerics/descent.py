@@ -1,4 +1,4 @@
-"""Descent to the nearest least of a function of a few numbers, within limits."""
+"""Local minimisation of a function of a few variables under inequality constraints."""
 
 from __future__ import annotations
 
@@ -11,30 +11,30 @@ from explorer.numerics.arrays import FloatArray
 
 
 def descend(
-    value: Callable[[FloatArray], tuple[float, FloatArray]],
-    kept: Callable[[FloatArray], FloatArray],
+    objective: Callable[[FloatArray], tuple[float, FloatArray]],
+    constraints: Callable[[FloatArray], FloatArray],
     start: FloatArray,
 ) -> FloatArray | None:
-    """Return where SciPy's SLSQP ends, shape (n,), None if nowhere finite.
+    """Return the last iterate of SciPy's SLSQP, shape (n,); None if it is not finite.
 
-    All numbers are to be of the order of one. Whether it is less, and within, is for the
-    caller to see.
+    Variables, objective and constraints must be scaled to the order of one. The caller checks
+    whether the result is feasible and better than the start.
 
     Args:
-        value: Of a place (n,), with its gradient (n,).
-        kept: What must not be negative there, shape (m,).
-        start: Shape (n,).
+        objective: Function from variables (n,) to the value and its gradient (n,).
+        constraints: Function from variables (n,) to values (m,) that must not be negative.
+        start: Initial variables, shape (n,).
     """
     from scipy import optimize
 
     untyped: Any = optimize
-    found = untyped.minimize(
-        value,
+    result = untyped.minimize(
+        objective,
         start,
         jac=True,
         method="SLSQP",
-        constraints={"type": "ineq", "fun": kept},
+        constraints={"type": "ineq", "fun": constraints},
         options={"maxiter": 60, "ftol": 1e-14},
     )
-    at = np.asarray(found.x, dtype=np.float64)
-    return at if np.isfinite(at).all() else None
+    variables = np.asarray(result.x, dtype=np.float64)
+    return variables if np.isfinite(variables).all() else None

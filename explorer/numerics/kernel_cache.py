@@ -1,11 +1,11 @@
 """The cache of compiled kernels, and the one process on a machine that fills it.
 
-A kernel is kept under a fingerprint of its own code, of the functions that it calls and of
-the constants that it names, since Numba's own key misses changes in the latter two. So a
-change elsewhere, a second checkout and a new installation all find what is there. Kernels
-are compiled by a child process, because compiling holds the interpreter lock for seconds; a
-lock in the cache keeps a second process from compiling the same ones meanwhile. What
-somebody waits for is compiled first, and the rest shortest first.
+The key of a kernel is a fingerprint of its own code, of the functions that it calls and of
+the constants that it names; Numba's own key misses changes in the latter two. A change in
+other code, a second checkout and a new installation therefore use the same entries. A child
+process compiles, because compiling holds the interpreter lock for seconds; a lock in the cache
+keeps a second process from compiling the same kernels. Kernels that a caller waits for are
+compiled first, the others in the order of their code's length.
 """
 
 from __future__ import annotations
@@ -29,27 +29,26 @@ from filelock import FileLock, Timeout
 
 from explorer.files.packaged import SOURCES
 
-# Exit status of a compiling process that found another one at work.
+# Exit status of a compiling process if another one holds the lock.
 BUSY = 75
-# Hexadecimal digits of a fingerprint.
+# Number of hexadecimal digits of a fingerprint.
 DIGITS = 16
-# Seconds between two looks at what another process has compiled, while somebody waits for
-# it and otherwise.
+# Seconds between two looks into the cache: while a caller waits for a kernel, and otherwise.
 URGENT_SECONDS, POLL_SECONDS = 0.02, 0.2
-# Seconds after which compiled code that nobody has loaded is removed.
+# Seconds after which unused compiled code is removed.
 KEPT_SECONDS = 30 * 24 * 3600
 
 
 class Cacheable(Protocol):
-    """What the cache needs to know of a kernel."""
+    """A kernel as the cache requires it."""
 
     @property
     def entry(self) -> Entry:
-        """The place of the kernel in the cache."""
+        """The kernel's entry in the cache."""
         ...
 
     def compile_here(self) -> None:
-        """Compile in this process, into the cache."""
+        """Compile the kernel in this process, into the cache."""
         ...
 
 
@@ -57,18 +56,18 @@ Kind = TypeVar("Kind", bound=Cacheable)
 
 
 class Entry:
-    """The place of a kernel in the cache.
+    """The entry of a kernel in the cache.
 
     Args:
-        function: The kernel's Python function.
-        helpers: The functions that kernels may call.
-        options: What else the compiled code depends on, such as its signature.
+        function: Python function of the kernel.
+        helpers: Functions that kernels may call.
+        options: Other values on which the compiled code depends, such as its signature.
 
     Attributes:
-        module: The name of the module that defines the kernel.
-        name: The kernel's name in its module.
+        module: Name of the module that defines the kernel.
+        name: Name of the kernel in its module.
         fingerprint: Hexadecimal digits that change with the compiled code.
-        effort: Bytes of code to compile, which the time it takes grows with.
+        effort: Bytes of Python code to compile, a measure of the time that compiling takes.
     """
 
     def __init__(
@@ -79,28 +78,28 @@ class Entry:
 
     @property
     def is_filled(self) -> bool:
-        """Whether some process has compiled the kernel."""
+        """Whether the cache holds the compiled kernel."""
         return self.fingerprint in _compiled()
 
     @property
     def label(self) -> str:
-        """The kernel's module and name, as the compiling process is told."""
+        """The kernel's module and name, as an argument of the compiling process."""
         return f"{self.module}:{self.name}"
 
     def mark_used(self) -> None:
-        """Note that the compiled code is in use, so that it is kept."""
+        """Set the time of last use of the compiled code, so that it is not removed."""
         for path in cache_folder().glob(f"*-{self.fingerprint}.*"):
             with contextlib.suppress(OSError):
                 os.utime(path)
 
     def request(self) -> None:
-        """Ask whichever process is compiling to take this kernel next."""
+        """Request that the compiling process, of whichever program, compiles this kernel next."""
         with contextlib.suppress(OSError):
             _requests().mkdir(parents=True, exist_ok=True)
             self._request.write_text(self.label, encoding="utf-8")
 
     def withdraw_request(self) -> None:
-        """Remove the request, which has been answered or given up."""
+        """Remove the request."""
         with contextlib.suppress(OSError):
             self._request.unlink(missing_ok=True)
 
@@ -112,16 +111,16 @@ class Entry:
 def fingerprint_of(
     function: Callable[..., Any], helpers: set[Callable[..., Any]], options: object
 ) -> tuple[str, int]:
-    """Return a fingerprint of a function with all that it calls, and the bytes of its code.
+    """Return a fingerprint of a function and the helpers that it calls, and their bytes of code.
 
     Args:
         function: The function.
-        helpers: The functions whose code counts where they are called.
-        options: What else the compiled code depends on; its `repr` counts.
+        helpers: Functions whose code is part of the compiled code of those that call them.
+        options: Other values on which the compiled code depends; their `repr` is hashed.
     """
     digest = hashlib.sha256(repr(options).encode())
     effort = 0
-    seen: set[Callable[..., Any]] = {function}
+    visited: set[Callable[..., Any]] = {function}
     waiting = [function]
     while waiting:
         called = waiting.pop()
@@ -136,8 +135,8 @@ def fingerprint_of(
         for name in code.co_names:
             value = called.__globals__.get(name)
             if isinstance(value, FunctionType) and value in helpers:
-                if value not in seen:
-                    seen.add(value)
+                if value not in visited:
+                    visited.add(value)
                     waiting.append(value)
             elif isinstance(value, bool | int | float | tuple):
                 digest.update(f"{name}={value!r}".encode())
@@ -146,7 +145,7 @@ def fingerprint_of(
 
 @functools.cache
 def cache_folder() -> Path:
-    """Return the folder of the user's cache where compiled code is kept."""
+    """Return the folder for compiled code in the user's cache."""
     from importlib.metadata import version
 
     default = Path.home() / ".cache"
@@ -155,13 +154,13 @@ def cache_folder() -> Path:
     elif sys.platform == "win32":
         default = Path(os.environ.get("LOCALAPPDATA", Path.home()))
     root = Path(os.environ.get("XDG_CACHE_HOME") or default)
-    # Code of one Numba and one Python is of no use to another.
+    # Other versions of Numba or Python cannot load the code.
     made_by = f"{sys.implementation.cache_tag}-numba-{version('numba')}"
     return root / "flagged-explorer" / "kernels" / made_by
 
 
 def is_writable() -> bool:
-    """Whether compiled code can be kept."""
+    """Return whether compiled code can be written to the cache."""
     try:
         cache_folder().mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=cache_folder()).close()
@@ -171,23 +170,24 @@ def is_writable() -> bool:
 
 
 class Locator:
-    """Tells Numba where the code of a function is kept, and under which fingerprint.
+    """Numba's cache locator: the folder and the key of a function's compiled code.
 
-    Numba makes one for each function that it caches; the function carries its fingerprint.
+    Numba creates one for each function that it caches. The key is the function's attribute
+    `fingerprint`.
     """
 
     def __init__(self, function: FunctionType, file: str) -> None:
         self._fingerprint = str(function.__dict__["fingerprint"])
-        # Numba names it in warnings.
+        # Numba reads this attribute for its warnings.
         self._py_file = file
 
     @classmethod
     def from_function(cls, function: FunctionType, file: str) -> Locator | None:
-        """Return the locator of a function; None for one that is not ours."""
+        """Return the locator of a function; None if the function has no fingerprint."""
         return cls(function, file) if "fingerprint" in function.__dict__ else None
 
     def ensure_cache_path(self) -> None:
-        """Make the folder."""
+        """Create the folder."""
         cache_folder().mkdir(parents=True, exist_ok=True)
 
     def get_cache_path(self) -> str:
@@ -196,48 +196,48 @@ class Locator:
         return str(cache_folder())
 
     def get_source_stamp(self) -> str:
-        """Return what the code depends on."""
+        """Return the fingerprint, which changes with the code."""
         return self._fingerprint
 
     def get_disambiguator(self) -> str:
-        """Return what tells functions of one name apart in file names."""
+        """Return the fingerprint, which distinguishes functions of the same name in file names."""
         return self._fingerprint
 
 
-def when_cached(kernels: Iterable[Kind], *, urgent: bool = False) -> Iterator[Kind]:
-    """Yield each kernel as soon as the cache holds it, having what is missing compiled.
+def await_cached(kernels: Iterable[Kind], *, urgent: bool = False) -> Iterator[Kind]:
+    """Yield each kernel as soon as the cache holds it; have missing ones compiled.
 
-    Kernels that could not be compiled elsewhere, because the cache cannot be written say,
-    are yielded in the end, for the caller to compile.
+    If the compiling process ends without some kernels, for example because the cache cannot be
+    written, these are yielded last, for the caller to compile.
 
     Args:
         kernels: The kernels.
-        urgent: Whether somebody waits for them, so that they are compiled before others.
+        urgent: Whether a caller waits for them, so that they are compiled before others.
     """
     waiting = list(kernels)
     child: subprocess.Popen[bytes] | None = None
-    asked: list[Entry] = []
+    requested: list[Entry] = []
     try:
         while True:
             compiled = _compiled()
-            for each in [each for each in waiting if each.entry.fingerprint in compiled]:
-                waiting.remove(each)
-                yield each
+            for kernel in [k for k in waiting if k.entry.fingerprint in compiled]:
+                waiting.remove(kernel)
+                yield kernel
             if not waiting:
                 return
-            if urgent and not asked:
-                asked = [each.entry for each in waiting]
-                for entry in asked:
+            if urgent and not requested:
+                requested = [kernel.entry for kernel in waiting]
+                for entry in requested:
                     entry.request()
             if child is not None and child.poll() not in (None, BUSY):
-                # Between the last look and its end it may have compiled some.
+                # Some may have been compiled since the last look, and are then loaded.
                 yield from waiting
                 return
-            if (child is None or child.poll() == BUSY) and not _is_somebody_compiling():
+            if (child is None or child.poll() == BUSY) and not _is_compiling_elsewhere():
                 child = _start_compiling(waiting)
             time.sleep(URGENT_SECONDS if urgent else POLL_SECONDS)
     finally:
-        for entry in asked:
+        for entry in requested:
             entry.withdraw_request()
         if child is not None and child.stdin is not None:
             child.stdin.close()
@@ -245,12 +245,12 @@ def when_cached(kernels: Iterable[Kind], *, urgent: bool = False) -> Iterator[Ki
 
 
 def compile_all(labels: Iterable[str]) -> int:
-    """Compile kernels that the cache lacks, those first that are asked for meanwhile.
+    """Compile kernels that are not in the cache; requested ones before the others.
 
-    The work of the compiling process.
+    The compiling process runs this function.
 
     Args:
-        labels: The labels of the kernels, see `Entry.label`.
+        labels: Labels of the kernels, see `Entry.label`.
 
     Returns:
         The exit status of the process.
@@ -261,12 +261,12 @@ def compile_all(labels: Iterable[str]) -> int:
             _compile_by_urgency(labels)
     except Timeout:
         return BUSY
-    _forget_unused()
+    _remove_unused()
     return 0
 
 
 def main() -> None:
-    """Compile the kernels named on the command line until done, or until the parent ends."""
+    """Compile the kernels named on the command line; exit early if the parent process ends."""
 
     def end_with_parent() -> None:
         sys.stdin.buffer.read()
@@ -277,8 +277,8 @@ def main() -> None:
 
 
 def _compile_by_urgency(labels: Iterable[str]) -> None:
-    given = [_kernel_named(label) for label in labels]
-    rest = sorted((each for each in given if each), key=lambda each: each.entry.effort)
+    kernels = [_kernel_named(label) for label in labels]
+    rest = sorted((kernel for kernel in kernels if kernel), key=lambda kernel: kernel.entry.effort)
     while True:
         chosen = next(iter(_requested()), None)
         while chosen is None and rest:
@@ -291,11 +291,11 @@ def _compile_by_urgency(labels: Iterable[str]) -> None:
 
 
 def _requested() -> Iterator[Cacheable]:
-    """Yield the kernels that processes wait for and the cache lacks."""
+    """Yield the requested kernels that are not in the cache."""
     for path in sorted(_requests().glob("*"), key=lambda path: path.name):
         with contextlib.suppress(OSError):
             kernel = _kernel_named(path.read_text(encoding="utf-8"))
-            # Another version of the explorer asks for another fingerprint.
+            # A request of another version of the explorer has another fingerprint.
             if kernel and path.name.endswith(kernel.entry.fingerprint):
                 if not kernel.entry.is_filled:
                     yield kernel
@@ -314,14 +314,14 @@ def _kernel_named(label: str) -> Cacheable | None:
 
 
 def _start_compiling(kernels: Iterable[Cacheable]) -> subprocess.Popen[bytes]:
-    # The child must find these very sources, wherever it is started. A higher level of
-    # optimisation takes longer for kernels that run no faster.
+    # The child must import the same sources in any working folder. At higher levels of
+    # optimisation compiling takes longer and the kernels are no faster.
     changed = {"PYTHONPATH": str(SOURCES), "NUMBA_OPT": "1"}
     return subprocess.Popen(  # noqa: S603 - our own interpreter and our own words
         [
             *(sys.executable, "-P", "-c"),
             f"from {__name__} import main; main()",
-            *(each.entry.label for each in kernels),
+            *(kernel.entry.label for kernel in kernels),
         ],
         stdin=subprocess.PIPE,
         stdout=subprocess.DEVNULL,
@@ -330,14 +330,14 @@ def _start_compiling(kernels: Iterable[Cacheable]) -> subprocess.Popen[bytes]:
     )
 
 
-def _is_somebody_compiling() -> bool:
+def _is_compiling_elsewhere() -> bool:
     try:
         with _lock().acquire(blocking=False):
             return False
     except Timeout:
         return True
     except OSError:
-        # No folder yet, or none that can be written: the child finds out.
+        # There is no folder yet, or it cannot be written: the child's result shows which.
         return False
 
 
@@ -347,7 +347,7 @@ def _compiled() -> set[str]:
         names = [path.name for path in cache_folder().iterdir()]
     except OSError:
         return set()
-    # Numba writes the index before the code, so an index alone tells nothing.
+    # Numba writes the index before the code, so only a file of code counts.
     return {name.rpartition("-")[2][:DIGITS] for name in names if name.endswith(".nbc")}
 
 
@@ -359,8 +359,8 @@ def _requests() -> Path:
     return cache_folder() / "requests"
 
 
-def _forget_unused() -> None:
-    """Remove compiled code that has not been loaded for a month, of any version."""
+def _remove_unused() -> None:
+    """Remove compiled code of any version that has not been loaded for a month."""
     for path in cache_folder().parent.glob("**/*"):
         with contextlib.suppress(OSError):
             if path.is_file() and time.time() - path.stat().st_mtime > KEPT_SECONDS:

@@ -1,4 +1,4 @@
-"""Stages of a long computation, told to a watcher that may end it."""
+"""Stages of a long computation, reported to a callback that may end it."""
 
 from __future__ import annotations
 
@@ -6,32 +6,32 @@ from collections.abc import Callable
 from typing import TypeAlias
 
 Watch: TypeAlias = Callable[[str, float], None]
-"""Called before each stage with what the stage computes and the share of the stages that are
-done, from 0 to below 1. It ends the computation by raising an exception."""
+"""Callback before each stage: it takes a description of the stage and the share of stages that
+are done, at least 0 and below 1, and ends the computation by raising an exception."""
 
 
 def unwatched(words: str, share: float) -> None:
-    """Watch nothing and end nothing."""
+    """Ignore the stage; the default callback."""
 
 
 class Stages:
     """The stages of one computation.
 
     Args:
-        watch: Called before each stage.
-        count: The number of stages, or an upper bound as long as it is not known.
+        watch: Callback before each stage.
+        count: Number of stages; an upper bound while it is not known.
     """
 
     def __init__(self, watch: Watch, count: int) -> None:
         self.count = count
         self._watch = watch
-        self._begun = 0
+        self._started = 0
 
     def begin(self, words: str) -> None:
-        """Tell the watcher that the next stage begins.
+        """Report to the callback that the next stage begins.
 
         Args:
-            words: What the stage computes.
+            words: Description of what the stage computes.
         """
-        self._watch(words, self._begun / max(self.count, self._begun + 1))
-        self._begun += 1
+        self._watch(words, self._started / max(self.count, self._started + 1))
+        self._started += 1

@@ -1,1 +1,1 @@
-"""Where the manipulator is singular, how near that is, and what it can move there."""
+"""Jacobian, strata, distances from singular poses, and motions that change one margin."""

@@ -1,9 +1,9 @@
-"""The order of the 24 strata: which one borders on which, and what each is in words.
+"""The closure order of the 24 strata, and their description by incidences.
 
-One stratum lies in the closure of another where each of its intersections r_ij is at least
-as large (the Bruhat order of permutations). Of the conditions r_ij that cut a closure out,
-those that follow from a neighbouring one are left out (Fulton's essential set); what is left
-is what the stratum is in words.
+A stratum lies in the closure of another if each of its dimensions r_ij is at least as large (the
+Bruhat order of permutations). A closure is defined by conditions on the r_ij; those that follow
+from a neighbouring condition are redundant. The others, the essential set of W. Fulton (1992),
+describe the stratum.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from functools import cache
 from types import MappingProxyType
 from typing import TypeAlias
 
+from explorer.mechanism.margins import INCIDENCES
 from explorer.numerics.arrays import IntArray
 from explorer.singularity.strata import GENERIC, STRATA, inversions, ranks
 
@@ -20,13 +21,13 @@ Stratum: TypeAlias = tuple[int, ...]
 Condition: TypeAlias = tuple[int, int, int]
 
 OF_INCIDENCES: tuple[Stratum, ...] = ((3, 4, 2, 1), (4, 2, 3, 1), (4, 3, 1, 2))
-"""The strata in which κ1, κ2 or κ3 alone vanishes: those of codimension one."""
+"""The strata of codimension one, in which δ1, δ2 or δ3 alone vanishes."""
 
 WORDS: Mapping[Condition, str] = MappingProxyType(
     {
-        (1, 3, 1): "a1 on the platform plane",
-        (2, 2, 1): "lines a1a2 and b2b3 meeting",
-        (3, 1, 1): "b4 on the base plane",
+        (1, 3, 1): INCIDENCES[0],
+        (2, 2, 1): INCIDENCES[1],
+        (3, 1, 1): INCIDENCES[2],
         (1, 2, 1): "a1 on the line b2b3",
         (2, 1, 1): "b4 on the guide",
         (2, 3, 2): "the guide on the platform plane",
@@ -36,24 +37,24 @@ WORDS: Mapping[Condition, str] = MappingProxyType(
         (3, 3, 3): "the planes coinciding",
     }
 )
-"""What r_ij being at least r means, by (i, j, r); the first three are κ1, κ2 and κ3 = 0."""
+"""The incidence at which r_ij is at least r, by (i, j, r)."""
 
 
 def codimension(stratum: Stratum) -> int:
-    """Return by how much a stratum's dimension falls short of the generic one's."""
+    """Return the dimension of the generic stratum less that of a stratum."""
     return inversions(GENERIC) - inversions(stratum)
 
 
 def is_below(lower: Stratum, upper: Stratum) -> bool:
-    """Return whether a stratum lies in the closure of another, or is the same."""
+    """Return whether a stratum lies in the closure of another, which contains that one itself."""
     return bool((ranks(lower) >= ranks(upper)).all())
 
 
 def conditions(stratum: Stratum) -> tuple[Condition, ...]:
-    """Return the essential conditions (i, j, r): r_ij is at least r; none if generic."""
+    """Return the essential conditions (i, j, r), r_ij ≥ r, of a stratum; none if it is generic."""
     r = _all_ranks(stratum)
 
-    def follows(i: int, j: int) -> bool:
+    def is_redundant(i: int, j: int) -> bool:
         value = r[i][j]
         return (
             value == max(0, i + j - 4)
@@ -61,24 +62,24 @@ def conditions(stratum: Stratum) -> tuple[Condition, ...]:
             or value + 1 in (r[i + 1][j], r[i][j + 1])
         )
 
-    return tuple((i, j, r[i][j]) for i in (1, 2, 3) for j in (1, 2, 3) if not follows(i, j))
+    return tuple((i, j, r[i][j]) for i in (1, 2, 3) for j in (1, 2, 3) if not is_redundant(i, j))
 
 
-def words(stratum: Stratum) -> str:
-    """Return what a stratum is, such as "a1 on the platform plane"; "generic" if nothing."""
-    return ", ".join(WORDS[each] for each in conditions(stratum)) or "generic"
+def describe_stratum(stratum: Stratum) -> str:
+    """Return a stratum's incidences, such as "a1 on the platform plane", or "generic"."""
+    return ", ".join(WORDS[condition] for condition in conditions(stratum)) or "generic"
 
 
 @cache
 def incidences(stratum: Stratum) -> tuple[int, ...]:
-    """Return which of κ1, κ2 and κ3 vanish in a stratum, as 1, 2 and 3."""
+    """Return the indices 1, 2 and 3 of those of δ1, δ2 and δ3 that vanish in a stratum."""
     return tuple(
         index for index, closure in enumerate(OF_INCIDENCES, 1) if is_below(stratum, closure)
     )
 
 
 def _all_ranks(stratum: Stratum) -> list[list[int]]:
-    """Return r_ij for i and j from 0 to 4."""
+    """Return r_ij, shape (5, 5), for i and j from 0 to 4."""
     inner: IntArray = ranks(stratum)
     return [
         [0, 0, 0, 0, 0],
@@ -87,7 +88,7 @@ def _all_ranks(stratum: Stratum) -> list[list[int]]:
     ]
 
 
-def _covered() -> dict[Stratum, tuple[Stratum, ...]]:
+def _covered_strata() -> dict[Stratum, tuple[Stratum, ...]]:
     return {
         upper: tuple(
             lower
@@ -98,10 +99,5 @@ def _covered() -> dict[Stratum, tuple[Stratum, ...]]:
     }
 
 
-COVERED: Mapping[Stratum, tuple[Stratum, ...]] = MappingProxyType(_covered())
-"""By stratum, those of one dimension less in its closure: the edges of the diagram."""
-
-COVERING: Mapping[Stratum, tuple[Stratum, ...]] = MappingProxyType(
-    {lower: tuple(upper for upper in STRATA if lower in COVERED[upper]) for lower in STRATA}
-)
-"""By stratum, those of one dimension more whose closure it lies in."""
+COVERED: Mapping[Stratum, tuple[Stratum, ...]] = MappingProxyType(_covered_strata())
+"""The strata of one dimension less in the closure of each: the edges of the Hasse diagram."""

@@ -1,10 +1,9 @@
-"""How strong and how fast the platform is in a pose, and how far it keeps from singularity.
+"""Velocity and force ellipsoids of a pose, and its distance from the singular poses.
 
-With joint rates = J · twist, a wrench takes the actuator forces J⁻ᵀ · wrench. So the speed of
-b4 per unit of actuator speed and the actuator force per unit of force at b4 are the same three
-numbers along the same three directions: where the platform is fast, it is weak. Rotations
-are made comparable with the reach as the length that multiplies angular velocities and divides
-moments.
+Since joint rates = J · twist, actuator forces J⁻ᵀ · wrench balance a wrench. So the speed of b4
+per unit of actuator speed and the actuator force per unit of force at b4 are the same three
+numbers along the same three directions: the faster the platform, the weaker it is. The reach
+makes rotations comparable: it multiplies angular velocities and divides moments.
 """
 
 from __future__ import annotations
@@ -22,18 +21,18 @@ from explorer.numerics.arrays import FloatArray, finite_array
 from explorer.singularity.jacobian import jacobian
 from explorer.singularity.nearest import nearest_singularities
 
-# A singular value below this share of the largest is zero.
+# Share of the largest singular value up to which a singular value counts as zero.
 SINGULAR = 1e-13
 
 
 @dataclass(frozen=True)
 class Ellipsoid:
-    """What unit actuator speeds, or unit actuator forces, do in all directions.
+    """The velocity ellipsoid of a pose, and the force ellipsoid reciprocal to it.
 
     Attributes:
-        axes: The principal directions in the base frame, in columns, shape (3, 3), a
-            right-handed frame.
-        gain: Along each, the speed per unit of actuator speed, which is also the actuator
+        axes: Principal directions in the base frame, in columns, shape (3, 3), a right-handed
+            frame.
+        gain: Speed per unit of actuator speed along each axis, which is also the actuator
             force per unit of force; descending, inf in a singular direction, shape (3,).
     """
 
@@ -42,12 +41,12 @@ class Ellipsoid:
 
     @property
     def velocity(self) -> FloatArray:
-        """The semi-axes of all speeds that a unit of actuator speed reaches, shape (3,)."""
+        """Semi-axes of the ellipsoid of velocities at unit actuator speed, shape (3,)."""
         return self.gain
 
     @property
     def force(self) -> FloatArray:
-        """The semi-axes of all forces that a unit of actuator force holds, shape (3,)."""
+        """Semi-axes of the ellipsoid of forces that unit actuator force balances, shape (3,)."""
         with np.errstate(divide="ignore"):
             return np.where(np.isinf(self.gain), 0.0, 1.0 / self.gain)
 
@@ -57,8 +56,9 @@ class Performance:
     """The ellipsoids of a pose.
 
     Attributes:
-        translation: Of b4: speeds and forces, without dimension.
-        rotation: Of angular velocity times the reach, and of moments over the reach.
+        translation: Velocities of b4 and forces at b4; dimensionless.
+        rotation: Angular velocities times the reach, and moments over the reach;
+            dimensionless.
     """
 
     translation: Ellipsoid
@@ -70,10 +70,11 @@ class SingularityFreeBall:
     """The largest ball of positions about a pose, at its orientation, without singularity.
 
     Attributes:
-        radius: In design units; 0 on the singular set.
-        incidence: 1, 2 or 3: of the plane that it touches.
-        touches: Where, shape (3,).
-        distances: Of b4 from the three planes, in the order κ1, κ2, κ3, shape (3,).
+        radius: Radius in design units; 0 at a singular pose.
+        incidence: Index 1, 2 or 3 of the margin whose plane the ball touches.
+        touches: Point of contact in the base frame, shape (3,), in design units.
+        distances: Distances of b4 from the planes of δ1, δ2 and δ3, shape (3,), in design
+            units.
     """
 
     radius: float
@@ -83,18 +84,18 @@ class SingularityFreeBall:
 
 
 def performance(design: Design, pose: Pose) -> Performance:
-    """Return the ellipsoids of a pose; where it is singular some axes are infinite.
+    """Return the ellipsoids of a pose; some axes are infinite if it is singular.
 
     Args:
         design: The manipulator.
-        pose: Of its platform.
+        pose: Pose of its platform.
     """
     length = design.reach
     rates = jacobian(design, pose.position, pose.rotation) / np.array([1.0] * 3 + [length] * 3)
     _, values, rows = np.linalg.svd(rates)
     lost = values <= SINGULAR * values[0]
     inverse = np.divide(1.0, values, out=np.zeros(6), where=~lost)
-    # Platform motions by column: those that no actuator feels, and those per unit of speed.
+    # Twists by column: those at zero actuator speed, and those per unit of actuator speed.
     return Performance(
         _ellipsoid(rows.T[:3, lost], rows.T[:3] * inverse),
         _ellipsoid(rows.T[3:, lost], rows.T[3:] * inverse),
@@ -102,10 +103,17 @@ def performance(design: Design, pose: Pose) -> Performance:
 
 
 def planes_of_singularity(rotation: ArrayLike) -> FloatArray:
-    """Return the gradients of (κ1, κ2, κ3) with respect to p, shape (..., 3, 3), in rows.
+    """Return the gradients of (δ1, δ2, δ3) with respect to p, shape (..., 3, 3), in rows.
 
-    At a fixed orientation the singular positions are the planes through a1 with these
-    normals. That of κ2 is as long as the sine between the lines, and zero if they are parallel.
+    At a fixed orientation the singular positions are the planes through a1 with these normals.
+    The gradient of δ2 has the length of the sine between the lines a1a2 and b2b3, which is zero
+    if they are parallel; the others have unit length.
+
+    Args:
+        rotation: Platform to base, shape (..., 3, 3).
+
+    Raises:
+        InputError: The rotation is not one.
     """
     r = checked_rotation(rotation)
     gradients = np.zeros(r.shape)
@@ -118,28 +126,30 @@ def planes_of_singularity(rotation: ArrayLike) -> FloatArray:
 def singular_plane_distances(position: ArrayLike, rotation: ArrayLike) -> FloatArray:
     """Return the distances of positions from the three singular planes, shape (..., 3).
 
-    Where the lines are parallel every position is singular, and that of κ2 is zero.
+    If the lines a1a2 and b2b3 are parallel every position is singular, and the distance for δ2
+    is zero.
 
     Args:
-        position: b4 in the base frame, shape (..., 3).
+        position: b4 in the base frame, shape (..., 3), in design units.
         rotation: Platform to base, shape (..., 3, 3).
 
     Raises:
-        InputError: a pose that is not finite or not a rotation.
+        InputError: The position is not finite, or the rotation is not one.
     """
     p, r = finite_array("position", position, (3,)), checked_rotation(rotation)
-    found = np.abs(margins(p, r))
-    sine = np.broadcast_to(np.hypot(r[..., 1, 0], r[..., 2, 0]), found.shape[:-1])
-    found[..., 1] = np.divide(
-        found[..., 1], sine, out=np.zeros(found.shape[:-1]), where=sine > SINGULAR
+    distances = np.abs(margins(p, r))
+    sine = np.broadcast_to(np.hypot(r[..., 1, 0], r[..., 2, 0]), distances.shape[:-1])
+    distances[..., 1] = np.divide(
+        distances[..., 1], sine, out=np.zeros(sine.shape), where=sine > SINGULAR
     )
-    return found
+    return distances
 
 
 def singularity_free_ball(pose: Pose) -> SingularityFreeBall:
-    """Return the largest ball of positions about a pose that holds no singular one.
+    """Return the largest open ball of positions about a pose without a singular position.
 
-    It is exact: the ball about b4 that touches the nearest of three planes.
+    The orientation is fixed. The ball about b4 touches the nearest of the three singular
+    planes, so it is exact.
     """
     distances = singular_plane_distances(pose.position, pose.rotation)
     index = int(distances.argmin())
@@ -154,16 +164,21 @@ def singularity_free_ball(pose: Pose) -> SingularityFreeBall:
 
 
 def certified_radius(design: Design, pose: Pose) -> float:
-    """Return the root-mean-square way of b1 to b4 below which no pose is singular.
+    """Return the root-mean-square displacement of b1 to b4 below which no pose is singular.
 
-    In design units. It holds for all six degrees of freedom, and comes with a proof, see
-    `explorer.singularity.nearest`.
+    The result is in design units. It is a proven lower bound over all six degrees of freedom,
+    see `explorer.singularity.nearest`.
     """
-    return min(each.bound for each in nearest_singularities(design, pose))
+    return min(nearest.bound for nearest in nearest_singularities(design, pose))
 
 
 def _ellipsoid(free: FloatArray, driven: FloatArray) -> Ellipsoid:
-    """Return the ellipsoid of directions (3, k) that go freely and those (3, 6) of unit drive."""
+    """Return the ellipsoid of the velocities at unit actuator speed.
+
+    Args:
+        free: Velocities at zero actuator speed, by column, shape (3, k).
+        driven: Velocities per unit of actuator speed, by column, shape (3, 6).
+    """
     axes, sizes, _ = np.linalg.svd(free @ free.T)
     count = int((sizes > SINGULAR).sum())
     infinite = axes[:, :count]

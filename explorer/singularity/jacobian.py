@@ -1,4 +1,4 @@
-"""The actuator Jacobian, its determinant and condition, and the volumes of the tetrahedra."""
+"""The actuator Jacobian, its determinant and conditioning, and the volumes of the tetrahedra."""
 
 from __future__ import annotations
 
@@ -11,9 +11,13 @@ from explorer.numerics.arrays import FloatArray, dot
 
 
 def tetrahedron_volumes(design: Design, margin: FloatArray) -> FloatArray:
-    """Return the volumes (..., 3) of the three tetrahedra, in cubed design units.
+    """Return the volumes of the three tetrahedra, shape (..., 3), in cubed design units.
 
-    Those of the second and third grow with a2x, that is with where a2 is drawn.
+    The second and third are proportional to a2x, the position at which a2 is drawn.
+
+    Args:
+        design: The manipulator.
+        margin: Margins (δ1, δ2, δ3) of the pose, shape (..., 3), in design units.
     """
     span = design.b3 - design.b2
     factors = np.array(
@@ -25,9 +29,14 @@ def tetrahedron_volumes(design: Design, margin: FloatArray) -> FloatArray:
 def jacobian(design: Design, position: ArrayLike, rotation: ArrayLike) -> FloatArray:
     """Return the actuator Jacobian J, shape (..., 6, 6): joint rates = J @ twist.
 
-    The twist is (velocity of b4, angular velocity), both in the base frame; the columns
-    of the velocity are dimensionless, those of the angular velocity lengths. Where a
-    length is zero its direction is undefined and its row is zero: such a pose is singular.
+    J maps the platform's twist to the joint rates; Merlet ("Parallel Robots") calls this matrix
+    the inverse kinematic Jacobian. The twist is (v; ω): the velocity v of the reference point
+    b4, in design units per unit of time, and the angular velocity ω, in radians per unit of
+    time, both along the axes of the base frame. The rows are the rates of (l1, d1, d2, d3, d4,
+    l4), the order of `JOINTS`, in design units per unit of time; so columns 1 to 3 are
+    dimensionless and columns 4 to 6 are lengths in design units.
+
+    A joint of length zero has no direction, and its row is zero: such a pose is singular.
 
     Args:
         design: The manipulator.
@@ -35,7 +44,7 @@ def jacobian(design: Design, position: ArrayLike, rotation: ArrayLike) -> FloatA
         rotation: Platform to base, shape (..., 3, 3).
 
     Raises:
-        InputError: a pose that is not finite or not a rotation.
+        InputError: The position is not finite, or the rotation is not one.
     """
     points = attachment_points(design, position, rotation)
     p = points.b4
@@ -46,7 +55,7 @@ def jacobian(design: Design, position: ArrayLike, rotation: ArrayLike) -> FloatA
     out[..., [1, 3], 0] = 1.0
     b1, b2, b3 = points.b1 - p, points.b2 - p, points.b3 - p
     arms = np.stack([b1, b2, b2, b3, b3, np.zeros_like(p)], axis=-2)
-    # The moment arm × direction of all rows at once; np.cross takes three times as long.
+    # The moment arm × direction of every row; np.cross takes three times as long.
     dx, dy, dz = (out[..., i] for i in range(3))
     ax, ay, az = (arms[..., i] for i in range(3))
     out[..., 3] = ay * dz - az * dy
@@ -56,15 +65,15 @@ def jacobian(design: Design, position: ArrayLike, rotation: ArrayLike) -> FloatA
 
 
 def determinant(design: Design, joints: FloatArray, margin: FloatArray) -> FloatArray:
-    """Return det J, shape (...), by det J · l1 d2 d4 l4 = -b1y a3y (b3 - b2)² κ1 κ2 κ3.
+    """Return det J, shape (...), in cubed design units.
 
-    Where a length is zero the determinant has no limit and zero is returned, in keeping
-    with `jacobian`.
+    The closed form is det J · l1 d2 d4 l4 = -b1y a3y (b3 - b2)² δ1 δ2 δ3. At a length of zero
+    the determinant has no limit; the result is then zero, as for the matrix of `jacobian`.
 
     Args:
         design: The manipulator.
-        joints: Those of the pose, shape (..., 6).
-        margin: Those of the pose, shape (..., 3).
+        joints: Joints of the pose, shape (..., 6), in design units.
+        margin: Margins (δ1, δ2, δ3) of the pose, shape (..., 3), in design units.
     """
     lengths = joints[..., [0, 2, 4, 5]]
     product = np.prod(lengths, axis=-1)
@@ -75,12 +84,14 @@ def determinant(design: Design, joints: FloatArray, margin: FloatArray) -> Float
 
 
 def inverse_condition(jacobian: FloatArray, length: float) -> FloatArray:
-    """Return the least over the largest singular value of J made homogeneous, shape (...).
+    """Return the inverse condition number of the homogeneous J, from 0 to 1, shape (...).
+
+    It is the smallest singular value over the largest.
 
     Args:
-        jacobian: Shape (..., 6, 6).
-        length: The characteristic length that divides the columns of the angular
-            velocity, in design units.
+        jacobian: Matrices J, shape (..., 6, 6).
+        length: Characteristic length that divides the columns of the angular velocity, in
+            design units.
     """
     homogeneous = jacobian / np.array([1.0, 1.0, 1.0, length, length, length])
     values = np.linalg.svd(homogeneous, compute_uv=False)

@@ -1,9 +1,10 @@
-"""The nearest singular pose of each of the three incidences, by the way of b1, b2, b3 and b4.
+"""The nearest singular pose of each of the three incidences.
 
-The distance is the root-mean-square way of the platform's four points, see
-`explorer.mechanism.displacement`: it is in design units and asks for no length to weigh angles
-with. Each of the three is a global least with a proof beside it, see
-`explorer.singularity.nearest_plane` for κ1 and κ3 and `explorer.singularity.nearest_lines` for κ2.
+The distance is the root-mean-square displacement of b1, b2, b3 and b4, see
+`explorer.mechanism.displacement`: it is in design units and needs no length that weights
+angles. Each of the three is a global minimum with a proven lower bound, see
+`explorer.singularity.nearest_plane` for δ1 and δ3 and `explorer.singularity.nearest_lines` for
+δ2.
 """
 
 from __future__ import annotations
@@ -21,23 +22,24 @@ from explorer.mechanism.margins import INCIDENCES
 from explorer.mechanism.pose import Pose, checked_rotation
 from explorer.numerics.arrays import FloatArray, batch_shape, finite_array
 from explorer.numerics.compiled import helper, kernel
-from explorer.singularity.nearest_lines import ROOM, least_on_torus, polished, write_on_plane
+from explorer.singularity.nearest_lines import ROOM, minimise_on_torus, polish, write_on_plane
 from explorer.singularity.nearest_plane import nearest_quaternion, write_form, write_turned
 
-# A margin is zero within this share of what it is made of.
+# Share of the magnitude of its terms up to which a margin counts as zero.
 ROUNDING = 1e-14
 
 
 class NearestPoses(NamedTuple):
-    """The nearest singular poses of a batch of poses, in the order κ1, κ2, κ3.
+    """The nearest singular poses of a batch of poses, in the order δ1, δ2, δ3.
 
     Attributes:
-        distance: The root-mean-square way of b1 to b4, shape (..., 3), in design units.
-        bound: What no pose with the incidence undercuts, shape (..., 3). Its square is
-            within 1e-8 of the distance's, relative, or 1e-13 of the platform's size squared;
-            but looser where the two lines nearly coincide, for the size of the platform.
-        position: b4 of the nearest poses in the base frame, shape (..., 3, 3).
-        rotation: Their rotations, platform to base, shape (..., 3, 3, 3).
+        distance: Root-mean-square displacement of b1 to b4, shape (..., 3), in design units.
+        bound: Proven lower bound of the distance, shape (..., 3), in design units. Its square
+            is within 1e-8 (relative) of the square of the distance, or within 1e-13 of the
+            square of the platform's size; it is looser where the lines a1a2 and b2b3 nearly
+            coincide, for the size of the platform.
+        position: b4 of the nearest poses in the base frame, shape (..., 3, 3), in design units.
+        rotation: Platform to base, of the nearest poses, shape (..., 3, 3, 3).
     """
 
     distance: FloatArray
@@ -51,11 +53,11 @@ class NearestSingularity:
     """The nearest pose with one of the three incidences.
 
     Attributes:
-        incidence: 1, 2 or 3, for κ1, κ2 or κ3.
-        distance: The root-mean-square way of b1 to b4 to it, in design units; 0 for a pose
-            that has the incidence, which is then its own nearest.
-        bound: What the distance is proved not to undercut, see `NearestPoses`.
-        pose: The nearest pose.
+        incidence: Index 1, 2 or 3 of the margin δ1, δ2 or δ3 that vanishes.
+        distance: Root-mean-square displacement of b1 to b4, in design units; 0 for a pose with
+            the incidence.
+        bound: Proven lower bound of the distance, in design units, see `NearestPoses`.
+        pose: The nearest pose; the pose itself at a distance of 0.
     """
 
     incidence: int
@@ -65,38 +67,38 @@ class NearestSingularity:
 
     @property
     def name(self) -> str:
-        """What the incidence is, such as "a1 on the platform plane"."""
+        """The name of the incidence, such as "a1 on the platform plane"."""
         return INCIDENCES[self.incidence - 1]
 
 
 def nearest_singularities(
     design: Design, pose: Pose
 ) -> tuple[NearestSingularity, NearestSingularity, NearestSingularity]:
-    """Return the nearest singular pose of each incidence, in the order κ1, κ2, κ3.
+    """Return the nearest singular pose of each incidence, in the order δ1, δ2, δ3.
 
     Args:
         design: The manipulator.
-        pose: Of its platform; it may be singular itself.
+        pose: Pose of its platform; it may be singular itself.
     """
-    return each_singularity(nearest_singular_poses(design, pose.position, pose.rotation), pose)
+    return singularities_of(nearest_singular_poses(design, pose.position, pose.rotation), pose)
 
 
-def each_singularity(
-    found: NearestPoses, pose: Pose
+def singularities_of(
+    nearest: NearestPoses, pose: Pose
 ) -> tuple[NearestSingularity, NearestSingularity, NearestSingularity]:
-    """Return the nearest singular pose of each incidence, in the order κ1, κ2, κ3.
+    """Return the nearest singular pose of each incidence, in the order δ1, δ2, δ3.
 
     Args:
-        found: The nearest singular poses of one pose.
+        nearest: Nearest singular poses of one pose.
         pose: That pose.
     """
 
     def one(index: int) -> NearestSingularity:
-        distance, bound = float(found.distance[index]), float(found.bound[index])
+        distance, bound = float(nearest.distance[index]), float(nearest.bound[index])
         if distance == 0.0:
             return NearestSingularity(index + 1, 0.0, 0.0, pose)
-        nearest = Pose.of(found.position[index], found.rotation[index])
-        return NearestSingularity(index + 1, distance, bound, nearest)
+        singular = Pose.of(nearest.position[index], nearest.rotation[index])
+        return NearestSingularity(index + 1, distance, bound, singular)
 
     return one(0), one(1), one(2)
 
@@ -104,7 +106,7 @@ def each_singularity(
 def nearest_singular_poses(
     design: Design, position: ArrayLike, rotation: ArrayLike
 ) -> NearestPoses:
-    """Return the nearest singular poses of many poses.
+    """Return the nearest singular poses of a batch of poses.
 
     Args:
         design: The manipulator.
@@ -112,7 +114,7 @@ def nearest_singular_poses(
         rotation: Platform to base, shape (..., 3, 3).
 
     Raises:
-        InputError: a pose that is not finite or not a rotation.
+        InputError: A position is not finite, or a rotation is not one.
     """
     p, r = finite_array("position", position, (3,)), checked_rotation(rotation)
     batch = batch_shape((p, 1), (r, 2))
@@ -125,7 +127,7 @@ def nearest_singular_poses(
     distance, bound = np.empty((count, 3)), np.empty((count, 3))
     found_p, found_r = np.empty((count, 3, 3)), np.empty((count, 3, 3, 3))
     nearest_rows(
-        # The branch and bound looks at some hundred boxes.
+        # The branch and bound examines some hundred boxes for each pose.
         100 * count,
         platform.points / unit,
         platform.centroid / unit,
@@ -146,10 +148,10 @@ def nearest_singular_poses(
 
 
 @helper
-def mean_way(
+def rms_displacement(
     points: FloatArray, p: FloatArray, r: FloatArray, q: FloatArray, s: FloatArray
 ) -> float:
-    """Return the root-mean-square way of points from the pose (p, r) to (q, s)."""
+    """Return the root-mean-square displacement of points from the pose (p, r) to (q, s)."""
     total = 0.0
     for point in range(points.shape[0]):
         for i in range(3):
@@ -164,15 +166,15 @@ def mean_way(
 def write_a1_on_plane(
     g: FloatArray, r: FloatArray, c: FloatArray, forms: FloatArray, q: FloatArray, s: FloatArray
 ) -> float:
-    """Write the nearest pose (q, s) with κ1 = 0 and return a bound of its square.
+    """Write the nearest pose (q, s) with δ1 = 0; return a lower bound of its squared distance.
 
     Args:
-        g: The centroid in the base frame, shape (3,).
-        r: The rotation of the pose to start from, shape (3, 3).
-        c: The centroid in the platform frame, shape (3,).
-        forms: The scatter's in the first place; the others are overwritten, shape (5, 4, 4).
-        q: Written, shape (3,).
-        s: Written, shape (3, 3).
+        g: Centroid of the points in the base frame, shape (3,).
+        r: Rotation of the given pose, shape (3, 3).
+        c: Centroid of the points in the platform frame, shape (3,).
+        forms: Quadratic form of the scatter, then four that are overwritten, shape (5, 4, 4).
+        q: Output, position, shape (3,).
+        s: Output, rotation, shape (3, 3).
     """
     # x is the distance of a1 from the turned plane through the centroid.
     linear = forms[4]
@@ -184,7 +186,7 @@ def write_a1_on_plane(
     write_turned(r, turn, s)
     for i in range(3):
         q[i] = g[i] - s[i, 0] * c[0] - s[i, 1] * c[1]
-    # Twice: the second time takes the rounding of the first.
+    # The second projection removes the rounding of the first.
     for _ in range(2):
         off = s[0, 2] * q[0] + s[1, 2] * q[1] + s[2, 2] * q[2]
         for i in range(3):
@@ -196,7 +198,7 @@ def write_a1_on_plane(
 def write_b4_on_plane(
     g: FloatArray, r: FloatArray, c: FloatArray, forms: FloatArray, q: FloatArray, s: FloatArray
 ) -> float:
-    """Write the nearest pose with κ3 = 0, as `write_a1_on_plane` does for κ1."""
+    """Write the nearest pose with δ3 = 0, as `write_a1_on_plane` does for δ1."""
     # x is the height of b4 with the centroid where it was.
     linear = forms[4]
     for i in range(3):
@@ -215,9 +217,21 @@ def write_b4_on_plane(
 def shorter_shift(
     way: float, shift: float, nx: float, ny: float, nz: float, p: FloatArray, q: FloatArray
 ) -> bool:
-    """Write the shift of p along n (a multiple of it) into q if it is the shorter way.
+    """Write p less a multiple of n into q if this translation is the shorter displacement.
 
-    Below the root of the rounding, squares do not tell which way is the shortest.
+    Distances below the square root of rounding cannot be compared by their squares.
+
+    Args:
+        way: Root-mean-square displacement to the pose found so far.
+        shift: Multiple of the unit vector n = (nx, ny, nz).
+        nx: First entry of n.
+        ny: Second entry of n.
+        nz: Third entry of n.
+        p: Position of the given pose, shape (3,).
+        q: Output, shape (3,).
+
+    Returns:
+        Whether q was written.
     """
     if way <= abs(shift):
         return False
@@ -227,7 +241,7 @@ def shorter_shift(
 
 @helper
 def angles_at(r: FloatArray) -> tuple[float, float]:
-    """Return the angles on the torus of a rotation whose line keeps its direction."""
+    """Return the angles on the torus at which the line b2b3 has the direction of a rotation."""
     across = math.hypot(r[1, 0], r[2, 0])
     ny, nz = -r[2, 0] / across, r[1, 0] / across
     ex, ey, ez = ny * r[2, 0] - nz * r[1, 0], nz * r[0, 0], -ny * r[0, 0]
@@ -237,7 +251,7 @@ def angles_at(r: FloatArray) -> tuple[float, float]:
 
 @helper
 def copy_rotation(rotation: FloatArray, into: FloatArray) -> None:
-    """Copy a rotation (3, 3) by its elements, for which Numba compiles far less code."""
+    """Copy a rotation (3, 3) element by element, for which Numba compiles far less code."""
     for i in range(3):
         for j in range(3):
             into[i, j] = rotation[i, j]
@@ -275,14 +289,14 @@ def nearest_rows(
 
     Args:
         points: b1 to b4 in the platform frame, shape (4, 3).
-        c: Their centroid, shape (3,).
-        scatter: Theirs, shape (3, 3), with a trace of one.
-        position: Shape (n, 3).
-        rotation: Shape (n, 3, 3).
-        distance: Written, shape (n, 3).
-        bound: Written, shape (n, 3).
-        found_position: Written, shape (n, 3, 3).
-        found_rotation: Written, shape (n, 3, 3, 3).
+        c: Centroid of the points, shape (3,).
+        scatter: Scatter of the points, shape (3, 3), with a trace of one.
+        position: Positions of the given poses, shape (n, 3).
+        rotation: Rotations of the given poses, shape (n, 3, 3).
+        distance: Output, shape (n, 3), see `NearestPoses`.
+        bound: Output, shape (n, 3).
+        found_position: Output, shape (n, 3, 3).
+        found_rotation: Output, shape (n, 3, 3, 3).
     """
     forms, boxes, k, g = np.zeros((5, 4, 4)), np.empty((ROOM, 4)), np.empty(10), np.empty(3)
     near_q, near_s = np.empty(3), np.empty((3, 3))
@@ -297,7 +311,7 @@ def nearest_rows(
         off = r[0, 2] * p[0] + r[1, 2] * p[1] + r[2, 2] * p[2]
         if abs(off) > ROUNDING * size:
             square = write_a1_on_plane(g, r, c, forms, q[0], s[0])
-            way = mean_way(points, p, r, q[0], s[0])
+            way = rms_displacement(points, p, r, q[0], s[0])
             if shorter_shift(way, off, r[0, 2], r[1, 2], r[2, 2], p, q[0]):
                 copy_rotation(r, s[0])
                 way = abs(off)
@@ -312,14 +326,14 @@ def nearest_rows(
             k[6] = r[0, 0] * scatter[0, 0] + r[0, 1] * scatter[1, 0]
             k[7] = r[0, 0] * scatter[0, 1] + r[0, 1] * scatter[1, 1]
             k[8], k[9] = c[1], 2.0
-            phi, sigma, square = least_on_torus(k, boxes)
+            phi, sigma, square = minimise_on_torus(k, boxes)
             write_on_plane(phi, sigma, k, c, g, s[1], q[1])
-            way = mean_way(points, p, r, q[1], s[1])
-            # For the same reason, that which the pose itself descends to.
+            way = rms_displacement(points, p, r, q[1], s[1])
+            # As in `shorter_shift`, squares may miss a minimum very close to the given pose.
             phi, sigma = angles_at(r)
-            phi, sigma = polished(phi, sigma, k)
+            phi, sigma = polish(phi, sigma, k)
             write_on_plane(phi, sigma, k, c, g, near_s, near_q)
-            near_way = mean_way(points, p, r, near_q, near_s)
+            near_way = rms_displacement(points, p, r, near_q, near_s)
             if near_way < way:
                 copy_pose(near_q, near_s, q[1], s[1])
                 way = near_way
@@ -330,7 +344,7 @@ def nearest_rows(
             distance[row, 1], bound[row, 1] = way, min(way, math.sqrt(max(0.0, square)))
         if abs(p[2]) > ROUNDING * size:
             square = write_b4_on_plane(g, r, c, forms, q[2], s[2])
-            way = mean_way(points, p, r, q[2], s[2])
+            way = rms_displacement(points, p, r, q[2], s[2])
             if shorter_shift(way, p[2], 0.0, 0.0, 1.0, p, q[2]):
                 copy_rotation(r, s[2])
                 way = abs(p[2])

@@ -1,18 +1,18 @@
-"""The nearest poses in which the line b2b3 meets the guide, or is parallel to it, exactly.
+"""The nearest poses in which the line b2b3 meets the guide or is parallel to it, exactly.
 
-Two lines meet or are parallel where one plane holds both. That plane turns about the guide
-by an angle φ, and the platform about its own line by an angle σ from the plane's normal n.
-For given φ and σ the best direction of the line in the plane and the best translation, the
-shortest one along n, are closed forms. What is left is a function on a torus,
+Two lines meet or are parallel if and only if one plane contains both. Let φ be the angle of
+that plane about the guide and σ the angle of the platform about the line b2b3 from the plane's
+normal n. For given φ and σ the best direction of the line in the plane and the best translation,
+which is along n, have closed forms. The squared distance that remains is a function on a torus,
 
     f(φ, σ) = 2 tr M − 2 |W| − 2 b sin σ + (γ − c_y sin σ)²,
     W = (a' + k cos σ, h − b' cos σ),
 
-with a and b the parts along n of m = R M x̂ and l = R M ŷ (M the scatter of the platform's
-points), γ that of their centroid, a' and b' the rates with φ, and h and k the parts of m and l
-along the guide. Its least is found by
-branch and bound: on a box of half-sides α and β, f is at least the least over its four corners
-of f linearised inside |·| and (·)², which is concave, less the second-order terms.
+with a and b the components along n of m = R M x̂ and l = R M ŷ (M the scatter of the platform's
+points), γ that of their centroid, a' and b' the derivatives by φ, and h and k the components of
+m and l along the guide. Branch and bound minimises f: on a box of half-sides α and β, f is at
+least the smallest value, over its four corners, of f linearised inside |·| and (·)², which is
+concave, less bounds of the second-order terms.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from explorer.numerics.compiled import helper
 
 Angles: TypeAlias = tuple[float, float]
 
-# The boxes that are looked at first, over half the torus: (φ + π, σ + π) is the same pose.
+# Numbers of initial boxes over half the torus, since (φ + π, σ + π) is the same pose.
 FIRST_PHI, FIRST_SIGMA = 6, 12
-# Enough for all but poses in which the two lines nearly coincide.
+# Largest number of halvings; only poses in which the lines nearly coincide need more.
 MOST_HALVINGS = 4_000
 ROOM = FIRST_PHI * FIRST_SIGMA + 2 * MOST_HALVINGS
 POLISH_STEPS = 60
-# Of the least, and of the scatter: what a box must promise to be looked into.
+# Least improvement for which a box is divided, relative to the minimum and to the scatter.
 RELATIVE_GAIN, LEAST_GAIN = 1e-9, 1e-14
 EPSILON = 2.0**-52
 
@@ -40,12 +40,12 @@ EPSILON = 2.0**-52
 def parts_at(
     phi: float, sigma: float, k: FloatArray
 ) -> tuple[float, float, float, float, float, float, float, float, float, float]:
-    """Return a, b, γ, their rates a', b', γ', both sines and cosines, of φ first.
+    """Return a, b, γ, the derivatives a', b', γ' by φ, and sin φ, cos φ, sin σ, cos σ.
 
     Args:
-        phi: The angle of the plane about the guide.
-        sigma: The angle of the platform about its line.
-        k: The constants, see `least_on_torus`.
+        phi: Angle of the plane about the guide.
+        sigma: Angle of the platform about its line.
+        k: Constants, see `minimise_on_torus`.
     """
     cp, sp, cs, ss = math.cos(phi), math.sin(phi), math.cos(sigma), math.sin(sigma)
     # n = (0, −sin φ, cos φ): at φ = 0 the plane is that of the base.
@@ -65,7 +65,7 @@ def parts_at(
 
 @helper
 def value_at(phi: float, sigma: float, k: FloatArray) -> float:
-    """Return f."""
+    """Return f(φ, σ), the squared distance."""
     _, b, g, da, db, _, _, _, ss, cs = parts_at(phi, sigma, k)
     y = g - k[8] * ss
     return k[9] - 2.0 * math.hypot(da + k[7] * cs, k[6] - db * cs) - 2.0 * b * ss + y * y
@@ -73,7 +73,7 @@ def value_at(phi: float, sigma: float, k: FloatArray) -> float:
 
 @helper
 def bound_over(phi: float, sigma: float, alpha: float, beta: float, k: FloatArray) -> float:
-    """Return what f does not undercut within α of φ and β of σ."""
+    """Return a lower bound of f within α of φ and β of σ."""
     a, b, g, da, db, dg, _, _, ss, cs = parts_at(phi, sigma, k)
     y = g - k[8] * ss
     w0, w1 = da + k[7] * cs, k[6] - db * cs
@@ -100,8 +100,8 @@ def bound_over(phi: float, sigma: float, alpha: float, beta: float, k: FloatArra
 
 
 @helper
-def polished(phi: float, sigma: float, k: FloatArray) -> Angles:
-    """Return the angles of the local least that Newton's method descends to."""
+def polish(phi: float, sigma: float, k: FloatArray) -> Angles:
+    """Return the angles of the local minimum to which Newton's method descends."""
     value = value_at(phi, sigma, k)
     for _ in range(POLISH_STEPS):
         a, b, g, da, db, dg, _, _, ss, cs = parts_at(phi, sigma, k)
@@ -109,7 +109,7 @@ def polished(phi: float, sigma: float, k: FloatArray) -> Angles:
         w0, w1 = da + k[7] * cs, k[6] - db * cs
         w = math.hypot(w0, w1)
         if w == 0.0:
-            # A ridge: any way off it descends.
+            # On a ridge of f every direction descends.
             phi, sigma = phi + 1e-3, sigma + 1e-3
             value = value_at(phi, sigma, k)
             continue
@@ -125,7 +125,7 @@ def polished(phi: float, sigma: float, k: FloatArray) -> Angles:
         hpp = -2.0 * pp + 2.0 * b * ss + 2.0 * dg * dg - 2.0 * y * g
         hps = -2.0 * ps - 2.0 * db * cs + 2.0 * dg * y_sigma
         hss = -2.0 * sss + 2.0 * b * ss + 2.0 * y_sigma * y_sigma + 2.0 * y * k[8] * ss
-        # Where f is not convex, raise both eigenvalues to above zero.
+        # If f is not convex here, raise both eigenvalues of the Hessian above zero.
         middle, half = 0.5 * (hpp + hss), math.hypot(0.5 * (hpp - hss), hps)
         raised = 0.0 if middle - half > 1e-9 * half else half - middle + 1e-3 * half
         hpp, hss = hpp + raised, hss + raised
@@ -150,13 +150,13 @@ def polished(phi: float, sigma: float, k: FloatArray) -> Angles:
 
 
 @helper
-def least_on_torus(k: FloatArray, boxes: FloatArray) -> tuple[float, float, float]:
-    """Return the angles of the least f, and a bound that f undercuts nowhere.
+def minimise_on_torus(k: FloatArray, boxes: FloatArray) -> tuple[float, float, float]:
+    """Return the angles φ and σ of the minimum of f, and a lower bound of f.
 
     Args:
-        k: m_y, m_z, l_y, l_z, g_y, g_z, m_x, l_x, c_y and 2 tr M, shape (10,); the
-            vectors in the base frame.
-        boxes: Overwritten, shape (ROOM, 4).
+        k: Constants m_y, m_z, l_y, l_z, g_y, g_z, m_x, l_x, c_y and 2 tr M, shape (10,); m, l
+            and the centroid g in the base frame, the centroid c in the platform frame.
+        boxes: Working space, shape (ROOM, 4).
     """
     alpha, beta = 0.5 * math.pi / FIRST_PHI, math.pi / FIRST_SIGMA
     last = 0
@@ -169,21 +169,21 @@ def least_on_torus(k: FloatArray, boxes: FloatArray) -> tuple[float, float, floa
             if value < best:
                 best, phi, sigma = value, boxes[last, 0], boxes[last, 1]
             last += 1
-    phi, sigma = polished(phi, sigma, k)
+    phi, sigma = polish(phi, sigma, k)
     best = value_at(phi, sigma, k)
     bound, first = math.inf, 0
-    # What bounds leave out grows with these, so boxes are longer where f bends less.
+    # The second-order terms grow with these, so boxes are longer in the direction of the less.
     size_b = math.hypot(k[2], k[3])
     bend_phi = math.hypot(math.hypot(k[0], k[1]), size_b) + k[4] * k[4] + k[5] * k[5]
     bend_sigma = math.hypot(k[7], size_b) + k[8] * k[8]
-    # The largest boxes first, so that what is left in the end is bounded evenly.
+    # Large boxes precede small ones, so that the boxes left at the end have similar bounds.
     while first < last:
         p, s, alpha, beta = boxes[first]
         first += 1
         low, value = bound_over(p, s, alpha, beta, k), value_at(p, s, k)
         if value < best:
             best, phi, sigma = value, p, s
-            p_down, s_down = polished(p, s, k)
+            p_down, s_down = polish(p, s, k)
             value = value_at(p_down, s_down, k)
             if value < best:
                 best, phi, sigma = value, p_down, s_down
@@ -217,13 +217,13 @@ def write_on_plane(
     """Write the best rotation (3, 3) and position (3,) at two angles.
 
     Args:
-        phi: The angle of the plane about the guide.
-        sigma: The angle of the platform about its line.
-        k: The constants, see `least_on_torus`.
-        centroid: Of the platform's points, in its own frame, shape (3,).
-        g: The same of the pose to start from, in the base frame, shape (3,).
-        rotation: Written.
-        position: Written.
+        phi: Angle of the plane about the guide.
+        sigma: Angle of the platform about its line.
+        k: Constants, see `minimise_on_torus`.
+        centroid: Centroid of the points in the platform frame, shape (3,).
+        g: Centroid of the points of the given pose in the base frame, shape (3,).
+        rotation: Output, shape (3, 3).
+        position: Output, shape (3,).
     """
     _, _, _, da, db, _, sp, cp, ss, cs = parts_at(phi, sigma, k)
     w0, w1 = da + k[7] * cs, k[6] - db * cs
@@ -241,7 +241,7 @@ def write_on_plane(
         rotation[i, 1] = cs * e + ss * n[i]
         rotation[i, 2] = cs * n[i] - ss * e
         position[i] = g[i] - rotation[i, 0] * centroid[0] - rotation[i, 1] * centroid[1]
-    # Twice: the second time takes the rounding of the first.
+    # The second projection removes the rounding of the first.
     for _ in range(2):
         off = n[1] * position[1] + n[2] * position[2]
         position[1] -= off * n[1]

@@ -1,15 +1,15 @@
-"""The nearest poses in which a1 or b4 lies on the other flag's plane, exactly.
+"""The nearest poses in which a1 or b4 lies on the plane of the other flag, exactly.
 
-For a given rotation the best translation is that of the shortest way to the plane, x. What
-is left is the least of F(D) = x(D)² − 2 tr(D M) over rotations D from the pose, in which
-x and tr are linear in D, hence quadratic forms of a unit quaternion q. Two such forms
-have a convex joint range (Brickman 1961), so the dual is exact: the greatest over s of
+For a given rotation the best translation is the shortest one to the plane, of signed length x.
+The rest is to minimise F(D) = x(D)² − 2 tr(D M) over the rotations D from the given pose. Both x
+and tr are linear in D, hence quadratic forms of a unit quaternion q. Two such forms have a
+convex joint range (Brickman 1961), so the dual problem is exact: to maximise over s
 
     g(s) = −s² − 2 λ(s),    λ(s) the largest eigenvalue of N_M − s N_x,
 
-which is concave in one variable, with g'(s) = 2 (x(q(s)) − s). The root lies between 0 and
-the x of no rotation at all. Where two eigenvalues are equal at the root there are two
-nearest poses or more, and a mixture of their quaternions on which x = s is one of them.
+which is concave, with g'(s) = 2 (x(q(s)) − s). The root lies between 0 and the x of the given
+rotation. If two eigenvalues are equal at the root there are two nearest poses or more, and one
+of them is the combination of their quaternions at which x = s.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ EPSILON = 2.0**-52
 
 @helper
 def write_form(s: FloatArray, out: FloatArray) -> None:
-    """Write the N with qᵀ N q = Σ D_ij s_ij for the rotation D of a quaternion (w, x, y, z)."""
+    """Write the N with qᵀ N q = Σ D_ij s_ij, where D is the rotation of q = (w, x, y, z)."""
     out[0, 0] = s[0, 0] + s[1, 1] + s[2, 2]
     out[1, 1] = s[0, 0] - s[1, 1] - s[2, 2]
     out[2, 2] = s[1, 1] - s[0, 0] - s[2, 2]
@@ -44,11 +44,11 @@ def write_form(s: FloatArray, out: FloatArray) -> None:
 
 @helper
 def diagonalise(a: FloatArray, v: FloatArray) -> int:
-    """Turn a symmetric (4, 4) into its eigenvalues, on the diagonal, by Jacobi's rotations.
+    """Diagonalise a symmetric matrix in place by Jacobi's rotations.
 
     Args:
-        a: Overwritten.
-        v: Written: the eigenvectors, in columns.
+        a: Symmetric matrix, shape (4, 4), overwritten by the diagonal matrix of eigenvalues.
+        v: Output, eigenvectors in columns, shape (4, 4).
 
     Returns:
         The index of the largest eigenvalue.
@@ -88,7 +88,7 @@ def diagonalise(a: FloatArray, v: FloatArray) -> int:
 
 @helper
 def bilinear(q: Quaternion, form: FloatArray, r: Quaternion) -> float:
-    """Return qᵀ N r."""
+    """Return qᵀ N r, where N is the matrix `form`, shape (4, 4)."""
     total = 0.0
     for i in range(4):
         total += q[i] * (
@@ -98,14 +98,14 @@ def bilinear(q: Quaternion, form: FloatArray, r: Quaternion) -> float:
 
 
 @helper
-def mixture(low: Quaternion, high: Quaternion, form: FloatArray, value: float) -> Quaternion:
-    """Return the unit quaternion among all mixtures of two at which a form has a value.
+def combine(low: Quaternion, high: Quaternion, form: FloatArray, value: float) -> Quaternion:
+    """Return the unit quaternion between two at which a quadratic form has a given value.
 
-    The value lies between those that the form has at the two.
+    The value must lie between those of the form at the two quaternions.
     """
     a, c = bilinear(low, form, low) - value, bilinear(high, form, high) - value
     dot = low[0] * high[0] + low[1] * high[1] + low[2] * high[2] + low[3] * high[3]
-    # Their signs are free; mixtures of opposite ones would vanish on the way.
+    # Their signs are free; combinations of opposite quaternions would vanish.
     sign = -1.0 if dot < 0.0 else 1.0
     b = sign * (bilinear(low, form, high) - value * dot)
     if a < 0.0 or c > 0.0:
@@ -128,17 +128,20 @@ def mixture(low: Quaternion, high: Quaternion, form: FloatArray, value: float) -
 def nearest_quaternion(
     scatter: FloatArray, form: FloatArray, constant: float, work: FloatArray, vectors: FloatArray
 ) -> tuple[Quaternion, float]:
-    """Return the q of least (constant + qᵀ N_x q)² − 2 qᵀ N_M q, and a bound of this least.
+    """Return the unit q that minimises (constant + qᵀ N_x q)² − 2 qᵀ N_M q, and a lower bound.
 
     Args:
-        scatter: N_M, shape (4, 4); without x, no rotation at all is best.
-        form: N_x, shape (4, 4).
-        constant: That of x.
-        work: Overwritten, shape (4, 4).
-        vectors: Overwritten, shape (4, 4).
+        scatter: Matrix N_M, shape (4, 4), whose form alone is largest at the identity.
+        form: Matrix N_x, shape (4, 4).
+        constant: Constant term of x.
+        work: Working space, shape (4, 4).
+        vectors: Working space, shape (4, 4).
+
+    Returns:
+        The quaternion (w, x, y, z), and a lower bound of the minimum.
     """
     still = (1.0, 0.0, 0.0, 0.0)
-    # x is positive at `low` and negative at `high`, each less its s; both on one side of 0.
+    # With the sign of x at rest, x − s is positive at `low` and negative at `high`.
     at_rest = constant + form[0, 0]
     sign = -1.0 if at_rest < 0.0 else 1.0
     low, high = 0.0, abs(at_rest)
@@ -175,15 +178,15 @@ def nearest_quaternion(
             if following in (low, high):
                 break
         s = following
-    # The eigenvectors change over no distance at all: the two largest are equal here.
+    # The eigenvector is discontinuous here: the two largest eigenvalues are equal.
     if has_above:
-        q = mixture(below, above, form, sign * 0.5 * (low + high) - constant)
+        q = combine(below, above, form, sign * 0.5 * (low + high) - constant)
     return q, bound
 
 
 @helper
 def write_turned(rotation: FloatArray, q: Quaternion, out: FloatArray) -> None:
-    """Write the product of a rotation and that of a unit quaternion, shape (3, 3)."""
+    """Write the product of a rotation (3, 3) and the rotation of a unit quaternion."""
     w, x, y, z = q
     for i in range(3):
         a, b, c = rotation[i, 0], rotation[i, 1], rotation[i, 2]

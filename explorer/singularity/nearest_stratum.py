@@ -1,10 +1,10 @@
 """The nearest pose in each stratum of codimension one or more.
 
-What a stratum asks of the rotation leaves three angles free, or two, one or none; what it then
-asks of b4 is that it lies on a plane or a line through a1, or on a1 itself. So the best
-position is a projection, and what is left is a smooth function of the angles alone: its local
-leasts on a grid are polished by Newton's method, with derivatives by complex steps. The
-three strata of codimension one have their exact answer in `explorer.singularity.nearest`.
+The conditions of a stratum leave three, two, one or no angles of the rotation free, and b4 must
+lie on a plane or a line through a1, or on a1 itself. The best position is then a projection,
+and the squared distance a smooth function of the angles: Newton's method, with derivatives by
+complex steps, refines its local minima on a grid. The three strata of codimension one have an
+exact solution in `explorer.singularity.nearest`.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from explorer.singularity.bruhat import OF_INCIDENCES, Stratum, codimension, is_
 from explorer.singularity.nearest import nearest_singularities
 from explorer.singularity.strata import STRATA, stratum
 
-# Real, or complex for a derivative.
+# Arrays of real numbers, or of complex ones for derivatives.
 Array: TypeAlias = NDArray[Any]
 
 GRID = 12
@@ -38,12 +38,12 @@ COMPLEX_STEP, HESSIAN_STEP = 1e-40, 1e-5
 
 @dataclass(frozen=True)
 class NearestInStratum:
-    """The nearest pose in a stratum, or in its closure where that is nearer still.
+    """The nearest pose in the closure of a stratum.
 
     Attributes:
-        stratum: That which was asked for.
-        seen: That of the pose: the same, or one in its closure.
-        distance: The root-mean-square way of b1 to b4 to it, in design units.
+        stratum: Stratum that was asked for.
+        seen: Stratum of the nearest pose: that one, or one in its closure.
+        distance: Root-mean-square displacement of b1 to b4, in design units.
         pose: The nearest pose.
     """
 
@@ -55,13 +55,14 @@ class NearestInStratum:
 
 @dataclass(frozen=True)
 class _Closure:
-    """The closure of a stratum, by what it asks of the rotation and of b4.
+    """The closure of a stratum as conditions on the rotation and on b4.
 
     Attributes:
-        axes: Of the base, the rotation is the product of turns about them in this order.
-        flips: Times one of these at the right, "" for none: half turns about an axis.
-        place: Where b4 is: on the line "u" (b2b3), "guide" or "node" (of both planes),
-            on the plane "platform" or "base", or on "a1".
+        axes: Base axes; the rotation is the product of turns about them in this order.
+        flips: Axes of half turns, one of which multiplies the rotation on the right; "" for
+            none.
+        place: Set of positions of b4: the line "u" (b2b3), "guide" or "node" (of both planes)
+            through a1, the plane "platform" or "base" through a1, or "a1".
     """
 
     axes: str
@@ -70,7 +71,7 @@ class _Closure:
 
 
 _FREE = ("zxz", ("",))
-# The guide on the direction of the platform plane; the line b2b3 on that of the base.
+# The guide parallel to the platform plane; the line b2b3 parallel to the base plane.
 _GUIDE_ALONG, _LINE_ALONG = ("xz", ("",)), ("zx", ("",))
 _PARALLEL_PLANES, _PARALLEL_LINES = ("z", ("", "x")), ("x", ("", "z"))
 _PARALLEL_FLAGS = ("", ("", "x", "y", "z"))
@@ -99,19 +100,19 @@ _CLOSURES: Mapping[Stratum, _Closure] = MappingProxyType(
         (1, 2, 3, 4): _Closure(*_PARALLEL_FLAGS, "a1"),
     }
 )
-"""All strata but the generic one and those of codimension one."""
+"""The closures of all strata of codimension two or more."""
 
 
 def nearest_in_stratum(design: Design, pose: Pose, asked: Stratum) -> NearestInStratum:
-    """Return the nearest pose in a stratum; the pose itself if that lies in its closure.
+    """Return the nearest pose in the closure of a stratum; the pose itself if it lies in it.
 
     Args:
         design: The manipulator.
-        pose: Of its platform.
-        asked: A permutation of (1, 2, 3, 4).
+        pose: Pose of its platform.
+        asked: Stratum, a permutation of (1, 2, 3, 4).
 
     Raises:
-        InputError: no such stratum.
+        InputError: There is no such stratum.
     """
     w = tuple(asked)
     if w not in STRATA:
@@ -120,38 +121,38 @@ def nearest_in_stratum(design: Design, pose: Pose, asked: Stratum) -> NearestInS
     if is_below(here, w):
         return NearestInStratum(w, here, 0.0, pose)
     if codimension(w) == 1:
-        nearest = nearest_singularities(design, pose)[OF_INCIDENCES.index(w)]
-        found, distance = nearest.pose, nearest.distance
+        singular = nearest_singularities(design, pose)[OF_INCIDENCES.index(w)]
+        nearest, distance = singular.pose, singular.distance
     else:
-        found = _nearest(design, pose, _CLOSURES[w])
+        nearest = _nearest(design, pose, _CLOSURES[w])
         distance = float(
-            displacement(design, pose.position, pose.rotation, found.position, found.rotation)
+            displacement(design, pose.position, pose.rotation, nearest.position, nearest.rotation)
         )
-    seen = seen_stratum(design, found)
-    # Just at the tolerance of incidences, those that imply others need not agree.
-    return NearestInStratum(w, seen if is_below(seen, w) else w, distance, found)
+    seen = seen_stratum(design, nearest)
+    # At the tolerance of incidences a pose may lack one that its other incidences imply.
+    return NearestInStratum(w, seen if is_below(seen, w) else w, distance, nearest)
 
 
 def nearest_in_strata(design: Design, pose: Pose) -> Mapping[Stratum, NearestInStratum]:
-    """Return the nearest pose in each of the 24 strata."""
+    """Return the nearest pose in the closure of each of the 24 strata, by stratum."""
     return {w: nearest_in_stratum(design, pose, w) for w in STRATA}
 
 
 def seen_stratum(design: Design, pose: Pose) -> Stratum:
-    """Return the stratum of a pose, to the tolerance that a snapshot has."""
+    """Return the stratum of a pose, with a tolerance relative to the design's reach."""
     return tuple(stratum(pose.position, pose.rotation, design.reach).tolist())
 
 
 @dataclass(frozen=True)
 class _Problem:
-    """The least way to a closure, in units of the platform's own length.
+    """The minimisation of the distance to a closure; the unit is `PlatformPoints.length`.
 
     Attributes:
-        closure: Where to.
-        flip: Which of its flips, shape (3, 3).
-        centroid: Of the platform's points, in its own frame, shape (3,).
-        goal: The same of the pose, in the base frame, shape (3,).
-        turned: R M, shape (3, 3): the scatter of the points, turned as the pose is.
+        closure: The closure.
+        flip: One of its half turns as a rotation, shape (3, 3).
+        centroid: Centroid of the points in the platform frame, shape (3,).
+        goal: Centroid of the points of the given pose in the base frame, shape (3,).
+        turned: Product R M of the given rotation and the scatter, shape (3, 3).
     """
 
     closure: _Closure
@@ -180,25 +181,25 @@ class _Problem:
         if place == "u":
             along = rotation[..., 0]
         elif place == "node":
-            # The platform turned about the base's normal, then about this line.
+            # The first turn is about the base's normal, the second about this line.
             along = _turn("z", angles[..., 0])[..., 0]
         return (free * along).sum(axis=-1, keepdims=True) * along
 
     def value(self, angles: Array) -> Array:
-        """Return the square of the way, shape (...), at angles (..., d)."""
+        """Return the squared distance, shape (...), at angles (..., d)."""
         rotation = self.rotation(angles)
         position = self.position(angles, rotation)
         off = self.goal - rotation @ self.centroid - position
-        # No absolute values: it is a function of complex angles, too.
+        # Without absolute values the function extends to complex angles.
         return 2.0 - 2.0 * (rotation * self.turned).sum(axis=(-2, -1)) + (off * off).sum(axis=-1)
 
     def slope(self, angles: FloatArray) -> FloatArray:
-        """Return the gradient (..., d) at angles (..., d), to the last digits."""
+        """Return the gradient (..., d) at angles (..., d), accurate to rounding."""
         steps = 1j * COMPLEX_STEP * np.eye(angles.shape[-1])
         return np.imag(self.value(angles[..., None, :] + steps)) / COMPLEX_STEP
 
-    def least(self) -> tuple[float, FloatArray]:
-        """Return the least square and its angles (d,)."""
+    def minimise(self) -> tuple[float, FloatArray]:
+        """Return the smallest squared distance and its angles, shape (d,)."""
         count = len(self.closure.axes)
         if count == 0:
             none = np.zeros(0)
@@ -213,7 +214,7 @@ class _Problem:
             hessian = (ahead - behind) / (2.0 * HESSIAN_STEP)
             hessian = 0.5 * (hessian + np.swapaxes(hessian, -1, -2))
             bends, axes = np.linalg.eigh(hessian)
-            # Downhill also where it is not convex, and not far where it is nearly flat.
+            # The step descends even if the value is not convex, and is short if it is flat.
             bends = np.maximum(np.abs(bends), 1e-9) + damping[:, None]
             along = (np.swapaxes(axes, -1, -2) @ slope[..., None])[..., 0] / bends
             step = -(axes @ along[..., None])[..., 0]
@@ -229,11 +230,11 @@ class _Problem:
         return float(value[best]), angles[best]
 
     def _starts(self, count: int) -> FloatArray:
-        """Return the angles (n, d) of the local leasts on a grid over all turns.
+        """Return the angles (n, d) of local minima on a grid over all turns.
 
-        Of two angles, those that are least along either alone: far from a1, the value has
-        valleys so narrow that a grid does not tell where their floor is lowest. Of three,
-        these would be too many.
+        For two angles these are the minima along either angle alone: far from a1 the value has
+        valleys too narrow for the grid to locate the lowest point of their floor. For three
+        angles there would be too many.
         """
         grid = _grid(count)
         value = self.value(grid)
@@ -242,26 +243,25 @@ class _Problem:
             for axis in range(count)
         ]
         low = np.any(along, axis=0) if count == 2 else np.all(along, axis=0)
-        found = grid[low]
-        return found[np.argsort(value[low], kind="stable")]
+        return grid[low][np.argsort(value[low], kind="stable")]
 
 
 def _nearest(design: Design, pose: Pose, closure: _Closure) -> Pose:
-    """Return the nearest pose in a closure, of all its flips."""
+    """Return the nearest pose in a closure over all its flips."""
     platform = PlatformPoints.of(design)
     unit, rotation = platform.length, pose.rotation
     centroid = platform.centroid / unit
     goal = np.array(pose.position) / unit + rotation @ centroid
     turned = rotation @ platform.scatter / unit**2
-    best, found = math.inf, pose
+    best, nearest = math.inf, pose
     for flip in closure.flips:
         half_turn = _turn(flip, np.array(math.pi)) if flip else np.eye(3)
         problem = _Problem(closure, half_turn, centroid, goal, turned)
-        value, angles = problem.least()
+        value, angles = problem.minimise()
         if value < best:
             turn = problem.rotation(angles)
-            best, found = value, Pose.of(unit * problem.position(angles, turn), turn)
-    return found
+            best, nearest = value, Pose.of(unit * problem.position(angles, turn), turn)
+    return nearest
 
 
 @functools.cache

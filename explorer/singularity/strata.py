@@ -1,10 +1,10 @@
-"""The 24 strata of two flags in projective space, and where a pose lies among them.
+"""The 24 strata of the relative position of two flags in projective space.
 
-The base flag is the point a1, the line a1a2 and the base plane; the platform flag is the
-point b4, the line b2b3 and the platform plane. Their relative position is a permutation
-w of (1, 2, 3, 4) (a Schubert cell); its number of inversions is the stratum's dimension,
-and the closure of a stratum is cut out by the least dimensions r_ij of the intersections
-of the i-th subspace of one flag with the j-th of the other.
+The base flag is the point a1, the line a1a2 and the base plane; the platform flag is the point
+b4, the line b2b3 and the platform plane. Their relative position is a permutation w of
+(1, 2, 3, 4), which is a Schubert cell; its number of inversions is the stratum's dimension. The
+closure of a stratum is defined by lower bounds of r_ij, the dimension of the intersection of
+the i-th subspace of one flag with the j-th of the other.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ from numpy.typing import ArrayLike
 from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import FloatArray, IntArray, batch_shape, dot, finite_array
 
-# An incidence holds within this share of the characteristic length (or this angle, rad).
+# Tolerance of an incidence: a share of the characteristic length, or an angle in radians.
 TOLERANCE = 1e-9
 
 GENERIC = (4, 3, 2, 1)
 
 
 def inversions(permutation: tuple[int, ...]) -> int:
-    """Return the number of pairs out of order: the dimension of the stratum."""
+    """Return the number of inversions of a permutation, the dimension of its stratum."""
     return sum(a > b for a, b in itertools.combinations(permutation, 2))
 
 
 def ranks(permutation: tuple[int, ...]) -> IntArray:
-    """Return r_ij, shape (3, 3): entries of the permutation's first i rows in j columns."""
+    """Return r_ij, shape (3, 3): how many of a permutation's first i entries are at most j."""
     return np.array([[sum(v <= j for v in permutation[:i]) for j in (1, 2, 3)] for i in (1, 2, 3)])
 
 
@@ -44,36 +44,36 @@ _RANKS_OF_STRATA = np.stack([ranks(w) for w in STRATA])
 def stratum(position: ArrayLike, rotation: ArrayLike, length: float | None = None) -> IntArray:
     """Return the stratum of a pose, shape (..., 4): a permutation of (1, 2, 3, 4).
 
-    (4, 3, 2, 1) is generic; (3, 4, 2, 1), (4, 2, 3, 1) and (4, 3, 1, 2) are where only
-    κ1, κ2 or κ3 vanishes. It is the smallest stratum whose closure holds the pose to a
-    relative 1e-9.
+    (4, 3, 2, 1) is generic; only δ1, δ2 or δ3 vanishes in (3, 4, 2, 1), (4, 2, 3, 1) or
+    (4, 3, 1, 2). The result is the smallest stratum whose closure contains the pose to a
+    relative tolerance of 1e-9.
 
     Args:
         position: b4 in the base frame, shape (..., 3).
         rotation: Platform to base, shape (..., 3, 3).
-        length: What distances are compared with, in the unit of the position; |p| if
-            None, so that a1 and b4 then coincide only where p is exactly zero.
+        length: Length to which the tolerance of distances is relative, in the unit of the
+            position; None for |p|, so that a1 and b4 coincide only if p is exactly zero.
 
     Raises:
-        InputError: a pose that is not finite or not a rotation.
+        InputError: The position is not finite, or the rotation is not one.
     """
     p = finite_array("position", position, (3,))
     r = checked_rotation(rotation)
     shape = batch_shape((p, 1), (r, 2))
     ranks = np.zeros((*shape, 3, 3), dtype=np.int64)
-    for (i, j), excess in _incidences(p, r, length).items():
-        ranks[..., i, j] = excess
+    for (i, j), rank in _ranks_of_pose(p, r, length).items():
+        ranks[..., i, j] = rank
     holds = (ranks[..., None, :, :] >= _RANKS_OF_STRATA).all(axis=(-2, -1))
     return np.array(STRATA)[np.argmax(holds, axis=-1)]
 
 
-def _incidences(
+def _ranks_of_pose(
     p: FloatArray, r: FloatArray, length: float | None
 ) -> dict[tuple[int, int], IntArray]:
-    """Return r_ij by (i - 1, j - 1), from distances and angles rather than from ranks."""
+    """Return r_ij of poses by (i - 1, j - 1), from distances and angles."""
     u, n = r[..., 0], r[..., 2]
     across = np.hypot(p[..., 1], p[..., 2])
-    # Not from squares, which vanish or overflow in some units.
+    # Squares would underflow or overflow in some units.
     distance = np.hypot(p[..., 0], across)
     near = TOLERANCE * (distance if length is None else length)
 
@@ -105,7 +105,7 @@ def _incidences(
 
 
 def _cross_norm(u: FloatArray, p: FloatArray) -> FloatArray:
-    """Return |u × p| over the last axis; a third of the time of NumPy's."""
+    """Return |u × p| over the last axis, in a third of the time of `np.cross`."""
     a, b, c = u[..., 0], u[..., 1], u[..., 2]
     x, y, z = p[..., 0], p[..., 1], p[..., 2]
     return np.hypot(np.hypot(b * z - c * y, c * x - a * z), a * y - b * x)

@@ -1,9 +1,10 @@
-"""Six motions that move exactly one margin each, and how far each goes (design.md, section 5).
+"""The six motions that change exactly one margin, and their travel to the singularity.
 
-A flag keeps its point, its line and its plane in three of them: along the axis x the point
-moves on its line, about x the plane turns about the line, about z the line turns in the plane.
-So each moves what only one incidence is about. In a translation the margin changes linearly;
-in a rotation by an angle θ it is κ cos θ + κ' sin θ, which vanishes every half turn.
+On the axes of each of the two frames there are three: the translation along x moves the flag's
+point on its line, the rotation about x turns its plane about the line, and the rotation about z
+turns its line in the plane. Every motion leaves the other two elements of the flag where they
+are, so it changes the margin of one incidence alone. Along a translation the margin is linear;
+in a rotation by an angle θ it is δ cos θ + δ' sin θ, which vanishes every half turn.
 """
 
 from __future__ import annotations
@@ -20,19 +21,19 @@ from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 
-# A margin that changes by less than this share of a translation changes by rounding alone.
+# Rate per unit of translation up to which a change of a margin is rounding.
 NO_RATE = 1e-12
-# Of the distance of b4 from a1: a singular pose that is farther away is never reached.
+# Longest travel over the distance of b4 from a1; a longer one counts as infinite.
 FARTHEST = 1e6
 
 
 @dataclass(frozen=True)
 class Travel:
-    """How far a motion goes to the singularity, either side; in units or in radians.
+    """The travel of a motion to the singularity on either side, in design units or radians.
 
     Attributes:
-        low: Backwards, not above zero; −inf for never.
-        high: Forwards, not below zero; inf for never.
+        low: Travel backwards, at most zero; −inf if there is no singularity.
+        high: Travel forwards, at least zero; inf if there is no singularity.
     """
 
     low: float
@@ -41,13 +42,13 @@ class Travel:
 
 @dataclass(frozen=True)
 class UncoupledMotion:
-    """A motion on an axis of one of the frames that moves one margin and no other.
+    """A motion along or about an axis of a frame that changes one margin and no other.
 
     Attributes:
-        frame: Whose axis it is on: the platform's go through b4, the base's through a1.
-        kind: Along the axis or about it.
-        axis: Of the frame.
-        incidence: 1, 2 or 3: of which margin.
+        frame: Frame of the axis, which passes through b4 (platform) or a1 (base).
+        kind: Translation along the axis or rotation about it.
+        axis: Axis of the frame.
+        incidence: Index 1, 2 or 3 of the margin that changes.
     """
 
     frame: Literal["platform", "base"]
@@ -57,13 +58,13 @@ class UncoupledMotion:
 
     @property
     def name(self) -> str:
-        """Such as "along the platform's x"."""
+        """The motion's name, such as "along the platform's x"."""
         return (
             f"{'along' if self.kind == 'translation' else 'about'} the {self.frame}'s {self.axis}"
         )
 
     def line(self, pose: Pose) -> tuple[FloatArray, FloatArray]:
-        """Return a point of the axis and its unit direction, (3,) each, in the base frame."""
+        """Return a point on the axis and its unit direction, shape (3,) each, in the base frame."""
         unit = np.eye(3)["xyz".index(self.axis)]
         if self.frame == "base":
             return np.zeros(3), unit
@@ -73,11 +74,11 @@ class UncoupledMotion:
         """Return the pose after the motion.
 
         Args:
-            pose: Before it.
-            amount: In design units of a translation, in radians of a rotation.
+            pose: Pose before the motion.
+            amount: Travel in design units (translation) or radians (rotation).
 
         Raises:
-            InputError: an amount that is not finite.
+            InputError: The amount is not finite.
         """
         if not math.isfinite(amount):
             raise InputError(f"a motion {self.name} needs a finite amount; got {amount}")
@@ -88,14 +89,14 @@ class UncoupledMotion:
         return Pose.of(*_turned(self, pose, amount))
 
     def rate(self, pose: Pose) -> float:
-        """Return how fast the margin changes with the amount, in units per unit or radian."""
+        """Return the derivative of the margin by the amount, in design units per unit or radian."""
         ((_, rate),) = _margins_and_rates(pose, (self,))
         return rate
 
     def travel(self, pose: Pose) -> Travel:
-        """Return how far the motion goes until the margin is zero, forwards and backwards.
+        """Return the travel until the margin is zero, backwards and forwards.
 
-        On the singular set both are zero. A rotation's are half a turn apart.
+        Both are zero if the margin is. The two of a rotation differ by half a turn.
         """
         return _travels(pose, (self,))[0]
 
@@ -108,7 +109,7 @@ UNCOUPLED = (
     UncoupledMotion("base", "rotation", "z", 2),
     UncoupledMotion("base", "rotation", "x", 3),
 )
-"""The six motions: three of each frame, in the order of the margins that they move."""
+"""The six motions: three of each frame, in the order of the margins that they change."""
 
 
 def travels(pose: Pose) -> tuple[Travel, ...]:
@@ -117,11 +118,11 @@ def travels(pose: Pose) -> tuple[Travel, ...]:
 
 
 def _travels(pose: Pose, motions: tuple[UncoupledMotion, ...]) -> tuple[Travel, ...]:
-    found = _margins_and_rates(pose, motions)
+    margins_and_rates = _margins_and_rates(pose, motions)
     farthest = FARTHEST * math.hypot(*pose.position)
     return tuple(
         _travel(motion.kind, margin, rate, farthest)
-        for motion, (margin, rate) in zip(motions, found, strict=True)
+        for motion, (margin, rate) in zip(motions, margins_and_rates, strict=True)
     )
 
 
@@ -135,17 +136,17 @@ def _travel(
         return Travel(high - math.pi, high)
     if abs(rate) <= NO_RATE or abs(margin) > farthest * abs(rate):
         return Travel(-math.inf, math.inf)
-    way = -margin / rate
-    return Travel(way, math.inf) if way < 0.0 else Travel(-math.inf, way)
+    end = -margin / rate
+    return Travel(end, math.inf) if end < 0.0 else Travel(-math.inf, end)
 
 
 def _margins_and_rates(
     pose: Pose, motions: tuple[UncoupledMotion, ...]
 ) -> list[tuple[float, float]]:
-    """Return of each motion the margin that it moves and how fast; all of them in one go."""
-    placed = [_place_of_rate(motion, pose) for motion in motions]
-    positions = [np.array(pose.position), *(position for position, _ in placed)]
-    rotations = [pose.rotation, *(rotation for _, rotation in placed)]
+    """Return, for each motion, the margin that it changes and the rate of that margin."""
+    poses = [_pose_of_rate(motion, pose) for motion in motions]
+    positions = [np.array(pose.position), *(position for position, _ in poses)]
+    rotations = [pose.rotation, *(rotation for _, rotation in poses)]
     here, *rates = margins(np.stack(positions), np.stack(rotations)).tolist()
     return [
         (here[motion.incidence - 1], rate[motion.incidence - 1])
@@ -153,16 +154,16 @@ def _margins_and_rates(
     ]
 
 
-def _place_of_rate(motion: UncoupledMotion, pose: Pose) -> tuple[FloatArray, FloatArray]:
-    """Return the position and rotation whose margin is the rate at a pose."""
-    # Along the axis all changes are linear; about it a quarter turn later κ is κ'.
+def _pose_of_rate(motion: UncoupledMotion, pose: Pose) -> tuple[FloatArray, FloatArray]:
+    """Return a position and rotation at which the margin equals the rate at a pose."""
+    # Along the axis every change is linear; a quarter turn about it makes δ equal to δ'.
     if motion.kind == "rotation":
         return _turned(motion, pose, 0.5 * math.pi)
     return motion.line(pose)[1], pose.rotation
 
 
 def _turned(motion: UncoupledMotion, pose: Pose, angle: float) -> tuple[FloatArray, FloatArray]:
-    """Return position and rotation after a turn about the axis."""
+    """Return the position and rotation after a turn about the axis by an angle in radians."""
     point, direction = motion.line(pose)
     turn = Rotation.from_rotvec(angle * direction).as_matrix()
     return point + turn @ (np.array(pose.position) - point), turn @ pose.rotation

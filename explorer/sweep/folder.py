@@ -9,7 +9,7 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 
 from explorer.errors import InputError
-from explorer.files.writing import make_folder, refusal
+from explorer.files.writing import make_folder, storage_error
 from explorer.sweep.parts import BadPartError, part_paths, read_part
 from explorer.sweep.study import Study, study_hash
 
@@ -74,7 +74,7 @@ def _check(folder: Path, study: Study) -> None:
         try:
             is_used = any(not _is_scratch(each) for each in folder.iterdir())
         except OSError as error:
-            raise refusal("read", folder, error) from None
+            raise storage_error("read", folder, error) from None
         if is_used:
             raise InputError(
                 f"{str(folder)!r} is not empty, and holds no results of a study: use another folder"

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from explorer.errors import InputError, MissingExtraError
-from explorer.files.writing import refusal, write_whole
+from explorer.files.writing import storage_error, write_whole
 from explorer.sweep.rows import Kind, Rows, columns_of
 from explorer.sweep.study import Study, decode_study, encode_study, study_hash
 
@@ -81,7 +81,7 @@ def _visible(folder: Path) -> list[Path]:
     try:
         found = list(folder.glob(f"*{SUFFIX}"))
     except OSError as error:
-        raise refusal("read", folder, error) from None
+        raise storage_error("read", folder, error) from None
     # Readers of Parquet folders pass over the others.
     return [path for path in found if not path.name.startswith((".", "_"))]
 

@@ -22,7 +22,7 @@ from explorer.app.state.state import State, opened
 from explorer.app.widgets.assigning import Update
 from explorer.measures.snapshot import evaluate
 from explorer.mechanism.design_file import PRESETS
-from explorer.mechanism.margins import mode_words
+from explorer.mechanism.margins import describe_modes
 from explorer.mechanism.pose import Pose
 from explorer.singularity.bruhat import COVERED, OF_INCIDENCES, incidences
 
@@ -58,7 +58,7 @@ def test_singular_pose_is_told_as_the_boundary_of_two_modes(incidence: int) -> N
 
 
 def test_deeper_pose_is_told_as_the_boundary_of_four_or_eight_modes() -> None:
-    assert mode_words((1, 3, 5, 7)) == "boundary of modes 1, 3, 5 and 7"
+    assert describe_modes((1, 3, 5, 7)) == "boundary of modes 1, 3, 5 and 7"
     coinciding = GoToStratum((1, 2, 3, 4)).apply(opened(OPTIMAL))
     assert "boundary of all eight modes" in summary(Frame(coinciding))
 

@@ -34,7 +34,7 @@ from explorer.legs.moves import move_clearance
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
-from explorer.numerics.number_text import scientific
+from explorer.numerics.number_text import format_number
 
 OPTIMAL = PRESETS["paper-optimal"]
 # Started when it is first needed, and so never.
@@ -201,7 +201,7 @@ def test_the_closest_pair_is_marked_wherever_the_platform_goes(server: viser.Vis
             along = np.linalg.norm(end - base) + np.linalg.norm(tip - end)
             assert along == pytest.approx(float(np.linalg.norm(tip - base)), rel=1e-4)
         np.testing.assert_allclose(label["position"], ends.mean(axis=0), rtol=1e-5, atol=1e-5)
-        clearance = scientific(float(found.clearance[pair]), 3)
+        clearance = format_number(float(found.clearance[pair]), 3)
         assert label["text"] == f"legs {first}–{second}: {clearance}"
     assert len(marked) > 1
 

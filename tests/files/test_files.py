@@ -1,4 +1,4 @@
-"""Files written whole or not at all: what is forced to the disk, and what is said when it fails."""
+"""Atomic writing of files: what is forced to the disk, and the messages of failures."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 @pytest.mark.parametrize("code", REMEDIES)
 @pytest.mark.parametrize("step", ["open", "fsync", "replace"])
-def test_what_fails_leaves_what_was_there_and_says_what_would_work(
+def test_write_failure_leaves_the_old_file_and_names_the_remedy(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: int, step: str
 ) -> None:
     path = tmp_path / "file"
@@ -54,7 +54,7 @@ def test_what_fails_leaves_what_was_there_and_says_what_would_work(
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="folders cannot be forced to the disk there")
-def test_file_and_folder_are_forced_to_the_disk_in_this_order(
+def test_write_forces_the_file_then_the_folder_to_the_disk(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path, forced = tmp_path / "file", list[tuple[bool, bool]]()
@@ -73,7 +73,7 @@ def test_file_and_folder_are_forced_to_the_disk_in_this_order(
     assert forced == [(False, False), (True, True)]
 
 
-def test_readers_see_the_old_file_or_the_new_one(tmp_path: Path) -> None:
+def test_write_during_reads_shows_the_old_file_or_the_new_one(tmp_path: Path) -> None:
     path = tmp_path / "file"
     whole = [bytes([number]) * (10_000 + number) for number in range(50)]
     write_whole(path, whole[0])
@@ -96,7 +96,7 @@ def test_readers_see_the_old_file_or_the_new_one(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["x" * 300, "nul\0", "é" * 200])
-def test_names_that_no_system_takes_are_refused(tmp_path: Path, name: str) -> None:
+def test_path_names_that_no_system_takes_are_refused(tmp_path: Path, name: str) -> None:
     path = tmp_path / name
     for attempt in (
         lambda: write_whole(path, b""),
@@ -111,12 +111,12 @@ def test_names_that_no_system_takes_are_refused(tmp_path: Path, name: str) -> No
 
 
 @pytest.mark.parametrize("name", ["x" * 255, "é" * 127, "🦾" * 63])
-def test_the_longest_names_are_written(tmp_path: Path, name: str) -> None:
+def test_path_names_of_greatest_length_are_written(tmp_path: Path, name: str) -> None:
     write_whole(tmp_path / name, b"new")
     assert contents(tmp_path) == {name: b"new"}
 
 
-def test_files_are_read_up_to_a_size(tmp_path: Path) -> None:
+def test_read_of_larger_missing_or_odd_file_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "file"
     path.write_bytes(b"1234")
     assert read_at_most(path, 4) == b"1234"
@@ -133,7 +133,7 @@ def test_files_are_read_up_to_a_size(tmp_path: Path) -> None:
             read_at_most(each, 3)
 
 
-def test_folders_are_made_for_their_owner_alone(tmp_path: Path) -> None:
+def test_folder_is_made_for_its_owner_alone(tmp_path: Path) -> None:
     folder = tmp_path / "one" / "two"
     make_folder(folder)
     make_folder(folder)
@@ -146,7 +146,7 @@ def test_folders_are_made_for_their_owner_alone(tmp_path: Path) -> None:
             make_folder(path)
 
 
-def test_a_file_is_moved_with_all_that_is_in_it(tmp_path: Path) -> None:
+def test_move_replaces_the_target_and_refuses_a_missing_source(tmp_path: Path) -> None:
     (tmp_path / "one").write_bytes(b"1")
     (tmp_path / "two").write_bytes(b"2")
     move(tmp_path / "one", tmp_path / "two")
@@ -156,7 +156,7 @@ def test_a_file_is_moved_with_all_that_is_in_it(tmp_path: Path) -> None:
     assert contents(tmp_path) == {"two": b"1"}
 
 
-def test_a_link_stays_a_link(tmp_path: Path) -> None:
+def test_write_to_a_link_replaces_its_target(tmp_path: Path) -> None:
     target, link = tmp_path / "target", tmp_path / "link"
     target.write_bytes(b"old")
     link.symlink_to(target)

@@ -1,4 +1,4 @@
-"""Designs and their files: what comes in is usable or refused with one line."""
+"""Designs and their files: every input is usable or refused with one line."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def message_of(action: Callable[[], object]) -> str:
     return text
 
 
-# What files can hold, and words of the message that it must give.
+# Contents of files, and words of the message with which each is refused.
 BAD_FIELDS: dict[str, tuple[dict[str, Any], str]] = {
     "a3y zero": (changed(a3=[8, 0]), "a3y = 0"),
     "b1y zero": (changed(b1=[3, 0]), "b1y = 0"),
@@ -200,7 +200,7 @@ def test_a_missing_file_is_refused_with_the_presets(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["", ".", "no\nsuch", "nul\0l", "x" * 5000, "~"])
-def test_odd_names_of_files_are_refused(name: str) -> None:
+def test_file_names_that_cannot_be_opened_are_refused(name: str) -> None:
     message_of(lambda: load_design(name))
 
 
@@ -282,7 +282,7 @@ def test_bad_limits_are_refused_on_one_line(kind: str) -> None:
 
 @pytest.mark.parametrize("index", range(6))
 @pytest.mark.parametrize("value", [math.nan, math.inf, 1e41, None, "x"])
-def test_no_variable_can_become_unusable(index: int, value: Any) -> None:
+def test_variable_changed_to_unusable_value_is_refused(index: int, value: Any) -> None:
     design = PRESETS["paper-optimal"]
     message_of(lambda: design.with_variable(VARIABLES[index], value))
     values: list[Any] = list(design.variables)
@@ -290,7 +290,7 @@ def test_no_variable_can_become_unusable(index: int, value: Any) -> None:
     message_of(lambda: design.with_variables(values))
 
 
-def test_changing_variables_checks_their_number_and_name() -> None:
+def test_variables_changed_check_their_number_and_name() -> None:
     design = PRESETS["paper-optimal"]
     message_of(lambda: design.with_variables([1.0, 2.0]))
     message_of(lambda: design.with_variable("a9", 1.0))
@@ -300,7 +300,7 @@ def test_changing_variables_checks_their_number_and_name() -> None:
     assert design.with_variables(values).limits == design.limits
 
 
-def test_lists_and_arrays_make_the_same_design_as_tuples() -> None:
+def test_design_of_lists_and_arrays_equals_that_of_tuples() -> None:
     one = Design(**NUMBERS)
     arrays: dict[str, Any] = {
         "a3": np.array(NUMBERS["a3"]),
@@ -364,7 +364,7 @@ def complete_designs(draw: st.DrawFn) -> Design:
 
 
 @given(complete_designs())
-def test_a_design_comes_back_from_its_file_to_the_last_bit(design: Design) -> None:
+def test_design_file_round_trip_keeps_every_bit(design: Design) -> None:
     data = encode_design(design)
     again = decode_design(data, "round trip")
     assert again == design
@@ -372,7 +372,7 @@ def test_a_design_comes_back_from_its_file_to_the_last_bit(design: Design) -> No
 
 
 @given(complete_designs())
-def test_a_design_comes_back_from_disk(
+def test_design_loaded_from_disk_equals_the_saved_one(
     tmp_path_factory: pytest.TempPathFactory, design: Design
 ) -> None:
     path = tmp_path_factory.mktemp("designs") / "one.json"
@@ -380,7 +380,7 @@ def test_a_design_comes_back_from_disk(
     assert load_design(str(path)) == design
 
 
-def test_a_file_may_leave_out_all_but_the_variables() -> None:
+def test_design_file_with_variables_only_has_defaults() -> None:
     design = decoded(SMALLEST)
     assert design == Design(**NUMBERS)
     assert design.name == "untitled"
@@ -391,7 +391,7 @@ def test_a_file_may_leave_out_all_but_the_variables() -> None:
     assert design.schema == 1
 
 
-def test_limits_left_out_are_no_minima_maxima_at_the_reach_no_box_and_the_homes_signs() -> None:
+def test_limits_left_out_are_the_reach_and_the_signs_of_home() -> None:
     design = decoded(SMALLEST)
     reach = math.hypot(8.0, 5.0)
     assert design.reach == reach
@@ -490,7 +490,7 @@ def test_the_home_of_a_design_without_one_is_regular(design: Design) -> None:
 
 
 @given(designs(), limits())
-def test_home_is_found_whatever_the_limits(design: Design, within: Limits) -> None:
+def test_home_of_any_limits_is_finite(design: Design, within: Limits) -> None:
     pose = home_pose(msgspec.structs.replace(design, limits=within))
     assert np.isfinite(pose.position).all()
     assert max(map(abs, pose.position)) <= LARGEST_NUMBER
@@ -525,7 +525,7 @@ def usable_or_refused(data: bytes) -> Design | None:
 
 
 @given(json_values)
-def test_any_json_is_a_usable_design_or_refused(value: Any) -> None:
+def test_json_of_any_kind_is_a_usable_design_or_refused(value: Any) -> None:
     usable_or_refused(json.dumps(value).encode())
 
 

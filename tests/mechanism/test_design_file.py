@@ -1,4 +1,4 @@
-"""The strict door for design files: schemas, fields given twice, names, and fuzz."""
+"""Strict reading of design files: schemas, repeated fields, names, and fuzzing."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def test_files_of_older_schemas_are_read_as_strictly() -> None:
 
 
 @pytest.mark.parametrize("schema", [SCHEMA + 1, 10**6, 2**63])
-def test_a_file_of_a_newer_explorer_is_refused_and_says_so(schema: int) -> None:
+def test_file_of_newer_schema_is_refused_and_says_so(schema: int) -> None:
     # Whatever else it holds.
     text = refusal(PLAIN | {"schema": schema, "hologram": {"x": [1]}})
     assert "newer explorer" in text
@@ -82,11 +82,11 @@ def test_a_file_of_a_newer_explorer_is_refused_and_says_so(schema: int) -> None:
 
 
 @pytest.mark.parametrize("schema", [0, -1, 0.5, "1", None, True, [1], {"schema": 1}])
-def test_a_schema_that_never_was_is_refused(schema: Any) -> None:
+def test_file_of_impossible_schema_is_refused(schema: Any) -> None:
     assert "schema" in refusal(PLAIN | {"schema": schema})
 
 
-def test_a_file_without_a_schema_is_of_the_first() -> None:
+def test_file_without_schema_is_of_the_first() -> None:
     assert decode_design(json.dumps(PLAIN).encode(), "x").schema == 1
 
 
@@ -102,13 +102,13 @@ def test_a_file_without_a_schema_is_of_the_first() -> None:
         (b'"sche\\u006da": 1, "schema": 1', "schema"),
     ],
 )  # fmt: skip
-def test_a_field_given_twice_is_refused_at_every_level(more: bytes, name: str) -> None:
+def test_field_given_twice_is_refused_at_every_level(more: bytes, name: str) -> None:
     text = refusal(json.dumps(PLAIN)[:-1].encode() + b", " + more + b"}")
     assert f"{name!r} is given twice" in text
 
 
 @pytest.mark.parametrize("name", ["../../x", "/etc/passwd", "a/b", "C:\\x", "CON", ".", "", "ä 漢"])
-def test_a_name_is_words_and_never_a_path(
+def test_name_like_a_path_is_kept_as_text(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -119,18 +119,18 @@ def test_a_name_is_words_and_never_a_path(
 
 
 @pytest.mark.parametrize("name", ["a\nb", "\0", "\x7f", "\x1b[31m", "\u202ex", "\u2028", "x" * 101])
-def test_a_name_that_cannot_be_shown_on_a_line_is_refused(name: str) -> None:
+def test_name_that_is_no_printable_line_is_refused(name: str) -> None:
     assert "name must be one printable line" in refusal(PLAIN | {"name": name})
 
 
-def test_what_a_message_quotes_stays_short_and_can_be_shown() -> None:
+def test_message_that_quotes_a_file_is_short_and_printable() -> None:
     assert "unknown field" in refusal(PLAIN | {"x" * 100_000: 1})
     assert "unknown field" in refusal(PLAIN | {"\x1b[31m\u202e\n\x7f": 1})
     assert "unknown field" in refusal(PLAIN | {"x": 1}, "\x1b\n" + "file" * 50)
 
 
 @pytest.mark.parametrize("w", [1e-308, 1e-200, 1e-17])
-def test_lines_that_rounding_alone_keeps_from_being_parallel_leave_no_workspace(w: float) -> None:
+def test_home_with_lines_parallel_but_for_rounding_has_no_workspace(w: float) -> None:
     home = {"position": [5, 3, 5], "quaternion": [w, 1, w, -w]}
     design = decode_design(json.dumps(PLAIN | {"home": home}).encode(), "x")
     found = workspace_volume(design)
@@ -139,7 +139,7 @@ def test_lines_that_rounding_alone_keeps_from_being_parallel_leave_no_workspace(
 
 
 @pytest.mark.parametrize("step", [5e-324, 1e-300, 1e-200])
-def test_a_node_step_beyond_all_numbers_is_refused_in_words(step: float) -> None:
+def test_node_step_too_small_to_count_is_refused_on_one_line(step: float) -> None:
     limits = {"box": [[-1e39, -1e39, 0], [1e39, 1e39, 1e39]], "margin": None}
     design = decode_design(json.dumps(PLAIN | {"node_step": step, "limits": limits}).encode(), "x")
     with pytest.raises(InputError, match=r"^a node step of [^\n]*$"):

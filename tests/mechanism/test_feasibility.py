@@ -183,7 +183,9 @@ def test_the_nearest_feasible_value_closes_and_nothing_nearer_does(
 
 
 @given(ordinary_cases(), joint_indices)
-def test_what_closes_already_is_its_own_nearest(case: Case, joint: int) -> None:
+def test_nearest_feasible_value_of_closing_joints_is_the_present_one(
+    case: Case, joint: int
+) -> None:
     assume(np.abs(margins(case.position, case.rotation)).min() > 1e-2 * case.size)
     joints = inverse(case.design, case.position, case.rotation)
     found = nearest(case.design, joints, joint)
@@ -202,7 +204,7 @@ def test_at_a_singular_pose_the_nearest_value_is_near_or_there_is_none(
         assert forward(case.design, rows).feasible.all()
 
 
-def test_where_nothing_closes_there_is_no_nearest_value() -> None:
+def test_nearest_feasible_value_is_none_if_no_value_closes() -> None:
     design = PRESETS["paper-initial"]
     # The carriages are farther apart than b2 and b3, whatever the lengths.
     joints = np.array([9.0, 0.0, 8.0, 50.0, 7.0, 6.0])
@@ -223,7 +225,7 @@ def test_any_design_and_joints_give_finite_intervals(design: Design, seed: int) 
     assert len(feasible_intervals(design, joints * 4e14)) == 6
 
 
-def test_at_the_identity_orientation_only_the_radii_have_no_room() -> None:
+def test_intervals_at_the_identity_orientation_are_empty_for_the_radii_alone() -> None:
     design = PRESETS["paper-initial"]
     joints = inverse(design, [5.0, 3.0, 5.0], np.eye(3))
     found = feasible_intervals(design, joints)

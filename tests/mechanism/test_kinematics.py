@@ -116,7 +116,7 @@ def compiled() -> None:
     solve_rows.compile()
 
 
-def test_there_are_two_hundred_reference_cases_of_every_mode() -> None:
+def test_reference_cases_are_two_hundred_of_every_mode() -> None:
     modes = {int(mode_of(np.array(case["margins"]))) for case in REFERENCE}
     assert len(REFERENCE) == 200
     assert modes == set(range(8))
@@ -593,7 +593,7 @@ def test_unusable_joints_are_refused(joints: Any, words: str) -> None:
             function(design, joints)
 
 
-def test_carriages_may_be_on_the_negative_side() -> None:
+def test_joints_of_carriages_on_the_negative_side_are_accepted() -> None:
     assert checked_joints(PRESETS["paper-initial"], [1, -2, 3, -4, 5, 6]).tolist()[1] == -2.0
 
 

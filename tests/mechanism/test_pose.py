@@ -160,7 +160,7 @@ def test_conversions_take_batches_over_leading_axes() -> None:
         np.stack([np.eye(3), -np.eye(3)]),
     ],
 )
-def test_what_is_no_rotation_is_refused_on_one_line(matrix: Any) -> None:
+def test_matrix_that_is_no_rotation_is_refused_on_one_line(matrix: Any) -> None:
     for function in (checked_rotation, quaternion_from_rotation, yaw_pitch_roll_from_rotation):
         with pytest.raises(InputError) as caught:
             function(matrix)
@@ -213,7 +213,7 @@ def test_a_pose_keeps_its_quaternion_at_unit_length(
 
 
 @given(rotations())
-def test_a_pose_of_a_rotation_has_that_rotation(rotation: FloatArray) -> None:
+def test_pose_of_a_rotation_has_that_rotation(rotation: FloatArray) -> None:
     pose = Pose.of([1.0, 2.0, 3.0], rotation)
     assert pose.position == (1.0, 2.0, 3.0)
     assert_allclose(pose.rotation, rotation, rtol=0, atol=ROUNDING)
@@ -224,7 +224,7 @@ def test_a_pose_of_angles_has_those_angles() -> None:
     assert_allclose(yaw_pitch_roll_from_rotation(pose.rotation), [-73.1, 10.0, 20.0], atol=1e-12)
 
 
-def test_poses_are_values() -> None:
+def test_poses_of_equal_values_are_equal_and_frozen() -> None:
     one, other = Pose((1.0, 2.0, 3.0), (1.0, 0.0, 0.0, 0.0)), Pose((1, 2, 3), (2, 0, 0, 0))
     assert one == other
     assert hash(one) == hash(other)

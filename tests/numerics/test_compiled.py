@@ -1,4 +1,4 @@
-"""Kernels: compiled once on a machine, urgent ones first, and nobody waits for others."""
+"""Kernels: each is compiled once on a machine, requested ones first."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ import explorer
 from explorer.legs import clearance, tetrahedra
 from explorer.numerics import kernel_cache
 from explorer.numerics.compiled import Kernel
-from explorer.numerics.kernel_cache import Cacheable, compile_all, fingerprint_of, when_cached
+from explorer.numerics.kernel_cache import Cacheable, await_cached, compile_all, fingerprint_of
 from explorer.optimise.defaults import make_problem
 from explorer.optimise.solver import optimise_design
 from explorer.workspace.slices import nodes
@@ -75,7 +75,7 @@ def test_kernels_have_fingerprints_of_their_own() -> None:
 
 
 class Stand:
-    """A kernel that is compiled by writing a file, and tells when."""
+    """A kernel whose compilation writes a file and records the order."""
 
     def __init__(self, kernel: Cacheable, folder: Path, order: list[str]) -> None:
         self.entry = kernel.entry
@@ -117,7 +117,7 @@ def test_compiling_takes_requested_kernels_first_then_the_shortest(
     assert len(order) == len(stands)
 
 
-def test_request_of_another_version_is_left_to_it(
+def test_request_of_another_version_is_ignored(
     empty_cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (stand,), order = stand_in(monkeypatch, empty_cache, clearance.pair_rows)
@@ -146,7 +146,7 @@ def test_kernel_compiled_by_another_process_is_awaited_not_compiled_again(
     ready: list[Stand] = []
     with lock.acquire():
         assert compile_all([stand.entry.label]) == kernel_cache.BUSY
-        waiter = threading.Thread(target=lambda: ready.extend(when_cached([stand], urgent=True)))
+        waiter = threading.Thread(target=lambda: ready.extend(await_cached([stand], urgent=True)))
         waiter.start()
         while not any((empty_cache / "requests").glob("*")):
             waiter.join(0.01)
@@ -182,7 +182,7 @@ np.testing.assert_allclose(found, same, rtol=1e-12)
     assert not any("overlap_rows" in path.name for path in tmp_path.rglob("*"))
 
 
-def test_kernel_is_compiled_where_nothing_can_be_kept(tmp_path: Path) -> None:
+def test_kernel_is_compiled_if_the_cache_cannot_be_written(tmp_path: Path) -> None:
     blocked = tmp_path / "file"
     blocked.touch()
     program = """

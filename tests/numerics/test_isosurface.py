@@ -1,4 +1,4 @@
-"""The surface around what is below zero: closed and on the right side, whatever the values."""
+"""The surface around negative values: closed and correctly oriented for any values."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def solid_of(values: FloatArray) -> Solid:
 
 @settings(deadline=None, max_examples=40)
 @given(st.integers(0, 2**32), st.tuples(*[st.integers(4, 9)] * 3), st.floats(0.0, 1.0))
-def test_any_values_have_a_closed_surface_around_those_below_zero(
+def test_surface_of_any_values_is_closed_around_negative_ones(
     seed: int, shape: tuple[int, int, int], zeros: float
 ) -> None:
     rng = np.random.default_rng(seed)
@@ -37,7 +37,7 @@ def test_any_values_have_a_closed_surface_around_those_below_zero(
         assert round(winding) == (1 if values[tuple(node)] < 0.0 else 0)
 
 
-def test_a_ball_is_found_where_it_is() -> None:
+def test_surface_of_a_ball_has_its_radius_and_volume() -> None:
     grid = np.stack(np.meshgrid(*[np.arange(30)] * 3, indexing="ij"), axis=-1)
     centre, radius = np.array([14.2, 13.9, 14.6]), 9.3
     solid = solid_of(np.linalg.norm(grid - centre, axis=-1) - radius)
@@ -47,7 +47,7 @@ def test_a_ball_is_found_where_it_is() -> None:
     assert 0.98 < solid.volume / (4.0 / 3.0 * math.pi * radius**3) < 1.0
 
 
-def test_planes_are_exact() -> None:
+def test_surface_of_linear_values_is_an_exact_plane() -> None:
     values = np.ones((6, 6, 6))
     z = np.arange(6.0)
     values[1:5, 1:5, :] = z - 2.25

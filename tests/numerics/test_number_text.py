@@ -1,4 +1,4 @@
-"""Numbers as people read them: no rounding, no zero with a minus sign."""
+"""Numbers as text: no rounding errors, no zero with a minus sign."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from explorer.cli.commands.singularity import Singularity
 from explorer.cli.output import degrees, figures
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
-from explorer.numerics.number_text import fixed, scientific, settled, significant
+from explorer.numerics.number_text import drop_rounding, format_ascii, format_fixed, format_number
 
 NEGATIVE_ZERO = re.compile(r"(?<![\d.])[-−]0(\.0*)?(?![\d.e])")
 
 
 @given(st.floats(-1e6, 1e6), st.floats(1e-20, 1e20), st.integers(1, 8))
-def test_no_zero_has_a_sign(value: float, size: float, digits: int) -> None:
+def test_number_text_of_zero_has_no_sign(value: float, size: float, digits: int) -> None:
     for text in (
-        fixed(value, digits),
-        significant(value, digits, size=size),
+        format_fixed(value, digits),
+        format_ascii(value, digits, size=size),
         signed(value, digits),
-        scientific(value, digits, size=size),
+        format_number(value, digits, size=size),
         fitted(value, size, digits),
         *figures([value, size]),
         *degrees([value]),
@@ -38,18 +38,18 @@ def test_no_zero_has_a_sign(value: float, size: float, digits: int) -> None:
 
 
 @given(st.floats(1e-20, 1e20), st.floats(-1.0, 1.0))
-def test_rounding_beside_its_size_reads_zero_in_every_unit(size: float, share: float) -> None:
+def test_number_text_of_rounding_reads_zero_in_every_unit(size: float, share: float) -> None:
     rounding = 1e-15 * share * size
-    assert scientific(rounding, size=size) == "0"
-    assert settled(rounding, size) == 0.0
+    assert format_number(rounding, size=size) == "0"
+    assert drop_rounding(rounding, size) == 0.0
     assert float(figures([size, rounding])[1]) == 0.0
     assert float(fitted(rounding, size, 5)) == 0.0
 
 
 @given(st.floats(1e-20, 1e20))
-def test_small_numbers_that_are_no_rounding_are_kept(size: float) -> None:
-    assert scientific(1e-9 * size, size=size) != "0"
-    assert scientific(1e-30 * size) != "0"
+def test_number_text_of_small_number_above_rounding_is_kept(size: float) -> None:
+    assert format_number(1e-9 * size, size=size) != "0"
+    assert format_number(1e-30 * size) != "0"
     assert share(1.651e-9) == "1.65e−09"
 
 

@@ -1,4 +1,4 @@
-"""The nearest singular poses: on the singular set, nearest of all, and safe where degenerate."""
+"""The nearest singular poses: singular, globally nearest, and finite where degenerate."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def random_poses(seed: int, count: int) -> tuple[FloatArray, FloatArray]:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_nothing_nearer_is_found_by_slsqp_from_many_starts(seed: int) -> None:
+def test_nearest_poses_are_as_near_as_slsqp_from_many_starts(seed: int) -> None:
     rng = np.random.default_rng(seed)
     a3x, a3y, b1x, b1y, b2, span = (
         rng.uniform(0.3, 1.0, 6) * rng.choice([-1.0, 1.0], 6) * 10.0
@@ -83,7 +83,7 @@ def test_the_nearest_poses_lie_on_the_singular_set_at_their_distance(case: Case)
 
 
 @given(all_cases())
-def test_a_shift_along_the_shortest_way_is_never_shorter(case: Case) -> None:
+def test_nearest_poses_are_no_farther_than_a_translation(case: Case) -> None:
     margin = np.abs(margins(case.position, case.rotation))
     margin[1] /= max(math.hypot(case.rotation[1, 0], case.rotation[2, 0]), 1e-300)
     found = nearest_singular_poses(case.design, case.position, case.rotation)
@@ -104,7 +104,7 @@ def test_a_distance_changes_no_more_than_the_platform_moves(
 
 @pytest.mark.parametrize("b1y", [-3.8858, 0.3, 1e-3, 20.0])
 @pytest.mark.parametrize("spread", [1.0, 30.0])
-def test_many_poses_have_a_proof_that_nothing_is_nearer(b1y: float, spread: float) -> None:
+def test_bounds_of_many_poses_are_close_to_the_distances(b1y: float, spread: float) -> None:
     # Platforms from wide to nearly a line, and from near by to far off.
     design = OPTIMAL.with_variable("b1y", b1y)
     positions, rotations = random_poses(1, 500)
@@ -117,7 +117,7 @@ def test_many_poses_have_a_proof_that_nothing_is_nearer(b1y: float, spread: floa
 
 
 @given(st.data())
-def test_the_bound_of_a_box_is_one(data: st.DataObject) -> None:
+def test_bound_of_a_box_is_below_its_values(data: st.DataObject) -> None:
     number = st.floats(-1.0, 1.0)
     k = np.array([data.draw(number) for _ in range(9)] + [2.0])
     k[4:6] *= data.draw(st.sampled_from((0.1, 1.0, 10.0)))
@@ -156,7 +156,7 @@ def test_on_the_singular_set_the_pose_itself_is_returned() -> None:
 
 @given(all_cases())
 @example(Case(OPTIMAL, np.zeros(3), np.eye(3)))
-def test_the_nearest_of_the_nearest_is_itself(case: Case) -> None:
+def test_nearest_pose_of_a_nearest_pose_is_itself(case: Case) -> None:
     found = nearest_singular_poses(case.design, case.position, case.rotation)
     for index in range(3):
         again = nearest_singular_poses(case.design, found.position[index], found.rotation[index])
@@ -236,7 +236,7 @@ def test_a_batch_is_that_of_its_poses_interpreted_or_compiled() -> None:
         assert_allclose(distances, many.distance.reshape(-1, 3)[index], atol=1e-12)
 
 
-def test_poses_that_are_none_are_refused() -> None:
+def test_unusable_poses_are_refused() -> None:
     with pytest.raises(InputError, match="position"):
         nearest_singular_poses(OPTIMAL, [0.0, math.nan, 1.0], np.eye(3))
     with pytest.raises(InputError, match="rotation"):

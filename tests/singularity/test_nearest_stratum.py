@@ -1,4 +1,4 @@
-"""The nearest pose in each stratum: in it or its closure, and nearest of all."""
+"""The nearest pose in each stratum: in its closure, and globally nearest."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def test_each_pose_is_in_its_stratum_or_one_in_its_closure(case: Case) -> None:
 
 
 @pytest.mark.parametrize("w", SEARCHED)
-def test_nothing_nearer_is_found_by_slsqp_from_many_starts(w: Stratum) -> None:
+def test_nearest_pose_is_as_near_as_slsqp_from_many_starts(w: Stratum) -> None:
     rng = np.random.default_rng(sum(10**i * x for i, x in enumerate(w)))
     position, rotation = rng.uniform(-8.0, 8.0, 3), Rotation.random(random_state=rng).as_matrix()
     found = nearest_in_stratum(OPTIMAL, Pose.of(position, rotation), w)
@@ -160,7 +160,7 @@ def test_a_pose_in_the_closure_is_its_own_nearest(w: Stratum) -> None:
             assert found.distance > 1e-3
 
 
-def test_those_of_codimension_one_are_the_nearest_singular_poses() -> None:
+def test_strata_of_codimension_one_have_the_nearest_singular_poses() -> None:
     home = home_pose(OPTIMAL)
     for w, nearest in zip(OF_INCIDENCES, nearest_singularities(OPTIMAL, home), strict=True):
         found = nearest_in_stratum(OPTIMAL, home, w)
@@ -178,6 +178,6 @@ def test_special_strata_have_their_closed_forms() -> None:
 
 
 @pytest.mark.parametrize("w", [(1, 2, 3), (1, 1, 2, 3), (5, 4, 3, 2)])
-def test_what_is_no_stratum_is_refused(w: Stratum) -> None:
+def test_permutation_that_is_no_stratum_is_refused(w: Stratum) -> None:
     with pytest.raises(InputError, match="permutation"):
         nearest_in_stratum(OPTIMAL, home_pose(OPTIMAL), w)

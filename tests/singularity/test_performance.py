@@ -1,4 +1,4 @@
-"""Ellipsoids of speed and force, balls without singularity, and maps over a slice."""
+"""Velocity and force ellipsoids, singularity-free balls, and maps over a slice."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def is_well_conditioned(case: Case) -> bool:
 
 
 @given(ordinary_cases(), st.integers(0, 2**32))
-def test_no_unit_of_actuator_speed_leaves_the_ellipsoids(case: Case, seed: int) -> None:
+def test_velocities_at_unit_actuator_speed_lie_in_the_ellipsoids(case: Case, seed: int) -> None:
     assume(is_well_conditioned(case))
     found = performance(case.design, pose_of(case))
     drive = np.random.default_rng(seed).normal(size=(100, 6))
@@ -85,7 +85,7 @@ def test_a_unit_force_on_an_axis_takes_the_gain_of_actuator_force(case: Case) ->
 
 
 @given(singular_cases())
-def test_in_a_singular_pose_nothing_is_divided_by_zero(case: Case) -> None:
+def test_ellipsoids_of_singular_poses_have_finite_axes(case: Case) -> None:
     found = performance(case.design, pose_of(case))
     for ellipsoid in (found.translation, found.rotation):
         assert np.isfinite(ellipsoid.axes).all()
@@ -93,7 +93,7 @@ def test_in_a_singular_pose_nothing_is_divided_by_zero(case: Case) -> None:
         assert np.isfinite(ellipsoid.force).all()
 
 
-def test_the_infinite_axis_is_a_motion_that_no_actuator_feels() -> None:
+def test_infinite_axis_is_a_motion_at_zero_actuator_speed() -> None:
     # b4 on the base plane: it can leave that plane with all six lengths held to first order.
     pose = Pose((10.0, 5.0, 0.0), Pose.of_yaw_pitch_roll((0, 0, 0), (-70.0, 20.0, 30.0)).quaternion)
     found = performance(OPTIMAL, pose)
@@ -133,7 +133,7 @@ def test_the_largest_ball_touches_a_plane_and_holds_no_singular_position(
 
 
 @given(all_cases())
-def test_balls_exist_for_every_pose(case: Case) -> None:
+def test_singularity_free_ball_of_any_pose_is_finite(case: Case) -> None:
     ball = singularity_free_ball(pose_of(case))
     assert np.isfinite(ball.touches).all()
     assert ball.radius == ball.distances.min() >= 0.0
@@ -198,7 +198,7 @@ def test_fields_take_batches_of_poses() -> None:
     assert distances[1, 2] == pytest.approx(min(each.distance for each in alone))
 
 
-def test_maps_that_cannot_be_are_refused() -> None:
+def test_map_with_unusable_arguments_is_refused() -> None:
     r = HOME.rotation
     with pytest.raises(InputError, match="no field"):
         slice_field(OPTIMAL, r, "colour", level=1.0)  # pyright: ignore[reportArgumentType]

@@ -1,4 +1,4 @@
-"""The 24 strata of two flags: permutations, ranks and the order in which they border."""
+"""The 24 strata of two flags: permutations, ranks and the closure order."""
 
 from __future__ import annotations
 

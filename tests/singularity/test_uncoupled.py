@@ -1,4 +1,4 @@
-"""The six motions that move one margin each: what they move, and how far they go."""
+"""The six motions that change one margin each: rates and travel."""
 
 from __future__ import annotations
 
@@ -37,7 +37,8 @@ def test_a_motion_moves_its_margin_and_no_other(motion: UncoupledMotion) -> None
     @given(ordinary_cases(), st.floats(-3.0, 3.0))
     def law(case: Case, amount: float) -> None:
         pose = pose_of(case)
-        before, after = margins_of(pose), margins_of(motion.moved(pose, amount))
+        length = case.size if motion.kind == "translation" else 1.0
+        before, after = margins_of(pose), margins_of(motion.moved(pose, amount * length))
         others = np.arange(3) != motion.incidence - 1
         assert_allclose(after[others], before[others], atol=1e-13 * case.size)
 
@@ -45,7 +46,7 @@ def test_a_motion_moves_its_margin_and_no_other(motion: UncoupledMotion) -> None
 
 
 @each_motion
-def test_some_pose_has_its_margin_moved(motion: UncoupledMotion) -> None:
+def test_motion_of_a_generic_pose_changes_its_margin(motion: UncoupledMotion) -> None:
     pose = Pose((3.0, 4.0, 5.0), (0.8, 0.3, -0.4, 0.2))
     change = margins_of(motion.moved(pose, 0.1)) - margins_of(pose)
     assert abs(change[motion.incidence - 1]) > 1e-3
@@ -149,7 +150,7 @@ def test_travel_of_a_level_platform_in_another_mode_is_never_in_spite_of_roundin
         assert travel == never or max(map(abs, ends)) < 1e6 * design.reach
 
 
-def test_on_the_singular_set_there_is_no_travel_left() -> None:
+def test_travel_on_the_singular_set_is_zero() -> None:
     pose = Pose((3.0, 4.0, 0.0), HOME.quaternion)
     for motion in UNCOUPLED:
         if motion.incidence == 3:
@@ -168,6 +169,6 @@ def test_motions_on_the_bases_axes_keep_what_the_fixed_flag_sees() -> None:
 
 
 @pytest.mark.parametrize("amount", [math.nan, math.inf])
-def test_amounts_that_are_none_are_refused(amount: float) -> None:
+def test_motion_by_an_infinite_amount_is_refused(amount: float) -> None:
     with pytest.raises(InputError, match="finite amount"):
         UNCOUPLED[0].moved(HOME, amount)

@@ -43,5 +43,5 @@ FIELD_WORDS = {
 def message_of(error: ExplorerError) -> str:
     """Return the message of an error as the page tells it."""
     if isinstance(error, DesignError) and error.field in FIELD_WORDS:
-        return error.said_of(FIELD_WORDS[error.field])
+        return error.message_about(FIELD_WORDS[error.field])
     return str(error)

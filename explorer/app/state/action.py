@@ -11,7 +11,7 @@ from dataclasses import fields, is_dataclass
 from typing import ClassVar, cast
 
 from explorer.app.state.state import State
-from explorer.numerics.number_text import significant
+from explorer.numerics.number_text import format_ascii
 
 # A description names so many changes at the most.
 MOST_NAMED = 2
@@ -82,7 +82,7 @@ def _value(value: object) -> str:
     if isinstance(value, bool):
         return "on" if value else "off"
     if isinstance(value, float):
-        return significant(value, 6)
+        return format_ascii(value, 6)
     if isinstance(value, tuple):
         return " ".join(_value(each) for each in cast("tuple[object, ...]", value))
     return str(value)

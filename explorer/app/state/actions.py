@@ -31,7 +31,7 @@ from explorer.mechanism.feasible_intervals import feasible_intervals, nearest_fe
 from explorer.mechanism.kinematics import discriminants, forward
 from explorer.mechanism.margins import mode_name
 from explorer.mechanism.pose import Pose, Triple
-from explorer.numerics.number_text import significant
+from explorer.numerics.number_text import format_ascii
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ class SetJoint(Action):
 
     def words(self) -> str:
         """Return what the action does."""
-        return f"{JOINTS[self.joint]} = {significant(self.value, 6)}"
+        return f"{JOINTS[self.joint]} = {format_ascii(self.value, 6)}"
 
 
 @dataclass(frozen=True)
@@ -142,7 +142,7 @@ class SetPosition(Action):
 
     def words(self) -> str:
         """Return what the action does."""
-        return f"{'xyz'[self.axis]} = {significant(self.value, 6)}"
+        return f"{'xyz'[self.axis]} = {format_ascii(self.value, 6)}"
 
 
 @dataclass(frozen=True)
@@ -162,7 +162,7 @@ class SetAngle(Action):
 
     def words(self) -> str:
         """Return what the action does."""
-        return f"{('yaw', 'pitch', 'roll')[self.axis]} = {significant(self.value, 6)}°"
+        return f"{('yaw', 'pitch', 'roll')[self.axis]} = {format_ascii(self.value, 6)}°"
 
 
 @dataclass(frozen=True)
@@ -179,7 +179,7 @@ class SetPose(Action):
         """Return what the action does."""
         p = self.pose.position
         size = max(map(abs, p))
-        return f"Move b4 to {', '.join(significant(x, 4, size=size) for x in p)}"
+        return f"Move b4 to {', '.join(format_ascii(x, 4, size=size) for x in p)}"
 
 
 @dataclass(frozen=True)

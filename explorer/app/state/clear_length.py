@@ -18,7 +18,7 @@ from explorer.mechanism.design import JOINTS
 from explorer.mechanism.feasible_intervals import feasible_intervals
 from explorer.mechanism.kinematics import forward
 from explorer.mechanism.pose import Pose
-from explorer.numerics.number_text import scientific
+from explorer.numerics.number_text import format_number
 
 # The lengths between both ends of an interval that are tried, and the halvings that follow.
 TRIALS, HALVINGS = 24, 14
@@ -49,8 +49,8 @@ def clear_length(state: State) -> tuple[float, str] | None:
     if found == 0.0:
         return None
     value = length(found)
-    taken, singular = scientific(value), scientific(end)
-    instead = f"{JOINTS[joint]} = {taken} instead of {scientific(unclosed.asked, 6)}. "
+    taken, singular = format_number(value), format_number(end)
+    instead = f"{JOINTS[joint]} = {taken} instead of {format_number(unclosed.asked, 6)}. "
     why = f"{instead}The nearest value that closes, {singular}, is singular; "
     if is_clear:
         return value, f"{why}this is the nearest that stays clear."

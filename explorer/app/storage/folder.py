@@ -11,7 +11,7 @@ from filelock import FileLock, Timeout
 from platformdirs import user_data_path
 
 from explorer.errors import StorageError
-from explorer.files.writing import make_folder, refusal
+from explorer.files.writing import make_folder, storage_error
 
 NAME = "flagged-explorer"
 
@@ -68,7 +68,7 @@ def alone_in(folder: Path, patience: float | None = None) -> Generator[None]:
             "try again, or close it"
         ) from None
     except OSError as error:
-        raise refusal("lock", folder / LOCK, error) from None
+        raise storage_error("lock", folder / LOCK, error) from None
     try:
         yield
     finally:
@@ -87,5 +87,5 @@ def taken(path: Path) -> FileLock | None:
     except Timeout:
         return None
     except OSError as error:
-        raise refusal("lock", path, error) from None
+        raise storage_error("lock", path, error) from None
     return lock

@@ -20,7 +20,7 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
 from explorer.mechanism.pose import Triple
-from explorer.numerics.number_text import settled
+from explorer.numerics.number_text import drop_rounding
 
 Value = TypeVar("Value", float, bool, str, Triple)
 
@@ -107,7 +107,7 @@ class Slider(Control[float]):
         def shown(frame: Frame) -> float:
             # A field would show rounding as −0.00.
             span_now = span(frame.state)
-            return settled(read(frame), max(abs(span_now.low), abs(span_now.high)))
+            return drop_rounding(read(frame), max(abs(span_now.low), abs(span_now.high)))
 
         super().__init__(session, handle, shown, write, disabled)
         self._slider = handle

@@ -6,7 +6,7 @@ import math
 from html import escape
 
 from explorer.app.widgets.colours import OUTLINE, css
-from explorer.numerics.number_text import fixed, scientific, settled, with_true_minus
+from explorer.numerics.number_text import drop_rounding, format_fixed, format_number, set_true_minus
 
 
 def by_theme(light: str, dark: str) -> str:
@@ -50,7 +50,7 @@ def remark(title: str, body: str) -> str:
 
 def signed(value: float, digits: int = 3) -> str:
     """Return a number with a true minus sign."""
-    return with_true_minus(fixed(value, digits))
+    return set_true_minus(format_fixed(value, digits))
 
 
 # Beyond these sizes numbers are told with a power of ten.
@@ -71,11 +71,11 @@ def fitted(value: float, size: float, digits: int) -> str:
         digits: That one of this size has.
     """
     if size != 0.0 and not LEAST <= size < MOST:
-        return scientific(value, digits, size=size)
+        return format_number(value, digits, size=size)
     return signed(value, decimals_for(size, digits))
 
 
 def share(value: float) -> str:
     """Return a number from 0 to 1 with four decimals, or more where it would look like 0."""
-    value = settled(value, 1.0)
-    return scientific(value, 3) if 0.0 < value < LEAST else fixed(value, 4)
+    value = drop_rounding(value, 1.0)
+    return format_number(value, 3) if 0.0 < value < LEAST else format_fixed(value, 4)

@@ -17,9 +17,9 @@ from explorer.cli.output import (
 )
 from explorer.measures.snapshot import Snapshot, evaluate
 from explorer.measures.verdict import verdict
-from explorer.mechanism.margins import INCIDENCES, TETRAHEDRA, mode_words
+from explorer.mechanism.margins import INCIDENCES, TETRAHEDRA, describe_modes
 from explorer.mechanism.pose import yaw_pitch_roll_from_rotation
-from explorer.singularity.bruhat import incidences, words
+from explorer.singularity.bruhat import describe_stratum, incidences
 from explorer.singularity.colours import WARN_SHARE
 
 
@@ -104,10 +104,16 @@ def _measures(snapshot: Snapshot) -> str:
         [
             ("verdict", f"{found.title.lower()}: {found.reason(away)}"),
             ("singular", " and ".join(names) or "no"),
-            ("assembly mode", f"{mode_words(snapshot.bordering_modes)} ({snapshot.sign_words})"),
+            (
+                "assembly mode",
+                f"{describe_modes(snapshot.bordering_modes)} ({snapshot.sign_words})",
+            ),
             (
                 "stratum",
-                f"{stratum}, dimension {snapshot.stratum_dimension}: {words(snapshot.stratum)}",
+                (
+                    f"{stratum}, dimension {snapshot.stratum_dimension}: "
+                    f"{describe_stratum(snapshot.stratum)}"
+                ),
             ),
             ("det J", figure(snapshot.determinant, snapshot.determinant_size)),
             (

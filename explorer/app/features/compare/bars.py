@@ -7,7 +7,7 @@ from html import escape
 
 from explorer.app.features.compare.columns import Column, best_of, unit_of
 from explorer.app.widgets.colours import css
-from explorer.app.widgets.markup import scientific
+from explorer.app.widgets.markup import format_number
 from explorer.optimise.figures import FIGURES, Figure
 
 DRAWN = (
@@ -84,6 +84,6 @@ def _drawing(figure: Figure, columns: Sequence[Column], *, millimetres: bool) ->
             f'<rect x="{start:.2f}" y="{y:g}" width="{max(end - start, 0.8):.2f}" '
             f'height="{BAR:g}" rx="1.5" fill="{css(column.colour)}"/>'
             f'<text x="{end + 4.0:.1f}" y="{line:g}" font-weight="{weight}">'
-            f"{scientific(value)}</text>"
+            f"{format_number(value)}</text>"
         )
     return "".join(parts)

@@ -11,7 +11,7 @@ from explorer.app.features.optimise.words import decimals_of
 from explorer.app.state.compared import SLOTS
 from explorer.app.state.state import State
 from explorer.app.widgets.colours import COMPARED, Rgb, css
-from explorer.app.widgets.markup import LEAST, MOST, scientific
+from explorer.app.widgets.markup import LEAST, MOST, format_number
 from explorer.mechanism.design import Design
 from explorer.optimise.figures import Figure, Figures
 
@@ -107,13 +107,13 @@ def told(figure: Figure, value: float, size: float, *, signed: bool = False) -> 
         text = f"{value:+,.0f}" if signed else f"{value:,.0f}"
         return text.replace(",", "\N{NARROW NO-BREAK SPACE}").replace("-", "−")
     if size != 0.0 and not LEAST <= size < MOST:
-        return ("+" if signed and value >= 0.0 else "") + scientific(value)
+        return ("+" if signed and value >= 0.0 else "") + format_number(value)
     digits = decimals_of(size)
     text = f"{value:+.{digits}f}" if signed else f"{value:.{digits}f}"
     if float(text) == 0.0:
         # A difference by rounding is none.
         least = SAME * size if signed else 0.0
-        return "0" if abs(value) <= least else scientific(value, 3)
+        return "0" if abs(value) <= least else format_number(value, 3)
     return text.replace("-", "−")
 
 

@@ -17,7 +17,7 @@ from explorer.app.storage.library import Entry
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.controls import Controls
 from explorer.app.widgets.labels import labelled, out_of_sight
-from explorer.app.widgets.markup import BEYOND, DIM, scientific
+from explorer.app.widgets.markup import BEYOND, DIM, format_number
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import LARGEST_FILE, PRESETS
 
@@ -266,8 +266,8 @@ def _line(row: Row, ids: tuple[str, ...], is_current: bool) -> str:
         )
         length = row.design.reach
         reach = (
-            f'{scientific(length)} units <span style="{DIM}">= '
-            f"{scientific(length * row.design.unit_mm)} mm</span>"
+            f'{format_number(length)} units <span style="{DIM}">= '
+            f"{format_number(length * row.design.unit_mm)} mm</span>"
         )
         doubled = _deed(ids[1], f"Duplicate {row.name}", "Duplicate")
     gone = "" if row.is_preset else _deed(ids[2], f"Delete {row.name}", "Delete")

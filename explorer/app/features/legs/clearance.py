@@ -12,7 +12,7 @@ from explorer.app.scene.shapes import Balls, Rods
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.colours import OUTLINE, TUBE
 from explorer.legs.clearance import PAIRS, leg_axes
-from explorer.numerics.number_text import scientific
+from explorer.numerics.number_text import format_number
 
 CAPSULE_OPACITY = 0.22
 
@@ -56,5 +56,5 @@ class ClearanceScene:
             first, second = PAIRS[pair]
             yield self._line, "points", ends[None].astype(np.float32)
             yield self._label, "position", tuple(ends.mean(axis=0).tolist())
-            clearance = scientific(float(found.clearance[pair]), 3)
+            clearance = format_number(float(found.clearance[pair]), 3)
             yield self._label, "text", f"legs {first}–{second}: {clearance}"

@@ -15,7 +15,7 @@ from explorer.app.state.actions import SetView
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.controls import Controls
-from explorer.app.widgets.markup import BEYOND, DIM, WITHIN, scientific
+from explorer.app.widgets.markup import BEYOND, DIM, WITHIN, format_number
 from explorer.legs.clearance import PAIRS
 
 BOX = (
@@ -129,7 +129,7 @@ def _row(index: int, clearance: float, unit_mm: float, is_closest: bool) -> str:
     if math.isinf(clearance):
         units, millimetres = "joined", ""
     else:
-        units, millimetres = scientific(clearance), scientific(clearance * unit_mm)
+        units, millimetres = format_number(clearance), format_number(clearance * unit_mm)
     weight = "font-weight:600;" if is_closest else ""
     colour = f"color:{BEYOND};" if clearance < 0.0 else ""
     return (
@@ -146,7 +146,7 @@ def _move_row(
         swept, least, at = "", "joined", ""
     else:
         swept = f'<span style="color:{BEYOND}">overlap</span>' if overlaps else "free"
-        least, at = scientific(clearance), f"{100.0 * share:.0f} %"
+        least, at = format_number(clearance), f"{100.0 * share:.0f} %"
     weight = "font-weight:600;" if is_closest else ""
     colour = f"color:{BEYOND};" if clearance < 0.0 else ""
     return (

@@ -15,7 +15,7 @@ from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.charts import BLUE, ORANGE, TEAL, VIOLET, axis
 from explorer.app.widgets.colours import Rgb, css
-from explorer.app.widgets.markup import DIM, alert, scientific
+from explorer.app.widgets.markup import DIM, alert, format_number
 from explorer.app.widgets.under_way import UnderWay, problem, progress
 from explorer.legs.clearance import PAIRS
 from explorer.mechanism.design import Design
@@ -197,7 +197,7 @@ def _row(mark: Mark, curve: RadiusCurve, unit_mm: float) -> str:
         value, left = "they differ", ""
     else:
         share = 100.0 * volume_at(curve, mark.radius) / float(curve.volumes[0])
-        value = scientific(mark.radius, 3)
+        value = format_number(mark.radius, 3)
         left = f"{share:.3g} %" if mark.label == "present radius" else _length(mark, unit_mm)
     return (
         f'<tr><td style="padding:1px 0">{swatch}{mark.label}</td>'
@@ -207,12 +207,12 @@ def _row(mark: Mark, curve: RadiusCurve, unit_mm: float) -> str:
 
 
 def _length(mark: Mark, unit_mm: float) -> str:
-    return f"{scientific((mark.radius or 0.0) * unit_mm, 3)} mm"
+    return f"{format_number((mark.radius or 0.0) * unit_mm, 3)} mm"
 
 
 def _shown(position: FloatArray) -> str:
     rounded = np.round(position, 6) + 0.0
-    return "(" + ", ".join(scientific(float(x), 3) for x in rounded) + ")"
+    return "(" + ", ".join(format_number(float(x), 3) for x in rounded) + ")"
 
 
 def _series(marks: tuple[Mark, ...]) -> tuple[uplot.Series, ...]:

@@ -22,11 +22,11 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.controls import Controls, Span
-from explorer.app.widgets.markup import alert, remark, scientific
+from explorer.app.widgets.markup import alert, format_number, remark
 from explorer.app.widgets.ranges import coordinate_span, length_span
 from explorer.mechanism.design import JOINTS, LENGTHS
 from explorer.mechanism.feasible_intervals import Interval
-from explorer.mechanism.margins import mode_name, mode_words
+from explorer.mechanism.margins import describe_modes, mode_name
 
 JOINT_HINTS = {
     "l1": "Leg 1: length of the actuator from a1 to b1 (U joint, actuator, ball joint).",
@@ -160,7 +160,7 @@ def mode_options(frame: Frame) -> tuple[str, ...]:
     if not is_between(frame):
         return MODES
     snapshot = frame.snapshot
-    return (*MODES, f"{snapshot.sign_words}:  {mode_words(snapshot.bordering_modes)}")
+    return (*MODES, f"{snapshot.sign_words}:  {describe_modes(snapshot.bordering_modes)}")
 
 
 def interval_marks(intervals: tuple[Interval, ...], span: Span) -> tuple[Mark, ...]:
@@ -176,7 +176,7 @@ def interval_marks(intervals: tuple[Interval, ...], span: Span) -> tuple[Mark, .
         start, end = (min(max(v, span.low), span.high) for v in (low, high))
         first, last = ((v - span.low) / (span.high - span.low) for v in (start, end))
         size = max(abs(span.low), abs(span.high))
-        texts = (scientific(low, 3, size=size), scientific(high, 3, size=size))
+        texts = (format_number(low, 3, size=size), format_number(high, 3, size=size))
         if first - labelled < LABEL_ROOM:
             texts = ("", "")
         elif last - first < LABEL_ROOM:

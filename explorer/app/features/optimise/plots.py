@@ -16,7 +16,7 @@ from explorer.app.state.state import Run
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.charts import BLUE, FONT, ORANGE
 from explorer.app.widgets.colours import css
-from explorer.app.widgets.markup import DIM, scientific
+from explorer.app.widgets.markup import DIM, format_number
 from explorer.optimise import curves
 from explorer.optimise.outcome import Iterate
 from explorer.optimise.problem import Problem
@@ -101,7 +101,7 @@ def _words(problem: Problem, last: Iterate, curve: curves.Curve) -> str:
     if curve.powers:
         return f"log10 of F = |1 − V / V′|; F = {last.objective:.2g}".replace("e-", "e−")
     name = curves.CALLED[problem.objective].capitalize()
-    return f"{name} (units): {scientific(last.objective, 6)}"
+    return f"{name} (units): {format_number(last.objective, 6)}"
 
 
 def data_of(curve: Curve) -> tuple[NDArray[np.float64], ...]:

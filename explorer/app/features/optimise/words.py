@@ -8,7 +8,7 @@ from html import escape
 
 from explorer.app.state.optimisation import SearchResult
 from explorer.app.state.state import Run, State
-from explorer.app.widgets.markup import BEYOND, DIM, WITHIN, alert, decimals_for, scientific
+from explorer.app.widgets.markup import BEYOND, DIM, WITHIN, alert, decimals_for, format_number
 from explorer.mechanism.design import VARIABLES
 from explorer.optimise.curves import CALLED
 from explorer.optimise.facts import Facts
@@ -55,7 +55,7 @@ def progress_line(run: Run) -> str:
     name = CALLED[run.problem.objective]
     return _running(
         f"{start}{last.phase} {inside}".capitalize(),
-        f"{name} {scientific(last.objective, 5)}{missed}",
+        f"{name} {format_number(last.objective, 5)}{missed}",
         last.run / run.starts,
     )
 

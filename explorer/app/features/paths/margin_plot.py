@@ -15,7 +15,7 @@ from explorer.app.state.paths import Journey
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.charts import BLUE, NEUTRAL, ORANGE, TEAL, VIOLET, axis
 from explorer.app.widgets.colours import Rgb, css
-from explorer.app.widgets.markup import DIM, scientific, signed
+from explorer.app.widgets.markup import DIM, format_number, signed
 from explorer.mechanism.margins import INCIDENCES, margins
 from explorer.numerics.arrays import FloatArray
 
@@ -125,7 +125,7 @@ def _crossings(journey: Journey) -> str:
         index = int(least.argmin())
         return (
             f'<span style="{DIM}">No singularity on the way; the closest is δ{index + 1} = 0, '
-            f"with |δ{index + 1}| = {scientific(float(least[index]), 3)}.</span>"
+            f"with |δ{index + 1}| = {format_number(float(least[index]), 3)}.</span>"
         )
     dot = (
         '<span style="display:inline-block;width:9px;height:9px;border-radius:5px;'

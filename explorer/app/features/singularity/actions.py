@@ -12,8 +12,7 @@ from explorer.app.state.view import SingularView
 from explorer.errors import InputError
 from explorer.mechanism.margins import INCIDENCES
 from explorer.mechanism.pose import Pose
-from explorer.numerics.number_text import significant
-from explorer.singularity.bruhat import Stratum, codimension, words
+from explorer.singularity.bruhat import Stratum, codimension, describe_stratum
 from explorer.singularity.nearest import nearest_singularities
 from explorer.singularity.nearest_stratum import nearest_in_stratum, seen_stratum
 from explorer.singularity.uncoupled import UNCOUPLED
@@ -90,7 +89,9 @@ class GoToStratum(Action):
             )
         here = seen_stratum(state.design, state.pose)
         if here == asked:
-            raise InputError(f"the pose lies in {name_of(asked)} already: {words(asked)}")
+            raise InputError(
+                f"the pose lies in {name_of(asked)} already: {describe_stratum(asked)}"
+            )
         if found.distance == 0.0:
             raise InputError(
                 f"the pose lies in {name_of(here)}, which {name_of(asked)} borders on: its poses "

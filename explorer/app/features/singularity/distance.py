@@ -16,7 +16,7 @@ from explorer.app.state.view import Ghost
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.colours import css, proximity_colour
 from explorer.app.widgets.controls import Controls
-from explorer.app.widgets.markup import DIM, scientific
+from explorer.app.widgets.markup import DIM, format_number
 
 GHOSTS: tuple[Ghost, ...] = get_args(Ghost)
 GO = ("δ1 = 0", "δ2 = 0", "δ3 = 0")
@@ -59,9 +59,9 @@ def distance_table(frame: Frame) -> str:
     rows = "".join(
         f'<tr title="{escape(each.name)}" style="{"font-weight:600" * (each.distance == least)}">'
         f'<td style="padding:1px 0">{_swatch(levels[each.incidence - 1])}δ{each.incidence} = 0</td>'
-        f'<td style="text-align:right">{scientific(each.distance, size=reach)}</td>'
+        f'<td style="text-align:right">{format_number(each.distance, size=reach)}</td>'
         f'<td style="text-align:right">'
-        f"{scientific(each.distance * unit, 3, size=reach * unit)}</td></tr>"
+        f"{format_number(each.distance * unit, 3, size=reach * unit)}</td></tr>"
         for each in nearest
     )
     return (

@@ -19,7 +19,7 @@ from explorer.app.state.view import Arrows
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.colours import css, proximity_colour
 from explorer.app.widgets.controls import Controls, Span
-from explorer.app.widgets.markup import DIM, scientific, signed
+from explorer.app.widgets.markup import DIM, format_number, signed
 from explorer.app.widgets.ranges import coordinate_span
 from explorer.singularity.bruhat import incidences
 from explorer.singularity.uncoupled import UNCOUPLED, Travel, UncoupledMotion
@@ -150,4 +150,4 @@ def _row(frame: Frame, motion: UncoupledMotion) -> str:
 def _end(value: float, unit: str, size: float) -> str:
     if math.isinf(value):
         return f'<span style="{DIM}">never</span>'
-    return f"{scientific(value, 3, size=size)}{unit}"
+    return f"{format_number(value, 3, size=size)}{unit}"

@@ -26,11 +26,11 @@ from explorer.app.widgets.colours import (
     proximity_colour,
 )
 from explorer.app.widgets.controls import Controls
-from explorer.app.widgets.markup import BEYOND, CLOSE, DIM, WITHIN, fitted, scientific, share
+from explorer.app.widgets.markup import BEYOND, CLOSE, DIM, WITHIN, fitted, format_number, share
 from explorer.app.widgets.ranges import length_span
 from explorer.measures.snapshot import Snapshot
 from explorer.measures.verdict import DISTANCE_SHARE
-from explorer.mechanism.margins import INCIDENCES, mode_name, mode_words
+from explorer.mechanism.margins import INCIDENCES, describe_modes, mode_name
 from explorer.singularity.strata import GENERIC
 
 VERDICT_HINT = (
@@ -84,7 +84,7 @@ def summary(frame: Frame) -> str:
 def _status(frame: Frame) -> str:
     found, design = frame.verdict, frame.state.design
     colour = {"clear": WITHIN, "near": CLOSE, "singular": BEYOND}[found.kind]
-    millimetres = f"{scientific(found.distance * design.unit_mm, 3)} mm"
+    millimetres = f"{format_number(found.distance * design.unit_mm, 3)} mm"
     note = DIM if found.kind == "clear" else f"color:{colour}"
     return (
         f'<div style="font-size:15px;font-weight:600;color:{colour};margin-bottom:2px">'
@@ -137,7 +137,7 @@ def _margin(frame: Frame, index: int) -> str:
         f'<span style="{DIM};font-size:11.5px">{fitted(value * unit_mm, reach * unit_mm, 4)} mm'
         f'</span><span style="{DIM};margin-left:auto;font-size:11.5px" '
         'title="Volume of its tetrahedron, signed">'
-        f"V {scientific(volume, size=size)} units³</span></div>"
+        f"V {format_number(volume, size=size)} units³</span></div>"
         '<div style="height:3px;border-radius:2px;margin:3px 0 2px;'
         'background:color-mix(in srgb,currentColor 12%,transparent)">'
         f'<div style="height:3px;border-radius:2px;width:{filled:.1f}%;background:{colour}">'
@@ -151,7 +151,7 @@ def _table(frame: Frame) -> str:
     rows = (
         (
             "det J",
-            f"{scientific(snapshot.determinant, size=snapshot.determinant_size)} units³",
+            f"{format_number(snapshot.determinant, size=snapshot.determinant_size)} units³",
             "Determinant of the actuator Jacobian",
         ),
         (
@@ -184,7 +184,7 @@ def _mode_rows(frame: Frame) -> tuple[tuple[str, str, str], ...]:
     between = "At a singular pose the modes meet whose signs differ where a margin is 0"
     return (
         ("Mode", snapshot.sign_words, hint),
-        ("", mode_words(snapshot.bordering_modes), between),
+        ("", describe_modes(snapshot.bordering_modes), between),
     )
 
 

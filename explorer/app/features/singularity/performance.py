@@ -16,7 +16,7 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.view import Gain
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.controls import Controls
-from explorer.app.widgets.markup import DIM, scientific
+from explorer.app.widgets.markup import DIM, format_number
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.strata import GENERIC
 
@@ -74,8 +74,8 @@ def performance_table(frame: Frame) -> str:
         for name, (low, high), hint in rows
     )
     room = (
-        f"{scientific(ball.radius)} "
-        f'<span style="{DIM}">= {scientific(ball.radius * unit, 3)} mm, '
+        f"{format_number(ball.radius)} "
+        f'<span style="{DIM}">= {format_number(ball.radius * unit, 3)} mm, '
         f"to δ{ball.incidence} = 0</span>"
         if frame.snapshot.stratum == GENERIC
         else f"none: δ{ball.incidence} = 0 here"
@@ -96,4 +96,4 @@ def _between(semi_axes: FloatArray) -> tuple[str, str]:
 
 
 def _figure(value: float) -> str:
-    return "∞" if math.isinf(value) else scientific(value, 3)
+    return "∞" if math.isinf(value) else format_number(value, 3)

@@ -14,7 +14,7 @@ from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.colours import FAR, GHOST, SINGULAR, Rgb, proximity_colour
 from explorer.mechanism.pose import quaternion_from_rotation
 from explorer.numerics.arrays import FloatArray, IntArray
-from explorer.numerics.number_text import scientific
+from explorer.numerics.number_text import format_number
 from explorer.singularity.nearest import NearestSingularity
 from explorer.singularity.strata import GENERIC
 
@@ -79,7 +79,7 @@ class NearestGhost:
         bases[3] = placed.points["a3"]
         yield self._legs, "points", np.stack([bases, tips], axis=1).astype(np.float32)
         yield self._ways, "points", np.stack([here, tips], axis=1).astype(np.float32)
-        away = scientific(nearest.distance, size=placed.frame.state.design.reach)
+        away = format_number(nearest.distance, size=placed.frame.state.design.reach)
         yield self._label, "text", f"δ{nearest.incidence} = 0: {away} away"
         yield self._label, "position", tuple(tips[0].tolist())
 
@@ -142,7 +142,7 @@ class EllipsoidScene:
             np.stack([centre - ways, centre + ways], axis=1).astype(np.float32),
         )
         longest = int(gain.argmax())
-        value = "∞" if np.isinf(gain[longest]) else scientific(float(gain[longest]), 3)
+        value = "∞" if np.isinf(gain[longest]) else format_number(float(gain[longest]), 3)
         yield self._label, "text", f"{kind} ≤ {value} per unit"
         way = ways[longest] * (1.0 if ways[longest, 2] >= 0.0 else -1.0)
         yield self._label, "position", tuple((centre + way).tolist())
@@ -188,7 +188,7 @@ class BallScene:
         yield self._ball, "color", colour
         yield self._touch, "position", tuple(touch.tolist())
         yield self._line, "points", np.stack([centre, touch])[None].astype(np.float32)
-        away = scientific(ball.radius, size=placed.frame.state.design.reach)
+        away = format_number(ball.radius, size=placed.frame.state.design.reach)
         yield self._label, "text", f"δ{ball.incidence} = 0: {away} away"
         yield self._label, "position", tuple(touch.tolist())
 

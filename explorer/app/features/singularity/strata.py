@@ -18,15 +18,15 @@ from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.colours import css, proximity_colour
 from explorer.app.widgets.controls import Controls
 from explorer.app.widgets.labels import out_of_sight
-from explorer.app.widgets.markup import DIM, scientific
+from explorer.app.widgets.markup import DIM, format_number
 from explorer.measures.verdict import DISTANCE_SHARE
 from explorer.singularity.bruhat import (
     COVERED,
     OF_INCIDENCES,
     Stratum,
     codimension,
+    describe_stratum,
     incidences,
-    words,
 )
 from explorer.singularity.strata import GENERIC, STRATA, inversions
 
@@ -53,7 +53,7 @@ class StrataPanel:
         self.buttons: dict[Stratum, viser.GuiButtonHandle] = {}
         for stratum in STRATA:
             if stratum != GENERIC:
-                label = f"Go to {name_of(stratum)}: {words(stratum)}"
+                label = f"Go to {name_of(stratum)}: {describe_stratum(stratum)}"
                 self.buttons[stratum] = self._controls.button(
                     label, f"{label}.", lambda w=stratum: GoToStratum(w)
                 )
@@ -148,13 +148,13 @@ def _sentence(stratum: Stratum) -> str:
     if stratum == GENERIC:
         return "Generic: no incidence, not singular."
     zero = ", ".join(f"δ{index}" for index in incidences(stratum))
-    return f"{zero} = 0: {words(stratum)}"
+    return f"{zero} = 0: {describe_stratum(stratum)}"
 
 
 def _distance(distance: float | None, digits: int, frame: Frame) -> str:
     if distance is None:
         return "…"
-    return scientific(distance, digits, size=frame.state.design.reach)
+    return format_number(distance, digits, size=frame.state.design.reach)
 
 
 def _neighbour(stratum: Stratum, value: str) -> str:

@@ -14,7 +14,7 @@ from explorer.app.features.studies.runner import Run
 from explorer.app.features.studies.shown import MOST_ROWS
 from explorer.app.state.studies import RADIUS, StudyWish, spoken, titled
 from explorer.app.widgets.labels import labelled
-from explorer.app.widgets.markup import BEYOND, DIM, by_theme, scientific, signed
+from explorer.app.widgets.markup import BEYOND, DIM, by_theme, format_number, signed
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.optimise.problem import REACH, YAW
 from explorer.sweep.measures import MEASURES
@@ -62,7 +62,7 @@ def status(drawing: StudyDrawing, clear: str, resize: str) -> str:
     if count and drawing.shown is None:
         told += " · nothing to draw yet: the designs that are done differ in fewer than two values"
     wanted = ", ".join(f"{spoken(each.measure)} {ARROWS[each.sense]}" for each in study.objectives)
-    unit = f"1 unit (u) = {scientific(study.base.unit_mm, 6)} mm"
+    unit = f"1 unit (u) = {format_number(study.base.unit_mm, 6)} mm"
     note = f"wanted: {escape(wanted)} · {unit}" if wanted else f"no objectives · {unit}"
     return (
         f'{BOX}<div style="display:flex;gap:10px"><span style="flex:1">{told}</span>{resize}</div>'
@@ -95,7 +95,7 @@ def run_line(run: Run) -> str:
     else:
         words = f"{escape(run.name)}: <b>{progress.done}</b> of {progress.total} designs"
         if progress.rate > 0.0:
-            words += f" · {scientific(progress.rate, 3)} a second"
+            words += f" · {format_number(progress.rate, 3)} a second"
         left = progress.seconds_left
         if left:
             words += f" · {duration(left)} left"

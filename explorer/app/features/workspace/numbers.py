@@ -15,7 +15,7 @@ from explorer.app.scene.bands import COLLIDING, PLAIN, WARN_CONDITION
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.colours import css
-from explorer.app.widgets.markup import BEYOND, DIM, WITHIN, alert, scientific
+from explorer.app.widgets.markup import BEYOND, DIM, WITHIN, alert, format_number
 from explorer.app.widgets.under_way import problem, progress
 from explorer.singularity.colours import BAND_EDGES, band_colours
 from explorer.workspace.accessible.workspace import PairCost
@@ -129,7 +129,7 @@ def _numbers(drawing: WorkspaceDrawing) -> str:
     if drawing.extent is not None:
         for axis, low, high in zip("xyz", *drawing.extent, strict=True):
             size = drawing.request.design.reach
-            text = f"{scientific(low, size=size)} … {scientific(high, size=size)}"
+            text = f"{format_number(low, size=size)} … {format_number(high, size=size)}"
             rows.append((f"Extent {axis}", text, "Of the solid, in design units"))
     volume = drawing.volume if reached is None else reached.volume
     if volume > 0.0:
@@ -166,7 +166,7 @@ def _pairs(reached: Reached, *, coloured: bool) -> str:
     rows = "".join(map(_pair, reached.pairs))
     radius = (
         f'<div style="{DIM};margin-top:4px">No two collide with radii larger by up to '
-        f"{scientific(reached.harmless_radius)}</div>"
+        f"{format_number(reached.harmless_radius)}</div>"
         if reached.harmless_radius > 0.0
         else ""
     )
@@ -179,8 +179,8 @@ def _pairs(reached: Reached, *, coloured: bool) -> str:
 
 def _pair(pair: PairCost) -> str:
     first, second = pair.legs
-    clearance = "joined" if math.isinf(pair.clearance) else scientific(pair.clearance, 3)
-    blocked = scientific(pair.blocked_volume, 3) if pair.blocked_volume > 0.0 else "–"
+    clearance = "joined" if math.isinf(pair.clearance) else format_number(pair.clearance, 3)
+    blocked = format_number(pair.blocked_volume, 3) if pair.blocked_volume > 0.0 else "–"
     colour = f"color:{BEYOND};" if pair.blocked_volume > 0.0 else ""
     return (
         f'<tr style="{colour}"><td style="padding:1px 0">{first} – {second}</td>'

@@ -21,7 +21,7 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.controls import Controls, Span
-from explorer.app.widgets.markup import DIM, alert, scientific
+from explorer.app.widgets.markup import DIM, alert, format_number
 from explorer.app.widgets.ranges import coordinate_span, fine_step, round_up
 from explorer.app.widgets.under_way import UnderWay
 from explorer.mechanism.pose import Pose
@@ -158,7 +158,7 @@ class WorkspacePanel:
             across, up = slice_map.axes
             reach = frame.state.design.reach
             (left, low), (right, high) = (
-                [scientific(float(end), size=reach) for end in ends]
+                [format_number(float(end), size=reach) for end in ends]
                 for ends in (slice_map.lows, slice_map.highs)
             )
             text = f"{across} from {left} to {right}, {up} from {low} to {high} upwards"

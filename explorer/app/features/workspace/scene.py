@@ -17,7 +17,7 @@ from explorer.app.scene.shapes import Patch
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.colours import OUTLINE, Rgb, proximity_colour
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.number_text import scientific
+from explorer.numerics.number_text import format_number
 from explorer.singularity.colours import band_colours
 from explorer.workspace.limits.constraints import (
     BallOrCylinder,
@@ -135,7 +135,7 @@ class WorkspaceScene:
         if worst is not None:
             ends = placed.scale * np.array([frame.state.pose.position, worst[2]])
             yield self._broken, "points", ends[None].astype(np.float32)
-            yield self._broken_label, "text", f"{worst[1]}: {scientific(-worst[0], 3)} beyond"
+            yield self._broken_label, "text", f"{worst[1]}: {format_number(-worst[0], 3)} beyond"
             yield self._broken_label, "position", tuple(ends[1].tolist())
 
 

@@ -15,7 +15,7 @@ from explorer.export.report.drawings.mechanism import path_of
 from explorer.export.report.drawings.projection import Projection
 from explorer.export.report.markup import coordinate, element
 from explorer.numerics.arrays import FloatArray
-from explorer.singularity.colours import css, mixed
+from explorer.singularity.colours import css, mix
 from explorer.workspace.solids.solid import Solid
 
 # The direction of the light: right, up and towards the eye.
@@ -53,7 +53,7 @@ def visible_edges(solid: Solid, view: Projection) -> Element:
 
 
 def _faces(shade: int, data: list[str]) -> Element:
-    colour = css(mixed(_DARK, _PALE, shade / (_SHADES - 1)))
+    colour = css(mix(_DARK, _PALE, shade / (_SHADES - 1)))
     return element("path", d="".join(data), fill=colour, stroke=colour)
 
 

@@ -18,9 +18,9 @@ from explorer.export.report.markup import (
 )
 from explorer.export.report.sections.mechanism import pose_words
 from explorer.measures.verdict import verdict
-from explorer.mechanism.margins import INCIDENCES, TETRAHEDRA, mode_words
+from explorer.mechanism.margins import INCIDENCES, TETRAHEDRA, describe_modes
 from explorer.mechanism.pose import yaw_pitch_roll_from_rotation
-from explorer.singularity.bruhat import words
+from explorer.singularity.bruhat import describe_stratum
 from explorer.singularity.colours import WARN_SHARE
 from explorer.singularity.ellipsoids import Ellipsoid
 
@@ -71,7 +71,7 @@ def singularity_section(data: ReportData) -> Iterator[Element]:
             (
                 "stratum of the two flags",
                 " ".join(map(str, snapshot.stratum)),
-                f"dimension {snapshot.stratum_dimension}: {words(snapshot.stratum)}",
+                f"dimension {snapshot.stratum_dimension}: {describe_stratum(snapshot.stratum)}",
             ),
             (
                 "ball of positions without a singular one",
@@ -102,7 +102,7 @@ def singularity_section(data: ReportData) -> Iterator[Element]:
 
 
 def _mode_figure(modes: tuple[int, ...]) -> Piece:
-    return whole(modes[0]) if len(modes) == 1 else mode_words(modes)
+    return whole(modes[0]) if len(modes) == 1 else describe_modes(modes)
 
 
 def _nearest(data: ReportData) -> Element:
