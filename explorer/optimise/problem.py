@@ -13,6 +13,7 @@ from typing import Literal, get_args
 import msgspec
 
 from explorer.errors import InputError
+from explorer.measures.size import longest_length
 from explorer.mechanism.design import DEGENERATE_RATIO, LENGTHS, VARIABLES, Design, Limits, Swing
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import Pose, Triple, yaw_pitch_roll_from_rotation
@@ -261,11 +262,6 @@ def start_value(start: Design, name: str) -> float:
     if name in SHIFTS:
         return 0.0
     raise InputError(f"no variable {name!r}; there are {', '.join((*VARIABLES, *OPTIONAL))}")
-
-
-def longest_length(design: Design) -> float:
-    """Return the largest of the four maximum lengths."""
-    return max(design.length_range(name)[1] for name in LENGTHS)
 
 
 def longest_minimum(design: Design) -> float:

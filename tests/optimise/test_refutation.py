@@ -11,12 +11,12 @@ import pytest
 from numpy.testing import assert_allclose
 
 from explorer import InputError, workspace_volume
+from explorer.measures.clearance import CERTAIN, clearance_beyond
 from explorer.mechanism.design import Design, DesignError, Limits
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
 from explorer.numerics.compiled import warm
 from explorer.optimise.defaults import make_problem
-from explorer.optimise.facts import CERTAIN, clearance_beyond
 from explorer.optimise.problem import Problem, Variable
 from explorer.optimise.refutation.binding import binding
 from explorer.optimise.refutation.cut_box import cut_volume

@@ -35,11 +35,11 @@ from explorer import (
     workspace_nodes,
     workspace_volume,
 )
+from explorer.measures.size import corners_of
 from explorer.mechanism.design import LENGTHS, Swing
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import warm
 from explorer.optimise.problem import SHIFTS, Box
-from explorer.optimise.search.demands import corners_of
 from explorer.workspace.limits.constraints import angle_between, constraints, legs, slacks
 from explorer.workspace.orientations import orientations_within
 

@@ -10,6 +10,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from explorer.measures.size import corners_of
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.margins import margins
 from explorer.numerics.arrays import FloatArray
@@ -239,12 +240,6 @@ def _outside(state: State, limit: Round, box: Box) -> tuple[FloatArray, FloatArr
         by_u = state.along({name: float(own @ rate) for name, rate in limit.rates.items()})[None, :]
         by_p = -normal[None, :]
     return slack, by_u, by_p
-
-
-def corners_of(box: Box) -> FloatArray:
-    """Return the corners of a box, shape (8, 3)."""
-    lows, highs = box
-    return np.array([[(lows, highs)[c >> a & 1][a] for a in range(3)] for c in range(8)])
 
 
 class MarginDemand:

@@ -7,11 +7,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from explorer.errors import DesignError, InputError
+from explorer.measures.size import longest_length
 from explorer.mechanism.design import Design
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.margins import margins
 from explorer.numerics.arrays import FloatArray
-from explorer.optimise.problem import DISTANCES, Problem, distance_of, longest_length
+from explorer.optimise.problem import DISTANCES, Problem, distance_of
 
 # Positions an axis at which clearance is demanded at first; more come where they matter.
 IN_SPACE, IN_SURFACE = 7, 21
