@@ -72,7 +72,7 @@ class Snapshot:
 
     @cached_property
     def margins(self) -> FloatArray:
-        """(κ1, κ2, κ3), shape (3,)."""
+        """(δ1, δ2, δ3), shape (3,)."""
         return margins(self.pose.position, self.rotation)
 
     @cached_property
@@ -168,7 +168,7 @@ class Snapshot:
 
     @cached_property
     def nearest(self) -> tuple[NearestSingularity, NearestSingularity, NearestSingularity]:
-        """The nearest singular pose of each incidence, in the order κ1, κ2, κ3."""
+        """The nearest singular pose of each incidence, in the order δ1, δ2, δ3."""
         return each_singularity(self._nearest_poses, self.pose)
 
     @cached_property

@@ -53,15 +53,15 @@ class Verdict:
         return TITLES[self.kind]
 
     def reason(self, length: str) -> str:
-        """Return what it rests on, such as "2.52 mm from κ2 = 0, lines a1a2 and b2b3 meeting".
+        """Return what it rests on, such as "2.52 mm from δ2 = 0, lines a1a2 and b2b3 meeting".
 
         Args:
             length: The distance, with its unit.
         """
         if self.kind == "singular":
-            return "; ".join(f"κ{each} = 0: {INCIDENCES[each - 1]}" for each in self.incidences)
+            return "; ".join(f"δ{each} = 0: {INCIDENCES[each - 1]}" for each in self.incidences)
         first = self.incidences[0]
-        return f"{length} from κ{first} = 0, {INCIDENCES[first - 1]}"
+        return f"{length} from δ{first} = 0, {INCIDENCES[first - 1]}"
 
 
 def verdict(snapshot: Snapshot, warn_below: float) -> Verdict:

@@ -64,7 +64,7 @@ class Demands(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         reach: The largest length allowed.
         clearance: Smallest clearance of each pair of legs, radii taken off, wherever in the
             workspace every margin is at least `clearance_margin`. Nearer to a singularity
-            legs may have to meet: with a level platform all four lie in the base at κ3 = 0.
+            legs may have to meet: with a level platform all four lie in the base at δ3 = 0.
         clearance_margin: See above, in design units.
         least: Smallest |a3y|, |b1y| and |b3 − b2|, at zero of which a design is degenerate.
         stroke_ratio: Longest over shortest of each actuator: raises its minimum length to

@@ -147,8 +147,8 @@ class Study(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         sampling: How the ranges are filled.
         measures: What is measured, out of `measures_in("studies")`.
         nodes: On each axis of the grid that margins and clearances are measured on.
-        clearance_margin: From which |κ| on clearances count, in design units; None for a
-            20th of the design's reach.
+        clearance_margin: Least |δ| at which clearances count, in design units; None for a 20th
+            of the design's reach.
         polish: A search from each sample, whose result is what is measured; or None.
         objectives: What the Pareto front is of.
         chunk: How many designs make one task and one part of the results.

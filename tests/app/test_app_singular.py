@@ -299,7 +299,7 @@ def test_at_a_singular_pose_motions_say_so_and_lead_away() -> None:
         own = [i for i, each in enumerate(UNCOUPLED) if each.frame == motion.frame]
         row = rows_of(travel_table(Frame(state), motion.frame))[own.index(index)]
         assert row[1:] == ["singular", "here"]
-        assert f"κ{motion.incidence} = 0: {INCIDENCES[motion.incidence - 1]}" in plain(
+        assert f"δ{motion.incidence} = 0: {INCIDENCES[motion.incidence - 1]}" in plain(
             summary(Frame(state))
         )
         after = Jog(index, 5.0).apply(state)
@@ -472,7 +472,7 @@ def test_everything_is_told_and_drawn_at_singular_poses(
     frame = Frame(shown)
     words = plain(summary(frame))
     for index in incidences(frame.snapshot.stratum):
-        assert f"κ{index} = 0: {INCIDENCES[index - 1]}" in words
+        assert f"δ{index} = 0: {INCIDENCES[index - 1]}" in words
     panel, feed = SingularityPanel(server.gui, desk.session), StrataFeed(UNUSED, lambda: None)
     texts = [str(v) for _, n, v in panel.updates(frame, feed) if n == "content"]
     assert not any(re.search(r"\b(nan|inf)\b", plain(text)) for text in texts)

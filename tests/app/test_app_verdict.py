@@ -43,7 +43,7 @@ def test_verdict_seven_degrees_from_an_incidence_is_near() -> None:
     text = summary(frame)
     assert "Near a singularity" in text
     assert "Clear of singularities" not in text
-    assert "2.52 mm from κ2 = 0, lines a1a2 and b2b3 meeting" in text
+    assert "2.52 mm from δ2 = 0, lines a1a2 and b2b3 meeting" in text
 
 
 def test_summary_colours_the_incidence_that_the_verdict_names() -> None:

@@ -16,6 +16,7 @@ from explorer.mechanism.margins import margins
 from explorer.numerics.arrays import FloatArray
 from explorer.optimise.problem import SHIFTS, Box
 from explorer.optimise.search.state import State
+from explorer.singularity.ellipsoids import planes_of_singularity
 from explorer.workspace.limits.constraints import GAP, YAW, Constraint, HalfSpace, Round
 
 # How far a demand that is no limit may be missed and is still met, dimensionless.
@@ -250,10 +251,10 @@ class MarginDemand:
 
     is_equality = False
     is_limit = False
-    names = tuple(f"margin κ{i} over the required box" for i in (1, 2, 3))
+    names = tuple(f"margin δ{i} over the required box" for i in (1, 2, 3))
 
     def measure(self, state: State) -> Measured:
-        """Return sign · κ at the corner that is worst for each κ, over the size of the start."""
+        """Return sign · δ at the corner that is worst for each δ, over the size of the start."""
         value, gradient = box_margins(state)
         worst = value.argmin(axis=1)
         rows, size = np.arange(3), state.problem.size
@@ -261,7 +262,7 @@ class MarginDemand:
 
 
 def box_margins(state: State) -> tuple[FloatArray, FloatArray]:
-    """Return sign · κ at the corners of the required box, shape (3, 8), and (3, 8, n).
+    """Return sign · δ at the corners of the required box, shape (3, 8), and (3, 8, n).
 
     The signs are those of the home pose.
     """
@@ -269,7 +270,7 @@ def box_margins(state: State) -> tuple[FloatArray, FloatArray]:
     corners, n, r = corners_of(state.box), len(state.u), state.rotation
     signs = np.sign(margins(home.position, r))
     u, normal = r[:, 0], r[:, 2]
-    slopes = np.array([-normal, [0.0, -u[2], u[1]], [0.0, 0.0, 1.0]])
+    slopes = planes_of_singularity(r)
     # Turning about the base's z-axis moves x to y and y to −x.
     turned = np.array([[normal[1], -normal[0], 0.0], [0.0, 0.0, u[0]], [0.0, 0.0, 0.0]])
     gradients = np.zeros((3, 8, n))

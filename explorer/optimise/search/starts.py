@@ -79,7 +79,7 @@ def first_positions(problem: Problem, design: Design) -> FloatArray:
     rotation, least = home_pose(design).rotation, problem.demands.clearance_margin
     columns = grid(IN_SURFACE, IN_SURFACE)
     foot = np.column_stack([columns, np.zeros(len(columns))])
-    # Margins are linear in z: κ = at the foot + rise · z.
+    # Margins are linear in z: δ = δ at the foot + rise · z.
     at_foot = margins(foot, rotation)
     rise = margins(np.array([0.0, 0.0, 1.0]), rotation)
     found = [grid(IN_SPACE, IN_SPACE, IN_SPACE)]
