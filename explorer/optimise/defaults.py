@@ -6,6 +6,8 @@ import math
 from collections.abc import Iterable
 
 from explorer.errors import InputError
+from explorer.measures.clearance import MARGIN_OF_CLEARANCE
+from explorer.measures.size import longest_length
 from explorer.mechanism.design import VARIABLES, Design
 from explorer.optimise.problem import (
     DISTANCES,
@@ -17,7 +19,6 @@ from explorer.optimise.problem import (
     Problem,
     Variable,
     distance_of,
-    longest_length,
     longest_minimum,
     start_value,
 )
@@ -26,8 +27,6 @@ from explorer.optimise.problem import (
 A3_WITHIN, B_WITHIN = 3.0, 1.0
 # How near a design may come to a degenerate one by default, as such a share.
 LEAST = 0.05
-# Where clearances are demanded by default: from this margin on, as a share of the reach.
-MARGIN_OF_CLEARANCE = 0.05
 # Degrees of yaw that may change, and that stay between the two lines.
 YAW_WITHIN, LINES_APART = 45.0, 5.0
 

@@ -10,10 +10,12 @@ from dataclasses import dataclass
 
 import msgspec
 
+from explorer.measures.case import Case
+from explorer.measures.catalogue import measures_in
+from explorer.measures.measurements import Measurements, measure_design
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
 from explorer.optimise.defaults import make_problem
-from explorer.optimise.facts import Facts, facts_of
 from explorer.optimise.problem import Box, Problem, Variable
 from explorer.optimise.solver import optimise_design
 from explorer.workspace.slices.volume import workspace_volume
@@ -43,14 +45,14 @@ class Finding:
         iterations: None for a design that was given.
         objective: F = |1 − V/V′| as whoever found it measures V; None if none was asked for.
         seconds: How long it took, from all starts.
-        facts: Its measures.
+        measured: The values of its measures: those of the optimiser, and the step of the nodes.
     """
 
     name: str
     iterations: int | None
     objective: float | None
     seconds: float | None
-    facts: Facts
+    measured: Measurements
 
 
 def paper_start() -> Design:
@@ -91,12 +93,13 @@ def findings(tell: Callable[[str], None]) -> Iterator[Finding]:
     """
     margin = paper_problem().demands.clearance_margin
 
-    def facts(design: Design) -> Facts:
-        return facts_of(design, demanded_margin=margin, box=BOX, step=STEP)
+    def measure(design: Design) -> Measurements:
+        case = Case(design, demanded_margin=margin, box=BOX, node_step=STEP)
+        return measure_design(case, (*measures_in("optimise"), "node_step"))
 
-    optimal = facts(PRESETS["paper-optimal"])
-    counted = abs(1.0 - (optimal.nodes.volume if optimal.nodes else 0.0) / PAPER_VOLUME)
-    yield Finding("the paper's initial design", None, None, None, facts(paper_start()))
+    optimal = measure(PRESETS["paper-optimal"])
+    counted = abs(1.0 - (optimal["node_volume"] or 0.0) / PAPER_VOLUME)
+    yield Finding("the paper's initial design", None, None, None, measure(paper_start()))
     yield Finding("the paper's optimum, by nodes", 220, counted, None, optimal)
     for name, problem, starts in (
         ("volume 8000, interference off", paper_problem(None), 1),
@@ -112,5 +115,5 @@ def findings(tell: Callable[[str], None]) -> Iterator[Finding]:
             outcome.iterations,
             outcome.best.objective if is_match else None,
             outcome.seconds,
-            facts(outcome.design),
+            measure(outcome.design),
         )

@@ -13,6 +13,7 @@ from typing import Literal, get_args
 import msgspec
 
 from explorer.errors import InputError
+from explorer.measures.size import longest_length
 from explorer.mechanism.design import DEGENERATE_RATIO, LENGTHS, VARIABLES, Design, Limits, Swing
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import Pose, Triple, yaw_pitch_roll_from_rotation
@@ -63,7 +64,7 @@ class Demands(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         reach: The largest length allowed.
         clearance: Smallest clearance of each pair of legs, radii taken off, wherever in the
             workspace every margin is at least `clearance_margin`. Nearer to a singularity
-            legs may have to meet: with a level platform all four lie in the base at κ3 = 0.
+            legs may have to meet: with a level platform all four lie in the base at δ3 = 0.
         clearance_margin: See above, in design units.
         least: Smallest |a3y|, |b1y| and |b3 − b2|, at zero of which a design is degenerate.
         stroke_ratio: Longest over shortest of each actuator: raises its minimum length to
@@ -261,11 +262,6 @@ def start_value(start: Design, name: str) -> float:
     if name in SHIFTS:
         return 0.0
     raise InputError(f"no variable {name!r}; there are {', '.join((*VARIABLES, *OPTIONAL))}")
-
-
-def longest_length(design: Design) -> float:
-    """Return the largest of the four maximum lengths."""
-    return max(design.length_range(name)[1] for name in LENGTHS)
 
 
 def longest_minimum(design: Design) -> float:

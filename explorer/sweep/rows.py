@@ -18,10 +18,11 @@ import msgspec
 
 from explorer.errors import DesignError, InputError
 from explorer.files.versions import versions
+from explorer.measures.case import Case
+from explorer.measures.measurements import measure_design, reason_for_missing
 from explorer.mechanism.design import Design
 from explorer.numerics.compiled import warm
 from explorer.optimise.problem import YAW, Problem, Variable, start_value, varied, with_strokes
-from explorer.sweep.measures import Case, measured
 from explorer.sweep.sampling import samples
 from explorer.sweep.study import RADIUS, Study, decode_study
 
@@ -316,11 +317,10 @@ def _fill(study: Study, sample: dict[str, float], row: dict[str, Value]) -> None
     if case.volume.volume <= 0.0 and status == "done":
         because = ", ".join(case.volume.empty_because)
         status, reason = "empty workspace", f"emptied by {because}" if because else "no volume"
-    row |= measured(case, study.measures)
-    row |= {
-        "status": status,
-        "reason": "; ".join(each for each in (reason, case.reason) if each),
-    }
+    found = measure_design(case, study.measures)
+    reasons = (reason, reason_for_missing(case, found))
+    row |= found.values
+    row |= {"status": status, "reason": "; ".join(filter(None, reasons))}
 
 
 def _as_columns(study: Study, indices: range, rows: list[dict[str, Value]]) -> Rows:

@@ -21,7 +21,7 @@ from explorer.sweep.folder import claimed
 from explorer.sweep.parts import pyarrow, sound_parts, write_part
 from explorer.sweep.rows import Answer, Rows, answer, check_study, evaluate, load_kernels, lost
 from explorer.sweep.study import Study, encode_study
-from explorer.sweep.workers import LocalWorkers, NoWorkerError, Workers
+from explorer.sweep.workers import NoWorkerError, Workers
 
 # Tasks under way for each worker: enough that none waits for this process.
 AHEAD = 4
@@ -107,37 +107,6 @@ def run_study(
         load_kernels(study)
         fill_cache()
         return _Run(study, path, workers, told or (lambda _: None)).run(limit, is_cut)
-
-
-def run_locally(
-    study: Study,
-    folder: str | Path,
-    size: int | None = None,
-    *,
-    limit: int | None = None,
-    told: Callable[[Progress], None] | None = None,
-    is_cut: Callable[[], bool] | None = None,
-) -> Progress:
-    """Compute what is missing in a results folder with processes of this machine.
-
-    They end at once with the run, however it ends.
-
-    Args:
-        study: See `run_study`, as the rest.
-        folder: Of the results.
-        size: How many processes; one for each core that this process may use if None.
-        limit: Of designs.
-        told: Called with how far it has got.
-        is_cut: Asked whether to end early.
-
-    Raises:
-        ExplorerError: see `run_study` and `LocalWorkers`.
-    """
-    workers = LocalWorkers(size)
-    try:
-        return run_study(study, folder, workers, limit=limit, told=told, is_cut=is_cut)
-    finally:
-        workers.shutdown(cancel_futures=True)
 
 
 @dataclass

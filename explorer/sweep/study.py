@@ -19,6 +19,7 @@ from explorer.errors import InputError
 from explorer.files.json_text import decode_strictly
 from explorer.files.packaged import packaged_files
 from explorer.files.writing import read_at_most
+from explorer.measures.catalogue import measures_in
 from explorer.mechanism.design import VARIABLES, Design, Pair
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.home import home_pose
@@ -31,7 +32,6 @@ from explorer.optimise.problem import (
     ObjectiveName,
     longest_minimum,
 )
-from explorer.sweep.measures import MEASURES
 from explorer.workspace.node_measures import DEFAULT_NODES, FEWEST_NODES, MOST_NODES
 
 Method = Literal["sobol", "latin-hypercube", "grid"]
@@ -145,10 +145,10 @@ class Study(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
             becomes the design. Its home's position is that of all designs.
         variables: What differs, by name out of `NAMES`, and the range of each.
         sampling: How the ranges are filled.
-        measures: What is measured, out of `explorer.sweep.measures.MEASURES`.
+        measures: What is measured, out of `measures_in("studies")`.
         nodes: On each axis of the grid that margins and clearances are measured on.
-        clearance_margin: From which |κ| on clearances count, in design units; None for a
-            20th of the design's reach.
+        clearance_margin: Least |δ| at which clearances count, in design units; None for a 20th
+            of the design's reach.
         polish: A search from each sample, whose result is what is measured; or None.
         objectives: What the Pareto front is of.
         chunk: How many designs make one task and one part of the results.
@@ -259,12 +259,13 @@ class Study(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
             )
 
     def _check_measures(self) -> None:
+        known = measures_in("studies")
         if not self.measures:
-            raise InputError(f"measure something; there are {', '.join(MEASURES)}")
+            raise InputError(f"measure something; there are {', '.join(known)}")
         _once("measures", self.measures)
         for name in self.measures:
-            if name not in MEASURES:
-                raise InputError(f"no measure {name!r}; there are {', '.join(MEASURES)}")
+            if name not in known:
+                raise InputError(f"no measure {name!r}; there are {', '.join(known)}")
             if name in self.varied:
                 raise InputError(f"{name} is a variable of the study: leave it out of the measures")
 

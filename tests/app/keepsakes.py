@@ -51,14 +51,16 @@ from explorer.app.state.optimisation import PLACE, Comparison, SearchResult
 from explorer.app.state.state import State, opened
 from explorer.app.state.view import SingularView
 from explorer.errors import ExplorerError
+from explorer.measures.case import Case
+from explorer.measures.catalogue import measures_in
+from explorer.measures.measurements import measure_design
 from explorer.mechanism.design import VARIABLES, Limits
 from explorer.mechanism.design_file import PRESETS
-from explorer.optimise.facts import facts_of
 from explorer.optimise.outcome import Iterate
 from explorer.optimise.problem import YAW
 
 OPTIMAL = PRESETS["paper-optimal"]
-FACTS = facts_of(OPTIMAL)
+MEASURED = measure_design(Case(OPTIMAL), measures_in("optimise"))
 
 Make = Callable[[State, int, float], Action]
 
@@ -136,7 +138,7 @@ MAKERS: tuple[Make, ...] = (
     lambda state, i, share: Advance(state.optimisation.count, iterates_of(state, i)),
     lambda state, i, share: CancelRun(),
     lambda state, i, share: _end(state, i),
-    lambda state, i, share: Compare(state.optimisation.count, Comparison(FACTS, FACTS)),
+    lambda state, i, share: Compare(state.optimisation.count, Comparison(MEASURED, MEASURED)),
     lambda state, i, share: Accept(),
     lambda state, i, share: Pin(state.design),
     lambda state, i, share: Unpin(i % 3),

@@ -18,7 +18,7 @@ from hypothesis import given, strategies as st
 
 from explorer.app.features.compare.actions import Pin, SetLook, Unpin
 from explorer.app.features.compare.bars import DRAWN, bars
-from explorer.app.features.compare.columns import Column, best_of, columns_of, notes, told
+from explorer.app.features.compare.columns import Column, best_of, columns_of, notes, value_text
 from explorer.app.features.compare.drawing import ComparedDrawing, ComparedRequest, compared_drawing
 from explorer.app.features.compare.feed import LIVE, CompareFeed
 from explorer.app.features.compare.panel import NOTHING, ComparePanel
@@ -34,22 +34,28 @@ from explorer.app.state.state import State, opened
 from explorer.app.widgets.assigning import Assigner
 from explorer.app.widgets.colours import COMPARED
 from explorer.errors import InputError
+from explorer.measures.case import Case
+from explorer.measures.catalogue import CATALOGUE, measures_in
+from explorer.measures.measurements import Measurements, measure_design
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import Pose
-from explorer.optimise.figures import FIGURES, figures_of
 from explorer.workspace.slices.volume import workspace_nodes, workspace_volume
 
 INITIAL, OPTIMAL = PRESETS.values()
-DEEDS = [(f"open{slot}", f"unpin{slot}") for slot in range(3)]
-BY_NAME = {figure.name: figure for figure in FIGURES}
+BUTTONS = [(f"open{slot}", f"unpin{slot}") for slot in range(3)]
+LISTED = measures_in("compare")
 
 
 def variant(number: int, **changes: object) -> Design:
     return msgspec.structs.replace(
         OPTIMAL, name=f"variant {number}", b2=2.0 + 0.1 * number, **changes
     )
+
+
+def measured(design: Design) -> Measurements:
+    return measure_design(Case(design), LISTED)
 
 
 def compared(*pinned: Design, look: Look | None = None, live: Design = OPTIMAL) -> State:
@@ -63,7 +69,7 @@ def columns(state: State) -> tuple[Column, ...]:
     """Return the columns of a state, all of them found here and now."""
     unit = 1.0 if state.compared.look.millimetres else state.design.unit_mm
     return tuple(
-        Column(number, design, figures_of(design), design.unit_mm / unit)
+        Column(number, design, measured(design), design.unit_mm / unit)
         for number, design in enumerate((state.design, *state.compared.pinned))
         if design is not None
     )
@@ -148,8 +154,8 @@ def test_pins_are_steps_that_are_undone(desk: Desk) -> None:
 def test_the_table_tells_what_the_functions_tell(millimetres: bool) -> None:
     small = msgspec.structs.replace(INITIAL, unit_mm=12.0)
     state = compared(small, variant(3), look=Look(millimetres=millimetres))
-    rows = cells(table(columns(state), DEEDS, millimetres=millimetres))
-    assert len(rows) == len(FIGURES)
+    rows = cells(table(columns(state), BUTTONS, millimetres=millimetres))
+    assert len(rows) == len(LISTED)
     unit = "mm" if millimetres else "units"
     for place, design in enumerate((OPTIMAL, small, variant(3))):
         factor = design.unit_mm if millimetres else design.unit_mm / OPTIMAL.unit_mm
@@ -160,24 +166,24 @@ def test_the_table_tells_what_the_functions_tell(millimetres: bool) -> None:
             f"node volume {unit}³": nodes.volume * factor**3,
             f"reach {unit}": design.reach * factor,
             f"b2 {unit}": design.b2 * factor,
-            f"clearance {unit}": (figures_of(design).clearance or 0.0) * factor,
+            f"clearance {unit}": (measured(design)["least_clearance"] or 0.0) * factor,
         }
         for name, value in expected.items():
             assert number(rows[name][place]) == pytest.approx(value, rel=1e-3, abs=1e-4)
 
 
 def test_what_is_small_beside_the_others_is_not_told_as_nothing() -> None:
-    volume = BY_NAME["volume"]
-    assert told(volume, 0.000999998, 8000.0) == "0.001"
-    assert told(volume, -8.574e-9, 8000.0) == "−8.57e−09"
-    assert told(volume, 0.0, 8000.0) == "0"
-    assert told(volume, 7992.0, 8000.0) == "7992.00"
+    volume = CATALOGUE["volume"]
+    assert value_text(volume, 0.000999998, 8000.0) == "0.001"
+    assert value_text(volume, -8.574e-9, 8000.0) == "−8.57e−09"
+    assert value_text(volume, 0.0, 8000.0) == "0"
+    assert value_text(volume, 7992.0, 8000.0) == "7992.00"
     # A difference by rounding is none.
-    assert told(BY_NAME["extent x"], -7.1e-15, 20.0, signed=True) == "0"
+    assert value_text(CATALOGUE["exact_extent_x"], -7.1e-15, 20.0, signed=True) == "0"
 
 
 def test_the_best_of_a_row_is_bold_and_only_where_better_means_something() -> None:
-    html = table(columns(compared(INITIAL)), DEEDS, millimetres=False)
+    html = table(columns(compared(INITIAL)), BUTTONS, millimetres=False)
     rows = {re.sub("<.*?>", "", row.partition("</td>")[0]): row for row in html.split("<tr")[2:]}
     (volume,) = (
         row for name, row in rows.items() if name.endswith("volume units³") and "node" not in name
@@ -188,7 +194,7 @@ def test_the_best_of_a_row_is_bold_and_only_where_better_means_something() -> No
 
 
 def test_what_is_as_good_is_not_the_best() -> None:
-    volume, reach, nodes = (BY_NAME[name] for name in ("volume", "reach", "nodes"))
+    volume, reach, nodes = (CATALOGUE[name] for name in ("volume", "reach", "node_count"))
     assert best_of(volume, [1.0, 2.0, None, 2.0]) == {1, 3}
     assert best_of(reach, [1.0, 2.0]) == {0}
     assert best_of(volume, [2.0, 2.0 * (1.0 + 1e-12)]) == set()
@@ -199,7 +205,7 @@ def test_what_is_as_good_is_not_the_best() -> None:
 def test_names_are_text_whatever_they_hold() -> None:
     state = compared(msgspec.structs.replace(INITIAL, name="<b onclick=x>&"))
     found = columns(state)
-    for html in (table(found, DEEDS, millimetres=False), "".join(notes(state, found))):
+    for html in (table(found, BUTTONS, millimetres=False), "".join(notes(state, found))):
         assert "<b onclick" not in html
 
 
@@ -207,7 +213,7 @@ def test_an_empty_workspace_is_told_with_its_reasons() -> None:
     limits = msgspec.structs.replace(OPTIMAL.limits, l1=(1.0, 2.0), l4=(1.0, 2.0))
     state = compared(msgspec.structs.replace(OPTIMAL, name="none", limits=limits))
     found = columns(state)
-    rows = cells(table(found, DEEDS, millimetres=False))
+    rows = cells(table(found, BUTTONS, millimetres=False))
     assert rows["volume units³"][1] == "empty"
     assert rows["clearance units"][1] == "–"
     (note,) = notes(state, found)
@@ -239,11 +245,11 @@ def test_other_units_are_told_and_the_same_manipulator_is_the_same() -> None:
     )
     state = compared(other)
     found = columns(state)
-    for figure in FIGURES:
-        live, same = (column.value(figure) for column in found)
-        assert same == pytest.approx(live, rel=1e-6, abs=1e-9), figure.name
+    for measure in LISTED.values():
+        live, same = (column.value(measure) for column in found)
+        assert same == pytest.approx(live, rel=1e-6, abs=1e-9), measure.name
     (note,) = notes(state, found)
-    assert "One unit of the live design is 10 mm; A has 5 mm. Lengths are told in units" in note
+    assert "One unit of the live design is 10 mm; A has 5 mm. Lengths are in units" in note
 
 
 def test_bars_are_as_long_as_their_values() -> None:
@@ -253,7 +259,7 @@ def test_bars_are_as_long_as_their_values() -> None:
     assert len(widths) == len(DRAWN) * len(found)
     per_drawing = np.array(widths).reshape(len(DRAWN), len(found))
     for name, drawn in zip(DRAWN, per_drawing, strict=True):
-        values = np.array([column.value(BY_NAME[name]) for column in found], dtype=np.float64)
+        values = np.array([column.value(CATALOGUE[name]) for column in found], dtype=np.float64)
         if values.max() > 0.0:
             expected = np.maximum(drawn.max() * values / values.max(), 0.8)
             assert drawn == pytest.approx(expected, abs=0.02), name
@@ -265,7 +271,10 @@ def test_a_drawing_has_the_workspace_at_the_home_of_the_design_and_its_points() 
     assert drawing.shell is not None
     assert drawing.figures is not None
     spans = np.ptp(drawing.shell.vertices, axis=0)
-    assert spans == pytest.approx(np.array(drawing.figures.extent), abs=0.01 * INITIAL.reach)
+    assert spans == pytest.approx(
+        np.array([drawing.figures[f"exact_extent_{axis}"] for axis in "xyz"]),
+        abs=0.01 * INITIAL.reach,
+    )
     ends = drawing.outline.reshape(-1, 3)
     for point in ((0.0, 0.0, 0.0), (*INITIAL.a3, 0.0), home_pose(INITIAL).position):
         assert np.abs(ends - np.array(point)).max(axis=1).min() < 1e-9
@@ -445,9 +454,9 @@ def test_the_worker_finds_the_columns(worker: Worker) -> None:
     live, pinned = columns_of(state, feed)
     # Compiled or not, the last bit may differ.
     for column, design in ((live, OPTIMAL), (pinned, INITIAL)):
-        assert column.figures is not None
-        expected = figures_of(unnamed(design))
+        assert column.measured is not None
+        expected = measured(unnamed(design))
         for each in fields(expected):
-            found, known = (getattr(f, each.name) for f in (column.figures, expected))
+            found, known = (getattr(f, each.name) for f in (column.measured, expected))
             assert found == known or found == pytest.approx(known, rel=1e-9), each.name
     assert [each.letter for each in (live, pinned)] == ["live", SLOTS[0]]

@@ -42,9 +42,9 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, opened
 from explorer.app.state.studies import Brush, Studies, StudyWish, range_around, study_around, within
 from explorer.errors import InputError
+from explorer.measures.catalogue import measures_in
 from explorer.mechanism.design import VARIABLES, Design
 from explorer.mechanism.design_file import PRESETS
-from explorer.sweep.measures import MEASURES
 from explorer.sweep.parts import part_paths, write_part
 from explorer.sweep.results import Results, load_results
 from explorer.sweep.rows import evaluate
@@ -176,7 +176,7 @@ def test_a_range_lies_around_the_live_design(
     st.lists(
         st.one_of(
             st.sampled_from(NAMES).map(lambda name: ("variable", name)),
-            st.sampled_from([*MEASURES]).map(lambda name: ("measure", name)),
+            st.sampled_from([*measures_in("studies")]).map(lambda name: ("measure", name)),
         ),
         max_size=30,
     )

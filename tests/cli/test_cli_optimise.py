@@ -17,8 +17,10 @@ import pytest
 import explorer
 from explorer.cli import run
 from explorer.cli.answers.optimisation import findings_table
+from explorer.measures.case import Case
+from explorer.measures.catalogue import measures_in
+from explorer.measures.measurements import measure_design
 from explorer.numerics.compiled import warm
-from explorer.optimise.facts import facts_of
 from explorer.optimise.findings import Finding
 from explorer.optimise.record import load_record
 
@@ -85,7 +87,7 @@ def test_optimise_text_has_start_beside_optimum(capsys: pytest.CaptureFixture[st
     assert "converged: F = " in captured.out
     lines = {line.split("  ")[0]: line.split() for line in captured.out.splitlines() if line}
     assert lines["a3x"][1] == "10.0000"
-    assert lines["exact volume"][2:4] == ["870.697", "8000.00"]
+    assert lines["volume"][1:3] == ["870.697", "8000.00"]
     assert "start 1 of 1" in captured.err
 
 
@@ -234,8 +236,9 @@ def test_optimise_interrupt_leaves_files_unchanged(tmp_path: Path) -> None:
 
 
 def test_findings_table_has_a_row_per_finding() -> None:
-    facts = facts_of(explorer.PRESETS["paper-optimal"], box=((8.0, 3.0, 7.0), (12.0, 7.0, 11.0)))
-    found = [Finding("given", None, None, None, facts), Finding("ours", 5, 1e-13, 0.1, facts)]
+    case = Case(explorer.PRESETS["paper-optimal"], box=((8.0, 3.0, 7.0), (12.0, 7.0, 11.0)))
+    measured = measure_design(case, measures_in("optimise"))
+    found = [Finding("given", None, None, None, measured), Finding("ours", 5, 1e-13, 0.1, measured)]
     page = findings_table(found).splitlines()
     assert [line.split()[0] for line in page[1:3]] == ["given", "ours"]
     assert page[1].split()[1:3] == ["–", "–"]

@@ -13,18 +13,20 @@ from explorer.app.features.optimise.tasks import compare
 from explorer.app.features.optimise.words import measure_rows
 from explorer.app.state.studies import spoken
 from explorer.cli import run
-from explorer.cli.answers.optimisation import fact_rows
+from explorer.cli.answers.optimisation import measure_rows as measure_rows_of_command
+from explorer.measures.case import Case
+from explorer.measures.catalogue import CATALOGUE, measures_in
+from explorer.measures.measurements import measure_design
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS, encode_design
 from explorer.numerics.compiled import warm
 from explorer.optimise.defaults import make_problem
-from explorer.optimise.figures import FIGURES, figures_of
 from explorer.optimise.findings import paper_start
 from explorer.optimise.problem import Problem
-from explorer.sweep.measures import MEASURES, Case
 
-Told = dict[str, dict[str, float | None]]
+Places = dict[str, dict[str, float | None]]
 
+SWIFT = [name for name, each in measures_in("studies").items() if each.cost == "low"]
 BOX = ((9.0, 4.0, 8.0), (11.0, 6.0, 10.0))
 
 
@@ -46,28 +48,27 @@ def found() -> Design:
     return msgspec.structs.replace(paper_start().with_variables(values), name="found")
 
 
-def told(design: Design, folder: Path, capsys: pytest.CaptureFixture[str]) -> Told:
-    """Return what each place tells of a design, by place and name."""
+def values_of_places(design: Design, folder: Path, capsys: pytest.CaptureFixture[str]) -> Places:
+    """Return what each place shows of a design, by place and label."""
     asked = problem()
     margin = asked.demands.clearance_margin
     both = compare(asked.start, design, margin, (BOX, BOX))
-    figures, case = figures_of(design), Case(design)
+    compared = measure_design(Case(design), measures_in("compare")).values
+    studied = measure_design(Case(design), SWIFT).values
     path = folder / "design.json"
     path.write_bytes(encode_design(design))
     assert run(["workspace", "--design", str(path), "--json"]) == 0
     measured = json.loads(capsys.readouterr().out)
     return {
-        "Compare": {each.name: each.of(figures) for each in FIGURES},
+        "Compare": {CATALOGUE[name].label: value for name, value in compared.items()},
         "Optimise": {
             row.name.removesuffix(", units³").removesuffix(", units"): row.after
             for row in measure_rows(asked, both.before, both.after)
         },
         "explorer optimise": {
-            name: after for name, (_, after) in fact_rows((both.before, both.after))
+            label: after for label, (_, after) in measure_rows_of_command(both.before, both.after)
         },
-        "Studies": {
-            spoken(name): each.of(case) for name, each in MEASURES.items() if not each.is_slow
-        },
+        "Studies": {spoken(name): value for name, value in studied.items()},
         "explorer workspace": {
             name.replace("_", " "): measured[name]
             for name in ("volume", "node_step", "node_volume")
@@ -75,7 +76,7 @@ def told(design: Design, folder: Path, capsys: pytest.CaptureFixture[str]) -> To
     }
 
 
-def values_by_name(places: Told) -> dict[str, dict[str, float]]:
+def values_by_name(places: Places) -> dict[str, dict[str, float]]:
     by_name: dict[str, dict[str, float]] = {}
     for place, values in places.items():
         for name, value in values.items():
@@ -85,10 +86,10 @@ def values_by_name(places: Told) -> dict[str, dict[str, float]]:
 
 
 @pytest.mark.parametrize("design", [found(), *PRESETS.values()], ids=lambda each: each.name)
-def test_what_two_places_call_by_one_name_has_one_value(
+def test_measures_of_one_label_have_one_value(
     design: Design, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    by_name = values_by_name(told(design, tmp_path, capsys))
+    by_name = values_by_name(values_of_places(design, tmp_path, capsys))
     shared = {name: values for name, values in by_name.items() if len(values) > 1}
     assert {"volume", "reach", "nodes", "node volume", "clearance"} <= {*shared}
     for name, values in shared.items():
@@ -96,13 +97,13 @@ def test_what_two_places_call_by_one_name_has_one_value(
         assert others == pytest.approx([first] * len(others), rel=1e-9), (name, values)
 
 
-def test_a_clearance_as_it_was_demanded_is_told_beside_the_designs_own() -> None:
+def test_optimised_demanded_clearance_stands_beside_own() -> None:
     asked = problem()
     both = compare(asked.start, found(), asked.demands.clearance_margin, (None, None))
     rows = {row.name: row for row in measure_rows(asked, both.before, both.after)}
-    demanded, own = rows["clearance, |κ| ≥ 0.539"], rows["clearance, units"]
-    assert demanded.after == both.after.demanded_clearance
-    assert own.after == both.after.clearance
+    demanded, own = rows["demanded clearance, |δ| ≥ 0.539"], rows["clearance, units"]
+    assert demanded.after == both.after["demanded_clearance"]
+    assert own.after == both.after["least_clearance"]
     # It was demanded nearer to the singular planes than where the design's own counts.
     assert demanded.after is not None
     assert own.after is not None
@@ -111,4 +112,4 @@ def test_a_clearance_as_it_was_demanded_is_told_beside_the_designs_own() -> None
         asked, demands=msgspec.structs.replace(asked.demands, clearance=None)
     )
     names = [row.name for row in measure_rows(free, both.before, both.after)]
-    assert [name for name in names if name.startswith("clearance")] == ["clearance, units"]
+    assert [name for name in names if "clearance" in name] == ["clearance, units"]

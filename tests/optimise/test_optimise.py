@@ -27,7 +27,7 @@ from explorer import (
     optimise_design,
     workspace_volume,
 )
-from explorer.optimise.facts import facts_of
+from explorer.measures.case import Case
 from explorer.optimise.findings import paper_problem, paper_start, reach_problem
 from explorer.optimise.problem import DISTANCES, distance_of
 from explorer.optimise.record import (
@@ -109,7 +109,7 @@ def test_a_clearance_is_kept_between_the_positions_that_the_solver_looks_at(
     margin = problem.demands.clearance_margin
     assert least_clearance_by_sampling(problem.start, margin, 100_000) < clearance
     assert least_clearance_by_sampling(outcome.design, margin, 100_000) >= 0.999 * clearance
-    found = facts_of(outcome.design, demanded_margin=margin).demanded_clearance
+    found = Case(outcome.design, demanded_margin=margin).demanded_clearance[0]
     assert found is not None
     assert found >= 0.98 * clearance
 

@@ -11,14 +11,14 @@ import pytest
 from numpy.testing import assert_allclose
 
 from explorer import InputError, workspace_volume
+from explorer.measures.clearance import CERTAIN, clearance_beyond
 from explorer.mechanism.design import Design, DesignError, Limits
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
 from explorer.numerics.compiled import warm
 from explorer.optimise.defaults import make_problem
-from explorer.optimise.facts import CERTAIN, clearance_beyond
 from explorer.optimise.problem import Problem, Variable
-from explorer.optimise.refutation.binding import binding
+from explorer.optimise.refutation.binding import find_binding_limit
 from explorer.optimise.refutation.cut_box import cut_volume
 from explorer.optimise.refutation.most_volume import ball_above, ceilings, disc_above
 from explorer.optimise.refutation.ranges import Ranges
@@ -285,13 +285,13 @@ def test_what_lies_over_a_height_of_a_ball_and_of_a_disc(foot: float) -> None:
 def test_a_limit_that_is_in_the_way_of_a_volume_is_the_one_without_which_it_is_there() -> None:
     grown = OPTIMAL.with_variables([25.0, 12.0, 4.0, -4.0, 2.6, 4.9])
     assert workspace_volume(grown).volume < 11_000.0
-    found = binding(grown, 11_000.0)
+    found = find_binding_limit(grown, 11_000.0)
     assert found is not None
     assert found.limit == "box"
     assert found.volume == workspace_volume(with_box(grown, None)).volume >= 11_000.0
-    assert binding(grown, 1e6) is None
-    assert binding(with_box(grown, None), 1e5) is None
+    assert find_binding_limit(grown, 1e6) is None
+    assert find_binding_limit(with_box(grown, None), 1e5) is None
     held = limited(with_box(grown, None), l1=(3.0, 12.0))
-    most = binding(held, 8000.0)
+    most = find_binding_limit(held, 8000.0)
     assert most is not None
     assert most.limit == "l1 maximum"

@@ -26,12 +26,13 @@ from explorer import (
     workspace_volume,
 )
 from explorer.files.json_text import LONGEST_LINE
+from explorer.measures.case import Case
+from explorer.measures.catalogue import measures_in
+from explorer.measures.measurements import measure_design
 from explorer.mechanism.design import VARIABLES
 from explorer.mechanism.pose import Pose
 from explorer.singularity.jacobian import inverse_condition, jacobian
 from explorer.sweep.front import front, undominated
-from explorer.sweep.labels import unit_of, words_of
-from explorer.sweep.measures import MEASURES, Case, measured
 from explorer.sweep.rows import (
     check_study,
     columns_of,
@@ -59,6 +60,7 @@ from explorer.workspace.limits.broken import violations
 from explorer.workspace.limits.constraints import home_signs
 from explorer.workspace.node_measures import node_measures
 
+MEASURES = measures_in("studies")
 OPTIMAL = PRESETS["paper-optimal"]
 PLAIN: dict[str, Any] = {
     "schema": 1,
@@ -389,7 +391,7 @@ def test_extents_agree_with_the_papers_nodes_to_a_cell() -> None:
     paper = workspace_nodes(OPTIMAL, step=0.5).extent
     assert paper is not None
     for axis, low, high in zip("xyz", *paper, strict=True):
-        own = measured(case, [f"extent_{axis}"])[f"extent_{axis}"]
+        own = measure_design(case, [f"extent_{axis}"])[f"extent_{axis}"]
         assert own == pytest.approx(high - low, abs=2.0 * (high - low) / 40.0 + 1.0)
 
 
@@ -605,18 +607,3 @@ def test_studies_can_be_made_in_python() -> None:
     assert decode_study(encode_study(study), "it") == study
     with pytest.raises(InputError, match="no preset"):
         Study(design="nothing", variables={"b2": (1.0, 2.0)}, sampling=Sampling(count=4))
-
-
-def test_every_column_has_words_and_a_unit() -> None:
-    study = decoded(
-        variables={"a3y": [4, 8], "yaw": [-80, -60], "radius": [0, 1]},
-        polish={"objective": "largest-volume"},
-        measures=list(MEASURES),
-    )
-    words = {name: words_of(name) for name in columns_of(study)}
-    assert len(set(words.values())) == len(words)
-    units = {name: unit_of(name) for name in columns_of(study)}
-    assert units["volume"] == "u³"
-    assert units["sample_yaw"] == units["yaw"] == "°"
-    assert units["a3y"] == units["radius"] == units["clearance_12"] == "u"
-    assert units["status"] == units["iterations"] == units["clear_share"] == ""

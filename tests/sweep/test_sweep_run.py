@@ -37,7 +37,7 @@ from explorer.sweep.front import front
 from explorer.sweep.parts import part_path, part_paths, read_part, sound_parts
 from explorer.sweep.results import design_at, load_results, summarise
 from explorer.sweep.rows import columns_of
-from explorer.sweep.run import AHEAD, Progress, RunError, run_locally, run_study
+from explorer.sweep.run import AHEAD, Progress, RunError, run_study
 from explorer.sweep.sampling import samples
 from explorer.sweep.study import Objective, Polish, Sampling, Study, encode_study
 from explorer.sweep.workers import LocalWorkers, WorkerDiedError
@@ -532,9 +532,11 @@ def test_a_script_that_its_workers_cannot_import_ends_in_one_line_and_no_rows(
     script = tmp_path / "script.py"
     # Each worker imports it, and so comes to where it would start workers itself.
     script.write_text(
-        "from explorer.sweep.run import run_locally\n"
+        "from explorer.sweep.run import run_study\n"
         "from explorer.sweep.study import load_study\n"
-        "run_locally(load_study('study.json'), 'results', 2)\n"
+        "from explorer.sweep.workers import LocalWorkers\n"
+        "with LocalWorkers(2) as workers:\n"
+        "    run_study(load_study('study.json'), 'results', workers)\n"
     )
     ended = subprocess.run(
         [sys.executable, str(script)],
@@ -591,7 +593,11 @@ def test_a_run_on_this_machine_ends_at_once_when_it_is_cut(tmp_path: Path) -> No
     # A chunk of these takes minutes.
     study = msgspec.structs.replace(STUDY, nodes=200, chunk=83)
     looks = iter([False, False])
-    progress = run_locally(study, tmp_path, 1, is_cut=functools.partial(next, looks, True))
+    workers = LocalWorkers(1)
+    try:
+        progress = run_study(study, tmp_path, workers, is_cut=functools.partial(next, looks, True))
+    finally:
+        workers.shutdown(cancel_futures=True)
     assert progress.done == 0
     assert not part_paths(tmp_path)
 

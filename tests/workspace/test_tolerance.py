@@ -35,10 +35,10 @@ from explorer import (
     workspace_nodes,
     workspace_volume,
 )
+from explorer.measures.size import corners_of
 from explorer.mechanism.design import LENGTHS, Swing
 from explorer.numerics.arrays import FloatArray
 from explorer.optimise.problem import SHIFTS, Box
-from explorer.optimise.search.demands import corners_of
 from explorer.workspace.limits.constraints import constraints, slacks
 from explorer.workspace.limits.joint_cones import angle_between, legs
 from explorer.workspace.orientations import orientations_within

@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from explorer.measures.measurements import Measurements
 from explorer.mechanism.design import VARIABLES
-from explorer.optimise.facts import Facts
 from explorer.optimise.outcome import Iterate, Outcome, Status
 from explorer.optimise.problem import (
     Box,
@@ -107,8 +107,8 @@ class SearchResult:
 class Comparison:
     """The measures of the user's own design and of the one found."""
 
-    before: Facts
-    after: Facts
+    before: Measurements
+    after: Measurements
 
 
 def verdict_of(outcome: Outcome, starts: int) -> SearchResult:

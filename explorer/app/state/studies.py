@@ -12,10 +12,10 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from explorer.errors import InputError
+from explorer.measures.catalogue import CATALOGUE, measures_in
 from explorer.mechanism.design import VARIABLES, Design
 from explorer.numerics.arrays import BoolArray
 from explorer.optimise.problem import REACH, YAW, longest_minimum, start_value
-from explorer.sweep.measures import AT_NODES, MEASURES
 from explorer.sweep.study import (
     DEFAULT_MEASURES,
     LONGEST_NAME,
@@ -39,7 +39,6 @@ LEAST_PERCENT, MOST_PERCENT = 1.0, 95.0
 LEAST_SHARE, RIGHT_ANGLE = 0.05, 90.0
 # A study from the page has about so many parts, each of which is shown when it is there.
 PARTS = 40
-UNITS = {"u": "units", "u³": "units³", "": ""}
 
 
 @dataclass(frozen=True)
@@ -93,15 +92,15 @@ class StudyWish:
         wanted = dict(self.objectives)
         measures = self.measures
         if name not in measures:
-            measures = _turned(tuple(MEASURES), measures, name)
+            measures = _turned(tuple(measures_in("studies")), measures, name)
         elif name not in wanted:
             wanted[name] = "max"
         elif wanted[name] == "max":
             wanted[name] = "min"
         else:
             del wanted[name]
-            measures = _turned(tuple(MEASURES), measures, name)
-        ordered = tuple((each, wanted[each]) for each in MEASURES if each in wanted)
+            measures = _turned(tuple(measures_in("studies")), measures, name)
+        ordered = tuple((each, wanted[each]) for each in CATALOGUE if each in wanted)
         return replace(self, measures=measures, objectives=ordered)
 
 
@@ -220,18 +219,15 @@ def study_around(design: Design, wish: StudyWish, name: str) -> Study:
 
 def unit_of(name: str) -> str:
     """Return the unit of a variable or measure as people read it, "" for a plain number."""
-    if name in MEASURES:
-        return UNITS[MEASURES[name].unit]
+    if name in CATALOGUE:
+        return CATALOGUE[name].unit_in("units")
     return "°" if name == YAW else "units" if name in NAMES else ""
 
 
 def spoken(name: str) -> str:
-    """Return what people call a variable or measure.
-
-    What a study finds over nodes, and a comparison of designs exactly, has a name that says so.
-    """
-    words = name.replace("_", " ")
-    return f"{words} at nodes" if name in AT_NODES else words
+    """Return what people call a variable or measure."""
+    is_measure = name in measures_in("studies")
+    return CATALOGUE[name].label if is_measure else name.replace("_", " ")
 
 
 def titled(name: str) -> str:

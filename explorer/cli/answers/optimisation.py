@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +14,7 @@ from explorer.mechanism.design import VARIABLES, Design
 from explorer.mechanism.design_file import encode_design
 
 if TYPE_CHECKING:
-    from explorer.optimise.facts import Facts
+    from explorer.measures.measurements import Measurements
     from explorer.optimise.findings import Finding
     from explorer.optimise.outcome import Outcome
     from explorer.optimise.problem import Problem
@@ -28,7 +28,7 @@ def optimised_design(outcome: Outcome) -> Design:
 
 def outcome_json(outcome: Outcome, written: Sequence[Path]) -> dict[str, object]:
     """Return an outcome as plain values."""
-    from explorer.optimise.facts import reach_of
+    from explorer.measures.size import reach_of
 
     best, run = outcome.best, outcome.run
     return {
@@ -66,7 +66,7 @@ def infeasible_json(problem: Problem, limit: str, message: str) -> dict[str, obj
         limit: Limit that contradicts the demands.
         message: Reason, in one line.
     """
-    from explorer.optimise.facts import reach_of
+    from explorer.measures.size import reach_of
 
     return {
         "design": _design_json(problem.start),
@@ -89,21 +89,23 @@ def infeasible_json(problem: Problem, limit: str, message: str) -> dict[str, obj
 
 def outcome_lines(outcome: Outcome, written: Sequence[Path]) -> list[str]:
     """Return an outcome as lines of text, with the start and the best design side by side."""
-    from explorer.optimise.facts import facts_of
+    from explorer.measures.case import Case
+    from explorer.measures.catalogue import measures_in
+    from explorer.measures.measurements import measure_design
 
     problem, best = outcome.problem, outcome.best
     margin = None if problem.demands.clearance is None else problem.demands.clearance_margin
     box = problem.demands.required_box
     if box is not None:
         box = problem.required_box_at(best.values)
-    facts = (
-        facts_of(problem.start, demanded_margin=margin, box=box),
-        facts_of(outcome.design, demanded_margin=margin, box=box),
+    before, after = (
+        measure_design(Case(design, demanded_margin=margin, box=box), measures_in("optimise"))
+        for design in (problem.start, outcome.design)
     )
     rows = [("", "start", "optimum" if outcome.converged else "best so far", "change")]
-    for name, (before, after) in fact_rows(facts):
-        change = "" if before is None or after is None else f"{after - before:+.6g}"
-        cells = ["none" if each is None else figure(each) for each in (before, after)]
+    for name, (old, new) in measure_rows(before, after):
+        change = "" if old is None or new is None else f"{new - old:+.6g}"
+        cells = ["none" if each is None else figure(each) for each in (old, new)]
         rows.append((name, cells[0], cells[1], change))
     lines = [outcome.run.message, ""] if outcome.converged else []
     lines.append(table(rows, "<>>>"))
@@ -116,48 +118,49 @@ def outcome_lines(outcome: Outcome, written: Sequence[Path]) -> list[str]:
     return lines
 
 
-def fact_rows(
-    facts: tuple[Facts, Facts],
-) -> list[tuple[str, tuple[float | None, float | None]]]:
-    """Return the rows of a table of two designs: a name and its two values."""
-    named: list[tuple[str, Callable[[Facts], float | None]]] = [
-        ("yaw (degrees)", lambda each: each.yaw),
-        ("reach", lambda each: each.reach),
-        ("exact volume", lambda each: each.volume),
-        ("node volume", lambda each: each.nodes and each.nodes.volume),
-        ("clearance", lambda each: each.clearance),
-        ("margin over the box", lambda each: each.box_margin),
-    ]
-    before, after = facts
-    if after.demanded_margin is not None:
-        words = f"clearance, margins ≥ {after.demanded_margin:.4g}"
-        named.append((words, lambda each: each.demanded_clearance))
-    own = zip(VARIABLES, before.design.variables, after.design.variables, strict=True)
-    return [
-        *((name, (first, second)) for name, first, second in own),
-        *((name, (of(before), of(after))) for name, of in named if of(after) is not None),
-    ]
+def measure_rows(
+    before: Measurements, after: Measurements
+) -> Iterator[tuple[str, tuple[float | None, float | None]]]:
+    """Yield the label and the two values of each measure that the second design has.
+
+    Args:
+        before: The measures of one design.
+        after: The same measures of another.
+    """
+    from explorer.measures.catalogue import CATALOGUE
+
+    yield from zip(
+        VARIABLES, zip(before.design.variables, after.design.variables, strict=True), strict=True
+    )
+    for name, value in after.values.items():
+        if value is None:
+            continue
+        measure = CATALOGUE[name]
+        label = f"{measure.label} (degrees)" if measure.unit == "°" else measure.label
+        if measure.needs == "demanded_margin":
+            label += f", margins ≥ {after.demanded_margin:.4g}"
+        yield label, (before[name], value)
 
 
 def finding_json(finding: Finding) -> dict[str, object]:
     """Return a finding as plain values; null is not available."""
-    facts = finding.facts
+    measured = finding.measured
     return {
         "name": finding.name,
-        "design": _design_json(facts.design),
+        "design": _design_json(measured.design),
         "iterations": finding.iterations,
         "objective": finding.objective,
         "seconds": finding.seconds,
-        "volume": facts.volume,
-        "node_step": facts.nodes and facts.nodes.step,
-        "node_count": facts.nodes and facts.nodes.count,
-        "node_volume": facts.nodes and facts.nodes.volume,
-        "reach": facts.reach,
-        "box_margin": facts.box_margin,
-        "clearance": facts.clearance,
-        "nearest_legs": facts.nearest,
-        "demanded_margin": facts.demanded_margin,
-        "demanded_clearance": facts.demanded_clearance,
+        "volume": measured["volume"],
+        "node_step": measured["node_step"],
+        "node_count": measured["node_count"],
+        "node_volume": measured["node_volume"],
+        "reach": measured["reach"],
+        "box_margin": measured["box_margin"],
+        "clearance": measured["least_clearance"],
+        "nearest_legs": measured.nearest,
+        "demanded_margin": measured.demanded_margin,
+        "demanded_clearance": measured["demanded_clearance"],
     }
 
 
@@ -165,8 +168,8 @@ def findings_table(found: Sequence[Finding]) -> str:
     """Return the table of findings with notes."""
     from explorer.optimise.findings import BOX, CLEARANCE, PAPER_VOLUME, STARTS, STEP
 
-    demanded = found[0].facts.demanded_margin or 0.0
-    rows = [
+    demanded = found[0].measured.demanded_margin or 0.0
+    rows: list[tuple[str, ...]] = [
         (
             "",
             "iterations",
@@ -180,19 +183,22 @@ def findings_table(found: Sequence[Finding]) -> str:
         )
     ]
     for each in found:
-        facts = each.facts
-        margin, clearance = facts.box_margin, facts.demanded_clearance
+        measured = each.measured
+        reach, margin = measured["reach"], measured["box_margin"]
+        cells = [
+            _cell(measured["volume"], ".3f"),
+            _cell(measured["node_count"], "d"),
+            _cell(reach, ".4f"),
+            _cell(margin and reach and margin / reach, ".4f"),
+            _cell(measured["demanded_clearance"], ".4f"),
+        ]
         rows.append(
             (
                 each.name,
-                "–" if each.iterations is None else str(each.iterations),
-                "–" if each.objective is None else f"{each.objective:.1e}",
-                f"{facts.volume:.3f}",
-                "–" if facts.nodes is None else str(facts.nodes.count),
-                f"{facts.reach:.4f}",
-                "–" if margin is None else f"{margin / facts.reach:.4f}",
-                "–" if clearance is None else f"{clearance:.4f}",
-                "–" if each.seconds is None else f"{each.seconds:.2f}",
+                _cell(each.iterations, "d"),
+                _cell(each.objective, ".1e"),
+                *cells,
+                _cell(each.seconds, ".2f"),
             )
         )
     lows, highs = BOX
@@ -207,6 +213,10 @@ def findings_table(found: Sequence[Finding]) -> str:
         "least 1 and b within ±10."
     )
     return f"{table(rows, '<>>>>>>>>')}\n\n{notes}"
+
+
+def _cell(value: float | None, form: str) -> str:
+    return "–" if value is None else format(value, form)
 
 
 def _design_json(design: Design) -> Any:

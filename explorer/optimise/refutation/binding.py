@@ -1,4 +1,4 @@
-"""The limit that keeps the workspace of a design from a volume: without it alone it has that."""
+"""The limit that alone keeps the workspace of a design from a volume."""
 
 from __future__ import annotations
 
@@ -12,36 +12,36 @@ from explorer.mechanism.home import home_pose
 from explorer.optimise.refutation.refutation import BOX_LIMIT
 from explorer.workspace.slices.volume import workspace_volume
 
-# A maximum length that bounds nothing, as a multiple of the reach.
+# Maximum length that bounds nothing, as a multiple of the reach.
 UNBOUNDED = 1e3
 
 
-class Binding(NamedTuple):
-    """The limit that binds.
+class BindingLimit(NamedTuple):
+    """A limit that alone keeps a workspace from a volume.
 
     Attributes:
-        limit: Its name, such as "box".
-        volume: Of the workspace without it, in cubed design units.
+        limit: Name of the limit, such as "box".
+        volume: Volume of the workspace without it, in cubed design units.
     """
 
     limit: str
     volume: float
 
 
-def binding(design: Design, volume: float) -> Binding | None:
+def find_binding_limit(design: Design, volume: float) -> BindingLimit | None:
     """Return the limit without which a design has a volume; None if no single one is in the way.
 
-    Of several the one without which it has the most.
+    If there are several, it is the one without which the volume is the largest.
 
     Args:
-        design: That has less.
-        volume: In cubed design units.
+        design: The manipulator, of a smaller volume.
+        volume: The volume, in cubed design units.
     """
     start = msgspec.structs.replace(design, home=home_pose(design))
-    found: list[Binding] = []
+    found: list[BindingLimit] = []
     for name, limits in _without_one(design):
         freed = msgspec.structs.replace(start, limits=limits)
-        found.append(Binding(name, workspace_volume(freed, explain=False).volume))
+        found.append(BindingLimit(name, workspace_volume(freed, explain=False).volume))
     enough = [each for each in found if each.volume >= volume]
     return max(enough, key=lambda each: each.volume, default=None)
 

@@ -2,7 +2,7 @@
 
 Each limit is a solid of positions, so that no workspace is larger than that solid is at most
 within the bounds of the variables: a box, a ball, the lens that two balls share, a slab of the
-guide. A least margin κ3 leaves of each only what lies on the home's side of the base plane.
+guide. A least margin δ3 leaves of each only what lies on the home's side of the base plane.
 Nothing here measures a workspace, so that all of it takes milliseconds.
 """
 
@@ -20,8 +20,9 @@ from explorer.numerics.arrays import FloatArray
 from explorer.optimise.problem import REACH, Box
 from explorer.optimise.refutation.cut_box import cut_volume
 from explorer.optimise.refutation.ranges import Ranges, product, smallest
+from explorer.singularity.ellipsoids import planes_of_singularity
 
-# Two lines between which the sine is less are parallel: κ2 is nothing wherever b4 is.
+# Below this sine between the two lines they are parallel: δ2 is zero wherever b4 is.
 PARALLEL = 1e-12
 
 
@@ -29,10 +30,10 @@ class Ceiling(NamedTuple):
     """An upper bound of the volume.
 
     Attributes:
-        limit: The limit that it comes from: "box", "guide", "reach" or such as "l1 maximum".
-        words: What leaves so much, with its verb, such as "the box holds".
-        volume: The bound, in cubed design units.
-        place: Of what the bound is the volume, "" for the whole of the limit.
+        limit: Limit that it comes from: "box", "guide", "reach" or such as "l1 maximum".
+        words: Subject and verb of a sentence on it, such as "the box holds".
+        volume: Bound, in cubed design units.
+        place: Part of the limit that the bound is the volume of, "" for all of it.
     """
 
     limit: str
@@ -53,14 +54,11 @@ def margin_planes(ranges: Ranges, least: float | None) -> list[tuple[FloatArray,
 
     Args:
         ranges: The intervals of the problem.
-        least: Of every margin, with the signs of home; None for no demand.
+        least: Least margin, with the signs of home, in design units; None for no demand.
     """
     if least is None:
         return []
-    start = ranges.problem.start
-    rotation = home_pose(start).rotation
-    u, n = rotation[:, 0], rotation[:, 2]
-    normals = [-n, np.array([0.0, -u[2], u[1]]), np.array([0.0, 0.0, 1.0])]
+    normals = planes_of_singularity(home_pose(ranges.problem.start).rotation)
     return [
         (sign * normal, least)
         for index, (normal, sign) in enumerate(zip(normals, ranges.signs, strict=True))
@@ -69,7 +67,7 @@ def margin_planes(ranges: Ranges, least: float | None) -> list[tuple[FloatArray,
     ]
 
 
-def near_singular(ranges: Ranges, margin: float) -> float:
+def near_singular_volume(ranges: Ranges, margin: float) -> float:
     """Return an upper bound of the volume in which some margin is less than this."""
     limits = ranges.problem.start.limits
     own, box = limits.margin, limits.box

@@ -1,7 +1,7 @@
-"""What the limits of a problem cannot give, known before a search starts.
+"""Demands that the limits of a problem cannot meet, known before a search starts.
 
-A demand is refuted only where no design within the bounds can keep it: each test compares it
-with a bound that holds for all of them. What is not refuted may still be impossible.
+A demand counts as impossible only where no design within the bounds can keep it: each test
+compares it with a bound that holds for all of them. Other demands may still be impossible.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from explorer.mechanism.design import Design, Pair
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.home import home_pose
 from explorer.optimise.problem import SHIFTS, Box, Problem
-from explorer.optimise.refutation.most_volume import ceilings, margin_planes, near_singular
+from explorer.optimise.refutation.most_volume import ceilings, margin_planes, near_singular_volume
 from explorer.optimise.refutation.ranges import Ranges, largest, smallest
 from explorer.workspace.limits.constraints import GAP
 
-# What a demand must exceed its bound by to be refuted, as a share: searches have tolerances.
+# Excess of an impossible demand over its bound, as a share: searches have tolerances.
 SPARE = 1e-6
 
 PAPER_BOX = PRESETS["paper-optimal"].limits.box
@@ -35,8 +35,8 @@ class Refutation(NamedTuple):
     """A demand that no design within the bounds keeps.
 
     Attributes:
-        limit: The limit that keeps it from being met, such as "box".
-        message: A clause for people, with the demand and what the limit gives.
+        limit: Limit that makes it impossible, such as "box".
+        message: Clause with the demand and the most that the limit allows.
     """
 
     limit: str
@@ -44,9 +44,9 @@ class Refutation(NamedTuple):
 
 
 def refutations(problem: Problem) -> tuple[Refutation, ...]:
-    """Return why no design within the bounds meets the demands; () if nothing speaks against it.
+    """Return why no design within the bounds meets the demands: one reason for each limit.
 
-    Of each limit the first reason is told.
+    Without such a reason the result is (): the demands may be possible.
     """
     ranges = Ranges(problem)
     found: dict[str, Refutation] = {}
@@ -75,8 +75,8 @@ def with_box(design: Design, box: Box | None) -> Design:
 def paper_box(problem: Problem) -> Box | None:
     """Return the box of the paper's optimum, or None where that would not do either."""
     boxed = msgspec.structs.replace(problem, start=with_box(problem.start, PAPER_BOX))
-    is_refuted = any(each.limit == BOX_LIMIT for each in refutations(boxed))
-    return None if is_refuted else PAPER_BOX
+    too_small = any(each.limit == BOX_LIMIT for each in refutations(boxed))
+    return None if too_small else PAPER_BOX
 
 
 def _volume(ranges: Ranges) -> Iterator[Refutation]:
@@ -87,7 +87,7 @@ def _volume(ranges: Ranges) -> Iterator[Refutation]:
     elif wanted == 0.0:
         return
     for each in ceilings(ranges):
-        # A workspace without any volume is none that anybody looks for.
+        # A workspace without any volume is of no use.
         if each.volume <= wanted * (1.0 - SPARE):
             room = "" if each.limit == BOX_LIMIT else "room for "
             most, asked = _amounts(each.volume, wanted)
@@ -217,7 +217,7 @@ def _clearance(ranges: Ranges) -> Iterator[Refutation]:
     # All of a smaller workspace may lie where no clearance is demanded.
     if demanded is None or problem.objective == "largest-volume" or volume is None:
         return
-    if volume * (1.0 - SPARE) <= near_singular(ranges, problem.demands.clearance_margin):
+    if volume * (1.0 - SPARE) <= near_singular_volume(ranges, problem.demands.clearance_margin):
         return
     radii = problem.start.limits.leg_radii
     for first, second in PAIRS:

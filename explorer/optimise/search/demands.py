@@ -10,11 +10,13 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from explorer.measures.size import corners_of
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.margins import margins
 from explorer.numerics.arrays import FloatArray
 from explorer.optimise.problem import SHIFTS, Box
 from explorer.optimise.search.state import State
+from explorer.singularity.ellipsoids import planes_of_singularity
 from explorer.workspace.limits.constraints import GAP, YAW, BallOrCylinder, Constraint, HalfSpace
 
 # How far a demand that is no limit may be missed and is still met, dimensionless.
@@ -243,12 +245,6 @@ def _outside(
     return slack, by_u, by_p
 
 
-def corners_of(box: Box) -> FloatArray:
-    """Return the corners of a box, shape (8, 3)."""
-    lows, highs = box
-    return np.array([[(lows, highs)[c >> a & 1][a] for a in range(3)] for c in range(8)])
-
-
 class MarginDemand:
     """The margins over a required box, each to be at least the worst, which is raised.
 
@@ -257,10 +253,10 @@ class MarginDemand:
 
     is_equality = False
     is_limit = False
-    names = tuple(f"margin κ{i} over the required box" for i in (1, 2, 3))
+    names = tuple(f"margin δ{i} over the required box" for i in (1, 2, 3))
 
     def measure(self, state: State) -> Measured:
-        """Return sign · κ at the corner that is worst for each κ, over the size of the start."""
+        """Return sign · δ at the corner that is worst for each δ, over the size of the start."""
         value, gradient = box_margins(state)
         worst = value.argmin(axis=1)
         rows, size = np.arange(3), state.problem.size
@@ -268,7 +264,7 @@ class MarginDemand:
 
 
 def box_margins(state: State) -> tuple[FloatArray, FloatArray]:
-    """Return sign · κ at the corners of the required box, shape (3, 8), and (3, 8, n).
+    """Return sign · δ at the corners of the required box, shape (3, 8), and (3, 8, n).
 
     The signs are those of the home pose.
     """
@@ -276,7 +272,7 @@ def box_margins(state: State) -> tuple[FloatArray, FloatArray]:
     corners, n, r = corners_of(state.box), len(state.u), state.rotation
     signs = np.sign(margins(home.position, r))
     u, normal = r[:, 0], r[:, 2]
-    slopes = np.array([-normal, [0.0, -u[2], u[1]], [0.0, 0.0, 1.0]])
+    slopes = planes_of_singularity(r)
     # Turning about the base's z-axis moves x to y and y to −x.
     turned = np.array([[normal[1], -normal[0], 0.0], [0.0, 0.0, u[0]], [0.0, 0.0, 0.0]])
     gradients = np.zeros((3, 8, n))

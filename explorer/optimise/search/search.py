@@ -22,7 +22,7 @@ from explorer.numerics.arrays import FloatArray
 from explorer.optimise.curves import CALLED
 from explorer.optimise.outcome import Iterate, Phase, Run, Status
 from explorer.optimise.problem import Problem
-from explorer.optimise.refutation.binding import Binding, binding
+from explorer.optimise.refutation.binding import BindingLimit, find_binding_limit
 from explorer.optimise.search.crossings import crossings
 from explorer.optimise.search.demands import MET
 from explorer.optimise.search.elsewhere import promising
@@ -96,7 +96,7 @@ class Search:
         chosen = min(attempts, key=self._rank)
         if self.trail.is_cancelled:
             chosen = chosen._replace(status="cancelled", holding="", message="")
-        limit = self._binding(chosen)
+        limit = self._binding_limit(chosen)
         return Run(
             start=self.start,
             status=chosen.status,
@@ -111,14 +111,14 @@ class Search:
     def _rank(self, attempt: Attempt) -> tuple[bool, tuple[float, float]]:
         return attempt.status != "converged", self.trail.rank(attempt.best)
 
-    def _binding(self, chosen: Attempt) -> Binding | None:
+    def _binding_limit(self, chosen: Attempt) -> BindingLimit | None:
         """Return the limit that keeps a search from the volume that is wanted."""
         wanted = self.problem.demands.volume
         if chosen.status == "infeasible" and wanted is not None and 0.0 < self.largest < wanted:
-            return binding(chosen.best.design, wanted)
+            return find_binding_limit(chosen.best.design, wanted)
         return None
 
-    def _message(self, chosen: Attempt, limit: Binding | None) -> str:
+    def _message(self, chosen: Attempt, limit: BindingLimit | None) -> str:
         wanted = self.problem.demands.volume
         if chosen.status == "infeasible" and wanted is not None and 0.0 < self.largest < wanted:
             without = ""

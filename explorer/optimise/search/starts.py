@@ -7,11 +7,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from explorer.errors import DesignError, InputError
+from explorer.measures.size import longest_length
 from explorer.mechanism.design import Design
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.margins import margins
 from explorer.numerics.arrays import FloatArray
-from explorer.optimise.problem import DISTANCES, Problem, distance_of, longest_length
+from explorer.optimise.problem import DISTANCES, Problem, distance_of
 
 # Positions an axis at which clearance is demanded at first; more come where they matter.
 IN_SPACE, IN_SURFACE = 7, 21
@@ -78,7 +79,7 @@ def first_positions(problem: Problem, design: Design) -> FloatArray:
     rotation, least = home_pose(design).rotation, problem.demands.clearance_margin
     columns = grid(IN_SURFACE, IN_SURFACE)
     foot = np.column_stack([columns, np.zeros(len(columns))])
-    # Margins are linear in z: κ = at the foot + rise · z.
+    # Margins are linear in z: δ = δ at the foot + rise · z.
     at_foot = margins(foot, rotation)
     rise = margins(np.array([0.0, 0.0, 1.0]), rotation)
     found = [grid(IN_SPACE, IN_SPACE, IN_SPACE)]

@@ -1,30 +1,30 @@
-"""Designs side by side: small bars from zero, a drawing for each figure."""
+"""Designs side by side: small bars from zero, a drawing for each of some measures."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from html import escape
 
-from explorer.app.features.compare.columns import Column, best_of, unit_of
+from explorer.app.features.compare.columns import Column, best_of, hint_of, unit_of
 from explorer.app.widgets.colours import css
 from explorer.app.widgets.markup import format_number
-from explorer.optimise.figures import FIGURES, Figure
+from explorer.measures.catalogue import CATALOGUE, Measure
 
 DRAWN = (
     "volume",
-    "volume / reach³",
-    "node volume",
+    "volume_per_reach",
+    "node_volume",
     "reach",
-    "extent x",
-    "extent y",
-    "extent z",
-    "clearance",
-    "worst margin",
-    "mean margin",
-    "margin at home",
-    "mean 1 / cond J",
+    "exact_extent_x",
+    "exact_extent_y",
+    "exact_extent_z",
+    "least_clearance",
+    "least_margin",
+    "mean_margin",
+    "home_margin",
+    "mean_inverse_condition",
 )
-"""The figures that are drawn, row by row."""
+"""The measures that are drawn, row by row."""
 
 ACROSS = 4
 # Of one drawing, its title, a bar, its letter and the room of its number, in pixels.
@@ -37,37 +37,35 @@ def bars(columns: Sequence[Column], *, millimetres: bool) -> str:
 
     Args:
         columns: The live design first.
-        millimetres: Whether lengths are told in millimetres, rather than in design units.
+        millimetres: Whether lengths are in millimetres, rather than in design units.
     """
-    figures = {figure.name: figure for figure in FIGURES}
     height = TITLE + len(columns) * (BAR + GAP) + SPACE
     drawings = "".join(
         f'<g transform="translate({(index % ACROSS) * WIDTH:g},{(index // ACROSS) * height:g})">'
-        f"{_drawing(figures[name], columns, millimetres=millimetres)}</g>"
+        f"{_drawing(CATALOGUE[name], columns, millimetres=millimetres)}</g>"
         for index, name in enumerate(DRAWN)
     )
     rows = -(-len(DRAWN) // ACROSS)
     return (
         f'<svg viewBox="0 0 {ACROSS * WIDTH:g} {rows * height:g}" width="100%" '
         'style="display:block;font-size:10.5px;fill:currentColor" role="img" '
-        f'aria-label="Figures of the designs as bars">{drawings}</svg>'
+        f'aria-label="Measures of the designs as bars">{drawings}</svg>'
     )
 
 
-def _drawing(figure: Figure, columns: Sequence[Column], *, millimetres: bool) -> str:
-    values = [column.value(figure) for column in columns]
+def _drawing(measure: Measure, columns: Sequence[Column], *, millimetres: bool) -> str:
+    values = [column.value(measure) for column in columns]
     known = [value for value in values if value is not None]
     low, high = min([0.0, *known]), max([0.0, *known])
     room = WIDTH - LETTER - NUMBER - 8.0
     scale = room / (high - low) if high > low else 0.0
     zero = LETTER - low * scale
-    best = best_of(figure, values)
-    unit = unit_of(figure, millimetres=millimetres)
-    arrow = {"more": " ↑", "less": " ↓", None: ""}[figure.better]
-    better = {"more": "; more is better", "less": "; less is better", None: ""}[figure.better]
+    best = best_of(measure, values)
+    unit = unit_of(measure, millimetres=millimetres)
+    arrow = {"more": " ↑", "less": " ↓", None: ""}[measure.sense]
     title = (
-        f"<title>{escape(figure.hint + better)}</title>"
-        f'<text x="0" y="11" font-weight="600">{escape(figure.name)}'
+        f"<title>{escape(hint_of(measure))}</title>"
+        f'<text x="0" y="11" font-weight="600">{escape(measure.label)}'
         f'<tspan font-weight="400" fill-opacity="0.6"> {unit}{arrow}</tspan></text>'
     )
     parts = [title]

@@ -1,4 +1,4 @@
-"""What the table and the bars of a comparison have in common: columns, and values in one unit."""
+"""The columns of a comparison: its designs, with the values of their measures in one unit."""
 
 from __future__ import annotations
 
@@ -12,11 +12,13 @@ from explorer.app.state.compared import SLOTS
 from explorer.app.state.state import State
 from explorer.app.widgets.colours import COMPARED, Rgb, css
 from explorer.app.widgets.markup import LEAST, MOST, format_number
+from explorer.measures.catalogue import Measure
+from explorer.measures.measurements import Measurements
 from explorer.mechanism.design import Design
-from explorer.optimise.figures import Figure, Figures
 
-# Values that differ by a smaller share are as good as each other.
+# Values that differ by a smaller share are equally good.
 SAME = 1e-9
+PERCENT = 100.0
 
 
 @dataclass(frozen=True)
@@ -26,33 +28,38 @@ class Column:
     Attributes:
         number: 0 for the live one, from 1 for those that are pinned.
         design: The design.
-        figures: What is known of it.
-        factor: By what its lengths are multiplied to be in the unit of the comparison.
-        is_current: Whether nothing newer is on its way.
-        problem: Why something is missing, None if nothing is.
+        measured: Values of its measures; None until they are computed.
+        factor: Unit of its lengths in units of the comparison.
+        is_current: Whether no newer values are being computed.
+        problem: Why something is missing; None if nothing is.
     """
 
     number: int
     design: Design
-    figures: Figures | None
+    measured: Measurements | None
     factor: float
     is_current: bool = True
     problem: str | None = None
 
     @property
     def letter(self) -> str:
-        """What it is called in short."""
+        """Its short name: "live", or the letter of its place."""
         return "live" if self.number == LIVE else SLOTS[self.number - 1]
 
     @property
     def colour(self) -> Rgb:
-        """Its own."""
+        """The colour of its place."""
         return COMPARED[self.number]
 
-    def value(self, figure: Figure) -> float | None:
-        """Return a figure in the unit of the comparison, None if it has none."""
-        value = None if self.figures is None else figure.of(self.figures)
-        return None if value is None else value * self.factor**figure.power
+    def own_value(self, measure: Measure) -> float | None:
+        """Return a value in the design's own units, None if it has none; shares in per cent."""
+        value = None if self.measured is None else self.measured[measure.name]
+        return PERCENT * value if value is not None and measure.unit == "share" else value
+
+    def value(self, measure: Measure) -> float | None:
+        """Return a value in the unit of the comparison, None if it has none."""
+        value = self.own_value(measure)
+        return None if value is None else value * self.factor**measure.power
 
     def swatch(self) -> str:
         """Return a square of its colour, as HTML."""
@@ -74,7 +81,7 @@ def columns_of(state: State, feed: CompareFeed) -> tuple[Column, ...]:
             Column(
                 number=number,
                 design=design,
-                figures=None if drawing is None else drawing.figures,
+                measured=None if drawing is None else drawing.figures,
                 factor=design.unit_mm / unit,
                 is_current=feed.is_current(number),
                 problem=feed.problem(number) or (None if drawing is None else drawing.problem),
@@ -83,27 +90,30 @@ def columns_of(state: State, feed: CompareFeed) -> tuple[Column, ...]:
     return tuple(found)
 
 
-def unit_of(figure: Figure, *, millimetres: bool) -> str:
-    """Return the unit in which a figure is told."""
-    if figure.power == 0:
-        return figure.unit
-    return ("mm" if millimetres else "units") + ("³" if figure.power == 3 else "")
+def unit_of(measure: Measure, *, millimetres: bool) -> str:
+    """Return the unit in which a comparison writes a measure."""
+    return "%" if measure.unit == "share" else measure.unit_in("mm" if millimetres else "units")
 
 
-def best_of(figure: Figure, values: list[float | None]) -> set[int]:
-    """Return the indices of the best values, none where all are as good or better means nothing."""
+def hint_of(measure: Measure) -> str:
+    """Return what a measure means, and whether more or less of it is better."""
+    return measure.hint if measure.sense is None else f"{measure.hint}; {measure.sense} is better"
+
+
+def best_of(measure: Measure, values: list[float | None]) -> set[int]:
+    """Return the indices of the best values: none if all are equal, or the measure has no sense."""
     known = [value for value in values if value is not None]
-    if figure.better is None or len(known) < 2:
+    if measure.sense is None or len(known) < 2:
         return set()
-    best = max(known) if figure.better == "more" else min(known)
+    best = max(known) if measure.sense == "more" else min(known)
     near = SAME * max(map(abs, known))
     found = {k for k, value in enumerate(values) if value is not None and abs(value - best) <= near}
     return found if len(found) < len(known) else set()
 
 
-def told(figure: Figure, value: float, size: float, *, signed: bool = False) -> str:
+def value_text(measure: Measure, value: float, size: float, *, signed: bool = False) -> str:
     """Return a value with as many decimals as the largest one of its row has room for."""
-    if figure.is_whole:
+    if measure.is_whole:
         text = f"{value:+,.0f}" if signed else f"{value:,.0f}"
         return text.replace(",", "\N{NARROW NO-BREAK SPACE}").replace("-", "−")
     if size != 0.0 and not LEAST <= size < MOST:
@@ -123,22 +133,24 @@ def size_of(values: list[float | None]) -> float:
 
 
 def notes(state: State, columns: tuple[Column, ...]) -> list[str]:
-    """Return what is to be known of a comparison besides its figures, as HTML."""
+    """Return remarks on a comparison: problems, empty workspaces, other units, as HTML."""
     found: list[str] = []
     live = state.design
     for column in columns:
         who = escape(f"{column.letter} ({column.design.name})")
         if column.problem is not None:
             found.append(f"{who}: {escape(column.problem)}.")
-        if column.figures is not None and column.figures.empty_because:
-            causes = ", ".join(map(escape, column.figures.empty_because))
+        if column.measured is not None and column.measured.empty_because:
+            causes = ", ".join(map(escape, column.measured.empty_because))
             found.append(f"{who} has an empty workspace; emptied by: {causes}.")
     others = [each for each in columns if not math.isclose(each.design.unit_mm, live.unit_mm)]
     if others:
-        units = ", ".join(f"{each.letter} has {each.design.unit_mm:.6g} mm" for each in others)
-        told_in = "millimetres" if state.compared.look.millimetres else "units of the live design"
+        others_units = ", ".join(
+            f"{each.letter} has {each.design.unit_mm:.6g} mm" for each in others
+        )
+        unit = "millimetres" if state.compared.look.millimetres else "units of the live design"
         found.append(
-            f"One unit of the live design is {live.unit_mm:.6g} mm; {units}. Lengths are told in "
-            f"{told_in}, and workspaces are drawn to true size."
+            f"One unit of the live design is {live.unit_mm:.6g} mm; {others_units}. Lengths are in "
+            f"{unit}, and workspaces are drawn to true size."
         )
     return found

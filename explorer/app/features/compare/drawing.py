@@ -10,11 +10,13 @@ import numpy as np
 
 from explorer.app.scene.bands import Shell
 from explorer.errors import ExplorerError
+from explorer.measures.case import MESH_TOLERANCE, Case
+from explorer.measures.catalogue import measures_in
+from explorer.measures.measurements import Measurements, measure_design
 from explorer.measures.snapshot import evaluate
 from explorer.mechanism.design import Design
 from explorer.mechanism.home import home_pose
 from explorer.numerics.arrays import FloatArray
-from explorer.optimise.figures import MESH_TOLERANCE, Figures, figures_of
 from explorer.singularity.colours import Rgb
 from explorer.workspace.solids.solid import Solid
 from explorer.workspace.solids.solids import workspace_solid
@@ -56,7 +58,7 @@ class ComparedDrawing:
     """
 
     request: ComparedRequest
-    figures: Figures | None
+    figures: Measurements | None
     shell: Shell | None
     outline: FloatArray
     problem: str | None = None
@@ -72,7 +74,7 @@ class ComparedDrawing:
 def compared_drawing(request: ComparedRequest) -> ComparedDrawing:
     """Return the figures of a design, and its workspace if that is asked for."""
     design = request.design
-    figures: Figures | None = None
+    figures: Measurements | None = None
     shell: Shell | None = None
     problem: str | None = None
     try:
@@ -107,9 +109,9 @@ def outline_of(design: Design) -> FloatArray:
 
 
 @lru_cache(maxsize=KEPT)
-def _figures(design: Design) -> Figures:
-    solid = _solid(design, None, None)
-    return figures_of(design, solid)
+def _figures(design: Design) -> Measurements:
+    case = Case(design, mesh=_solid(design, None, None))
+    return measure_design(case, measures_in("compare"))
 
 
 @lru_cache(maxsize=KEPT)

@@ -11,6 +11,7 @@ import numpy as np
 from explorer.app.state.optimisation import PLACE, Wish
 from explorer.app.state.state import State
 from explorer.errors import ExplorerError
+from explorer.measures.size import longest_length
 from explorer.mechanism.design import VARIABLES, Design
 from explorer.mechanism.home import home_pose
 from explorer.optimise.defaults import make_problem
@@ -19,7 +20,6 @@ from explorer.optimise.problem import (
     YAW,
     Box,
     Problem,
-    longest_length,
 )
 from explorer.optimise.refutation.refutation import Refutation, paper_box, refutations
 from explorer.workspace.limits.constraints import Never, constraints

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from explorer.app.session.worker import Line
 from explorer.app.state.optimisation import Comparison
+from explorer.measures.case import Case
+from explorer.measures.catalogue import measures_in
+from explorer.measures.measurements import measure_design
 from explorer.mechanism.design import Design
-from explorer.optimise.facts import facts_of
 from explorer.optimise.outcome import Outcome
 from explorer.optimise.problem import Box, Problem
 from explorer.optimise.solver import optimise_design
@@ -40,7 +42,9 @@ def compare(
         boxes: Over which the least margin of each is looked for, or None.
     """
     first, second = (
-        facts_of(design, demanded_margin=demanded_margin, box=box)
+        measure_design(
+            Case(design, demanded_margin=demanded_margin, box=box), measures_in("optimise")
+        )
         for design, box in zip((before, after), boxes, strict=True)
     )
     return Comparison(first, second)

@@ -9,11 +9,12 @@ from html import escape
 from explorer.app.state.optimisation import SearchResult
 from explorer.app.state.state import Run, State
 from explorer.app.widgets.markup import BEYOND, DIM, WITHIN, alert, decimals_for, format_number
+from explorer.measures.catalogue import CATALOGUE
+from explorer.measures.clearance import CERTAIN
+from explorer.measures.measurements import Measurements
 from explorer.mechanism.design import VARIABLES
 from explorer.optimise.curves import CALLED
-from explorer.optimise.facts import Facts
-from explorer.optimise.figures import FIGURES
-from explorer.optimise.problem import YAW, Problem
+from explorer.optimise.problem import YAW, ObjectiveName, Problem
 from explorer.optimise.refutation.refutation import BOX_LIMIT, Refutation
 
 BOX = (
@@ -29,8 +30,13 @@ TITLES = {
 }
 # Significant digits of the larger of two numbers that are compared.
 DIGITS = 6
-# A share of the reach: how well the least clearance over a workspace is known.
-KNOWN = 1e-3
+# The measure that each objective improves.
+GOALS: dict[ObjectiveName, str] = {
+    "match-volume": "volume",
+    "largest-volume": "volume",
+    "smallest-reach": "reach",
+    "largest-margin": "box_margin",
+}
 
 
 def refused_words(refusals: Sequence[Refutation]) -> str:
@@ -125,79 +131,58 @@ def comparison_table(run: Run) -> str:
     )
 
 
-def measure_rows(problem: Problem, before: Facts, after: Facts) -> Iterator[Row]:
-    """Yield what is compared besides the variables."""
-    goal, demands = problem.objective, problem.demands
-    volumes, reaches = (before.volume, after.volume), (before.reach, after.reach)
-    missed = [abs(volume - (demands.volume or 0.0)) for volume in volumes]
-    nearer = goal == "match-volume" and missed[1] < missed[0]
-    grown = goal == "largest-volume" and volumes[1] > volumes[0]
-    yield _figure(
-        "volume",
-        *volumes,
-        colour=WITHIN if nearer or grown else None,
-        is_goal=goal in ("match-volume", "largest-volume"),
-    )
-    shorter = goal == "smallest-reach" and reaches[1] < reaches[0]
-    yield _figure(
-        "reach",
-        *reaches,
-        colour=WITHIN if shorter else None,
-        is_goal=goal == "smallest-reach",
-    )
-    counts = tuple(each.nodes for each in (before, after))
-    yield _figure("nodes", *(each and each.count for each in counts))
-    yield _figure("node volume", *(each and each.volume for each in counts))
-    if before.box_margin is not None or after.box_margin is not None:
-        margins = (before.box_margin, after.box_margin)
-        better = goal == "largest-margin" and (margins[1] or 0.0) > (margins[0] or 0.0)
+def measure_rows(problem: Problem, before: Measurements, after: Measurements) -> Iterator[Row]:
+    """Yield the rows of the measures of two designs.
+
+    Args:
+        problem: The problem that the second design is to solve.
+        before: The measures of the user's own design.
+        after: The same measures of the other one.
+    """
+    goal = GOALS[problem.objective]
+    for name in after.values:
+        if name == "yaw" and YAW not in problem.names:
+            continue
+        if name == "demanded_clearance" and problem.demands.clearance is None:
+            continue
+        measure = CATALOGUE[name]
+        label, hint = measure.label, measure.hint
+        if name == "demanded_clearance":
+            label += f", |δ| ≥ {after.demanded_margin:.3g}"
+            hint += _pair(after.demanded_nearest)
+        elif unit := measure.unit_in("units"):
+            label += f", {unit}"
+        if name == "least_clearance":
+            hint += _pair(after.nearest)
         yield Row(
-            "margin over box, units",
-            "The least |δ| over the required box",
-            *margins,
-            colour=WITHIN if better else None,
-            is_goal=goal == "largest-margin",
+            label,
+            hint,
+            before[name],
+            after[name],
+            measure.is_whole,
+            _colour(problem, name, before, after),
+            is_goal=name == goal,
         )
-    known = KNOWN * after.reach
-    has_none = after.clearance is not None and after.clearance <= known
-    yield _figure(
-        "clearance",
-        before.clearance,
-        after.clearance,
-        more=_pair(after.nearest),
-        colour=BEYOND if has_none else None,
-    )
-    if demands.clearance is not None and after.demanded_margin is not None:
-        found = after.demanded_clearance
-        # It is known to a thousandth of the reach.
-        is_kept = found is None or found >= demands.clearance - known
-        yield Row(
-            f"clearance, |δ| ≥ {after.demanded_margin:.3g}",
-            f"As it was demanded: the least of any two legs over the workspace, wherever every |δ| "
-            f"is at least {after.demanded_margin:.3g} units{_pair(after.demanded_nearest)}",
-            before.demanded_clearance,
-            found,
-            colour=WITHIN if is_kept else BEYOND,
-        )
-    if YAW in problem.names:
-        yield Row("yaw, °", "Of home", before.yaw, after.yaw)
 
 
-def _figure(
-    name: str,
-    before: float | None,
-    after: float | None,
-    *,
-    more: str = "",
-    colour: str | None = None,
-    is_goal: bool = False,
-) -> Row:
-    """Return the row of one of `FIGURES`, by its name there."""
-    figure = next(each for each in FIGURES if each.name == name)
-    unit = {0: "", 1: ", units", 3: ", units³"}[figure.power]
-    return Row(
-        f"{name}{unit}", f"{figure.hint}{more}", before, after, figure.is_whole, colour, is_goal
-    )
+def _colour(problem: Problem, name: str, before: Measurements, after: Measurements) -> str | None:
+    """Return the colour of a change: better or worse for the problem, None if neither."""
+    old, new = before[name] or 0.0, after[name] or 0.0
+    # Clearances are known to this length.
+    known = CERTAIN * (after["reach"] or 0.0)
+    if name == "least_clearance":
+        return BEYOND if after[name] is not None and new <= known else None
+    if name == "demanded_clearance":
+        demand = problem.demands.clearance or 0.0
+        return BEYOND if after[name] is not None and new < demand - known else WITHIN
+    if name != GOALS[problem.objective]:
+        return None
+    if problem.objective == "match-volume":
+        target = problem.demands.volume or 0.0
+        is_better = abs(new - target) < abs(old - target)
+    else:
+        is_better = new > old if CATALOGUE[name].sense == "more" else new < old
+    return WITHIN if is_better else None
 
 
 def _row(row: Row, *, is_first: bool = False) -> str:

@@ -32,7 +32,7 @@ from explorer.app.widgets.controls import Control
 from explorer.app.widgets.labels import labelled, out_of_sight
 from explorer.app.widgets.markup import DIM, alert
 from explorer.errors import ExplorerError
-from explorer.sweep.measures import MEASURES
+from explorer.measures.catalogue import measures_in
 from explorer.sweep.study import NAMES
 
 NONE = "—"
@@ -277,7 +277,9 @@ class StudiesPanel:
             hint="Run it in processes of their own; its results go to the data folder.",
         )
         self.vary = {name: gui.add_button(f"Vary {spoken(name)}") for name in NAMES}
-        self.measure = {name: gui.add_button(f"Measure {spoken(name)}") for name in MEASURES}
+        self.measure = {
+            name: gui.add_button(f"Measure {spoken(name)}") for name in measures_in("studies")
+        }
 
     def _listen(self) -> None:
         self.start.on_click(

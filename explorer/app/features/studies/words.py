@@ -15,9 +15,9 @@ from explorer.app.features.studies.shown import MOST_ROWS
 from explorer.app.state.studies import RADIUS, StudyWish, spoken, titled
 from explorer.app.widgets.labels import labelled
 from explorer.app.widgets.markup import BEYOND, DIM, by_theme, format_number, signed
+from explorer.measures.catalogue import measures_in
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.optimise.problem import REACH, YAW
-from explorer.sweep.measures import MEASURES
 from explorer.sweep.study import NAMES, Sense, Study
 
 ROWS = 10
@@ -226,7 +226,7 @@ def chips(wish: StudyWish, variables: Mapping[str, str], measures: Mapping[str, 
     measured = "".join(
         _chip(
             identity,
-            f"{MEASURES[name].words}. Click: measured, to be large, to be small, left out",
+            f"{_explained(name)}. Click: measured, to be large, to be small, left out",
             escape(spoken(name)) + _sense(wish.sense_of(name)),
             is_chosen=name in wish.measures,
         )
@@ -254,7 +254,10 @@ def _arrow(study: Study, name: str) -> str:
 
 
 def _explained(name: str) -> str:
-    return MEASURES[name].words if name in MEASURES else _variable_words(name)
+    measure = measures_in("studies").get(name)
+    if measure is None:
+        return _variable_words(name)
+    return f"{measure.hint}{'; slow to compute' if measure.cost == 'high' else ''}"
 
 
 def _variable_words(name: str) -> str:

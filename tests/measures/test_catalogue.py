@@ -1,4 +1,4 @@
-"""All figures of a design, against the functions that tell them one by one, samples and laws."""
+"""The measures of the catalogue, against the functions that compute them, samples and laws."""
 
 from __future__ import annotations
 
@@ -11,15 +11,17 @@ import pytest
 from limited_designs import limited, ordinary_case, reference_case, troubled_case
 
 from explorer.legs.clearance import PAIRS, leg_clearances
+from explorer.measures.case import Case
+from explorer.measures.catalogue import CATALOGUE, measures_in
+from explorer.measures.clearance import clearance_beyond, clearance_margin_of
+from explorer.measures.measurements import Measurements, measure_design
 from explorer.measures.snapshot import evaluate
-from explorer.mechanism.design import Design, Limits
+from explorer.mechanism.design import LENGTHS, VARIABLES, Design, Limits
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
-from explorer.optimise.facts import clearance_beyond, clearance_margin_of, facts_of
-from explorer.optimise.figures import FIGURES, figures_of
 from explorer.workspace.extremes import extent_of, farthest, least_margins
 from explorer.workspace.least_clearance import least_clearances
 from explorer.workspace.limits.constraints import constraints, slacks
@@ -28,6 +30,7 @@ from explorer.workspace.solids.solid import Solid
 from explorer.workspace.solids.solids import workspace_solid
 
 OPTIMAL = PRESETS["paper-optimal"]
+EXTREMES = [*(f"exact_extent_{axis}" for axis in "xyz"), "least_margin"]
 CASES = (*PRESETS.values(), *(ordinary_case(seed)[0] for seed in range(8)))
 
 
@@ -37,6 +40,11 @@ def samples(design: Design, rotation: FloatArray, about: Solid, count: int = 800
     room = 0.05 * (highs - lows)
     points = np.random.default_rng(5).uniform(lows - room, highs + room, (count, 3))
     return points[(slacks(constraints(design, rotation), points) >= 0.0).all(axis=-1)]
+
+
+def compared(design: Design) -> Measurements:
+    """Return the measures that Compare lists."""
+    return measure_design(Case(design), measures_in("compare"))
 
 
 def scaled(design: Design, factor: float) -> Design:
@@ -67,16 +75,16 @@ def scaled(design: Design, factor: float) -> Design:
 
 
 @pytest.mark.parametrize("design", CASES, ids=lambda d: d.name)
-def test_figures_are_those_that_the_functions_tell_one_by_one(design: Design) -> None:
-    found, home = figures_of(design), home_pose(design)
-    snapshot, facts = evaluate(design, home), facts_of(design)
-    assert found.volume == workspace_volume(design).volume == facts.volume
-    assert found.nodes == workspace_nodes(design)
-    assert found.reach == facts.reach
-    assert found.home_condition == pytest.approx(snapshot.inverse_condition, rel=1e-9)
-    assert found.home_margin == pytest.approx(np.abs(snapshot.margins).min(), rel=1e-12)
-    assert (found.clearance, found.nearest) == (facts.clearance, facts.nearest)
-    assert found.yaw == facts.yaw
+def test_measures_are_those_of_the_functions(design: Design) -> None:
+    found, home = compared(design), home_pose(design)
+    snapshot, nodes = evaluate(design, home), workspace_nodes(design)
+    assert found["volume"] == workspace_volume(design).volume
+    assert (found["node_count"], found["node_volume"]) == (nodes.count, nodes.volume)
+    assert found["node_step"] == nodes.step
+    assert found["inverse_condition"] == pytest.approx(snapshot.inverse_condition, rel=1e-9)
+    assert found["home_margin"] == pytest.approx(np.abs(snapshot.margins).min(), rel=1e-12)
+    clearance = clearance_beyond(design, clearance_margin_of(design))
+    assert (found["least_clearance"], found.nearest) == clearance
     assert found.empty_because == ()
 
 
@@ -154,51 +162,48 @@ def test_clearances_count_off_the_singular_planes_only() -> None:
 
 @pytest.mark.parametrize("factor", [1e-15, 0.1, 1e12])
 @pytest.mark.parametrize("seed", range(3))
-def test_figures_grow_with_the_power_of_a_length_that_they_are(seed: int, factor: float) -> None:
+def test_measures_of_scaled_design_have_their_power_of_length(seed: int, factor: float) -> None:
     design = ordinary_case(seed)[0]
-    one, other = figures_of(design), figures_of(scaled(design, factor))
-    for figure in FIGURES:
-        small, large = figure.of(one), figure.of(other)
+    one, other = compared(design), compared(scaled(design, factor))
+    for name, small in one.values.items():
+        measure, large = CATALOGUE[name], other[name]
         assert small is not None
         # A grid may have a node more or less where one lies on the surface.
-        near = 1e-6 if figure.name not in ("nodes", "node volume") else 0.02
-        expected = small * factor**figure.power
-        tiny = 1e-9 * one.reach * factor**figure.power
-        assert large == pytest.approx(expected, rel=near, abs=tiny), figure.name
+        near = 1e-6 if name not in ("node_count", "node_volume") else 0.02
+        tiny = 1e-9 * design.reach * factor**measure.power
+        assert large == pytest.approx(small * factor**measure.power, rel=near, abs=tiny), name
 
 
 @pytest.mark.parametrize("seed", range(30))
-def test_designs_in_trouble_have_figures_or_none(seed: int) -> None:
-    design = troubled_case(seed)[0]
-    found = figures_of(design)
-    assert (found.volume > 0.0) != bool(found.empty_because)
-    for figure in FIGURES:
-        value = figure.of(found)
-        assert value is None or math.isfinite(value), figure.name
-        if found.volume == 0.0 and value is not None and figure.power == 0:
-            assert figure.name not in ("mean 1 / cond J", "clear of collisions")
+def test_designs_in_trouble_have_finite_measures_or_none(seed: int) -> None:
+    found = compared(troubled_case(seed)[0])
+    assert bool(found["volume"]) != bool(found.empty_because)
+    assert all(value is None or math.isfinite(value) for value in found.values.values())
+    if not found["volume"]:
+        assert found["mean_inverse_condition"] is found["clear_share"] is None
 
 
 def test_an_empty_workspace_has_no_more_than_its_reasons() -> None:
-    found = figures_of(limited(OPTIMAL, l1=(1.0, 2.0), l4=(1.0, 2.0)))
-    assert found.volume == 0.0
+    found = compared(limited(OPTIMAL, l1=(1.0, 2.0), l4=(1.0, 2.0)))
+    assert found["volume"] == 0.0
     assert {"l1 maximum", "l4 maximum"} & {*found.empty_because}
-    assert found.extent is found.worst_margin is found.mean_margin is found.clearance is None
+    for name in (*EXTREMES, "mean_margin", "least_clearance"):
+        assert found[name] is None
 
 
 def test_a_home_at_which_the_lines_are_parallel_has_no_margin() -> None:
     home = Pose(home_pose(OPTIMAL).position, (1.0, 0.0, 0.0, 0.0))
-    found = figures_of(msgspec.structs.replace(limited(OPTIMAL, margin=None), home=home))
-    assert found.home_margin == found.worst_margin == found.mean_margin == 0.0
-    assert found.home_condition == pytest.approx(0.0, abs=1e-12)
-    assert found.volume > 0.0
+    found = compared(msgspec.structs.replace(limited(OPTIMAL, margin=None), home=home))
+    assert found["home_margin"] == found["least_margin"] == found["mean_margin"] == 0.0
+    assert found["inverse_condition"] == pytest.approx(0.0, abs=1e-12)
+    assert found["volume"]
 
 
 def test_too_fine_a_grid_leaves_out_the_nodes_and_nothing_else() -> None:
-    found = figures_of(msgspec.structs.replace(OPTIMAL, node_step=1e-4))
-    assert found.nodes is None
-    assert found.volume == workspace_volume(OPTIMAL).volume
-    assert found.extent is not None
+    found = compared(msgspec.structs.replace(OPTIMAL, node_step=1e-4))
+    assert found["node_count"] is found["node_volume"] is found["node_step"] is None
+    assert found["volume"] == workspace_volume(OPTIMAL).volume
+    assert found["exact_extent_x"] is not None
 
 
 @pytest.mark.parametrize("index", range(0, 24, 5))
@@ -208,6 +213,25 @@ def test_the_mesh_that_is_there_already_tells_the_same(index: int) -> None:
     solid = workspace_solid(design, rotation, 0.002 * design.reach)
     if solid.is_empty:
         pytest.skip("nothing to measure")
-    one, other = figures_of(design), figures_of(design, solid)
-    assert one.extent == pytest.approx(other.extent, abs=1e-6 * design.reach)
-    assert one.worst_margin == pytest.approx(other.worst_margin, abs=1e-6 * design.reach)
+    one, other = (measure_design(Case(design, mesh=mesh), EXTREMES) for mesh in (None, solid))
+    assert one.values == pytest.approx(other.values, abs=1e-6 * design.reach)
+
+
+@pytest.mark.parametrize("design", CASES, ids=lambda d: d.name)
+def test_gradients_are_those_of_finite_differences(design: Design) -> None:
+    # Limits that are tied to the reach would change with the design.
+    reach = 1.2 * design.reach
+    limits = dict.fromkeys(LENGTHS, (0.0, reach))
+    for measure in CATALOGUE.values():
+        if measure.gradient is None:
+            continue
+        held = design if measure.name == "reach" else limited(design, **limits)
+        held = msgspec.structs.replace(held, home=home_pose(held))
+        gradient = measure.gradient(Case(held))
+        for name, value in zip(VARIABLES, held.variables, strict=True):
+            step = 1e-5 * design.reach
+            ends = (Case(held.with_variable(name, value + side * step)) for side in (-1.0, 1.0))
+            low, high = map(measure.function, ends)
+            expected = (high - low) / (2.0 * step)
+            size = design.reach ** (measure.power - 1)
+            assert gradient.get(name, 0.0) == pytest.approx(expected, abs=1e-5 * size), name

@@ -1,0 +1,144 @@
+"""A design to measure, with the intermediate results that several measures share."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from explorer.measures.clearance import clearance_beyond, clearance_margin_of
+from explorer.measures.size import nodes_of
+from explorer.mechanism.design import Design
+from explorer.mechanism.home import home_pose
+from explorer.mechanism.pose import Pose, Triple
+from explorer.numerics.arrays import FloatArray
+from explorer.singularity.jacobian import inverse_condition, jacobian
+from explorer.workspace.extremes import extent_of, least_margins
+from explorer.workspace.node_measures import DEFAULT_NODES, NodeMeasures, node_measures
+from explorer.workspace.slices.volume import NodeCount, Volume, workspace_volume
+from explorer.workspace.solids.solid import Solid
+
+MESH_TOLERANCE = 0.004
+"""Tolerance of the mesh on which a search for the farthest positions starts, as a share of the
+reach."""
+
+
+@dataclass
+class Case:
+    """A design to measure; lengths in design units.
+
+    All is of the constant-orientation workspace at the home's orientation. Each intermediate
+    result is computed when a measure first asks for it.
+
+    Attributes:
+        design: The manipulator.
+        nodes: Number of nodes on each axis of the grid of node measures.
+        margin: Least |δ| at which clearances count; a 20th of the design's reach if None.
+        node_step: Step of the paper's nodes; that of the design if None.
+        box: Box (lows, highs) over which the least |δ| is measured; not measured if None.
+        demanded_margin: Least |δ| at which a demanded clearance counts; None without demand.
+        mesh: The workspace as a mesh of any tolerance, if there is one already.
+    """
+
+    design: Design
+    nodes: int = DEFAULT_NODES
+    margin: float | None = None
+    node_step: float | None = None
+    box: tuple[Triple, Triple] | None = None
+    demanded_margin: float | None = None
+    mesh: Solid | None = None
+
+    @property
+    def clearance_margin(self) -> float:
+        """The least |δ| at which clearances count, in design units."""
+        return clearance_margin_of(self.design) if self.margin is None else self.margin
+
+    @cached_property
+    def home(self) -> Pose:
+        """The home pose."""
+        return home_pose(self.design)
+
+    @cached_property
+    def rotation(self) -> FloatArray:
+        """The home's rotation, platform to base, shape (3, 3)."""
+        return self.home.rotation
+
+    @cached_property
+    def volume(self) -> Volume:
+        """The exact volume, its gradient, and the limits that empty the workspace."""
+        return workspace_volume(self.design)
+
+    @cached_property
+    def paper_nodes(self) -> NodeCount | None:
+        """The paper's nodes; None if the grid is too fine to count."""
+        return nodes_of(self.design, self.node_step)
+
+    @cached_property
+    def at_nodes(self) -> NodeMeasures:
+        """Extent, margins and clearances at the nodes of a grid over the workspace."""
+        return node_measures(self.design, nodes=self.nodes, clearance_margin=self.clearance_margin)
+
+    @cached_property
+    def conditions(self) -> tuple[float, float]:
+        """The smallest and the mean inverse condition over the nodes; NaN without a node."""
+        positions = self.at_nodes.positions
+        if not len(positions):
+            return math.nan, math.nan
+        found = self.inverse_conditions(positions)
+        return float(found.min()), float(found.mean())
+
+    @cached_property
+    def clearance(self) -> tuple[float, tuple[int, int]] | tuple[None, None]:
+        """The least clearance where `clearance_margin` is kept, and its two legs."""
+        return clearance_beyond(self.design, self.clearance_margin)
+
+    @cached_property
+    def demanded_clearance(self) -> tuple[float, tuple[int, int]] | tuple[None, None]:
+        """The least clearance where `demanded_margin` is kept, and its two legs."""
+        if self.demanded_margin is None:
+            return None, None
+        return clearance_beyond(self.design, self.demanded_margin)
+
+    @cached_property
+    def solid(self) -> Solid | None:
+        """The workspace as a mesh; None if it is empty."""
+        if self.mesh is None and self.volume.volume > 0.0:
+            # It loads the kernel of solids.
+            from explorer.workspace.solids.solids import workspace_solid
+
+            tolerance = MESH_TOLERANCE * self.design.reach
+            self.mesh = workspace_solid(self.design, self.rotation, tolerance, volume=self.volume)
+        return None if self.mesh is None or self.mesh.is_empty else self.mesh
+
+    @cached_property
+    def extent(self) -> FloatArray:
+        """The exact extents of the workspace on the axes, shape (3,); NaN if it is empty."""
+        if self.solid is None:
+            return np.full(3, math.nan)
+        lows, highs = extent_of(self.design, self.rotation, self.solid)
+        return highs - lows
+
+    @cached_property
+    def least_margins(self) -> FloatArray:
+        """The least |δ1|, |δ2|, |δ3| in the workspace, exact, shape (3,); NaN if it is empty."""
+        if self.solid is None:
+            return np.full(3, math.nan)
+        return least_margins(self.design, self.rotation, self.solid)
+
+    @cached_property
+    def accessible_volume(self) -> tuple[float, str]:
+        """The volume that a collision-free move from home leads to; else NaN and the reason."""
+        # Both load the kernel of solids.
+        from explorer.workspace.accessible.start import StartError
+        from explorer.workspace.accessible.workspace import reachable_workspace
+
+        try:
+            return reachable_workspace(self.design).reachable_volume, ""
+        except StartError as error:
+            return math.nan, str(error)
+
+    def inverse_conditions(self, positions: FloatArray) -> FloatArray:
+        """Return the inverse condition of the Jacobian at positions (n, 3), shape (n,)."""
+        return inverse_condition(jacobian(self.design, positions, self.rotation), self.design.reach)

@@ -1,0 +1,50 @@
+"""The least clearance of the legs over the part of a workspace that is off the singular planes."""
+
+from __future__ import annotations
+
+import msgspec
+import numpy as np
+
+from explorer.legs.clearance import PAIRS
+from explorer.mechanism.design import Design
+from explorer.mechanism.home import home_pose
+from explorer.workspace.least_clearance import least_clearances
+from explorer.workspace.slices.volume import workspace_volume
+
+CERTAIN = 1e-3
+"""Accuracy of the least clearance, as a share of the reach."""
+
+MARGIN_OF_CLEARANCE = 0.05
+"""Least |δ| of the positions at which clearances count by default, as a share of the reach."""
+
+
+def clearance_margin_of(design: Design) -> float:
+    """Return the least |δ| at which clearances count by default, in design units."""
+    return MARGIN_OF_CLEARANCE * design.reach
+
+
+def clearance_beyond(
+    design: Design, margin: float
+) -> tuple[float, tuple[int, int]] | tuple[None, None]:
+    """Return the least clearance where every |δ| is at least some length, and its two legs.
+
+    The positions are those of the workspace at the home's orientation; the clearance is certain
+    to a thousandth of the reach. Without such a position, or without a volume (positions may be
+    left then, all on a surface), both are None.
+
+    Args:
+        design: The manipulator; nearer to a singularity its legs may have to meet.
+        margin: The least |δ|, in design units.
+    """
+    if workspace_volume(design, explain=False).volume <= 0.0:
+        return None, None
+    own = design.limits.margin or 0.0
+    limits = msgspec.structs.replace(design.limits, margin=max(own, margin))
+    found = least_clearances(
+        msgspec.structs.replace(design, limits=limits),
+        home_pose(design).rotation,
+        CERTAIN * design.reach,
+        only_least=True,
+    ).clearance
+    pair = int(found.argmin())
+    return (float(found[pair]), PAIRS[pair]) if np.isfinite(found[pair]) else (None, None)

@@ -1,0 +1,71 @@
+"""The values of measures for one design."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from explorer.measures.case import Case
+from explorer.measures.catalogue import CATALOGUE
+from explorer.mechanism.design import Design
+
+
+@dataclass(frozen=True)
+class Measurements:
+    """The values of measures for one design, in design units.
+
+    Attributes:
+        design: The manipulator.
+        values: By name out of `CATALOGUE`; None where there is none, as of an empty workspace.
+        empty_because: The limits that empty the workspace; () if it is not empty.
+        nearest: The two legs that have the least clearance; None if it was not measured.
+        demanded_margin: Least |δ| at which the demanded clearance counts; None without demand.
+        demanded_nearest: The two legs that have the least demanded clearance, or None.
+    """
+
+    design: Design
+    values: Mapping[str, float | None]
+    empty_because: tuple[str, ...]
+    nearest: tuple[int, int] | None = None
+    demanded_margin: float | None = None
+    demanded_nearest: tuple[int, int] | None = None
+
+    def __getitem__(self, name: str) -> float | None:
+        """Return the value of a measure; None if there is none, or if it was not measured."""
+        return self.values.get(name)
+
+
+def measure_design(case: Case, names: Iterable[str]) -> Measurements:
+    """Return the values of measures for a design.
+
+    Args:
+        case: The design, and what its measures need.
+        names: Out of `CATALOGUE`; measures are left out whose needs the case does not have.
+
+    Raises:
+        ExplorerError: a mesh that is needed cannot be made.
+    """
+    values: dict[str, float | None] = {}
+    for name in names:
+        measure = CATALOGUE[name]
+        if measure.needs is not None and getattr(case, measure.needs) is None:
+            continue
+        value = measure.function(case)
+        values[name] = None if not math.isfinite(value) else value
+    return Measurements(
+        design=case.design,
+        values=values,
+        empty_because=case.volume.empty_because,
+        nearest=case.clearance[1] if "least_clearance" in values else None,
+        demanded_margin=case.demanded_margin,
+        demanded_nearest=case.demanded_clearance[1] if "demanded_clearance" in values else None,
+    )
+
+
+def reason_for_missing(case: Case, measurements: Measurements) -> str:
+    """Return why a design lacks values, "" if it has all or an empty workspace says enough."""
+    if case.volume.volume <= 0.0:
+        return ""
+    lacking = [name for name, value in measurements.values.items() if value is None]
+    return "; ".join(filter(None, dict.fromkeys(CATALOGUE[name].reason(case) for name in lacking)))
