@@ -67,7 +67,7 @@ def assert_computes_again(row: dict[str, str]) -> None:
     mode = int(row["mode"])
     assert_allclose(solution.position[mode], position, atol=1e-7)
     assert_allclose(solution.rotation[mode], rotation, atol=1e-7)
-    deltas = floats(row, "delta1", "delta2", "delta3")
+    deltas = floats(row, "kappa1", "kappa2", "kappa3")
     assert_allclose(deltas, margins_of(position, rotation), atol=1e-12)
 
 

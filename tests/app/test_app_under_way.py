@@ -11,11 +11,11 @@ import msgspec
 import pytest
 
 from explorer.app.features.legs.tasks import RadiusRequest, draw_radius_curve
-from explorer.app.features.workspace import feed as workspace_feed
 from explorer.app.features.workspace.feed import WorkspaceFeed
 from explorer.app.features.workspace.numbers import workspace_summary
 from explorer.app.features.workspace.reached import MOST_LIVE_NODES, reach_workspace
 from explorer.app.features.workspace.tasks import WorkspaceRequest, draw_workspace
+from explorer.app.session import feed as session_feed
 from explorer.app.session.feed import Stage
 from explorer.app.session.jobs import Worker
 from explorer.app.session.worker import CancelledError, Line
@@ -180,7 +180,7 @@ def reachable_state() -> State:
 def test_a_drawing_shows_its_stage_and_can_be_cancelled_and_asked_for_again(
     worker: Worker, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(workspace_feed, "LONG_SECONDS", 0.0)
+    monkeypatch.setattr(session_feed, "LONG_SECONDS", 0.0)
     frame, followed = Frame(reachable_state()), Followed(worker)
     feed = followed.feed
     feed.follow(frame)
@@ -205,7 +205,7 @@ def test_a_drawing_shows_its_stage_and_can_be_cancelled_and_asked_for_again(
 def test_what_is_shown_no_more_is_not_computed_to_its_end(
     worker: Worker, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(workspace_feed, "LONG_SECONDS", 0.0)
+    monkeypatch.setattr(session_feed, "LONG_SECONDS", 0.0)
     state, followed = reachable_state(), Followed(worker)
     feed = followed.feed
     feed.follow(Frame(state))
