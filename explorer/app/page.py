@@ -14,6 +14,7 @@ import viser
 
 from explorer.app.browser.press_events import listen
 from explorer.app.drawing import Scene
+from explorer.app.features.compare.drawing import compared_drawing
 from explorer.app.features.compare.feed import CompareFeed
 from explorer.app.features.compare.panel import ComparePanel
 from explorer.app.features.designs.panel import DesignsPanel
@@ -21,6 +22,7 @@ from explorer.app.features.designs.shelf import Shelf
 from explorer.app.features.history.panel import HistoryPanel
 from explorer.app.features.legs.feed import RadiusFeed
 from explorer.app.features.legs.panel import LegsPanel
+from explorer.app.features.legs.tasks import draw_radius_curve
 from explorer.app.features.mechanism.design_panel import DesignPanel
 from explorer.app.features.mechanism.pose_panel import MovePanel
 from explorer.app.features.mechanism.show_panel import ViewPanel
@@ -40,6 +42,7 @@ from explorer.app.features.studies.panel import StudiesPanel
 from explorer.app.features.workspace.feed import WorkspaceFeed
 from explorer.app.features.workspace.numbers import WorkspaceNumbers
 from explorer.app.features.workspace.panel import WorkspacePanel
+from explorer.app.features.workspace.tasks import draw_workspace
 from explorer.app.hands import Hands
 from explorer.app.scene.camera import Cameras, ViewName
 from explorer.app.scene.placing import Placed
@@ -57,9 +60,7 @@ from explorer.mechanism.design import Design
 
 TITLE = "Flagged 4-4 explorer"
 # Modules that the worker imports before anything is asked of it.
-TASKS = tuple(
-    f"explorer.app.features.{name}" for name in ("workspace.tasks", "legs.tasks", "compare.drawing")
-)
+TASKS = tuple(task.__module__ for task in (draw_workspace, draw_radius_curve, compared_drawing))
 # What a notice is called that answers something asked for.
 REFUSAL = "That is not possible"
 # One notice is shown this long, and not again within it.

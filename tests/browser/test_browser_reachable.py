@@ -89,7 +89,9 @@ def test_a_home_that_is_no_start_is_told_and_the_button_goes_to_one(tab: Tab) ->
     tab.choose("Region", "reachable")
     alert = tab.page.get_by_role("alert").filter(has_text="The home position is no start")
     alert.wait_for()
-    expect(alert).to_contain_text("l4 = 13.01 is above its maximum 12.5; the nearest valid position")
+    expect(alert).to_contain_text(
+        "l4 = 13.01 is above its maximum 12.5; the nearest valid position"
+    )
     home = tab.state.pose
     tab.push("Go there")
     tab.wait_for(lambda: tab.state.pose != home, "another pose")

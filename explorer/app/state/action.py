@@ -6,6 +6,7 @@ An action turns one state into the next, or raises an `ExplorerError` and change
 from __future__ import annotations
 
 import re
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
 from typing import ClassVar, cast
@@ -18,7 +19,7 @@ MOST_NAMED = 2
 DESIGN = "{design}"
 
 
-class Action:
+class Action(ABC):
     """A change of the state; actions are frozen dataclasses that inherit from this one.
 
     Attributes:
@@ -30,13 +31,14 @@ class Action:
     template: ClassVar[str] = ""
     continues: ClassVar[bool] = False
 
+    @abstractmethod
     def apply(self, state: State) -> State:
         """Return the next state.
 
         Raises:
             ExplorerError: the change is not possible; the state stays as it was.
         """
-        raise NotImplementedError
+        ...
 
     def words(self) -> str:
         """Return what the action does; "{design}" stands for the name of the design after it."""
