@@ -1,7 +1,7 @@
 """Design explorer of the flagged 4-4 parallel manipulator.
 
-The public names stand in the stub beside this file; each is loaded when it is first used, so
-that `import explorer` costs next to nothing.
+The stub beside this file lists the public names; each is loaded on first use, so that
+`import explorer` is fast.
 """
 
 import lazy_loader  # pyright: ignore[reportMissingTypeStubs]

@@ -1,4 +1,4 @@
-"""The public names, each written once: where it is loaded from when it is first used."""
+"""The public names, and the module from which each is loaded on first use."""
 
 from .app.notebook import Shown as Shown, show as show
 from .errors import (

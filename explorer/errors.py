@@ -10,13 +10,13 @@ from typing import ClassVar
 
 
 class ExplorerError(Exception):
-    """Root of every error that the explorer raises on purpose."""
+    """Base class of every error that the explorer raises on purpose."""
 
     exit_status: ClassVar[int] = 2
 
 
 class InputError(ExplorerError, ValueError):
-    """A value that cannot be used: wrong shape, not finite, out of its range."""
+    """A value of the wrong shape or type, not finite, or out of its range."""
 
 
 class DesignError(InputError):

@@ -21,7 +21,7 @@ if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from explorer.app.session.faults import read_fault
-from explorer.app.session.worker import Line
+from explorer.app.session.worker import Channel
 from explorer.numerics.compiled import warm
 
 
@@ -36,11 +36,11 @@ def main() -> None:
     task: Any = getattr(importlib.import_module(fault.module), fault.task)
     if asked.warm:
         warm()
-    line = (Line(print, lambda: False),) if fault.tells else ()
+    channel = (Channel(print, lambda: False),) if fault.is_sending else ()
     began = time.process_time()
     with TemporaryDirectory() as folder:
         arguments = [Path(folder) if isinstance(each, Path) else each for each in fault.arguments]
-        value = task(*arguments, *line)
+        value = task(*arguments, *channel)
     print(
         f"now it is done, in {time.process_time() - began:.2f} s of processor time: {value!r}"[
             :2000

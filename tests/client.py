@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
+import re
 import socket
 import time
 from collections.abc import Generator
 from contextlib import closing, contextmanager
+from html import unescape
 from typing import Any
 
 import msgspec
@@ -14,8 +17,10 @@ import zstandard
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin, Subprotocol
 
+from explorer.app.browser.viser_gaps import element_id
 from explorer.app.server import Running
 
+_COUNT = itertools.count()
 PROTOCOL = Subprotocol(f"viser-v{viser.__version__}")
 CAMERA: dict[str, Any] = {
     "type": "ViewerCameraMessage",
@@ -56,6 +61,28 @@ def opened(
         max_size=None,
         proxy=None,
     )
+
+
+def presses_in(running: Running) -> list[tuple[str, str]]:
+    """Return name and value of every button in the markup that all browsers share."""
+    gui: Any = running.viser.gui
+    contents = [
+        unescape(handle.content)
+        for container in gui._container_handle_from_uuid.values()
+        for handle in container._children.values()
+        if isinstance(handle, viser.GuiHtmlHandle)
+    ]
+    return [
+        (name, value)
+        for content in contents
+        for name, value in re.findall(r'data-press="([^"]+)"(?: data-value="([^"]*)")?', content)
+    ]
+
+
+def press_update(running: Running, name: str, value: str = "") -> tuple[str, str]:
+    """Return the id of the control to which the page sends a press, and what it sends."""
+    press = {"name": name, "value": value, "count": next(_COUNT)}
+    return element_id(running.page.buttons.inbox), msgspec.json.encode(press).decode()
 
 
 class Client:

@@ -1,4 +1,4 @@
-"""One check of every Jacobian: against central differences along a twist."""
+"""One check of every Jacobian, by central differences along twists."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ def assert_is_jacobian(
     length: float,
     tolerance: float,
 ) -> None:
-    """Check the derivative of a function of the pose in lengths, column by column.
+    """Check the Jacobian of a function of the pose, column by column.
 
     Args:
-        function: Of position and rotation, in lengths, shape (n,).
-        jacobian: What is claimed, shape (n, 6).
-        position: Where, shape (3,).
-        rotation: Where, shape (3, 3).
-        length: Divides the columns of the angular velocity; steps are a share of it.
-        tolerance: On the homogeneous Jacobian.
+        function: Function of position and rotation to lengths, shape (n,).
+        jacobian: Its Jacobian by the twist (v; ω), shape (n, 6).
+        position: Position of the pose, shape (3,).
+        rotation: Rotation of the pose, shape (3, 3).
+        length: Length of which steps are a share, and that divides the columns of ω.
+        tolerance: Tolerance of the homogeneous Jacobian.
     """
     step = 1e-5
     columns: list[FloatArray] = []

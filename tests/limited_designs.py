@@ -1,28 +1,23 @@
-"""Random designs with random limits: ordinary, thin-walled, extreme; reference workspaces."""
+"""Random designs with random limits (ordinary, thin-walled, extreme) and reference workspaces."""
 
 from __future__ import annotations
 
 import json
 import math
-from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import msgspec
 import numpy as np
+from reference import read_reference
 from scipy.spatial.transform import Rotation
 
-from explorer import Design, Limits, Pose
+from explorer import Design, Limits, Pose, home_pose, inverse
 from explorer.mechanism.design import LENGTHS, Swing
 from explorer.mechanism.design_file import decode_design
 from explorer.numerics.arrays import FloatArray
 
-REFERENCE: dict[str, Any] = json.loads(
-    (Path(__file__).parent / "data" / "workspace.json").read_text(encoding="utf-8")
-)
-
-DEFECTS: dict[str, Any] = json.loads(
-    (Path(__file__).parent / "data" / "defects_solid.json").read_text(encoding="utf-8")
-)
+REFERENCE: dict[str, Any] = read_reference("workspace")
+DEFECTS: dict[str, Any] = read_reference("defects_solid")
 
 SIZES = (10.0, 1e-9, 1e9, 1e-20, 1e20)
 NEARNESS = (1.0, 1e-3, 1e-6)
@@ -34,6 +29,23 @@ MINIMA = (0.1, 0.5, 0.9, 0.999, 1.0 - 1e-6)
 def limited(design: Design, **limits: Any) -> Design:
     """Return a design with some of its limits changed."""
     return msgspec.structs.replace(design, limits=msgspec.structs.replace(design.limits, **limits))
+
+
+def scaled_design(design: Design, factor: float) -> Design:
+    """Return a design with every length, its limits and its home, times a factor."""
+
+    def times(value: Any) -> Any:
+        if isinstance(value, tuple):
+            return tuple(times(each) for each in cast("tuple[Any, ...]", value))
+        return value * factor if isinstance(value, float) else value
+
+    names = [name for name in Limits.__struct_fields__ if name != "swing"]
+    home = home_pose(design)
+    return msgspec.structs.replace(
+        limited(design, **{name: times(getattr(design.limits, name)) for name in names}),
+        **{name: times(getattr(design, name)) for name in ("a3", "b1", "b2", "b3", "node_step")},
+        home=Pose(times(home.position), home.quaternion),
+    )
 
 
 def reference_case(index: int) -> tuple[Design, FloatArray, float]:
@@ -73,14 +85,10 @@ def ordinary_case(seed: int) -> tuple[Design, FloatArray]:
     rotation = Rotation.random(random_state=rng).as_matrix()
     pose = Pose.of(rng.uniform(-6.0, 6.0, 3), rotation)
     free = Design(a3=(a3x, a3y), b1=(b1x, b1y), b2=b2, b3=b3 + (1.0 if b3 > b2 else -1.0))
-    from explorer import inverse
-
     joints = inverse(free, pose.position, rotation).tolist()
     lengths: dict[str, Any] = {
         name: (value * float(rng.uniform(0.3, 0.7)), value * float(rng.uniform(1.3, 1.8)))
-        for name, value in zip(
-            ("l1", "d2", "d4", "l4"), [joints[k] for k in (0, 2, 4, 5)], strict=True
-        )
+        for name, value in zip(LENGTHS, [joints[k] for k in (0, 2, 4, 5)], strict=True)
     }
     carriages = joints[1], joints[3]
     low = np.array(pose.position) - rng.uniform(2.0, 6.0, 3)
@@ -137,8 +145,6 @@ def shell_case(seed: int) -> tuple[Design, FloatArray]:
 
 def thin_case(seed: int) -> tuple[Design, FloatArray]:
     """Return a design whose lengths may differ little from those at home, and a rotation."""
-    from explorer import inverse
-
     design, rotation = ordinary_case(seed)
     joints = inverse(design, design.home.position, rotation) if design.home else np.zeros(6)
     rng = np.random.default_rng(seed)

@@ -25,18 +25,21 @@ from typing import Any
 
 import psutil
 import viser
+from client import press_update, presses_in
 from page_props import differences, shown_by
 from socket_tab import SocketTab
 
+from explorer.app.features.designs.panel import DesignsPanel
+from explorer.app.features.designs.saved_designs import SavedDesigns
 from explorer.app.page import REFUSAL
 from explorer.app.server import Running, start
 from explorer.app.session.faults import Faults
 from explorer.app.session.jobs import RESTARTED
-from explorer.app.session.memory import given_back, keep_for_good, limit_arenas
+from explorer.app.session.memory import freeze_objects, limit_arenas, trim_repeatedly
 from explorer.app.state.actions import Open
-from explorer.app.storage.autosave import Autosave
-from explorer.app.storage.keeping import Keep
 from explorer.app.storage.library import Library
+from explorer.app.storage.session_file import SessionFile
+from explorer.app.storage.user_data import UserData
 from explorer.mechanism.design_file import PRESETS, encode_design
 from explorer.numerics.compiled import warm
 
@@ -105,6 +108,7 @@ class Monkey:
             (50, self._use),
             (20, self._drag),
             (12, self._push),
+            (12, self._press),
             (8, self._trigger),
             (4, self._pull_handle),
             (2, self._click_scene),
@@ -167,15 +171,14 @@ class Monkey:
             session: Any = fresh.page.session
             fresh.page.wait_until_drawn(PATIENCE_SECONDS)
             session._state, session._history = state, history
-            fresh.page.hands.theme.choose(dark=page.hands.theme.is_dark)
-            if page.shelf is not None and fresh.page.shelf is not None:
-                page.shelf.wait_until_idle()
-                fresh.page.shelf.wait_until_idle()
-                fresh.page.shelf.entries = page.shelf.entries
-                fresh.page.shelf.deleted = page.shelf.deleted
-                # To which page the list is turned is no state.
-                lists: list[Any] = [fresh.page, page]
-                lists[0]._designs._first = lists[1]._designs._first
+            fresh.page.services.theme.choose(dark=page.services.theme.is_dark)
+            shelves = [each.services.get(SavedDesigns) for each in (fresh.page, page)]
+            for saved in shelves:
+                saved.wait_until_idle()
+            shelves[0].entries, shelves[0].deleted = shelves[1].entries, shelves[1].deleted
+            # The part of the list that is shown is no state.
+            lists = [each.services.get(DesignsPanel) for each in (fresh.page, page)]
+            lists[0].first = lists[1].first
             session.redraw()
             assert fresh.page.wait_until_drawn(PATIENCE_SECONDS)
             self.report.drift += differences(shown_by(self.running), shown_by(fresh))
@@ -244,6 +247,15 @@ class Monkey:
         elif _is(handle, viser.GuiUploadButtonHandle):
             return
         self._tab.update(handle._impl.uuid, value)
+        self._did()
+
+    def _press(self) -> None:
+        """Press a button in markup, or what is none."""
+        found = presses_in(self.running)
+        press = self._random.choice(found)
+        if self._random.random() < 0.1:
+            press = (press[0], "gone")
+        self._tab.update(*press_update(self.running, *press))
         self._did()
 
     def _trigger(self) -> None:
@@ -364,10 +376,10 @@ def _is(handle: Any, kind: type) -> bool:
 def explorer_with_data() -> Generator[Running]:
     """Start an explorer with a data folder of its own, to be let loose on."""
     with tempfile.TemporaryDirectory() as folder:
-        library, store = Library(Path(folder) / "designs"), Autosave(Path(folder) / "sessions")
+        library, store = Library(Path(folder) / "designs"), SessionFile(Path(folder) / "sessions")
         # What failed is to be had when the rest is gone.
-        keep = Keep(library, store, faults=Faults(FAULTS))
-        running = start(PRESETS["paper-optimal"], port=0, keep=keep)
+        user_data = UserData(library, store, faults=Faults(FAULTS))
+        running = start(PRESETS["paper-optimal"], port=0, user_data=user_data)
         try:
             yield running
         finally:
@@ -384,8 +396,8 @@ def main() -> None:
     # As the command does, lest what the kernels need is counted as growth.
     limit_arenas()
     warm()
-    with explorer_with_data() as running, given_back():
-        keep_for_good()
+    with explorer_with_data() as running, trim_repeatedly():
+        freeze_objects()
         began = time.monotonic()
         report = Monkey(running, asked.seed, compares=not asked.memory).run(asked.actions)
         print(f"{report.actions} actions in {time.monotonic() - began:.0f} s")

@@ -1,4 +1,4 @@
-"""What one would do without a formula: SLSQP from many starts for the nearest singular pose."""
+"""The nearest singular pose by SLSQP from many starts, without the formulas of the package."""
 
 from __future__ import annotations
 
@@ -11,14 +11,8 @@ from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
 from explorer import Design
+from explorer.mechanism.kinematics import platform_points
 from explorer.numerics.arrays import FloatArray
-
-
-def platform_points(design: Design) -> FloatArray:
-    """Return b1 to b4 in the platform frame, shape (4, 3)."""
-    return np.array(
-        [[*design.b1, 0.0], [design.b2, 0.0, 0.0], [design.b3, 0.0, 0.0], [0.0, 0.0, 0.0]]
-    )
 
 
 def searched_distance(
@@ -28,22 +22,11 @@ def searched_distance(
     incidence: int,
     starts: int,
 ) -> float:
-    """Return the least root-mean-square way found to a pose with an incidence.
-
-    Args:
-        design: The manipulator, of ordinary size.
-        position: b4, shape (3,).
-        rotation: Platform to base, shape (3, 3).
-        incidence: 1, 2 or 3.
-        starts: How many, from the pose itself to any rotation at all.
-    """
+    """Return the least root-mean-square displacement to a pose with an incidence, 1, 2 or 3."""
 
     def margin(p: FloatArray, r: FloatArray) -> list[float]:
-        if incidence == 1:
-            return [float(r[:, 2] @ p)]
-        if incidence == 2:
-            return [float(r[1, 0] * p[2] - r[2, 0] * p[1])]
-        return [float(p[2])]
+        values = (r[:, 2] @ p, r[1, 0] * p[2] - r[2, 0] * p[1], p[2])
+        return [float(values[incidence - 1])]
 
     return searched_least(design, position, rotation, margin, starts)
 
@@ -56,15 +39,15 @@ def searched_least(
     starts: int,
     seed: int = 0,
 ) -> float:
-    """Return the least root-mean-square way found to a pose that meets conditions.
+    """Return the least root-mean-square displacement to a pose that satisfies conditions.
 
     Args:
         design: The manipulator, of ordinary size.
         position: b4, shape (3,).
         rotation: Platform to base, shape (3, 3).
-        condition: What vanishes there, independent of each other, of position and rotation.
-        starts: How many, from the pose itself to any rotation at all.
-        seed: Of the starts.
+        condition: Function of position and rotation to independent values that must vanish.
+        starts: Number of starts, from the pose itself to arbitrary rotations.
+        seed: Seed of the starts.
     """
     rng = np.random.default_rng(seed)
     points = platform_points(design)
@@ -82,12 +65,12 @@ def searched_least(
     def off(x: FloatArray) -> FloatArray:
         return np.array(condition(*pose(x)))
 
-    # The stubs know only conditions of one number.
+    # SciPy's stubs allow only conditions of one number.
     vanishing: Any = {"type": "eq", "fun": off}
     best = np.inf
     for index in range(starts):
         start = np.zeros(6)
-        # From the pose itself first, then from farther and farther off.
+        # The first start is the pose itself; the others are farther and farther away.
         start[3:] = rng.normal(size=3) * 2.0 * index / starts
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")

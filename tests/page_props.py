@@ -17,7 +17,7 @@ PASSING = {"order", "_order", "_tab_container_ids"}
 # Choices for the next file; they are no part of the state and kept nowhere.
 OF_THE_MOMENT = {"Format", "Size (px)", "Width (px)", "Height (px)", "Transparent"}
 # What is told of the way here: how long it took, and how much was logged on it.
-OF_THE_WAY = re.compile(r"(?<=Computed in</td>).*?ms|(?<=The session has )[0-9,]+ poses?")
+OF_THE_WAY = re.compile(r"(?<=Computed in<).*?ms|(?<=The session has )[0-9,]+ poses?")
 
 
 def shown_by(running: Running) -> dict[str, object]:

@@ -19,21 +19,22 @@ import numpy as np
 from playwright.sync_api import Browser, FloatRect
 
 from explorer.app.browser.headless import headless_browser
-from explorer.app.features.compare.actions import Pin, SetLook
-from explorer.app.features.optimise.actions import SetWish, StartRun
+from explorer.app.features.compare.actions import Pin
+from explorer.app.features.optimise.actions import SetRequest, StartRun
 from explorer.app.features.sharing.reporting import make_report
 from explorer.app.features.singularity.actions import Jog
 from explorer.app.features.studies.actions import BrushAxis, OpenStudy, PickDesign
-from explorer.app.features.studies.folders import StudyFolders
+from explorer.app.features.studies.panel import StudiesPanel
 from explorer.app.scene.camera import ViewName
 from explorer.app.screenshot import open_page, picture, settle, stable_picture
 from explorer.app.server import Running, start
 from explorer.app.state.action import Action
-from explorer.app.state.actions import Open, SetJoint, SetLimits, SetVariable, SetView
+from explorer.app.state.actions import Open, Set, SetJoint, SetVariable
 from explorer.app.state.compared import Look
-from explorer.app.state.optimisation import Wish
+from explorer.app.state.optimisation import OptimisationRequest
 from explorer.app.state.studies import Brush, within
 from explorer.app.state.view import PrototypeView, SingularView, View, WorkspaceView
+from explorer.app.storage.study_folders import StudyFolders
 from explorer.mechanism.design import JOINTS
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
@@ -85,20 +86,21 @@ SCENES = {
     # δ2 is small, the other two are not: both lines are orange and all else is blue.
     "near-singular": Scene(
         pose=Pose.of_yaw_pitch_roll((9, 8, 7.5), (-38, 24, 8)),
-        actions=(SetView(View(handle=False)),),
+        actions=(Set("view", View(handle=False)),),
         panels=True,
     ),
     # From the side no two of the eight names lie on one another.
     "modes": Scene(
         actions=(
-            SetView(
+            Set(
+                "view",
                 View(
                     handle=False,
                     ghosts=True,
                     flags=False,
                     grid=False,
                     tetrahedra=(False, False, False),
-                )
+                ),
             ),
         ),
         view="side",
@@ -109,43 +111,45 @@ SCENES = {
     "strata": Scene(
         pose=Pose.of_yaw_pitch_roll((10, 5, 9), (-73.1, 12, 0)),
         actions=(
-            SetView(View(handle=False, singular=SingularView(strata=True, ghost="nearest"))),
+            Set("view", View(handle=False, singular=SingularView(strata=True, ghost="nearest"))),
             Jog(0, 20.0),
         ),
         panels=True,
         size=(1280, 1330),
     ),
-    "twin": Scene(actions=(SetView(View(handle=False, twin=True)),)),
+    "twin": Scene(actions=(Set("view", View(handle=False, twin=True)),)),
     "workspace": Scene(
-        actions=(SetView(replace(BARE, workspace=WorkspaceView(solid=True))),),
+        actions=(Set("view", replace(BARE, workspace=WorkspaceView(solid=True))),),
     ),
     "workspace-cut": Scene(
         actions=(
-            SetView(
+            Set(
+                "view",
                 replace(
                     BARE,
                     workspace=WorkspaceView(solid=True, colour="margin", cut="y", level=5.0),
-                )
+                ),
             ),
         ),
     ),
     # Where legs 2 and 4 collide, low on both sides, shows through the solid.
     "reachable": Scene(
         actions=(
-            SetLimits(with_radius(DESIGN, 0.2).limits),
-            SetView(replace(BARE, workspace=WorkspaceView(solid=True, region="reachable"))),
+            Set("design.limits", with_radius(DESIGN, 0.2).limits),
+            Set("view", replace(BARE, workspace=WorkspaceView(solid=True, region="reachable"))),
         ),
     ),
     # Half apart, so that each part is seen and where it belongs too.
     "prototype": Scene(
         actions=(
-            SetView(
+            Set(
+                "view",
                 replace(
                     BARE,
                     flags=False,
                     labels=False,
                     prototype=PrototypeView(shown=True, exploded=0.5),
-                )
+                ),
             ),
         ),
         panels=True,
@@ -155,11 +159,11 @@ SCENES = {
     # What is left of the paper's optimum when a3 comes nearer, beside both rows of Table 1.
     "compare": Scene(
         actions=(
-            SetView(BARE),
+            Set("view", BARE),
             Pin(DESIGN),
             Pin(PRESETS["paper-initial"]),
             SetVariable("a3x", 17.0),
-            SetLook(Look(overlay=True)),
+            Set("compared.look", Look(overlay=True)),
         ),
         panels=True,
         tab="Compare",
@@ -169,8 +173,11 @@ SCENES = {
     "optimise": Scene(
         actions=(
             Open(paper_start()),
-            SetView(BARE),
-            SetWish(Wish(volume=PAPER_VOLUME, clearance=CLEARANCE)),
+            Set("view", BARE),
+            SetRequest(
+                "optimisation.request",
+                OptimisationRequest(volume=PAPER_VOLUME, clearance=CLEARANCE),
+            ),
             StartRun(),
         ),
         panels=True,
@@ -237,13 +244,12 @@ def draw_studies(browser: Browser) -> bytes:
         index = int(results.columns["index"][row])
         running = start(DESIGN, port=0, studies=StudyFolders(Path(home)))
         try:
-            session, panel = running.page.session, running.page.studies
-            session.do(SetView(BARE))
+            session, panel = running.page.session, running.page.services.get(StudiesPanel)
+            session.do(Set("view", BARE))
             session.do(OpenStudy(study.name))
             session.do(PickDesign(results.design_of_row(row), index=index, study=study.name))
             session.do(brush)
             session.wait_until_idle()
-            assert panel is not None
             assert panel.feed.wait_until_idle(60.0)
             page, client = open_page(browser, running, (1280, 1000))
             page.get_by_role("tab", name="Studies", exact=True).click()

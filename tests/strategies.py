@@ -1,8 +1,8 @@
-"""Random designs and poses: ordinary ones, and those where arithmetic is in trouble.
+"""Random designs and poses: ordinary ones, and those in which rounding errors are large.
 
-Designs come in every size from 1e-20 to 1e20 and down to 1e-6 of degenerate. Rotations
-come uniform, near the identity (where the lines are parallel) and in quarter turns. Poses
-come general, singular in each way, and close to singular in each way.
+The sizes of designs are from 1e-20 to 1e20; some are degenerate but for a share of 1e-6. Rotations
+are uniform, near the identity (where the lines are parallel) and quarter turns. Poses are
+general, singular in each way, and nearly singular in each way.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from hypothesis import strategies as st
 
-from explorer import Design, margins, rotation_from_quaternion
+from explorer import Design, Pose, inverse, margins, rotation_from_quaternion
 from explorer.numerics.arrays import FloatArray
 
 EPSILON = 2.0**-52
@@ -23,7 +23,7 @@ SIZES = (10.0, 1e-6, 1e-20, 1e6, 1e20)
 """Sizes of designs: ordinary, tiny and huge."""
 
 NEARNESS = (1.0, 1e-3, 1e-6)
-"""Shares of the size that a3y, b1y and b3 - b2 come down to; at zero they are degenerate."""
+"""Smallest a3y, b1y and b3 - b2 as shares of the size; a design with a zero is degenerate."""
 
 WAYS = tuple(way for count in (1, 2, 3) for way in itertools.combinations((1, 2, 3), count))
 """The ways of being singular: which of δ1, δ2, δ3 vanish."""
@@ -39,30 +39,54 @@ class Case:
 
     @property
     def size(self) -> float:
-        """The largest length that enters, which rounding errors are measured by."""
+        """The largest length of the computation, to which rounding errors are relative."""
         return max(*map(abs, self.design.variables), float(np.abs(self.position).max()))
+
+    @property
+    def pose(self) -> Pose:
+        """The pose, with its rotation as a quaternion."""
+        return Pose.of(self.position, self.rotation)
+
+    @property
+    def joints(self) -> FloatArray:
+        """The joints, shape (6,)."""
+        return inverse(self.design, self.position, self.rotation)
+
+    @property
+    def margins(self) -> FloatArray:
+        """The margins (δ1, δ2, δ3), shape (3,)."""
+        return margins(self.position, self.rotation)
+
+    @property
+    def regularity(self) -> float:
+        """The smallest |δi| as a share of the size; 0 for a singular pose."""
+        return float(np.abs(self.margins).min()) / self.size
+
+    def scaled(self, factor: float) -> Case:
+        """Return the case in a unit that is smaller by a factor."""
+        variables = [factor * value for value in self.design.variables]
+        return Case(self.design.with_variables(variables), factor * self.position, self.rotation)
 
 
 def span_amplification(case: Case) -> float:
-    """Return by how much a short b2b3 magnifies rounding, at least one."""
+    """Return the factor by which a short b2b3 magnifies rounding, at least one."""
     return case.size / abs(case.design.b3 - case.design.b2)
 
 
 def amplification(case: Case) -> float:
-    """Return by how much a design near a degenerate one magnifies rounding in all."""
+    """Return the factor by which a nearly degenerate design magnifies rounding, at least one."""
     shortest = min(abs(case.design.a3[1]), abs(case.design.b1[1]))
     return span_amplification(case) * case.size / shortest
 
 
 def isolation(case: Case) -> float:
-    """Return how far the pose is from being singular in two ways at once, over the size.
+    """Return a measure of the distance from poses that are singular in two ways at once.
 
-    It is the second smallest of the margins and the sine between the two lines, on whose
-    vanishing δ2 vanishes too.
+    It is the second smallest of the margins over the size and the sine between the two lines,
+    with which δ2 vanishes too.
     """
     sine = math.hypot(case.rotation[1, 0], case.rotation[2, 0])
-    found = np.abs(margins(case.position, case.rotation)) / case.size
-    return float(np.sort([*found.tolist(), sine])[1])
+    return float(np.sort([*(np.abs(case.margins) / case.size).tolist(), sine])[1])
 
 
 def _away_from_zero(least: float = 0.1) -> st.SearchStrategy[float]:
@@ -90,13 +114,13 @@ def designs(
 
 
 def ordinary_designs() -> st.SearchStrategy[Design]:
-    """Draw designs of the size that people use, none near a degenerate one."""
+    """Draw designs of ordinary size, none of them nearly degenerate."""
     return designs(sizes=(10.0,), nearness=(1.0,))
 
 
 @st.composite
 def uniform_rotations(draw: st.DrawFn) -> FloatArray:
-    """Draw a rotation from a quaternion in a cube's shell."""
+    """Draw a rotation from a quaternion in the shell of a cube."""
     quaternion = [draw(st.floats(-1.0, 1.0)) for _ in range(4)]
     quaternion[draw(st.integers(0, 3))] = draw(_away_from_zero(0.2))
     return rotation_from_quaternion(quaternion)
@@ -115,18 +139,14 @@ def quarter_turns() -> st.SearchStrategy[FloatArray]:
     return st.sampled_from(range(24)).map(lambda index: QUARTER_TURNS[index].copy())
 
 
-def _quarter_turns() -> FloatArray:
-    found: list[FloatArray] = []
-    for order in itertools.permutations(range(3)):
-        for signs in itertools.product((1.0, -1.0), repeat=3):
-            matrix = np.zeros((3, 3))
-            matrix[range(3), order] = signs
-            if np.linalg.det(matrix) > 0.0:
-                found.append(matrix)
-    return np.array(found)
-
-
-QUARTER_TURNS = _quarter_turns()
+QUARTER_TURNS = np.array(
+    [
+        matrix
+        for order in itertools.permutations(range(3))
+        for signs in itertools.product((1.0, -1.0), repeat=3)
+        if np.linalg.det(matrix := np.diag(signs) @ np.eye(3)[list(order)] + 0.0) > 0.0
+    ]
+)
 
 
 def rotations() -> st.SearchStrategy[FloatArray]:
@@ -145,7 +165,7 @@ def singular_positions(draw: st.DrawFn, rotation: FloatArray, way: tuple[int, ..
     """Draw a position in which the margins of the way vanish, to rounding."""
     u, v, n = rotation[:, 0], rotation[:, 1], rotation[:, 2]
     x, y = (draw(_away_from_zero()) * 3.0 for _ in range(2))
-    found: dict[tuple[int, ...], FloatArray] = {
+    position: dict[tuple[int, ...], FloatArray] = {
         (1,): x * u + y * v,
         (2,): np.array([x, y * u[1], y * u[2]]),
         (3,): np.array([x, y, 0.0]),
@@ -154,7 +174,7 @@ def singular_positions(draw: st.DrawFn, rotation: FloatArray, way: tuple[int, ..
         (2, 3): np.array([x, 0.0, 0.0]),
         (1, 2, 3): np.zeros(3),
     }
-    return found[way]
+    return position[way]
 
 
 @st.composite

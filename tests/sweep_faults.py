@@ -11,11 +11,11 @@ from explorer.sweep.rows import Rows, evaluate
 from explorer.sweep.workers import Workers
 
 DEADLY = 13
-"""The index of the design that kills whoever evaluates it."""
+"""Index of the design that kills the process that evaluates it."""
 
 
 class HereWorkers(Workers):
-    """Does each task at once, in this process, and remembers the pieces of all."""
+    """Workers that do each task at once in this process, and keep the pieces of all."""
 
     def __init__(self) -> None:
         self.tasks: list[list[range]] = []
@@ -39,7 +39,7 @@ class HereWorkers(Workers):
 
 
 def deadly(study: bytes, start: int, stop: int) -> Rows:
-    """Evaluate designs, but die of one of them."""
+    """Evaluate designs; end the process at one of them."""
     if start <= DEADLY < stop:
         os._exit(1)
     return evaluate(study, start, stop)

@@ -37,6 +37,26 @@ ROOMS = (
 )
 """The rooms of the package, from the ground up: each imports only from those before it."""
 
+APP_ROOMS = (
+    "look",
+    "state",
+    "session",
+    "security",
+    "storage",
+    "browser",
+    "widgets",
+    "scene",
+    "features.feature",
+    "features",
+    "features.listed",
+    "layout",
+    "page",
+    "server",
+    "notebook",
+    "screenshot",
+)
+"""The rooms of the page, from the ground up; features import from each other without a circle."""
+
 WITHOUT_VISER = ("app.state", "app.session", "app.storage")
 """The parts of the app whose logic runs without a browser."""
 
@@ -165,16 +185,46 @@ def test_a_module_imports_only_from_its_own_room_or_those_below(module: str) -> 
             )
 
 
+def own_imports(module: str) -> set[str]:
+    """Return the other modules of the package that a module imports, whenever it does."""
+    names = {each.name.removeprefix("explorer.") for each in imports(module)}
+    return {name for name in names if name in MODULES and name != module}
+
+
+def app_room(module: str) -> str:
+    """Return the room of a module of the page, the most specific one of `APP_ROOMS`."""
+    inner = module.removeprefix("app.")
+    rooms = [each for each in APP_ROOMS if inner == each or inner.startswith(f"{each}.")]
+    assert rooms, f"explorer.{module} belongs to no room of the page"
+    return max(rooms, key=len)
+
+
+@pytest.mark.parametrize("module", [module for module in MODULES if module.startswith("app.")])
+def test_module_of_page_imports_only_from_its_own_room_or_those_below(module: str) -> None:
+    below = APP_ROOMS[: APP_ROOMS.index(app_room(module)) + 1]
+    for name in own_imports(module):
+        if name.startswith("app."):
+            assert app_room(name) in below, f"explorer.{module} imports {name} of a room above"
+
+
+def test_no_feature_imports_itself_through_others() -> None:
+    def feature(module: str) -> str | None:
+        parts = module.split(".")
+        return parts[2] if parts[:2] == ["app", "features"] and len(parts) > 3 else None
+
+    graph: dict[str, set[str]] = {}
+    for module in MODULES:
+        own = feature(module)
+        if own is not None:
+            others = {feature(name) for name in own_imports(module)} - {own, None}
+            graph.setdefault(own, set()).update(other for other in others if other)
+    assert {"compare", "workspace"} <= set(graph)
+    assert len(tuple(TopologicalSorter(graph).static_order())) == len(graph)
+
+
 def test_no_module_imports_itself_in_a_circle() -> None:
     """Imports for type checkers, and those that run in functions, count as well."""
-    graph = {
-        module: {
-            name
-            for each in imports(module)
-            if (name := each.name.removeprefix("explorer.")) in MODULES and name != module
-        }
-        for module in MODULES
-    }
+    graph = {module: own_imports(module) for module in MODULES}
     assert len(tuple(TopologicalSorter(graph).static_order())) >= len(MODULES)
 
 

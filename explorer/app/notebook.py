@@ -1,7 +1,7 @@
 """The live page inside a notebook, and the state behind it from Python.
 
-The page is served on this machine and shown in a frame, so the notebook's browser must run on
-this machine too, or reach it as if it did, for instance by `ssh -L`.
+A frame of the notebook shows the page of a server on this machine. The notebook's browser must run
+on this machine too, or reach the server through a tunnel, for instance by `ssh -L`.
 """
 
 from __future__ import annotations
@@ -26,24 +26,24 @@ STYLE = "border:1px solid rgba(128,128,128,0.35);border-radius:4px"
 
 
 class Shown:
-    """A running explorer that a notebook displays; it ends when nothing refers to it any more.
+    """A running explorer that a notebook displays; it ends with the last reference to it.
 
     Args:
         running: The explorer.
-        height: Of its frame, in pixels.
+        height: Height of the frame, in pixels.
     """
 
     def __init__(self, running: Running, height: int) -> None:
         self._running = running
         self._height = height
         self._end = weakref.finalize(self, _end, running)
-        # viser ends its servers at exit by itself, and says so; this comes before.
+        # This runs before viser stops its servers at exit, which prints a message.
         self._end.atexit = False
         atexit.register(self._end)
 
     @property
     def url(self) -> str:
-        """Where a browser on this machine finds the page."""
+        """The address of the page for a browser on this machine."""
         return self._running.url
 
     @property
@@ -53,13 +53,11 @@ class Shown:
 
     @property
     def design(self) -> Design:
-        """The design as it is on the page; assigning one opens it in its home pose.
-
-        Assigned it may be a design, the name of a preset, or a file.
+        """The design on the page; assigning a design, a preset or a file opens it in its home pose.
 
         Raises:
             DesignError: no such preset or file, or a file that holds no design.
-            InputError: it is stopped, or the design is being optimised.
+            InputError: the explorer is stopped, or the design is being optimised.
         """
         self._check_running()
         return self._running.page.session.state.design
@@ -70,10 +68,10 @@ class Shown:
 
     @property
     def pose(self) -> Pose:
-        """The pose as it is on the page; assigning one moves the platform there.
+        """The pose on the page; assigning one moves the platform there.
 
         Raises:
-            InputError: it is stopped.
+            InputError: the explorer is stopped.
         """
         self._check_running()
         return self._running.page.session.state.pose
@@ -83,13 +81,13 @@ class Shown:
         self._do(SetPose(_as_pose(pose)))
 
     def stop(self) -> None:
-        """End the page; its last picture stays in the notebook until that is loaded again."""
+        """Stop the server; the notebook shows the last picture until it is loaded again."""
         if self._end.detach() is not None:
             atexit.unregister(self._end)
             self._running.stop()
 
     def _do(self, action: Action) -> None:
-        """Do what is refused here rather than on the page."""
+        """Do an action; its errors are raised here rather than shown on the page."""
         self._check_running()
         session = self._running.page.session
         session.wait_until_idle()
@@ -126,7 +124,7 @@ class Shown:
         )
 
     def _repr_mimebundle_(self, include: object = None, exclude: object = None) -> dict[str, str]:
-        """Return what Jupyter displays."""
+        """Return the frame and the words that Jupyter displays."""
         del include, exclude
         return {"text/html": self._repr_html_(), "text/plain": repr(self)}
 
@@ -138,20 +136,20 @@ def show(
     height: int = 600,
     port: int = 0,
 ) -> Shown:
-    """Serve the live page and return what displays it inline in a notebook.
+    """Serve the live page and return a handle that displays it inline in a notebook.
 
-    In a plain Python shell nothing opens; what is returned says where the page is.
+    In a plain Python shell nothing opens; the handle has the address of the page.
 
     Args:
-        design: The manipulator to open: itself, the name of a preset, or a design file.
-        pose: In which to open it; its home pose if None.
-        height: Of the frame in the notebook, in pixels.
-        port: The port to listen on; any free one if 0.
+        design: Manipulator to open: a design, the name of a preset, or a design file.
+        pose: Pose to open it in; its home pose if None.
+        height: Height of the frame in the notebook, in pixels.
+        port: Port to listen on; any free one if 0.
 
     Raises:
         InputError: a height that is too small, or a design or pose that cannot be drawn.
         DesignError: no such preset or file, or a file that holds no design.
-        ServerError: the port cannot be had.
+        ServerError: the port is not available.
     """
     if height < LEAST_HEIGHT:
         raise InputError(f"the height must be {LEAST_HEIGHT} pixels at least; got {height}")
@@ -160,10 +158,10 @@ def show(
 
 
 def _as_design(given: object) -> Design:
-    """Return the design that was given, whichever way.
+    """Return a design from itself, the name of a preset or a file.
 
     Raises:
-        InputError: it is none.
+        InputError: the value is none of these.
         DesignError: no such preset or file, or a file that holds no design.
     """
     if isinstance(given, str):
@@ -183,8 +181,8 @@ def _as_pose(given: object) -> Pose:
 
 def _end(running: Running) -> None:
     if not threading.main_thread().is_alive():
-        # Python is ending, and starts no more threads.
+        # A Python that ends starts no more threads.
         running.stop()
         return
-    # The collector may run on a thread of this very server, which cannot wait for itself.
+    # The garbage collector may run on a thread of this server, which cannot wait for itself.
     threading.Thread(target=running.stop, name="explorer stops", daemon=True).start()

@@ -1,4 +1,4 @@
-"""The page of one server: scene and panels, drawn from the session's frames."""
+"""The page of one server: its features, drawn from the session's frames."""
 
 from __future__ import annotations
 
@@ -6,74 +6,53 @@ import sys
 import threading
 import time
 import traceback
-from collections.abc import Iterable, Iterator
 from typing import get_args
 
 import numpy as np
 import viser
 
+from explorer.app.browser.downloads import Downloads
 from explorer.app.browser.press_events import listen
-from explorer.app.drawing import Scene
-from explorer.app.features.compare.drawing import compared_drawing
-from explorer.app.features.compare.feed import CompareFeed
-from explorer.app.features.compare.panel import ComparePanel
-from explorer.app.features.designs.panel import DesignsPanel
-from explorer.app.features.designs.shelf import Shelf
-from explorer.app.features.history.panel import HistoryPanel
-from explorer.app.features.legs.feed import RadiusFeed
-from explorer.app.features.legs.panel import LegsPanel
-from explorer.app.features.legs.tasks import draw_radius_curve
-from explorer.app.features.mechanism.design_panel import DesignPanel
-from explorer.app.features.mechanism.pose_panel import MovePanel
-from explorer.app.features.mechanism.show_panel import ViewPanel
-from explorer.app.features.optimise.panel import OptimisePanel
-from explorer.app.features.optimise.runner import Optimiser
-from explorer.app.features.paths.panel import PathsPanel
-from explorer.app.features.paths.runner import PathRunner
-from explorer.app.features.prototype.feed import PartsFeed
-from explorer.app.features.prototype.panel import PrototypePanel
-from explorer.app.features.sharing.downloads import Downloads
-from explorer.app.features.sharing.panel import SharePanel
-from explorer.app.features.singularity.feed import StrataFeed
-from explorer.app.features.singularity.jog_panel import JogPanel
-from explorer.app.features.singularity.panel import SingularityPanel
-from explorer.app.features.studies.folders import StudyFolders
-from explorer.app.features.studies.panel import StudiesPanel
-from explorer.app.features.workspace.feed import WorkspaceFeed
-from explorer.app.features.workspace.numbers import WorkspaceNumbers
-from explorer.app.features.workspace.panel import WorkspacePanel
-from explorer.app.features.workspace.tasks import draw_workspace
-from explorer.app.hands import Hands
+from explorer.app.browser.viser_gaps import run_script
+from explorer.app.features.feature import Panel, Place, Services
+from explorer.app.features.listed import FEATURES
+from explorer.app.layout import Layout
+from explorer.app.look import read_script, read_stylesheet
 from explorer.app.scene.camera import Cameras, ViewName
 from explorer.app.scene.placing import Placed
 from explorer.app.session.history import History
 from explorer.app.session.jobs import Worker
 from explorer.app.session.session import REDO, UNDO, Session, Who
-from explorer.app.state.actions import SetPose
 from explorer.app.state.frame import Frame
 from explorer.app.state.presses import Presses
 from explorer.app.state.state import State
-from explorer.app.storage.keeping import Keep, Keeper
+from explorer.app.storage.autosaver import Autosaver
 from explorer.app.storage.preferences import PreferenceFile
+from explorer.app.storage.study_folders import StudyFolders
+from explorer.app.storage.user_data import UserData
 from explorer.app.widgets.assigning import QUIET_SECONDS, Assigner, Update
-from explorer.mechanism.design import Design
+from explorer.app.widgets.buttons import Buttons
+from explorer.app.widgets.commands import KEYS
+from explorer.app.widgets.palette import Command, Palette
+from explorer.app.widgets.theme import Theme
+from explorer.numerics.arrays import FloatArray
 
 TITLE = "Flagged 4-4 explorer"
-# Modules that the worker imports before anything is asked of it.
-TASKS = tuple(task.__module__ for task in (draw_workspace, draw_radius_curve, compared_drawing))
-# What a notice is called that answers something asked for.
+# Modules that the worker imports at its start.
+TASKS = tuple({task.__module__: None for feature in FEATURES for task in feature.tasks})
+# Scripts of the whole page.
+SCRIPTS = ("fields", "room", "names", "cards")
+# Title of a notice that a request is refused.
 REFUSAL = "That is not possible"
-# One notice is shown this long, and not again within it.
+# Seconds for which a notice is shown, and not repeated.
 NOTICE_SECONDS = 6.0
-# While events come faster than frames, all figures are told this often.
-FIGURES_SECONDS = 0.1
-# To send a frame to one browser takes about so long; up to so many at once are not felt.
+# Seconds between two updates of all panels, while events come faster than frames.
+PANELS_SECONDS = 0.1
+# Seconds to send a frame to one browser, and number of browsers that need no rest.
 REST_SECONDS, FEW_BROWSERS, LONGEST_REST_SECONDS = 0.002, 4, 0.04
 # Properties that decide whether a control can be used.
-IN_USE = ("disabled", "visible")
-# Between two looks at a run that is waited for.
-WAIT_SECONDS = 0.02
-TRAVELS = {"Undo": UNDO, "Redo": REDO}
+USABILITY = ("disabled", "visible")
+HISTORY_MOVES = {"Undo": UNDO, "Redo": REDO}
 VIEW_LABELS: dict[str, ViewName] = {name.capitalize(): name for name in get_args(ViewName)}
 
 
@@ -81,11 +60,11 @@ class Page:
     """Draws frames on a viser server and posts what people do to the session.
 
     Args:
-        server: On which everything is drawn.
+        server: Server that the page is drawn on.
         state: The first state.
         docked: Whether the panels lie beside the scene, rather than over it.
-        keep: The user's designs and where the session is kept; None to keep nothing.
-        history: That led to the state; None where it begins with it.
+        user_data: The user's designs and where the session is saved; None to save nothing.
+        history: History that led to the state; None to start one with it.
         preferences: Where theme and tour are remembered; None to be light and to begin no
             tour by itself.
         studies: Where design studies lie; None to offer none.
@@ -97,16 +76,16 @@ class Page:
         state: State,
         *,
         docked: bool = True,
-        keep: Keep | None = None,
+        user_data: UserData | None = None,
         history: History | None = None,
         preferences: PreferenceFile | None = None,
         studies: StudyFolders | None = None,
     ) -> None:
         self._server = server
         self._notified: dict[str, float] = {}
-        self._told = 0.0
-        self._again: threading.Timer | None = None
-        # What is read on other threads may be there before the last panel is.
+        self._panels_updated = 0.0
+        self._redraw_timer: threading.Timer | None = None
+        # Other threads may ask for a frame before the last panel is there.
         self._is_complete = False
         self._frame = Frame(state)
         self._assigner = Assigner(server)
@@ -114,66 +93,51 @@ class Page:
         self.session = Session(
             state, self._draw, self._complain, self._report, history, press_at=presses.at
         )
-        faults = None if keep is None else keep.faults
-        self.worker = Worker(self._tell, preload=TASKS, faults=faults)
-        self.feed = WorkspaceFeed(self.worker, self.session.redraw)
-        self.radius_feed = RadiusFeed(self.worker, self.session.redraw)
-        self.strata_feed = StrataFeed(self.worker, self.session.redraw)
-        self.parts_feed = PartsFeed(self.worker, self.session.redraw)
-        self.compare_feed = CompareFeed(self.worker, self.session.redraw)
-        self.path_runner = PathRunner(self.session, self._tell, faults)
+        faults = None if user_data is None else user_data.faults
+        self.worker = Worker(self._announce, preload=TASKS, faults=faults)
         gui = server.gui
         gui.set_panel_label(TITLE)
-        self.hands = Hands(server, self.session, preferences, self._complain)
-        self.optimiser = Optimiser(
-            self.session,
-            self._tell,
-            lambda: self.feed.is_settled,
-            faults,
+        self.buttons = Buttons(server)
+        chosen = None if preferences is None else preferences.chosen
+        theme = Theme(
+            gui,
+            dark=False if chosen is None else chosen.dark,
+            changed=self.session.redraw,
         )
-        self._scene = Scene(server, self.feed, self.compare_feed)
-        self._cameras = Cameras(server.initial_camera, self._placed)
-        self.downloads = downloads = Downloads(
+        run_script(server, read_stylesheet())
+        for script in SCRIPTS:
+            run_script(server, read_script(script))
+        side, drawer = gui.add_panel(), gui.add_panel()
+        self.services = Services(
             server,
             self.session,
             self.worker,
+            self.buttons,
+            Downloads(server, self.worker, self._complain),
             self._complain,
-            lambda: self.hands.theme.is_dark,
+            self._announce,
+            theme,
+            drawer,
+            user_data,
+            studies,
+            preferences,
+            lambda: self.palette.commands,
         )
-        self._add_edit_buttons(gui)
-        self._add_view_buttons(gui)
-        tabs = gui.add_tab_group()
-        with tabs.add_tab("Move"):
-            move = MovePanel(gui, self.session)
-            jog = JogPanel(gui, self.session)
-        with tabs.add_tab("Design"):
-            design = DesignPanel(gui, self.session)
-        with tabs.add_tab("Workspace"):
-            self._workspace = WorkspacePanel(gui, self.session, downloads.workspace)
-        with tabs.add_tab("Optimise"):
-            self._optimise = OptimisePanel(
-                gui,
-                self.session,
-                lambda who: downloads.hull(self._workspace.file_format, who),
-                downloads.design,
-                downloads.search,
-            )
-        with tabs.add_tab("View"):
-            self._prototype = PrototypePanel(gui, self.session, downloads.assembly)
-            view = ViewPanel(gui, self.session)
-        side = gui.add_panel()
-        with side.add_tab("Singularity"):
-            self._singularity = SingularityPanel(gui, self.session)
-        with side.add_tab("Workspace"):
-            self._numbers = WorkspaceNumbers(gui)
-        with side.add_tab("Legs"):
-            self._legs = LegsPanel(gui, self.session)
-        with side.add_tab("Paths"):
-            paths = PathsPanel(gui, self.session, downloads.path)
-        self._panels = (move, jog, design, view, paths)
-        drawer = self._add_drawer(gui, keep, studies)
-        self.hands.complete(self._cameras, side, drawer, docked=docked)
-        self._scene.drag_handle.handle.on_update(self._dragged)
+        self.services.at_end(self.services.downloads.stop)
+        self.autosaver = None if user_data is None else Autosaver(user_data.store, self._announce)
+        server.scene.set_up_direction("+z")
+        self._features = tuple(each for each in FEATURES if each.is_offered(self.services))
+        self._feeds = [
+            self.services.get(kind) for feature in self._features for kind in feature.feeds
+        ]
+        self._scene = [self.services.get(part) for each in self._features for part in each.scene]
+        self._runners = [
+            self.services.get(kind) for each in self._features for kind in each.runners
+        ]
+        self._cameras = Cameras(server.initial_camera, self.corners)
+        self._panels = self._add_panels(side, drawer)
+        self.palette = self._add_palette()
+        Layout(server, theme, self._cameras, side, drawer, docked=docked)
         server.on_client_connect(self._cameras.connected)
         server.on_client_disconnect(self._cameras.disconnected)
         server.on_client_connect(lambda client: listen(client, presses))
@@ -182,33 +146,33 @@ class Page:
         self.session.redraw()
         self.session.wait_until_idle()
 
+    def start_workers(self) -> None:
+        """Start the processes that will be needed, that of the page first, in the background."""
+
+        def prepare() -> None:
+            for runner in self._runners:
+                runner.prepare()
+
+        self.worker.start(then=prepare)
+
     def stop(self) -> None:
-        """End the session and the worker."""
-        if self._again is not None:
-            self._again.cancel()
+        """End the session, the features and the worker."""
+        if self._redraw_timer is not None:
+            self._redraw_timer.cancel()
+        self.buttons.stop()
         self.session.stop()
-        if self.shelf is not None:
-            self.shelf.stop()
-        if self.keeper is not None:
-            self.keeper.stop()
-        if self.studies is not None:
-            self.studies.stop()
-        self.downloads.stop()
-        self.path_runner.stop()
+        self.services.stop()
+        if self.autosaver is not None:
+            self.autosaver.stop()
         self.worker.stop()
-        self.optimiser.stop()
 
     def wait_until_drawn(self, timeout: float = 30.0) -> bool:
-        """Wait until the newest state and its workspace are drawn; say whether they are.
-
-        A run of the optimiser is waited for too.
-        """
+        """Wait until the newest state and all that follows are drawn; return whether they are."""
         deadline = time.monotonic() + timeout
         idle = self.session.wait_until_idle(timeout)
-        while self.session.state.optimisation.is_on and time.monotonic() < deadline:
-            time.sleep(WAIT_SECONDS)
-        idle = idle and self.optimiser.worker.wait_until_idle(deadline - time.monotonic())
-        # Drawing may ask the worker, whose answer is drawn again.
+        for runner in self._runners:
+            idle = idle and runner.wait_until_idle(deadline - time.monotonic())
+        # Drawing may request work of the worker, whose result is drawn again.
         for _ in range(2):
             idle = idle and self.session.wait_until_idle(deadline - time.monotonic())
             idle = idle and self.worker.wait_until_idle(deadline - time.monotonic())
@@ -219,38 +183,35 @@ class Page:
         for client in self._server.get_clients().values():
             self._cameras.point(client, view)
 
-    def _add_drawer(
-        self, gui: viser.GuiApi, keep: Keep | None, studies: StudyFolders | None
-    ) -> viser.PanelHandle:
-        # A drawer over the foot of the scene: what is wide, and what is not needed all the time.
-        drawer = gui.add_panel()
-        self.shelf: Shelf | None = None
-        self.keeper: Keeper | None = None
-        self._designs: DesignsPanel | None = None
-        if keep is not None:
-            self.keeper = Keeper(keep.store, self._tell)
-            self.shelf = Shelf(keep.library, self.session, self._complain)
-            with drawer.add_tab("Designs"):
-                self._designs = DesignsPanel(gui, self.session, self.shelf, self.downloads.design)
-        with drawer.add_tab("Compare"):
-            self._compare = ComparePanel(gui, self.session, self._saved_designs)
-        self.studies: StudiesPanel | None = None
-        if studies is not None:
-            with drawer.add_tab("Studies") as tab:
-                self.studies = StudiesPanel(
-                    self._server,
-                    tab,
-                    self.session,
-                    studies,
-                    self._complain,
-                    lambda client, tall: self.hands.set_drawer(client, drawer, tall=tall),
-                    None if keep is None else keep.faults,
-                )
-        with drawer.add_tab("History"):
-            self._history = HistoryPanel(gui, self.session)
-        with drawer.add_tab("Share"):
-            self._share = SharePanel(gui, self.downloads)
-        return drawer
+    def _add_panels(self, side: viser.PanelHandle, drawer: viser.PanelHandle) -> list[Panel]:
+        gui = self._server.gui
+        declared = [tab for feature in self._features for tab in feature.tabs]
+        panels = [self.services.get(tab.panel) for tab in declared if tab.place == "top"]
+        self._add_edit_buttons(gui)
+        self._add_view_buttons(gui)
+        places = {"main": gui.add_tab_group(), "side": side, "drawer": drawer}
+        tabs: dict[tuple[Place, str], viser.GuiTabHandle] = {}
+        for tab in declared:
+            if tab.place == "top":
+                continue
+            key = (tab.place, tab.title)
+            if key not in tabs:
+                tabs[key] = places[tab.place].add_tab(tab.title)
+            self.services.tab = tabs[key]
+            with tabs[key]:
+                panels.append(self.services.get(tab.panel))
+        return panels
+
+    def _add_palette(self) -> Palette:
+        fit = Command(
+            "View › Fit", "Show the whole mechanism from where you look.", self._cameras.fit
+        )
+        commands = [each.of(self.session) for one in self._features for each in one.commands]
+        keys = dict(KEYS)
+        for feature in self._features:
+            keys.update(feature.keys)
+        lists = {label for feature in self._features for label in feature.lists}
+        return Palette(self._server, (*self.buttons.commands, fit, *commands), keys, lists)
 
     def _add_view_buttons(self, gui: viser.GuiApi) -> None:
         buttons = gui.add_button_group(
@@ -265,11 +226,11 @@ class Page:
     def _add_edit_buttons(self, gui: viser.GuiApi) -> None:
         buttons = gui.add_button_group(
             "Edit",
-            tuple(TRAVELS),
+            tuple(HISTORY_MOVES),
             hint="Undo the last step, or redo it; the drawer lists them all.",
         )
         buttons.on_click(
-            lambda event: self.session.travel(TRAVELS[buttons.value], who=event.client_id)
+            lambda event: self.session.travel(HISTORY_MOVES[buttons.value], who=event.client_id)
         )
 
     def _draw(self, frame: Frame) -> None:
@@ -280,106 +241,73 @@ class Page:
 
     def _draw_all(self, frame: Frame) -> None:
         self._frame, began = frame, time.time()
-        step = self.session.history.step
-        self.downloads.log.record(frame.state, step.number, step.words)
-        if self.keeper is not None:
-            self.keeper.follow(frame.state, self.session.history)
-        # First, so that what is asked for is called out of date until it arrives.
-        for feed in (self.feed, self.radius_feed, self.strata_feed, self.parts_feed):
+        if self.autosaver is not None:
+            self.autosaver.follow(frame.state, self.session.history)
+        # Feeds come first, so that a drawing counts as outdated until the new one arrives.
+        for feed in self._feeds:
             feed.follow(frame)
-        self.compare_feed.follow(frame)
-        # The mechanism follows the hand before the figures do, which nobody reads meanwhile.
-        self._assigner.assign(self._scene.updates(self._placed()), since=began)
-        self.optimiser.follow(frame)
-        self.path_runner.follow(frame)
-        changed = self._assigner.assign(self._told_now(frame), since=began)
-        # What a control allows, its command does; controls have been told of it by now.
-        controls = any(name in IN_USE for _, name, _ in changed)
-        self._assigner.assign(self.hands.updates(controls=controls))
-        if self.shelf is not None:
-            self.hands.offer_saved(self.shelf)
-        self.hands.follow(frame)
+        # The scene is updated before the panels, whose numbers nobody reads during a drag.
+        placed = self._placed()
+        drawn = [update for part in self._scene for update in part.updates(placed)]
+        self._assigner.assign(drawn, since=began)
+        for runner in self._runners:
+            runner.follow(frame)
+        changed = self._assigner.assign(self._panel_updates(frame), since=began)
+        # A command is enabled as its control is, so that it is updated after the controls.
+        controls = any(name in USABILITY for _, name, _ in changed)
+        self._assigner.assign(self.palette.updates(controls=controls))
+        for feature in self._features:
+            if feature.passing is not None:
+                self.palette.offer(feature.name, feature.passing(self.services))
         if self._assigner.settle():
-            self._look_again()
+            self._schedule_redraw()
 
-    def _look_again(self) -> None:
-        """Draw once more when hands rest, unless that is to come already."""
-        if self._again is None:
-            self._again = threading.Timer(QUIET_SECONDS, self._draw_again)
-            self._again.daemon = True
-            self._again.start()
+    def _schedule_redraw(self) -> None:
+        """Schedule one more frame for when no control is moved, unless one is scheduled."""
+        if self._redraw_timer is None:
+            self._redraw_timer = threading.Timer(QUIET_SECONDS, self._redraw)
+            self._redraw_timer.daemon = True
+            self._redraw_timer.start()
 
-    def _draw_again(self) -> None:
-        self._again = None
+    def _redraw(self) -> None:
+        self._redraw_timer = None
         self.session.redraw()
 
-    def _told_now(self, frame: Frame) -> list[Update]:
-        """Return what makes the panels show a frame, or the first of them if another waits.
+    def _panel_updates(self, frame: Frame) -> list[Update]:
+        """Return the updates of the panels for a frame, or of the first panels if another waits.
 
-        What is left out is told with the next frame.
+        The panels that are left out are updated with the next frame.
         """
-        is_due = time.monotonic() - self._told >= FIGURES_SECONDS
+        is_due = time.monotonic() - self._panels_updated >= PANELS_SECONDS
         updates: list[Update] = []
-        for panel in self._figures(frame):
+        for panel in self._panels:
             if self.session.has_more and not is_due:
                 return updates
-            updates.extend(panel)
-        self._told = time.monotonic()
+            updates.extend(panel.updates(frame))
+        self._panels_updated = time.monotonic()
         return updates
 
-    def _figures(self, frame: Frame) -> Iterator[Iterable[Update]]:
-        """Yield the updates of panel after panel; each is computed when it is gone through."""
-        for panel in (self._optimise, *self._panels):
-            yield panel.updates(frame)
-        for panel in (self._workspace, self._numbers):
-            yield panel.updates(frame, self.feed)
-        yield self._legs.updates(frame, self.radius_feed)
-        yield self._singularity.updates(frame, self.strata_feed)
-        yield self._prototype.updates(frame, self.parts_feed)
-        yield self._history.updates(self.session.history)
-        if self._designs is not None:
-            yield self._designs.updates(frame)
-        if self.studies is not None:
-            yield self.studies.updates(frame, dark=self.hands.theme.is_dark)
-        yield self._compare.updates(frame, self.compare_feed)
-        yield self._share.updates()
-
     def _rest(self) -> None:
-        """Leave the processor to the many browsers that a frame has to be sent to."""
+        """Leave the processor time for sending a frame to many browsers."""
         many = len(self._server.get_clients()) - FEW_BROWSERS
         if many > 0:
             time.sleep(min(REST_SECONDS * many, LONGEST_REST_SECONDS))
 
-    def _saved_designs(self) -> tuple[Design, ...]:
-        entries = () if self.shelf is None else self.shelf.entries
-        return tuple(entry.design for entry in entries if entry.design is not None)
-
     def _placed(self) -> Placed:
-        drawing = self.feed.drawing
-        boxes = self.compare_feed.extents(self._frame.state)
-        if drawing is not None and drawing.extent is not None:
-            boxes.append(np.array(drawing.extent))
-        box = None
-        if boxes:
-            box = np.array([np.min(boxes, axis=0)[0], np.max(boxes, axis=0)[1]])
-        return Placed(self._frame, box, self.parts_feed.parts, self.hands.theme.is_dark)
+        floors = (each.floor(self.services) for each in self._features if each.floor is not None)
+        floor = next((floor for floor in floors if floor is not None), None)
+        return Placed(self._frame, self.services.theme.is_dark, floor)
 
-    def _dragged(self, event: viser.TransformControlsEvent) -> None:
-        if event.client_id is None:
-            return
-        gizmo = self._scene.drag_handle
-        self.session.post(
-            "drag",
-            lambda state: SetPose(gizmo.pose(state)),
-            stamp=gizmo.handle.update_timestamp,
-            who=event.client_id,
-        )
+    def corners(self) -> FloatArray:
+        """Return the points of all that a picture must show, shape (n, 3)."""
+        placed = self._placed()
+        return np.concatenate([part.corners(placed) for part in self._scene])
 
     def _complain(self, message: str, who: Who) -> None:
         self._notify(REFUSAL, message, who)
 
-    def _tell(self, message: str) -> None:
-        """Tell all of what nobody asked for."""
+    def _announce(self, message: str) -> None:
+        """Notify all browsers of what no request caused."""
         self._notify("Please note", message, None)
 
     def _report(self, error: Exception) -> None:

@@ -1,7 +1,7 @@
 """Pictures of the page or of the scene alone, taken by a headless browser.
 
 The browser is a real one with a software renderer, so the pictures need no display and
-no graphics card, and the README's can be made again by anyone.
+no graphics card.
 """
 
 from __future__ import annotations
@@ -24,12 +24,14 @@ if TYPE_CHECKING:
 
 # A software renderer on a busy machine takes seconds for a large picture.
 PATIENCE_SECONDS = 60.0
-# Charts have canvases too; three.js marks its own.
+# Selector of the canvas with the scene: charts have canvases too, but three.js marks its own.
 SCENE_CANVAS = "canvas[data-engine]"
+# Seconds after which the camera is moved a little if the size of the canvas is not known.
 NUDGE_SECONDS = 2.0
-# A panel that docks changes the shape of the canvas by far more.
+# Relative difference of aspect ratios that count as equal; a panel that docks changes the shape
+# of the canvas by far more.
 SAME_SHAPE = 0.01
-# Whatever neither holds the canvas nor is it.
+# Style that hides every element but the canvas and those around it.
 SCENE_ALONE = (
     f"body *:not(:has({SCENE_CANVAS})):not({SCENE_CANVAS}) {{ visibility: hidden !important; }}"
 )
@@ -49,8 +51,8 @@ def take(
 
     Args:
         design: The manipulator.
-        pose: Of its platform; its home pose if None.
-        view: From where to look.
+        pose: Pose of the platform; the home pose if None.
+        view: Side from which to look.
         out: The file to write.
         size: Width and height in pixels.
         panels: Whether to show the page with its panels, rather than the scene alone.
@@ -77,9 +79,9 @@ def picture(
     tab: str | None = None,
     prepare: Callable[[Running], None] | None = None,
 ) -> bytes:
-    """Return a picture as `take` writes it, from a browser that serves for many.
+    """Return a picture as `take` writes it, from a browser that is running already.
 
-    The panels may be turned to a tab by its name.
+    A tab of the panels may be chosen by its name.
 
     Raises:
         PictureError: the browser did not draw in time.
@@ -118,8 +120,8 @@ def open_page(
     known = set(running.viser.get_clients())
     page = browser.new_page(viewport={"width": size[0], "height": size[1]})
     page.set_default_timeout(1000.0 * PATIENCE_SECONDS)
-    page.goto(evenly_drawn(running))
-    # viser tells of software rendering; a picture is not the place for it.
+    page.goto(fixed_resolution_url(running))
+    # viser warns of software rendering; no picture shows the warning.
     page.add_style_tag(content=".mantine-Notifications-root { display: none !important; }")
     deadline = time.monotonic() + PATIENCE_SECONDS
     while time.monotonic() < deadline:
@@ -130,8 +132,8 @@ def open_page(
     raise PictureError("the page did not connect to the explorer in time")
 
 
-def evenly_drawn(running: Running) -> str:
-    """Return the address of a page that never draws coarser for being slow, as viser's do."""
+def fixed_resolution_url(running: Running) -> str:
+    """Return the address of the page at a fixed resolution: viser lowers it on slow machines."""
     return f"{running.url}/?fixedDpr=1"
 
 
@@ -142,27 +144,27 @@ def settle(page: Page, client: ClientHandle) -> None:
         PictureError: it does not draw in time.
     """
     deadline = time.monotonic() + PATIENCE_SECONDS
-    asked = time.monotonic()
-    while not _knows_its_size(page, client):
+    nudged = time.monotonic()
+    while not _is_size_known(page, client):
         now = time.monotonic()
         if now > deadline:
             raise PictureError("the page did not come to rest in time")
-        if now > asked + NUDGE_SECONDS:
-            # A browser may tell its size before it has changed; any move makes it tell again.
+        if now > nudged + NUDGE_SECONDS:
+            # A browser may report its size before it has changed; any move makes it report again.
             client.camera.position = client.camera.position * (1.0 + 1e-4)
-            asked = now
+            nudged = now
         page.wait_for_timeout(50)
-    # A frame that comes back tells that all that was sent before it has arrived.
+    # A frame that comes back shows that all earlier messages have arrived.
     try:
         client.get_render(16, 16, timeout=PATIENCE_SECONDS)
     except (TimeoutError, RuntimeError):
         raise PictureError("the page did not draw in time") from None
 
 
-def _knows_its_size(page: Page, client: ClientHandle) -> bool:
+def _is_size_known(page: Page, client: ClientHandle) -> bool:
     """Whether the server knows the size of the canvas, which docked panels narrow.
 
-    To a pixel of those that are drawn: a busy browser draws fewer than it shows.
+    Aspect ratios are compared, since a busy browser draws fewer pixels than it shows.
     """
     box = page.locator(SCENE_CANVAS).bounding_box()
     if box is None:
@@ -179,7 +181,7 @@ def stable_picture(page: Page) -> bytes:
     deadline = time.monotonic() + PATIENCE_SECONDS
     last = page.screenshot()
     while time.monotonic() < deadline:
-        # Longer than what fades in takes.
+        # This is longer than any part of the page takes to fade in.
         page.wait_for_timeout(300)
         data = page.screenshot()
         if data == last:

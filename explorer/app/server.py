@@ -15,31 +15,31 @@ from pathlib import Path
 import viser
 
 from explorer.app.browser.viser_gaps import (
-    ControlsOf,
+    ServerControls,
     refuse_tunnels,
+    report_uploads_to_senders,
     start_viser,
     stop_viser,
-    tell_uploads_to_their_senders,
 )
-from explorer.app.features.studies.folders import STUDIES_FOLDER, StudyFolders
 from explorer.app.page import TITLE, Page
 from explorer.app.security.access import EVERYWHERE, Access, is_loopback
 from explorer.app.security.guard import Guard
-from explorer.app.session.memory import given_back, keep_for_good, limit_arenas
-from explorer.app.state.drawable import check_drawable
+from explorer.app.session.drawable import check_drawable
+from explorer.app.session.memory import freeze_objects, limit_arenas, trim_repeatedly
 from explorer.app.state.state import opened
 from explorer.app.storage.folder import data_folder
-from explorer.app.storage.keeping import Keep, history_of, take_up
 from explorer.app.storage.preferences import PreferenceFile
+from explorer.app.storage.study_folders import STUDIES_FOLDER, StudyFolders
+from explorer.app.storage.user_data import UserData, open_user_data
 from explorer.errors import ExplorerError, ServerError
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
 from explorer.numerics.compiled import warm_in_background
 
-# Opens where there is no session to go on with.
+# Preset that is opened if there is no session to go on with.
 FIRST_DESIGN = "paper-optimal"
-# How soon an interruption is heard where it does not end a wait.
+# Longest delay of an interruption, on systems where it does not end a wait.
 WAKE_SECONDS = 1.0
 
 
@@ -50,7 +50,7 @@ class Running:
     Attributes:
         viser: The server that the page is drawn on.
         page: The page.
-        access: Who may come in.
+        access: The rule for who may connect.
     """
 
     viser: viser.ViserServer
@@ -59,7 +59,7 @@ class Running:
 
     @property
     def url(self) -> str:
-        """Where a browser on this machine finds it, with the token if there is one."""
+        """The address for a browser on this machine, with the token if there is one."""
         return self.access.url(self.viser.get_port())
 
     def stop(self) -> None:
@@ -76,7 +76,7 @@ def start(
     port: int = 8080,
     token: str | None = None,
     docked: bool = True,
-    keep: Keep | None = None,
+    user_data: UserData | None = None,
     preferences: PreferenceFile | None = None,
     studies: StudyFolders | None = None,
 ) -> Running:
@@ -84,14 +84,14 @@ def start(
 
     Args:
         design: The manipulator to open, unless a session is gone on with.
-        pose: In which to open it; its home pose if None.
+        pose: Pose in which to open it; its home pose if None.
         host: The address to listen on.
         port: The port to listen on; any free one if 0.
         token: What has to be known to get in; if None a random one is made, but none for
             a host that only this machine reaches.
         docked: Whether the panels lie beside the scene, rather than over it.
-        keep: The user's designs, where the session is kept and with which to go on; None
-            to keep nothing.
+        user_data: The user's designs, where the session is saved and the history to go on with;
+            None to save nothing.
         preferences: Where theme and tour are remembered; None to be light and to begin no
             tour by itself.
         studies: Where design studies lie; None to offer none.
@@ -100,8 +100,8 @@ def start(
         InputError: the design or the pose is too large to be drawn.
         ServerError: the address or the port cannot be had, or the token cannot be used.
     """
-    left = None if keep is None else keep.left
-    state = opened(design, pose) if left is None else left.present
+    history = None if user_data is None else user_data.history
+    state = opened(design, pose) if history is None else history.step.state
     check_drawable(state)
     access = Access.to(host, token)
     guard = Guard(access)
@@ -111,18 +111,17 @@ def start(
         stop_viser(server)
         raise _taken(port)
     refuse_tunnels(server)
-    tell_uploads_to_their_senders(server)
-    history = None if left is None else history_of(left)
+    report_uploads_to_senders(server)
     page = Page(
         server,
         state,
         docked=docked,
-        keep=keep,
+        user_data=user_data,
         history=history,
         preferences=preferences,
         studies=studies,
     )
-    guard.let_in(ControlsOf(server), lambda: page.session.waiting)
+    guard.let_in(ServerControls(server), lambda: page.session.waiting)
     return Running(server, page, access)
 
 
@@ -135,10 +134,10 @@ def serve(
     open_browser: bool = True,
     studies: Sequence[Path] = (),
 ) -> None:
-    """Serve the explorer until it is interrupted; all that is done in it is kept.
+    """Serve the explorer until it is interrupted, and save the session.
 
     Args:
-        design: The manipulator to open; None to go on with the session that was left last.
+        design: The manipulator to open; None to go on with the newest session.
         host: The address to listen on.
         port: The port to listen on; any free one if 0.
         token: What has to be known to get in; if None a random one is made, but none for
@@ -150,8 +149,8 @@ def serve(
         ServerError: the address or the port cannot be had, or the token cannot be used.
     """
     limit_arenas()
-    keep = take_up(resume=design is None)
-    for message in keep.messages:
+    user_data = open_user_data(resume=design is None)
+    for message in user_data.messages:
         sys.stderr.write(f"{message}\n")
     opening = PRESETS[FIRST_DESIGN] if design is None else design
     try:
@@ -160,27 +159,27 @@ def serve(
             host=host,
             port=port,
             token=token,
-            keep=keep,
+            user_data=user_data,
             preferences=PreferenceFile(data_folder()),
             studies=StudyFolders(data_folder() / STUDIES_FOLDER, studies),
         )
     except ExplorerError:
-        keep.store.close()
+        user_data.store.close()
         raise
-    if keep.left is not None:
-        name = keep.left.present.design.name
+    if user_data.history is not None:
+        name = user_data.history.step.state.design.name
         sys.stderr.write(f"Going on with {name!r} where it was left.\n")
     try:
-        with contextlib.suppress(KeyboardInterrupt), given_back():
-            _attend(running, open_browser)
+        with contextlib.suppress(KeyboardInterrupt), trim_repeatedly():
+            _wait_for_interruption(running, open_browser)
         sys.stderr.write("Stopped.\n")
     finally:
         running.stop()
 
 
-def _attend(running: Running, open_browser: bool) -> None:
-    """Say where the page is, make ready what it needs, and wait for an interruption."""
-    interrupted = _interruption()
+def _wait_for_interruption(running: Running, open_browser: bool) -> None:
+    """Print the address of the page, start what it needs, and wait for an interruption."""
+    interrupted = _catch_interruption()
     sys.stderr.write(f"{TITLE}: {running.url}   (Ctrl-C stops it)\n")
     access = running.access
     if not is_loopback(access.host):
@@ -191,34 +190,33 @@ def _attend(running: Running, open_browser: bool) -> None:
             "Nothing is encrypted.\n"
         )
     sys.stderr.flush()
-    keep_for_good()
-    warm_in_background(then=keep_for_good)
-    # One after the other, and what the page needs first.
-    running.page.worker.start(then=running.page.optimiser.worker.start)
+    freeze_objects()
+    warm_in_background(then=freeze_objects)
+    running.page.start_workers()
     if open_browser:
         threading.Thread(target=webbrowser.open, args=(running.url,), daemon=True).start()
-    # Some systems hear of signals only between two waits.
+    # Some systems handle signals only between two waits.
     while not interrupted.wait(WAKE_SECONDS):
         pass
 
 
-def _interruption() -> threading.Event:
-    """Return what the first Ctrl-C sets; the next one interrupts as ever.
+def _catch_interruption() -> threading.Event:
+    """Return an event that the first Ctrl-C sets; the next one interrupts as usual.
 
-    Python would raise wherever it is, and what is raised while the collector or a finaliser
-    runs is lost. Where nothing is to be interrupted, as in a background job, nothing changes.
+    Python would raise at any point, and an exception within the garbage collector or a finaliser
+    is lost. Where Ctrl-C is ignored, as in a background job, nothing changes.
     """
-    asked = threading.Event()
+    interrupted = threading.Event()
     usual = signal.getsignal(signal.SIGINT)
     in_main = threading.current_thread() is threading.main_thread()
     if in_main and usual is signal.default_int_handler:
 
-        def ask(*_: object) -> None:
+        def interrupt(*_: object) -> None:
             signal.signal(signal.SIGINT, usual)
-            asked.set()
+            interrupted.set()
 
-        signal.signal(signal.SIGINT, ask)
-    return asked
+        signal.signal(signal.SIGINT, interrupt)
+    return interrupted
 
 
 def _check_free(host: str, port: int) -> None:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import contextlib
 import os
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Annotated
 
 import msgspec
 import tyro
 
-from explorer.cli.values import numbers
+from explorer.cli.output import write_json, write_lines
+from explorer.cli.values import DESIGN_NAME, Flag, hint, numbers
 from explorer.errors import DesignError, ExplorerError, InputError
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import load_design
@@ -22,16 +24,12 @@ from explorer.mechanism.pose import Pose, Quadruple, Triple
 class DesignOptions:
     """The option for the design."""
 
-    design: Annotated[str, tyro.conf.arg(metavar="PRESET_OR_FILE")] = "paper-optimal"
+    design: Annotated[str, tyro.conf.arg(metavar=DESIGN_NAME)] = "paper-optimal"
     """A preset (paper-initial, paper-optimal), a design file (JSON), or the name of a design
     saved on the page."""
 
     def load(self) -> Design:
-        """Return the design.
-
-        Raises:
-            DesignError: no such preset, file or saved design, or a file without a design.
-        """
+        """Return the design, as `load` does."""
         return load(self.design)
 
 
@@ -39,12 +37,12 @@ def load(name: str) -> Design:
     """Return a preset, the design in a file, or a design saved on the page.
 
     Raises:
-        DesignError: no such preset, file or saved design, or a file without a design.
+        DesignError: There is no such preset, file or saved design, or the file holds no design.
     """
     try:
         return load_design(name)
     except DesignError:
-        # A file of this name exists, so it was meant, and is invalid.
+        # The name means a file that exists; its error says what is wrong with it.
         if os.path.exists(name):  # noqa: PTH110 - that of a Path raises for names too long
             raise
         from explorer.app.storage.library import Library
@@ -58,8 +56,17 @@ def load(name: str) -> Design:
 class JsonOptions:
     """The option for JSON."""
 
-    json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    json: Flag = False
     """Write one JSON object to standard output, and nothing else."""
+
+    def write(
+        self, as_json: Callable[[], Mapping[str, object]], as_lines: Callable[[], Iterable[str]]
+    ) -> None:
+        """Write the answer to standard output: as JSON with `--json`, otherwise as text."""
+        if self.json:
+            write_json(as_json())
+        else:
+            write_lines(*as_lines())
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,7 +76,7 @@ class RadiiOptions:
     radii: Annotated[
         Quadruple | None,
         numbers("--radii", "r1 r2 r3 r4", or_one=True),
-        tyro.conf.arg(help_behavior_hint="(default: those of the design)"),
+        hint("default: those of the design"),
     ] = None
     """Radii of the four legs in design units, or one for all."""
 
@@ -77,7 +84,7 @@ class RadiiOptions:
         """Return the design with the given radii.
 
         Raises:
-            DesignError: a radius is negative.
+            DesignError: A radius is negative.
         """
         if self.radii is None:
             return design
@@ -85,49 +92,63 @@ class RadiiOptions:
         return msgspec.structs.replace(design, limits=limits)
 
 
-_THE_HOME = tyro.conf.arg(help_behavior_hint="(default: that of the home pose)")
+def make_pose(
+    option: str,
+    default: Pose,
+    position: Triple | None,
+    quaternion: Quadruple | None,
+    yaw_pitch_roll: Triple | None,
+) -> Pose:
+    """Return the pose that options give, completed from a default pose.
+
+    Args:
+        option: Start of the names of both options for the orientation, such as ``--to-``.
+        default: Pose that completes what is not given.
+        position: Position of b4 in the base frame, in design units.
+        quaternion: Orientation as (w, x, y, z), of any length but zero.
+        yaw_pitch_roll: Orientation as angles in degrees.
+
+    Raises:
+        InputError: There are two orientations, or the quaternion is zero.
+    """
+    if quaternion is not None and yaw_pitch_roll is not None:
+        raise InputError(f"give one of {option}quaternion and {option}yaw-pitch-roll, not both")
+    at = default.position if position is None else position
+    if yaw_pitch_roll is not None:
+        return Pose.of_yaw_pitch_roll(at, yaw_pitch_roll)
+    return Pose(at, quaternion or default.quaternion)
+
+
+_HOME_HINT = hint("default: that of the home pose")
 
 
 @dataclass(frozen=True, kw_only=True)
 class OrientationOptions:
     """The options for the orientation; that of the home pose by default."""
 
-    quaternion: Annotated[Quadruple | None, numbers("--quaternion", "w x y z"), _THE_HOME] = None
+    quaternion: Annotated[Quadruple | None, numbers("--quaternion", "w x y z"), _HOME_HINT] = None
     """Orientation of the platform; of any length but zero."""
 
     yaw_pitch_roll: Annotated[
         Triple | None,
         numbers("--yaw-pitch-roll", "yaw pitch roll"),
-        tyro.conf.arg(help_behavior_hint="(instead of --quaternion)"),
+        hint("instead of --quaternion"),
     ] = None
     """Orientation of the platform: angles in degrees about its own z, then y, then x axis."""
 
     def oriented_home(self, design: Design) -> Pose:
-        """Return the home pose of the design, with the given orientation.
-
-        Raises:
-            InputError: two orientations, or a quaternion of length zero.
-        """
-        if self.quaternion is not None and self.yaw_pitch_roll is not None:
-            raise InputError("give one of --quaternion and --yaw-pitch-roll, not both")
-        home = home_pose(design)
-        if self.yaw_pitch_roll is not None:
-            return Pose.of_yaw_pitch_roll(home.position, self.yaw_pitch_roll)
-        return Pose(home.position, self.quaternion or home.quaternion)
+        """Return the home pose of the design with the given orientation, as `make_pose` does."""
+        return make_pose("--", home_pose(design), None, self.quaternion, self.yaw_pitch_roll)
 
 
 @dataclass(frozen=True, kw_only=True)
 class PoseOptions(OrientationOptions):
     """The options for the pose; position and orientation are those of the home pose by default."""
 
-    position: Annotated[Triple | None, numbers("--position", "x y z"), _THE_HOME] = None
+    position: Annotated[Triple | None, numbers("--position", "x y z"), _HOME_HINT] = None
     """Position of b4 in the base frame, in design units."""
 
     def pose(self, design: Design) -> Pose:
-        """Return the pose, completed from the home pose.
-
-        Raises:
-            InputError: two orientations, or a quaternion of length zero.
-        """
-        oriented = self.oriented_home(design)
-        return oriented if self.position is None else Pose(self.position, oriented.quaternion)
+        """Return the given pose completed from the home pose, as `make_pose` does."""
+        home, position = home_pose(design), self.position
+        return make_pose("--", home, position, self.quaternion, self.yaw_pitch_roll)

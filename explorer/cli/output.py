@@ -6,15 +6,20 @@ The text has no colours, and its numbers have ASCII minus signs, so that they ca
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from pathlib import PurePath
+from typing import TYPE_CHECKING, Any
 
 from explorer.cli.streams import write
 from explorer.mechanism.design import Design
+from explorer.mechanism.design_file import encode_design
 from explorer.mechanism.pose import Pose, yaw_pitch_roll_from_rotation
 from explorer.numerics.number_text import format_ascii, format_fixed
 
 if TYPE_CHECKING:
+    from explorer.measures.measure import Measure
+    from explorer.measures.snapshot import Snapshot
     from explorer.workspace.solids.solid import Solid
 
 
@@ -22,9 +27,32 @@ def write_json(answer: Mapping[str, object]) -> None:
     """Write the one JSON object of a command to standard output.
 
     Args:
-        answer: Plain values, lists and mappings; arrays as lists, no NaN or infinity.
+        answer: Plain values, lists, mappings, arrays, designs and paths; no NaN or infinity.
     """
-    write(json.dumps(answer, allow_nan=False) + "\n")
+    write(json.dumps(answer, allow_nan=False, default=_plain) + "\n")
+
+
+def _plain(value: Any) -> object:
+    """Convert a value that JSON cannot hold: a design, a path or an array."""
+    if isinstance(value, Design):
+        return json.loads(encode_design(value))
+    return str(value) if isinstance(value, PurePath) else value.tolist()
+
+
+def attributes(of: object, names: str) -> dict[str, object]:
+    """Return attributes of a value by their names, which spaces separate."""
+    return {name: getattr(of, name) for name in names.split()}
+
+
+def finite(value: float) -> float | None:
+    """Return a number, or None for the infinite clearance of legs that share a joint."""
+    return value if math.isfinite(value) else None
+
+
+def limits_json(snapshot: Snapshot) -> dict[str, object]:
+    """Return whether a pose is within the limits, and the limits that it violates."""
+    violations = [str(violation) for violation in snapshot.violations]
+    return {"within_limits": not violations, "violations": violations}
 
 
 def write_lines(*lines: str) -> None:
@@ -48,33 +76,43 @@ def table(rows: Sequence[Sequence[str]], align: str) -> str:
     )
 
 
+def indented(text: str) -> list[str]:
+    """Return the lines of a text, indented by two spaces."""
+    return [f"  {line}" for line in text.splitlines()]
+
+
 def figure(value: float, size: float = 0.0) -> str:
     """Return a number with six significant digits.
 
     Args:
         value: Number to write.
-        size: Magnitude of the terms that it is computed from; rounding errors of it read 0.
+        size: Magnitude of the terms that it is computed from; their rounding errors read 0.
     """
     return format_ascii(value, 6, size=size, padded=True)
 
 
+def measure_text(measure: Measure, value: float | None) -> str:
+    """Return the value of a measure as text, "none" if there is none."""
+    if value is None:
+        return "none"
+    return str(round(value)) if measure.is_whole else figure(value)
+
+
+def lengths(design: Design, value: float, size: float = 0.0) -> tuple[str, str]:
+    """Return a length in design units and in millimetres, as `figure` writes it."""
+    return figure(value, size), figure(value * design.unit_mm, size * design.unit_mm)
+
+
 def figures(values: Iterable[float]) -> list[str]:
     """Return numbers of equal unit with six significant digits."""
-    listed = list(values)
-    size = max(map(abs, listed), default=0.0)
-    return [figure(value, size) for value in listed]
+    numbers = list(values)
+    size = max(map(abs, numbers), default=0.0)
+    return [figure(number, size) for number in numbers]
 
 
 def degrees(values: Iterable[float]) -> list[str]:
     """Return angles in degrees with three decimals each, never a negative zero."""
     return [f"{format_fixed(value, 3)}°" for value in values]
-
-
-def millimetres(design: Design, values: Iterable[float]) -> str:
-    """Return lengths in design units as millimetres in brackets."""
-    listed = [value * design.unit_mm for value in values]
-    size = max(map(abs, listed), default=0.0)
-    return f"[{', '.join(format_ascii(value, 6, size=size) for value in listed)} mm]"
 
 
 def heading(design: Design) -> str:
@@ -87,15 +125,22 @@ def heading(design: Design) -> str:
 def pose_table(design: Design, pose: Pose) -> str:
     """Return three lines: position, quaternion and angles of a pose."""
     angles = yaw_pitch_roll_from_rotation(pose.rotation).tolist()
-    position = f"{'  '.join(figures(pose.position))}  {millimetres(design, pose.position)}"
+    millimetres = [value * design.unit_mm for value in pose.position]
+    size = max(map(abs, millimetres))
+    in_mm = ", ".join(format_ascii(value, 6, size=size) for value in millimetres)
     return table(
         [
-            ("position", position),
+            ("position", f"{'  '.join(figures(pose.position))}  [{in_mm} mm]"),
             ("quaternion", "  ".join(figures(pose.quaternion))),
             ("yaw pitch roll", "  ".join(degrees(angles))),
         ],
         "<<",
     )
+
+
+def radii_line(design: Design) -> str:
+    """Return the line of the radii of the legs, in design units."""
+    return f"radii of the legs  {'  '.join(f'{radius:.6g}' for radius in design.limits.leg_radii)}"
 
 
 DISAGREES = "its volume does not agree with the exact one"

@@ -35,7 +35,7 @@ class Command(Protocol):
         """Run the command and write its answer to standard output.
 
         Raises:
-            ExplorerError: bad input, or the question has no answer.
+            ExplorerError: The input is bad, or the question has no answer.
         """
         ...
 
@@ -44,7 +44,7 @@ def load_command(name: str, known: Iterable[str]) -> type[Command]:
     """Import a command's module and return its dataclass.
 
     Raises:
-        UsageError: unknown command; the message suggests a similar one.
+        UsageError: The command is unknown; the message suggests a similar one.
     """
     if name not in known:
         hint = suggestion(name, known) or f"there are {', '.join(known)}"
@@ -57,7 +57,7 @@ def parse(name: str, command: type[Command], argv: Sequence[str]) -> Command | N
     """Return the command with its options set; None if the arguments ask for help.
 
     Raises:
-        UsageError: invalid arguments.
+        UsageError: The arguments are invalid.
     """
     program = f"explorer {name}"
     page, errors = io.StringIO(), io.StringIO()
@@ -69,8 +69,8 @@ def parse(name: str, command: type[Command], argv: Sequence[str]) -> Command | N
         if not unread:
             return parsed
         reason = f"cannot make sense of {unread[0]!r}"
-    except SystemExit as leave:
-        if not leave.code:
+    except SystemExit as end:
+        if not end.code:
             write("".join(f"{line.rstrip()}\n" for line in page.getvalue().splitlines()))
             return None
         reason = condense(errors.getvalue())
@@ -82,7 +82,7 @@ def parse(name: str, command: type[Command], argv: Sequence[str]) -> Command | N
 def condense(message: str) -> str:
     """Return the first sentence of tyro's framed message, as one line without the frame."""
     lines = [_COLOUR.sub("", line).strip() for line in message.strip().splitlines()]
-    titled = bool(lines) and lines[0].startswith("╭")
+    has_title = bool(lines) and lines[0].startswith("╭")
     sections: list[list[str]] = [[]]
     for line in lines:
         is_rule = line.startswith("╭") or not line.strip(_FRAME + "-")
@@ -92,7 +92,7 @@ def condense(message: str) -> str:
             sections.append([])
     sections = [section for section in sections if section]
     # Without line-drawing characters the title is a section of its own, over a rule.
-    body = sections[min(len(sections) - 1, 0 if titled else 1)] if sections else []
+    body = sections[min(len(sections) - 1, 0 if has_title else 1)] if sections else []
     text = " ".join(body)
     if text.startswith("Missing from"):
         options = [words.split()[0] for words in body if words.startswith("--")]

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from explorer.optimise.outcome import Iterate
 
 WIDTH = 20
-# The seconds between updates, in a terminal and elsewhere.
+# Seconds between updates, in a terminal and elsewhere.
 IN_TERMINAL, ELSEWHERE = 0.05, 1.0
 
 
@@ -20,8 +20,8 @@ class Meter:
 
     def __init__(self) -> None:
         self.is_terminal = sys.stderr.isatty()
-        self._shown = 0.0
-        self._last = 0
+        self._last_update = 0.0
+        self._last_width = 0
 
     def __enter__(self) -> Self:
         """Return the meter."""
@@ -38,16 +38,16 @@ class Meter:
 
     def clear(self) -> None:
         """Erase the bar from a terminal."""
-        if self._last and self.is_terminal:
-            sys.stderr.write("\r" + " " * self._last + "\r")
+        if self._last_width and self.is_terminal:
+            sys.stderr.write("\r" + " " * self._last_width + "\r")
             sys.stderr.flush()
-        self._last = 0
+        self._last_width = 0
 
     @property
     def is_due(self) -> bool:
         """Whether the last update is old enough for another."""
         pause = IN_TERMINAL if self.is_terminal else ELSEWHERE
-        return time.monotonic() - self._shown >= pause
+        return time.monotonic() - self._last_update >= pause
 
     def show(self, text: str, share: float) -> None:
         """Show a line, unless the last update is too recent.
@@ -58,12 +58,12 @@ class Meter:
         """
         if not self.is_due:
             return
-        self._shown = time.monotonic()
+        self._last_update = time.monotonic()
         full = round(WIDTH * share)
         text = f"[{'#' * full}{'.' * (WIDTH - full)}] {text}"
         if self.is_terminal:
-            sys.stderr.write("\r" + text.ljust(self._last)[:200])
-            self._last = len(text)
+            sys.stderr.write("\r" + text.ljust(self._last_width)[:200])
+            self._last_width = len(text)
         else:
             sys.stderr.write(text + "\n")
         sys.stderr.flush()

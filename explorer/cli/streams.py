@@ -32,8 +32,8 @@ def write(text: str) -> None:
     """Write text to standard output and flush it.
 
     Raises:
-        OutputError: standard output cannot be written.
-        BrokenPipeError: the reader has closed the pipe.
+        OutputError: Standard output cannot be written.
+        BrokenPipeError: The reader has closed the pipe.
     """
     try:
         sys.stdout.write(text)

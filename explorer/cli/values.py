@@ -1,17 +1,55 @@
-"""Parsers of option values for tyro, with messages that name the expected values."""
+"""Parsers of option values for tyro, whose messages name the expected values, and their hints."""
 
 from __future__ import annotations
 
 import math
 import re
-from typing import Any
+from collections.abc import Callable, Iterable
+from typing import Annotated, Any, TypeAlias
 
+import tyro
 from tyro.constructors import PrimitiveConstructorSpec
 
 from explorer.cli.usage import UsageError
 from explorer.mechanism.design import LARGEST_SIZE
 
 _COUNTS = {2: "two", 3: "three", 4: "four", 6: "six", 7: "seven"}
+
+Numbers = tuple[float, ...]
+Flag: TypeAlias = Annotated[bool, tyro.conf.FlagCreatePairsOff]
+"""An option without a value, and without an opposite."""
+
+
+def hint(words: str, metavar: str | None = None) -> Any:
+    """Return the marker of an option whose help has these words in place of the default.
+
+    Args:
+        words: Hint; the help puts it in parentheses.
+        metavar: Name of the value in the help; that of the parser if None.
+    """
+    return tyro.conf.arg(metavar=metavar, help_behavior_hint=f"({words})")
+
+
+OPTIONAL = hint("optional")
+FILE = hint("optional", "FILE")
+DESIGN_NAME = "PRESET_OR_FILE"
+
+
+def _parser(
+    metavar: str,
+    read: Callable[[list[str]], Any],
+    write: Callable[[Any], Iterable[object]] = lambda value: [value],
+    *,
+    many: bool = False,
+) -> PrimitiveConstructorSpec[Any]:
+    """Return the parser of an option; a parser of many words must take any number of them."""
+    return PrimitiveConstructorSpec(
+        nargs="*" if many else 1,
+        metavar=metavar,
+        instance_from_str=read,
+        is_instance=lambda value: value is None or isinstance(value, tuple | float | int),
+        str_from_instance=lambda value: [str(word) for word in write(value)],
+    )
 
 
 def numbers(option: str, order: str, *, or_one: bool = False) -> PrimitiveConstructorSpec[Any]:
@@ -24,7 +62,7 @@ def numbers(option: str, order: str, *, or_one: bool = False) -> PrimitiveConstr
     """
     names = order.split()
 
-    def read(words: list[str]) -> tuple[float, ...]:
+    def read(words: list[str]) -> Numbers:
         values = [_number(option, word) for word in words]
         if or_one and len(values) == 1:
             values *= len(names)
@@ -43,31 +81,18 @@ def numbers(option: str, order: str, *, or_one: bool = False) -> PrimitiveConstr
                 )
         return tuple(values)
 
-    return PrimitiveConstructorSpec(
-        nargs="*",
-        metavar=order.upper(),
-        instance_from_str=read,
-        is_instance=lambda value: value is None or isinstance(value, tuple),
-        str_from_instance=lambda value: [str(entry) for entry in value or ()],
-    )
+    return _parser(order.upper(), read, lambda value: value or (), many=True)
 
 
 def numbers_or_none(option: str, order: str) -> PrimitiveConstructorSpec[Any]:
     """Return the parser of an option with one number per name, or the word none, which gives ()."""
     all_numbers = numbers(option, order)
 
-    def read(words: list[str]) -> tuple[float, ...]:
+    def read(words: list[str]) -> Numbers:
         return () if words == ["none"] else all_numbers.instance_from_str(words)
 
-    return PrimitiveConstructorSpec(
-        nargs="*",
-        metavar=f"{order.upper()} | none",
-        instance_from_str=read,
-        is_instance=all_numbers.is_instance,
-        str_from_instance=lambda value: (
-            ["none"] if value == () else all_numbers.str_from_instance(value)
-        ),
-    )
+    metavar = f"{order.upper()} | none"
+    return _parser(metavar, read, lambda value: ["none"] if value == () else value or (), many=True)
 
 
 def pose_numbers(option: str) -> PrimitiveConstructorSpec[Any]:
@@ -75,30 +100,28 @@ def pose_numbers(option: str) -> PrimitiveConstructorSpec[Any]:
 
     Three numbers are a position; six add yaw, pitch and roll, seven a quaternion.
     """
-    orders = {
-        count: numbers(option, order).instance_from_str
-        for count, order in (
-            (3, "x y z"),
-            (6, "x y z yaw pitch roll"),
-            (7, "x y z qw qx qy qz"),
-        )
-    }
+    orders = {3: "x y z", 6: "x y z yaw pitch roll", 7: "x y z qw qx qy qz"}
 
-    def read(words: list[str]) -> tuple[float, ...]:
+    def read(words: list[str]) -> Numbers:
         if len(words) not in orders:
             raise UsageError(
                 f"{option} needs a position x y z, and may go on with yaw pitch roll or with a "
                 f"quaternion w x y z; got {len(words)} numbers"
             )
-        return orders[len(words)](words)
+        return numbers(option, orders[len(words)]).instance_from_str(words)
 
-    return PrimitiveConstructorSpec(
-        nargs="*",
-        metavar="X Y Z [...]",
-        instance_from_str=read,
-        is_instance=lambda value: value is None or isinstance(value, tuple),
-        str_from_instance=lambda value: [str(each) for each in value or ()],
-    )
+    return _parser("X Y Z [...]", read, lambda value: value or (), many=True)
+
+
+def texts(option: str, metavar: str) -> PrimitiveConstructorSpec[Any]:
+    """Return the parser of an option with one word or more."""
+
+    def read(words: list[str]) -> tuple[str, ...]:
+        if not words:
+            raise UsageError(f"{option} needs at least one value, such as {metavar}")
+        return tuple(words)
+
+    return _parser(metavar, read, list, many=True)
 
 
 def positive(option: str) -> PrimitiveConstructorSpec[Any]:
@@ -110,13 +133,7 @@ def positive(option: str) -> PrimitiveConstructorSpec[Any]:
             raise UsageError(f"{option} must be a positive number; got {words[0]}")
         return value
 
-    return PrimitiveConstructorSpec(
-        nargs=1,
-        metavar="NUMBER",
-        instance_from_str=read,
-        is_instance=lambda value: value is None or isinstance(value, float),
-        str_from_instance=lambda value: [str(value)],
-    )
+    return _parser("NUMBER", read)
 
 
 def whole_number(option: str, low: int, high: int) -> PrimitiveConstructorSpec[Any]:
@@ -131,13 +148,7 @@ def whole_number(option: str, low: int, high: int) -> PrimitiveConstructorSpec[A
             raise UsageError(f"{option} must lie within {low} to {high}; got {value}")
         return value
 
-    return PrimitiveConstructorSpec(
-        nargs=1,
-        metavar="N",
-        instance_from_str=read,
-        is_instance=lambda value: value is None or isinstance(value, int),
-        str_from_instance=lambda value: [str(value)],
-    )
+    return _parser("N", read)
 
 
 def pixels(option: str, low: int, high: int) -> PrimitiveConstructorSpec[Any]:
@@ -157,18 +168,12 @@ def pixels(option: str, low: int, high: int) -> PrimitiveConstructorSpec[Any]:
                 )
         return width, height
 
-    return PrimitiveConstructorSpec(
-        nargs=1,
-        metavar="WIDTHxHEIGHT",
-        instance_from_str=read,
-        is_instance=lambda value: isinstance(value, tuple),
-        str_from_instance=lambda value: ["x".join(map(str, value))],
-    )
+    return _parser("WIDTHxHEIGHT", read, lambda value: ["x".join(map(str, value))])
 
 
 def _number(option: str, word: str) -> float:
     try:
         return float(word)
     except ValueError:
-        hint = "; separate numbers by blanks" if "," in word else ""
-        raise UsageError(f"{option}: {word!r} is not a number{hint}") from None
+        advice = "; separate numbers by blanks" if "," in word else ""
+        raise UsageError(f"{option}: {word!r} is not a number{advice}") from None

@@ -11,7 +11,6 @@ from __future__ import annotations
 import io
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
@@ -22,7 +21,6 @@ from explorer.export.glb import METRES_PER_MILLIMETRE, Y_UP, Body, Material, glb
 from explorer.export.mesh import mesh_bytes
 from explorer.export.metadata import Rgb
 from explorer.export.three_mf import Model, check_size, refusals_of_lib3mf
-from explorer.files.writing import write_whole
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import quaternion_from_rotation
 from explorer.prototype.assembly import Prototype
@@ -41,7 +39,7 @@ COLOURS: Mapping[str, Rgb] = MappingProxyType(
 )
 """The colours of the kinds of parts."""
 
-# The decimals of coordinates in 3MF, in millimetres.
+# Decimals of coordinates in 3MF, in millimetres.
 _DECIMALS = 6
 
 
@@ -53,28 +51,18 @@ def assembly_bytes(prototype: Prototype, file_format: str) -> bytes:
         file_format: One of `FORMATS`.
 
     Raises:
-        InputError: unknown format, or parts too large for it.
-        ExplorerError: the library of the format refuses the parts.
+        InputError: The format is unknown, or the parts are too large for it.
+        ExplorerError: The library of the format refuses the parts.
     """
     check_format(file_format)
     return FORMATS[file_format](prototype)
-
-
-def write_assembly(prototype: Prototype, path: Path, file_format: str) -> None:
-    """Write a file of a prototype, whole or not at all.
-
-    Raises:
-        InputError: as for `assembly_bytes`, or a file that cannot be written.
-        ExplorerError: the library of the format refuses the parts.
-    """
-    write_whole(path, assembly_bytes(prototype, file_format))
 
 
 def check_format(file_format: str) -> None:
     """Refuse an unknown format.
 
     Raises:
-        InputError: unknown format; the message lists the formats.
+        InputError: The format is unknown; the message lists the formats.
     """
     if file_format not in FORMATS:
         raise InputError(
@@ -96,6 +84,7 @@ def part_groups() -> Sequence[tuple[str, Sequence[str]]]:
 
 
 def _chain(leg: int) -> tuple[str, str, str]:
+    """Return the kinds of the parts of a leg, from the base to the platform."""
     return ("carriage" if leg in ON_GUIDE else "cross", "cylinder", "rod")
 
 
@@ -163,6 +152,7 @@ def _parent(body: str) -> str | None:
 
 
 def _relative(places: Places, body: int, outer: int, metres: float) -> dict[str, list[float]]:
+    """Return the rotation (x, y, z, w) and translation in metres of a body within its parent."""
     turn = places.rotation[outer].T
     w, x, y, z = quaternion_from_rotation(turn @ places.rotation[body]).tolist()
     offset = turn @ (places.origin[body] - places.origin[outer]) * metres

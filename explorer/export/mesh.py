@@ -14,7 +14,6 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Iterable, Mapping
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
@@ -24,7 +23,6 @@ from explorer.errors import ExplorerError, InputError, NoAnswerError
 from explorer.export.glb import METRES_PER_MILLIMETRE, Y_UP, Body, Material, glb_bytes
 from explorer.export.metadata import APPLICATION, Rgb, design_json
 from explorer.export.three_mf import Model, check_size, refusals_of_lib3mf
-from explorer.files.writing import write_whole
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import FloatArray
 from explorer.workspace.solids.solid import Solid
@@ -59,9 +57,9 @@ def mesh_bytes(solid: Solid, file_format: str, design: Design, name: str) -> byt
         name: Name of the solid in the file.
 
     Raises:
-        InputError: unknown format, or one too coarse for coordinates this far from the origin.
-        NoAnswerError: the solid is empty.
-        ExplorerError: the solid is not closed, or the library of the format refuses it.
+        InputError: The format is unknown, or too coarse for coordinates of this size.
+        NoAnswerError: The solid is empty.
+        ExplorerError: The solid is not closed, or the library of the format refuses it.
     """
     check_format(file_format)
     if solid.is_empty:
@@ -73,29 +71,11 @@ def mesh_bytes(solid: Solid, file_format: str, design: Design, name: str) -> byt
     return FORMATS[file_format](solid, design, plain or "workspace")
 
 
-def write_mesh(solid: Solid, path: Path, file_format: str, design: Design, name: str) -> None:
-    """Write a file of a solid, whole or not at all.
-
-    Args:
-        solid: Closed and not empty.
-        path: The file; an existing one is replaced.
-        file_format: One of `FORMATS`.
-        design: What it is of.
-        name: What to call it.
-
-    Raises:
-        InputError: as for `mesh_bytes`, or a file that cannot be written.
-        NoAnswerError: the solid is empty.
-        ExplorerError: the solid is not closed, or the library of the format refuses it.
-    """
-    write_whole(path, mesh_bytes(solid, file_format, design, name))
-
-
 def check_format(file_format: str) -> None:
     """Refuse an unknown format.
 
     Raises:
-        InputError: unknown format; the message lists the formats.
+        InputError: The format is unknown; the message lists the formats.
     """
     if file_format not in FORMATS:
         raise InputError(f"no mesh format {file_format!r}; there are {', '.join(FORMATS)}")
@@ -116,7 +96,7 @@ def _single(
     """Return points rounded to single precision, and to decimals if given, as float64.
 
     Raises:
-        InputError: rounding changes the volume by more than `ROUNDING`.
+        InputError: Rounding changes the volume by more than `ROUNDING`.
     """
     with np.errstate(over="ignore", under="ignore"):
         rounded = points.astype(np.float32).astype(np.float64)
@@ -124,7 +104,7 @@ def _single(
         if decimals is not None:
             rounded = rounded.round(decimals)
         middle = points.mean(axis=0)
-        before, after = (_volume(each - middle, solid) for each in (points, rounded))
+        before, after = (_volume(corners - middle, solid) for corners in (points, rounded))
         if abs(after - before) <= ROUNDING * before:
             return rounded
     raise InputError(
@@ -144,9 +124,9 @@ def _stl(solid: Solid, design: Design, name: str) -> bytes:
     points = _single(_millimetres(solid, design), solid, "stl")
     # Rounding may merge corners; the facets that it degenerates are left out.
     a, b, c = (points[solid.faces[:, k]] for k in range(3))
-    kept = ~((a == b).all(axis=1) | (b == c).all(axis=1) | (c == a).all(axis=1))
+    is_facet = ~((a == b).all(axis=1) | (b == c).all(axis=1) | (c == a).all(axis=1))
     untyped: Any = trimesh
-    mesh = untyped.Trimesh(points, solid.faces[kept], process=False)
+    mesh = untyped.Trimesh(points, solid.faces[is_facet], process=False)
     data: bytes = mesh.export(file_type="stl")
     # trimesh leaves the header empty. It must not start with "solid", by which readers tell text
     # from binary.

@@ -1,6 +1,6 @@
 """OpenCASCADE: its classes, imported on first use, exact shapes, and STEP files of documents.
 
-It comes with the extra `cad`, and is untyped.
+OpenCASCADE comes with the extra `cad`; it has no types, hence `Any`.
 """
 
 from __future__ import annotations
@@ -43,9 +43,9 @@ def occ(name: str) -> Any:
     return getattr(package, name)
 
 
-def point(where: FloatArray) -> Any:
+def point(position: FloatArray) -> Any:
     """Return a `gp_Pnt`."""
-    return occ("gp_Pnt")(*map(float, where))
+    return occ("gp_Pnt")(*map(float, position))
 
 
 def direction(vector: FloatArray) -> Any:
@@ -60,10 +60,10 @@ def coordinates(of: Any) -> FloatArray:
 
 def transform(rotation: FloatArray, origin: FloatArray) -> Any:
     """Return a `gp_Trsf` that rotates and then translates."""
-    made = occ("gp_Trsf")()
+    result = occ("gp_Trsf")()
     rows = np.column_stack([rotation, origin])
-    made.SetValues(*map(float, rows.ravel()))
-    return made
+    result.SetValues(*map(float, rows.ravel()))
+    return result
 
 
 def faces_of(shape: Any) -> Iterator[Any]:
@@ -92,13 +92,13 @@ class ExactShape:
     shape: Any
 
     def __add__(self, other: ExactShape) -> ExactShape:
-        return self._with(other, "BRepAlgoAPI_Fuse")
+        return self._combined(other, "BRepAlgoAPI_Fuse")
 
     def __sub__(self, other: ExactShape) -> ExactShape:
-        return self._with(other, "BRepAlgoAPI_Cut")
+        return self._combined(other, "BRepAlgoAPI_Cut")
 
     def __xor__(self, other: ExactShape) -> ExactShape:
-        return self._with(other, "BRepAlgoAPI_Common")
+        return self._combined(other, "BRepAlgoAPI_Common")
 
     def translate(self, offset: Triple) -> ExactShape:
         """Return the shape translated."""
@@ -115,14 +115,14 @@ class ExactShape:
 
     def mirror(self, normal: Triple) -> ExactShape:
         """Return the mirror image in a plane through the origin."""
-        found = occ("gp_Trsf")()
-        found.SetMirror(occ("gp_Ax2")(point(np.zeros(3)), direction(np.array(normal))))
-        return self._moved(found)
+        reflection = occ("gp_Trsf")()
+        reflection.SetMirror(occ("gp_Ax2")(point(np.zeros(3)), direction(np.array(normal))))
+        return self._moved(reflection)
 
-    def _moved(self, how: Any) -> ExactShape:
-        return ExactShape(occ("BRepBuilderAPI_Transform")(self.shape, how, True).Shape())
+    def _moved(self, transformation: Any) -> ExactShape:
+        return ExactShape(occ("BRepBuilderAPI_Transform")(self.shape, transformation, True).Shape())
 
-    def _with(self, other: ExactShape, operation: str) -> ExactShape:
+    def _combined(self, other: ExactShape, operation: str) -> ExactShape:
         work = occ(operation)(self.shape, other.shape)
         if not work.IsDone():
             raise ExplorerError(f"OpenCASCADE cannot combine two shapes ({operation})")
@@ -157,8 +157,8 @@ class ExactKernel:
     def union(self, shapes: Sequence[ExactShape]) -> ExactShape:
         """Return the union of some shapes."""
         whole, *others = shapes
-        for each in others:
-            whole = whole + each
+        for shape in others:
+            whole = whole + shape
         return whole
 
     def hull(self, circles: Sequence[Circle], low: float, high: float) -> ExactShape:
@@ -166,7 +166,7 @@ class ExactKernel:
         around = [circles[index] for index in _outline(circles)]
         if len(around) < 2:
             return self.disc(around[0], low, high)
-        # Of each tangent the angle of its outward normal, from one circle to the next.
+        # Angle of the outward normal of the tangent from each circle to the next.
         normals = [
             math.atan2(b.y - a.y, b.x - a.x)
             - math.acos((a.radius - b.radius) / math.hypot(b.x - a.x, b.y - a.y))
@@ -197,8 +197,8 @@ def _outline(circles: Sequence[Circle]) -> list[int]:
     angles = np.linspace(0.0, 2.0 * math.pi, _DIRECTIONS, endpoint=False)
     reach = np.array([c.x * np.cos(angles) + c.y * np.sin(angles) + c.radius for c in circles])
     farthest = reach.argmax(axis=0).tolist()
-    found = [b for a, b in zip([farthest[-1], *farthest[:-1]], farthest, strict=True) if a != b]
-    return found or farthest[:1]
+    outline = [b for a, b in zip([farthest[-1], *farthest[:-1]], farthest, strict=True) if a != b]
+    return outline or farthest[:1]
 
 
 class Document:

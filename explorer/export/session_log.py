@@ -67,13 +67,13 @@ def session_csv(table: SessionTable) -> str:
             margins(table.position, rotation),
         ]
     ).tolist()
-    design = np.column_stack([table.unit_mm, table.variables]).tolist()
+    designs = np.column_stack([table.unit_mm, table.variables]).tolist()
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(COLUMNS)
     modes = table.mode.astype(int).tolist()
-    for number, mode, moved_by, own in zip(numbers, modes, table.moved_by, design, strict=True):
-        writer.writerow([*map(repr, number), mode, moved_by, *map(repr, own)])
+    for pose, mode, moved_by, design in zip(numbers, modes, table.moved_by, designs, strict=True):
+        writer.writerow([*map(repr, pose), mode, moved_by, *map(repr, design)])
     return text.getvalue()
 
 

@@ -13,16 +13,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import numpy as np
 
 from explorer import __version__
 from explorer.errors import InputError
-from explorer.files.writing import write_whole
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.home import home_pose
+from explorer.mechanism.kinematics import platform_points
 from explorer.mechanism.pose import quaternion_from_rotation
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.chains import (
@@ -35,7 +34,7 @@ from explorer.prototype.chains import (
     Places,
 )
 from explorer.prototype.mass import Mass
-from explorer.prototype.sketch import BALL, ROD, leg_radii, platform_points, sketch_masses
+from explorer.prototype.sketch import BALL, ROD, leg_radii, sketch_masses
 from explorer.workspace.limits.constraints import demanded_order
 
 DENSITY = 1240.0
@@ -62,14 +61,14 @@ def simulation_joints(design: Design, position: FloatArray, rotation: FloatArray
         rotation: Rotation from platform to base, shape (..., 3, 3).
 
     Raises:
-        InputError: a pose that is not finite or not a rotation.
+        InputError: The position is not finite, or the rotation is not one.
     """
     metres = 1e-3 * design.unit_mm
-    found = Chains.of(design).joints(position, rotation)
-    found = np.where(np.isin(CHAIN_JOINTS, JOINTS), found * metres, found)
-    place = np.broadcast_to(position * metres, (*found.shape[:-1], 3))
-    turn = np.broadcast_to(quaternion_from_rotation(rotation), (*found.shape[:-1], 4))
-    return np.concatenate([found, place, turn], axis=-1)
+    values = Chains.of(design).joints(position, rotation)
+    values = np.where(np.isin(CHAIN_JOINTS, JOINTS), values * metres, values)
+    platform_position = np.broadcast_to(position * metres, (*values.shape[:-1], 3))
+    quaternion = np.broadcast_to(quaternion_from_rotation(rotation), (*values.shape[:-1], 4))
+    return np.concatenate([values, platform_position, quaternion], axis=-1)
 
 
 def simulation_mjcf(
@@ -85,26 +84,12 @@ def simulation_mjcf(
             if None.
 
     Raises:
-        InputError: a density that is not positive, a home pose in which a leg has zero
-            length, or bodies so light that MuJoCo treats them as massless.
+        InputError: The density is not positive, a leg has zero length in the home pose, or bodies
+            are so light that MuJoCo treats them as massless.
     """
     if not (math.isfinite(density) and density > 0.0):
         raise InputError(f"the density must be positive; got {density:g}")
     return _Model(design, density, masses).text()
-
-
-def write_simulation(
-    design: Design,
-    path: Path,
-    density: float = DENSITY,
-    masses: Mapping[str, Mass] | None = None,
-) -> None:
-    """Write the model into a file, whole or not at all.
-
-    Raises:
-        InputError: as for `simulation_mjcf`, or a file that cannot be written.
-    """
-    write_whole(path, simulation_mjcf(design, density, masses).encode())
 
 
 class _Model:
@@ -148,6 +133,7 @@ class _Model:
             )
 
     def text(self) -> str:
+        """Return the model as XML."""
         root = ET.Element("mujoco", model=self.design.name)
         root.append(
             ET.Comment(
@@ -262,7 +248,7 @@ class _Model:
             low, high = self.design.length_range(name)
         else:
             degrees = {"a1": limits.swing.a1, "a3": limits.swing.a3}.get(name[:2])
-            # A wider cone holds every first angle.
+            # A cone of 90° or more does not limit the joint's first angle.
             if degrees is None or degrees >= 90.0:
                 return None
             swing = math.radians(degrees)

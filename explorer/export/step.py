@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -29,7 +28,6 @@ from explorer.export.opencascade import (
     point,
     volume_of,
 )
-from explorer.files.writing import write_whole
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import FloatArray
@@ -48,9 +46,9 @@ SMALLEST_MM, LARGEST_MM = 1e-1, 1e7
 GOOD_ERROR, LARGEST_ERROR = 1e-6, 1e-4
 """Relative errors of the volume: the first is accepted at once, beyond the last is refused."""
 
-# The overhang of the first box over the workspace, relative to the largest extent.
+# Overhang of the first box over the workspace, relative to the largest extent.
 _BEYOND = 0.1
-# The size of half-spaces, relative to the largest extent.
+# Size of half-spaces, relative to the largest extent.
 _FAR = 4.0
 
 
@@ -81,9 +79,9 @@ def exact_workspace(design: Design, rotation: ArrayLike | None = None) -> ExactS
 
     Raises:
         MissingExtraError: OpenCASCADE is not installed.
-        InputError: not a rotation, or a workspace too small or large for OpenCASCADE.
-        NoAnswerError: the workspace is empty.
-        ExplorerError: a boolean fails.
+        InputError: The rotation is not one, or OpenCASCADE cannot hold a workspace of this size.
+        NoAnswerError: The workspace is empty.
+        ExplorerError: A boolean operation fails.
     """
     check_extra()
     r = home_rotation(design) if rotation is None else checked_rotation(rotation)
@@ -101,51 +99,29 @@ def exact_workspace(design: Design, rotation: ArrayLike | None = None) -> ExactS
             f"{size:.3g} mm: choose another unit"
         )
     best: ExactSolid | None = None
-    off = math.inf
+    least_error = math.inf
     for shape in _Primitives(lows, highs, unit).attempts(limits, region):
-        found = ExactSolid(shape, tuple(_limit_of(face, limits, unit) for face in faces_of(shape)))
-        error = abs(found.volume / unit**3 - exact.volume) / exact.volume
-        if error < off:
-            best, off = found, error
-        if off <= GOOD_ERROR + exact.error / exact.volume:
+        solid = ExactSolid(shape, tuple(_limit_of(face, limits, unit) for face in faces_of(shape)))
+        error = abs(solid.volume / unit**3 - exact.volume) / exact.volume
+        if error < least_error:
+            best, least_error = solid, error
+        if least_error <= GOOD_ERROR + exact.error / exact.volume:
             break
-    if best is None or off > LARGEST_ERROR + exact.error / exact.volume:
+    if best is None or least_error > LARGEST_ERROR + exact.error / exact.volume:
         raise ExplorerError(
-            f"OpenCASCADE is off by {off:.1g} of the volume of this workspace, which may be too "
-            "thin for it; as 3mf, ply or stl it can be exported"
+            f"OpenCASCADE is off by {least_error:.1g} of the volume of this workspace, which may "
+            "be too thin for it; as 3mf, ply or stl it can be exported"
         )
     return best
 
 
 def workspace_step(design: Design, rotation: ArrayLike | None = None) -> bytes:
-    """Return a STEP file of the constant-orientation workspace.
-
-    Raises:
-        MissingExtraError, InputError, NoAnswerError, ExplorerError: as for `exact_workspace`.
-    """
+    """Return a STEP file of the constant-orientation workspace, as `exact_workspace` does."""
     return step_bytes(exact_workspace(design, rotation), f"workspace of {design.name}")
 
 
-def write_workspace_step(
-    design: Design, path: Path, rotation: ArrayLike | None = None
-) -> ExactSolid:
-    """Write a STEP file of the workspace, whole or not at all, and return its solid.
-
-    Raises:
-        MissingExtraError, NoAnswerError, ExplorerError: as for `exact_workspace`.
-        InputError: as for `exact_workspace`, or a file that cannot be written.
-    """
-    solid = exact_workspace(design, rotation)
-    write_whole(path, step_bytes(solid, f"workspace of {design.name}"))
-    return solid
-
-
 def check_extra() -> None:
-    """Check that OpenCASCADE is installed.
-
-    Raises:
-        MissingExtraError: OpenCASCADE is not installed; the message says how to get it.
-    """
+    """Raise a MissingExtraError, which says how to get OpenCASCADE, if it is not installed."""
     occ("gp_Pnt")
 
 
@@ -178,21 +154,22 @@ class _Primitives:
         for plane in planes:
             if self._heights(plane).max() > plane.offset * self.unit:
                 yield self._half_space(plane.normal, plane.offset), True
-        for each in region.circle_limits:
-            near, far = self._distances(each)
-            if (each.radius * self.unit < far) if each.inside else (each.radius * self.unit > near):
-                yield self._round(each), each.inside
-        for each in limits:
-            if isinstance(each, Cone):
-                yield from self._cone(each)
+        for limit in region.circle_limits:
+            near, far = self._distances(limit)
+            radius = limit.radius * self.unit
+            if radius < far if limit.inside else radius > near:
+                yield self._round(limit), limit.inside
+        for limit in limits:
+            if isinstance(limit, Cone):
+                yield from self._cone(limit)
 
     def _heights(self, plane: HalfSpace) -> FloatArray:
         corners = np.array(np.meshgrid(*zip(self.lows, self.highs, strict=True)))
         return corners.reshape(3, -1).T @ plane.normal
 
-    def _distances(self, each: BallOrCylinder) -> tuple[float, float]:
-        start = 0 if each.is_ball else 1
-        centre = each.centre[start:] * self.unit
+    def _distances(self, limit: BallOrCylinder) -> tuple[float, float]:
+        start = 0 if limit.is_ball else 1
+        centre = limit.centre[start:] * self.unit
         lows, highs = self.lows[start:] - centre, self.highs[start:] - centre
         near = np.maximum(0.0, np.maximum(lows, -highs))
         far = np.maximum(np.abs(lows), np.abs(highs))
@@ -212,9 +189,9 @@ class _Primitives:
         )
         return occ("BRepPrimAPI_MakeBox")(corner, 2.0 * far, 2.0 * far, 2.0 * far).Shape()
 
-    def _round(self, each: BallOrCylinder) -> Any:
-        radius, centre = each.radius * self.unit, each.centre * self.unit
-        if each.is_ball:
+    def _round(self, limit: BallOrCylinder) -> Any:
+        radius, centre = limit.radius * self.unit, limit.centre * self.unit
+        if limit.is_ball:
             away = self._away(centre)
             aside = _cross(away, np.eye(3)[np.abs(away).argmin()])
             return occ("BRepPrimAPI_MakeSphere")(self._frame(centre, aside), radius).Shape()
@@ -236,10 +213,10 @@ class _Primitives:
             return occ("gp_Ax2")(point(origin), direction(axis))
         return occ("gp_Ax2")(point(origin), direction(axis), direction(across))
 
-    def _cone(self, each: Cone) -> Iterator[tuple[Any, bool]]:
+    def _cone(self, cone: Cone) -> Iterator[tuple[Any, bool]]:
         """Yield primitives and whether they keep p inside; a section of a cone is a wedge."""
-        apex, axis, angle = each.apex, each.axis, each.half_angle
-        if each.flat:
+        apex, axis, angle = cone.apex, cone.axis, cone.half_angle
+        if cone.flat:
             across = math.hypot(axis[1], axis[2])
             if abs(math.cos(angle)) >= across:
                 return
@@ -249,7 +226,7 @@ class _Primitives:
             axis, angle = -axis, math.pi - angle
         if abs(math.cos(angle)) < 1e-9:
             yield self._half_space(-axis, -float(axis @ apex)), True
-        elif each.flat:
+        elif cone.flat:
             # The planes of a wedge meet in a line along x through the apex.
             sides = [
                 self._half_space(side, float(side @ apex))
@@ -293,17 +270,13 @@ def _limit_of(face: Any, limits: tuple[Constraint, ...], unit: float) -> str:
     shares = (1.0 / 3.0, 2.0 / 3.0)
     u0, v0 = float(surface.FirstUParameter()), float(surface.FirstVParameter())
     du, dv = float(surface.LastUParameter()) - u0, float(surface.LastVParameter()) - v0
-    where = [surface.Value(u0 + a * du, v0 + b * dv) for a in shares for b in shares]
-    points = np.array([coordinates(point) for point in where]) / unit
+    samples = [surface.Value(u0 + a * du, v0 + b * dv) for a in shares for b in shares]
+    points = np.array([coordinates(point) for point in samples]) / unit
     return min(limits, key=lambda limit: float(limit.distance(points).max())).name
 
 
 def step_bytes(solid: ExactSolid, name: str) -> bytes:
-    """Return a STEP file of a solid.
-
-    Raises:
-        ExplorerError: OpenCASCADE cannot write it.
-    """
+    """Return a STEP file of a solid, each face with the name and colour of its limit."""
     document = Document()
     top = document.shapes.AddShape(solid.shape, False)
     document.set_name(top, name)

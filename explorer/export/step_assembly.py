@@ -6,12 +6,10 @@ the extra `cad`, which is imported only when it is used.
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 from explorer.export.assembly import COLOURS, part_groups
 from explorer.export.opencascade import Document, ExactKernel, ExactShape, occ, transform
-from explorer.files.writing import write_whole
 from explorer.mechanism.home import home_pose
 from explorer.prototype.chains import BODIES, Chains
 from explorer.prototype.forms import forms_of
@@ -23,7 +21,7 @@ def exact_parts(sizes: Sizes) -> dict[str, ExactShape]:
 
     Raises:
         MissingExtraError: OpenCASCADE is not installed.
-        ExplorerError: a boolean fails.
+        ExplorerError: A boolean operation fails.
     """
     return {name: shape for name, _, shape in forms_of(sizes, ExactKernel())}
 
@@ -33,7 +31,7 @@ def assembly_step(sizes: Sizes) -> bytes:
 
     Raises:
         MissingExtraError: OpenCASCADE is not installed.
-        ExplorerError: a boolean fails, or the file cannot be made.
+        ExplorerError: A boolean operation fails, or the file cannot be made.
     """
     design = sizes.design
     home = home_pose(design)
@@ -48,21 +46,11 @@ def assembly_step(sizes: Sizes) -> bytes:
             document.set_name(label, member)
             document.set_colour(label, COLOURS[member.partition(" ")[0]])
             body = BODIES.index(member if member in BODIES else "platform")
-            where = transform(places.rotation[body], places.origin[body] * design.unit_mm)
-            _add(document, group, label, where, member)
+            location = transform(places.rotation[body], places.origin[body] * design.unit_mm)
+            _add(document, group, label, location, member)
         _add(document, whole, group, occ("gp_Trsf")(), name)
     document.shapes.UpdateAssemblies()
     return document.step()
-
-
-def write_assembly_step(sizes: Sizes, path: Path) -> None:
-    """Write a STEP file of the parts, whole or not at all.
-
-    Raises:
-        MissingExtraError, ExplorerError: as for `assembly_step`.
-        InputError: the file cannot be written.
-    """
-    write_whole(path, assembly_step(sizes))
 
 
 def _group(document: Document, name: str) -> Any:
@@ -71,7 +59,7 @@ def _group(document: Document, name: str) -> Any:
     return label
 
 
-def _add(document: Document, group: Any, label: Any, where: Any, name: str) -> None:
+def _add(document: Document, group: Any, label: Any, location: Any, name: str) -> None:
     document.set_name(
-        document.shapes.AddComponent(group, label, occ("TopLoc_Location")(where)), name
+        document.shapes.AddComponent(group, label, occ("TopLoc_Location")(location)), name
     )

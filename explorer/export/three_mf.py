@@ -22,10 +22,10 @@ NAMESPACE = "urn:flagged-explorer"
 
 
 def check_size(points: FloatArray) -> float:
-    """Return the largest coordinate of points (n, 3) in millimetres, by its absolute value.
+    """Return the largest magnitude of a coordinate of points (n, 3), in millimetres.
 
     Raises:
-        InputError: lib3mf does not take it.
+        InputError: lib3mf does not accept the coordinate.
     """
     largest = float(np.abs(points).max())
     if largest > LARGEST:
@@ -38,7 +38,7 @@ def check_size(points: FloatArray) -> float:
 
 @contextlib.contextmanager
 def refusals_of_lib3mf(what: str) -> Generator[None]:
-    """Raise what lib3mf refuses as an ExplorerError that names what it refuses."""
+    """Raise an error of lib3mf as an `ExplorerError` that names what it refuses."""
     import lib3mf  # pyright: ignore[reportMissingTypeStubs]
 
     library: Any = lib3mf

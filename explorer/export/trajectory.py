@@ -30,6 +30,6 @@ def write_trajectory(trajectory: Trajectory, path: Path) -> None:
     """Write a trajectory as a CSV file.
 
     Raises:
-        InputError: the file cannot be written.
+        StorageError: The file cannot be written.
     """
     write_whole(path, trajectory_csv(trajectory).encode())

@@ -1,4 +1,4 @@
-"""The manual: Markdown pages that come along, in the order to read them."""
+"""The manual: Markdown pages that are part of the package, in the order to read them."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class ManualPage(NamedTuple):
 
     Attributes:
         title: Text of the page's first heading.
-        file: Name of the page's file, as `read_page` takes it and links between pages write it.
+        file: Name of the page's file, the argument of `read_page` and the target of links.
     """
 
     title: str
@@ -48,7 +48,7 @@ def read_page(file: str) -> str:
         file: Name of the page's file, such as "glossary.md".
 
     Raises:
-        InputError: the manual has no such page.
+        InputError: The manual has no such page.
     """
     if file not in FILES:
         raise InputError(f"the manual has no page {file!r}; its pages are {', '.join(FILES)}")

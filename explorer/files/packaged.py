@@ -11,17 +11,17 @@ SOURCES = Path(__file__).parents[2]
 
 
 def packaged_file(folder: str, name: str) -> Traversable:
-    """Return a file of one of the folders that come along, whether or not it is there."""
-    return _place(folder).joinpath(name)
+    """Return a file in one of the explorer's folders, which need not exist."""
+    return _packaged_folder(folder).joinpath(name)
 
 
 def packaged_files(folder: str, suffix: str) -> list[Traversable]:
     """Return the files with a suffix in one of the explorer's folders, ordered by name."""
-    files = (file for file in _place(folder).iterdir() if file.name.endswith(suffix))
+    files = (file for file in _packaged_folder(folder).iterdir() if file.name.endswith(suffix))
     return sorted(files, key=lambda file: file.name)
 
 
-def _place(folder: str) -> Traversable:
+def _packaged_folder(folder: str) -> Traversable:
     # In a wheel the folders lie inside the package, in a checkout beside it.
     packaged = resources.files("explorer").joinpath(folder)
     return packaged if packaged.is_dir() else SOURCES / "assets" / folder

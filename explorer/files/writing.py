@@ -47,7 +47,7 @@ def check_writable(path: Path) -> None:
     with _storage_errors("write", path):
         _check_target(path)
         scratch = _scratch_path(path)
-        # Only a trial is sure: superusers and read-only disks make permission bits misleading.
+        # Permission bits mislead on read-only disks and for superusers, so try it.
         scratch.open("xb").close()
         scratch.unlink()
 
@@ -121,11 +121,11 @@ def move(source: Path, target: Path) -> None:
 
 def _replace(source: Path, target: Path) -> None:
     """Move a file in one step; retry on a system that refuses while the target is being read."""
-    for last in range(1, _TRIES + 1):
+    for attempt in range(1, _TRIES + 1):
         try:
             source.replace(target)
         except PermissionError:
-            if last == _TRIES:
+            if attempt == _TRIES:
                 raise
             time.sleep(_PAUSE_SECONDS)
         else:
@@ -169,7 +169,7 @@ def _storage_errors(operation: str, path: Path) -> Generator[None]:
 
 
 def _scratch_path(path: Path) -> Path:
-    """Return an unused path in the same folder, because only there a rename is atomic."""
+    """Return an unused path in the same folder, since a rename is atomic only there."""
     return path.resolve().parent / f".{path.name[:_SCRATCH_CHARACTERS]}.{uuid.uuid4().hex}.part"
 
 

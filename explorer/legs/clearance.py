@@ -1,8 +1,8 @@
 """Clearances of the four legs in a pose.
 
-A leg is a capsule about its axis, from its base end (a1; the carriages on the guide at d1
-and d3; a3) to its platform end (b1, b2, b3, b4). The clearance of a pair is the distance
-of the axes less both radii; a pair with a negative clearance collides.
+A leg is a capsule about its axis, from its base end (a1, the carriages on the guide at d1 and d3,
+a3) to its platform end (b1, b2, b3, b4). The clearance of a pair is the distance of the axes less
+both radii; a pair with a negative clearance collides.
 """
 
 from __future__ import annotations
@@ -50,19 +50,12 @@ class LegClearances(NamedTuple):
 def joined_pairs(design: Design) -> BoolArray:
     """Return which pairs of legs share a joint, shape (6,), in the order of `PAIRS`.
 
-    Leg 2 or 3 ends in b4, as leg 4 does, where b2 or b3 is zero to rounding. No test looks
-    at such a pair.
+    Leg 2 or 3 ends in b4, as leg 4 does, if b2 or b3 is zero to rounding. All tests leave such
+    a pair out.
     """
     least = DEGENERATE_RATIO * max(map(abs, design.variables))
-    return np.array(
-        [
-            second == 4
-            and (
-                (first == 2 and abs(design.b2) <= least) or (first == 3 and abs(design.b3) <= least)
-            )
-            for first, second in PAIRS
-        ]
-    )
+    distances = {(2, 4): abs(design.b2), (3, 4): abs(design.b3)}
+    return np.array([distances.get(pair, math.inf) <= least for pair in PAIRS])
 
 
 def radii_of_pairs(design: Design) -> FloatArray:
@@ -74,13 +67,7 @@ def radii_of_pairs(design: Design) -> FloatArray:
 def leg_axes(design: Design, position: ArrayLike, rotation: ArrayLike) -> FloatArray:
     """Return the axes of the four legs, base end and platform end, shape (..., 4, 2, 3).
 
-    Args:
-        design: The manipulator.
-        position: b4 in the base frame, shape (..., 3), in design units.
-        rotation: Platform to base, shape (..., 3, 3).
-
-    Raises:
-        InputError: the pose has a number that is not finite, or no rotation.
+    Arguments and errors are those of `leg_clearances`.
     """
     points = attachment_points(design, position, rotation)
     axes = np.zeros((*points.b1.shape[:-1], 4, 2, 3))
@@ -100,7 +87,7 @@ def leg_clearances(design: Design, position: ArrayLike, rotation: ArrayLike) -> 
         rotation: Platform to base, shape (..., 3, 3).
 
     Raises:
-        InputError: the pose has a number that is not finite, or no rotation.
+        InputError: The position is not finite, or the rotation is not one.
     """
     axes = leg_axes(design, position, rotation)
     batch = axes.shape[:-3]
@@ -120,16 +107,11 @@ def leg_clearances(design: Design, position: ArrayLike, rotation: ArrayLike) -> 
 def distance_gradients(
     design: Design, position: ArrayLike, rotation: ArrayLike, clearances: LegClearances
 ) -> FloatArray:
-    """Return the rates of the distances of all pairs with the position, shape (..., 6, 3).
+    """Return the gradients of all pairs' distances by the position, shape (..., 6, 3).
 
-    The rate is zero for a pair that shares a joint, and where the axes of a pair cross,
-    since the distance has no rate there.
-
-    Args:
-        design: The manipulator.
-        position: b4 in the base frame, shape (..., 3), in design units.
-        rotation: Platform to base, shape (..., 3, 3).
-        clearances: Clearances in that pose.
+    The gradient is zero for a pair that shares a joint. It is also set to zero where the axes of a
+    pair cross, since the distance is not differentiable there. The clearances are those of the
+    same poses.
     """
     offset = clearances.points[..., 0, :] - clearances.points[..., 1, :]
     length = np.linalg.norm(offset, axis=-1, keepdims=True)
@@ -138,26 +120,27 @@ def distance_gradients(
 
 
 def point_rates(axes: FloatArray, points: FloatArray) -> FloatArray:
-    """Return the rates of the offset between two points on legs with the position of b4.
+    """Return the derivatives, by the position, of the offset between points on two legs.
+
+    A platform end moves as b4 does, a carriage along x only, so each Jacobian is diagonal.
 
     Args:
         axes: Axes of the legs, shape (..., 4, 2, 3).
         points: One point on each axis of a pair, shape (..., 6, 2, 3).
 
     Returns:
-        Diagonals of the Jacobians of (first point − second point) in the position, shape
-        (..., 6, 3): a platform end moves as b4 does, a carriage along x only.
+        Diagonals of the Jacobians of (first point − second point), shape (..., 6, 3).
     """
     sides: list[FloatArray] = []
     for side in (0, 1):
-        which = [pair[side] - 1 for pair in PAIRS]
-        base, end = axes[..., which, 0, :], axes[..., which, 1, :]
-        along = end - base
-        square = (along * along).sum(axis=-1)
-        share = ((points[..., side, :] - base) * along).sum(axis=-1)
+        legs = [pair[side] - 1 for pair in PAIRS]
+        base, end = axes[..., legs, 0, :], axes[..., legs, 1, :]
+        axis = end - base
+        square = (axis * axis).sum(axis=-1)
+        share = ((points[..., side, :] - base) * axis).sum(axis=-1)
         share = share / np.where(square > 0.0, square, 1.0)
         rates = np.repeat(share[..., None], 3, axis=-1)
-        on_guide = [leg in (1, 2) for leg in which]
+        on_guide = [leg in (1, 2) for leg in legs]
         rates[..., on_guide, 0] = 1.0
         sides.append(rates)
     return sides[0] - sides[1]
@@ -169,8 +152,8 @@ def pair_rows(axes: FloatArray, distance: FloatArray, points: FloatArray) -> Non
 
     Args:
         axes: Shape (n, 4, 2, 3).
-        distance: Written, shape (n, 6).
-        points: Written, shape (n, 6, 2, 3).
+        distance: Output, shape (n, 6).
+        points: Output, shape (n, 6, 2, 3).
     """
     for row in range(axes.shape[0]):
         pair = 0

@@ -1,9 +1,8 @@
 """The paper's test for leg interference over one sampling step, by swept tetrahedra.
 
-Over a step at constant orientation a leg stays within the tetrahedron of its two base ends
-and its two platform ends. The step is free if no two of the four tetrahedra overlap or
-touch. Legs 1 and 4 have fixed base ends, so their tetrahedra are triangles. The test
-ignores the legs' radii.
+Over a step at constant orientation a leg stays within the tetrahedron of its two base ends and
+its two platform ends. The step is free if no two of the four tetrahedra overlap or touch. Legs 1
+and 4 have fixed base ends, so their tetrahedra are triangles. The test ignores the legs' radii.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ def swept_tetrahedra(
     end_position: ArrayLike,
     end_rotation: ArrayLike,
 ) -> FloatArray:
-    """Return the tetrahedra that hold the four legs over a step, shape (..., 4, 4, 3).
+    """Return the tetrahedra that contain the four legs over a step, shape (..., 4, 4, 3).
 
     The vertices of a tetrahedron are the leg's base ends at the start and at the end of the
     step, then its platform ends. All batch axes are broadcast.
@@ -37,7 +36,7 @@ def swept_tetrahedra(
         end_rotation: Platform to base at the end of the step, shape (..., 3, 3).
 
     Raises:
-        InputError: a pose has a number that is not finite, or no rotation.
+        InputError: A position is not finite, or a rotation is not one.
     """
     start = leg_axes(design, start_position, start_rotation)
     end = leg_axes(design, end_position, end_rotation)
@@ -56,7 +55,7 @@ def step_overlaps(
 ) -> BoolArray:
     """Return which pairs of swept tetrahedra overlap, shape (..., 6), in the order of `PAIRS`.
 
-    A pair that shares a joint (see `explorer.legs.clearance.joined_pairs`) has False.
+    The result is False for a pair that shares a joint, see `explorer.legs.clearance.joined_pairs`.
     Arguments and errors are those of `swept_tetrahedra`.
     """
     swept = swept_tetrahedra(design, start_position, start_rotation, end_position, end_rotation)
@@ -81,8 +80,5 @@ def step_is_free(
 
     Arguments and errors are those of `swept_tetrahedra`.
     """
-    return np.asarray(
-        ~step_overlaps(design, start_position, start_rotation, end_position, end_rotation).any(
-            axis=-1
-        )
-    )
+    arrays = (start_position, start_rotation, end_position, end_rotation)
+    return np.asarray(~step_overlaps(design, *arrays).any(axis=-1))

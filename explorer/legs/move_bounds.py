@@ -1,10 +1,10 @@
 """Lower bounds of the distance between two legs over a whole interval of a move.
 
-The greater of two bounds counts. First, the distance of two segments changes by no more than
-the greatest relative motion of an end of one and an end of the other. Second, for any
-direction n the distance is at least the minimum of n·(X − Y)/|n| over the ends X and Y of
-the two segments: with the n of the closest points, which turns with the legs to first order,
-this bound is low by the square of the interval only.
+The result is the greater of two bounds. First, the distance of two segments changes by no more
+than the greatest relative motion of an end of one and an end of the other. Second, for any
+direction n the distance is at least the minimum of n·(X − Y)/|n| over the ends X and Y of the two
+segments. If n is the direction of the closest points and turns with the legs to first order, the
+error of this bound falls with the square of the interval.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from explorer.legs.segments import Vector, closest_shares, dot3, minus, square_a
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import helper, kernel
 
-# Intervals of a move whose ends give the first guess of the least distance.
+# Number of intervals of a move whose ends give the first estimate of the least distance.
 SAMPLES = 8
-# The most intervals in the queue: one for each halving.
+# Largest number of intervals in the queue: one for each halving.
 DEEPEST = 60
 
 
@@ -60,7 +60,7 @@ def base_end(leg: int, end: Vector, velocity: Vector, a3: FloatArray) -> tuple[V
 
 @helper
 def tangent_error(leg: int, half: float, angle: float, parts: FloatArray) -> float:
-    """Return the most that an end departs from its tangent within half an interval."""
+    """Return the largest distance of an end from its tangent within half an interval."""
     x, y, z = parts[leg, 1, 0], parts[leg, 1, 1], parts[leg, 1, 2]
     turn = angle * half
     return 0.5 * turn * turn * math.sqrt(x * x + y * y + z * z)
@@ -112,7 +112,7 @@ def bound_interval(
     parts: FloatArray,
     a3: FloatArray,
 ) -> tuple[float, float]:
-    """Return the distance of two legs amid an interval, and a lower bound over all of it."""
+    """Return the distance of two legs at the middle of an interval, and a lower bound over it."""
     p, dp = platform_end(i, middle, start, step, angle, parts)
     q, dq = platform_end(j, middle, start, step, angle, parts)
     a, da = base_end(i, p, dp, a3)
@@ -120,7 +120,7 @@ def bound_interval(
     u, v, r = minus(p, a), minus(q, b), minus(a, b)
     s, t = closest_shares(u, v, r)
     distance = math.sqrt(square_at(s, t, u, v, r))
-    bends = tangent_error(i, half, angle, parts) + tangent_error(j, half, angle, parts)
+    tangent_errors = tangent_error(i, half, angle, parts) + tangent_error(j, half, angle, parts)
     d0, d1, d2, d3 = minus(da, db), minus(dp, db), minus(da, dq), minus(dp, dq)
     fastest = math.sqrt(max(dot3(d0, d0), dot3(d1, d1), dot3(d2, d2), dot3(d3, d3)))
     bound = distance - half * fastest
@@ -140,7 +140,7 @@ def bound_interval(
         length = math.sqrt(1.0 + half * (2.0 * abs(dot3(n, m)) + half * dot3(m, m)))
         if least > 0.0:
             bound = max(bound, least / length)
-    return distance, max(0.0, bound - bends)
+    return distance, max(0.0, bound - tangent_errors)
 
 
 @kernel(
@@ -168,13 +168,13 @@ def least_rows(
         parts: Parts of each leg's platform end, see `explorer.legs.moves`, shape
             (n, 4, 3, 3).
         a3: Base end of leg 4, shape (3,).
-        tolerance: The most that `least` may exceed `bound`, shape (n,).
-        target: Distance of each pair at which the search may end, once it is certain
-            whether the least is greater, shape (6,). NaN for a search to the tolerance, −inf
-            for a pair to leave out.
-        bound: Written except for pairs left out: the lower bound, shape (n, 6).
-        least: Written likewise: the least distance seen, shape (n, 6).
-        share: Written likewise: the share of the move where that is, shape (n, 6).
+        tolerance: Largest difference of `least` and `bound`, shape (n,).
+        target: Distance of each pair, shape (6,). The search ends once it is certain whether the
+            least distance is greater. NaN for a search to the tolerance, −inf for a pair to
+            leave out.
+        bound: Output, lower bound, shape (n, 6); nothing is written for pairs left out.
+        least: Output likewise, least distance of all evaluated poses, shape (n, 6).
+        share: Output likewise, share of the move at which it occurs, shape (n, 6).
     """
     middles, halves = np.zeros(DEEPEST), np.zeros(DEEPEST)
     for row in range(start.shape[0]):
@@ -182,18 +182,18 @@ def least_rows(
         for i in range(3):
             for j in range(i + 1, 4):
                 pair += 1
-                limit = target[pair]
-                if limit == -math.inf:
+                pair_target = target[pair]
+                if pair_target == -math.inf:
                     continue
-                best, where, lowest = math.inf, 0.0, math.inf
-                # A good guess saves halvings in finding the least, but none in deciding.
-                for k in range(SAMPLES + 1 if math.isnan(limit) else 0):
+                best, best_share, least_bound = math.inf, 0.0, math.inf
+                # A good estimate saves halvings in the search for the least distance only.
+                for k in range(SAMPLES + 1 if math.isnan(pair_target) else 0):
                     t = k / SAMPLES
                     distance, _ = bound_interval(
                         i, j, t, 0.0, start[row], step[row], angle[row], parts[row], a3
                     )
                     if distance < best:
-                        best, where = distance, t
+                        best, best_share = distance, t
                 middles[0], halves[0] = 0.5, 0.5
                 queued = 1
                 while queued > 0:
@@ -203,20 +203,20 @@ def least_rows(
                         i, j, t, half, start[row], step[row], angle[row], parts[row], a3
                     )
                     if distance < best:
-                        best, where = distance, t
-                    if best <= limit:
+                        best, best_share = distance, t
+                    if best <= pair_target:
                         # The least is not greater than the target: the rest needs no bound.
-                        lowest = 0.0
+                        least_bound = 0.0
                         break
-                    if low >= best - tolerance[row] or low > limit or queued + 2 > DEEPEST:
-                        lowest = min(lowest, low)
+                    if low >= best - tolerance[row] or low > pair_target or queued + 2 > DEEPEST:
+                        least_bound = min(least_bound, low)
                         continue
                     half *= 0.5
                     # The half nearer to the least so far comes first.
-                    near = half if where > t else -half
+                    near = half if best_share > t else -half
                     middles[queued], halves[queued] = t - near, half
                     middles[queued + 1], halves[queued + 1] = t + near, half
                     queued += 2
-                bound[row, pair] = min(lowest, best)
+                bound[row, pair] = min(least_bound, best)
                 least[row, pair] = best
-                share[row, pair] = where
+                share[row, pair] = best_share

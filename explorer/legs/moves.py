@@ -1,9 +1,9 @@
 """Clearances of the legs over a whole straight move, with a bound between all poses.
 
-Over a straight move the position goes along a line and the platform turns about one fixed
-axis (slerp). An interval of the move is halved until a lower bound over all of it is within
-the tolerance of the least distance seen so far, see `explorer.legs.move_bounds`. The bound
-holds for every pose of the move, not only for those that were evaluated.
+Over a straight move the position goes along a line and the platform turns about one fixed axis
+(slerp). An interval of the move is halved until a lower bound over all of it is within the
+tolerance of the least evaluated distance, see `explorer.legs.move_bounds`. The bound holds for
+every pose of the move, not only for those that were evaluated.
 """
 
 from __future__ import annotations
@@ -21,13 +21,14 @@ from explorer.legs.clearance import PAIRS, joined_pairs, leg_clearances, radii_o
 from explorer.legs.interference import step_overlaps
 from explorer.legs.move_bounds import least_rows
 from explorer.mechanism.design import Design
+from explorer.mechanism.kinematics import platform_points
 from explorer.mechanism.pose import Pose, checked_rotation
 from explorer.numerics.arrays import BoolArray, FloatArray, batch_shape, finite_array
 
-# Tolerances as shares of the reach, or of the longest way of a leg's end if that is longer.
+# Tolerances as shares of the reach, or of the longest travel of a leg's end if that is longer.
 DEFAULT_TOLERANCE = 1e-6
 SMALLEST_TOLERANCE = 1e-9
-# About how many poses of a move the kernel evaluates, for its choice whether to compile.
+# Approximate number of poses of a move that the kernel evaluates, on which compiling depends.
 POSES_OF_MOVE = 64
 # A move has no length if no platform point goes farther than this share of the reach.
 NO_LENGTH = 1e-12
@@ -52,7 +53,7 @@ class MoveClearances(NamedTuple):
 
 @dataclass(frozen=True)
 class MoveClearance:
-    """One move by both tests: the exact one with radii, and the paper's without.
+    """One move under both tests: the exact one with radii, and the paper's without.
 
     Attributes:
         start, end: The two poses.
@@ -60,7 +61,7 @@ class MoveClearance:
         clearance: Clearance of each pair at `share`, shape (6,).
         share: Share of the move for each pair, from 0 to 1, shape (6,).
         points: Closest points of the two axes there, shape (6, 2, 3).
-        tolerance: The most by which `clearance` exceeds `bound`, in design units.
+        tolerance: Largest difference of `clearance` and `bound`, in design units.
         steps: Number of steps of the paper's test.
         overlaps: Whether the swept tetrahedra of each pair overlap in a step, shape (6,).
     """
@@ -95,8 +96,8 @@ def poses_between(start: Pose, end: Pose, shares: ArrayLike) -> tuple[FloatArray
     """Return the poses of a straight move.
 
     Args:
-        start: Pose at the start.
-        end: Pose at the end; the platform turns the shorter way.
+        start: Pose at the start of the move.
+        end: Pose at its end; the platform turns the shorter way.
         shares: Shares of the move, from 0 to 1, shape (...).
 
     Returns:
@@ -131,8 +132,7 @@ def move_clearances(
         tolerance: As for `move_clearance`.
 
     Raises:
-        InputError: a pose has a number that is not finite, or no rotation, or the tolerance
-            is too small.
+        InputError: a pose is not finite or not a rotation, or the tolerance is too small.
     """
     moves = _Moves.of(design, start_position, start_rotation, end_position, end_rotation)
     bound, least, share = moves.least(design, moves.tolerance(design, tolerance), math.nan)
@@ -149,9 +149,9 @@ def moves_are_clear(
     *,
     clearance: float = 0.0,
 ) -> BoolArray:
-    """Return whether all pairs have more than a clearance all along, shape (...).
+    """Return whether all pairs have more than a clearance over whole moves, shape (...).
 
-    Arguments and errors are those of `pairs_are_clear`.
+    Arguments and errors are those of `move_clearances`; see `pairs_are_clear` for the accuracy.
     """
     arrays = (start_position, start_rotation, end_position, end_rotation)
     return np.asarray(pairs_are_clear(design, *arrays, clearance=clearance).all(axis=-1))
@@ -166,12 +166,12 @@ def pairs_are_clear(
     *,
     clearance: float = 0.0,
 ) -> BoolArray:
-    """Return which pairs have more than a clearance all along, shape (..., 6).
+    """Return which pairs have more than a clearance over whole moves, shape (..., 6).
 
-    This is much faster than `move_clearances`, since the search ends once the answer is
-    certain. True is a proof. A pair whose least clearance is greater by less than the
-    default tolerance of `move_clearance` may have False. A pair that shares a joint is
-    clear. Other arguments and errors are those of `move_clearances`.
+    This is much faster than `move_clearances`, since the search ends once the result is certain.
+    True is proven. The result may be False for a pair whose least clearance is greater by less than
+    the default tolerance of `move_clearance`. It is True for a pair that shares a joint. Other
+    arguments and errors are those of `move_clearances`.
     """
     moves = _Moves.of(design, start_position, start_rotation, end_position, end_rotation)
     bound, _, _ = moves.least(design, moves.tolerance(design, None), clearance)
@@ -189,16 +189,16 @@ def move_clearance(
         end: Pose at its end; the platform turns about one axis, the shorter way.
         steps: Number of steps of the paper's test.
         tolerance: Tolerance of the least clearances, in design units; by default a millionth
-            of the reach, or of the longest way of a leg's end if that is longer.
+            of the reach, or of the longest travel of a leg's end if that is longer.
 
     Raises:
-        InputError: the move has no length or no steps, or the tolerance is too small.
+        InputError: The move has no length or no steps, or the tolerance is too small.
     """
     if steps < 1:
         raise InputError(f"a move has at least one step; got {steps}")
     arrays = (np.array(start.position), start.rotation, np.array(end.position), end.rotation)
     moves = _Moves.of(design, *arrays)
-    if float(moves.way[0]) <= NO_LENGTH * max(design.reach, *map(abs, start.position)):
+    if float(moves.travel[0]) <= NO_LENGTH * max(design.reach, *map(abs, start.position)):
         shown = ", ".join(f"{x:g}" for x in start.position)
         raise InputError(
             f"a move needs two poses that differ; both have the position ({shown}) and the "
@@ -208,7 +208,7 @@ def move_clearance(
     least = move_clearances(design, *arrays, tolerance=float(tolerances[0]))
     positions, rotations = poses_between(start, end, np.linspace(0.0, 1.0, steps + 1))
     overlaps = step_overlaps(design, positions[:-1], rotations[:-1], positions[1:], rotations[1:])
-    at = leg_clearances(design, *poses_between(start, end, least.share))
+    closest = leg_clearances(design, *poses_between(start, end, least.share))
     pairs = np.arange(len(PAIRS))
     return MoveClearance(
         start=start,
@@ -216,7 +216,7 @@ def move_clearance(
         bound=least.bound,
         clearance=least.clearance,
         share=least.share,
-        points=at.points[pairs, pairs],
+        points=closest.points[pairs, pairs],
         tolerance=float(tolerances[0]),
         steps=steps,
         overlaps=np.asarray(overlaps.any(axis=0)),
@@ -236,7 +236,7 @@ class _Moves:
         step: Displacement of b4, shape (n, 3).
         angle: Rotation of the platform, in radians, shape (n,).
         parts: fixed, across and up of each leg's platform end, shape (n, 4, 3, 3).
-        way: Upper bound of the longest way of a leg's end, shape (n,).
+        travel: Upper bound of the longest travel of a leg's end, shape (n,).
     """
 
     batch: tuple[int, ...]
@@ -244,45 +244,40 @@ class _Moves:
     step: FloatArray
     angle: FloatArray
     parts: FloatArray
-    way: FloatArray
+    travel: FloatArray
 
     @staticmethod
-    def of(
-        design: Design,
-        start_position: ArrayLike,
-        start_rotation: ArrayLike,
-        end_position: ArrayLike,
-        end_rotation: ArrayLike,
-    ) -> _Moves:
-        """Return the moves from start to end poses, batch axes broadcast."""
-        p = finite_array("start position", start_position, (3,))
-        q = finite_array("end position", end_position, (3,))
-        r, s = checked_rotation(start_rotation), checked_rotation(end_rotation)
+    def of(design: Design, *arrays: ArrayLike) -> _Moves:
+        """Return the moves of the positions and rotations of `move_clearances`, broadcast."""
+        p, q = (
+            finite_array(f"{end} position", position, (3,))
+            for end, position in zip(("start", "end"), arrays[::2], strict=True)
+        )
+        r, s = map(checked_rotation, arrays[1::2])
         batch = batch_shape((p, 1), (r, 2), (q, 1), (s, 2))
         start, end = (np.broadcast_to(x, (*batch, 3)).reshape(-1, 3) for x in (p, q))
         first, last = (np.broadcast_to(x, (*batch, 3, 3)).reshape(-1, 3, 3) for x in (r, s))
         turn = Rotation.from_matrix(last @ np.swapaxes(first, -1, -2)).as_rotvec()
         angle = np.linalg.norm(turn, axis=-1)
         axis = turn / np.where(angle > 0.0, angle, 1.0)[:, None]
-        points = np.zeros((4, 3))
-        points[0, :2] = design.b1
-        points[1, 0], points[2, 0] = design.b2, design.b3
-        arms = points @ np.swapaxes(first, -1, -2)
+        arms = platform_points(design) @ np.swapaxes(first, -1, -2)
         fixed = (arms @ axis[:, :, None]) * axis[:, None, :]
         up = np.cross(axis[:, None, :], arms)
         across = np.where(angle[:, None, None] > 0.0, arms - fixed, 0.0)
         parts = np.stack([arms - across, across, up], axis=2)
         step = end - start
-        way = np.linalg.norm(step, axis=-1) + angle * np.linalg.norm(across, axis=-1).max(axis=-1)
-        return _Moves(batch, start.copy(), step, np.asarray(angle), parts, np.asarray(way))
+        travel = np.linalg.norm(step, axis=-1) + angle * np.linalg.norm(across, axis=-1).max(
+            axis=-1
+        )
+        return _Moves(batch, start.copy(), step, np.asarray(angle), parts, np.asarray(travel))
 
     def tolerance(self, design: Design, requested: float | None) -> FloatArray:
         """Return the tolerance of each move, shape (n,).
 
         Raises:
-            InputError: the requested one is too small.
+            InputError: the requested tolerance is too small.
         """
-        size = np.maximum(design.reach, self.way)
+        size = np.maximum(design.reach, self.travel)
         if requested is None:
             return DEFAULT_TOLERANCE * size
         least = SMALLEST_TOLERANCE * float(size.max(initial=design.reach))
@@ -297,27 +292,16 @@ class _Moves:
 
         Args:
             design: The manipulator.
-            tolerance: The most by which a least distance exceeds its bound, shape (n,).
-            target: Clearance at which the search may end, once it is certain whether the
-                least is greater; NaN for a search to the tolerance.
+            tolerance: Largest difference of a least distance and its bound, shape (n,).
+            target: Clearance; the search ends once it is certain whether the least is greater.
+                NaN for a search to the tolerance.
         """
         rows = len(self.start)
         bound, least, share = (np.full((rows, len(PAIRS)), math.inf) for _ in range(3))
         share[:] = 0.0
         targets = np.where(joined_pairs(design), -math.inf, radii_of_pairs(design) + target)
-        fixed = np.array([*design.a3, 0.0])
-        least_rows(
-            POSES_OF_MOVE * rows,
-            self.start,
-            self.step,
-            self.angle,
-            self.parts,
-            fixed,
-            tolerance,
-            targets,
-            bound,
-            least,
-            share,
-        )
+        a3 = np.array([*design.a3, 0.0])
+        moves = (self.start, self.step, self.angle, self.parts, a3)
+        least_rows(POSES_OF_MOVE * rows, *moves, tolerance, targets, bound, least, share)
         shape = (*self.batch, len(PAIRS))
         return bound.reshape(shape), least.reshape(shape), share.reshape(shape)

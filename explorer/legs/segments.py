@@ -1,8 +1,8 @@
 """Closest points of two line segments, as functions that kernels call.
 
-Parallel, touching, crossing and zero-length segments need no case of their own: the least
-distance is that of the two lines, where their closest points lie within both segments, or
-that of an end of one from the other. See V. J. Lumelsky, "On fast computation of distance
+Parallel, touching, crossing and zero-length segments need no special case. The least distance
+is that of the two lines, if their closest points lie within both segments, or else that of an
+end of one segment from the other. See V. J. Lumelsky, "On fast computation of distance
 between line segments" (1985).
 """
 

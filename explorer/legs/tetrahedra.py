@@ -1,10 +1,10 @@
 """Whether two tetrahedra overlap, by the separating axis theorem, flat ones included.
 
-Two convex bodies are apart if and only if their projections on some axis are. For solid
-bodies the candidates are the face normals and the cross products of an edge of each: S.
-Gottschalk, M. C. Lin and D. Manocha, "OBBTree" (1996). If all these projections overlap
-deeply, so do the bodies. If some only touch, which includes bodies in one plane, segments
-and points, the shortest connections of edges are candidates as well.
+Two convex bodies are apart if and only if their projections on some axis are. For solid bodies
+the candidates are the face normals and the cross products of an edge of each (Gottschalk, Lin and
+Manocha, "OBBTree", 1996). If all these projections overlap deeply, so do the bodies. If some only
+touch, as happens for bodies in one plane, segments and points, the shortest connections of edges
+are candidates as well.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from explorer.legs.segments import Vector, closest_shares, dot3, minus
 from explorer.numerics.arrays import BoolArray, FloatArray, batch_shape, finite_array, for_kernel
 from explorer.numerics.compiled import helper, kernel
 
-# A gap within this share of the largest coordinate is rounding: the two touch.
+# Share of the largest coordinate up to which a gap is rounding, so that two bodies touch.
 TOUCHING = 2.0**-46
-# Coordinates between these are used as they are: their fourth powers neither overflow nor vanish.
+# Range of coordinates that need no scaling: their fourth powers neither overflow nor underflow.
 LEAST, MOST = 1e-60, 1e60
-# An overlap of projections beyond this share of the size is deep.
+# Share of the size above which an overlap of projections is deep.
 DEEP = 2.0**-8
-# A cross product below this share of the squared size has mostly rounding for a direction.
+# Share of the squared size below which the direction of a cross product is mostly rounding.
 FAINT = 1e-12
 EDGES = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
 
@@ -35,7 +35,7 @@ def vertex(bodies: FloatArray, body: int, k: int) -> Vector:
 
 @helper
 def compare_boxes(p: FloatArray, q: FloatArray, row: int) -> tuple[float, float, bool]:
-    """Return the largest coordinate, the size, and whether the bounding boxes are apart."""
+    """Return the largest |coordinate|, the size, and whether the bounding boxes are apart."""
     largest, size, gap = 0.0, 0.0, 0.0
     for axis in range(3):
         a, b, c, d = p[row, 0, axis], p[row, 1, axis], p[row, 2, axis], p[row, 3, axis]
@@ -49,7 +49,7 @@ def compare_boxes(p: FloatArray, q: FloatArray, row: int) -> tuple[float, float,
 
 
 @helper
-def place(
+def write_body(
     rows: FloatArray,
     row: int,
     scale: float,
@@ -90,7 +90,7 @@ def project(
 
     Args:
         bodies: Vertices, shape (2, 3, 4).
-        axes: Shape (3, n).
+        axes: Axes, shape (3, n).
         count: Number of axes to use.
         tolerance: Gap of projections that counts as touching, over the axis' length.
         size: Largest extent of the bodies.
@@ -118,7 +118,7 @@ def project(
 
 
 @helper
-def without(w: Vector, u: Vector) -> Vector:
+def perpendicular_part(w: Vector, u: Vector) -> Vector:
     """Return the part of w perpendicular to u, where u is not zero."""
     uu = dot3(u, u)
     share = dot3(w, u) / uu if uu > 0.0 else 0.0
@@ -129,7 +129,7 @@ def without(w: Vector, u: Vector) -> Vector:
 def connections_separate(
     bodies: FloatArray, axes: FloatArray, tolerance: float, size: float
 ) -> bool:
-    """Return whether the shortest connection of some two edges is a separating axis."""
+    """Return whether the shortest connection of any two edges is a separating axis."""
     for i, j in EDGES:
         a = vertex(bodies, 0, i)
         u = minus(vertex(bodies, 0, j), a)
@@ -147,9 +147,9 @@ def connections_separate(
                 return False
             # Of a short connection only the part perpendicular to the edges is more than rounding.
             if 0.0 < s < 1.0:
-                w = without(w, u)
+                w = perpendicular_part(w, u)
             if 0.0 < t < 1.0:
-                w = without(w, v)
+                w = perpendicular_part(w, v)
             axes[0, 0], axes[1, 0], axes[2, 0] = w
             if project(bodies, axes, 1, tolerance, size)[0]:
                 return True
@@ -166,9 +166,9 @@ def overlaps(
         p: First bodies, shape (n, 4, 3).
         q: Second bodies, shape (n, 4, 3).
         row: Index of the pair.
-        bodies: Scratch for vertices, shape (2, 3, 4).
-        edges: Scratch for edges, shape (2, 3, 6).
-        axes: Scratch, shape (3, 36).
+        bodies: Working space for vertices, shape (2, 3, 4).
+        edges: Working space for edges, shape (2, 3, 6).
+        axes: Working space, shape (3, 36).
     """
     largest, size, apart = compare_boxes(p, q, row)
     if apart:
@@ -178,8 +178,8 @@ def overlaps(
         scale = 1.0 / max(largest, 1e-300)
     tolerance, size = TOUCHING * largest * scale, size * scale
     origin = (p[row, 0, 0], p[row, 0, 1], p[row, 0, 2])
-    place(p, row, scale, origin, 0, bodies, edges)
-    place(q, row, scale, origin, 1, bodies, edges)
+    write_body(p, row, scale, origin, 0, bodies, edges)
+    write_body(q, row, scale, origin, 1, bodies, edges)
     for body in range(2):
         cross_edges(edges, body, 0, body, 1, axes, 4 * body)
         cross_edges(edges, body, 0, body, 2, axes, 4 * body + 1)
@@ -201,13 +201,7 @@ def overlaps(
 
 @kernel("void(f8[:,:,::1], f8[:,:,::1], b1[::1])")
 def overlap_rows(p: FloatArray, q: FloatArray, overlap: BoolArray) -> None:
-    """Write for each pair whether it overlaps.
-
-    Args:
-        p: Shape (n, 4, 3).
-        q: Shape (n, 4, 3).
-        overlap: Written, shape (n,).
-    """
+    """Write whether each pair overlaps, shape (n,), from its vertices p and q (n, 4, 3)."""
     bodies, edges, axes = np.empty((2, 3, 4)), np.empty((2, 3, 6)), np.empty((3, 36))
     for row in range(p.shape[0]):
         overlap[row] = overlaps(p, q, row, bodies, edges, axes)
@@ -225,12 +219,13 @@ def tetrahedra_overlap(p: ArrayLike, q: ArrayLike) -> BoolArray:
         q: Vertices, shape (..., 4, 3), in the same unit; batch axes are broadcast.
 
     Raises:
-        InputError: p or q is not an array of finite numbers of that shape.
+        InputError: p or q does not consist of finite numbers, or has another shape.
     """
     a, b = finite_array("p", p, (4, 3)), finite_array("q", q, (4, 3))
     batch = batch_shape((a, 2), (b, 2))
     a_rows, b_rows = (
-        for_kernel(np.broadcast_to(each, (*batch, 4, 3)).reshape(-1, 4, 3)) for each in (a, b)
+        for_kernel(np.broadcast_to(vertices, (*batch, 4, 3)).reshape(-1, 4, 3))
+        for vertices in (a, b)
     )
     overlap = np.empty(len(a_rows), dtype=np.bool_)
     overlap_rows(len(a_rows), a_rows, b_rows, overlap)

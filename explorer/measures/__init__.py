@@ -1,1 +1,1 @@
-"""What can be measured of a design or a pose."""
+"""Measures of a design or a pose."""

@@ -9,7 +9,6 @@ from functools import cached_property
 import numpy as np
 
 from explorer.measures.clearance import clearance_beyond, clearance_margin_of
-from explorer.measures.size import nodes_of
 from explorer.mechanism.design import Design
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import Pose, Triple
@@ -17,7 +16,7 @@ from explorer.numerics.arrays import FloatArray
 from explorer.singularity.jacobian import inverse_condition, jacobian
 from explorer.workspace.extremes import extent_of, least_margins
 from explorer.workspace.node_measures import DEFAULT_NODES, NodeMeasures, node_measures
-from explorer.workspace.slices.volume import NodeCount, Volume, workspace_volume
+from explorer.workspace.slices.volume import NodeCount, Volume, workspace_nodes, workspace_volume
 from explorer.workspace.solids.solid import Solid
 
 MESH_TOLERANCE = 0.004
@@ -29,8 +28,8 @@ reach."""
 class Case:
     """A design to measure; lengths in design units.
 
-    All is of the constant-orientation workspace at the home's orientation. Each intermediate
-    result is computed when a measure first asks for it.
+    All values describe the constant-orientation workspace. Each intermediate result is computed
+    when a measure first needs it.
 
     Attributes:
         design: The manipulator.
@@ -40,6 +39,7 @@ class Case:
         box: Box (lows, highs) over which the least |δ| is measured; not measured if None.
         demanded_margin: Least |δ| at which a demanded clearance counts; None without demand.
         mesh: The workspace as a mesh of any tolerance, if there is one already.
+        pose: Pose that has the orientation of the workspace; the home pose if None.
     """
 
     design: Design
@@ -49,36 +49,42 @@ class Case:
     box: tuple[Triple, Triple] | None = None
     demanded_margin: float | None = None
     mesh: Solid | None = None
+    pose: Pose | None = None
 
     @property
     def clearance_margin(self) -> float:
         """The least |δ| at which clearances count, in design units."""
         return clearance_margin_of(self.design) if self.margin is None else self.margin
 
-    @cached_property
-    def home(self) -> Pose:
-        """The home pose."""
-        return home_pose(self.design)
+    @property
+    def at(self) -> Pose:
+        """The pose of the case: the given one, or else the home pose."""
+        return home_pose(self.design) if self.pose is None else self.pose
 
-    @cached_property
+    @property
     def rotation(self) -> FloatArray:
-        """The home's rotation, platform to base, shape (3, 3)."""
-        return self.home.rotation
+        """The rotation of the workspace, platform to base, shape (3, 3)."""
+        return self.at.rotation
 
     @cached_property
     def volume(self) -> Volume:
         """The exact volume, its gradient, and the limits that empty the workspace."""
-        return workspace_volume(self.design)
+        return workspace_volume(self.design, self.rotation)
 
     @cached_property
-    def paper_nodes(self) -> NodeCount | None:
-        """The paper's nodes; None if the grid is too fine to count."""
-        return nodes_of(self.design, self.node_step)
+    def paper_nodes(self) -> NodeCount:
+        """The paper's nodes; an InputError if the grid is too fine to count."""
+        return workspace_nodes(self.design, self.rotation, self.node_step)
 
     @cached_property
     def at_nodes(self) -> NodeMeasures:
         """Extent, margins and clearances at the nodes of a grid over the workspace."""
-        return node_measures(self.design, nodes=self.nodes, clearance_margin=self.clearance_margin)
+        return node_measures(
+            self.design,
+            self.rotation,
+            nodes=self.nodes,
+            clearance_margin=self.clearance_margin,
+        )
 
     @cached_property
     def conditions(self) -> tuple[float, float]:
@@ -86,20 +92,20 @@ class Case:
         positions = self.at_nodes.positions
         if not len(positions):
             return math.nan, math.nan
-        found = self.inverse_conditions(positions)
-        return float(found.min()), float(found.mean())
+        conditions = self.inverse_conditions(positions)
+        return float(conditions.min()), float(conditions.mean())
 
     @cached_property
     def clearance(self) -> tuple[float, tuple[int, int]] | tuple[None, None]:
-        """The least clearance where `clearance_margin` is kept, and its two legs."""
-        return clearance_beyond(self.design, self.clearance_margin)
+        """The least clearance where every |δ| is at least `clearance_margin`, and its two legs."""
+        return clearance_beyond(self.design, self.clearance_margin, self.rotation)
 
     @cached_property
     def demanded_clearance(self) -> tuple[float, tuple[int, int]] | tuple[None, None]:
-        """The least clearance where `demanded_margin` is kept, and its two legs."""
+        """The least clearance where every |δ| is at least `demanded_margin`, and its two legs."""
         if self.demanded_margin is None:
             return None, None
-        return clearance_beyond(self.design, self.demanded_margin)
+        return clearance_beyond(self.design, self.demanded_margin, self.rotation)
 
     @cached_property
     def solid(self) -> Solid | None:
@@ -135,7 +141,7 @@ class Case:
         from explorer.workspace.accessible.workspace import reachable_workspace
 
         try:
-            return reachable_workspace(self.design).reachable_volume, ""
+            return reachable_workspace(self.design, self.rotation).reachable_volume, ""
         except StartError as error:
             return math.nan, str(error)
 

@@ -8,6 +8,7 @@ import numpy as np
 from explorer.legs.clearance import PAIRS
 from explorer.mechanism.design import Design
 from explorer.mechanism.home import home_pose
+from explorer.numerics.arrays import FloatArray
 from explorer.workspace.least_clearance import least_clearances
 from explorer.workspace.slices.volume import workspace_volume
 
@@ -24,27 +25,29 @@ def clearance_margin_of(design: Design) -> float:
 
 
 def clearance_beyond(
-    design: Design, margin: float
+    design: Design, margin: float, rotation: FloatArray | None = None
 ) -> tuple[float, tuple[int, int]] | tuple[None, None]:
     """Return the least clearance where every |δ| is at least some length, and its two legs.
 
-    The positions are those of the workspace at the home's orientation; the clearance is certain
-    to a thousandth of the reach. Without such a position, or without a volume (positions may be
-    left then, all on a surface), both are None.
+    The clearance is accurate to a thousandth of the reach. Both are None where the
+    constant-orientation workspace has no such position, or no volume: the positions left may
+    then all lie on a surface.
 
     Args:
         design: The manipulator; nearer to a singularity its legs may have to meet.
         margin: The least |δ|, in design units.
+        rotation: Platform to base, shape (3, 3); that of the home pose if None.
     """
-    if workspace_volume(design, explain=False).volume <= 0.0:
+    r = home_pose(design).rotation if rotation is None else rotation
+    if workspace_volume(design, r, explain=False).volume <= 0.0:
         return None, None
-    own = design.limits.margin or 0.0
-    limits = msgspec.structs.replace(design.limits, margin=max(own, margin))
-    found = least_clearances(
+    own_margin = design.limits.margin or 0.0
+    limits = msgspec.structs.replace(design.limits, margin=max(own_margin, margin))
+    clearances = least_clearances(
         msgspec.structs.replace(design, limits=limits),
-        home_pose(design).rotation,
+        r,
         CERTAIN * design.reach,
         only_least=True,
     ).clearance
-    pair = int(found.argmin())
-    return (float(found[pair]), PAIRS[pair]) if np.isfinite(found[pair]) else (None, None)
+    pair = int(clearances.argmin())
+    return (float(clearances[pair]), PAIRS[pair]) if np.isfinite(clearances[pair]) else (None, None)

@@ -91,9 +91,9 @@ class Snapshot:
     @property
     def determinant_size(self) -> float:
         """The |determinant| if the smallest margin were the reach, a scale for rounding errors."""
-        long = self.margins.copy()
-        long[np.abs(long).argmin()] = self.design.reach
-        return abs(float(determinant(self.design, self.joints, long)))
+        enlarged = self.margins.copy()
+        enlarged[np.abs(enlarged).argmin()] = self.design.reach
+        return abs(float(determinant(self.design, self.joints, enlarged)))
 
     @cached_property
     def inverse_condition(self) -> float:
@@ -104,8 +104,8 @@ class Snapshot:
     @cached_property
     def stratum(self) -> tuple[int, ...]:
         """The stratum: the permutation of the relative position of the two flags."""
-        found = stratum(self.pose.position, self.rotation, self.design.reach)
-        return tuple(found.tolist())
+        permutation = stratum(self.pose.position, self.rotation, self.design.reach)
+        return tuple(permutation.tolist())
 
     @property
     def stratum_dimension(self) -> int:
@@ -160,7 +160,7 @@ class Snapshot:
 
     @cached_property
     def nearest_distances(self) -> tuple[float, float, float]:
-        """The distances of `nearest`, in a third of the time that the poses take."""
+        """The distances of `nearest`, computed in a third of the time of the poses."""
         first, second, third = self._nearest_poses.distance.tolist()
         return first, second, third
 

@@ -17,7 +17,7 @@ from explorer.measures.snapshot import Snapshot
 from explorer.mechanism.margins import INCIDENCES
 from explorer.singularity.bruhat import incidences
 
-# The warning length of distances, over that of margins.
+# Warning length of distances, as a share of that of margins.
 DISTANCE_SHARE = 1.0 / 3.0
 
 Kind = Literal["singular", "near", "clear"]
@@ -30,7 +30,7 @@ TITLES: dict[Kind, str] = {
 
 @dataclass(frozen=True)
 class Verdict:
-    """How near a pose is to a singularity.
+    """The nearness of a pose to a singularity.
 
     Attributes:
         kind: Whether the pose is singular, near a singularity, or clear of all.

@@ -46,7 +46,8 @@ radians for angles."""
 
 # Share of the design's size up to which a3y, b1y and b3 - b2 are rounding noise.
 DEGENERATE_RATIO = 1e-12
-# The determinant of the Jacobian grows with the seventh power of the size.
+# Bounds of the largest design variable, whose seventh power in det J must not over- or
+# underflow.
 SMALLEST_SIZE, LARGEST_SIZE = 1e-30, 1e30
 
 

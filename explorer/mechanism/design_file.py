@@ -28,7 +28,7 @@ MIGRATIONS: dict[int, Callable[[dict[str, Any]], dict[str, Any]]] = {}
 
 
 class _Versioned(msgspec.Struct):
-    """The field of every schema; a file without it is of the first schema."""
+    """The schema of a design file; a file without the field is of the first schema."""
 
     schema: int = 1
 
@@ -56,15 +56,15 @@ def decode_design(data: bytes, source: str) -> Design:
             )
         if schema in MIGRATIONS:
             fields = msgspec.json.decode(data, type=dict[str, Any])
-            design = msgspec.convert(up_to_date(fields), Design)
+            design = msgspec.convert(migrate(fields), Design)
         else:
             design = msgspec.json.decode(data, type=Design)
         check_unique_fields(data)
         return design
 
 
-def up_to_date(fields: dict[str, Any]) -> dict[str, Any]:
-    """Return the fields of a design of this schema or an older one, converted to this schema."""
+def migrate(fields: dict[str, Any]) -> dict[str, Any]:
+    """Return the fields of a design of any older schema, converted to the present one."""
     for older in range(fields.get("schema", 1), SCHEMA):
         fields = MIGRATIONS[older](fields)
     return fields | {"schema": SCHEMA}

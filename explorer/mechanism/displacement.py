@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.mechanism.design import Design
+from explorer.mechanism.kinematics import platform_points
 from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import FloatArray, batch_shape, dot, finite_array
 
@@ -36,9 +37,7 @@ class PlatformPoints:
     @staticmethod
     def of(design: Design) -> PlatformPoints:
         """Return the points of a design's platform."""
-        points = np.zeros((4, 3))
-        points[0, :2] = design.b1
-        points[1, 0], points[2, 0] = design.b2, design.b3
+        points = platform_points(design)
         centroid = points.mean(axis=0)
         off = points - centroid
         scatter = off.T @ off / len(points)
@@ -52,16 +51,14 @@ def displacement(
     other_position: ArrayLike,
     other_rotation: ArrayLike,
 ) -> FloatArray:
-    """Return the root-mean-square displacement of b1 to b4 between poses, shape (...).
-
-    The result is in design units.
+    """Return the root-mean-square displacement of b1 to b4, shape (...), in design units.
 
     Args:
         design: The manipulator.
         position: b4 in the base frame, shape (..., 3), in design units.
         rotation: Platform to base, shape (..., 3, 3).
-        other_position: The same of the other pose, shape (..., 3).
-        other_rotation: The same of the other pose, shape (..., 3, 3).
+        other_position: b4 of the other pose, shape (..., 3).
+        other_rotation: Platform to base in the other pose, shape (..., 3, 3).
 
     Raises:
         InputError: A position is not finite, or a rotation is not one.
@@ -70,7 +67,6 @@ def displacement(
     q = finite_array("other position", other_position, (3,))
     r, s = checked_rotation(rotation), checked_rotation(other_rotation)
     batch_shape((p, 1), (r, 2), (q, 1), (s, 2))
-    points = PlatformPoints.of(design).points
     # For close poses the formula with the scatter would cancel; these squares do not.
-    moves = (q - p)[..., None, :] + points @ np.swapaxes(s - r, -1, -2)
+    moves = (q - p)[..., None, :] + platform_points(design) @ np.swapaxes(s - r, -1, -2)
     return np.sqrt(dot(moves, moves).mean(axis=-1))

@@ -61,18 +61,18 @@ def nearest_feasible(
         intervals: Its intervals, from `feasible_intervals`.
     """
     value = float(joints[joint])
-    ends = [(min(max(value, low), high), low, high) for low, high in intervals]
-    if not ends:
+    if not intervals:
         return None
-    nearest, low, high = min(ends, key=lambda end: abs(end[0] - value))
+    candidates = [(min(max(value, low), high), low, high) for low, high in intervals]
+    nearest, low, high = min(candidates, key=lambda candidate: abs(candidate[0] - value))
     # The last bits of a root may lie outside: step inwards until the joints close.
     middle = 0.5 * (low + high)
     for share in (0.0, *(10.0**-k for k in range(15, 2, -1))):
-        candidate = nearest + share * (middle - nearest)
+        inner = nearest + share * (middle - nearest)
         trial = joints.copy()
-        trial[joint] = candidate
+        trial[joint] = inner
         if forward(design, trial).feasible:
-            return candidate
+            return inner
     return None
 
 
@@ -125,12 +125,12 @@ def _discriminants(
             l4_2_at_0[5] - 2.0 * a3y * unknown,
         ]
     )
-    room = ((0, 0), (0, 2))
+    to_degree_four = ((0, 0), (0, 2))
     polynomials = np.stack(
         [
-            np.pad(p2, room) - _product(along, along) - _product(across, across),
+            np.pad(p2, to_degree_four) - _product(along, along) - _product(across, across),
             _product(s2, r2) - _product(w, w),
-            np.pad(r2, room) - _product(py, py),
+            np.pad(r2, to_degree_four) - _product(py, py),
         ]
     )
     return polynomials, joint_of[:, :2]
@@ -166,19 +166,14 @@ def _real_roots(polynomials: FloatArray) -> list[list[float]]:
     return roots_of_joint
 
 
-def _breaks(ends: FloatArray, scale: float, largest: float, is_length: bool) -> list[float]:
-    """Return the ascending values at which the joints may begin or cease to close.
+def _breaks(roots: FloatArray, scale: float, largest: float, is_length: bool) -> list[float]:
+    """Return the ascending values of one joint at which the joints may cease to close.
 
-    |d1 - d3|, and with it every length, is bounded by a few times the largest of the others, so
-    no joints close beyond the outer values; a very large value belongs to a vanishing term.
-
-    Args:
-        ends: Roots for one joint, or for its square if it is a length, over `scale`.
-        scale: Length by which the joints were divided.
-        largest: Largest value that is returned.
-        is_length: Whether the joint is a length.
+    No joints close beyond the outer values: |d1 - d3|, and with it every length, is bounded by a
+    few times the largest of the others. A value above `largest` belongs to a vanishing term and
+    is left out. The roots are those of the joint over `scale`, or of its square for a length.
     """
-    values = np.sort(ends)
+    values = np.sort(roots)
     if is_length:
         values = np.sqrt(np.append(0.0, values[values > 0.0]))
     values = values * scale
@@ -190,13 +185,13 @@ def _closing_intervals(
 ) -> tuple[tuple[Interval, ...], ...]:
     """Return, for each joint, the intervals between breaks in whose middle the joints close.
 
-    The forward kinematics decides, so that a discriminant that is zero but for rounding, as in
-    every singular pose, counts as closing here and there alike.
+    The forward kinematics decides, so that both agree where a discriminant is zero but for
+    rounding, as in every singular pose.
     """
     gaps = [
         (joint, low, high)
-        for joint, ends in enumerate(breaks)
-        for low, high in itertools.pairwise(ends)
+        for joint, values in enumerate(breaks)
+        for low, high in itertools.pairwise(values)
         if low < high
     ]
     trials = np.repeat(joints[None, :], len(gaps), axis=0)
@@ -205,8 +200,6 @@ def _closing_intervals(
     intervals: list[list[Interval]] = [[] for _ in JOINTS]
     closes = forward(design, trials).feasible.tolist()
     for joint, low, high in itertools.compress(gaps, closes):
-        start = low
-        if intervals[joint] and intervals[joint][-1][1] == low:
-            start = intervals[joint].pop()[0]
-        intervals[joint].append((start, high))
+        adjoins = intervals[joint] and intervals[joint][-1][1] == low
+        intervals[joint].append((intervals[joint].pop()[0] if adjoins else low, high))
     return tuple(map(tuple, intervals))

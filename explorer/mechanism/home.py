@@ -18,7 +18,7 @@ from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose, rotation_from_yaw_pitch_roll
 from explorer.numerics.arrays import FloatArray
 
-# The yaw that reproduces the paper's Table 1 in our reading, and its mirror images (degrees).
+# Yaw that reproduces the paper's Table 1 in our reading, and its mirror images, in degrees.
 YAWS = (-73.1, 73.1, -106.9, 106.9)
 # Number of grid positions on each axis.
 STEPS = 9
@@ -41,25 +41,23 @@ def _search_grid(design: Design) -> Pose:
     p, r = positions[None, :, :], rotations[:, None, :, :]
     least_margin = np.abs(margins(p, r)).min(axis=-1)
     joints = inverse(design, p, r)
+    ranges = {name: design.length_range(name) for name in LENGTHS}
+    if design.limits.guide is not None:
+        ranges |= dict.fromkeys(("d1", "d3"), design.limits.guide)
     excess = np.zeros(least_margin.shape)
-    for name in LENGTHS:
-        low, high = design.length_range(name)
+    for name, (low, high) in ranges.items():
         value = joints[..., JOINTS.index(name)]
         excess += np.maximum(0.0, low - value) + np.maximum(0.0, value - high)
-    if design.limits.guide is not None:
-        low, high = design.limits.guide
-        for name in ("d1", "d3"):
-            value = joints[..., JOINTS.index(name)]
-            excess += np.maximum(0.0, low - value) + np.maximum(0.0, value - high)
     order = np.lexsort((-least_margin.ravel(), np.round(excess / design.reach, 12).ravel()))
-    yaw, place = divmod(int(order[0]), len(positions))
-    return Pose.of(positions[place], rotations[yaw])
+    rotation, position = divmod(int(order[0]), len(positions))
+    return Pose.of(positions[position], rotations[rotation])
 
 
 def _candidates(design: Design) -> FloatArray:
+    """Return the positions of the grid, shape (n, 3), in design units."""
     reach = design.reach
     lows, highs = design.limits.box or ((-reach, -reach, 0.0), (reach, reach, reach))
-    # The ends are left out: there a margin or a distance to a limit is zero.
+    # The ends are left out: there a margin or the distance to a limit is zero.
     shares = np.linspace(0.0, 1.0, STEPS + 2)[1:-1]
     axes = [low + (high - low) * shares for low, high in zip(lows, highs, strict=True)]
     return np.array(list(itertools.product(*axes)))

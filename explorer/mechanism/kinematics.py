@@ -50,6 +50,13 @@ class ForwardKinematics(NamedTuple):
     feasible: BoolArray
 
 
+def platform_points(design: Design) -> FloatArray:
+    """Return b1, b2, b3 and b4 in the platform frame, shape (4, 3), in design units."""
+    return np.array(
+        [(*design.b1, 0.0), (design.b2, 0.0, 0.0), (design.b3, 0.0, 0.0), (0.0, 0.0, 0.0)]
+    )
+
+
 def attachment_points(design: Design, position: ArrayLike, rotation: ArrayLike) -> AttachmentPoints:
     """Return the seven attachment points of a pose.
 
@@ -112,8 +119,7 @@ def forward(design: Design, joints: ArrayLike) -> ForwardKinematics:
     Raises:
         InputError: The joints are not usable, see `checked_joints`.
     """
-    position, rotation, feasible, _ = _solve(design, joints)
-    return ForwardKinematics(position, rotation, feasible)
+    return ForwardKinematics(*_solve(design, joints)[:3])
 
 
 def discriminants(design: Design, joints: ArrayLike) -> FloatArray:

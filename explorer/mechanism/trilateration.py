@@ -1,4 +1,4 @@
-"""The three trilaterations in closed form (the paper's section 2, Figure 2).
+"""The three trilaterations in closed form (the paper's geometric analysis, Figure 2).
 
 With u, v, n the platform's axes in the base frame and p the position of b4, the joints
 determine the scalars c = u·x̂, the yz-radius r of b4, w = uy py + uz pz, X = u·p and Y = v·p.
@@ -101,7 +101,7 @@ def solve_rows(  # noqa: PLR0915 - one loop body, so that nothing is stored betw
             ep2 + 2.0 * abs(b1x) * ealong + EPSILON * (l1 * l1 + abs(p2) + b1x * b1x + b1y * b1y)
         ) / (2.0 * abs(b1y))
 
-        # The discriminants. Of δ2² the Gram determinant is PSD only if 1 - c² and r² are.
+        # The discriminants. δ2² is a Gram determinant: 1 - c² and r² must not be negative either.
         k3 = r2 - py * py
         ek3 = er2 + 2.0 * abs(py) * epy + epy * epy
         k2 = s2 * r2 - w * w
@@ -142,21 +142,21 @@ def solve_rows(  # noqa: PLR0915 - one loop body, so that nothing is stored betw
             turn = delta2 if lower & 2 else -delta2
             uy, uz = w * py + turn * pz, w * pz - turn * py
             square = uy * uy + uz * uz
-            # Its length is s by construction, but near the guide only after this scaling.
+            # (uy, uz) has length s; near the guide rounding spoils it, hence the scaling.
             if square > NEGLIGIBLE_SQUARE:
                 stretch = s / math.sqrt(square)
                 uy, uz = uy * stretch, uz * stretch
             else:
                 uy, uz = s, 0.0
 
-            # e: from the line b2b3 to a1, backwards; f: the same turned about u.
+            # e: direction from a1 to the nearest point of the line b2b3; f = u × e.
             ex, ey, ez = px - along * c, py - along * uy, pz - along * uz
             square_h = ex * ex + ey * ey + ez * ez
             lean = ex * c + ey * uy + ez * uz
             on_line = square_h < NEGLIGIBLE_SQUARE
             if lean * lean > LEAST_SQUARED_ANGLE * square_h:
                 # Near the line, cancellation leaves a part of e along u, so project once more.
-                # If little is left it is rounding: a1 is on the line, and e is any normal of u.
+                # What is left may be mere rounding: then a1 is on the line, and e any normal of u.
                 ex, ey, ez = ex - lean * c, ey - lean * uy, ez - lean * uz
                 rough, square_h = square_h, ex * ex + ey * ey + ez * ez
                 on_line = square_h <= max(0.25 * rough, NEGLIGIBLE_SQUARE)

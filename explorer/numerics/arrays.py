@@ -18,7 +18,7 @@ BoolArray: TypeAlias = NDArray[np.bool_]
 
 
 def finite_array(name: str, value: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
-    """Return `value` as float64 with the trailing `shape`, every entry finite.
+    """Return numbers as a float64 array, after checking their shape and that all are finite.
 
     Args:
         name: Name of the value in the error message.

@@ -85,10 +85,10 @@ def one_of(name: str, value: object, allowed: Sequence[str]) -> None:
 
 
 def instance(name: str, value: object, *kinds: type) -> None:
-    """Check that a value given by code is of one of the types; a file's decoder does so itself."""
+    """Check that a value is of one of the types; a file's decoder checks them itself."""
     if not isinstance(value, kinds):
-        wanted = " or ".join(kind.__name__ for kind in kinds)
-        raise DesignError(f"{name} must be of type {wanted}; got {_short_repr(value)}", name)
+        names = " or ".join(kind.__name__ for kind in kinds)
+        raise DesignError(f"{name} must be of type {names}; got {_short_repr(value)}", name)
 
 
 def _entries(value: Any) -> list[Any]:

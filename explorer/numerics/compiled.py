@@ -46,7 +46,6 @@ class Kernel(Generic[Arguments]):
         self._function = function
         self._signature = signature
         self._compiled: Callable[Arguments, None] | None = None
-        self._entry: Entry | None = None
         functools.update_wrapper(self, function)
         _kernels.append(self)
 
@@ -56,12 +55,11 @@ class Kernel(Generic[Arguments]):
             self.compile()
         (self._compiled or self._function)(*args, **kwargs)
 
-    @property
+    @functools.cached_property
     def entry(self) -> Entry:
         """The kernel's entry in the cache."""
-        if self._entry is None:
-            self._entry = Entry(self._function, _helpers, (self._signature, OPTIONS))
-        return self._entry
+        options = (self._signature, OPTIONS)
+        return Entry(self._function, set(_helpers), options, self._compile_here)
 
     @property
     def ready(self) -> bool:
@@ -71,10 +69,10 @@ class Kernel(Generic[Arguments]):
     def compile(self) -> None:
         """Load the compiled form; wait while another process compiles it."""
         if self._compiled is None:
-            for _ in await_cached([self], urgent=True):
-                self.compile_here()
+            for entry in await_cached([self.entry], urgent=True):
+                entry.compile_here()
 
-    def compile_here(self) -> None:
+    def _compile_here(self) -> None:
         """Load the compiled form; compile it in this process if it is not in the cache."""
         with _compile_lock:
             if self._compiled is not None:
@@ -87,9 +85,9 @@ class Kernel(Generic[Arguments]):
             settings.CACHE_LOCATOR_CLASSES = f"{Locator.__module__}.{Locator.__qualname__}"
             try:
                 # A cache that cannot be written can still be read.
-                kept = self.entry.is_filled or is_writable()
-                source = _with_compiled_helpers(self._function, self.entry.fingerprint, kept=kept)
-                self._compiled = numba.njit(self._signature, cache=kept, **OPTIONS)(source)
+                is_cached = self.entry.is_filled or is_writable()
+                source = _with_compiled_helpers(self._function, self.entry.fingerprint, is_cached)
+                self._compiled = numba.njit(self._signature, cache=is_cached, **OPTIONS)(source)
             finally:
                 settings.CACHE_LOCATOR_CLASSES = before
         self.entry.mark_used()
@@ -97,11 +95,7 @@ class Kernel(Generic[Arguments]):
 
 def kernel(signature: str) -> Callable[[Callable[Arguments, None]], Kernel[Arguments]]:
     """Make a `Kernel` of the decorated function."""
-
-    def decorate(function: Callable[Arguments, None]) -> Kernel[Arguments]:
-        return Kernel(function, signature)
-
-    return decorate
+    return lambda function: Kernel(function, signature)
 
 
 def helper(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
@@ -111,14 +105,14 @@ def helper(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]
 
 
 def _with_compiled_helpers(
-    function: Callable[..., Any], fingerprint: str, *, kept: bool
+    function: Callable[..., Any], fingerprint: str, is_cached: bool
 ) -> Callable[..., Any]:
     """Return a copy of a function that calls compiled helpers instead of plain ones.
 
     Args:
         function: Function of a kernel or a helper.
         fingerprint: Fingerprint under which the cache stores its code.
-        kept: Whether the cache stores code at all.
+        is_cached: Whether the cache stores code at all.
     """
     import numba
 
@@ -127,9 +121,9 @@ def _with_compiled_helpers(
         called = namespace.get(name)
         if isinstance(called, FunctionType) and called in _helpers:
             if _helpers[called] is None:
-                own, _ = fingerprint_of(called, set(_helpers), OPTIONS)
-                plain = _with_compiled_helpers(called, own, kept=kept)
-                _helpers[called] = numba.njit(cache=kept, **OPTIONS)(plain)
+                called_fingerprint, _ = fingerprint_of(called, set(_helpers), OPTIONS)
+                plain = _with_compiled_helpers(called, called_fingerprint, is_cached)
+                _helpers[called] = numba.njit(cache=is_cached, **OPTIONS)(plain)
             namespace[name] = _helpers[called]
     copy = FunctionType(function.__code__, namespace, function.__name__, function.__defaults__)
     copy.__module__, copy.__qualname__ = function.__module__, function.__qualname__
@@ -139,14 +133,14 @@ def _with_compiled_helpers(
 
 def fill_cache() -> None:
     """Compile every imported kernel into the cache, in another process."""
-    for _ in await_cached([kernel for kernel in _kernels if not kernel.ready]):
+    for _ in await_cached(kernel.entry for kernel in _kernels if not kernel.ready):
         pass
 
 
 def warm() -> None:
     """Load the compiled form of every imported kernel, so that small calls are fast too."""
-    for kernel in await_cached([kernel for kernel in _kernels if not kernel.ready]):
-        kernel.compile_here()
+    for entry in await_cached(kernel.entry for kernel in _kernels if not kernel.ready):
+        entry.compile_here()
 
 
 def warm_in_background(then: Callable[[], None] | None = None) -> threading.Thread:

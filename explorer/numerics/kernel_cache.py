@@ -23,8 +23,9 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from types import FunctionType
-from typing import Any, Protocol, TypeVar
+from typing import Any
 
+import platformdirs
 from filelock import FileLock, Timeout
 
 from explorer.files.packaged import SOURCES
@@ -33,26 +34,10 @@ from explorer.files.packaged import SOURCES
 BUSY = 75
 # Number of hexadecimal digits of a fingerprint.
 DIGITS = 16
-# Seconds between two looks into the cache: while a caller waits for a kernel, and otherwise.
+# Seconds between two checks of the cache: while a caller waits for a kernel, and otherwise.
 URGENT_SECONDS, POLL_SECONDS = 0.02, 0.2
 # Seconds after which unused compiled code is removed.
-KEPT_SECONDS = 30 * 24 * 3600
-
-
-class Cacheable(Protocol):
-    """A kernel as the cache requires it."""
-
-    @property
-    def entry(self) -> Entry:
-        """The kernel's entry in the cache."""
-        ...
-
-    def compile_here(self) -> None:
-        """Compile the kernel in this process, into the cache."""
-        ...
-
-
-Kind = TypeVar("Kind", bound=Cacheable)
+UNUSED_SECONDS = 30 * 24 * 3600
 
 
 class Entry:
@@ -62,6 +47,7 @@ class Entry:
         function: Python function of the kernel.
         helpers: Functions that kernels may call.
         options: Other values on which the compiled code depends, such as its signature.
+        compile_here: Function that compiles the kernel in this process, into the cache.
 
     Attributes:
         module: Name of the module that defines the kernel.
@@ -71,15 +57,20 @@ class Entry:
     """
 
     def __init__(
-        self, function: Callable[..., Any], helpers: Iterable[Callable[..., Any]], options: object
+        self,
+        function: Callable[..., Any],
+        helpers: set[Callable[..., Any]],
+        options: object,
+        compile_here: Callable[[], None],
     ) -> None:
         self.module, self.name = function.__module__, function.__name__
-        self.fingerprint, self.effort = fingerprint_of(function, set(helpers), options)
+        self.fingerprint, self.effort = fingerprint_of(function, helpers, options)
+        self.compile_here = compile_here
 
     @property
     def is_filled(self) -> bool:
         """Whether the cache holds the compiled kernel."""
-        return self.fingerprint in _compiled()
+        return self.fingerprint in _cached_fingerprints()
 
     @property
     def label(self) -> str:
@@ -93,19 +84,19 @@ class Entry:
                 os.utime(path)
 
     def request(self) -> None:
-        """Request that the compiling process, of whichever program, compiles this kernel next."""
+        """Request that the compiling process, even of another program, takes this kernel next."""
         with contextlib.suppress(OSError):
-            _requests().mkdir(parents=True, exist_ok=True)
-            self._request.write_text(self.label, encoding="utf-8")
+            _request_folder().mkdir(parents=True, exist_ok=True)
+            self._request_file.write_text(self.label, encoding="utf-8")
 
     def withdraw_request(self) -> None:
         """Remove the request."""
         with contextlib.suppress(OSError):
-            self._request.unlink(missing_ok=True)
+            self._request_file.unlink(missing_ok=True)
 
     @property
-    def _request(self) -> Path:
-        return _requests() / f"{self.name}-{self.fingerprint}"
+    def _request_file(self) -> Path:
+        return _request_folder() / f"{self.name}-{self.fingerprint}"
 
 
 def fingerprint_of(
@@ -140,6 +131,9 @@ def fingerprint_of(
                     waiting.append(value)
             elif isinstance(value, bool | int | float | tuple):
                 digest.update(f"{name}={value!r}".encode())
+            elif isinstance(value, type):
+                # Compiled code addresses the fields of a named tuple by their order.
+                digest.update(f"{name}={getattr(value, '_fields', ())}".encode())
     return digest.hexdigest()[:DIGITS], effort
 
 
@@ -148,15 +142,10 @@ def cache_folder() -> Path:
     """Return the folder for compiled code in the user's cache."""
     from importlib.metadata import version
 
-    default = Path.home() / ".cache"
-    if sys.platform == "darwin":
-        default = Path.home() / "Library" / "Caches"
-    elif sys.platform == "win32":
-        default = Path(os.environ.get("LOCALAPPDATA", Path.home()))
-    root = Path(os.environ.get("XDG_CACHE_HOME") or default)
     # Other versions of Numba or Python cannot load the code.
-    made_by = f"{sys.implementation.cache_tag}-numba-{version('numba')}"
-    return root / "flagged-explorer" / "kernels" / made_by
+    versions = f"{sys.implementation.cache_tag}-numba-{version('numba')}"
+    root = Path(os.environ.get("XDG_CACHE_HOME") or platformdirs.user_cache_dir())
+    return root / "flagged-explorer" / "kernels" / versions
 
 
 def is_writable() -> bool:
@@ -204,33 +193,33 @@ class Locator:
         return self._fingerprint
 
 
-def await_cached(kernels: Iterable[Kind], *, urgent: bool = False) -> Iterator[Kind]:
-    """Yield each kernel as soon as the cache holds it; have missing ones compiled.
+def await_cached(entries: Iterable[Entry], *, urgent: bool = False) -> Iterator[Entry]:
+    """Yield each entry as soon as it is filled; start a process that compiles missing kernels.
 
     If the compiling process ends without some kernels, for example because the cache cannot be
-    written, these are yielded last, for the caller to compile.
+    written, their entries are yielded last, for the caller to compile.
 
     Args:
-        kernels: The kernels.
+        entries: Entries of the kernels.
         urgent: Whether a caller waits for them, so that they are compiled before others.
     """
-    waiting = list(kernels)
+    waiting = list(entries)
     child: subprocess.Popen[bytes] | None = None
     requested: list[Entry] = []
     try:
         while True:
-            compiled = _compiled()
-            for kernel in [k for k in waiting if k.entry.fingerprint in compiled]:
-                waiting.remove(kernel)
-                yield kernel
+            cached = _cached_fingerprints()
+            for entry in [entry for entry in waiting if entry.fingerprint in cached]:
+                waiting.remove(entry)
+                yield entry
             if not waiting:
                 return
             if urgent and not requested:
-                requested = [kernel.entry for kernel in waiting]
+                requested = waiting.copy()
                 for entry in requested:
                     entry.request()
             if child is not None and child.poll() not in (None, BUSY):
-                # Some may have been compiled since the last look, and are then loaded.
+                # The caller loads those that were compiled since the last check.
                 yield from waiting
                 return
             if (child is None or child.poll() == BUSY) and not _is_compiling_elsewhere():
@@ -245,15 +234,9 @@ def await_cached(kernels: Iterable[Kind], *, urgent: bool = False) -> Iterator[K
 
 
 def compile_all(labels: Iterable[str]) -> int:
-    """Compile kernels that are not in the cache; requested ones before the others.
+    """Compile kernels that are not in the cache, requested ones first; return the exit status.
 
-    The compiling process runs this function.
-
-    Args:
-        labels: Labels of the kernels, see `Entry.label`.
-
-    Returns:
-        The exit status of the process.
+    The compiling process runs this function. The labels are those of `Entry.label`.
     """
     cache_folder().mkdir(parents=True, exist_ok=True)
     try:
@@ -277,56 +260,55 @@ def main() -> None:
 
 
 def _compile_by_urgency(labels: Iterable[str]) -> None:
-    kernels = [_kernel_named(label) for label in labels]
-    rest = sorted((kernel for kernel in kernels if kernel), key=lambda kernel: kernel.entry.effort)
+    rest = sorted(filter(None, map(_entry_of, labels)), key=lambda entry: entry.effort)
     while True:
-        chosen = next(iter(_requested()), None)
-        while chosen is None and rest:
+        entry = next(_requested_entries(), None)
+        while entry is None and rest:
             candidate = rest.pop(0)
-            chosen = None if candidate.entry.is_filled else candidate
-        if chosen is None:
+            entry = None if candidate.is_filled else candidate
+        if entry is None:
             return
-        chosen.compile_here()
-        chosen.entry.withdraw_request()
+        entry.compile_here()
+        entry.withdraw_request()
 
 
-def _requested() -> Iterator[Cacheable]:
-    """Yield the requested kernels that are not in the cache."""
-    for path in sorted(_requests().glob("*"), key=lambda path: path.name):
+def _requested_entries() -> Iterator[Entry]:
+    """Yield the entries of requested kernels; withdraw the requests of compiled ones."""
+    for path in sorted(_request_folder().glob("*"), key=lambda path: path.name):
         with contextlib.suppress(OSError):
-            kernel = _kernel_named(path.read_text(encoding="utf-8"))
-            # A request of another version of the explorer has another fingerprint.
-            if kernel and path.name.endswith(kernel.entry.fingerprint):
-                if not kernel.entry.is_filled:
-                    yield kernel
+            entry = _entry_of(path.read_text(encoding="utf-8"))
+            # Another version of the explorer requests another fingerprint.
+            if entry and path.name.endswith(entry.fingerprint):
+                if entry.is_filled:
+                    entry.withdraw_request()
                 else:
-                    kernel.entry.withdraw_request()
+                    yield entry
 
 
-def _kernel_named(label: str) -> Cacheable | None:
+def _entry_of(label: str) -> Entry | None:
     module, _, name = label.partition(":")
     if not module.startswith("explorer."):
         return None
     try:
-        return getattr(importlib.import_module(module), name, None)
+        return getattr(getattr(importlib.import_module(module), name, None), "entry", None)
     except ImportError:
         return None
 
 
-def _start_compiling(kernels: Iterable[Cacheable]) -> subprocess.Popen[bytes]:
+def _start_compiling(entries: Iterable[Entry]) -> subprocess.Popen[bytes]:
     # The child must import the same sources in any working folder. At higher levels of
     # optimisation compiling takes longer and the kernels are no faster.
-    changed = {"PYTHONPATH": str(SOURCES), "NUMBA_OPT": "1"}
-    return subprocess.Popen(  # noqa: S603 - our own interpreter and our own words
+    variables = {"PYTHONPATH": str(SOURCES), "NUMBA_OPT": "1"}
+    return subprocess.Popen(  # noqa: S603 - our own interpreter and names of our own modules
         [
             *(sys.executable, "-P", "-c"),
             f"from {__name__} import main; main()",
-            *(kernel.entry.label for kernel in kernels),
+            *(entry.label for entry in entries),
         ],
         stdin=subprocess.PIPE,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
-        env={**os.environ, **changed},
+        env={**os.environ, **variables},
     )
 
 
@@ -341,7 +323,7 @@ def _is_compiling_elsewhere() -> bool:
         return False
 
 
-def _compiled() -> set[str]:
+def _cached_fingerprints() -> set[str]:
     """Return the fingerprints of all functions whose compiled code is in the cache."""
     try:
         names = [path.name for path in cache_folder().iterdir()]
@@ -355,7 +337,7 @@ def _lock() -> FileLock:
     return FileLock(cache_folder() / "compiling.lock", is_singleton=False)
 
 
-def _requests() -> Path:
+def _request_folder() -> Path:
     return cache_folder() / "requests"
 
 
@@ -363,5 +345,5 @@ def _remove_unused() -> None:
     """Remove compiled code of any version that has not been loaded for a month."""
     for path in cache_folder().parent.glob("**/*"):
         with contextlib.suppress(OSError):
-            if path.is_file() and time.time() - path.stat().st_mtime > KEPT_SECONDS:
+            if path.is_file() and time.time() - path.stat().st_mtime > UNUSED_SECONDS:
                 path.unlink()

@@ -1,53 +1,31 @@
-"""What is drawn of a search: its objective, the volume and the worst demand, by iterates."""
+"""Curves of a search over its iterates: objective, volume and worst demand."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Literal, Protocol
+from typing import Literal
 
 import numpy as np
 
+from explorer.measures.catalogue import CATALOGUE
 from explorer.numerics.arrays import FloatArray
+from explorer.optimise.outcome import Iterate
 from explorer.optimise.problem import ObjectiveName, Problem
+from explorer.optimise.record import Step
+
+_MEASURES: Mapping[ObjectiveName, str] = MappingProxyType(
+    {"smallest-reach": "reach", "largest-volume": "volume", "largest-margin": "box_margin"}
+)
 
 CALLED: Mapping[ObjectiveName, str] = MappingProxyType(
-    {
-        "match-volume": "F",
-        "smallest-reach": "reach",
-        "largest-volume": "volume",
-        "largest-margin": "margin over the box",
-    }
+    {"match-volume": "F", **{key: CATALOGUE[name].label for key, name in _MEASURES.items()}}
 )
-"""What people call the value of each objective."""
+"""The name of the value of each objective: F, or the label of the measure in the catalogue."""
 
-# What is drawn of an objective that is met exactly, since zero is no power of ten.
+# Value drawn for an objective of zero, which has no logarithm.
 LEAST = 1e-16
-
-
-class Measured(Protocol):
-    """What an iterate and its step in a record have in common."""
-
-    @property
-    def objective(self) -> float:
-        """The value of the objective."""
-        ...
-
-    @property
-    def volume(self) -> float:
-        """The exact volume."""
-        ...
-
-    @property
-    def worst(self) -> str:
-        """The demand that is missed most."""
-        ...
-
-    @property
-    def spare(self) -> float:
-        """Its value."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -55,10 +33,10 @@ class Curve:
     """Values of the iterates of one start.
 
     Attributes:
-        kind: What they are of.
-        values: In their order, shape (n,).
-        level: What they are compared with, or None.
-        powers: Whether they are exponents of ten.
+        kind: Quantity of the values.
+        values: Value of each iterate, shape (n,).
+        level: Value to compare the others with, or None.
+        powers: Whether the values are exponents of ten.
     """
 
     kind: Literal["objective", "volume", "spare"]
@@ -67,22 +45,22 @@ class Curve:
     powers: bool = False
 
 
-def curves_of(problem: Problem, iterates: Sequence[Measured]) -> list[Curve]:
+def curves_of(problem: Problem, iterates: Sequence[Iterate] | Sequence[Step]) -> list[Curve]:
     """Return the curves of one start of a search.
 
     Args:
-        problem: What is looked for.
-        iterates: In the order in which they were found; not empty.
+        problem: The problem.
+        iterates: Iterates in their order; not empty.
     """
-    objective = np.array([each.objective for each in iterates])
+    objective = np.array([iterate.objective for iterate in iterates])
     curves: list[Curve] = []
     if problem.objective == "match-volume":
         powers = np.log10(np.maximum(objective, LEAST))
         curves.append(Curve("objective", powers, None, powers=True))
     elif problem.objective != "largest-volume":
         curves.append(Curve("objective", objective, None))
-    volume = np.array([each.volume for each in iterates])
+    volume = np.array([iterate.volume for iterate in iterates])
     curves.append(Curve("volume", volume, problem.demands.volume))
-    if any(each.worst for each in iterates):
-        curves.append(Curve("spare", np.array([each.spare for each in iterates]), 0.0))
+    if any(iterate.worst for iterate in iterates):
+        curves.append(Curve("spare", np.array([iterate.spare for iterate in iterates]), 0.0))
     return curves

@@ -25,9 +25,9 @@ from explorer.optimise.problem import (
 
 # Default bounds, as multiples of the start's largest variable.
 A3_WITHIN, B_WITHIN = 3.0, 1.0
-# How near a design may come to a degenerate one by default, as such a share.
+# Least distance from a degenerate design by default, as a share of that variable.
 LEAST = 0.05
-# Degrees of yaw that may change, and that stay between the two lines.
+# Default change of the yaw, and least angle between the two lines, in degrees.
 YAW_WITHIN, LINES_APART = 45.0, 5.0
 
 
@@ -48,7 +48,7 @@ def make_problem(
     """Return a problem with sensible bounds and margins where none are given.
 
     Args:
-        start: Where to begin.
+        start: Design to start from.
         objective: One of `OBJECTIVES`.
         volume: See `Demands`; the start's own for the smallest reach if None.
         reach: See `Demands`; the start's own for the largest volume if None.
@@ -58,13 +58,13 @@ def make_problem(
             the start itself is half as far from degenerate.
         stroke_ratio: See `Demands`.
         required_box: See `Demands`.
-        free: What of `OPTIONAL` may change besides the six design variables.
-        bounds: Variables with bounds in the place of the default ones.
+        free: Variables of `OPTIONAL` that may change besides the six design variables.
+        bounds: Variables with other bounds than the default ones.
 
     Raises:
         InputError: see `Problem`.
     """
-    given = {each.name: each for each in bounds}
+    given = {variable.name: variable for variable in bounds}
     names = [*VARIABLES, *free, *(name for name in given if name not in VARIABLES)]
     variables = [given.get(name) or default_variable(start, name) for name in dict.fromkeys(names)]
     size = max(map(abs, start.variables))
@@ -108,7 +108,7 @@ def default_variable(start: Design, name: str) -> Variable:
         return Variable(name, max(value / A3_WITHIN, longest_minimum(start)), A3_WITHIN * value)
     if name in SHIFTS:
         return Variable(name, -size, size)
-    # Between the two yaws at which the lines are parallel, if the start is.
+    # The lines are parallel at multiples of 180°; stay between two of them if the start does.
     below = 180.0 * math.floor(value / 180.0)
     low = max(value - YAW_WITHIN, min(value, below + LINES_APART))
     high = min(value + YAW_WITHIN, max(value, below + 180.0 - LINES_APART))
@@ -120,5 +120,5 @@ def _own_volume(start: Design) -> float:
 
     volume = workspace_volume(start).volume
     if volume <= 0.0:
-        raise InputError("the start has an empty workspace: say which volume is wanted")
+        raise InputError("the start has an empty workspace: give the volume to reach")
     return volume

@@ -1,4 +1,4 @@
-"""Our optima beside the paper's, computed again: the table in the manual's page on optimising.
+"""The manual's table of our optima beside the paper's, computed again.
 
 All have the orientation of the paper's optimum, its box, and lengths up to the reach.
 """
@@ -21,31 +21,31 @@ from explorer.optimise.solver import optimise_design
 from explorer.workspace.slices.volume import workspace_volume
 
 PAPER_VOLUME = 8000.0
-"""The volume that the paper asks for, V′."""
+"""Volume that the paper demands, V′, in cubed design units."""
 
 CLEARANCE = 0.2
-"""The clearance demanded where interference is on, in design units; the legs have no radii."""
+"""Clearance demanded where interference is on, in design units; the legs have no radii."""
 
 BOX: Box = ((8.0, 3.0, 7.0), (12.0, 7.0, 11.0))
-"""A box about the home position that lies in all workspaces but the initial one's, to
-compare margins over."""
+"""Box about the home position, over which margins are compared; it lies in all workspaces but the
+initial one's."""
 
 STEP = 2.0
-"""The step of the paper's nodes."""
+"""Step of the paper's nodes, in design units."""
 
 STARTS = 14
 
 
 @dataclass(frozen=True)
 class Finding:
-    """A design and how it was found.
+    """A row of the table: a design and its search.
 
     Attributes:
-        name: What it is.
-        iterations: None for a design that was given.
-        objective: F = |1 − V/V′| as whoever found it measures V; None if none was asked for.
-        seconds: How long it took, from all starts.
-        measured: The values of its measures: those of the optimiser, and the step of the nodes.
+        name: Name of the row.
+        iterations: Number of iterations; None for the initial design.
+        objective: F = |1 − V/V′|, with V as its source measures it; None without a volume to match.
+        seconds: Duration of the searches from all starts; None for the paper's designs.
+        measured: Measures of the optimiser, and the step of the nodes.
     """
 
     name: str
@@ -86,10 +86,10 @@ def reach_problem(clearance: float | None = None) -> Problem:
 
 
 def findings(tell: Callable[[str], None]) -> Iterator[Finding]:
-    """Yield the designs of the page of findings.
+    """Yield the rows of the table.
 
     Args:
-        tell: Told what is being looked for.
+        tell: Called with the name of each search before it starts.
     """
     margin = paper_problem().demands.clearance_margin
 
@@ -98,9 +98,9 @@ def findings(tell: Callable[[str], None]) -> Iterator[Finding]:
         return measure_design(case, (*measures_in("optimise"), "node_step"))
 
     optimal = measure(PRESETS["paper-optimal"])
-    counted = abs(1.0 - (optimal["node_volume"] or 0.0) / PAPER_VOLUME)
+    node_objective = abs(1.0 - (optimal["node_volume"] or 0.0) / PAPER_VOLUME)
     yield Finding("the paper's initial design", None, None, None, measure(paper_start()))
-    yield Finding("the paper's optimum, by nodes", 220, counted, None, optimal)
+    yield Finding("the paper's optimum, by nodes", 220, node_objective, None, optimal)
     for name, problem, starts in (
         ("volume 8000, interference off", paper_problem(None), 1),
         ("volume 8000, interference on", paper_problem(), 1),

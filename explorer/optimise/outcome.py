@@ -1,6 +1,6 @@
-"""What an optimisation returns: how far it got, every iterate on the way, and what holds it.
+"""The outcome of an optimisation: status, every iterate, and the demand or bound that holds it.
 
-All of it are plain values, so that it goes to another process or into a file.
+All are plain values, to send to another process or write into a file.
 """
 
 from __future__ import annotations
@@ -12,32 +12,32 @@ from explorer.mechanism.design import Design
 from explorer.optimise.problem import Problem
 
 Status = Literal["converged", "not converged", "infeasible", "stalled", "cancelled"]
-"""Converged: the design, read back from its file, meets all demands and has a workspace that
-is not empty, and within the demands the objective cannot get better nearby.
-Not converged: the iterations ended first. Infeasible: no design that meets all demands was
-found. Stalled: the demands are met, but no step made the objective better although it
-should get better. Cancelled: on request."""
+"""Converged: the design, read back from its file, meets all demands and has a workspace, and no
+design nearby that meets them has a better objective. Not converged: the iterations ended first.
+Infeasible: the search found no design that meets all demands. Stalled: the demands are met,
+but no step improves the objective although the conditions of an optimum fail. Cancelled: `stop`
+ended the search."""
 
 Phase = Literal["opening", "growing", "solving"]
-"""Opening: looking for a design whose workspace is not empty. Growing: making the workspace
-larger first, since the volume was out of reach. Solving: the problem itself."""
+"""Opening: searching a design whose workspace is not empty. Growing: enlarging the workspace,
+since the volume was out of reach. Solving: the problem itself."""
 
 
 @dataclass(frozen=True)
 class Iterate:
-    """A design on the way.
+    """A design that the solver accepted on its way.
 
     Attributes:
-        number: From 0, over all runs.
-        run: Which start it belongs to, from 0.
-        phase: What the solver was doing.
-        design: The design itself, to draw.
-        values: Of the variables of the problem.
+        number: Number from 0, over all runs.
+        run: Number of the run, from 0.
+        phase: Phase of the search.
+        design: The design.
+        values: Values of the variables of the problem.
         objective: F = |1 − V/V′|, the reach, the volume or the worst margin.
-        volume: Of its workspace, exact.
-        worst: The demand that is missed most, or is nearest to being; "" if there is none.
-        spare: Its value, dimensionless: below zero where it is missed by more than its
-            tolerance.
+        volume: Exact volume of the workspace, in cubed design units.
+        worst: Demand that is missed most, or has the least to spare; "" without demands.
+        spare: Value of that demand, dimensionless: below zero where it is missed by more than
+            its tolerance.
     """
 
     number: int
@@ -53,17 +53,17 @@ class Iterate:
 
 @dataclass(frozen=True)
 class Run:
-    """What came of one start.
+    """The search from one start.
 
     Attributes:
-        start: The values of the variables that it started from.
-        status: How it ended.
-        best: Its best iterate.
-        iterations: Steps of the solver.
-        evaluations: Designs that were measured.
-        attempts: How often it began, at the start and elsewhere.
-        holding: The demand or bound that holds it, "" if nothing does.
-        message: One line for people.
+        start: Values of the variables at the start.
+        status: Status at the end.
+        best: Best iterate.
+        iterations: Number of steps of the solver.
+        evaluations: Number of designs that were measured.
+        attempts: Number of attempts, from the start and from elsewhere.
+        holding: Demand or bound that holds the best iterate, "" if none does.
+        message: Result in one line.
     """
 
     start: tuple[float, ...]
@@ -78,14 +78,14 @@ class Run:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What an optimisation found.
+    """The result of an optimisation.
 
     Attributes:
         problem: The problem.
-        runs: Each start.
+        runs: Run from each start.
         chosen: Index of the best run.
-        history: Every iterate, in the order in which they were found.
-        seconds: How long it took.
+        history: Every iterate, in order.
+        seconds: Duration in seconds.
     """
 
     problem: Problem
@@ -101,7 +101,7 @@ class Outcome:
 
     @property
     def status(self) -> Status:
-        """How the best run ended."""
+        """Status of the best run."""
         return self.run.status
 
     @property
@@ -121,10 +121,10 @@ class Outcome:
 
     @property
     def iterations(self) -> int:
-        """Steps of the solver in the best run."""
+        """Number of steps of the solver in the best run."""
         return self.run.iterations
 
     @property
     def evaluations(self) -> int:
-        """Designs that were measured in the best run."""
+        """Number of designs that were measured in the best run."""
         return self.run.evaluations

@@ -1,6 +1,6 @@
-"""Problems of optimal design: what may change, what is wanted, what must hold.
+"""Problems of optimal design: variables, objective and demands.
 
-A problem is a plain value: it goes to another process, into a file, and back. It starts
+A problem is a plain value that can be sent to another process or written into a file. It starts
 from a design, whose own limits (the box among them) bound its workspace as always.
 """
 
@@ -22,28 +22,28 @@ from explorer.numerics.checks import not_negative, number, numbers, ordered, pos
 ObjectiveName = Literal["match-volume", "smallest-reach", "largest-volume", "largest-margin"]
 
 OBJECTIVES: tuple[ObjectiveName, ...] = get_args(ObjectiveName)
-"""What can be wanted: the volume that is demanded (the paper's F = |1 − V/V′|), the
-smallest reach with it, the largest volume, the largest worst margin over the required box."""
+"""Objectives: to match the demanded volume (the paper's F = |1 − V/V′|), the smallest reach for
+it, the largest volume, the largest worst margin over the required box."""
 
 YAW = "yaw"
 REACH = "reach"
 SHIFTS = ("shift-x", "shift-y", "shift-z")
 OPTIONAL = (YAW, REACH, *SHIFTS)
-"""What may change besides the six design variables: the yaw of home in degrees, one maximum
-for all four lengths, and how far the required box is shifted along each axis."""
+"""Variables besides the six of a design: the yaw of home in degrees, one maximum for all four
+lengths, and the shift of the required box along each axis."""
 
 Box = tuple[Triple, Triple]
 
-# How small a reach of its own may become, as a share of the start's.
+# Least value of the reach as a variable, as a share of the start's.
 LEAST_REACH = 1e-3
 
 
 class Variable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Something that may change, within bounds.
+    """A variable and its bounds.
 
     Attributes:
         name: One of `VARIABLES` or `OPTIONAL`.
-        low, high: In design units; of the yaw in degrees.
+        low, high: Bounds in design units; of the yaw in degrees.
     """
 
     name: str
@@ -57,15 +57,15 @@ class Variable(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Demands(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What must hold besides the design's own limits; None is no demand.
+    """Demands besides the design's own limits; None is no demand.
 
     Attributes:
-        volume: Of the workspace, exact, in cubed design units: to match, or at least.
-        reach: The largest length allowed.
+        volume: Exact volume of the workspace to match, or the least one, in cubed design units.
+        reach: Largest length allowed, in design units.
         clearance: Smallest clearance of each pair of legs, radii taken off, wherever in the
             workspace every margin is at least `clearance_margin`. Nearer to a singularity
             legs may have to meet: with a level platform all four lie in the base at δ3 = 0.
-        clearance_margin: See above, in design units.
+        clearance_margin: Least margin at which clearance is demanded, in design units.
         least: Smallest |a3y|, |b1y| and |b3 − b2|, at zero of which a design is degenerate.
         stroke_ratio: Longest over shortest of each actuator: raises its minimum length to
             its maximum over this ratio, so that the workspace is what such strokes reach.
@@ -82,7 +82,7 @@ class Demands(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
 
     def __post_init__(self) -> None:
         if self.volume is not None:
-            # Of a huge design it exceeds what other numbers may be.
+            # The volume of a huge design exceeds the bound of other numbers.
             if not 0.0 < self.volume < math.inf:
                 raise InputError(
                     f"the volume demanded must be a positive, finite number; got {self.volume:g}"
@@ -91,8 +91,8 @@ class Demands(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         for field in ("reach", "clearance", "stroke_ratio"):
             value = getattr(self, field)
             if value is not None:
-                called = f"the {field.replace('_', ' ')} demanded"
-                msgspec.structs.force_setattr(self, field, positive(called, value))
+                label = f"the {field.replace('_', ' ')} demanded"
+                msgspec.structs.force_setattr(self, field, positive(label, value))
         for field in ("clearance_margin", "least"):
             value = not_negative(f"the {field.replace('_', ' ')}", getattr(self, field))
             msgspec.structs.force_setattr(self, field, value)
@@ -115,10 +115,10 @@ class Problem(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     """A problem of optimal design.
 
     Attributes:
-        start: Where to begin; its home pose is given, so that it does not jump about.
+        start: Design to start from, with its home pose, which stays the same in all designs.
         objective: One of `OBJECTIVES`.
-        variables: What may change; everything else stays as in the start.
-        demands: What must hold.
+        variables: Variables; everything else stays as in the start.
+        demands: Demands.
 
     Raises:
         InputError: bounds that cross or leave the start out, numbers that are not finite or
@@ -148,18 +148,18 @@ class Problem(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
 
     @property
     def size(self) -> float:
-        """The start's largest variable, which lengths are scaled by."""
+        """The largest variable of the start, by which lengths are scaled, in design units."""
         return max(map(abs, self.start.variables))
 
     @property
     def names(self) -> tuple[str, ...]:
         """The names of the variables."""
-        return tuple(each.name for each in self.variables)
+        return tuple(variable.name for variable in self.variables)
 
     @property
     def start_values(self) -> tuple[float, ...]:
         """The values of the variables at the start."""
-        return tuple(start_value(self.start, each.name) for each in self.variables)
+        return tuple(start_value(self.start, variable.name) for variable in self.variables)
 
     def design_at(self, values: Iterable[float]) -> Design:
         """Return the design with these values of the variables.
@@ -172,10 +172,10 @@ class Problem(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
 
     @property
     def wanted_volume(self) -> float:
-        """The volume that is demanded.
+        """The demanded volume, in cubed design units.
 
         Raises:
-            InputError: none is.
+            InputError: no volume is demanded.
         """
         if self.demands.volume is None:
             raise InputError("this problem demands no volume")
@@ -200,26 +200,26 @@ def varied(design: Design, values: Mapping[str, float]) -> Design:
 
     Args:
         design: The design.
-        values: By name, of `VARIABLES`, `YAW` and `REACH`; other names change nothing.
+        values: Values by name, of `VARIABLES`, `YAW` and `REACH`; other names change nothing.
 
     Raises:
         DesignError: the values make a degenerate design.
     """
     own = zip(VARIABLES, design.variables, strict=True)
-    found = design.with_variables([values.get(name, value) for name, value in own])
+    changed = design.with_variables([values.get(name, value) for name, value in own])
     if YAW in values:
         home = home_pose(design)
         _, pitch, roll = yaw_pitch_roll_from_rotation(home.rotation).tolist()
         home = Pose.of_yaw_pitch_roll(home.position, (values[YAW], pitch, roll))
-        found = msgspec.structs.replace(found, home=home)
+        changed = msgspec.structs.replace(changed, home=home)
     if REACH in values:
-        ranges = {name: (getattr(found.limits, name)[0], values[REACH]) for name in LENGTHS}
-        found = msgspec.structs.replace(found, limits=_with_lengths(found.limits, ranges))
-    return found
+        ranges = {name: (getattr(changed.limits, name)[0], values[REACH]) for name in LENGTHS}
+        changed = msgspec.structs.replace(changed, limits=_with_lengths(changed.limits, ranges))
+    return changed
 
 
 def with_strokes(design: Design, ratio: float | None) -> Design:
-    """Return a design whose minimum lengths allow no more than a ratio of strokes.
+    """Return a design whose minimum lengths are raised to keep a stroke ratio.
 
     Args:
         design: The design.
@@ -239,11 +239,11 @@ def with_strokes(design: Design, ratio: float | None) -> Design:
 
 
 DISTANCES = ("a3y", "b1y", "b3 − b2")
-"""What makes a design degenerate at zero."""
+"""Distances at zero of which a design is degenerate."""
 
 
 def distance_of(design: Design, name: str) -> float:
-    """Return one of `DISTANCES`, with its sign."""
+    """Return one of `DISTANCES` with its sign, in design units."""
     return {"a3y": design.a3[1], "b1y": design.b1[1]}.get(name, design.b3 - design.b2)
 
 
@@ -279,24 +279,26 @@ def _check_variables(problem: Problem) -> None:
         raise InputError("nothing may change: name at least one variable")
     if len(set(names)) < len(names):
         raise InputError(f"each variable may be named once; got {', '.join(names)}")
-    for each, value in zip(problem.variables, problem.start_values, strict=True):
-        unit = "°" if each.name == YAW else ""
-        if each.low > each.high:
+    for variable, value in zip(problem.variables, problem.start_values, strict=True):
+        unit = "°" if variable.name == YAW else ""
+        if variable.low > variable.high:
             raise InputError(
-                f"the bounds of {each.name} cross: low {each.low:g}{unit}, high {each.high:g}{unit}"
+                f"the bounds of {variable.name} cross: low {variable.low:g}{unit}, "
+                f"high {variable.high:g}{unit}"
             )
-        if not each.low <= value <= each.high:
+        if not variable.low <= value <= variable.high:
             raise InputError(
-                f"the start has {each.name} = {value:g}{unit}, outside its bounds "
-                f"{each.low:g}{unit} to {each.high:g}{unit}: widen them or start elsewhere"
+                f"the start has {variable.name} = {value:g}{unit}, outside its bounds "
+                f"{variable.low:g}{unit} to {variable.high:g}{unit}: widen them or start elsewhere"
             )
-        if each.name == REACH and not each.low >= max(LEAST_REACH * value, longest_minimum(start)):
+        least_reach = max(LEAST_REACH * value, longest_minimum(start))
+        if variable.name == REACH and not variable.low >= least_reach:
             raise InputError(
                 f"the reach must stay above every minimum length, so its low bound above "
-                f"{max(LEAST_REACH * value, longest_minimum(start)):g}; got {each.low:g}"
+                f"{least_reach:g}; got {variable.low:g}"
             )
-        if each.name in SHIFTS and problem.demands.required_box is None:
-            raise InputError(f"{each.name} shifts the required box, and none is given")
+        if variable.name in SHIFTS and problem.demands.required_box is None:
+            raise InputError(f"{variable.name} shifts the required box, and none is given")
 
 
 def _check_demands(problem: Problem) -> None:
@@ -322,12 +324,12 @@ def _check_demands(problem: Problem) -> None:
 def _check_objective(problem: Problem) -> None:
     limits = problem.start.limits
     names, demands = problem.names, problem.demands
-    tied = all(getattr(limits, name)[1] is None for name in LENGTHS)
+    is_tied = all(getattr(limits, name)[1] is None for name in LENGTHS)
     match problem.objective:
         case "match-volume" | "smallest-reach":
             if demands.volume is None:
                 raise InputError(f"{problem.objective} needs a volume")
-            if problem.objective == "smallest-reach" and not (REACH in names or tied):
+            if problem.objective == "smallest-reach" and not (REACH in names or is_tied):
                 raise InputError(
                     "the design fixes maximum lengths: tie them to the reach |a3|, or let the "
                     "reach change as a variable of its own"

@@ -1,7 +1,7 @@
-"""The record of an optimisation: all that is needed to look at it, or to run it again.
+"""Records of optimisations, to read them or run them again.
 
-JSON, read strictly. It holds the problem, the settings, every iterate, and the versions of
-the libraries that found it.
+They are JSON, read strictly: the problem, the settings, every iterate, and the versions of the
+libraries.
 """
 
 from __future__ import annotations
@@ -14,16 +14,17 @@ import msgspec
 from explorer.errors import InputError
 from explorer.files.json_text import decode_strictly
 from explorer.files.versions import versions
+from explorer.files.writing import read_at_most
 from explorer.mechanism.design import Design
 from explorer.optimise.outcome import Iterate, Outcome, Phase, Status
 from explorer.optimise.problem import Problem
 
-# No honest record comes near this size, in bytes.
+# Largest record that is read, in bytes; real ones are much smaller.
 LARGEST_FILE = 200_000_000
 
 
 class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """How the search was run; see `optimise_design`."""
+    """Settings of a search; see `optimise_design`."""
 
     starts: int = 1
     seed: int = 0
@@ -57,18 +58,18 @@ class RunRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
 
 
 class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """An optimisation as it is kept in a file.
+    """An optimisation as a file holds it.
 
     Attributes:
         schema: Version of the file format.
-        problem: What was looked for.
-        settings: How.
-        design: The best design found.
+        problem: The problem.
+        settings: Settings of the search.
+        design: Best design.
         chosen: Index of the best run.
-        runs: Each start; their best iterate is an index into the history.
+        runs: Run from each start; the best iterate is an index into the history.
         history: Every iterate.
-        seconds: How long it took.
-        versions: Of Python and the libraries, by name.
+        seconds: Duration in seconds.
+        versions: Versions of Python and the libraries by name.
     """
 
     schema: Literal[1] = 1
@@ -102,7 +103,7 @@ def record_of(outcome: Outcome, settings: Settings) -> Record:
             )
             for run in outcome.runs
         ),
-        history=tuple(step_of(each) for each in outcome.history),
+        history=tuple(step_of(iterate) for iterate in outcome.history),
         seconds=outcome.seconds,
         versions=versions(),
     )
@@ -118,7 +119,7 @@ def decode_record(data: bytes, source: str) -> Record:
 
     Args:
         data: The text, UTF-8.
-        source: What to call it in an error message.
+        source: Name of the text in an error message.
 
     Raises:
         InputError: not JSON, of another schema, with unknown fields, fields given twice or
@@ -131,19 +132,10 @@ def load_record(path: Path) -> Record:
     """Return the record in a file.
 
     Raises:
-        InputError: no such file, or one that holds no record.
+        InputError: the file holds no record.
+        StorageError: the file cannot be read.
     """
-    try:
-        with path.open("rb") as file:
-            data = file.read(LARGEST_FILE + 1)
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) else str(error)
-        raise InputError(f"cannot read {str(path)!r}: {reason}") from None
-    if len(data) > LARGEST_FILE:
-        raise InputError(
-            f"{path}: no record of an optimisation is larger than {LARGEST_FILE} bytes"
-        )
-    return decode_record(data, str(path))
+    return decode_record(read_at_most(path, LARGEST_FILE), str(path))
 
 
 def step_of(iterate: Iterate) -> Step:
@@ -155,7 +147,7 @@ def iterate_of(problem: Problem, step: Step) -> Iterate:
     """Return an iterate of a problem, with its design.
 
     Raises:
-        InputError: its values are not those of a design.
+        InputError: the values are too few, too many or those of no design.
     """
     if len(step.values) != len(problem.variables):
         raise InputError(

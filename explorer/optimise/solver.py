@@ -27,20 +27,20 @@ def optimise_design(
     watch: Watch | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> Outcome:
-    """Look for the best design.
+    """Search for the best design.
 
-    The search begins interpreted where kernels are not compiled yet, so that the last digits
-    are the same each time only after `explorer.numerics.compiled.warm`.
+    Until the kernels are compiled the search runs interpreted, so its last digits are
+    reproducible only after `explorer.numerics.compiled.warm`.
 
     Args:
-        problem: What to look for.
-        starts: From how many designs: the start of the problem, and others out of a
+        problem: The problem.
+        starts: Number of designs to start from: the start of the problem, and others from a
             low-discrepancy sequence within the bounds. Once a volume is matched no further
             start is tried.
-        seed: Of that sequence.
-        iterations: The most steps of the solver from each start.
-        watch: Called with every iterate as it is found.
-        stop: Asked before each evaluation, some milliseconds apart, whether to end here.
+        seed: Seed of that sequence.
+        iterations: Most steps of the solver from each start.
+        watch: Called with every iterate.
+        stop: Called before each evaluation, some milliseconds apart; True ends the search.
 
     Raises:
         InputError: no start, or no iterations.
@@ -48,7 +48,7 @@ def optimise_design(
     check_starts(starts)
     if iterations < 1:
         raise InputError(f"the number of iterations must be at least 1; got {iterations}")
-    # The first evaluations need not wait: what is compiled meanwhile takes over.
+    # The first evaluations need not wait: kernels take over once they are compiled.
     warm_in_background()
     began = time.perf_counter()
     trail = Trail(problem, watch, stop)
@@ -70,14 +70,14 @@ def optimise_design(
 
 
 def _best(runs: Sequence[Run], trail: Trail) -> int:
-    """Return the index of the best run: converged before others, then by what it found.
+    """Return the index of the best run: a converged one, then the one with the best iterate.
 
-    Of runs that found the same the first one is taken.
+    Of runs with the same objective the first one counts.
     """
     best = 0
     for index in range(1, len(runs)):
-        (missed, value), (least_missed, least) = (
-            trail.rank(runs[each].best) for each in (index, best)
+        (*missed, value), (*least_missed, least) = (
+            trail.rank(run.best) for run in (runs[index], runs[best])
         )
         converged = runs[index].status == "converged"
         if converged != (runs[best].status == "converged"):

@@ -25,7 +25,7 @@ from explorer.numerics.arrays import FloatArray
 
 # A margin is zero at a pose, and over a whole move, below these shares of |position| + |way|.
 ROUNDING, ALL_ALONG = 1e-14, 1e-12
-# The most intervals examined for a margin; only one that is nearly zero for long needs them.
+# The most intervals examined for a margin; only a margin that is nearly zero for long needs them.
 MOST_INTERVALS = 20_000
 # Two roots closer than this share of a move, without a change of sign between, are one.
 NEAREST_ROOTS = 1e-6
@@ -96,63 +96,57 @@ def path_margins(poses: Sequence[Pose], samples: int = SAMPLES) -> PathMargins:
     shares = np.linspace(0.0, 1.0, samples, dtype=np.float64)
     for index, (start, end) in enumerate(itertools.pairwise(poses)):
         # A corner is a sample of the move that ends there.
-        own = shares if index == 0 else shares[1:]
-        at.append(index + own)
-        values.append(margins(*poses_between(start, end, own)))
-        found, everywhere = _of_move(start, end, index)
-        crossings += found
-        lies_in.update(everywhere)
-    return PathMargins(
-        tuple(poses),
-        np.concatenate(at),
-        np.concatenate(values),
-        tuple(_merge_corners(crossings)),
-        tuple(sorted(lies_in)),
-    )
+        new_shares = shares if index == 0 else shares[1:]
+        at.append(index + new_shares)
+        values.append(margins(*poses_between(start, end, new_shares)))
+        of_move, lasting = _find_crossings_of_move(start, end, index)
+        crossings += of_move
+        lies_in.update(lasting)
+    merged = tuple(_merge_corners(crossings))
+    samples_at = np.concatenate(at), np.concatenate(values)
+    return PathMargins(tuple(poses), *samples_at, merged, tuple(sorted(lies_in)))
 
 
 def _merge_corners(crossings: list[Crossing]) -> list[Crossing]:
-    """Return the crossings, with one for each corner that both its moves cross at."""
-    kept: list[Crossing] = []
-    for each in crossings:
-        before = next(
-            (
-                other
-                for other in reversed(kept)
-                if other.incidence == each.incidence
-                and other.move == each.move - 1
-                and other.share > 1.0 - NEAREST_ROOTS
-            ),
-            None,
-        )
-        if before is None or each.share > NEAREST_ROOTS:
-            kept.append(each)
+    """Return the crossings, with one instead of two where both moves of a corner cross at it."""
+    merged: list[Crossing] = []
+    for crossing in crossings:
+        corner = (crossing.incidence, crossing.move - 1)
+        twins = [
+            index
+            for index, other in enumerate(merged)
+            if (other.incidence, other.move) == corner and other.share > 1.0 - NEAREST_ROOTS
+        ]
+        if twins and crossing.share <= NEAREST_ROOTS:
+            before = merged[twins[-1]]
+            merged[twins[-1]] = dataclasses.replace(
+                before, changes_sign=before.side != crossing.side
+            )
         else:
-            at = kept.index(before)
-            kept[at] = dataclasses.replace(before, changes_sign=before.side != each.side)
-    return kept
+            merged.append(crossing)
+    return merged
 
 
-def _of_move(start: Pose, end: Pose, index: int) -> tuple[list[Crossing], list[int]]:
+def _find_crossings_of_move(start: Pose, end: Pose, index: int) -> tuple[list[Crossing], list[int]]:
     """Return the crossings of a move in order, and the incidences that hold all along it."""
-    found: list[Crossing] = []
-    everywhere: list[int] = []
-    for which, wave in enumerate(_waves(start, end)):
-        if wave.is_zero:
-            everywhere.append(which + 1)
+    crossings: list[Crossing] = []
+    lasting: list[int] = []
+    for number, margin in enumerate(_move_margins(start, end)):
+        if margin.is_zero:
+            lasting.append(number + 1)
             continue
-        for share, changes in wave.roots():
+        for share, changes in margin.roots():
             position, rotation = poses_between(start, end, share)
             aside = share - ASIDE if share > NEAREST_ROOTS else share + ASIDE
-            side = 1 if wave.at(aside)[0] > 0.0 else -1
+            side = 1 if margin.at(aside)[0] > 0.0 else -1
             pose = Pose.of(position, rotation)
-            found.append(Crossing(which + 1, index, share, pose, changes, side))
-    return sorted(found, key=lambda each: each.share), everywhere
+            crossings.append(Crossing(number + 1, index, share, pose, changes, side))
+    return sorted(crossings, key=lambda crossing: crossing.share), lasting
 
 
 @dataclass(frozen=True)
-class _Wave:
-    """(a + a' t) + (b + b' t) cos ωt + (c + c' t) sin ωt over t from 0 to 1."""
+class _MoveMargin:
+    """A margin on a move, (a + a' t) + (b + b' t) cos ωt + (c + c' t) sin ωt for t from 0 to 1."""
 
     a: float
     da: float
@@ -165,7 +159,7 @@ class _Wave:
 
     @property
     def is_zero(self) -> bool:
-        """Whether it vanishes from 0 to 1, to rounding."""
+        """Whether the margin is zero all along the move, to rounding."""
         samples = [self.at(t)[0] for t in np.linspace(0.0, 1.0, 17).tolist()]
         return max(map(abs, samples)) <= ALL_ALONG * self.size
 
@@ -186,7 +180,7 @@ class _Wave:
 
     def roots(self) -> list[tuple[float, bool]]:
         """Return all roots in ascending order, with whether the sign changes there."""
-        bend, zero = self.curvature_bound(), ROUNDING * self.size
+        curvature, zero = self.curvature_bound(), ROUNDING * self.size
         roots: list[tuple[float, bool]] = []
         queue = [(0.0, 1.0)]
         examined = 0
@@ -195,22 +189,22 @@ class _Wave:
             low, high = queue.pop()
             half, middle = 0.5 * (high - low), 0.5 * (low + high)
             value, rate = self.at(middle)
-            off = 0.5 * bend * half * half
-            if abs(value) > abs(rate) * half + off + zero:
+            deviation = 0.5 * curvature * half * half
+            if abs(value) > abs(rate) * half + deviation + zero:
                 continue
-            if abs(rate) > bend * half or off <= zero or examined > MOST_INTERVALS:
-                roots += self._only_root(low, high)
+            if abs(rate) > curvature * half or deviation <= zero or examined > MOST_INTERVALS:
+                roots += self._isolated_root(low, high)
                 continue
             # The left half is next, so that roots come in order.
             queue += [(middle, high), (low, middle)]
-        return _distinct(roots)
+        return _merge_roots(roots)
 
-    def _only_root(self, low: float, high: float) -> list[tuple[float, bool]]:
-        """Return the root in an interval where the wave is monotonic or zero to rounding."""
+    def _isolated_root(self, low: float, high: float) -> list[tuple[float, bool]]:
+        """Return the root in an interval where the margin is monotonic or zero to rounding."""
         zero = ROUNDING * self.size
         first, last = self.at(low)[0], self.at(high)[0]
         if (first > 0.0) == (last > 0.0):
-            # The root is at an end of the move, or the wave only touches zero.
+            # The root is at an end of the move, or the margin only touches zero.
             least, t = min((abs(self.at(t)[0]), t) for t in (low, 0.5 * (low + high), high))
             return [(t, False)] if least <= zero else []
         # Newton's steps, within the interval that brackets the root.
@@ -232,20 +226,20 @@ class _Wave:
         return [(t, True)]
 
 
-def _distinct(roots: list[tuple[float, bool]]) -> list[tuple[float, bool]]:
+def _merge_roots(roots: list[tuple[float, bool]]) -> list[tuple[float, bool]]:
     """Return ascending roots, with one for each root that two neighbouring intervals have."""
-    kept: list[tuple[float, bool]] = []
+    merged: list[tuple[float, bool]] = []
     for share, changes in roots:
-        if kept and share - kept[-1][0] <= NEAREST_ROOTS and not (changes and kept[-1][1]):
+        if merged and share - merged[-1][0] <= NEAREST_ROOTS and not (changes and merged[-1][1]):
             if changes:
-                kept[-1] = (share, True)
+                merged[-1] = (share, True)
         else:
-            kept.append((share, changes))
-    return kept
+            merged.append((share, changes))
+    return merged
 
 
-def _waves(start: Pose, end: Pose) -> tuple[_Wave, _Wave, _Wave]:
-    """Return the three margins of a move as waves."""
+def _move_margins(start: Pose, end: Pose) -> tuple[_MoveMargin, _MoveMargin, _MoveMargin]:
+    """Return the three margins of a move."""
     p, first = np.array(start.position), start.rotation
     step = np.array(end.position) - p
     turn = Rotation.from_matrix(end.rotation @ first.T).as_rotvec()
@@ -254,17 +248,17 @@ def _waves(start: Pose, end: Pose) -> tuple[_Wave, _Wave, _Wave]:
     size = float(np.linalg.norm(p) + np.linalg.norm(step)) or 1.0
 
     def parts_of(direction: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return its constant, cosine and sine parts."""
+        """Return the constant, cosine and sine parts of a direction that turns."""
         stays = axis * float(axis @ direction)
         return stays, direction - stays, np.cross(axis, direction)
 
-    def wave(directions: Sequence[FloatArray]) -> _Wave:
+    def margin_along(directions: Sequence[FloatArray]) -> _MoveMargin:
         terms = [x for d in directions for x in (float(d @ p), float(d @ step))]
         a, da, b, db, c, dc = terms
-        return _Wave(a, da, b, db, c, dc, angle, size)
+        return _MoveMargin(a, da, b, db, c, dc, angle, size)
 
     x, zero = np.array([1.0, 0.0, 0.0]), np.zeros(3)
-    delta1 = wave([-part for part in parts_of(first[:, 2])])
-    delta2 = wave([np.cross(x, part) for part in parts_of(first[:, 0])])
-    delta3 = wave([np.array([0.0, 0.0, 1.0]), zero, zero])
+    delta1 = margin_along([-part for part in parts_of(first[:, 2])])
+    delta2 = margin_along([np.cross(x, part) for part in parts_of(first[:, 0])])
+    delta3 = margin_along([np.array([0.0, 0.0, 1.0]), zero, zero])
     return delta1, delta2, delta3

@@ -18,7 +18,7 @@ import numpy as np
 from explorer.errors import InputError, NoAnswerError
 from explorer.legs.clearance import PAIRS
 from explorer.measures.snapshot import Snapshot, evaluate
-from explorer.mechanism.design import Design
+from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.margins import INCIDENCES, mode_name
 from explorer.mechanism.pose import Pose
 from explorer.paths.smoothing import Smoother
@@ -28,10 +28,11 @@ from explorer.workspace.limits.broken import violations
 from explorer.workspace.limits.valid_poses import Rules
 
 DEFAULT_SECONDS = 2.0
-# Preferred margins and clearances, as shares of the reach and of those of the ends.
+# Preferred margin and clearance as a share of the reach; at most a share of those of the ends.
 PREFERRED, SHARE_OF_ENDS = 0.02, 0.5
-# The share of the time for a path with these.
+# Share of the time for a search with the preferred margin and clearance.
 SHARE_FOR_PREFERRED = 0.5
+D1, D3 = JOINTS.index("d1"), JOINTS.index("d3")
 
 Reason = Literal["other mode", "other order", "out of time"]
 EndReason = Literal["outside limits", "singular"]
@@ -68,7 +69,7 @@ class PlannedPath:
     Attributes:
         poses: Corners, from the start to the goal.
         unsmoothed: Corners before smoothing.
-        length: Root-mean-square way of b1 to b4, in design units.
+        length: Root-mean-square distance that b1 to b4 travel, in design units.
         margin: Lower bound of |δ1|, |δ2| and |δ3| along the path, in design units, to the
             tolerance of moves.
         clearance: Lower bound of the clearance of any two legs along the path, in design
@@ -116,34 +117,35 @@ def plan_path(
     if not (math.isfinite(seconds) and seconds > 0.0):
         raise InputError(f"planning needs a time above zero, in seconds; got {seconds:g}")
     ends = evaluate(design, start), evaluate(design, goal)
-    for name, snapshot in zip(("start", "goal"), ends, strict=True):
+    named_ends = {"start": ends[0], "goal": ends[1]}
+    for name, snapshot in named_ends.items():
         _check_not_singular(name, snapshot)
     _check_same_mode(*ends)
-    for name, snapshot in zip(("start", "goal"), ends, strict=True):
+    for name, snapshot in named_ends.items():
         _check_within(name, snapshot, ends[0].signs)
     _check_same_order(*ends)
-    began = time.perf_counter()
+    started = time.perf_counter()
     planner = _Planner(design, start, goal, seed)
-    exact = Rules.of(design, ends[0].signs, _order(ends[0]))
+    demanded = Rules.of(design, ends[0].signs, _order(ends[0]))
     margin, clearance = _preferred(*ends)
-    preferred = exact.tighten(margin, clearance)
+    preferred = demanded.tighten(margin, clearance)
     path = planner.plan_straight(preferred, margin, clearance)
     if path is None and search_is_possible():
         # Compiling takes seconds, once on a machine; they do not count as search.
         compile_checks()
-        began = time.perf_counter()
+        started = time.perf_counter()
         path = planner.search(preferred, margin, clearance, SHARE_FOR_PREFERRED * seconds)
-    path = path or planner.plan_straight(exact, 0.0, 0.0)
+    path = path or planner.plan_straight(demanded, 0.0, 0.0)
     if path is None:
-        left = seconds - (time.perf_counter() - began)
-        path = planner.search(exact, 0.0, 0.0, max(left, 0.0))
+        remaining = seconds - (time.perf_counter() - started)
+        path = planner.search(demanded, 0.0, 0.0, max(remaining, 0.0))
     if path is None:
         raise NoPathError(
             "out of time",
             f"no path was found within {seconds:g} s ({planner.checked} moves tried); there may "
             "be one: allow more time, or go by a pose in between",
         )
-    return dataclasses.replace(path, seconds=time.perf_counter() - began, checked=planner.checked)
+    return dataclasses.replace(path, seconds=time.perf_counter() - started, checked=planner.checked)
 
 
 class _Planner:
@@ -199,21 +201,19 @@ class _Planner:
 
 
 def _preferred(start: Snapshot, goal: Snapshot) -> tuple[float, float]:
-    """Return the preferred margin and clearance of a path, which both ends have."""
-    most = PREFERRED * start.design.reach
-    margin = min(float(np.abs(each.margins).min()) for each in (start, goal))
-    clearance = min(float(each.clearances.clearance.min()) for each in (start, goal))
-    return min(most, SHARE_OF_ENDS * margin), min(most, SHARE_OF_ENDS * clearance)
+    """Return the margin and the clearance to prefer on a path; both ends have more."""
+    preferred = PREFERRED * start.design.reach
+    margin = min(float(np.abs(end.margins).min()) for end in (start, goal))
+    clearance = min(float(end.clearances.clearance.min()) for end in (start, goal))
+    return min(preferred, SHARE_OF_ENDS * margin), min(preferred, SHARE_OF_ENDS * clearance)
 
 
 def _check_not_singular(name: str, snapshot: Snapshot) -> None:
     vanishing = incidences(snapshot.stratum)
     if vanishing:
         words = " and ".join(INCIDENCES[index - 1] for index in vanishing)
-        raise EndError(
-            "singular",
-            f"the {name} is singular ({words}); a path cannot start or end there",
-        )
+        message = f"the {name} is singular ({words}); a path cannot start or end there"
+        raise EndError("singular", message)
 
 
 def _check_same_mode(start: Snapshot, goal: Snapshot) -> None:
@@ -230,19 +230,11 @@ def _check_same_mode(start: Snapshot, goal: Snapshot) -> None:
 
 
 def _check_within(name: str, snapshot: Snapshot, signs: tuple[int, int, int]) -> None:
-    # The carriages' order is a matter of both ends, see `_check_same_order`.
-    position = np.array(snapshot.pose.position)
+    pose = np.array(snapshot.pose.position), snapshot.rotation
+    values = snapshot.joints, snapshot.margins
+    # `_check_same_order` compares the order of the carriages at both ends.
     broken = [
-        str(each)
-        for each in violations(
-            snapshot.design,
-            position,
-            snapshot.rotation,
-            snapshot.joints,
-            snapshot.margins,
-            signs,
-            order=0,
-        )
+        str(violation) for violation in violations(snapshot.design, *pose, *values, signs, order=0)
     ]
     clearances = snapshot.clearances.clearance.tolist()
     for (first, second), value in zip(PAIRS, clearances, strict=True):
@@ -255,7 +247,7 @@ def _check_within(name: str, snapshot: Snapshot, signs: tuple[int, int, int]) ->
 
 def _order(snapshot: Snapshot) -> int:
     """Return the sign of d3 − d1."""
-    return int(np.sign(snapshot.joints[3] - snapshot.joints[1]))
+    return int(np.sign(snapshot.joints[D3] - snapshot.joints[D1]))
 
 
 def _check_same_order(start: Snapshot, goal: Snapshot) -> None:
@@ -265,7 +257,7 @@ def _check_same_order(start: Snapshot, goal: Snapshot) -> None:
     are equal, so their order is the same all along a path without collisions.
     """
     orders = [
-        sorted((("a1", 0.0), ("d1", float(q[1])), ("d3", float(q[3]))), key=lambda base: base[1])
+        sorted((("a1", 0.0), ("d1", float(q[D1])), ("d3", float(q[D3]))), key=lambda base: base[1])
         for q in (start.joints, goal.joints)
     ]
     first, last = ([name for name, _ in order] for order in orders)

@@ -20,7 +20,7 @@ from explorer.numerics.arrays import FloatArray
 from explorer.workspace.limits.valid_moves import moves_are_valid
 from explorer.workspace.limits.valid_poses import Rules
 
-# Shortcuts checked at once, rounds without gain that end the search, and the most rounds.
+# Shortcuts tried in a round, rounds without gain that end the search, and the most rounds.
 TRIES, PATIENCE, MOST_ROUNDS = 24, 4, 60
 # The least gain, as a share of the path's length.
 GAIN = 1e-3
@@ -30,7 +30,7 @@ CUTS, CUT_ROUNDS = (0.25, 0.08), 3
 
 @dataclass(frozen=True)
 class Smoother:
-    """Makes paths shorter and rounder.
+    """A smoother of paths under one set of rules.
 
     Attributes:
         design: The manipulator.
@@ -47,8 +47,8 @@ class Smoother:
         return tuple(self._cut_corners(self._shorten(list(poses))))
 
     def lengths(self, poses: Sequence[Pose]) -> FloatArray:
-        """Return the root-mean-square way of each move, shape (n,)."""
-        p, r = _arrays(poses)
+        """Return the root-mean-square displacement over each move, shape (n,)."""
+        p, r = _positions_and_rotations(poses)
         return displacement(self.design, p[:-1], r[:-1], p[1:], r[1:])
 
     def is_valid(self, start: Pose, end: Pose) -> bool:
@@ -56,28 +56,29 @@ class Smoother:
         return self._are_valid([(start, end)])[0]
 
     def _are_valid(self, pieces: Sequence[tuple[Pose, Pose]]) -> list[bool]:
-        (p, r), (q, s) = (_arrays(each) for each in zip(*pieces, strict=True))
+        (p, r), (q, s) = (_positions_and_rotations(ends) for ends in zip(*pieces, strict=True))
         return moves_are_valid(self.design, p, r, q, s, rules=self.rules).tolist()
 
     def _shorten(self, poses: list[Pose]) -> list[Pose]:
         rng = np.random.default_rng(self.seed)
-        idle = 0
+        idle_rounds = 0
         for _ in range(MOST_ROUNDS):
-            if len(poses) < 3 or idle >= PATIENCE:
+            if len(poses) < 3 or idle_rounds >= PATIENCE:
                 break
             ends = np.concatenate([[0.0], np.cumsum(self.lengths(poses))])
             pairs = np.sort(rng.uniform(0.0, ends[-1], (TRIES, 2)), axis=1)
             # Some shortcuts go from corner to corner.
             pairs[0] = ends[0], ends[-1]
             pairs[1:4] = np.sort(ends[rng.integers(0, len(ends), (3, 2))], axis=1)
-            shorter = [self._shortcut(poses, ends, *pair) for pair in pairs.tolist()]
-            worth = [each for each in shorter if each.gain > GAIN * float(ends[-1])]
+            shortcuts = [self._shortcut(poses, ends, *pair) for pair in pairs.tolist()]
+            worthwhile = [cut for cut in shortcuts if cut.gain > GAIN * float(ends[-1])]
             shortened: list[Pose] | None = None
-            if worth:
-                worth.sort(key=lambda each: -each.gain)
-                valid = self._are_valid([each.piece for each in worth])
-                shortened = next((w.poses for w, v in zip(worth, valid, strict=True) if v), None)
-            idle = 0 if shortened else idle + 1
+            if worthwhile:
+                worthwhile.sort(key=lambda cut: -cut.gain)
+                valid = self._are_valid([cut.piece for cut in worthwhile])
+                checked = zip(worthwhile, valid, strict=True)
+                shortened = next((cut.poses for cut, is_valid in checked if is_valid), None)
+            idle_rounds = 0 if shortened else idle_rounds + 1
             poses = shortened or poses
         return poses
 
@@ -85,22 +86,22 @@ class Smoother:
         self, poses: list[Pose], ends: FloatArray, first: float, last: float
     ) -> _Shortcut:
         """Return the path with a straight move between two points of it."""
-        i, start = self._at(poses, ends, first)
-        j, end = self._at(poses, ends, last)
+        i, start = self._pose_after(poses, ends, first)
+        j, end = self._pose_after(poses, ends, last)
         if i == j:
             return _Shortcut(poses, (start, end), 0.0)
         gain = last - first - float(self.lengths([start, end])[0])
         path = [*poses[: i + 1], start, end, *poses[j + 1 :]]
         return _Shortcut(_without_repeats(path), (start, end), gain)
 
-    def _at(self, poses: list[Pose], ends: FloatArray, way: float) -> tuple[int, Pose]:
-        """Return the number of the move, and the pose, after a way along the path."""
-        index = int(np.searchsorted(ends, way, side="right")) - 1
+    def _pose_after(self, poses: list[Pose], ends: FloatArray, distance: float) -> tuple[int, Pose]:
+        """Return the number of the move, and the pose, at a distance along the path."""
+        index = int(np.searchsorted(ends, distance, side="right")) - 1
         if index >= len(poses) - 1:
             return len(poses) - 2, poses[-1]
         length = float(ends[index + 1] - ends[index])
-        share = (way - float(ends[index])) / length
-        return index, poses[index] if share == 0.0 else _between(
+        share = (distance - float(ends[index])) / length
+        return index, poses[index] if share == 0.0 else _pose_between(
             poses[index], poses[index + 1], share
         )
 
@@ -110,14 +111,14 @@ class Smoother:
                 break
             corners = list(zip(poses, poses[1:], poses[2:], strict=False))
             cuts = [
-                [(_between(b, a, share), _between(b, c, share)) for share in CUTS]
+                [(_pose_between(b, a, share), _pose_between(b, c, share)) for share in CUTS]
                 for a, b, c in corners
             ]
-            valid = iter(self._are_valid([each for own in cuts for each in own]))
+            valid = iter(self._are_valid([cut for choices in cuts for cut in choices]))
             path: list[Pose] = [poses[0]]
-            for corner, own in zip(corners, cuts, strict=True):
-                good = [cut for cut in own if next(valid)]
-                path += list(good[0]) if good else [corner[1]]
+            for corner, choices in zip(corners, cuts, strict=True):
+                possible = [cut for cut in choices if next(valid)]
+                path += list(possible[0]) if possible else [corner[1]]
             poses = [*path, poses[-1]]
         return poses
 
@@ -131,11 +132,11 @@ class _Shortcut:
     gain: float
 
 
-def _arrays(poses: Sequence[Pose]) -> tuple[FloatArray, FloatArray]:
-    return np.array([each.position for each in poses]), np.array([each.rotation for each in poses])
+def _positions_and_rotations(poses: Sequence[Pose]) -> tuple[FloatArray, FloatArray]:
+    return np.array([pose.position for pose in poses]), np.array([pose.rotation for pose in poses])
 
 
-def _between(start: Pose, end: Pose, share: float) -> Pose:
+def _pose_between(start: Pose, end: Pose, share: float) -> Pose:
     return Pose.of(*poses_between(start, end, share))
 
 

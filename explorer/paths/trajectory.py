@@ -24,7 +24,7 @@ from explorer.numerics.arrays import FloatArray
 DEFAULT_SPEED = 0.1
 DEFAULT_SAMPLES = 201
 MOST_SAMPLES = 100_000
-# Steps of a move over which the actuators' ways are added up.
+# Steps of a move over which the actuators' travel is added up.
 STEPS = 32
 
 
@@ -83,33 +83,28 @@ def trajectory(
         raise InputError("a trajectory needs a path of at least two poses")
     if not 2 <= samples <= MOST_SAMPLES:
         raise InputError(f"a trajectory has 2 to {MOST_SAMPLES} samples; got {samples}")
-    fastest = DEFAULT_SPEED * design.reach if speed is None else speed
-    if not (math.isfinite(fastest) and fastest > 0.0):
-        raise InputError(f"the speed must be above zero; got {fastest:g}")
+    actuator_speed = DEFAULT_SPEED * design.reach if speed is None else speed
+    if not (math.isfinite(actuator_speed) and actuator_speed > 0.0):
+        raise InputError(f"the speed must be above zero; got {actuator_speed:g}")
     moves = list(itertools.pairwise(poses))
     shares = np.linspace(0.0, 1.0, STEPS + 1, dtype=np.float64)
     time: list[FloatArray] = [np.zeros(1)]
     for start, end in moves:
         joints = inverse(design, *poses_between(start, end, shares))
-        ways = np.abs(np.diff(joints, axis=0)).max(axis=-1)
-        time.append(time[-1][-1] + np.cumsum(ways) / fastest)
-    known = np.concatenate(time)
-    sampled = np.linspace(0.0, float(known[-1]), samples, dtype=np.float64)
+        travels = np.abs(np.diff(joints, axis=0)).max(axis=-1)
+        time.append(time[-1][-1] + np.cumsum(travels) / actuator_speed)
+    times = np.concatenate(time)
+    sampled = np.linspace(0.0, float(times[-1]), samples, dtype=np.float64)
     # A path without motion takes no time: all its samples are at its start.
-    at = np.interp(sampled, known, np.arange(len(known)) / STEPS)
+    at = np.interp(sampled, times, np.arange(len(times)) / STEPS)
     at[-1] = len(moves)
     number = np.minimum(at.astype(np.int64), len(moves) - 1)
     position, rotation = np.empty((samples, 3)), np.empty((samples, 3, 3))
     for index, (start, end) in enumerate(moves):
-        own = number == index
-        position[own], rotation[own] = poses_between(start, end, at[own] - index)
+        on_move = number == index
+        position[on_move], rotation[on_move] = poses_between(start, end, at[on_move] - index)
     quaternion = quaternion_from_rotation(rotation)
-    turns = (quaternion[1:] * quaternion[:-1]).sum(axis=-1) < 0.0
-    signs = np.cumprod(np.where(np.concatenate([[False], turns]), -1.0, 1.0))
-    return Trajectory(
-        time=sampled,
-        joints=inverse(design, position, rotation),
-        position=position,
-        quaternion=quaternion * signs[:, None],
-        at=at,
-    )
+    flips = (quaternion[1:] * quaternion[:-1]).sum(axis=-1) < 0.0
+    signs = np.cumprod(np.where(np.concatenate([[False], flips]), -1.0, 1.0))
+    joints = inverse(design, position, rotation)
+    return Trajectory(sampled, joints, position, quaternion * signs[:, None], at)

@@ -28,7 +28,7 @@ LONGEST_MOVE = 0.25
 def search_is_possible() -> bool:
     """Return whether OMPL can be imported."""
     try:
-        _Ompl.loaded()
+        _Ompl.load()
     except MissingExtraError:
         return False
     return True
@@ -48,7 +48,12 @@ class _Ompl:
     geometric: Any
 
     @staticmethod
-    def loaded() -> _Ompl:
+    def load() -> _Ompl:
+        """Import the modules.
+
+        Raises:
+            MissingExtraError: OMPL is not installed.
+        """
         try:
             util: Any = importlib.import_module("ompl.util")
             modules = _Ompl(
@@ -86,22 +91,17 @@ class TreeSearch:
         self._design = design
         self._rules = rules
         self._tolerance = DEFAULT_TOLERANCE * design.reach
-        self._places: FloatArray = np.empty((2, 1, 3))
-        self._turns: FloatArray = np.empty((2, 1, 3, 3))
+        self._positions: FloatArray = np.empty((2, 1, 3))
+        self._rotations: FloatArray = np.empty((2, 1, 3, 3))
         self._valid: BoolArray = np.empty(1, dtype=np.bool_)
 
     def path(self, start: Pose, goal: Pose, seconds: float) -> tuple[Pose, ...] | None:
-        """Return the corners of a path, or None if the time was too short.
-
-        Args:
-            start: Valid pose at the start.
-            goal: Valid pose at the end.
-            seconds: Time for the search.
+        """Return the corners of a path between two valid poses, or None if the time was too short.
 
         Raises:
             MissingExtraError: OMPL is not installed.
         """
-        ompl = _Ompl.loaded()
+        ompl = _Ompl.load()
         base, geometric = ompl.base, ompl.geometric
         space = base.SE3StateSpace()
         bounds = base.RealVectorBounds(3)
@@ -125,50 +125,41 @@ class TreeSearch:
         if not setup.haveExactSolutionPath():
             return None
         states = setup.getSolutionPath().getStates()
-        # The ends are those given, to the last bit.
+        # The given ends replace those of OMPL, which differ by rounding.
         return (start, *(_pose(state) for state in list(states)[1:-1]), goal)
 
-    def _read(self, which: int, state: Any) -> None:
-        place, turn, q = self._places[which, 0], self._turns[which, 0], state.rotation()
-        place[0], place[1], place[2] = state.getX(), state.getY(), state.getZ()
+    def _read(self, index: int, state: Any) -> None:
+        """Read a state of OMPL into the arrays of the first or the second pose."""
+        p, r, q = self._positions[index, 0], self._rotations[index, 0], state.rotation()
+        p[0], p[1], p[2] = state.getX(), state.getY(), state.getZ()
         w, x, y, z = q.w, q.x, q.y, q.z
-        turn[0] = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)
-        turn[1] = 2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)
-        turn[2] = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)
+        r[0] = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)
+        r[1] = 2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)
+        r[2] = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)
 
     def _state_is_valid(self, state: Any) -> bool:
         self._read(0, state)
         rules = self._rules
-        valid_rows(1, rules.row, rules.cones, self._places[0], self._turns[0], self._valid)
+        valid_rows(1, rules.row, rules.cones, self._positions[0], self._rotations[0], self._valid)
         return bool(self._valid[0])
 
     def _move_is_valid(self, start: Any, end: Any) -> bool:
         self.checked += 1
         self._read(0, start)
         self._read(1, end)
-        rules = self._rules
-        valid_move_rows(
-            1,
-            rules.row,
-            rules.cones,
-            self._places[0],
-            self._turns[0],
-            self._places[1],
-            self._turns[1],
-            self._tolerance,
-            self._valid,
-        )
+        (p, q), (r, s), rules = self._positions, self._rotations, self._rules
+        valid_move_rows(1, rules.row, rules.cones, p, r, q, s, self._tolerance, self._valid)
         return bool(self._valid[0])
 
 
 def _validator(base: Any, information: Any, is_valid: Callable[[Any, Any], bool]) -> Any:
-    """Return OMPL's check of moves, of a class made here since OMPL is imported late."""
+    """Return OMPL's check of moves; its class is made here since OMPL is imported late."""
 
     def check(_: Any, start: Any, end: Any) -> bool:
         return is_valid(start, end)
 
-    kind = type("MoveValidator", (base.MotionValidator,), {"checkMotion": check})
-    return kind(information)
+    validator_class = type("MoveValidator", (base.MotionValidator,), {"checkMotion": check})
+    return validator_class(information)
 
 
 def _box(design: Design, start: Pose, goal: Pose) -> tuple[list[float], list[float]]:
@@ -180,9 +171,9 @@ def _box(design: Design, start: Pose, goal: Pose) -> tuple[list[float], list[flo
         highs = np.minimum(highs, design.limits.box[1])
     # The ends may be beyond the limits by rounding.
     ends = np.array([start.position, goal.position])
-    spare = 1e-9 * design.reach
-    lows = np.minimum(lows, ends.min(axis=0)) - spare
-    highs = np.maximum(highs, ends.max(axis=0)) + spare
+    tolerance = 1e-9 * design.reach
+    lows = np.minimum(lows, ends.min(axis=0)) - tolerance
+    highs = np.maximum(highs, ends.max(axis=0)) + tolerance
     return lows.tolist(), highs.tolist()
 
 

@@ -49,9 +49,7 @@ class Prototype:
     def places(self, position: ArrayLike, rotation: ArrayLike) -> Places:
         """Return the placements of the parts in a pose, in the order of `parts`.
 
-        Args:
-            position: Position of b4 in the base frame, shape (..., 3), in design units.
-            rotation: Rotation from platform to base, shape (..., 3, 3).
+        Arguments are those of `Chains.joints`.
 
         Raises:
             InputError: a pose that is not finite or not a rotation.
@@ -61,21 +59,11 @@ class Prototype:
         return Places(bodies.origin[..., index, :], bodies.rotation[..., index, :, :])
 
     def broken_joint_limits(self, position: ArrayLike, rotation: ArrayLike) -> tuple[str, ...]:
-        """Return the limits of actuators and joints that one pose breaks, as sentences.
-
-        Collisions between the parts of different legs are not checked.
-
-        Raises:
-            InputError: a pose that is not finite or not a rotation.
-        """
+        """Return the joint limits that one pose breaks, see `broken_joint_limits`."""
         return broken_joint_limits(self.sizes, position, rotation)
 
     def masses(self, density: float) -> Mapping[str, Mass]:
-        """Return the masses of all bodies but the base, in kilograms and metres.
-
-        Args:
-            density: Density of the parts, in kg/m³.
-        """
+        """Return the masses of all bodies but the base, in kg and metres; density in kg/m³."""
         return {
             body: total_mass(
                 part.mass(density, self.design.unit_mm) for part in self.parts if part.body == body
@@ -109,12 +97,8 @@ def exploded_offsets(prototype: Prototype, places: Places) -> FloatArray:
     """Return the shift of each part in the full exploded view, shape (n, 3), in design units.
 
     Parts are lifted off the base in layers, each as far as it takes to clear the one below:
-    crosses and carriages, cylinders, rods, balls, and the platform. So the parts of one layer
+    crosses and carriages, cylinders, rods, balls, and the platform. The parts of one layer
     keep their places beside each other, however the legs lean.
-
-    Args:
-        prototype: The parts.
-        places: Placements of all parts in one pose.
     """
     sizes, parts = prototype.sizes, prototype.parts
     index = {part.name: i for i, part in enumerate(parts)}

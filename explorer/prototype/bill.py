@@ -32,14 +32,14 @@ class Actuator:
     Attributes:
         leg: Number of the leg, 1 to 4.
         stroke: Shortest and longest length, from base joint to ball, in millimetres.
-        asked: Stroke that the limits of the design allow; a single rod may cover less of it.
+        required: Stroke that the limits of the design allow; a single rod may cover less of it.
         diameter: Diameter of the cylinder, in millimetres.
         mass: Mass of cylinder and rod, in kilograms.
     """
 
     leg: int
     stroke: Stroke
-    asked: Stroke
+    required: Stroke
     diameter: float
     mass: float
 
@@ -58,12 +58,7 @@ class Bill:
 
 
 def bill_of_materials(prototype: Prototype, density: float) -> Bill:
-    """Return the bill of materials of a prototype.
-
-    Args:
-        prototype: The parts.
-        density: Density of the parts, in kg/m³.
-    """
+    """Return the bill of materials of a prototype; the density is in kg/m³."""
     unit, sizes = prototype.design.unit_mm, prototype.sizes
     items: list[Item] = []
     for part in prototype.parts:
@@ -71,14 +66,9 @@ def bill_of_materials(prototype: Prototype, density: float) -> Bill:
         volume = part.unit_mass.mass * unit**3
         items.append(Item(part.name, (x, y, z), volume, part.mass(density, unit).mass))
     mass = {item.name: item.mass for item in items}
-    actuators = (
-        Actuator(
-            leg,
-            stroke,
-            sizes.asked(leg),
-            2.0 * sizes.radii[leg - 1],
-            mass[f"cylinder {leg}"] + mass[f"rod {leg}"],
-        )
-        for leg, stroke in enumerate(sizes.strokes, 1)
-    )
+    actuators: list[Actuator] = []
+    for leg, stroke in enumerate(sizes.strokes, 1):
+        actuator_mass = mass[f"cylinder {leg}"] + mass[f"rod {leg}"]
+        diameter = 2.0 * sizes.radii[leg - 1]
+        actuators.append(Actuator(leg, stroke, sizes.required_stroke(leg), diameter, actuator_mass))
     return Bill(tuple(items), tuple(actuators))

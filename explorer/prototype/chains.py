@@ -53,6 +53,11 @@ _GUIDE = np.array([False, True, True, False])
 _LENGTHS, _FIRST, _SECOND, _CARRIAGES = [2, 5, 8, 11], [0, 4, 7, 9], [1, 10], [3, 6]
 
 
+def joints_of_leg(joints: FloatArray, leg: int) -> FloatArray:
+    """Return the three joint values of a leg, the last of them its length, shape (..., 3)."""
+    return joints[..., 3 * leg - 3 : 3 * leg]
+
+
 class Places(NamedTuple):
     """Placements of bodies: a point of a body's frame lies at `origin + rotation @ point`.
 
@@ -121,22 +126,19 @@ class Chains:
         ends = np.stack([b.b1, b.b2, b.b3, b.b4 - b.a3], axis=-2)
         legs = np.where(_GUIDE[:, None], ends * [0.0, 1.0, 1.0], ends)
         x, y, z = np.moveaxis(np.einsum("kji,...kj->...ki", self.mounts, legs), -1, 0)
-        found = np.empty((*x.shape[:-1], len(CHAIN_JOINTS)))
-        # Adding zero makes a negative zero positive, so that the angle of no leg is zero.
-        found[..., _FIRST] = np.arctan2(0.0 - y, z + 0.0)
+        joint_values = np.empty((*x.shape[:-1], len(CHAIN_JOINTS)))
+        # Adding zero makes a negative zero positive, so that a leg of no length has the angle zero.
+        joint_values[..., _FIRST] = np.arctan2(0.0 - y, z + 0.0)
         across = np.hypot(y, z)
-        found[..., _SECOND] = np.arctan2(x, across)[..., [0, 3]]
-        found[..., _LENGTHS] = np.hypot(x, across)
-        found[..., _CARRIAGES] = ends[..., [1, 2], 0]
-        return found
+        joint_values[..., _SECOND] = np.arctan2(x, across)[..., [0, 3]]
+        joint_values[..., _LENGTHS] = np.hypot(x, across)
+        joint_values[..., _CARRIAGES] = ends[..., [1, 2], 0]
+        return joint_values
 
     def places(self, joints: FloatArray, position: ArrayLike, rotation: ArrayLike) -> Places:
-        """Return the placements of all bodies, in the order of `BODIES`.
+        """Return the placements of all bodies in a pose, in the order of `BODIES`.
 
-        Args:
-            joints: Joint values of the chains, shape (..., 12); a leg depends on its own alone.
-            position: Position of the platform, shape (..., 3), in design units.
-            rotation: Rotation of the platform, shape (..., 3, 3).
+        A leg depends on its own joint values alone, shape (..., 12).
 
         Raises:
             InputError: not a rotation.
@@ -149,9 +151,9 @@ class Chains:
         first, cylinder, rod = slice(1, 13, 3), slice(2, 13, 3), slice(3, 13, 3)
         alpha, beta = joints[..., _FIRST], np.zeros((*shape, 4))
         beta[..., [0, 3]] = joints[..., _SECOND]
-        turned = self.mounts @ _about_x(alpha)
+        turned = self.mounts @ _turns(0, alpha)
         turn[..., first, :, :] = np.where(_GUIDE[:, None, None], self.mounts, turned)
-        turn[..., cylinder, :, :] = turn[..., rod, :, :] = turned @ _about_y(beta)
+        turn[..., cylinder, :, :] = turn[..., rod, :, :] = turned @ _turns(1, beta)
         starts = np.zeros((*shape, 4, 3))
         starts[..., 3, :2] = self.design.a3
         starts[..., [1, 2], 0] = joints[..., _CARRIAGES]
@@ -162,23 +164,15 @@ class Chains:
         return Places(origin, turn)
 
     def places_at(self, position: ArrayLike, rotation: ArrayLike) -> Places:
-        """Return the placements of all bodies in a pose.
-
-        Args:
-            position: Position of b4 in the base frame, shape (..., 3), in design units.
-            rotation: Rotation from platform to base, shape (..., 3, 3).
-
-        Raises:
-            InputError: a pose that is not finite or not a rotation.
-        """
+        """Return the placements of all bodies in a pose; arguments are those of `joints`."""
         return self.places(self.joints(position, rotation), position, rotation)
 
 
-def _about_x(angle: FloatArray) -> FloatArray:
-    c, s, o, i = np.cos(angle), np.sin(angle), np.zeros_like(angle), np.ones_like(angle)
-    return np.stack([i, o, o, o, c, -s, o, s, c], axis=-1).reshape(*angle.shape, 3, 3)
-
-
-def _about_y(angle: FloatArray) -> FloatArray:
-    c, s, o, i = np.cos(angle), np.sin(angle), np.zeros_like(angle), np.ones_like(angle)
-    return np.stack([c, o, s, o, i, o, -s, o, c], axis=-1).reshape(*angle.shape, 3, 3)
+def _turns(axis: int, angle: FloatArray) -> FloatArray:
+    """Return the rotations about an axis of the frame by angles (...), shape (..., 3, 3)."""
+    turn = np.zeros((*angle.shape, 3, 3))
+    first, second = (axis + 1) % 3, (axis + 2) % 3
+    turn[..., axis, axis] = 1.0
+    turn[..., first, first] = turn[..., second, second] = np.cos(angle)
+    turn[..., second, first], turn[..., first, second] = np.sin(angle), -np.sin(angle)
+    return turn

@@ -21,8 +21,8 @@ FIRST_SWING, SECOND_SWING = math.radians(60.0), math.radians(50.0)
 
 # Dimensions over the radius of a leg.
 _WALL, _SWING, _EYE, _PIN, _NECK, _OVERLAP, _SHAFT = 0.3, 2.6, 1.1, 0.45, 0.45, 3.0, 0.7
-# Depth of a cup's rim below the ball's centre, over the ball's radius: the neck can swing to a
-# right angle. A magnet holds the ball.
+# Depth of a cup's rim below the ball's centre, over the ball's radius. The rim is so low that the
+# neck can swing to a right angle; a magnet holds the ball.
 _RIM = 0.5
 
 
@@ -129,21 +129,21 @@ class LegSizes:
         """The dead length: the excess of twice the shortest length over the longest one."""
         return self.floor + self.end + _OVERLAP * self.radius + 2.0 * CLEARANCE
 
-    def stroke(self, asked: Stroke, at_home: float) -> Stroke:
+    def stroke(self, required: Stroke, home_length: float) -> Stroke:
         """Return the required stroke, or the part of it that a single rod covers.
 
         A rod no longer than its cylinder can at most double the length of a leg. Of a longer
-        stroke, the part covered has the home length midway, unless it would pass an end.
+        stroke it covers a part about the home length, shifted where that part would pass an end.
 
         Args:
-            asked: The required stroke.
-            at_home: The length of the leg at home.
+            required: The required stroke.
+            home_length: The length of the leg at home.
         """
         shortest = max(
-            asked.shortest,
-            min((2.0 * at_home + self.dead) / 3.0, 0.5 * (asked.longest + self.dead)),
+            required.shortest,
+            min((2.0 * home_length + self.dead) / 3.0, 0.5 * (required.longest + self.dead)),
         )
-        return Stroke(shortest, min(asked.longest, 2.0 * shortest - self.dead))
+        return Stroke(shortest, min(required.longest, 2.0 * shortest - self.dead))
 
 
 @dataclass(frozen=True)

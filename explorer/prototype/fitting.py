@@ -36,33 +36,26 @@ def sizes_of(design: Design) -> Sizes:
             leg; the message names the parts, their distance and what would fit.
     """
     design = msgspec.structs.replace(design, home=home_pose(design))
-    share = 1.0 if all(design.limits.leg_radii) else _thicker(design, 1.0)[0]
-    found = _sizes(design, 1.0, share or 1.0)
-    if found.worst is not None:
-        raise InputError(_refusal(design, found.worst))
+    share = 1.0 if all(design.limits.leg_radii) else _fitting_factors(design, 1.0)[0]
+    sizes = _sizes(design, 1.0, share or 1.0)
+    if sizes.worst is not None:
+        raise InputError(_refusal(design, sizes.worst))
     for leg in LEGS:
-        low, high = found.asked(leg)
-        # At home a pose on a limit is within it, whatever its last bits say.
-        if not low * (1.0 - 1e-9) <= found.at_home(leg) <= high * (1.0 + 1e-9):
+        low, high = sizes.required_stroke(leg)
+        # A home pose on a limit is within it, whatever its rounding.
+        if not low * (1.0 - 1e-9) <= sizes.home_length(leg) <= high * (1.0 + 1e-9):
             raise InputError(
-                f"leg {leg} is {found.at_home(leg):.4g} mm long at home, but its limits are "
+                f"leg {leg} is {sizes.home_length(leg):.4g} mm long at home, but its limits are "
                 f"{low:.4g} to {high:.4g} mm; choose another home"
             )
     home = home_pose(design)
-    for problem in broken_joint_limits(found, home.position, home.rotation):
+    for problem in broken_joint_limits(sizes, home.position, home.rotation):
         raise InputError(f"at home {problem}; choose another home")
-    return found
+    return sizes
 
 
 def _sizes(design: Design, unit: float, share: float, all_of: bool = False) -> Sizes:
-    """Return sizes with a scaled unit and scaled radii.
-
-    Args:
-        design: The manipulator.
-        unit: Factor on its unit.
-        share: Factor on the radii that the design leaves open.
-        all_of: Whether `share` also scales the radii that the design gives.
-    """
+    """Return sizes with factors on the unit and on the radii that are open, or on `all_of` them."""
     larger = msgspec.structs.replace(design, unit_mm=unit * design.unit_mm)
     open_radius = THICKEST_SHARE * design.reach * share
     factor = share if all_of else 1.0
@@ -70,37 +63,37 @@ def _sizes(design: Design, unit: float, share: float, all_of: bool = False) -> S
     return Sizes(larger, tuple(radius * larger.unit_mm for radius in radii))
 
 
-def _thicker(
+def _fitting_factors(
     design: Design, unit: float, all_of: bool = False
 ) -> tuple[float | None, float | None]:
-    """Return the largest factor up to 1 on the radii that fits, and the smallest from 1 on."""
+    """Return the factors on the radii that fit: the largest up to 1, the smallest from 1 on."""
 
-    def first(shares: FloatArray) -> float | None:
+    def first_fitting(shares: FloatArray) -> float | None:
         for share in shares.tolist():
             if _sizes(design, unit, share, all_of).worst is None:
                 return share
         return None
 
-    # Thin legs lack room for walls, thick ones beside each other: what fits is one interval.
-    return first(np.geomspace(1.0, 1e-2, 100)), first(np.geomspace(1.0, 1e2, 100))
+    # Thin legs lack room for walls, thick legs room beside each other, so one interval fits.
+    return first_fitting(np.geomspace(1.0, 1e-2, 100)), first_fitting(np.geomspace(1.0, 1e2, 100))
 
 
 def _refusal(design: Design, worst: tuple[str, float, float]) -> str:
-    parts, apart, needed = worst
+    parts, distance, needed = worst
     if parts.startswith("the radius"):
-        text = f"too thin: {parts} is {_mm(apart)} and must be at least {_mm(needed)}"
+        text = f"too thin: {parts} is {_mm(distance)} and must be at least {_mm(needed)}"
     else:
-        text = f"too tight for the parts: {parts} are {_mm(apart)} apart and need {_mm(needed)}"
+        text = f"too tight for the parts: {parts} are {_mm(distance)} apart and need {_mm(needed)}"
     ways: list[str] = []
     unit = _least_unit(design)
     if unit is not None:
-        ways.append(f"with a unit of at least {_rounded(unit * design.unit_mm, up=True)} mm")
-    given = max(design.limits.leg_radii)
-    smaller, larger = _thicker(design, 1.0, all_of=True) if given else (None, None)
+        ways.append(f"with a unit of at least {_round(unit * design.unit_mm, up=True)} mm")
+    largest_radius = max(design.limits.leg_radii)
+    smaller, larger = _fitting_factors(design, 1.0, all_of=True) if largest_radius else (None, None)
     if smaller is not None:
-        ways.append(f"with legs of radius at most {_rounded(smaller * given, up=False)}")
+        ways.append(f"with legs of radius at most {_round(smaller * largest_radius, up=False)}")
     elif larger is not None:
-        ways.append(f"with legs of radius at least {_rounded(larger * given, up=True)}")
+        ways.append(f"with legs of radius at least {_round(larger * largest_radius, up=True)}")
     if not ways:
         return (
             f"{text}; no unit makes that fit: take thinner legs, another home, or points that "
@@ -114,7 +107,7 @@ def _least_unit(design: Design) -> float | None:
     share: float | None = 1.0
     if not all(design.limits.leg_radii):
         # With a huge unit clearances vanish, so open radii are at their largest.
-        share = _thicker(design, LARGEST_FACTOR)[0]
+        share = _fitting_factors(design, LARGEST_FACTOR)[0]
 
     def fits(factor: float) -> bool:
         return share is not None and _sizes(design, factor, share).worst is None
@@ -132,7 +125,7 @@ def _mm(value: float) -> str:
     return f"{value:.3g} mm"
 
 
-def _rounded(value: float, up: bool) -> str:
+def _round(value: float, up: bool) -> str:
     """Return a value to three digits, rounded up or down."""
     step = 10.0 ** (math.floor(math.log10(value)) - 2)
     whole = math.ceil(value / step) if up else math.floor(value / step)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.numerics.arrays import FloatArray
-from explorer.prototype.chains import BODIES, LEGS, ON_GUIDE
+from explorer.prototype.chains import BODIES, LEGS, ON_GUIDE, joints_of_leg
 from explorer.prototype.dimensions import FIRST_SWING, SECOND_SWING
 from explorer.prototype.sizes import Sizes
 
@@ -23,6 +23,8 @@ _SLACK = 1e-9
 def broken_joint_limits(sizes: Sizes, position: ArrayLike, rotation: ArrayLike) -> tuple[str, ...]:
     """Return the limits of actuators and joints that one pose breaks, as sentences.
 
+    Collisions between the parts of different legs are not checked.
+
     Args:
         sizes: Sizes of the parts.
         position: Position of b4 in the base frame, shape (3,), in design units.
@@ -34,46 +36,44 @@ def broken_joint_limits(sizes: Sizes, position: ArrayLike, rotation: ArrayLike) 
     chains = sizes.chains
     joints = chains.joints(position, rotation)
     places = chains.places(joints, position, rotation)
-    found = [*_strokes(sizes, joints), *_swings(joints)]
+    broken = [*_strokes(sizes, joints), *_swings(joints)]
     normal = -chains.platform_side * places.rotation[-1][:, 2]
     for leg in LEGS:
         along = places.rotation[BODIES.index(f"rod {leg}")][:, 2]
         lean = math.acos(float(np.clip(along @ normal, -1.0, 1.0)))
         if lean > BALL_SWING + _SLACK:
-            found.append(f"the ball joint at b{leg} leans {_beyond(lean, BALL_SWING)}")
-    return tuple(found)
+            broken.append(f"the ball joint at b{leg} leans {_angle_beyond(lean, BALL_SWING)}")
+    return tuple(broken)
 
 
 def _strokes(sizes: Sizes, joints: FloatArray) -> Iterator[str]:
     unit = sizes.design.unit_mm
     for leg, (low, high) in zip(LEGS, sizes.strokes, strict=True):
-        length = float(joints[3 * leg - 1]) * unit
+        length = float(joints_of_leg(joints, leg)[-1]) * unit
         if not low * (1.0 - _SLACK) <= length <= high * (1.0 + _SLACK):
             yield f"leg {leg} is {length:.4g} mm long, its stroke is {low:.4g} to {high:.4g} mm"
-    where = [float(joints[3 * leg - 3]) * unit for leg in ON_GUIDE]
-    for leg, place in zip(ON_GUIDE, where, strict=True):
+    places = [float(joints_of_leg(joints, leg)[0]) * unit for leg in ON_GUIDE]
+    for leg, place in zip(ON_GUIDE, places, strict=True):
         low, high = sizes.carriage_range(leg)
         if not low - _SLACK * abs(low) <= place <= high + _SLACK * abs(high):
             yield f"carriage {leg} is at {place:.4g} mm, its rail is {low:.4g} to {high:.4g} mm"
-    apart, needed = where[0] - where[1], sizes.between_carriages
+    distance, needed = places[0] - places[1], sizes.between_carriages
     at_home = sizes.carriage_at_home(2) - sizes.carriage_at_home(3)
-    if math.copysign(1.0, at_home) * apart < needed * (1.0 - _SLACK):
-        yield f"carriages 2 and 3 are {abs(apart):.4g} mm apart and need {needed:.4g} mm"
+    if math.copysign(1.0, at_home) * distance < needed * (1.0 - _SLACK):
+        yield f"carriages 2 and 3 are {abs(distance):.4g} mm apart and need {needed:.4g} mm"
 
 
 def _swings(joints: FloatArray) -> Iterator[str]:
-    for leg, first in ((1, 0), (4, 9)):
-        name = f"the universal joint at a{1 if leg == 1 else 3}"
-        for angle, most in zip(
-            joints[first : first + 2].tolist(), (FIRST_SWING, SECOND_SWING), strict=True
-        ):
-            if abs(angle) > most + _SLACK:
-                yield f"{name} leans {_beyond(abs(angle), most)}"
-    for leg, index in ((2, 4), (3, 7)):
-        angle = abs(float(joints[index]))
+    for leg, point in ((1, "a1"), (4, "a3")):
+        first, second, _ = np.abs(joints_of_leg(joints, leg)).tolist()
+        for angle, most in ((first, FIRST_SWING), (second, SECOND_SWING)):
+            if angle > most + _SLACK:
+                yield f"the universal joint at {point} leans {_angle_beyond(angle, most)}"
+    for leg in ON_GUIDE:
+        _, angle, _ = np.abs(joints_of_leg(joints, leg)).tolist()
         if angle > 0.5 * math.pi:
-            yield f"leg {leg} leans {_beyond(angle, 0.5 * math.pi)} about the guide"
+            yield f"leg {leg} leans {_angle_beyond(angle, 0.5 * math.pi)} about the guide"
 
 
-def _beyond(angle: float, most: float) -> str:
+def _angle_beyond(angle: float, most: float) -> str:
     return f"{math.degrees(angle):.1f}°, and {math.degrees(most):.0f}° is the most"

@@ -30,12 +30,12 @@ class Mass:
     inertia: FloatArray
 
     def scaled(self, length: float, mass: float = 1.0) -> Mass:
-        """Return the same properties with numbers for length and mass multiplied by factors."""
+        """Return the properties in other units, given the factors for lengths and masses."""
         return Mass(self.mass * mass, self.centre * length, self.inertia * (mass * length**2))
 
 
 def bar(radius: float, start: FloatArray, end: FloatArray, density: float) -> Mass:
-    """Return the mass properties of a round bar between two points (3,), at zero length none."""
+    """Return the mass properties of a round bar between two points (3,), zero if they coincide."""
     along = end - start
     length = float(np.linalg.norm(along))
     mass = density * math.pi * radius**2 * length
@@ -53,27 +53,22 @@ def ball(radius: float, centre: FloatArray, density: float) -> Mass:
 
 
 def total_mass(parts: Iterable[Mass]) -> Mass:
-    """Return the mass properties of parts joined as one body; one at least has a mass."""
-    known = list(parts)
-    mass = sum(each.mass for each in known)
-    centre = np.sum([each.mass * each.centre for each in known], axis=0) / mass
+    """Return the mass properties of parts joined as one body; at least one part has a mass."""
+    masses = list(parts)
+    mass = sum(part.mass for part in masses)
+    centre = np.sum([part.mass * part.centre for part in masses], axis=0) / mass
     inertia = np.zeros((3, 3))
-    for each in known:
-        off = each.centre - centre
-        inertia += each.inertia + each.mass * (off @ off * np.eye(3) - np.outer(off, off))
+    for part in masses:
+        off = part.centre - centre
+        inertia += part.inertia + part.mass * (off @ off * np.eye(3) - np.outer(off, off))
     return Mass(mass, centre, inertia)
 
 
 def mesh_mass(vertices: FloatArray, faces: NDArray[np.int32], density: float) -> Mass:
     """Return the mass properties of the body that a closed mesh encloses, exactly.
 
-    They are sums over the tetrahedra between the faces and one point, whose second moments
-    have a closed form.
-
-    Args:
-        vertices: Vertices, shape (n, 3).
-        faces: Indices of vertices, counter-clockwise from outside, shape (m, 3).
-        density: Mass over volume.
+    They are sums over the tetrahedra between the faces (m, 3), counter-clockwise from outside, and
+    one point; their second moments have a closed form.
     """
     middle = 0.5 * (vertices.min(axis=0) + vertices.max(axis=0))
     corners = (vertices - middle)[faces]

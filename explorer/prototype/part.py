@@ -43,8 +43,8 @@ class Part:
     @cached_property
     def solid(self) -> Solid:
         """The part as a closed mesh in its own frame."""
-        none = np.zeros(len(self.faces), dtype=np.int64)
-        return Solid(self.vertices, self.faces, none, (self.name,), 0.0)
+        limit_of_face = np.zeros(len(self.faces), dtype=np.int64)
+        return Solid(self.vertices, self.faces, limit_of_face, (self.name,), 0.0)
 
     @cached_property
     def unit_mass(self) -> Mass:
@@ -52,11 +52,6 @@ class Part:
         return mesh_mass(self.vertices, self.faces, 1.0)
 
     def mass(self, density: float, unit_mm: float) -> Mass:
-        """Return the mass properties in kilograms and metres.
-
-        Args:
-            density: Density in kg/m³.
-            unit_mm: Millimetres in a design unit.
-        """
+        """Return the mass properties in kilograms and metres, at a density in kg/m³."""
         metres = 1e-3 * unit_mm
         return self.unit_mass.scaled(metres, density * metres**3)

@@ -45,14 +45,13 @@ class MeshKernel:
         """Return a cylinder along z between two heights."""
         from manifold3d import Manifold
 
-        made = Manifold.cylinder(high - low, circle.radius, circle.radius, SEGMENTS)
-        return made.translate((circle.x, circle.y, low))
+        cylinder = Manifold.cylinder(high - low, circle.radius, circle.radius, SEGMENTS)
+        return cylinder.translate((circle.x, circle.y, low))
 
     def hole(self, circle: Circle, low: float, high: float) -> Manifold:
         """Return the tool that cuts a round hole; its chords lie outside the circle."""
-        return self.disc(
-            circle._replace(radius=circle.radius / math.cos(math.pi / SEGMENTS)), low, high
-        )
+        radius = circle.radius / math.cos(math.pi / SEGMENTS)
+        return self.disc(circle._replace(radius=radius), low, high)
 
     def ball(self, radius: float) -> Manifold:
         """Return a ball about the origin."""
@@ -62,7 +61,7 @@ class MeshKernel:
 
     def cavity(self, radius: float) -> Manifold:
         """Return the tool that cuts a seat for a ball about the origin."""
-        return self.ball(radius / _inscribed())
+        return self.ball(radius / _inscribed_radius())
 
     def box(self, low: Triple, high: Triple) -> Manifold:
         """Return a box between two corners."""
@@ -81,11 +80,11 @@ class MeshKernel:
         """Return a plate between two heights, whose outline is the convex hull of circles."""
         from manifold3d import Manifold
 
-        return Manifold.batch_hull([self.disc(each, low, high) for each in circles])
+        return Manifold.batch_hull([self.disc(circle, low, high) for circle in circles])
 
 
 @functools.cache
-def _inscribed() -> float:
+def _inscribed_radius() -> float:
     """Return the inner radius of the polyhedron for a ball of radius 1."""
     mesh: Any = MeshKernel().ball(1.0).to_mesh64()
     corners = np.array(mesh.vert_properties)[:, :3][np.array(mesh.tri_verts)]
@@ -99,7 +98,7 @@ def _part(name: str, body: str, shape: Manifold, unit_mm: float) -> Part:
     from manifold3d import Error
 
     if shape.status() != Error.NoError:
-        raise ExplorerError(f"the body of a part cannot be made: {shape.status().name}")
+        raise ExplorerError(f"the {name} cannot be made: manifold3d reports {shape.status().name}")
     mesh: Any = shape.to_mesh64()
     vertices = np.array(mesh.vert_properties, dtype=np.float64)[:, :3] / unit_mm
     return Part(name, body, vertices, np.array(mesh.tri_verts, dtype=np.int32))

@@ -1,4 +1,4 @@
-"""The sizes of a design's parts, in millimetres, and the places that are too tight for them."""
+"""The sizes of a design's parts, in millimetres, and the places that may be too tight."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ import numpy as np
 
 from explorer.mechanism.design import LENGTHS, Design
 from explorer.mechanism.home import home_pose
-from explorer.prototype.chains import LEGS, ON_GUIDE, Chains
+from explorer.mechanism.kinematics import platform_points
+from explorer.numerics.arrays import FloatArray
+from explorer.prototype.chains import LEGS, ON_GUIDE, Chains, joints_of_leg
 from explorer.prototype.dimensions import CLEARANCE, THINNEST, GuideSizes, LegSizes, Stroke
-from explorer.prototype.sketch import platform_points
 from explorer.workspace.limits.constraints import constraints
 from explorer.workspace.limits.region import region_of
 from explorer.workspace.slices.volume import bounds
@@ -39,12 +40,12 @@ class Sizes:
     @cached_property
     def legs(self) -> tuple[LegSizes, ...]:
         """The dimensions of the four legs."""
-        found: list[LegSizes] = []
+        sizes: list[LegSizes] = []
         for leg, radius in zip(LEGS, self.radii, strict=True):
-            own = LegSizes(radius, 0.0)
-            bottom = self.guide.eye if leg in ON_GUIDE else own.bottom
-            found.append(LegSizes(radius, bottom + own.plate))
-        return tuple(found)
+            joint_sizes = LegSizes(radius, 0.0)
+            bottom = self.guide.eye if leg in ON_GUIDE else joint_sizes.bottom
+            sizes.append(LegSizes(radius, bottom + joint_sizes.plate))
+        return tuple(sizes)
 
     @cached_property
     def chains(self) -> Chains:
@@ -52,20 +53,20 @@ class Sizes:
         return Chains.of(self.design)
 
     @cached_property
-    def home_joints(self) -> tuple[float, ...]:
-        """The joint values of the chains at home, in design units and radians."""
+    def home_joints(self) -> FloatArray:
+        """The joint values of the chains at home, in design units and radians, shape (12,)."""
         home = home_pose(self.design)
-        return tuple(self.chains.joints(home.position, home.rotation).tolist())
+        return self.chains.joints(home.position, home.rotation)
 
-    def at_home(self, leg: int) -> float:
-        """Return the length of a leg at home."""
-        return self.home_joints[3 * leg - 1] * self.design.unit_mm
+    def home_length(self, leg: int) -> float:
+        """Return the length of a leg in the home pose."""
+        return float(joints_of_leg(self.home_joints, leg)[-1]) * self.design.unit_mm
 
     def carriage_at_home(self, leg: int) -> float:
-        """Return the place on the guide of a leg's carriage at home."""
-        return self.home_joints[3 * leg - 3] * self.design.unit_mm
+        """Return the coordinate of a leg's carriage on the guide in the home pose."""
+        return float(joints_of_leg(self.home_joints, leg)[0]) * self.design.unit_mm
 
-    def asked(self, leg: int) -> Stroke:
+    def required_stroke(self, leg: int) -> Stroke:
         """Return the stroke that the limits of a leg allow."""
         low, high = self.design.length_range(LENGTHS[leg - 1])
         return Stroke(low * self.design.unit_mm, high * self.design.unit_mm)
@@ -74,15 +75,15 @@ class Sizes:
     def strokes(self) -> tuple[Stroke, ...]:
         """The strokes of the four actuators."""
         return tuple(
-            own.stroke(self.asked(leg), self.at_home(leg))
-            for leg, own in zip(LEGS, self.legs, strict=True)
+            leg_sizes.stroke(self.required_stroke(leg), self.home_length(leg))
+            for leg, leg_sizes in zip(LEGS, self.legs, strict=True)
         )
 
     @cached_property
     def depth(self) -> float:
         """The distance from the base plane to the base plate."""
-        swings = max(self.legs[0].swing, self.legs[3].swing)
-        return max(swings, self.guide.eye) + 2.0 * CLEARANCE
+        room_for_joints = max(self.legs[0].swing, self.legs[3].swing)
+        return max(room_for_joints, self.guide.eye) + 2.0 * CLEARANCE
 
     @cached_property
     def base_plate(self) -> float:
@@ -91,8 +92,8 @@ class Sizes:
 
     @cached_property
     def standoff(self) -> float:
-        """The distance from the platform plane to its plate, where a rod along it has room."""
-        return max(1.1 * own.cup for own in self.legs) + 2.0 * CLEARANCE
+        """The distance from the platform plane to the plate, with room for a rod between."""
+        return max(1.1 * leg_sizes.cup for leg_sizes in self.legs) + 2.0 * CLEARANCE
 
     @cached_property
     def platform_plate(self) -> float:
@@ -101,33 +102,31 @@ class Sizes:
 
     def nearest_to_a1(self, leg: int) -> float:
         """Return the least distance of a leg's carriage from a1; a pillar stands between."""
-        own = self.radii[leg - 1]
+        radius = self.radii[leg - 1]
         sweep = self.legs[0].sweep(self.guide.eye)
-        return sweep + 2.0 * CLEARANCE + self.guide.pillar + own
+        return sweep + 2.0 * CLEARANCE + self.guide.pillar + radius
 
     def carriage_range(self, leg: int) -> Stroke:
         """Return the range along the guide of the carriage of a leg.
 
-        It is the range of the guide's limits or, without any, the range that the workspace
-        needs, on the carriage's own side of a1.
+        It is the range of the guide's limits or, without such limits, the range that the
+        workspace needs, on the carriage's side of a1.
         """
         return self._carriage_ranges[leg]
 
     @cached_property
     def _carriage_ranges(self) -> Mapping[int, Stroke]:
-        return {leg: self._carriage_range(leg) for leg in ON_GUIDE}
+        return {leg: self._compute_carriage_range(leg) for leg in ON_GUIDE}
 
-    def _carriage_range(self, leg: int) -> Stroke:
+    def _compute_carriage_range(self, leg: int) -> Stroke:
         home, nearest = self.carriage_at_home(leg), self.nearest_to_a1(leg)
-        low, high = self._asked_of_guide(leg)
+        low, high = self._required_guide_range(leg)
         low, high = min(low, home), max(high, home)
-        return (
-            Stroke(max(low, min(nearest, home)), high)
-            if home > 0.0
-            else Stroke(low, min(high, max(-nearest, home)))
-        )
+        if home > 0.0:
+            return Stroke(max(low, min(nearest, home)), high)
+        return Stroke(low, min(high, max(-nearest, home)))
 
-    def _asked_of_guide(self, leg: int) -> Stroke:
+    def _required_guide_range(self, leg: int) -> Stroke:
         design, home = self.design, home_pose(self.design)
         if design.limits.guide is not None:
             low, high = design.limits.guide
@@ -144,12 +143,14 @@ class Sizes:
     @cached_property
     def rails(self) -> tuple[Stroke, ...]:
         """The ends of the shaft, or of two shafts if a1 is between the carriages."""
-        found: dict[bool, list[float]] = {}
+        ends_by_side: dict[bool, list[float]] = {}
         for leg in ON_GUIDE:
-            room = self.radii[leg - 1] + CLEARANCE + self.guide.pillar
+            overhang = self.radii[leg - 1] + CLEARANCE + self.guide.pillar
             low, high = self.carriage_range(leg)
-            found.setdefault(self.carriage_at_home(leg) > 0.0, []).extend((low - room, high + room))
-        return tuple(Stroke(min(ends), max(ends)) for ends in found.values())
+            ends_by_side.setdefault(self.carriage_at_home(leg) > 0.0, []).extend(
+                (low - overhang, high + overhang)
+            )
+        return tuple(Stroke(min(ends), max(ends)) for ends in ends_by_side.values())
 
     @property
     def between_carriages(self) -> float:
@@ -157,10 +158,10 @@ class Sizes:
         return self.radii[1] + self.radii[2] + CLEARANCE
 
     def tight_places(self) -> Iterator[tuple[str, float, float]]:
-        """Yield the tight places: the parts, their distance, and the distance that they need."""
-        for leg, own in zip(LEGS, self.legs, strict=True):
-            # A leg this thin has the thinnest wall.
-            yield f"the radius of leg {leg}", own.radius, 2.0 * THINNEST + CLEARANCE
+        """Yield places that may be tight: the parts, their distance, and the distance needed."""
+        for leg, leg_sizes in zip(LEGS, self.legs, strict=True):
+            # A leg as thin as this has the thinnest wall and the thinnest rod.
+            yield f"the radius of leg {leg}", leg_sizes.radius, 2.0 * THINNEST + CLEARANCE
         d1, d3 = (self.carriage_at_home(leg) for leg in ON_GUIDE)
         yield "carriages 2 and 3 at home", abs(d1 - d3), self.between_carriages
         for leg, place in ((2, d1), (3, d3)):
@@ -171,15 +172,15 @@ class Sizes:
         yield "the guide and the universal joint at a3", a3y, needed
         points = platform_points(self.design) * self.design.unit_mm
         for i, j in itertools.combinations(range(4), 2):
-            apart = float(np.linalg.norm(points[i] - points[j]))
+            distance = float(np.linalg.norm(points[i] - points[j]))
             needed = self.legs[i].cup + self.legs[j].cup + CLEARANCE
-            yield f"the ball joints at b{i + 1} and b{j + 1}", apart, needed
-        for leg, own in zip(LEGS, self.legs, strict=True):
+            yield f"the ball joints at b{i + 1} and b{j + 1}", distance, needed
+        for leg, leg_sizes in zip(LEGS, self.legs, strict=True):
             # The stroke needs room on both sides of the home length.
-            yield f"the ends of leg {leg} at home", self.at_home(leg), 1.1 * own.dead
+            yield f"the ends of leg {leg} at home", self.home_length(leg), 1.1 * leg_sizes.dead
 
     @cached_property
     def worst(self) -> tuple[str, float, float] | None:
-        """The tight place that lacks the largest share of its need, None if everything fits."""
-        short = [each for each in self.tight_places() if each[1] < each[2]]
-        return max(short, key=lambda each: each[2] / max(each[1], 1e-300), default=None)
+        """The place whose need exceeds its distance by the largest factor; None if all fit."""
+        tight = [place for place in self.tight_places() if place[1] < place[2]]
+        return max(tight, key=lambda place: place[2] / max(place[1], 1e-300), default=None)

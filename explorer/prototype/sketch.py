@@ -7,14 +7,15 @@ from collections.abc import Mapping
 import numpy as np
 
 from explorer.mechanism.design import Design
+from explorer.mechanism.kinematics import platform_points
 from explorer.numerics.arrays import FloatArray
-from explorer.prototype.chains import ON_GUIDE, Chains
+from explorer.prototype.chains import ON_GUIDE, Chains, joints_of_leg
 from explorer.prototype.mass import Mass, ball, bar, total_mass
 
 DEFAULT_RADIUS = 0.01
 """Radius, over the reach, of a leg that has none in the design."""
 
-# Length of a cylinder and of a rod, over the leg's length at home: they overlap.
+# Length of a cylinder and of a rod, over the leg's length at home; above a half, so they overlap.
 SHARE = 0.55
 # Radii over the radius of the leg.
 ROD, JOINT, BALL = 0.6, 2.0, 1.2
@@ -25,33 +26,23 @@ def leg_radii(design: Design) -> tuple[float, ...]:
     return tuple(radius or DEFAULT_RADIUS * design.reach for radius in design.limits.leg_radii)
 
 
-def platform_points(design: Design) -> FloatArray:
-    """Return b1 to b4 in the platform frame, shape (4, 3)."""
-    return np.array(
-        [(*design.b1, 0.0), (design.b2, 0.0, 0.0), (design.b3, 0.0, 0.0), (0.0, 0.0, 0.0)]
-    )
-
-
 def sketch_masses(chains: Chains, home_joints: FloatArray, density: float) -> Mapping[str, Mass]:
-    """Return the mass properties of all bodies but the base, in own frames and design units.
+    """Return the masses of all bodies but the base, in the bodies' frames and design units.
 
-    Args:
-        chains: Chains of the design.
-        home_joints: Joint values of the chains at home, shape (12,).
-        density: Mass over volume, the volume in cubed design units.
+    The joint values at home have the shape (12,); the density is per cubed design unit.
     """
     radii = leg_radii(chains.design)
-    found: dict[str, Mass] = {}
+    masses: dict[str, Mass] = {}
     for leg, radius in enumerate(radii, 1):
-        length = SHARE * max(float(home_joints[3 * leg - 1]), radius)
+        length = SHARE * max(float(joints_of_leg(home_joints, leg)[-1]), radius)
         joint = "carriage" if leg in ON_GUIDE else "cross"
         along = np.array([0.0, 0.0, length])
-        found[f"{joint} {leg}"] = ball(JOINT * radius, np.zeros(3), density)
-        found[f"cylinder {leg}"] = bar(radius, np.zeros(3), along, density)
-        found[f"rod {leg}"] = bar(ROD * radius, -along, np.zeros(3), density)
+        masses[f"{joint} {leg}"] = ball(JOINT * radius, np.zeros(3), density)
+        masses[f"cylinder {leg}"] = bar(radius, np.zeros(3), along, density)
+        masses[f"rod {leg}"] = bar(ROD * radius, -along, np.zeros(3), density)
     points = platform_points(chains.design)
     hub = points.mean(axis=0)
     balls = (ball(BALL * r, point, density) for r, point in zip(radii, points, strict=True))
     bars = (bar(r, hub, point, density) for r, point in zip(radii, points, strict=True))
-    found["platform"] = total_mass([*balls, *bars])
-    return found
+    masses["platform"] = total_mass([*balls, *bars])
+    return masses

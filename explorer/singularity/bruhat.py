@@ -14,7 +14,6 @@ from types import MappingProxyType
 from typing import TypeAlias
 
 from explorer.mechanism.margins import INCIDENCES
-from explorer.numerics.arrays import IntArray
 from explorer.singularity.strata import GENERIC, STRATA, inversions, ranks
 
 Stratum: TypeAlias = tuple[int, ...]
@@ -46,7 +45,7 @@ def codimension(stratum: Stratum) -> int:
 
 
 def is_below(lower: Stratum, upper: Stratum) -> bool:
-    """Return whether a stratum lies in the closure of another, which contains that one itself."""
+    """Return whether a stratum lies in the closure of another, or is the same one."""
     return bool((ranks(lower) >= ranks(upper)).all())
 
 
@@ -80,16 +79,11 @@ def incidences(stratum: Stratum) -> tuple[int, ...]:
 
 def _all_ranks(stratum: Stratum) -> list[list[int]]:
     """Return r_ij, shape (5, 5), for i and j from 0 to 4."""
-    inner: IntArray = ranks(stratum)
-    return [
-        [0, 0, 0, 0, 0],
-        *([0, *inner[i - 1].tolist(), i] for i in (1, 2, 3)),
-        [0, 1, 2, 3, 4],
-    ]
+    return [[sum(v <= j for v in stratum[:i]) for j in range(5)] for i in range(5)]
 
 
-def _covered_strata() -> dict[Stratum, tuple[Stratum, ...]]:
-    return {
+COVERED: Mapping[Stratum, tuple[Stratum, ...]] = MappingProxyType(
+    {
         upper: tuple(
             lower
             for lower in STRATA
@@ -97,7 +91,5 @@ def _covered_strata() -> dict[Stratum, tuple[Stratum, ...]]:
         )
         for upper in STRATA
     }
-
-
-COVERED: Mapping[Stratum, tuple[Stratum, ...]] = MappingProxyType(_covered_strata())
+)
 """The strata of one dimension less in the closure of each: the edges of the Hasse diagram."""

@@ -84,21 +84,16 @@ class SingularityFreeBall:
 
 
 def performance(design: Design, pose: Pose) -> Performance:
-    """Return the ellipsoids of a pose; some axes are infinite if it is singular.
-
-    Args:
-        design: The manipulator.
-        pose: Pose of its platform.
-    """
+    """Return the ellipsoids of a pose; some axes are infinite if it is singular."""
     length = design.reach
     rates = jacobian(design, pose.position, pose.rotation) / np.array([1.0] * 3 + [length] * 3)
     _, values, rows = np.linalg.svd(rates)
-    lost = values <= SINGULAR * values[0]
-    inverse = np.divide(1.0, values, out=np.zeros(6), where=~lost)
+    is_lost = values <= SINGULAR * values[0]
+    inverse = np.divide(1.0, values, out=np.zeros(6), where=~is_lost)
     # Twists by column: those at zero actuator speed, and those per unit of actuator speed.
     return Performance(
-        _ellipsoid(rows.T[:3, lost], rows.T[:3] * inverse),
-        _ellipsoid(rows.T[3:, lost], rows.T[3:] * inverse),
+        _ellipsoid(rows.T[:3, is_lost], rows.T[:3] * inverse),
+        _ellipsoid(rows.T[3:, is_lost], rows.T[3:] * inverse),
     )
 
 
@@ -107,13 +102,7 @@ def planes_of_singularity(rotation: ArrayLike) -> FloatArray:
 
     At a fixed orientation the singular positions are the planes through a1 with these normals.
     The gradient of δ2 has the length of the sine between the lines a1a2 and b2b3, which is zero
-    if they are parallel; the others have unit length.
-
-    Args:
-        rotation: Platform to base, shape (..., 3, 3).
-
-    Raises:
-        InputError: The rotation is not one.
+    if they are parallel; the others have unit length. The rotation has the shape (..., 3, 3).
     """
     r = checked_rotation(rotation)
     gradients = np.zeros(r.shape)
@@ -127,14 +116,7 @@ def singular_plane_distances(position: ArrayLike, rotation: ArrayLike) -> FloatA
     """Return the distances of positions from the three singular planes, shape (..., 3).
 
     If the lines a1a2 and b2b3 are parallel every position is singular, and the distance for δ2
-    is zero.
-
-    Args:
-        position: b4 in the base frame, shape (..., 3), in design units.
-        rotation: Platform to base, shape (..., 3, 3).
-
-    Raises:
-        InputError: The position is not finite, or the rotation is not one.
+    is zero. Arguments and errors are those of `margins`.
     """
     p, r = finite_array("position", position, (3,)), checked_rotation(rotation)
     distances = np.abs(margins(p, r))
@@ -155,11 +137,9 @@ def singularity_free_ball(pose: Pose) -> SingularityFreeBall:
     index = int(distances.argmin())
     normal = planes_of_singularity(pose.rotation)[index]
     length = float(np.linalg.norm(normal))
-    position = np.array(pose.position)
+    touches = np.array(pose.position)
     if length > SINGULAR:
-        touches = position - normal * float(normal @ position) / length**2
-    else:
-        touches = position
+        touches -= normal * float(normal @ touches) / length**2
     return SingularityFreeBall(float(distances[index]), index + 1, touches, distances)
 
 
@@ -182,8 +162,8 @@ def _ellipsoid(free: FloatArray, driven: FloatArray) -> Ellipsoid:
     axes, sizes, _ = np.linalg.svd(free @ free.T)
     count = int((sizes > SINGULAR).sum())
     infinite = axes[:, :count]
-    across = np.eye(3) - infinite @ infinite.T
-    directions, gains, _ = np.linalg.svd(across @ driven, full_matrices=False)
+    projector = np.eye(3) - infinite @ infinite.T
+    directions, gains, _ = np.linalg.svd(projector @ driven, full_matrices=False)
     finite = 3 - count
     axes = np.concatenate([infinite, directions[:, :finite]], axis=1)
     if np.linalg.det(axes) < 0.0:

@@ -13,28 +13,23 @@ from explorer.numerics.arrays import FloatArray, dot
 def tetrahedron_volumes(design: Design, margin: FloatArray) -> FloatArray:
     """Return the volumes of the three tetrahedra, shape (..., 3), in cubed design units.
 
-    The second and third are proportional to a2x, the position at which a2 is drawn.
-
-    Args:
-        design: The manipulator.
-        margin: Margins (δ1, δ2, δ3) of the pose, shape (..., 3), in design units.
+    They are proportional to the margins (δ1, δ2, δ3), shape (..., 3); the second and third also
+    to a2x, the position at which a2 is drawn.
     """
     span = design.b3 - design.b2
-    factors = np.array(
-        [design.b1[1] * span, design.a2x * span, design.a2x * design.a3[1]], dtype=np.float64
-    )
+    factors = np.array([design.b1[1] * span, design.a2x * span, design.a2x * design.a3[1]])
     return np.abs(margin * factors) / 6.0
 
 
 def jacobian(design: Design, position: ArrayLike, rotation: ArrayLike) -> FloatArray:
     """Return the actuator Jacobian J, shape (..., 6, 6): joint rates = J @ twist.
 
-    J maps the platform's twist to the joint rates; Merlet ("Parallel Robots") calls this matrix
-    the inverse kinematic Jacobian. The twist is (v; ω): the velocity v of the reference point
-    b4, in design units per unit of time, and the angular velocity ω, in radians per unit of
-    time, both along the axes of the base frame. The rows are the rates of (l1, d1, d2, d3, d4,
-    l4), the order of `JOINTS`, in design units per unit of time; so columns 1 to 3 are
-    dimensionless and columns 4 to 6 are lengths in design units.
+    J maps the platform's twist to the joint rates; Merlet ("Parallel Robots", 2006) calls this
+    matrix the inverse Jacobian. The twist is (v; ω): the velocity v of the reference point b4, in
+    design units per unit of time, and the angular velocity ω, in radians per unit of time, both
+    along the axes of the base frame. The rows are the rates of (l1, d1, d2, d3, d4, l4), the order
+    of `JOINTS`, in design units per unit of time; so columns 1 to 3 are dimensionless and columns
+    4 to 6 are lengths in design units.
 
     A joint of length zero has no direction, and its row is zero: such a pose is singular.
 
@@ -49,9 +44,9 @@ def jacobian(design: Design, position: ArrayLike, rotation: ArrayLike) -> FloatA
     points = attachment_points(design, position, rotation)
     p = points.b4
     radial = np.array([0.0, 1.0, 1.0])
-    spokes = [points.b1, points.b2 * radial, points.b3 * radial, p - points.a3]
+    actuators = [points.b1, points.b2 * radial, points.b3 * radial, p - points.a3]
     out = np.zeros((*p.shape[:-1], 6, 6))
-    out[..., [0, 2, 4, 5], :3] = _unit(np.stack(spokes, axis=-2))
+    out[..., [0, 2, 4, 5], :3] = _unit(np.stack(actuators, axis=-2))
     out[..., [1, 3], 0] = 1.0
     b1, b2, b3 = points.b1 - p, points.b2 - p, points.b3 - p
     arms = np.stack([b1, b2, b2, b3, b3, np.zeros_like(p)], axis=-2)
@@ -77,9 +72,8 @@ def determinant(design: Design, joints: FloatArray, margin: FloatArray) -> Float
     """
     lengths = joints[..., [0, 2, 4, 5]]
     product = np.prod(lengths, axis=-1)
-    numerator = (
-        -design.b1[1] * design.a3[1] * (design.b3 - design.b2) ** 2 * np.prod(margin, axis=-1)
-    )
+    factor = -design.b1[1] * design.a3[1] * (design.b3 - design.b2) ** 2
+    numerator = factor * np.prod(margin, axis=-1)
     return np.divide(numerator, product, out=np.zeros_like(product), where=product > 0.0)
 
 

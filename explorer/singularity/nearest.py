@@ -22,7 +22,13 @@ from explorer.mechanism.margins import INCIDENCES
 from explorer.mechanism.pose import Pose, checked_rotation
 from explorer.numerics.arrays import FloatArray, batch_shape, finite_array
 from explorer.numerics.compiled import helper, kernel
-from explorer.singularity.nearest_lines import ROOM, minimise_on_torus, polish, write_on_plane
+from explorer.singularity.nearest_lines import (
+    ROOM,
+    constants_at,
+    minimise_on_torus,
+    polish,
+    write_on_plane,
+)
 from explorer.singularity.nearest_plane import nearest_quaternion, write_form, write_turned
 
 # Share of the magnitude of its terms up to which a margin counts as zero.
@@ -77,8 +83,8 @@ def nearest_singularities(
     """Return the nearest singular pose of each incidence, in the order δ1, δ2, δ3.
 
     Args:
-        design: The manipulator.
-        pose: Pose of its platform; it may be singular itself.
+        design: The manipulator, which gives the unit of all lengths.
+        pose: Pose of its platform, which may be singular itself.
     """
     return singularities_of(nearest_singular_poses(design, pose.position, pose.rotation), pose)
 
@@ -86,21 +92,16 @@ def nearest_singularities(
 def singularities_of(
     nearest: NearestPoses, pose: Pose
 ) -> tuple[NearestSingularity, NearestSingularity, NearestSingularity]:
-    """Return the nearest singular pose of each incidence, in the order δ1, δ2, δ3.
+    """Return the results of `nearest_singular_poses` for one pose, in the order δ1, δ2, δ3."""
 
-    Args:
-        nearest: Nearest singular poses of one pose.
-        pose: That pose.
-    """
-
-    def one(index: int) -> NearestSingularity:
+    def of_margin(index: int) -> NearestSingularity:
         distance, bound = float(nearest.distance[index]), float(nearest.bound[index])
         if distance == 0.0:
             return NearestSingularity(index + 1, 0.0, 0.0, pose)
         singular = Pose.of(nearest.position[index], nearest.rotation[index])
         return NearestSingularity(index + 1, distance, bound, singular)
 
-    return one(0), one(1), one(2)
+    return of_margin(0), of_margin(1), of_margin(2)
 
 
 def nearest_singular_poses(
@@ -125,7 +126,7 @@ def nearest_singular_poses(
     r_rows = np.broadcast_to(r, (*batch, 3, 3)).reshape(-1, 3, 3).copy()
     count = len(p_rows)
     distance, bound = np.empty((count, 3)), np.empty((count, 3))
-    found_p, found_r = np.empty((count, 3, 3)), np.empty((count, 3, 3, 3))
+    near_p, near_r = np.empty((count, 3, 3)), np.empty((count, 3, 3, 3))
     nearest_rows(
         # The branch and bound examines some hundred boxes for each pose.
         100 * count,
@@ -136,14 +137,14 @@ def nearest_singular_poses(
         r_rows,
         distance,
         bound,
-        found_p,
-        found_r,
+        near_p,
+        near_r,
     )
     return NearestPoses(
         (distance * unit).reshape(*batch, 3),
         (bound * unit).reshape(*batch, 3),
-        (found_p * unit).reshape(*batch, 3, 3),
-        found_r.reshape(*batch, 3, 3, 3),
+        (near_p * unit).reshape(*batch, 3, 3),
+        near_r.reshape(*batch, 3, 3, 3),
     )
 
 
@@ -163,29 +164,45 @@ def rms_displacement(
 
 
 @helper
-def write_a1_on_plane(
-    g: FloatArray, r: FloatArray, c: FloatArray, forms: FloatArray, q: FloatArray, s: FloatArray
+def write_point_on_plane(
+    is_a1: bool,
+    g: FloatArray,
+    r: FloatArray,
+    c: FloatArray,
+    forms: FloatArray,
+    q: FloatArray,
+    s: FloatArray,
 ) -> float:
-    """Write the nearest pose (q, s) with δ1 = 0; return a lower bound of its squared distance.
+    """Write the nearest pose (q, s) with a1 or b4 on the plane of the other flag.
 
     Args:
+        is_a1: Whether the point is a1, so that δ1 = 0; otherwise it is b4, and δ3 = 0.
         g: Centroid of the points in the base frame, shape (3,).
         r: Rotation of the given pose, shape (3, 3).
         c: Centroid of the points in the platform frame, shape (3,).
         forms: Quadratic form of the scatter, then four that are overwritten, shape (5, 4, 4).
         q: Output, position, shape (3,).
         s: Output, rotation, shape (3, 3).
+
+    Returns:
+        A lower bound of the squared distance.
     """
-    # x is the distance of a1 from the turned plane through the centroid.
+    # x is the distance of a1 from the turned plane through the centroid, or the height of b4
+    # with the centroid where it was.
     linear = forms[4]
     for i in range(3):
-        linear[i, 0] = linear[i, 1] = 0.0
-        linear[i, 2] = -(r[0, i] * g[0] + r[1, i] * g[1] + r[2, i] * g[2])
+        along = -(r[0, i] * g[0] + r[1, i] * g[1] + r[2, i] * g[2])
+        for j in range(3):
+            linear[i, j] = (along if j == 2 else 0.0) if is_a1 else -r[2, i] * c[j]
     write_form(linear, forms[1])
-    turn, least = nearest_quaternion(forms[0], forms[1], 0.0, forms[2], forms[3])
+    constant = 0.0 if is_a1 else g[2]
+    turn, least = nearest_quaternion(forms[0], forms[1], constant, forms[2], forms[3])
     write_turned(r, turn, s)
     for i in range(3):
         q[i] = g[i] - s[i, 0] * c[0] - s[i, 1] * c[1]
+    if not is_a1:
+        q[2] = 0.0
+        return 2.0 + least
     # The second projection removes the rounding of the first.
     for _ in range(2):
         off = s[0, 2] * q[0] + s[1, 2] * q[1] + s[2, 2] * q[2]
@@ -195,48 +212,37 @@ def write_a1_on_plane(
 
 
 @helper
-def write_b4_on_plane(
-    g: FloatArray, r: FloatArray, c: FloatArray, forms: FloatArray, q: FloatArray, s: FloatArray
+def shorten(
+    way: float,
+    shift: float,
+    n: tuple[float, float, float],
+    p: FloatArray,
+    r: FloatArray,
+    q: FloatArray,
+    s: FloatArray,
 ) -> float:
-    """Write the nearest pose with δ3 = 0, as `write_a1_on_plane` does for δ1."""
-    # x is the height of b4 with the centroid where it was.
-    linear = forms[4]
-    for i in range(3):
-        for j in range(3):
-            linear[i, j] = -r[2, i] * c[j]
-    write_form(linear, forms[1])
-    turn, least = nearest_quaternion(forms[0], forms[1], g[2], forms[2], forms[3])
-    write_turned(r, turn, s)
-    for i in range(2):
-        q[i] = g[i] - s[i, 0] * c[0] - s[i, 1] * c[1]
-    q[2] = 0.0
-    return 2.0 + least
-
-
-@helper
-def shorter_shift(
-    way: float, shift: float, nx: float, ny: float, nz: float, p: FloatArray, q: FloatArray
-) -> bool:
-    """Write p less a multiple of n into q if this translation is the shorter displacement.
+    """Write (p − shift n, r) into the pose (q, s) if this is nearer to the pose (p, r).
 
     Distances below the square root of rounding cannot be compared by their squares.
 
     Args:
-        way: Root-mean-square displacement to the pose found so far.
-        shift: Multiple of the unit vector n = (nx, ny, nz).
-        nx: First entry of n.
-        ny: Second entry of n.
-        nz: Third entry of n.
+        way: Root-mean-square displacement from (p, r) to (q, s).
+        shift: Length of the translation along −n.
+        n: Unit vector.
         p: Position of the given pose, shape (3,).
-        q: Output, shape (3,).
+        r: Rotation of the given pose, shape (3, 3).
+        q: Position, shape (3,).
+        s: Rotation, shape (3, 3).
 
     Returns:
-        Whether q was written.
+        The smaller displacement.
     """
     if way <= abs(shift):
-        return False
-    q[0], q[1], q[2] = p[0] - shift * nx, p[1] - shift * ny, p[2] - shift * nz
-    return True
+        return way
+    for i in range(3):
+        q[i] = p[i] - shift * n[i]
+    copy_rotation(r, s)
+    return abs(shift)
 
 
 @helper
@@ -282,8 +288,8 @@ def nearest_rows(
     rotation: FloatArray,
     distance: FloatArray,
     bound: FloatArray,
-    found_position: FloatArray,
-    found_rotation: FloatArray,
+    nearest_position: FloatArray,
+    nearest_rotation: FloatArray,
 ) -> None:
     """Write the three nearest singular poses of each pose.
 
@@ -295,41 +301,35 @@ def nearest_rows(
         rotation: Rotations of the given poses, shape (n, 3, 3).
         distance: Output, shape (n, 3), see `NearestPoses`.
         bound: Output, shape (n, 3).
-        found_position: Output, shape (n, 3, 3).
-        found_rotation: Output, shape (n, 3, 3, 3).
+        nearest_position: Output, shape (n, 3, 3).
+        nearest_rotation: Output, shape (n, 3, 3, 3).
     """
-    forms, boxes, k, g = np.zeros((5, 4, 4)), np.empty((ROOM, 4)), np.empty(10), np.empty(3)
+    forms, boxes, g = np.zeros((5, 4, 4)), np.empty((ROOM, 4)), np.empty(3)
     near_q, near_s = np.empty(3), np.empty((3, 3))
     write_form(scatter, forms[0])
     for row in range(position.shape[0]):
-        p, r, q, s = position[row], rotation[row], found_position[row], found_rotation[row]
+        p, r, q, s = position[row], rotation[row], nearest_position[row], nearest_rotation[row]
         size = math.sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2])
         for i in range(3):
             g[i] = p[i] + r[i, 0] * c[0] + r[i, 1] * c[1]
             distance[row, i] = bound[row, i] = 0.0
             copy_pose(p, r, q[i], s[i])
-        off = r[0, 2] * p[0] + r[1, 2] * p[1] + r[2, 2] * p[2]
-        if abs(off) > ROUNDING * size:
-            square = write_a1_on_plane(g, r, c, forms, q[0], s[0])
-            way = rms_displacement(points, p, r, q[0], s[0])
-            if shorter_shift(way, off, r[0, 2], r[1, 2], r[2, 2], p, q[0]):
-                copy_rotation(r, s[0])
-                way = abs(off)
-            distance[row, 0], bound[row, 0] = way, min(way, math.sqrt(max(0.0, square)))
+        for i in (0, 2):
+            n = (0.0, 0.0, 1.0) if i == 2 else (r[0, 2], r[1, 2], r[2, 2])
+            off = n[0] * p[0] + n[1] * p[1] + n[2] * p[2]
+            if abs(off) > ROUNDING * size:
+                square = write_point_on_plane(i == 0, g, r, c, forms, q[i], s[i])
+                way = rms_displacement(points, p, r, q[i], s[i])
+                way = shorten(way, off, n, p, r, q[i], s[i])
+                distance[row, i], bound[row, i] = way, min(way, math.sqrt(max(0.0, square)))
         across = math.hypot(r[1, 0], r[2, 0])
         off = r[1, 0] * p[2] - r[2, 0] * p[1]
         if across > ROUNDING and abs(off) > ROUNDING * across * size:
-            for i in range(2):
-                k[i] = r[i + 1, 0] * scatter[0, 0] + r[i + 1, 1] * scatter[1, 0]
-                k[i + 2] = r[i + 1, 0] * scatter[0, 1] + r[i + 1, 1] * scatter[1, 1]
-                k[i + 4] = g[i + 1]
-            k[6] = r[0, 0] * scatter[0, 0] + r[0, 1] * scatter[1, 0]
-            k[7] = r[0, 0] * scatter[0, 1] + r[0, 1] * scatter[1, 1]
-            k[8], k[9] = c[1], 2.0
+            k = constants_at(r, g, scatter, c)
             phi, sigma, square = minimise_on_torus(k, boxes)
             write_on_plane(phi, sigma, k, c, g, s[1], q[1])
             way = rms_displacement(points, p, r, q[1], s[1])
-            # As in `shorter_shift`, squares may miss a minimum very close to the given pose.
+            # As in `shorten`, squares may miss a minimum very close to the given pose.
             phi, sigma = angles_at(r)
             phi, sigma = polish(phi, sigma, k)
             write_on_plane(phi, sigma, k, c, g, near_s, near_q)
@@ -337,15 +337,6 @@ def nearest_rows(
             if near_way < way:
                 copy_pose(near_q, near_s, q[1], s[1])
                 way = near_way
-            off /= across
-            if shorter_shift(way, off, 0.0, -r[2, 0] / across, r[1, 0] / across, p, q[1]):
-                copy_rotation(r, s[1])
-                way = abs(off)
+            n = (0.0, -r[2, 0] / across, r[1, 0] / across)
+            way = shorten(way, off / across, n, p, r, q[1], s[1])
             distance[row, 1], bound[row, 1] = way, min(way, math.sqrt(max(0.0, square)))
-        if abs(p[2]) > ROUNDING * size:
-            square = write_b4_on_plane(g, r, c, forms, q[2], s[2])
-            way = rms_displacement(points, p, r, q[2], s[2])
-            if shorter_shift(way, p[2], 0.0, 0.0, 1.0, p, q[2]):
-                copy_rotation(r, s[2])
-                way = abs(p[2])
-            distance[row, 2], bound[row, 2] = way, min(way, math.sqrt(max(0.0, square)))

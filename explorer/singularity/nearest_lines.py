@@ -10,15 +10,15 @@ which is along n, have closed forms. The squared distance that remains is a func
 
 with a and b the components along n of m = R M x̂ and l = R M ŷ (M the scatter of the platform's
 points), γ that of their centroid, a' and b' the derivatives by φ, and h and k the components of
-m and l along the guide. Branch and bound minimises f: on a box of half-sides α and β, f is at
-least the smallest value, over its four corners, of f linearised inside |·| and (·)², which is
-concave, less bounds of the second-order terms.
+m and l along the guide. Branch and bound minimises f: on a box of half-sides α and β, W becomes
+linear and the other terms their tangents, which makes f concave, so that its least value is at one
+of the four corners; that value less bounds of the second-order terms is a lower bound.
 """
 
 from __future__ import annotations
 
 import math
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import helper
@@ -36,51 +36,81 @@ RELATIVE_GAIN, LEAST_GAIN = 1e-9, 1e-14
 EPSILON = 2.0**-52
 
 
-@helper
-def parts_at(
-    phi: float, sigma: float, k: FloatArray
-) -> tuple[float, float, float, float, float, float, float, float, float, float]:
-    """Return a, b, γ, the derivatives a', b', γ' by φ, and sin φ, cos φ, sin σ, cos σ.
+class Constants(NamedTuple):
+    """The constants of f: m, l and the centroid g in base axes, c_y of the centroid, 2 tr M."""
 
-    Args:
-        phi: Angle of the plane about the guide.
-        sigma: Angle of the platform about its line.
-        k: Constants, see `minimise_on_torus`.
-    """
-    cp, sp, cs, ss = math.cos(phi), math.sin(phi), math.cos(sigma), math.sin(sigma)
-    # n = (0, −sin φ, cos φ): at φ = 0 the plane is that of the base.
-    return (
-        -sp * k[0] + cp * k[1],
-        -sp * k[2] + cp * k[3],
-        -sp * k[4] + cp * k[5],
-        -cp * k[0] - sp * k[1],
-        -cp * k[2] - sp * k[3],
-        -cp * k[4] - sp * k[5],
-        sp,
-        cp,
-        ss,
-        cs,
+    m_x: float
+    m_y: float
+    m_z: float
+    l_x: float
+    l_y: float
+    l_z: float
+    g_y: float
+    g_z: float
+    c_y: float
+    twice_trace: float
+
+
+class Terms(NamedTuple):
+    """a, b and γ at φ, their derivatives by φ, and the sines and cosines of φ and σ."""
+
+    a: float
+    b: float
+    g: float
+    da: float
+    db: float
+    dg: float
+    sin_phi: float
+    cos_phi: float
+    sin_sigma: float
+    cos_sigma: float
+
+
+@helper
+def constants_at(r: FloatArray, g: FloatArray, scatter: FloatArray, c: FloatArray) -> Constants:
+    """Return the constants of a rotation, a centroid in the base and the platform's moments."""
+    return Constants(
+        r[0, 0] * scatter[0, 0] + r[0, 1] * scatter[1, 0],
+        r[1, 0] * scatter[0, 0] + r[1, 1] * scatter[1, 0],
+        r[2, 0] * scatter[0, 0] + r[2, 1] * scatter[1, 0],
+        r[0, 0] * scatter[0, 1] + r[0, 1] * scatter[1, 1],
+        r[1, 0] * scatter[0, 1] + r[1, 1] * scatter[1, 1],
+        r[2, 0] * scatter[0, 1] + r[2, 1] * scatter[1, 1],
+        g[1],
+        g[2],
+        c[1],
+        2.0,
     )
 
 
 @helper
-def value_at(phi: float, sigma: float, k: FloatArray) -> float:
-    """Return f(φ, σ), the squared distance."""
-    _, b, g, da, db, _, _, _, ss, cs = parts_at(phi, sigma, k)
-    y = g - k[8] * ss
-    return k[9] - 2.0 * math.hypot(da + k[7] * cs, k[6] - db * cs) - 2.0 * b * ss + y * y
+def terms_at(phi: float, sigma: float, k: Constants) -> Terms:
+    """Return the terms of f at the angles φ of the plane and σ of the platform."""
+    cp, sp, cs, ss = math.cos(phi), math.sin(phi), math.cos(sigma), math.sin(sigma)
+    # n = (0, −sin φ, cos φ): at φ = 0 the plane is that of the base.
+    a, b, g = -sp * k.m_y + cp * k.m_z, -sp * k.l_y + cp * k.l_z, -sp * k.g_y + cp * k.g_z
+    da, db, dg = -cp * k.m_y - sp * k.m_z, -cp * k.l_y - sp * k.l_z, -cp * k.g_y - sp * k.g_z
+    return Terms(a, b, g, da, db, dg, sp, cp, ss, cs)
 
 
 @helper
-def bound_over(phi: float, sigma: float, alpha: float, beta: float, k: FloatArray) -> float:
+def value_at(phi: float, sigma: float, k: Constants) -> float:
+    """Return f(φ, σ), the squared distance."""
+    _, b, g, da, db, _, _, _, ss, cs = terms_at(phi, sigma, k)
+    y = g - k.c_y * ss
+    return k.twice_trace - 2.0 * math.hypot(da + k.l_x * cs, k.m_x - db * cs) - 2.0 * b * ss + y * y
+
+
+@helper
+def bound_over(phi: float, sigma: float, alpha: float, beta: float, k: Constants) -> float:
     """Return a lower bound of f within α of φ and β of σ."""
-    a, b, g, da, db, dg, _, _, ss, cs = parts_at(phi, sigma, k)
-    y = g - k[8] * ss
-    w0, w1 = da + k[7] * cs, k[6] - db * cs
+    a, b, g, da, db, dg, _, _, ss, cs = terms_at(phi, sigma, k)
+    y = g - k.c_y * ss
+    w0, w1 = da + k.l_x * cs, k.m_x - db * cs
     w0_phi, w1_phi = -a * alpha, b * cs * alpha
-    w0_sigma, w1_sigma = -k[7] * ss * beta, db * ss * beta
+    w0_sigma, w1_sigma = -k.l_x * ss * beta, db * ss * beta
     slope_phi = (-2.0 * db * ss + 2.0 * y * dg) * alpha
-    slope_sigma = (-2.0 * b * cs - 2.0 * y * k[8] * cs) * beta
+    slope_sigma = (-2.0 * b * cs - 2.0 * y * k.c_y * cs) * beta
     least = math.inf
     for corner in range(4):
         i = 1.0 if corner & 1 else -1.0
@@ -88,43 +118,43 @@ def bound_over(phi: float, sigma: float, alpha: float, beta: float, k: FloatArra
         long = math.hypot(w0 + i * w0_phi + j * w0_sigma, w1 + i * w1_phi + j * w1_sigma)
         least = min(least, i * slope_phi + j * slope_sigma - 2.0 * long)
     # Second derivatives: of W, of b sin σ, and of γ − c_y sin σ.
-    size_a, size_b = math.hypot(k[0], k[1]), math.hypot(k[2], k[3])
+    size_a, size_b = math.hypot(k.m_y, k.m_z), math.hypot(k.l_y, k.l_z)
     second_w = (
         math.hypot(size_a, size_b) * alpha * alpha
         + 2.0 * size_b * alpha * beta
-        + math.hypot(k[7], size_b) * beta * beta
+        + math.hypot(k.l_x, size_b) * beta * beta
     )
     second_b = size_b * (alpha + beta) * (alpha + beta)
-    second_y = math.hypot(k[4], k[5]) * alpha * alpha + abs(k[8]) * beta * beta
-    return k[9] - 2.0 * b * ss + y * y + least - second_w - second_b - abs(y) * second_y
+    second_y = math.hypot(k.g_y, k.g_z) * alpha * alpha + abs(k.c_y) * beta * beta
+    return k.twice_trace - 2.0 * b * ss + y * y + least - second_w - second_b - abs(y) * second_y
 
 
 @helper
-def polish(phi: float, sigma: float, k: FloatArray) -> Angles:
+def polish(phi: float, sigma: float, k: Constants) -> Angles:
     """Return the angles of the local minimum to which Newton's method descends."""
     value = value_at(phi, sigma, k)
     for _ in range(POLISH_STEPS):
-        a, b, g, da, db, dg, _, _, ss, cs = parts_at(phi, sigma, k)
-        y = g - k[8] * ss
-        w0, w1 = da + k[7] * cs, k[6] - db * cs
+        a, b, g, da, db, dg, _, _, ss, cs = terms_at(phi, sigma, k)
+        y = g - k.c_y * ss
+        w0, w1 = da + k.l_x * cs, k.m_x - db * cs
         w = math.hypot(w0, w1)
         if w == 0.0:
             # On a ridge of f every direction descends.
             phi, sigma = phi + 1e-3, sigma + 1e-3
             value = value_at(phi, sigma, k)
             continue
-        p0, p1, s0, s1 = -a, b * cs, -k[7] * ss, db * ss
+        p0, p1, s0, s1 = -a, b * cs, -k.l_x * ss, db * ss
         along_p, along_s = (w0 * p0 + w1 * p1) / w, (w0 * s0 + w1 * s1) / w
         pp = (p0 * p0 + p1 * p1 - w0 * da + w1 * db * cs - along_p * along_p) / w
         ps = (p0 * s0 + p1 * s1 - w1 * b * ss - along_p * along_s) / w
-        square = s0 * s0 + s1 * s1 - w0 * k[7] * cs + w1 * db * cs
+        square = s0 * s0 + s1 * s1 - w0 * k.l_x * cs + w1 * db * cs
         sss = (square - along_s * along_s) / w
-        y_sigma = -k[8] * cs
+        y_sigma = -k.c_y * cs
         slope_p = -2.0 * along_p - 2.0 * db * ss + 2.0 * y * dg
         slope_s = -2.0 * along_s - 2.0 * b * cs + 2.0 * y * y_sigma
         hpp = -2.0 * pp + 2.0 * b * ss + 2.0 * dg * dg - 2.0 * y * g
         hps = -2.0 * ps - 2.0 * db * cs + 2.0 * dg * y_sigma
-        hss = -2.0 * sss + 2.0 * b * ss + 2.0 * y_sigma * y_sigma + 2.0 * y * k[8] * ss
+        hss = -2.0 * sss + 2.0 * b * ss + 2.0 * y_sigma * y_sigma + 2.0 * y * k.c_y * ss
         # If f is not convex here, raise both eigenvalues of the Hessian above zero.
         middle, half = 0.5 * (hpp + hss), math.hypot(0.5 * (hpp - hss), hps)
         raised = 0.0 if middle - half > 1e-9 * half else half - middle + 1e-3 * half
@@ -139,7 +169,7 @@ def polish(phi: float, sigma: float, k: FloatArray) -> Angles:
         moved = value
         for _ in range(30):
             moved = value_at(phi + share * step_p, sigma + share * step_s, k)
-            if moved <= value + 8.0 * EPSILON * (abs(value) + k[9]):
+            if moved <= value + 8.0 * EPSILON * (abs(value) + k.twice_trace):
                 break
             share *= 0.25
         phi, sigma = phi + share * step_p, sigma + share * step_s
@@ -150,12 +180,11 @@ def polish(phi: float, sigma: float, k: FloatArray) -> Angles:
 
 
 @helper
-def minimise_on_torus(k: FloatArray, boxes: FloatArray) -> tuple[float, float, float]:
+def minimise_on_torus(k: Constants, boxes: FloatArray) -> tuple[float, float, float]:
     """Return the angles φ and σ of the minimum of f, and a lower bound of f.
 
     Args:
-        k: Constants m_y, m_z, l_y, l_z, g_y, g_z, m_x, l_x, c_y and 2 tr M, shape (10,); m, l
-            and the centroid g in the base frame, the centroid c in the platform frame.
+        k: Constants of f.
         boxes: Working space, shape (ROOM, 4).
     """
     alpha, beta = 0.5 * math.pi / FIRST_PHI, math.pi / FIRST_SIGMA
@@ -172,10 +201,10 @@ def minimise_on_torus(k: FloatArray, boxes: FloatArray) -> tuple[float, float, f
     phi, sigma = polish(phi, sigma, k)
     best = value_at(phi, sigma, k)
     bound, first = math.inf, 0
-    # The second-order terms grow with these, so boxes are longer in the direction of the less.
-    size_b = math.hypot(k[2], k[3])
-    bend_phi = math.hypot(math.hypot(k[0], k[1]), size_b) + k[4] * k[4] + k[5] * k[5]
-    bend_sigma = math.hypot(k[7], size_b) + k[8] * k[8]
+    # Rates of the second-order terms: a box is halved along the angle whose term is larger.
+    size_b = math.hypot(k.l_y, k.l_z)
+    bend_phi = math.hypot(math.hypot(k.m_y, k.m_z), size_b) + k.g_y * k.g_y + k.g_z * k.g_z
+    bend_sigma = math.hypot(k.l_x, size_b) + k.c_y * k.c_y
     # Large boxes precede small ones, so that the boxes left at the end have similar bounds.
     while first < last:
         p, s, alpha, beta = boxes[first]
@@ -187,7 +216,7 @@ def minimise_on_torus(k: FloatArray, boxes: FloatArray) -> tuple[float, float, f
             value = value_at(p_down, s_down, k)
             if value < best:
                 best, phi, sigma = value, p_down, s_down
-        enough = best - RELATIVE_GAIN * abs(best) - LEAST_GAIN * k[9]
+        enough = best - RELATIVE_GAIN * abs(best) - LEAST_GAIN * k.twice_trace
         if low >= enough or last + 2 > ROOM:
             bound = min(bound, low)
             continue
@@ -208,7 +237,7 @@ def minimise_on_torus(k: FloatArray, boxes: FloatArray) -> tuple[float, float, f
 def write_on_plane(
     phi: float,
     sigma: float,
-    k: FloatArray,
+    k: Constants,
     centroid: FloatArray,
     g: FloatArray,
     rotation: FloatArray,
@@ -219,14 +248,14 @@ def write_on_plane(
     Args:
         phi: Angle of the plane about the guide.
         sigma: Angle of the platform about its line.
-        k: Constants, see `minimise_on_torus`.
+        k: Constants of f.
         centroid: Centroid of the points in the platform frame, shape (3,).
         g: Centroid of the points of the given pose in the base frame, shape (3,).
         rotation: Output, shape (3, 3).
         position: Output, shape (3,).
     """
-    _, _, _, da, db, _, sp, cp, ss, cs = parts_at(phi, sigma, k)
-    w0, w1 = da + k[7] * cs, k[6] - db * cs
+    _, _, _, da, db, _, sp, cp, ss, cs = terms_at(phi, sigma, k)
+    w0, w1 = da + k.l_x * cs, k.m_x - db * cs
     w = math.hypot(w0, w1)
     if w > 0.0:
         w0, w1 = w0 / w, w1 / w

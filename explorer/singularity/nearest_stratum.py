@@ -31,8 +31,8 @@ from explorer.singularity.strata import STRATA, stratum
 # Arrays of real numbers, or of complex ones for derivatives.
 Array: TypeAlias = NDArray[Any]
 
-GRID = 12
-STEPS = 40
+# Number of grid angles in a turn, and largest number of Newton steps.
+GRID, STEPS = 12, 40
 COMPLEX_STEP, HESSIAN_STEP = 1e-40, 1e-5
 
 
@@ -41,8 +41,8 @@ class NearestInStratum:
     """The nearest pose in the closure of a stratum.
 
     Attributes:
-        stratum: Stratum that was asked for.
-        seen: Stratum of the nearest pose: that one, or one in its closure.
+        stratum: Requested stratum.
+        seen: Stratum of the nearest pose, which is the requested one or lies in its closure.
         distance: Root-mean-square displacement of b1 to b4, in design units.
         pose: The nearest pose.
     """
@@ -61,8 +61,8 @@ class _Closure:
         axes: Base axes; the rotation is the product of turns about them in this order.
         flips: Axes of half turns, one of which multiplies the rotation on the right; "" for
             none.
-        place: Set of positions of b4: the line "u" (b2b3), "guide" or "node" (of both planes)
-            through a1, the plane "platform" or "base" through a1, or "a1".
+        place: Set of positions of b4: a line through a1, which is "u" (b2b3), "guide" or "node"
+            (where the planes intersect), the plane "platform" or "base" through a1, or "a1".
     """
 
     axes: str
@@ -109,7 +109,7 @@ def nearest_in_stratum(design: Design, pose: Pose, asked: Stratum) -> NearestInS
     Args:
         design: The manipulator.
         pose: Pose of its platform.
-        asked: Stratum, a permutation of (1, 2, 3, 4).
+        asked: Requested stratum, a permutation of (1, 2, 3, 4).
 
     Raises:
         InputError: There is no such stratum.
@@ -129,7 +129,7 @@ def nearest_in_stratum(design: Design, pose: Pose, asked: Stratum) -> NearestInS
             displacement(design, pose.position, pose.rotation, nearest.position, nearest.rotation)
         )
     seen = seen_stratum(design, nearest)
-    # At the tolerance of incidences a pose may lack one that its other incidences imply.
+    # Within the tolerance of incidences a pose may lack one that its other incidences imply.
     return NearestInStratum(w, seen if is_below(seen, w) else w, distance, nearest)
 
 
@@ -152,14 +152,14 @@ class _Problem:
         flip: One of its half turns as a rotation, shape (3, 3).
         centroid: Centroid of the points in the platform frame, shape (3,).
         goal: Centroid of the points of the given pose in the base frame, shape (3,).
-        turned: Product R M of the given rotation and the scatter, shape (3, 3).
+        rotated_scatter: Product R M of the given rotation and the scatter, shape (3, 3).
     """
 
     closure: _Closure
     flip: FloatArray
     centroid: FloatArray
     goal: FloatArray
-    turned: FloatArray
+    rotated_scatter: FloatArray
 
     def rotation(self, angles: Array) -> Array:
         """Return rotations (..., 3, 3) of angles (..., d)."""
@@ -191,7 +191,8 @@ class _Problem:
         position = self.position(angles, rotation)
         off = self.goal - rotation @ self.centroid - position
         # Without absolute values the function extends to complex angles.
-        return 2.0 - 2.0 * (rotation * self.turned).sum(axis=(-2, -1)) + (off * off).sum(axis=-1)
+        trace = (rotation * self.rotated_scatter).sum(axis=(-2, -1))
+        return 2.0 - 2.0 * trace + (off * off).sum(axis=-1)
 
     def slope(self, angles: FloatArray) -> FloatArray:
         """Return the gradient (..., d) at angles (..., d), accurate to rounding."""
@@ -213,10 +214,10 @@ class _Problem:
             behind = self.slope(angles[:, None, :] - offsets)
             hessian = (ahead - behind) / (2.0 * HESSIAN_STEP)
             hessian = 0.5 * (hessian + np.swapaxes(hessian, -1, -2))
-            bends, axes = np.linalg.eigh(hessian)
+            curvatures, axes = np.linalg.eigh(hessian)
             # The step descends even if the value is not convex, and is short if it is flat.
-            bends = np.maximum(np.abs(bends), 1e-9) + damping[:, None]
-            along = (np.swapaxes(axes, -1, -2) @ slope[..., None])[..., 0] / bends
+            curvatures = np.maximum(np.abs(curvatures), 1e-9) + damping[:, None]
+            along = (np.swapaxes(axes, -1, -2) @ slope[..., None])[..., 0] / curvatures
             step = -(axes @ along[..., None])[..., 0]
             step *= np.minimum(1.0, 0.5 / np.maximum(np.abs(step).max(axis=-1), 1e-300))[:, None]
             moved = self.value(angles + step)
@@ -252,11 +253,11 @@ def _nearest(design: Design, pose: Pose, closure: _Closure) -> Pose:
     unit, rotation = platform.length, pose.rotation
     centroid = platform.centroid / unit
     goal = np.array(pose.position) / unit + rotation @ centroid
-    turned = rotation @ platform.scatter / unit**2
+    rotated_scatter = rotation @ platform.scatter / unit**2
     best, nearest = math.inf, pose
     for flip in closure.flips:
         half_turn = _turn(flip, np.array(math.pi)) if flip else np.eye(3)
-        problem = _Problem(closure, half_turn, centroid, goal, turned)
+        problem = _Problem(closure, half_turn, centroid, goal, rotated_scatter)
         value, angles = problem.minimise()
         if value < best:
             turn = problem.rotation(angles)

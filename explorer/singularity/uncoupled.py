@@ -21,7 +21,7 @@ from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 
-# Rate per unit of translation up to which a change of a margin is rounding.
+# Change of a margin per unit of translation up to which it is rounding.
 NO_RATE = 1e-12
 # Longest travel over the distance of b4 from a1; a longer one counts as infinite.
 FARTHEST = 1e6
@@ -88,11 +88,6 @@ class UncoupledMotion:
             return Pose((x, y, z), pose.quaternion)
         return Pose.of(*_turned(self, pose, amount))
 
-    def rate(self, pose: Pose) -> float:
-        """Return the derivative of the margin by the amount, in design units per unit or radian."""
-        ((_, rate),) = _margins_and_rates(pose, (self,))
-        return rate
-
     def travel(self, pose: Pose) -> Travel:
         """Return the travel until the margin is zero, backwards and forwards.
 
@@ -118,11 +113,14 @@ def travels(pose: Pose) -> tuple[Travel, ...]:
 
 
 def _travels(pose: Pose, motions: tuple[UncoupledMotion, ...]) -> tuple[Travel, ...]:
-    margins_and_rates = _margins_and_rates(pose, motions)
+    poses = [_pose_of_rate(motion, pose) for motion in motions]
+    positions = [np.array(pose.position), *(position for position, _ in poses)]
+    rotations = [pose.rotation, *(rotation for _, rotation in poses)]
+    here, *rates = margins(np.stack(positions), np.stack(rotations)).tolist()
     farthest = FARTHEST * math.hypot(*pose.position)
     return tuple(
-        _travel(motion.kind, margin, rate, farthest)
-        for motion, (margin, rate) in zip(motions, margins_and_rates, strict=True)
+        _travel(motion.kind, here[motion.incidence - 1], rate[motion.incidence - 1], farthest)
+        for motion, rate in zip(motions, rates, strict=True)
     )
 
 
@@ -140,22 +138,8 @@ def _travel(
     return Travel(end, math.inf) if end < 0.0 else Travel(-math.inf, end)
 
 
-def _margins_and_rates(
-    pose: Pose, motions: tuple[UncoupledMotion, ...]
-) -> list[tuple[float, float]]:
-    """Return, for each motion, the margin that it changes and the rate of that margin."""
-    poses = [_pose_of_rate(motion, pose) for motion in motions]
-    positions = [np.array(pose.position), *(position for position, _ in poses)]
-    rotations = [pose.rotation, *(rotation for _, rotation in poses)]
-    here, *rates = margins(np.stack(positions), np.stack(rotations)).tolist()
-    return [
-        (here[motion.incidence - 1], rate[motion.incidence - 1])
-        for motion, rate in zip(motions, rates, strict=True)
-    ]
-
-
 def _pose_of_rate(motion: UncoupledMotion, pose: Pose) -> tuple[FloatArray, FloatArray]:
-    """Return a position and rotation at which the margin equals the rate at a pose."""
+    """Return a position and rotation at which the margin equals its derivative at a pose."""
     # Along the axis every change is linear; a quarter turn about it makes δ equal to δ'.
     if motion.kind == "rotation":
         return _turned(motion, pose, 0.5 * math.pi)

@@ -1,4 +1,4 @@
-"""The processes of a Dask cluster, as the same kind of executor. Needs the extra `cluster`.
+"""The workers of a Dask cluster as an executor. Needs the extra `cluster`.
 
 Every worker needs this very version of the explorer; rows of other versions are refused.
 """
@@ -24,20 +24,20 @@ Result = TypeVar("Result")
 
 SCHEMES = ("tcp", "tls", "ws", "wss")
 
-# A task costs scheduler, worker and client some 8 ms between them.
+# Shortest duration of a task that repays its 8 ms of scheduler, worker and client, in seconds.
 TASK_SECONDS = 0.4
-# Workers come and go; they are counted this often.
+# Seconds between two counts of the workers, which come and go.
 COUNT_SECONDS = 1.0
 # Seconds to wait for a scheduler that may not be there.
-PATIENCE = 5.0
+PATIENCE = 15.0
 
 
 class DaskWorkers(Workers):
     """The workers of a Dask scheduler.
 
     Args:
-        address: Of the scheduler, such as tcp://10.0.0.1:8786.
-        patience: Seconds to wait for it; `PATIENCE` if None.
+        address: Address of the scheduler, such as tcp://10.0.0.1:8786.
+        patience: Seconds to wait for the scheduler; `PATIENCE` if None.
 
     Raises:
         InputError: there is no scheduler at that address.
@@ -48,35 +48,34 @@ class DaskWorkers(Workers):
 
     def __init__(self, address: str, *, patience: float | None = None) -> None:
         distributed = _distributed()
-        waits = PATIENCE if patience is None else patience
-        _check(address)
+        timeout = PATIENCE if patience is None else patience
+        _check_address(address)
         with contextlib.ExitStack() as quiet:
             quiet.enter_context(_silence())
             try:
-                _greet(distributed, address, waits)
+                _try_connection(distributed, address, timeout)
                 self._client: Any = distributed.Client(
-                    address, timeout=waits, set_as_default=False, name="explorer"
+                    address, timeout=timeout, set_as_default=False, name="explorer"
                 )
-            except Exception as error:  # noqa: BLE001 - Dask stumbles anywhere over other tongues
+            except Exception as error:  # noqa: BLE001 - other protocols make Dask raise anything
                 raise InputError(
-                    f"no Dask scheduler answers at {address} within {waits:g} s "
+                    f"no Dask scheduler answers at {address} within {timeout:g} s "
                     f"({type(error).__name__}): start one with dask scheduler, and workers with "
                     f"dask worker {address}"
                 ) from None
             # A scheduler may be lost at any time.
             self._quiet = quiet.pop_all()
-        # A task is a function of what it is given, but one whose worker died is tried again.
+        # A task whose worker died must be computed again, although its arguments are the same.
         self._executor: Executor = self._client.get_executor(pure=False)
         self._size, self._counted = 1, -math.inf
         self.died = (distributed.scheduler.KilledWorker,)
 
     @property
     def size(self) -> int:
-        """How many threads the workers have; at least one, and known anew every second or so."""
+        """Number of threads of the workers, at least one; counted again every second."""
         now = time.monotonic()
         if now - self._counted > COUNT_SECONDS:
-            # It asks the scheduler, and whoever hands out tasks asks often. That it is gone, the
-            # tasks tell.
+            # The count is a request to the scheduler. Without a scheduler the tasks fail.
             with contextlib.suppress(OSError, TimeoutError):
                 self._size = max(1, self.threads)
             self._counted = now
@@ -84,54 +83,54 @@ class DaskWorkers(Workers):
 
     @property
     def threads(self) -> int:
-        """How many threads the workers have now; none as long as no worker has come."""
+        """Number of threads of the workers now; 0 before the first worker comes."""
         return sum(self._client.nthreads().values())
 
     def submit(
         self, fn: Callable[Arguments, Result], /, *args: Arguments.args, **kwargs: Arguments.kwargs
     ) -> Future[Result]:
-        """Have a function called by one of the workers, see `concurrent.futures.Executor`."""
+        """Call a function in one of the workers, see `concurrent.futures.Executor`."""
         return self._executor.submit(fn, *args, **kwargs)
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """Leave the scheduler; it and its workers stay.
 
         Args:
-            wait: Until tasks have ended.
-            cancel_futures: Drop all tasks.
+            wait: Whether to wait until tasks have ended.
+            cancel_futures: Whether to drop all tasks.
         """
         with self._quiet:
             self._executor.shutdown(wait=wait and not cancel_futures)
-            # A scheduler that is gone needs no farewell.
+            # The scheduler may be gone.
             with contextlib.suppress(OSError, TimeoutError):
                 self._client.close()
 
 
-def _check(address: str) -> None:
-    """Raise an `InputError` for what is no address of a scheduler."""
+def _check_address(address: str) -> None:
+    """Raise an `InputError` unless a text is the address of a scheduler."""
     try:
         parts = urlsplit(address)
-        is_one = parts.scheme in SCHEMES and bool(parts.hostname) and bool(parts.port)
+        is_address = parts.scheme in SCHEMES and bool(parts.hostname) and bool(parts.port)
     except ValueError:
-        is_one = False
-    if not is_one:
+        is_address = False
+    if not is_address:
         raise InputError(
             f"a scheduler has an address such as tcp://10.0.0.1:8786, with its host and its port; "
             f"got {address!r}"
         )
 
 
-def _greet(distributed: Any, address: str, waits: float) -> None:
-    """Connect and leave again: Dask's client waits for ever where nobody returns its greeting."""
+def _try_connection(distributed: Any, address: str, timeout: float) -> None:
+    """Connect once: Dask's client waits for ever where nothing answers its handshake."""
     options = distributed.security.Security().get_connection_args("client")
 
-    async def greet() -> None:
-        connection = distributed.comm.connect(address, timeout=waits, **options)
-        (await asyncio.wait_for(connection, waits)).abort()
+    async def connect_once() -> None:
+        connection = distributed.comm.connect(address, timeout=timeout, **options)
+        (await asyncio.wait_for(connection, timeout)).abort()
 
     # A notebook runs a loop of its own in this thread.
     with ThreadPoolExecutor(1) as thread:
-        thread.submit(asyncio.run, greet()).result()
+        thread.submit(asyncio.run, connect_once()).result()
 
 
 def _distributed() -> Any:
@@ -146,13 +145,13 @@ def _distributed() -> Any:
 
 @contextlib.contextmanager
 def _silence() -> Generator[None]:
-    """Keep what Dask logs of lost connections off the terminal: we tell it in one line."""
+    """Keep Dask's log of lost connections off the terminal, where one line is written instead."""
     loggers = [logging.getLogger(name) for name in ("distributed", "distributed.client")]
-    kept = [logger.level for logger in loggers]
+    levels = [logger.level for logger in loggers]
     for logger in loggers:
         logger.setLevel(logging.CRITICAL)
     try:
         yield
     finally:
-        for logger, level in zip(loggers, kept, strict=True):
+        for logger, level in zip(loggers, levels, strict=True):
             logger.setLevel(level)

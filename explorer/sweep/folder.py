@@ -1,4 +1,4 @@
-"""A results folder while a study is computed in it: nobody else's, and of no other study."""
+"""The lock and the checks of a results folder while a study is computed in it."""
 
 from __future__ import annotations
 
@@ -10,33 +10,24 @@ from filelock import FileLock, Timeout
 
 from explorer.errors import InputError
 from explorer.files.writing import make_folder, storage_error
-from explorer.sweep.parts import BadPartError, part_paths, read_part
+from explorer.sweep.parts import BadPartError, part_paths, read_part, words_of_paths
 from explorer.sweep.study import Study, study_hash
 
 LOCK_FILE = ".lock"
-"""In a results folder; readers of Parquet folders pass over it."""
+"""Name of the lock in a results folder; readers of Parquet folders ignore it."""
 
 
 @contextlib.contextmanager
-def claimed(folder: Path, study: Study) -> Generator[None]:
-    """Keep a folder for a study and other processes from it meanwhile; make it if need be.
+def claim(folder: Path, study: Study) -> Generator[None]:
+    """Make a folder if needed, and lock it for a study within a `with` block.
 
     Raises:
-        InputError: it belongs to another study, or is in use.
-        StorageError: it cannot be made, or not be read.
+        InputError: the folder belongs to another study, or is in use.
+        StorageError: the folder cannot be made or read.
     """
     make_folder(folder)
-    # Nothing is left, not even a lock, in a folder of somebody else's.
-    _check(folder, study)
-    with _locked(folder):
-        _check(folder, study)
-        _clear(folder)
-        yield
-
-
-@contextlib.contextmanager
-def _locked(folder: Path) -> Generator[None]:
-    """Keep other processes from the folder meanwhile."""
+    # A folder of other files is left alone: not even a lock goes into it.
+    _check_owner(folder, study)
     lock = FileLock(folder / LOCK_FILE, timeout=0)
     try:
         lock.acquire()
@@ -47,13 +38,18 @@ def _locked(folder: Path) -> Generator[None]:
     except OSError as error:
         raise InputError(f"cannot lock {str(folder)!r}: {error.strerror}") from None
     try:
+        _check_owner(folder, study)
+        for path in folder.iterdir():
+            # A killed process was writing it.
+            if _is_scratch(path) and path.name != LOCK_FILE:
+                path.unlink(missing_ok=True)
         yield
     finally:
         lock.release()
 
 
-def _check(folder: Path, study: Study) -> None:
-    """See that a folder is this study's, or empty."""
+def _check_owner(folder: Path, study: Study) -> None:
+    """Raise an `InputError` unless a folder is this study's, or empty."""
     parts = part_paths(folder)
     for path in parts:
         with contextlib.suppress(BadPartError):
@@ -65,27 +61,19 @@ def _check(folder: Path, study: Study) -> None:
             break
     else:
         if parts:
-            more = f" and {len(parts) - 1} more" if len(parts) > 1 else ""
             raise InputError(
                 f"{str(folder)!r} is not empty, and holds no results of a study that can be read: "
-                f"{parts[0].name}{more} cannot be, and may be of any study; move what cannot be "
-                "read away, and the same command computes it again"
+                f"{words_of_paths(parts)} cannot be read and may belong to any study; move such "
+                "files away, and the same command computes them again"
             )
         try:
-            is_used = any(not _is_scratch(each) for each in folder.iterdir())
+            is_used = any(not _is_scratch(path) for path in folder.iterdir())
         except OSError as error:
             raise storage_error("read", folder, error) from None
         if is_used:
             raise InputError(
                 f"{str(folder)!r} is not empty, and holds no results of a study: use another folder"
             )
-
-
-def _clear(folder: Path) -> None:
-    """Remove what a killed process was writing."""
-    for path in folder.iterdir():
-        if _is_scratch(path) and path.name != LOCK_FILE:
-            path.unlink(missing_ok=True)
 
 
 def _is_scratch(path: Path) -> bool:

@@ -1,4 +1,4 @@
-"""Pareto fronts: the designs than which no other is better in one respect and worse in none."""
+"""Pareto fronts: designs that no other beats in one objective without being worse in another."""
 
 from __future__ import annotations
 
@@ -12,39 +12,35 @@ from explorer.sweep.study import Objective
 
 
 def costs(columns: Mapping[str, Any], objectives: Sequence[Objective]) -> FloatArray:
-    """Return what is to be small of each row, shape (n, m).
+    """Return the objectives of each row with such signs that less is better, shape (n, m).
 
     Args:
-        columns: By name, shape (n,) each.
-        objectives: m of them.
+        columns: Columns by name, shape (n,) each.
+        objectives: The m objectives.
     """
-    signs = {"min": 1.0, "max": -1.0}
-    return np.column_stack(
-        [
-            signs[each.sense] * np.asarray(columns[each.measure], dtype=np.float64)
-            for each in objectives
-        ]
-    )
+    signs = [1.0 if objective.sense == "min" else -1.0 for objective in objectives]
+    values = [np.asarray(columns[objective.measure], np.float64) for objective in objectives]
+    return np.column_stack(values) * signs
 
 
 def front(columns: Mapping[str, Any], objectives: Sequence[Objective]) -> BoolArray:
     """Return which rows are on the Pareto front, shape (n,).
 
-    Only rows that are done and have all objectives can be. Of equal rows all are.
+    Only rows that are done and have all objectives can be on it; equal rows are on it together.
 
     Args:
-        columns: By name, shape (n,) each, with the status among them.
-        objectives: At least one.
+        columns: Columns by name, shape (n,) each, with the status among them.
+        objectives: At least one objective.
     """
     cost = costs(columns, objectives)
     rows = np.flatnonzero(_is_done(columns) & np.isfinite(cost).all(axis=1))
-    found = np.zeros(len(cost), dtype=np.bool_)
-    found[rows[undominated(cost[rows])]] = True
-    return found
+    is_best = np.zeros(len(cost), dtype=np.bool_)
+    is_best[rows[undominated(cost[rows])]] = True
+    return is_best
 
 
 def incomparable(columns: Mapping[str, Any], objectives: Sequence[Objective]) -> BoolArray:
-    """Return which rows are done and lack an objective, so that no front has them; see `front`."""
+    """Return which rows are done but lack an objective, so that no front has them; see `front`."""
     return _is_done(columns) & ~np.isfinite(costs(columns, objectives)).all(axis=1)
 
 
@@ -57,13 +53,13 @@ def undominated(cost: FloatArray) -> IntArray:
 
     A row dominates another if it is no larger anywhere and smaller somewhere.
     """
-    # A row is dominated only by such as come before it in this order.
+    # In this order a row is dominated only by rows before it.
     order = np.lexsort(cost.T[::-1])
-    left = cost[order]
+    remaining = cost[order]
     done = 0
-    while done < len(left):
-        best = left[done]
-        beaten = (left >= best).all(axis=1) & (left > best).any(axis=1)
-        order, left = order[~beaten], left[~beaten]
+    while done < len(remaining):
+        best = remaining[done]
+        beaten = (remaining >= best).all(axis=1) & (remaining > best).any(axis=1)
+        order, remaining = order[~beaten], remaining[~beaten]
         done += 1
     return np.sort(order)

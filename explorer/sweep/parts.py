@@ -1,8 +1,8 @@
-"""Results of a study as Parquet: a part for each chunk, written whole or not at all.
+"""Parts of a study's results: a Parquet file for each chunk, written whole or not at all.
 
-The bytes of a part are a function of the study, its chunk and the versions of the
-libraries: it holds no time and no place. Each carries its study, the study's hash, the seed,
-the chunk and the versions in its metadata. Needs the extra `study`.
+The bytes of a part are a function of the study, its chunk and the versions of the libraries,
+without times and paths. Its metadata hold the study, the study's hash, the seed, the chunk and the
+versions. Needs the extra `study`.
 """
 
 from __future__ import annotations
@@ -18,13 +18,15 @@ from typing import Any
 
 from explorer.errors import InputError, MissingExtraError
 from explorer.files.writing import storage_error, write_whole
-from explorer.sweep.rows import Kind, Rows, columns_of
+from explorer.sweep.rows import Kind, Rows, columns_of, one_line
 from explorer.sweep.study import Study, decode_study, encode_study, study_hash
 
 SUFFIX = ".parquet"
 
 _STUDY, _HASH, _SEED = b"explorer.study", b"explorer.study_hash", b"explorer.seed"
-_CHUNK, _VERSIONS = b"explorer.chunk", b"explorer.files.versions"
+_CHUNK, _VERSIONS = b"explorer.chunk", b"explorer.versions"
+# The key of the versions in parts that were written for some time.
+_OTHER_VERSIONS = b"explorer.files.versions"
 
 
 class BadPartError(InputError):
@@ -33,13 +35,13 @@ class BadPartError(InputError):
 
 @dataclass(frozen=True)
 class Part:
-    """What a part says of itself.
+    """Metadata of a part.
 
     Attributes:
-        study: The encoded study.
-        study_hash: Of it.
-        chunk: Its number.
-        versions: Of the libraries that computed it.
+        study: Encoded study.
+        study_hash: Hash of the study.
+        chunk: Number of the chunk.
+        versions: Versions of the libraries that computed the part.
     """
 
     study: bytes
@@ -54,49 +56,54 @@ def part_path(folder: Path, chunk: int) -> Path:
 
 
 def part_paths(folder: Path) -> list[Path]:
-    """Return the files in a folder that are named as parts are, in the order of their chunks."""
+    """Return the files in a folder with names of parts, in the order of their chunks."""
     return [path for _, path in _numbered(folder)]
 
 
 def stray_paths(folder: Path, study: Study) -> list[Path]:
-    """Return the Parquet files in a folder that are named after no chunk of a study.
+    """Return the Parquet files in a folder that have the name of no part of a study.
 
-    Copies of parts, for instance: what reads all Parquet of a folder reads their rows twice.
+    A program that reads all Parquet of a folder reads the rows of a copied part twice.
     """
     own = {path for chunk, path in _numbered(folder) if chunk < study.chunks}
     return sorted(set(_visible(folder)) - own)
 
 
 def _numbered(folder: Path) -> list[tuple[int, Path]]:
-    """Return chunks and the files that have the very names of their parts, in order."""
-    found: list[tuple[int, Path]] = []
+    """Return the chunks and the files that have exactly the names of their parts, in order."""
+    parts: list[tuple[int, Path]] = []
     for path in _visible(folder):
         number = path.stem.removeprefix("part-")
         if number.isascii() and number.isdigit() and path == part_path(folder, int(number)):
-            found.append((int(number), path))
-    return sorted(found)
+            parts.append((int(number), path))
+    return sorted(parts)
+
+
+def words_of_paths(paths: Sequence[Path]) -> str:
+    """Return the name of the first file and the number of the others."""
+    return paths[0].name + (f" and {len(paths) - 1} more" if len(paths) > 1 else "")
 
 
 def _visible(folder: Path) -> list[Path]:
     try:
-        found = list(folder.glob(f"*{SUFFIX}"))
+        paths = list(folder.glob(f"*{SUFFIX}"))
     except OSError as error:
         raise storage_error("read", folder, error) from None
-    # Readers of Parquet folders pass over the others.
-    return [path for path in found if not path.name.startswith((".", "_"))]
+    # Readers of Parquet folders ignore the others.
+    return [path for path in paths if not path.name.startswith((".", "_"))]
 
 
 def write_part(folder: Path, study: Study, chunk: int, pieces: Sequence[Rows]) -> None:
     """Write the part of a chunk.
 
     Args:
-        folder: To write it to.
+        folder: Results folder.
         study: The study.
-        chunk: Its number.
-        pieces: Its rows, in order and without gaps.
+        chunk: Number of the chunk.
+        pieces: Rows of the chunk, in order and without gaps.
 
     Raises:
-        StorageError: it cannot be written; what was there before is unchanged.
+        StorageError: the part cannot be written; a part that was there is unchanged.
         MissingExtraError: pyarrow is not installed.
     """
     arrow, parquet = pyarrow(), _parquet()
@@ -120,42 +127,43 @@ def write_part(folder: Path, study: Study, chunk: int, pieces: Sequence[Rows]) -
 
 
 def read_part(path: Path, columns: Sequence[str] | None = None) -> tuple[Part, Any]:
-    """Return what a part says of itself, and its table.
+    """Return the metadata and the table of a part.
 
     Args:
-        path: Of the part.
-        columns: To read; None for all.
+        path: File of the part.
+        columns: Columns to read; None for all.
 
     Raises:
-        BadPartError: it is damaged or cut off, or no part of a study.
+        BadPartError: the file is damaged or cut off, or no part of a study.
         MissingExtraError: pyarrow is not installed.
     """
     arrow, parquet = pyarrow(), _parquet()
     try:
         file = parquet.ParquetFile(path, page_checksum_verification=True)
         with file:
-            part = _told(file.schema_arrow.metadata or {}, file.metadata.metadata or {})
+            part = _checked_metadata(file.schema_arrow.metadata or {}, file.metadata.metadata or {})
             return part, file.read(columns=None if columns is None else list(columns))
     except (arrow.ArrowException, OSError, ValueError, KeyError) as error:
-        raise BadPartError(f"{path} is no part of a study: {_line(error)}") from None
+        raise BadPartError(f"{path} is no part of a study: {one_line(error)}") from None
 
 
-def _told(metadata: Mapping[bytes, bytes], again: Mapping[bytes, bytes]) -> Part:
-    """Return what a part says of itself, twice and without a checksum.
+def _checked_metadata(metadata: Mapping[bytes, bytes], copy: Mapping[bytes, bytes]) -> Part:
+    """Return the metadata of a part; it holds two copies of them, without a checksum.
 
     Raises:
-        KeyError: it says nothing.
-        ValueError: it is damaged.
+        KeyError: a value is missing.
+        ValueError: the metadata are damaged.
     """
-    names = (_STUDY, _HASH, _SEED, _CHUNK, _VERSIONS)
+    versions = _OTHER_VERSIONS if _OTHER_VERSIONS in metadata else _VERSIONS
+    names = (_STUDY, _HASH, _SEED, _CHUNK, versions)
     part = Part(
         study=metadata[_STUDY],
         study_hash=metadata[_HASH].decode(),
         chunk=int(metadata[_CHUNK]),
-        versions=json.loads(metadata[_VERSIONS]),
+        versions=json.loads(metadata[versions]),
     )
     if (
-        any(metadata[name] != again[name] for name in names)
+        any(metadata[name] != copy[name] for name in names)
         or hashlib.sha256(part.study).hexdigest() != part.study_hash
     ):
         raise ValueError("its metadata is damaged")
@@ -165,22 +173,21 @@ def _told(metadata: Mapping[bytes, bytes], again: Mapping[bytes, bytes]) -> Part
 def sound_parts(
     folder: Path, damaged: list[Path], study: Study | None = None
 ) -> Iterator[tuple[Study, int, Any]]:
-    """Yield the study, the chunk and the table of each part in a folder that counts.
+    """Yield the study, the chunk and the table of each sound part in a folder.
 
-    It is read whole, since each column has checksums of its own; and it must hold the rows of
-    the chunk that it is named after. Whoever reads results and whoever goes on with them must
-    see the same parts.
+    Each part is read whole, since each column has checksums of its own, and must hold the rows of
+    the chunk in its file name. Reading results and continuing a run see the same parts.
 
     Args:
-        folder: Of the results.
-        damaged: Takes the parts that do not count; a run computes them again.
-        study: That they must be of; that of the first one if None.
+        folder: Results folder.
+        damaged: List that damaged parts are added to; a run computes them again.
+        study: Study of all parts; that of the first one if None.
 
     Raises:
         InputError: a part is of another study.
         MissingExtraError: pyarrow is not installed.
     """
-    known = None if study is None else study_hash(study)
+    known_hash = None if study is None else study_hash(study)
     for chunk, path in _numbered(folder):
         try:
             part, table = read_part(path)
@@ -188,9 +195,9 @@ def sound_parts(
             if study is None or chunk < study.chunks:
                 damaged.append(path)
             continue
-        if study is None or known is None:
-            study, known = decode_study(part.study, str(path)), part.study_hash
-        if part.study_hash != known:
+        if study is None or known_hash is None:
+            study, known_hash = decode_study(part.study, str(path)), part.study_hash
+        if part.study_hash != known_hash:
             raise InputError(
                 f"{folder} holds results of several studies: {path.name} is a part of another "
                 "study; move it away"
@@ -241,7 +248,3 @@ def _type(kind: Kind) -> Any:
         "flag": arrow.bool_(),
         "text": arrow.string(),
     }[kind]
-
-
-def _line(error: Exception) -> str:
-    return " ".join(str(error).split()) or type(error).__name__

@@ -1,4 +1,4 @@
-"""The results of a study: a folder of parts, read whole into columns or part by part."""
+"""Results of a study: a folder of parts, read whole into columns or part by part."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from explorer.errors import InputError
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import BoolArray
 from explorer.sweep.front import costs, front, incomparable, undominated
-from explorer.sweep.parts import sound_parts, stray_paths
+from explorer.sweep.parts import sound_parts, stray_paths, words_of_paths
 from explorer.sweep.rows import Value, columns_of, design_of
 from explorer.sweep.study import Study
 
@@ -24,12 +24,12 @@ Column = NDArray[Any]
 
 @dataclass(frozen=True)
 class Results:
-    """What is known of the designs of a study so far.
+    """The rows of a study so far.
 
     Attributes:
         study: The study.
-        columns: By name, in the order of the files, shape (n,) each: numbers as float64 with
-            NaN where there is none, "index" as int64, "status" and "reason" as str objects.
+        columns: Columns by name, in the order of the files, shape (n,) each: numbers as float64
+            with NaN where there is none, "index" as int64, "status" and "reason" as str objects.
     """
 
     study: Study
@@ -37,7 +37,7 @@ class Results:
 
     @property
     def count(self) -> int:
-        """How many rows there are."""
+        """Number of rows."""
         return len(self.columns["index"])
 
     def front(self) -> BoolArray:
@@ -50,7 +50,7 @@ class Results:
         """Return the design of a row.
 
         Args:
-            row: From 0; where parts are missing it is not the design's index.
+            row: Row from 0; where parts are missing it is not the design's index.
 
         Raises:
             InputError: there is no such row.
@@ -63,7 +63,7 @@ class Results:
 
 
 def design_of_index(study: Study, index: int, values: Mapping[str, float]) -> Design:
-    """Return the design of some values, named after its study and its index.
+    """Return the design with given values, named after its study and its index.
 
     Raises:
         DesignError: the values make a degenerate design.
@@ -73,14 +73,14 @@ def design_of_index(study: Study, index: int, values: Mapping[str, float]) -> De
 
 @dataclass(frozen=True)
 class Summary:
-    """What a results folder holds, found in one pass that keeps nothing but the front.
+    """Summary of a results folder, from one pass that keeps nothing but the front.
 
     Attributes:
         study: The study.
-        counts: How many rows have each status.
-        front: The rows on the Pareto front, by the order of their first objective.
-        incomparable: How many rows are done but lack an objective: the front has none of them.
-        damaged: How many parts cannot be read; a run computes them again.
+        counts: Number of rows of each status.
+        front: Rows on the Pareto front, in the order of their first objective.
+        incomparable: Number of rows that are done but lack an objective, so no front has them.
+        damaged: Number of parts that cannot be read; a run computes them again.
         strays: Names of Parquet files that are no parts of the study, such as copies.
     """
 
@@ -93,12 +93,12 @@ class Summary:
 
     @property
     def count(self) -> int:
-        """How many rows there are."""
+        """Number of rows."""
         return sum(self.counts.values())
 
 
 def design_at(folder: str | Path, index: int) -> Design:
-    """Return the design with an index, reading no more parts than there are before its own.
+    """Return the design with an index, reading no parts after its own.
 
     Raises:
         InputError: the folder holds no results, or not yet those of this design.
@@ -107,12 +107,12 @@ def design_at(folder: str | Path, index: int) -> Design:
     """
     study, damaged = None, list[Path]()
     for study, _, table in sound_parts(Path(folder), damaged):
-        at = np.flatnonzero(_column(table, "index", "count") == index)
-        if len(at):
-            row = table.slice(int(at[0]), 1).to_pylist()[0]
+        places = np.flatnonzero(_column(table, "index", "count") == index)
+        if len(places):
+            row = table.slice(int(places[0]), 1).to_pylist()[0]
             return design_of_index(study, index, {name: row[name] for name in study.varied})
     if study is None:
-        raise _nothing(folder, damaged)
+        raise _no_results(folder, damaged)
     if index >= study.count:
         raise InputError(f"the index must lie within 0 to {study.count - 1}; got {index}")
     raise InputError(f"design {index} has not been computed yet")
@@ -128,7 +128,7 @@ def load_results(folder: str | Path) -> Results:
     damaged: list[Path] = []
     parts = list(sound_parts(Path(folder), damaged))
     if not parts:
-        raise _nothing(folder, damaged)
+        raise _no_results(folder, damaged)
     study = parts[0][0]
     columns = {
         name: np.concatenate([_column(table, name, kind) for *_, table in parts])
@@ -138,7 +138,7 @@ def load_results(folder: str | Path) -> Results:
 
 
 def summarise(folder: str | Path) -> Summary:
-    """Return a summary of a results folder, in memory that its number of parts does not raise.
+    """Return a summary of a results folder, in memory that does not grow with its parts.
 
     Raises:
         InputError: the folder holds no results, or those of several studies.
@@ -155,7 +155,7 @@ def summarise(folder: str | Path) -> Summary:
             chosen = table.filter(front(columns, study.objectives))
             best = _merged(best + chosen.to_pylist(), study)
     if study is None:
-        raise _nothing(folder, damaged)
+        raise _no_results(folder, damaged)
     first = study.objectives[0] if study.objectives else None
     if first is not None:
         best.sort(key=lambda row: float(row[first.measure] or 0.0), reverse=first.sense == "max")
@@ -164,20 +164,19 @@ def summarise(folder: str | Path) -> Summary:
 
 
 def _merged(rows: list[dict[str, Value]], study: Study) -> list[dict[str, Value]]:
-    names = [each.measure for each in study.objectives]
+    names = [objective.measure for objective in study.objectives]
     columns = {name: np.array([row[name] for row in rows], dtype=np.float64) for name in names}
     return [rows[index] for index in undominated(costs(columns, study.objectives)).tolist()]
 
 
 def _column(table: Any, name: str, kind: str) -> Column:
-    # What is missing becomes NaN in numbers; the index and texts have nothing missing.
+    # Missing numbers become NaN; the index and texts are never missing.
     dtype = object if kind == "text" else np.int64 if name == "index" else np.float64
     return np.asarray(table.column(name).to_numpy(), dtype=dtype)
 
 
-def _nothing(folder: str | Path, damaged: Sequence[Path]) -> InputError:
-    told = f"{str(folder)!r} holds no results of a study"
-    if not damaged:
-        return InputError(told)
-    more = f" and {len(damaged) - 1} more" if len(damaged) > 1 else ""
-    return InputError(f"{told} that can be read: {damaged[0].name}{more} cannot be")
+def _no_results(folder: str | Path, damaged: Sequence[Path]) -> InputError:
+    message = f"{str(folder)!r} holds no results of a study"
+    if damaged:
+        message += f" that can be read: {words_of_paths(damaged)} cannot be"
+    return InputError(message)

@@ -1,7 +1,7 @@
-"""What becomes of each design of a study: one row, whatever happens.
+"""Rows of a study: one for each design, whatever happens to it.
 
-A row is a function of the study and its index alone. What goes wrong with a design is told
-in its row, by a status and a reason; there are no holes.
+A row is a function of the study and its index alone. Its status and reason say what went wrong
+with the design, so that no row is missing.
 """
 
 from __future__ import annotations
@@ -29,23 +29,23 @@ from explorer.sweep.study import RADIUS, Study, decode_study
 Status = Literal[
     "done", "not converged", "empty workspace", "invalid design", "failed", "worker died"
 ]
-"""Done: all is measured. Not converged: a search met not all demands; its best is measured.
-Empty workspace: there is nothing to measure but the design. Invalid design: the variables
-make none. Failed: an error that is not the design's. Worker died: whoever tried it died."""
+"""Done: all is measured. Not converged: the search did not meet all demands; its best is measured.
+Empty workspace: only the design itself is measured. Invalid design: the variables make none.
+Failed: an error that is not the design's. Worker died: each process that tried it died."""
 
 Kind = Literal["count", "number", "flag", "text"]
 Value: TypeAlias = float | int | bool | str | None
-"""Of a row; None where there is nothing to tell."""
+"""Value of a row; None where there is none."""
 
-# Before none of a study's designs can be used, so many are tried.
+# Number of designs tried before a study is refused because none of them can be made.
 MOST_TRIED = 256
 GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 
-# Of an angle, in turns.
+# Rounding error of an angle, in turns.
 ROUNDING = 1e-12
 
 SAMPLE = "sample_"
-"""What the columns begin with that hold where a search started."""
+"""Prefix of the columns with the start of a search."""
 
 
 @dataclass(frozen=True)
@@ -53,9 +53,9 @@ class Rows:
     """Some rows of a study.
 
     Attributes:
-        indices: Of the designs, without gaps.
-        columns: By name, as many values as there are indices, see `columns_of`.
-        versions: Of the libraries that computed them.
+        indices: Indices of the designs, without gaps.
+        columns: Values by column, one for each index, see `columns_of`.
+        versions: Versions of the libraries that computed the rows.
     """
 
     indices: range
@@ -65,21 +65,21 @@ class Rows:
 
 def columns_of(study: Study) -> dict[str, Kind]:
     """Return the columns of a study's rows by name, in their order."""
-    found: dict[str, Kind] = {"index": "count"}
+    columns: dict[str, Kind] = {"index": "count"}
     if study.polish is not None:
-        found.update((f"{SAMPLE}{name}", "number") for name in study.variables)
-    found.update((name, "number") for name in (*study.varied, *study.measures))
+        columns.update((f"{SAMPLE}{name}", "number") for name in study.variables)
+    columns.update((name, "number") for name in (*study.varied, *study.measures))
     if study.polish is not None:
-        found.update(objective="number", iterations="count", converged="flag")
-    found.update(status="text", reason="text")
-    return found
+        columns.update(objective="number", iterations="count", converged="flag")
+    columns.update(status="text", reason="text")
+    return columns
 
 
 def evaluate(study: bytes, start: int, stop: int) -> Rows:
     """Return the rows of some designs.
 
     Args:
-        study: As encoded by `encode_study`.
+        study: Study encoded by `encode_study`.
         start: Index of the first design.
         stop: Index after the last one.
     """
@@ -95,11 +95,11 @@ def evaluate(study: bytes, start: int, stop: int) -> Rows:
 
 @dataclass(frozen=True)
 class Answer:
-    """What a worker says to a task.
+    """Result of a task.
 
     Attributes:
-        pieces: The rows of each piece of the task.
-        seconds: It took to find them.
+        pieces: Rows of each piece of the task.
+        seconds: Time that the worker took.
     """
 
     pieces: tuple[Rows, ...]
@@ -109,34 +109,34 @@ class Answer:
 def answer(
     function: Callable[[bytes, int, int], Rows], study: bytes, pieces: Sequence[range]
 ) -> Answer:
-    """Return the rows of several pieces of a study, and how long they took.
+    """Return the rows of several pieces of a study, and the time they took.
 
     Args:
-        function: Finds the rows of one piece, such as `evaluate`.
-        study: As encoded by `encode_study`.
-        pieces: The indices of their designs.
+        function: Function that returns the rows of one piece, such as `evaluate`.
+        study: Study encoded by `encode_study`.
+        pieces: Indices of the designs of each piece.
     """
     began = time.perf_counter()
-    found = tuple(function(study, piece.start, piece.stop) for piece in pieces)
-    return Answer(found, time.perf_counter() - began)
+    rows = tuple(function(study, piece.start, piece.stop) for piece in pieces)
+    return Answer(rows, time.perf_counter() - began)
 
 
-def lost(study: Study, indices: range, reason: str) -> Rows:
-    """Return the rows of designs that nobody could evaluate: their workers died."""
+def rows_of_dead_workers(study: Study, indices: range, reason: str) -> Rows:
+    """Return the rows of designs whose evaluation killed its workers."""
     rows: list[dict[str, Value]] = []
     for index, row in zip(indices, samples(study, indices).tolist(), strict=True):
         sample = dict(zip(study.variables, row, strict=True))
-        rows.append(_begun(study, index, sample) | {"status": "worker died", "reason": reason})
+        rows.append(_start_row(study, index, sample) | {"status": "worker died", "reason": reason})
     return _as_columns(study, indices, rows)
 
 
 def design_of(study: Study, values: Mapping[str, float], name: str | None = None) -> Design:
-    """Return the design with some values of the variables that a study varies.
+    """Return the design with given values of the variables of a study.
 
     Args:
         study: The study.
-        values: By name; a variable that is left out is as in the study's design.
-        name: Of the design; that of the study's if None.
+        values: Values by variable; others are those of the study's design.
+        name: Name of the design; that of the study's design if None.
 
     Raises:
         DesignError: the values make a degenerate design.
@@ -158,8 +158,8 @@ def problem_of(study: Study, sample: Mapping[str, float]) -> Problem:
     """
     if study.polish is None:
         raise InputError("this study polishes nothing")
-    without = msgspec.structs.replace(study, polish=None)
-    start = design_of(without, sample)
+    unpolished = msgspec.structs.replace(study, polish=None)
+    start = design_of(unpolished, sample)
     variables: list[Variable] = []
     for name in study.polished:
         value = start_value(start, name)
@@ -177,50 +177,50 @@ def problem_of(study: Study, sample: Mapping[str, float]) -> Problem:
 
 
 def _bounds(study: Study, sample: Mapping[str, float], name: str) -> tuple[float, float]:
-    """Return how far a search may change a variable: its range, and the way to it."""
+    """Return the bounds of a variable in a search: its range, extended to the start."""
     low, high = study.polished[name]
     start = sample.get(name, low)
     return min(low, start), max(high, start)
 
 
 def _turns(study: Study, sample: Mapping[str, float], yaw: float) -> float:
-    """Return how many degrees a start's yaw, which is within ±180°, is from the study's.
+    """Return the turns, in degrees, from a start's yaw, which is within ±180°, to the study's.
 
-    The study may mean 190° by what a rotation tells as −170°.
+    The study's 190° is a rotation's −170°.
     """
     if YAW in sample:
         return 360.0 * round((sample[YAW] - yaw) / 360.0)
     return 360.0 * math.ceil((study.polished[YAW][0] - yaw) / 360.0 - ROUNDING)
 
 
-def found_values(
+def end_values(
     study: Study, sample: Mapping[str, float], problem: Problem, values: Sequence[float]
 ) -> dict[str, float]:
-    """Return what a search found, by name, within the study's ranges and counted as they are.
+    """Return the result of a search by variable, within the study's ranges and their turns.
 
     Args:
         study: The study.
-        sample: Where the search began.
-        problem: That it solved, see `problem_of`.
-        values: That it found.
+        sample: Values that the search started from.
+        problem: Problem that it solved, see `problem_of`.
+        values: Values of the variables of the problem at its end.
     """
-    found = dict(zip(problem.names, values, strict=True))
-    if YAW in found:
-        found[YAW] += _turns(study, sample, start_value(problem.start, YAW))
-    for name, value in found.items():
+    ends = dict(zip(problem.names, values, strict=True))
+    if YAW in ends:
+        ends[YAW] += _turns(study, sample, start_value(problem.start, YAW))
+    for name, value in ends.items():
         low, high = _bounds(study, sample, name)
-        # By rounding alone would it leave them.
-        found[name] = min(max(value, low), high)
-    return found
+        # Only rounding takes a value out of its bounds.
+        ends[name] = min(max(value, low), high)
+    return ends
 
 
 def check_study(study: Study) -> None:
-    """Raise an `InputError` if no design of a study, of some all over it, can be made or polished.
+    """Raise an `InputError` if none of many designs of a study can be made or polished.
 
-    So that what is wrong with all of them is told at once, rather than in every row.
+    The user then reads at once what is wrong with all of them, rather than in every row.
     """
     first: InputError | None = None
-    tried = _all_over(study)
+    tried = _spread_samples(study)
     for row in tried:
         sample = dict(zip(study.variables, row, strict=True))
         try:
@@ -236,8 +236,8 @@ def check_study(study: Study) -> None:
     raise InputError(f"none of {which} designs all over the study can be used: {first}")
 
 
-def _all_over(study: Study) -> list[list[float]]:
-    """Return the samples of a study, or some that lie all over its ranges."""
+def _spread_samples(study: Study) -> list[list[float]]:
+    """Return the samples of a study, or `MOST_TRIED` of them that are spread over its ranges."""
     count = study.count
     if study.sampling.method != "grid" or count <= MOST_TRIED:
         # The first points of a sequence or a hypercube are spread like the others.
@@ -247,8 +247,8 @@ def _all_over(study: Study) -> list[list[float]]:
     return [samples(study, range(index, index + 1))[0].tolist() for index in indices]
 
 
-def ready() -> None:
-    """Load what most studies need, so that their first rows come at once."""
+def load_common() -> None:
+    """Load the modules and kernels that most studies need, so that the first rows come at once."""
     importlib.import_module("scipy.stats")
     warm()
 
@@ -266,26 +266,26 @@ def _decoded(study: bytes) -> Study:
     decoded = decode_study(study, "the study")
     load_kernels(decoded)
     # Compiled kernels repay their second within a few designs, and the last digits must
-    # not hang on when they are compiled.
+    # not depend on the time of compilation.
     warm()
     return decoded
 
 
 def _row(study: Study, index: int, sample: dict[str, float]) -> dict[str, Value]:
-    row = _begun(study, index, sample)
+    row = _start_row(study, index, sample)
     try:
-        _fill(study, sample, row)
+        _measure(study, sample, row)
     except DesignError as error:
-        row |= {"status": "invalid design", "reason": _line(error)}
+        row |= {"status": "invalid design", "reason": one_line(error)}
     except InputError as error:
-        row |= {"status": "failed", "reason": _line(error)}
-    except Exception as error:  # noqa: BLE001 - one design's trouble is not that of the others
-        row |= {"status": "failed", "reason": f"{type(error).__name__}: {_line(error)}"}
+        row |= {"status": "failed", "reason": one_line(error)}
+    except Exception as error:  # noqa: BLE001 - an error of one design must not end the others
+        row |= {"status": "failed", "reason": f"{type(error).__name__}: {one_line(error)}"}
     return row
 
 
-def _begun(study: Study, index: int, sample: Mapping[str, float]) -> dict[str, Value]:
-    """Return a row that knows only where it starts."""
+def _start_row(study: Study, index: int, sample: Mapping[str, float]) -> dict[str, Value]:
+    """Return a row with its index and its sample only."""
     row: dict[str, Value] = {"index": index, **sample}
     if study.polish is not None:
         row |= {f"{SAMPLE}{name}": value for name, value in sample.items()}
@@ -294,17 +294,18 @@ def _begun(study: Study, index: int, sample: Mapping[str, float]) -> dict[str, V
     return row
 
 
-def _fill(study: Study, sample: dict[str, float], row: dict[str, Value]) -> None:
+def _measure(study: Study, sample: dict[str, float], row: dict[str, Value]) -> None:
+    """Write the values, the status and the reason of a design into its row."""
     status, reason = "done", ""
     values = sample
     if study.polish is not None:
         from explorer.optimise.solver import optimise_design
 
         outcome = optimise_design(problem_of(study, sample), iterations=study.polish.iterations)
-        found = found_values(study, sample, outcome.problem, outcome.best.values)
-        values = {**sample, **found}
+        ends = end_values(study, sample, outcome.problem, outcome.best.values)
+        values = {**sample, **ends}
         row |= {
-            **found,
+            **ends,
             "objective": outcome.best.objective,
             "iterations": outcome.iterations,
             "converged": outcome.converged,
@@ -317,21 +318,22 @@ def _fill(study: Study, sample: dict[str, float], row: dict[str, Value]) -> None
     if case.volume.volume <= 0.0 and status == "done":
         because = ", ".join(case.volume.empty_because)
         status, reason = "empty workspace", f"emptied by {because}" if because else "no volume"
-    found = measure_design(case, study.measures)
-    reasons = (reason, reason_for_missing(case, found))
-    row |= found.values
+    measured = measure_design(case, study.measures)
+    reasons = (reason, reason_for_missing(case, measured))
+    row |= measured.values
     row |= {"status": status, "reason": "; ".join(filter(None, reasons))}
 
 
 def _as_columns(study: Study, indices: range, rows: list[dict[str, Value]]) -> Rows:
-    columns = {name: [_plain(row.get(name)) for row in rows] for name in columns_of(study)}
+    columns = {name: [_finite_or_none(row.get(name)) for row in rows] for name in columns_of(study)}
     return Rows(indices, columns, versions())
 
 
-def _plain(value: Value) -> Value:
-    """Return a value, None for what is no number."""
+def _finite_or_none(value: Value) -> Value:
+    """Return a value, or None for NaN and infinity."""
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _line(error: Exception) -> str:
-    return " ".join(str(error).split())
+def one_line(error: Exception) -> str:
+    """Return the message of an error in one line, or the name of its kind if it has none."""
+    return " ".join(str(error).split()) or type(error).__name__

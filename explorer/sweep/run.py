@@ -1,7 +1,7 @@
-"""A study is run: its chunks go to workers, their rows come back and become parts.
+"""Runs of studies: workers evaluate the chunks, and their rows become parts of the results.
 
-Killed at any point it goes on where it was: what counts as done is what lies in the folder
-as whole parts. Tasks under way are few, so that memory does not grow with the study.
+A run that is killed at any point can be continued: a chunk is done once its whole part lies in
+the folder. Tasks under way are few, so that memory does not grow with the study.
 """
 
 from __future__ import annotations
@@ -10,44 +10,52 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 
 from explorer.errors import ExplorerError
 from explorer.files.versions import versions
 from explorer.numerics.compiled import fill_cache
-from explorer.sweep.folder import claimed
+from explorer.sweep.folder import claim
 from explorer.sweep.parts import pyarrow, sound_parts, write_part
-from explorer.sweep.rows import Answer, Rows, answer, check_study, evaluate, load_kernels, lost
+from explorer.sweep.rows import (
+    Answer,
+    Rows,
+    answer,
+    check_study,
+    evaluate,
+    load_kernels,
+    rows_of_dead_workers,
+)
 from explorer.sweep.study import Study, encode_study
 from explorer.sweep.workers import NoWorkerError, Workers
 
-# Tasks under way for each worker: enough that none waits for this process.
+# Tasks under way for each worker, so that no worker waits for this process.
 AHEAD = 4
-# How often a chunk may lose its worker before its designs are tried one by one, and how often
-# a design with nothing else under way.
+# Deaths of its worker after which the designs of a chunk are tried one by one, and after which a
+# design tried with nothing else under way is given up.
 CHUNK_DEATHS, DESIGN_DEATHS = 2, 3
-# Seconds between two looks at whether to stop.
-GLANCE = 0.1
+# Seconds between two calls of `stop`.
+STOP_SECONDS = 0.1
 
 
 class RunError(ExplorerError):
-    """A run that cannot go on; what was finished is kept."""
+    """A run that cannot go on; finished parts are kept."""
 
     exit_status = 1
 
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a run has got.
+    """Progress of a run.
 
     Attributes:
-        total: How many designs the study has.
-        done: How many of them have their row.
-        kept: How many of these had it when the run began.
-        counts: How many rows have each status.
-        seconds: Since the run began.
+        total: Number of designs of the study.
+        done: Number of designs with a row.
+        kept: Number of designs that had a row when the run began.
+        counts: Number of rows of each status.
+        seconds: Time since the run began.
     """
 
     total: int
@@ -63,12 +71,12 @@ class Progress:
 
     @property
     def rate(self) -> float:
-        """Designs per second in this run; 0 as long as there is none."""
+        """Designs per second in this run; 0 before the first."""
         return (self.done - self.kept) / self.seconds if self.seconds > 0.0 else 0.0
 
     @property
     def seconds_left(self) -> float | None:
-        """How long the rest takes at this rate; None as long as there is none."""
+        """Time that the rest takes at this rate, in seconds; None before the first design."""
         return (self.total - self.done) / self.rate if self.rate > 0.0 else None
 
 
@@ -78,19 +86,18 @@ def run_study(
     workers: Workers,
     *,
     limit: int | None = None,
-    told: Callable[[Progress], None] | None = None,
-    is_cut: Callable[[], bool] | None = None,
+    watch: Callable[[Progress], None] | None = None,
+    stop: Callable[[], bool] | None = None,
 ) -> Progress:
-    """Compute what is missing in a results folder.
+    """Compute the rows that a results folder lacks.
 
     Args:
         study: The study.
-        folder: For its parts; made if it is not there.
-        workers: Who evaluates the designs.
-        limit: End after so many more designs, rounded up to whole chunks.
-        told: Called when the run begins, and after every part that is written.
-        is_cut: Asked some times a second whether to end early; what has not been finished
-            then is dropped.
+        folder: Folder of its parts; made if it does not exist.
+        workers: Executor that evaluates the designs.
+        limit: Number of designs after which to end, rounded up to whole chunks.
+        watch: Called when the run begins, and after each part that is written.
+        stop: Called some times a second; True ends the run and drops unfinished chunks.
 
     Raises:
         InputError: no design of the study can be made, or the folder belongs to another
@@ -102,106 +109,87 @@ def run_study(
     pyarrow()
     check_study(study)
     path = Path(folder)
-    with claimed(path, study):
-        # Once here, rather than in each worker.
+    with claim(path, study):
+        # The cache of kernels is filled once here, rather than in each worker.
         load_kernels(study)
         fill_cache()
-        return _Run(study, path, workers, told or (lambda _: None)).run(limit, is_cut)
+        return _Run(study, path, workers, watch or (lambda _: None)).run(limit, stop)
 
 
 @dataclass
 class _Piece:
-    """Some designs that stay together: those of a chunk, or one of them."""
+    """Designs of a task that are retried together: those of a chunk, or one of them."""
 
     chunk: int
     indices: range
     deaths: int = 0
 
 
-@dataclass
-class _Pending:
-    """What is there of a chunk."""
-
-    size: int
-    pieces: list[Rows] = field(default_factory=list[Rows])
-
-    @property
-    def is_whole(self) -> bool:
-        return sum(len(piece.indices) for piece in self.pieces) == self.size
-
-    def in_order(self) -> list[Rows]:
-        return sorted(self.pieces, key=lambda piece: piece.indices.start)
-
-
 class _Run:
-    """One run.
-
-    Args:
-        study: The study.
-        folder: For its parts.
-        workers: Who evaluates the designs.
-        told: Called with how far it has got.
-    """
+    """One run; see `run_study` for the arguments."""
 
     def __init__(
-        self, study: Study, folder: Path, workers: Workers, told: Callable[[Progress], None]
+        self, study: Study, folder: Path, workers: Workers, watch: Callable[[Progress], None]
     ) -> None:
         self.study = study
         self.folder = folder
         self.workers = workers
-        self.told = told
+        self.watch = watch
         self.encoded = encode_study(study)
         self.counts: Counter[str] = Counter()
-        # One byte a chunk tells which there are.
-        self.has = bytearray(study.chunks)
-        self.again: deque[_Piece] = deque()
-        # Designs that a worker may have died of; each is tried alone.
+        # One byte for each chunk, 1 if its part is written.
+        self.is_written = bytearray(study.chunks)
+        self.retries: deque[_Piece] = deque()
+        # Designs whose evaluation may have killed a worker; each is tried alone.
         self.suspects: deque[_Piece] = deque()
         self.under_way: dict[Future[Answer], list[_Piece]] = {}
-        self.pending: dict[int, _Pending] = {}
-        # Designs that workers have told of, and the seconds that they took.
-        self.told_designs, self.told_seconds = 0, 0.0
+        # Rows of the chunks that have no part yet.
+        self.pending: dict[int, list[Rows]] = {}
+        # Designs that workers have evaluated in this run, and the seconds that they took.
+        self.timed_designs, self.timed_seconds = 0, 0.0
 
-    def run(self, limit: int | None, is_cut: Callable[[], bool] | None) -> Progress:
-        """Compute what is missing."""
-        self._look()
+    def run(self, limit: int | None, stop: Callable[[], bool] | None) -> Progress:
+        """Compute the missing rows."""
+        # Damaged parts are computed again.
+        for _, chunk, table in sound_parts(self.folder, [], self.study):
+            self.is_written[chunk] = 1
+            self.counts.update(table.column("status").to_pylist())
         self.kept, self.began = self.counts.total(), time.monotonic()
-        self.told(self._progress())
+        self.watch(self._progress())
         missing = self._missing(limit)
         try:
-            while self._hand_out(missing):
-                if is_cut is not None and is_cut():
+            while self._submit_tasks(missing):
+                if stop is not None and stop():
                     break
-                done, _ = wait(self.under_way, timeout=GLANCE, return_when=FIRST_COMPLETED)
+                done, _ = wait(self.under_way, timeout=STOP_SECONDS, return_when=FIRST_COMPLETED)
                 for future in done:
-                    self._take(future)
+                    self._collect(future)
         finally:
             for future in self.under_way:
                 future.cancel()
         return self._progress()
-
-    def _look(self) -> None:
-        """Find out which parts there are; damaged ones are computed again."""
-        for _, chunk, table in sound_parts(self.folder, [], self.study):
-            self.has[chunk] = 1
-            self.counts.update(table.column("status").to_pylist())
 
     def _missing(self, limit: int | None) -> Iterator[_Piece]:
         designs = 0
         for chunk in range(self.study.chunks):
             if limit is not None and designs >= limit:
                 return
-            if not self.has[chunk]:
+            if not self.is_written[chunk]:
                 indices = self.study.rows_of(chunk)
                 designs += len(indices)
-                self.pending[chunk] = _Pending(len(indices))
+                self.pending[chunk] = []
                 yield _Piece(chunk, indices)
 
-    def _hand_out(self, missing: Iterator[_Piece]) -> bool:
-        """Keep the workers busy; say whether anything is under way."""
-        room = (AHEAD if self._knows_its_pace else 1) * self.workers.size
+    def _submit_tasks(self, missing: Iterator[_Piece]) -> bool:
+        """Keep the workers busy; return whether any task is under way."""
+        # Where long tasks pay, the first ones are timed.
+        is_timed = self.workers.task_seconds == 0.0 or self.timed_designs > 0
+        room = (AHEAD if is_timed else 1) * self.workers.size
         while len(self.under_way) < room:
-            pieces = [self.again.popleft()] if self.again else [*islice(missing, self._together())]
+            if self.retries:
+                pieces = [self.retries.popleft()]
+            else:
+                pieces = [*islice(missing, self._chunks_of_task())]
             if not pieces:
                 break
             self._submit(pieces)
@@ -209,39 +197,34 @@ class _Run:
             self._submit([self.suspects.popleft()])
         return bool(self.under_way)
 
-    @property
-    def _knows_its_pace(self) -> bool:
-        """Whether tasks may be of any length, or it is known by now how long they take."""
-        return self.workers.task_seconds == 0.0 or self.told_designs > 0
+    def _chunks_of_task(self) -> int:
+        """Return the number of chunks of the next task.
 
-    def _together(self) -> int:
-        """Return how many chunks make the next task.
-
-        As many as take the time that these workers ask for; fewer near the end, so that
-        all of them end at the same time.
+        They take as long as a task of these workers should, and less near the end, so that
+        all workers end at the same time.
         """
-        if self.workers.task_seconds == 0.0 or self.told_seconds == 0.0:
+        if self.workers.task_seconds == 0.0 or self.timed_seconds == 0.0:
             return 1
-        seconds = self.study.chunk * self.told_seconds / self.told_designs
-        share = (self.has.count(0) - len(self.pending)) // (2 * self.workers.size)
+        seconds = self.study.chunk * self.timed_seconds / self.timed_designs
+        share = (self.is_written.count(0) - len(self.pending)) // (2 * self.workers.size)
         return max(1, min(int(self.workers.task_seconds / seconds), share))
 
     def _submit(self, pieces: list[_Piece]) -> None:
         ranges = [piece.indices for piece in pieces]
         self.under_way[self.workers.submit(answer, evaluate, self.encoded, ranges)] = pieces
 
-    def _take(self, future: Future[Answer]) -> None:
-        """Take in what came of a task."""
+    def _collect(self, future: Future[Answer]) -> None:
+        """Add the rows of a task, or queue it again if its worker died."""
         pieces = self.under_way.pop(future)
         try:
-            told = future.result()
+            result = future.result()
         except self.workers.died:
-            self._mourn(pieces)
+            self._retry(pieces)
             return
         except CancelledError:
             raise RunError(
-                "the scheduler dropped the tasks; what is finished is kept, and the same "
-                "command goes on"
+                "the scheduler dropped the tasks; finished parts are kept, and the same "
+                "command continues"
             ) from None
         except NoWorkerError as error:
             raise RunError(str(error)) from None
@@ -251,53 +234,57 @@ class _Run:
             raise RunError(
                 f"the workers cannot do the tasks: {type(error).__name__}: {error}"
             ) from error
-        self.told_designs += sum(len(piece.indices) for piece in pieces)
-        self.told_seconds += told.seconds
-        for piece, rows in zip(pieces, told.pieces, strict=True):
+        self.timed_designs += sum(len(piece.indices) for piece in pieces)
+        self.timed_seconds += result.seconds
+        for piece, rows in zip(pieces, result.pieces, strict=True):
             if rows.versions != versions():
+                there, here = (
+                    ", ".join(map(" ".join, libraries.items()))
+                    for libraries in (rows.versions, versions())
+                )
                 raise RunError(
-                    f"the workers have other versions than this process: {_shown(rows.versions)} "
-                    f"there, {_shown(versions())} here; install the same everywhere"
+                    f"the workers have other versions than this process: {there} there, {here} "
+                    "here; install the same everywhere"
                 )
             self._add(piece.chunk, rows)
 
-    def _mourn(self, pieces: list[_Piece]) -> None:
-        """Have a task tried again whose worker died.
+    def _retry(self, pieces: list[_Piece]) -> None:
+        """Queue a task again whose worker died.
 
-        At first chunk by chunk and each whole, then design by design, and in the end with
+        At first its chunks are tried one by one, then their designs, and in the end each with
         nothing else under way: a scheduler blames all tasks that a dead worker had.
         """
         if len(pieces) > 1:
-            self.again.extend(pieces)
+            self.retries.extend(pieces)
             return
         (piece,) = pieces
         piece.deaths += 1
         if len(piece.indices) > 1:
             if piece.deaths < CHUNK_DEATHS:
-                self.again.append(piece)
+                self.retries.append(piece)
             else:
-                self.again.extend(
+                self.retries.extend(
                     _Piece(piece.chunk, range(index, index + 1)) for index in piece.indices
                 )
         elif piece.deaths <= DESIGN_DEATHS:
             self.suspects.append(piece)
         else:
             reason = f"{DESIGN_DEATHS} workers in a row died of it, with nothing else under way"
-            self._add(piece.chunk, lost(self.study, piece.indices, reason))
+            self._add(piece.chunk, rows_of_dead_workers(self.study, piece.indices, reason))
 
     def _add(self, chunk: int, rows: Rows) -> None:
-        """Take in rows, and write the part that they complete."""
-        pending = self.pending[chunk]
-        pending.pieces.append(rows)
-        if not pending.is_whole:
+        """Add rows of a chunk, and write its part once all are there."""
+        pieces = self.pending[chunk]
+        pieces.append(rows)
+        if sum(len(piece.indices) for piece in pieces) < len(self.study.rows_of(chunk)):
             return
         del self.pending[chunk]
-        pieces = pending.in_order()
+        pieces.sort(key=lambda piece: piece.indices.start)
         write_part(self.folder, self.study, chunk, pieces)
-        self.has[chunk] = 1
+        self.is_written[chunk] = 1
         for piece in pieces:
             self.counts.update(str(status) for status in piece.columns["status"])
-        self.told(self._progress())
+        self.watch(self._progress())
 
     def _progress(self) -> Progress:
         return Progress(
@@ -307,7 +294,3 @@ class _Run:
             counts=dict(self.counts),
             seconds=time.monotonic() - self.began,
         )
-
-
-def _shown(found: dict[str, str]) -> str:
-    return ", ".join(f"{name} {version}" for name, version in found.items())

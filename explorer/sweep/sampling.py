@@ -1,10 +1,10 @@
-"""The samples of a study: each is a function of the study and its index alone.
+"""Samples of a study: each is a function of the study and its index alone.
 
-So any chunk can be made anywhere, in any order and again, in constant memory.
+Any process can therefore compute any chunk, in any order, repeatedly, in constant memory.
 
 A Latin hypercube of n points needs a permutation of n for each variable. It is computed
-entry by entry: a keyed Feistel network permutes the numbers of 2k bits, and one that leads
-out of the n is permuted again until it is back among them (cycle walking; J. Black and
+entry by entry: a keyed Feistel network permutes the numbers of 2k bits, and an image that is n
+or more is permuted again until it is less (cycle walking; J. Black and
 P. Rogaway, "Ciphers with arbitrary finite domains", 2002).
 """
 
@@ -20,7 +20,7 @@ from explorer.sweep.study import Study
 
 WordArray: TypeAlias = NDArray[np.uint64]
 
-# Of the Feistel network; four make a permutation that looks random, more do no harm.
+# Rounds of the Feistel network; four make a permutation that looks random.
 ROUNDS = 6
 
 
@@ -29,10 +29,10 @@ def samples(study: Study, rows: range) -> FloatArray:
 
     Args:
         study: The study.
-        rows: Their indices, without gaps.
+        rows: Indices of the designs, without gaps.
 
     Returns:
-        In the order of the study's variables, shape (len(rows), d).
+        Values in the order of the study's variables, shape (len(rows), d).
     """
     ends = np.array(list(study.variables.values()))
     lows, highs = ends[:, 0], ends[:, 1]
@@ -43,7 +43,7 @@ def samples(study: Study, rows: range) -> FloatArray:
             shares = _latin(study, rows)
         case "grid":
             shares = _grid(study, rows)
-    # So that neither end is left by rounding.
+    # Rounding must not lead beyond the ends.
     return np.clip(lows + (highs - lows) * shares, lows, highs)
 
 
@@ -51,15 +51,13 @@ def _sobol(study: Study, rows: range) -> FloatArray:
     from scipy.stats import qmc
 
     sequence = qmc.Sobol(len(study.variables), rng=study.sampling.seed)
-    # The first point is drawn alone, since from it on only powers of two are balanced.
+    # SciPy warns of other than powers of two in the first draw, so that is one point.
     first = sequence.random(1)
     if rows.start > 1:
         sequence.fast_forward(rows.start - 1)
-    if rows.start > 0:
-        return sequence.random(len(rows))
-    if len(rows) == 1:
-        return first
-    return np.concatenate([first, sequence.random(len(rows) - 1)])
+    others = len(rows) - (rows.start == 0)
+    points = sequence.random(others) if others else first[:0]
+    return points if rows.start > 0 else np.concatenate([first, points])
 
 
 def _latin(study: Study, rows: range) -> FloatArray:
@@ -78,34 +76,34 @@ def _latin(study: Study, rows: range) -> FloatArray:
 def _grid(study: Study, rows: range) -> FloatArray:
     shape = study.shape
     at = np.unravel_index(np.arange(rows.start, rows.stop), shape)
-    # A single value lies in the middle.
+    # A single value lies in the middle of the range.
     return np.column_stack(
         [
-            index / (many - 1.0) if many > 1 else np.full(len(rows), 0.5)
-            for index, many in zip(at, shape, strict=True)
+            index / (count - 1.0) if count > 1 else np.full(len(rows), 0.5)
+            for index, count in zip(at, shape, strict=True)
         ]
     )
 
 
 def permuted(numbers: WordArray, count: int, keys: WordArray) -> WordArray:
-    """Return where a keyed permutation of 0 to count − 1 takes numbers.
+    """Return the images of numbers under a keyed permutation of 0 to count − 1.
 
     Args:
-        numbers: Below the count, shape (n,).
-        count: Up to 2^62.
-        keys: One for each round, shape (ROUNDS,).
+        numbers: Numbers below the count, shape (n,).
+        count: Count of all numbers, up to 2^62.
+        keys: Key of each round, shape (ROUNDS,).
     """
     half = np.uint64(max(1, -(-(count - 1).bit_length() // 2)))
     mask = (np.uint64(1) << half) - np.uint64(1)
-    found = numbers.copy()
-    outside = np.ones(len(found), dtype=np.bool_)
+    images = numbers.copy()
+    outside = np.ones(len(images), dtype=np.bool_)
     while outside.any():
-        left, right = found[outside] >> half, found[outside] & mask
+        left, right = images[outside] >> half, images[outside] & mask
         for key in keys:
             left, right = right, left ^ (mixed(right ^ key) & mask)
-        found[outside] = (left << half) | right
-        outside = found >= count
-    return found
+        images[outside] = (left << half) | right
+        outside = images >= count
+    return images
 
 
 def mixed(words: WordArray) -> WordArray:

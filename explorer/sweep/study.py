@@ -1,7 +1,7 @@
-"""A study: which designs to make, what to measure of them, and what is wanted.
+"""Studies: the designs, their measures and the objectives, in one JSON document.
 
-One JSON document, read as strictly as a design file. What is decoded is complete: the name of
-a preset has become the design itself, so that a study means the same wherever it is read.
+It is read as strictly as a design file. A decoded study is complete: it holds the design itself in
+place of the name of a preset, so that it means the same wherever it is read.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ NAMES = (*POLISHED, RADIUS)
 """The variables of a study: those of X, the yaw of home in degrees, one maximum for all four
 lengths, one radius for all four legs."""
 
-# No honest study comes near this size, in bytes.
+# Largest study that is read, in bytes; real ones are much smaller.
 LARGEST_FILE = 1_000_000
 # The longest Sobol sequence has as many points.
 MOST_DESIGNS = 2**30
@@ -63,12 +63,12 @@ def _set(struct: msgspec.Struct, name: str, value: object) -> None:
 
 
 class Sampling(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """How designs are spread over the ranges of the variables.
+    """The sampling of the ranges of the variables.
 
     Attributes:
         method: A scrambled Sobol sequence, a Latin hypercube, or a full grid.
-        count: How many designs; of a grid how many values of each variable, or of all.
-        seed: Of the scrambling or the hypercube; a grid has no use for it.
+        count: Number of designs; of a grid the number of values of each variable, or of all.
+        seed: Seed of the scrambling or the hypercube; a grid has none.
 
     Raises:
         InputError: no designs, too many, or a seed out of range.
@@ -88,20 +88,20 @@ class Sampling(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
                     "one for each variable"
                 )
             for name, count in self.count.items():
-                _within(f"sampling.count of {name}", count, 1, MOST_DESIGNS)
+                _check_within(f"sampling.count of {name}", count, 1, MOST_DESIGNS)
         else:
-            _within("sampling.count", self.count, 1, MOST_DESIGNS)
+            _check_within("sampling.count", self.count, 1, MOST_DESIGNS)
 
 
 class Polish(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A search for the optimum from each sample, see `explorer.optimise`.
 
     Attributes:
-        objective: What is wanted.
-        demands: What must hold.
-        variables: What the search may change, and the bounds; None for the variables of the
-            study within their ranges, the radius excepted.
-        iterations: The most steps of each search.
+        objective: Objective of the search.
+        demands: Demands of the search.
+        variables: Bounds of the variables of the search by name; None for the variables of the
+            study within their ranges, without the radius.
+        iterations: Most steps of each search.
 
     Raises:
         InputError: an unknown objective or variable, an empty range, no iterations.
@@ -117,7 +117,7 @@ class Polish(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
             raise InputError(
                 f"no objective {self.objective!r} to polish for; there are {', '.join(OBJECTIVES)}"
             )
-        _within("polish.iterations", self.iterations, 1, MOST_ITERATIONS)
+        _check_within("polish.iterations", self.iterations, 1, MOST_ITERATIONS)
         if self.variables is not None:
             ranges = _ranges("polish.variables", self.variables, POLISHED)
             _set(self, "variables", ranges)
@@ -140,18 +140,18 @@ class Study(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
     Attributes:
         schema: Version of the file format.
-        name: What people call it.
-        design: What is the same in all of them: a design, or the name of a preset, which
-            becomes the design. Its home's position is that of all designs.
-        variables: What differs, by name out of `NAMES`, and the range of each.
-        sampling: How the ranges are filled.
-        measures: What is measured, out of `measures_in("studies")`.
-        nodes: On each axis of the grid that margins and clearances are measured on.
+        name: Name of the study.
+        design: Design that is varied, or the name of a preset, which becomes the design. Its
+            home's position is that of all designs.
+        variables: Range of each variable by name, out of `NAMES`.
+        sampling: Sampling of the ranges.
+        measures: Measures, out of `measures_in("studies")`.
+        nodes: Nodes on each axis of the grid for margins and clearances.
         clearance_margin: Least |δ| at which clearances count, in design units; None for a 20th
             of the design's reach.
-        polish: A search from each sample, whose result is what is measured; or None.
-        objectives: What the Pareto front is of.
-        chunk: How many designs make one task and one part of the results.
+        polish: Search from each sample, whose result is measured; or None.
+        objectives: Objectives of the Pareto front.
+        chunk: Number of designs of one task and one part of the results.
 
     Raises:
         InputError: something is unknown, empty, named twice or out of range.
@@ -179,18 +179,18 @@ class Study(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         self._check_ranges()
         self._check_sampling()
         self._check_measures()
-        _within("nodes", self.nodes, FEWEST_NODES, MOST_NODES)
+        _check_within("nodes", self.nodes, FEWEST_NODES, MOST_NODES)
         if self.clearance_margin is not None:
             _set(self, "clearance_margin", positive("clearance_margin", self.clearance_margin))
-        _within("chunk", self.chunk, 1, MOST_IN_CHUNK)
-        for each in self.objectives:
-            if each.measure not in (*self.varied, *self.measures):
+        _check_within("chunk", self.chunk, 1, MOST_IN_CHUNK)
+        for objective in self.objectives:
+            if objective.measure not in (*self.varied, *self.measures):
                 raise InputError(
-                    f"the objective {each.measure!r} is neither measured nor a variable of the "
-                    f"study; there are {', '.join((*self.varied, *self.measures))}"
+                    f"the objective {objective.measure!r} is neither measured nor a variable of "
+                    f"the study; there are {', '.join((*self.varied, *self.measures))}"
                 )
-        named = [each.measure for each in self.objectives]
-        _once("objectives", named)
+        named = [objective.measure for objective in self.objectives]
+        _check_unique("objectives", named)
 
     @property
     def base(self) -> Design:
@@ -199,7 +199,7 @@ class Study(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
     @property
     def polished(self) -> Mapping[str, Pair]:
-        """What the searches may change, and the bounds; empty without any."""
+        """Bounds of the variables of the searches; empty without any."""
         if self.polish is None:
             return {}
         if self.polish.variables is not None:
@@ -208,12 +208,12 @@ class Study(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
     @property
     def varied(self) -> tuple[str, ...]:
-        """The variables in which the designs differ, in the order of their columns."""
+        """Variables in which the designs differ, in the order of their columns."""
         return tuple(dict.fromkeys((*self.variables, *self.polished)))
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Of a grid: how many values each variable takes."""
+        """Number of values of each variable of a grid."""
         count = self.sampling.count
         if isinstance(count, dict):
             return tuple(count[name] for name in self.variables)
@@ -221,14 +221,14 @@ class Study(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
     @property
     def count(self) -> int:
-        """How many designs there are."""
+        """Number of designs."""
         if self.sampling.method == "grid":
             return math.prod(self.shape)
         return cast("int", self.sampling.count)
 
     @property
     def chunks(self) -> int:
-        """How many chunks they make."""
+        """Number of chunks."""
         return -(-self.count // self.chunk)
 
     def rows_of(self, chunk: int) -> range:
@@ -261,8 +261,8 @@ class Study(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     def _check_measures(self) -> None:
         known = measures_in("studies")
         if not self.measures:
-            raise InputError(f"measure something; there are {', '.join(known)}")
-        _once("measures", self.measures)
+            raise InputError(f"measures must name at least one of {', '.join(known)}")
+        _check_unique("measures", self.measures)
         for name in self.measures:
             if name not in known:
                 raise InputError(f"no measure {name!r}; there are {', '.join(known)}")
@@ -275,14 +275,16 @@ def decode_study(data: bytes, source: str) -> Study:
 
     Args:
         data: The text, UTF-8.
-        source: What to call it in an error message.
+        source: Name of the text in an error message.
 
     Raises:
         InputError: not JSON, of another schema, with unknown fields, fields given twice or
             unusable values.
     """
     if len(data) > LARGEST_FILE:
-        raise InputError(f"{source}: {len(data)} bytes is no study; they stay below {LARGEST_FILE}")
+        raise InputError(
+            f"{source}: {len(data)} bytes are too many for a study; at most {LARGEST_FILE} are read"
+        )
     return decode_strictly(data, Study, source)
 
 
@@ -292,11 +294,11 @@ def encode_study(study: Study) -> bytes:
 
 
 def load_study(path: str | Path) -> Study:
-    """Return the study in a file, or one that comes along by its name.
+    """Return the study in a file, or a packaged one by its name.
 
     Raises:
-        InputError: a file that holds no study.
-        StorageError: one that cannot be read.
+        InputError: the file holds no study.
+        StorageError: the file cannot be read.
     """
     known = STUDIES.get(str(path))
     if known is not None:
@@ -309,18 +311,18 @@ def load_study(path: str | Path) -> Study:
             f"{', '.join(STUDIES)}"
         ) from None
     except OSError:
-        # Why, is told when it is read.
+        # Reading the file raises an error with the reason.
         pass
     return decode_study(read_at_most(Path(path), LARGEST_FILE), str(path))
 
 
 def study_hash(study: Study) -> str:
-    """Return what tells studies apart: the SHA-256 of the encoded study, in hexadecimal."""
+    """Return the SHA-256 of the encoded study, in hexadecimal; it differs between studies."""
     return hashlib.sha256(encode_study(study)).hexdigest()
 
 
 def _complete(design: Any) -> Design:
-    """Return the design itself, with its home pose so that it does not jump about."""
+    """Return the design itself, with a home pose that stays the same in all designs."""
     if isinstance(design, str):
         if design not in PRESETS:
             raise InputError(
@@ -336,7 +338,7 @@ def _ranges(
 ) -> dict[str, tuple[float, float]]:
     if not given:
         raise InputError(f"{field} must name at least one of {', '.join(known)}")
-    found: dict[str, tuple[float, float]] = {}
+    ranges: dict[str, tuple[float, float]] = {}
     for name, ends in given.items():
         if name not in known:
             raise InputError(f"{field}: no variable {name!r}; there are {', '.join(known)}")
@@ -347,16 +349,16 @@ def _ranges(
                 f"the range of {name} is empty: {low:g} to {high:g}; the low end must lie below "
                 "the high one"
             )
-        found[name] = (low, high)
-    return found
+        ranges[name] = (low, high)
+    return ranges
 
 
-def _within(field: str, value: int, low: int, high: int) -> None:
+def _check_within(field: str, value: int, low: int, high: int) -> None:
     if not low <= value <= high:
         raise InputError(f"{field} must lie within {low} to {high}; got {value}")
 
 
-def _once(field: str, names: Iterable[str]) -> None:
+def _check_unique(field: str, names: Iterable[str]) -> None:
     listed = list(names)
     if len(set(listed)) < len(listed):
         raise InputError(f"{field} may name each once; got {', '.join(listed)}")
@@ -369,4 +371,4 @@ def _load_studies() -> Mapping[str, Study]:
 
 
 STUDIES: Mapping[str, Study] = _load_studies()
-"""The studies that come along, by name."""
+"""Packaged studies by name."""

@@ -1,7 +1,8 @@
 """Processes that evaluate designs, as executors of `concurrent.futures`.
 
-Those of the standard library end all together when one of them dies. Here each has a thread
-and a pipe of its own: a death costs the one task that it had, and the process is started anew.
+The pool of the standard library, and that of loky, fails as a whole when one of its processes
+dies. Here each process has a thread and a pipe of its own: a death costs the one task that the
+process had, and the thread starts another.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import importlib
 import os
+import pickle
 import queue
 import signal
 import sys
@@ -16,11 +18,10 @@ import threading
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Generator
 from concurrent.futures import BrokenExecutor, Executor, Future
-from dataclasses import dataclass
 from multiprocessing import get_context, parent_process
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
-from typing import Any, ParamSpec, TypeVar
+from typing import Any, NamedTuple, ParamSpec, TypeVar
 
 from explorer.errors import InputError
 
@@ -33,12 +34,12 @@ MOST_WORKERS = 1024
 # the processes many.
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
-# How often in a row a process may die while it starts, before no task begins any more; and how
-# many may end by themselves as long as none was ever ready, since it is then no accident.
+# Failed starts in a row after which a task fails, and number of processes that may end by
+# themselves before any was ready: with more of them no process can start.
 STARTS, FIRST_STARTS = 10, 4
 
-# What can go wrong with a pipe to a process that has ended.
-GONE = (EOFError, OSError)
+# Errors of a pipe to a process that has ended.
+PIPE_ERRORS = (EOFError, OSError)
 
 
 class WorkerDiedError(BrokenExecutor):
@@ -46,87 +47,84 @@ class WorkerDiedError(BrokenExecutor):
 
 
 class NoWorkerError(Exception):
-    """No process stays alive until it is ready: a task was never begun."""
+    """A task was never begun, since no process stays alive until it is ready."""
 
 
 class Workers(Executor, ABC):
-    """An executor whose size is known, and how it tells that a worker died."""
+    """An executor with a known size, whose tasks fail in a known way when a worker dies."""
 
     died: tuple[type[BaseException], ...] = (BrokenExecutor,)
-    """What the future of a task raises whose worker died."""
+    """Errors of the future of a task whose worker died."""
 
     task_seconds: float = 0.0
-    """How long a task should take, so that handing it over costs little beside it."""
+    """Shortest duration of a task that repays handing it over, in seconds."""
 
     @property
     @abstractmethod
     def size(self) -> int:
-        """How many tasks run at the same time."""
+        """Number of tasks that run at the same time."""
 
 
-@dataclass(frozen=True)
-class _Task:
+class _Task(NamedTuple):
     future: Future[Any]
-    function: Callable[..., Any]
-    arguments: tuple[Any, ...]
-    options: dict[str, Any]
+    call: tuple[Callable[..., Any], tuple[Any, ...], dict[str, Any]]
 
 
 class LocalWorkers(Workers):
     """Processes on this machine.
 
     Args:
-        size: How many; one for each core that this process may use if None.
+        size: Number of processes; one for each core that this process may use if None.
 
     Raises:
-        InputError: none, or far too many.
+        InputError: fewer than one process, or more than `MOST_WORKERS`.
     """
 
     def __init__(self, size: int | None = None) -> None:
-        wanted = cores() if size is None else size
-        if not 1 <= wanted <= MOST_WORKERS:
-            raise InputError(f"the workers must be from 1 to {MOST_WORKERS}; got {wanted}")
+        count = cores() if size is None else size
+        if not 1 <= count <= MOST_WORKERS:
+            raise InputError(f"the workers must be from 1 to {MOST_WORKERS}; got {count}")
         self._tasks: queue.SimpleQueue[_Task | None] = queue.SimpleQueue()
         self._is_over = threading.Event()
-        # Of the processes, by their thread.
+        # Guards the processes, by the number of their thread.
         self._lock = threading.Lock()
-        self._children: dict[int, _Child] = {}
-        # As long as no process was ever ready, how many ended by themselves before they were.
-        self._was_ready, self._stillborn = False, 0
+        self._children: dict[int, ChildProcess] = {}
+        # Whether any process was ever ready, and how many ended by themselves before.
+        self._was_ready, self._failed_starts = False, 0
         self._threads = [
             threading.Thread(target=self._serve, args=(k,), name=f"worker {k}", daemon=True)
-            for k in range(wanted)
+            for k in range(count)
         ]
         for thread in self._threads:
             thread.start()
 
     @property
     def size(self) -> int:
-        """How many processes there are."""
+        """Number of processes."""
         return len(self._threads)
 
     @property
     def process_ids(self) -> list[int]:
-        """The processes that are there now."""
+        """Ids of the processes that exist now."""
         with self._lock:
             return [child.process_id for child in self._children.values()]
 
     def submit(
         self, fn: Callable[Arguments, Result], /, *args: Arguments.args, **kwargs: Arguments.kwargs
     ) -> Future[Result]:
-        """Have a function called in one of the processes, see `concurrent.futures.Executor`."""
+        """Call a function in one of the processes, see `concurrent.futures.Executor`."""
         if self._is_over.is_set():
             raise RuntimeError("cannot submit after shutdown")
         future: Future[Result] = Future()
-        self._tasks.put(_Task(future, fn, args, kwargs))
+        self._tasks.put(_Task(future, (fn, args, kwargs)))
         return future
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """End the processes.
 
         Args:
-            wait: Until they have ended.
-            cancel_futures: Drop what has not begun, and kill what has.
+            wait: Whether to return only when they have ended.
+            cancel_futures: Whether to drop tasks that have not begun, and kill those that have.
         """
         self._is_over.set()
         if cancel_futures:
@@ -143,7 +141,10 @@ class LocalWorkers(Workers):
                 thread.join()
 
     def _serve(self, number: int) -> None:
-        _keep_interrupts_from_children()
+        """Do tasks with the process of a thread, until there are no more."""
+        if sys.platform != "win32":
+            # A terminal sends Ctrl-C to the children too, which inherit this; the parent ends them.
+            signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
             while (task := self._tasks.get()) is not None:
                 if task.future.set_running_or_notify_cancel():
@@ -153,50 +154,49 @@ class LocalWorkers(Workers):
 
     def _do(self, task: _Task, number: int) -> None:
         try:
-            is_good, value = self._child(number).ask(task)
-        except GONE:
+            is_good, value = self._ready_child(number).call(task.call)
+        except PIPE_ERRORS:
             self._drop(number)
-            task.future.set_exception(WorkerDiedError("the worker process died"))
-        except Exception as error:  # noqa: BLE001 - whoever sent the task is told
-            task.future.set_exception(error)
+            is_good, value = False, WorkerDiedError("the worker process died")
+        except Exception as error:  # noqa: BLE001 - the future raises it
+            is_good, value = False, error
+        if is_good:
+            task.future.set_result(value)
         else:
-            if is_good:
-                task.future.set_result(value)
-            else:
-                task.future.set_exception(value)
+            task.future.set_exception(value)
 
-    def _child(self, number: int) -> _Child:
+    def _ready_child(self, number: int) -> ChildProcess:
         """Return the process of a thread, ready for tasks: a start that fails is no task's fault.
 
         Raises:
-            NoWorkerError: none stays alive until it is ready.
-            WorkerDiedError: it was killed, since no tasks are done any more.
+            NoWorkerError: no process stays alive until it is ready.
+            WorkerDiedError: the process was killed by `shutdown`.
         """
         last = ""
         for _ in range(STARTS):
-            if not self._was_ready and self._stillborn >= max(FIRST_STARTS, self.size):
+            if not self._was_ready and self._failed_starts >= max(FIRST_STARTS, self.size):
                 break
             child = None
             try:
                 with self._lock:
                     child = self._children.get(number)
                     if child is None:
-                        child = self._children[number] = _Child()
+                        child = self._children[number] = ChildProcess()
                 child.wait_until_ready()
-            except GONE as error:
+            except PIPE_ERRORS as error:
                 last = f" ({error})" if str(error) else ""
-                # Who kills one of them need not mean them all.
+                # That a process was killed does not mean that others cannot start.
                 is_own_fault = child is None or not child.was_killed()
                 self._drop(number)
                 if self._is_over.is_set():
                     raise WorkerDiedError("the worker process was ended") from None
                 with self._lock:
-                    self._stillborn += is_own_fault
+                    self._failed_starts += is_own_fault
             else:
                 self._was_ready = True
                 return child
         raise NoWorkerError(
-            f"no worker process stays alive until it is ready{last}; what they wrote tells why. A "
+            f"no worker process stays alive until it is ready{last}; see what they wrote. A "
             "script must be a file and start workers only below if __name__ == '__main__', since "
             "each of them imports it"
         )
@@ -209,56 +209,52 @@ class LocalWorkers(Workers):
             child.end()
 
 
-class _Child:
-    """A process and the pipe to it."""
+class ChildProcess:
+    """A process that answers calls over a pipe, and ends with its parent."""
 
     def __init__(self) -> None:
         context = get_context("spawn")
-        self._pipe, other = context.Pipe()
+        self._pipe, child_end = context.Pipe()
         self._process: SpawnProcess = context.Process(
-            target=_answer, args=(other,), name="explorer worker", daemon=True
+            target=_answer_calls, args=(child_end,), name="explorer worker", daemon=True
         )
         with _one_thread_each():
             self._process.start()
-        # Held here too, its end would not be seen.
-        other.close()
+        # While the parent holds the child's end too, it does not see the child close it.
+        child_end.close()
         self._is_ready = False
 
     @property
     def process_id(self) -> int:
+        """Id of the process."""
         return self._process.pid or 0
 
     def wait_until_ready(self) -> None:
-        """Wait until it has loaded what tasks need.
-
-        Raises:
-            EOFError: the process died.
-            OSError: likewise.
-        """
+        """Wait for the first message; raise one of `PIPE_ERRORS` if the process died."""
         if not self._is_ready:
             self._pipe.recv()
             self._is_ready = True
 
-    def ask(self, task: _Task) -> tuple[bool, Any]:
-        """Return whether a task ended well, and its result or what it raised.
+    def call(self, call: object) -> tuple[bool, Any]:
+        """Return whether a call succeeded, and its result or error.
 
-        Raises:
-            EOFError: the process died.
-            OSError: likewise.
+        Raises one of `PIPE_ERRORS` if the process died.
         """
-        self._pipe.send((task.function, task.arguments, task.options))
+        self._pipe.send(call)
         return self._pipe.recv()
 
     def was_killed(self) -> bool:
-        """Whether the process, which has died, was ended by a signal rather than by itself."""
-        # What ends by itself closes its pipe a little earlier.
+        """Return whether a signal ended the process, which is dead, rather than itself."""
+        # A process that ends by itself closes its pipe a little earlier.
         self._process.join(1.0)
         return (self._process.exitcode or 0) < 0
 
     def kill(self) -> None:
+        """Kill the process."""
         self._process.kill()
 
     def end(self) -> None:
+        """Kill the process, wait for its end and close the pipe."""
         self._process.kill()
         self._process.join()
         self._process.close()
@@ -266,7 +262,7 @@ class _Child:
 
 
 def cores() -> int:
-    """Return how many cores this process may use."""
+    """Return the number of cores that this process may use."""
     if sys.platform == "linux":
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
@@ -274,61 +270,47 @@ def cores() -> int:
 
 @contextlib.contextmanager
 def _one_thread_each() -> Generator[None]:
-    """Have processes that are started meanwhile use one thread each.
+    """Limit processes started within a `with` block to one thread each.
 
-    It must stand in the environment that they begin with: what a script of the user's
-    imports is imported in them first.
+    Their environment must say so from the start, since they import the user's script first.
     """
-    kept = {name: os.environ.get(name) for name in ONE_THREAD}
+    previous = {name: os.environ.get(name) for name in ONE_THREAD}
     os.environ.update(dict.fromkeys(ONE_THREAD, "1"))
     try:
         yield
     finally:
-        for name, value in kept.items():
+        for name, value in previous.items():
             if value is None:
                 del os.environ[name]
             else:
                 os.environ[name] = value
 
 
-def _keep_interrupts_from_children() -> None:
-    """Block Ctrl-C in this thread and in the processes that it starts, which inherit that.
-
-    A terminal sends it to all of them; it is the parent who ends them.
-    """
-    if sys.platform != "win32":
-        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-
-
-def _answer(pipe: Connection) -> None:
-    """Call what is asked for until the pipe is closed: the life of a worker process."""
+def _answer_calls(pipe: Connection) -> None:
+    """Call the functions that come over a pipe until it is closed; all that a worker does."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    importlib.import_module("explorer.sweep.rows").ready()
+    importlib.import_module("explorer.sweep.rows").load_common()
     pipe.send(None)
-    while True:
-        try:
-            function, arguments, options = pipe.recv()
-        except GONE:
-            return
-        except Exception as error:  # noqa: BLE001 - a task that cannot be read is told as such
-            answer = False, error
-        else:
-            answer = _called(function, arguments, options)
-        try:
-            pipe.send(answer)
-        except GONE:
-            return
-        except Exception as error:  # noqa: BLE001 - nor can every result be sent
-            pipe.send((False, RuntimeError(f"the result cannot be sent: {error}")))
+    # The parent closes the pipe when it ends this process.
+    with contextlib.suppress(*PIPE_ERRORS):
+        while True:
+            answer = _next_answer(pipe)
+            try:
+                pipe.send(answer)
+            except PIPE_ERRORS:
+                raise
+            except Exception as error:  # noqa: BLE001 - not every result can be sent
+                pipe.send((False, RuntimeError(f"the result cannot be sent: {error}")))
 
 
-def _called(
-    function: Callable[..., Any], arguments: tuple[Any, ...], options: dict[str, Any]
-) -> tuple[bool, Any]:
+def _next_answer(pipe: Connection) -> tuple[bool, Any]:
+    """Return whether the next call succeeded, and its result or error."""
+    data = pipe.recv_bytes()
     try:
+        function, arguments, options = pickle.loads(data)  # noqa: S301 - over a pipe of our own
         return True, function(*arguments, **options)
-    except Exception as error:  # noqa: BLE001 - the parent raises it
+    except Exception as error:  # noqa: BLE001 - the parent's future raises it
         return False, error
 
 

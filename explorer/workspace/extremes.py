@@ -1,8 +1,7 @@
 """The extent of a workspace, and the least margins within it.
 
-Margins are linear in the position, so both are extremes of linear functions over a solid. The
-best vertex of its mesh is the start of a descent on the exact limits, which ends on the true
-surface.
+Margins are linear in the position, so both are extremes of linear functions over a solid. A
+descent on the exact limits starts at the best vertex of its mesh and ends on the true surface.
 """
 
 from __future__ import annotations
@@ -19,24 +18,19 @@ from explorer.workspace.limits.constraints import Cone, Constraint, constraints,
 from explorer.workspace.solids.solid import Solid
 
 # Tolerance of a limit, over the reach.
-KEPT = 1e-9
+LIMIT_TOLERANCE = 1e-9
 # Error of a vertex, over the mesh's tolerance, where surfaces meet at a small angle.
-OFF = 4.0
+VERTEX_ERROR = 4.0
 
 
 def farthest(
     design: Design, rotation: ArrayLike, solid: Solid, directions: ArrayLike
 ) -> FloatArray:
-    """Return the largest direction · p over a workspace, shape (k,), in design units.
+    """Return the largest direction · p over a workspace that is not empty, in design units.
 
     It is exact where the descent ends within a few tolerances of the mesh, as it does unless
-    surfaces touch; otherwise it is the value of the mesh.
-
-    Args:
-        design: The manipulator.
-        rotation: Rotation from platform to base, shape (3, 3).
-        solid: Workspace at this orientation; not empty.
-        directions: Directions, shape (k, 3), none of them zero.
+    surfaces touch; otherwise it is the value of the mesh. Directions have the shape (k, 3), none
+    of them zero; results have the shape (k,).
 
     Raises:
         InputError: not a rotation, or directions that are not finite.
@@ -49,12 +43,7 @@ def farthest(
 
 
 def extent_of(design: Design, rotation: ArrayLike, solid: Solid) -> tuple[FloatArray, FloatArray]:
-    """Return (lows, highs) of a workspace on the three axes, each (3,), in design units.
-
-    Args:
-        design: The manipulator.
-        rotation: Rotation from platform to base, shape (3, 3).
-        solid: Workspace at this orientation; not empty.
+    """Return (lows, highs) of a workspace that is not empty, each (3,), in design units.
 
     Raises:
         InputError: not a rotation.
@@ -64,12 +53,7 @@ def extent_of(design: Design, rotation: ArrayLike, solid: Solid) -> tuple[FloatA
 
 
 def least_margins(design: Design, rotation: ArrayLike, solid: Solid) -> FloatArray:
-    """Return the least |δ1|, |δ2| and |δ3| over a workspace, shape (3,), in design units.
-
-    Args:
-        design: The manipulator.
-        rotation: Rotation from platform to base, shape (3, 3).
-        solid: Workspace at this orientation; not empty.
+    """Return the least |δ1|, |δ2| and |δ3| over a workspace that is not empty, in design units.
 
     Raises:
         InputError: not a rotation.
@@ -83,27 +67,22 @@ def least_margins(design: Design, rotation: ArrayLike, solid: Solid) -> FloatArr
         if ((corners > 0.0).any(axis=1) & (corners < 0.0).any(axis=1)).any():
             # The singular plane cuts the workspace.
             continue
-        # The parts on either side of the plane are taken one by one.
+        # The parts of the workspace on either side of the plane are measured one by one.
         nearest = [
-            -float(farthest(design, rotation, _part(solid, off >= 0.0), [-side * normal])[0])
+            -float(farthest(design, rotation, _part(solid, distances >= 0.0), [-side * normal])[0])
             for side in (-1.0, 1.0)
-            for off in [side * values]
-            if (off > 0.0).any()
+            for distances in [side * values]
+            if (distances > 0.0).any()
         ]
         least[index] = max(0.0, min(nearest, default=0.0))
-    least[least <= KEPT * design.reach] = 0.0
+    least[least <= LIMIT_TOLERANCE * design.reach] = 0.0
     return least
 
 
-def _part(solid: Solid, kept: BoolArray) -> Solid:
+def _part(solid: Solid, chosen: BoolArray) -> Solid:
     """Return a solid with some of the vertices and no faces, enough for `farthest`."""
-    return Solid(
-        solid.vertices[kept],
-        np.zeros((0, 3), dtype=np.int32),
-        np.zeros(0, dtype=np.int64),
-        solid.limits,
-        solid.tolerance,
-    )
+    faces, limit_of_face = np.zeros((0, 3), dtype=np.int32), np.zeros(0, dtype=np.int64)
+    return Solid(solid.vertices[chosen], faces, limit_of_face, solid.limits, solid.tolerance)
 
 
 def _farthest(
@@ -113,25 +92,25 @@ def _farthest(
     along = solid.vertices @ unit
     corner = int(along.argmax())
     start, end = solid.vertices[corner], float(along[corner])
-    off = OFF * solid.tolerance
-    near = tuple(limit for limit in limits if float(limit.distance(start)) <= off)
+    error = VERTEX_ERROR * solid.tolerance
+    near = tuple(limit for limit in limits if float(limit.distance(start)) <= error)
 
-    def away(p: FloatArray) -> tuple[float, FloatArray]:
+    def objective(p: FloatArray) -> tuple[float, FloatArray]:
         return -float(p @ unit), -unit
 
-    # The limits at the vertex bound the solid there, unless a surface is so curved that others do.
+    # The limits near the vertex bound the solid there, unless a surface is strongly curved.
     for bounding in (near, limits):
 
-        def kept(p: FloatArray, bounding: tuple[Constraint, ...] = bounding) -> FloatArray:
+        def limit_shares(p: FloatArray, bounding: tuple[Constraint, ...] = bounding) -> FloatArray:
             return _shares(bounding, p * reach, reach)
 
-        at = descend(away, kept, start / reach) if bounding else None
-        if at is None:
+        optimum = descend(objective, limit_shares, start / reach) if bounding else None
+        if optimum is None:
             continue
-        found = float(at @ unit) * reach
-        within = float(_shares(limits, at * reach, reach).min()) >= -KEPT
-        if within and abs(found - end) <= off + KEPT * reach:
-            return found
+        value = float(optimum @ unit) * reach
+        within = float(_shares(limits, optimum * reach, reach).min()) >= -LIMIT_TOLERANCE
+        if within and abs(value - end) <= error + LIMIT_TOLERANCE * reach:
+            return value
     return end
 
 

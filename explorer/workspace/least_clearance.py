@@ -10,6 +10,8 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +25,7 @@ from explorer.legs.clearance import (
     radii_of_pairs,
 )
 from explorer.mechanism.design import Design
+from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.descent import descend
@@ -33,9 +36,11 @@ from explorer.workspace.slices.volume import bounds, home_rotation
 # Tolerance of a least clearance, over the reach.
 DEFAULT_TOLERANCE = 1e-4
 # Number of cells on each axis at first, and the largest number of cells that a pair may have
-# left to divide; beyond that, the bound of the pair is the least bound of those cells.
+# left to divide; if more are left, the bound of the pair is the least bound of those cells.
 FIRST_CELLS = 8
 MOST_CELLS = 10_000
+# Largest number of cells whose clearances are computed at once.
+BATCH = 10_000
 
 # Distance, over the reach, at which axes count as crossing; also the tolerance of a limit.
 CROSSING = 1e-9
@@ -69,6 +74,9 @@ def least_clearances(
     tolerance: float | None = None,
     *,
     only_least: bool = False,
+    below: float = math.inf,
+    margin: float = 0.0,
+    before_each: Callable[[], None] = lambda: None,
 ) -> LeastClearances:
     """Return the least clearances in the constant-orientation workspace.
 
@@ -79,100 +87,117 @@ def least_clearances(
             10,000th of the reach if None. It is exceeded where too many cells are left.
         only_least: Whether to resolve the least of the six alone, which takes far less time;
             the other clearances and bounds still hold, but may differ by more.
+        below: Clearance, in design units, from which on none is resolved. A pair that is nowhere
+            closer has the clearance inf; other pairs have positions strictly within limits.
+        margin: Least |δ| of the positions that count, in design units.
+        before_each: Function that is called before each batch of cells; it may raise.
 
     Raises:
         InputError: not a rotation.
     """
     r = home_rotation(design) if rotation is None else checked_rotation(rotation)
-    finest = tolerance or DEFAULT_TOLERANCE * design.reach
-    limits = constraints(design, r)
+    resolution = tolerance or DEFAULT_TOLERANCE * design.reach
+    domain = _Domain(design, r, constraints(design, r), margin)
     radii, joined = radii_of_pairs(design), joined_pairs(design)
-    best = np.full(len(PAIRS), math.inf)
-    places = np.full((len(PAIRS), 3), math.nan)
+    best = np.where(joined, math.inf, below + radii)
+    positions = np.full((len(PAIRS), 3), math.nan)
     # The least bound of the cells of each pair that are not divided any further.
-    bounded = np.full(len(PAIRS), math.inf)
-    lows, highs = bounds(region_of(limits))
-    if any(isinstance(limit, Never) for limit in limits) or not (lows < highs).all():
-        return LeastClearances(best, bounded, places)
-    # Legs 2 and 3 are perpendicular to the guide: the planes of both keep their distance.
-    floor = np.zeros(len(PAIRS))
-    floor[PAIRS.index((2, 3))] = abs((design.b3 - design.b2) * float(r[0, 0]))
+    settled = np.full(len(PAIRS), math.inf)
+    lows, highs = bounds(region_of(domain.limits))
+    if any(isinstance(limit, Never) for limit in domain.limits) or not (lows < highs).all():
+        return LeastClearances(settled, settled, positions)
+    # Legs 2 and 3 lie in planes across the guide, whose distance is the same at every position.
+    plane_distance = np.zeros(len(PAIRS))
+    plane_distance[PAIRS.index((2, 3))] = abs((design.b3 - design.b2) * float(r[0, 0]))
     size = (highs - lows) / FIRST_CELLS
-    middles = lows + size * (
-        np.stack(np.meshgrid(*[np.arange(FIRST_CELLS)] * 3, indexing="ij"), axis=-1) + 0.5
-    ).reshape(-1, 3)
+    middles = lows + size * (np.indices((FIRST_CELLS,) * 3).reshape(3, -1).T + 0.5)
     # Pairs whose bounds can still be raised.
     is_open = ~joined
     while len(middles):
         half = 0.5 * float(np.linalg.norm(size))
-        slack = np.stack([_distance_within(limit, middles) for limit in limits], axis=-1)
-        near = np.asarray((slack >= -half).all(axis=-1))
-        middles, slack = middles[near], slack[near]
-        distance = leg_clearances(design, middles, r).distance
-        inside = np.flatnonzero((slack >= 0.0).all(axis=-1))
+        slack = domain.least_slacks(middles)
+        middles, slack = middles[slack >= -half], slack[slack >= -half]
+        distance = np.zeros((0, len(PAIRS)))
+        for part in np.array_split(middles, 1 + len(middles) // BATCH):
+            before_each()
+            distance = np.vstack([distance, leg_clearances(design, part, r).distance])
+        inside = np.flatnonzero(slack >= 0.0)
         if len(inside):
             least = inside[distance[inside].argmin(axis=0)]
             attained = distance[least, np.arange(len(PAIRS))]
-            better = ~joined & (attained < best)
-            best[better], places[better] = attained[better], middles[least[better]]
+            better = attained < best
+            best[better], positions[better] = attained[better], middles[least[better]]
             if only_least:
                 # The lower the least clearance so far, the more cells are ruled out by it.
                 pair = int((best - radii).argmin())
-                if better[pair] and best[pair] > floor[pair]:
-                    best[pair], places[pair] = _descend(
-                        design, r, limits, pair, best[pair], places[pair]
-                    )
+                if better[pair] and best[pair] > plane_distance[pair]:
+                    best[pair], positions[pair] = domain.descend(pair, best[pair], positions[pair])
                     if best[pair] <= CROSSING * design.reach:
                         best[pair] = 0.0
-        low = np.maximum(distance - half, floor)
-        top = (best - radii).min() + radii if only_least else best
-        divides = is_open & (low < top - finest)
+        low = np.maximum(distance - half, plane_distance)
+        largest = (best - radii).min() + radii if only_least else best
+        divides = is_open & (low < largest - resolution)
         is_open = is_open & (divides.sum(axis=0) <= MOST_CELLS)
         divides = divides & is_open
-        bounded = np.minimum(bounded, np.where(divides, math.inf, low).min(axis=0, initial=np.inf))
+        settled = np.minimum(settled, np.where(divides, math.inf, low).min(axis=0, initial=np.inf))
         size = 0.5 * size
         divided = divides.any(axis=-1)
         middles = (middles[divided][:, None, :] + size * CORNERS).reshape(-1, 3)
-    if not only_least:
-        for pair in np.flatnonzero(np.isfinite(best) & (best > floor)).tolist():
-            best[pair], places[pair] = _descend(design, r, limits, pair, best[pair], places[pair])
+    is_attained = ~np.isnan(positions[:, 0])
+    best[~is_attained] = math.inf
+    if not only_least and math.isinf(below):
+        for pair in np.flatnonzero(is_attained & (best > plane_distance)).tolist():
+            best[pair], positions[pair] = domain.descend(pair, best[pair], positions[pair])
     best[best <= CROSSING * design.reach] = 0.0
-    places[np.abs(places) <= CROSSING * design.reach] = 0.0
-    bound = np.where(joined, math.inf, np.minimum(bounded, best))
-    return LeastClearances(best - radii, bound - radii, places)
+    positions[np.abs(positions) <= CROSSING * design.reach] = 0.0
+    bound = np.where(joined, math.inf, np.minimum(settled, best))
+    return LeastClearances(best - radii, bound - radii, positions)
 
 
-def _distance_within(limit: Constraint, p: FloatArray) -> FloatArray:
-    """Return signed distances of positions (..., 3) within a limit, or upper bounds of them."""
-    if isinstance(limit, HalfSpace):
-        return limit.slack(p) / float(np.linalg.norm(limit.normal))
-    slack = limit.slack(p)
-    # The slack of a cone is an angle, not a distance; only its sign is used.
-    return np.where(slack >= 0.0, math.inf, -0.0) if isinstance(limit, Cone) else slack
+@dataclass(frozen=True)
+class _Domain:
+    """The positions that count: those within the limits and off the singular planes."""
 
+    design: Design
+    rotation: FloatArray
+    limits: tuple[Constraint, ...]
+    margin: float
 
-def _descend(
-    design: Design,
-    rotation: FloatArray,
-    limits: tuple[Constraint, ...],
-    pair: int,
-    least: float,
-    place: FloatArray,
-) -> tuple[float, FloatArray]:
-    """Return the least distance near a place within the limits, and where it is attained."""
-    reach = design.reach
+    def least_slacks(self, p: FloatArray) -> FloatArray:
+        """Return signed distances of positions (n, 3) within the domain, or their upper bounds."""
+        least = self._spare_margins(p).min(axis=-1, initial=math.inf)
+        for limit in self.limits:
+            slack = limit.slack(p)
+            if isinstance(limit, HalfSpace):
+                slack = slack / float(np.linalg.norm(limit.normal))
+            elif isinstance(limit, Cone):
+                # The slack of a cone is an angle, not a distance; only its sign is used.
+                slack = np.where(slack >= 0.0, math.inf, -math.ulp(0.0))
+            least = np.minimum(least, slack)
+        return least
 
-    def distance(p: FloatArray) -> tuple[float, FloatArray]:
-        found = leg_clearances(design, p * reach, rotation)
-        gradient = distance_gradients(design, p * reach, rotation, found)
-        return float(found.distance[pair]) / reach, gradient[pair]
+    def descend(self, pair: int, least: float, position: FloatArray) -> tuple[float, FloatArray]:
+        """Return the least distance near a position in the domain, and where it is attained."""
+        design, reach = self.design, self.design.reach
 
-    def kept(p: FloatArray) -> FloatArray:
-        return np.array([float(limit.slack(p * reach)) for limit in limits]) / reach
+        def distance(p: FloatArray) -> tuple[float, FloatArray]:
+            clearances = leg_clearances(design, p * reach, self.rotation)
+            gradient = distance_gradients(design, p * reach, self.rotation, clearances)
+            return float(clearances.distance[pair]) / reach, gradient[pair]
 
-    at = descend(distance, kept, place / reach)
-    if at is not None and (kept(at) >= -CROSSING).all():
-        value = distance(at)[0] * reach
-        if value < least:
-            return value, at * reach
-    return least, place
+        def slacks(p: FloatArray) -> FloatArray:
+            of_limits = [float(limit.slack(p * reach)) for limit in self.limits]
+            return np.array([*of_limits, *self._spare_margins(p * reach)]) / reach
+
+        optimum = descend(distance, slacks, position / reach)
+        if optimum is not None and (slacks(optimum) >= -CROSSING).all():
+            value = distance(optimum)[0] * reach
+            if value < least:
+                return value, optimum * reach
+        return least, position
+
+    def _spare_margins(self, p: FloatArray) -> FloatArray:
+        """Return |δ| less the margin at positions (..., 3), shape (..., 3); (..., 0) if it is 0."""
+        if not self.margin:
+            return np.zeros((*p.shape[:-1], 0))
+        return np.abs(margins(p, self.rotation)) - self.margin

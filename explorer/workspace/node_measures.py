@@ -85,35 +85,24 @@ def node_measures(
     r = home_rotation(design) if rotation is None else checked_rotation(rotation)
     region = region_of(constraints(design, r))
     lows, highs = bounds(region)
-    found, within = np.zeros(RESULTS), np.zeros((nodes, nodes, nodes), dtype=np.bool_)
+    results, within = np.zeros(RESULTS), np.zeros((nodes, nodes, nodes), dtype=np.bool_)
     step = (highs - lows) / nodes
     is_empty = region.is_empty or not (lows < highs).all()
     if not is_empty:
         row = np.zeros(LENGTH_LOWS)
         row[:] = design.variables
         radii = np.where(joined_pairs(design), -math.inf, radii_of_pairs(design))
-        measure_nodes(
-            nodes**3,
-            region.circles,
-            region.planes,
-            region.cones,
-            lows + 0.5 * step,
-            step,
-            row,
-            np.array(r),
-            radii,
-            clearance_margin,
-            within,
-            found,
-        )
-    count = float(found[COUNT])
+        grid, pose = (lows + 0.5 * step, step), (row, np.array(r))
+        rows = region.rows
+        measure_nodes(nodes**3, *rows, *grid, *pose, radii, clearance_margin, within, results)
+    count = float(results[COUNT])
     return NodeMeasures(
         positions=lows + (np.argwhere(within) + 0.5) * step if count else np.zeros((0, 3)),
-        extent=(found[HIGHS:LEAST] - found[LOWS:HIGHS]) * step if count else np.full(3, np.nan),
-        margins=found[LEAST:MEAN].copy() if count else np.full(3, np.nan),
-        mean_margin=float(found[MEAN]) / count if count else math.nan,
-        clearances=found[DISTANCES:] if found[OFF_PLANES] else np.full(len(PAIRS), math.inf),
-        clear_share=float(found[CLEAR]) / count if count else math.nan,
+        extent=(results[HIGHS:LEAST] - results[LOWS:HIGHS]) * step if count else np.full(3, np.nan),
+        margins=results[LEAST:MEAN].copy() if count else np.full(3, np.nan),
+        mean_margin=float(results[MEAN]) / count if count else math.nan,
+        clearances=results[DISTANCES:] if results[OFF_PLANES] else np.full(len(PAIRS), math.inf),
+        clear_share=float(results[CLEAR]) / count if count else math.nan,
     )
 
 
@@ -122,7 +111,7 @@ def node_measures(
     "b1[:,:,::1], f8[::1])"
 )
 def measure_nodes(  # noqa: PLR0917 - a compiled loop takes plain values
-    rounds: FloatArray,
+    circles: FloatArray,
     planes: FloatArray,
     cones: FloatArray,
     first: FloatArray,
@@ -132,12 +121,12 @@ def measure_nodes(  # noqa: PLR0917 - a compiled loop takes plain values
     radii: FloatArray,
     margin: float,
     within: BoolArray,
-    found: FloatArray,
+    results: FloatArray,
 ) -> None:
-    """Write the measures at all nodes.
+    """Write whether each node is in a region, shape (n, n, n), and measures of those that are.
 
     Args:
-        rounds: Balls and cylinders of the region, shape (n, 6).
+        circles: Balls and cylinders of the region, shape (n, 6).
         planes: Planes of the region, shape (m, 4).
         cones: Cones of the region, shape (k, 8).
         first: Position of the first node, shape (3,).
@@ -147,54 +136,57 @@ def measure_nodes(  # noqa: PLR0917 - a compiled loop takes plain values
         radii: Sum of the two radii of each pair, shape (6,); -inf for a pair to leave out.
         margin: Least |δ| of nodes at which clearances count.
         within: Written: whether a node is in the region, shape (n, n, n).
-        found: Written, shape (RESULTS,): number of nodes in the region, their lowest and
+        results: Written, shape (RESULTS,): number of nodes in the region, their lowest and
             highest indices, least margins, sum of the smallest margins, number of nodes off
             the singular planes, number with clear legs, least clearances of the pairs.
     """
     p, base, ends = np.zeros(3), np.zeros((4, 3)), np.zeros((4, 3))
-    found[:] = 0.0
-    found[LOWS:MEAN] = np.inf
-    found[HIGHS:LEAST] = -1.0
-    found[DISTANCES:] = np.inf
+    results[:] = 0.0
+    results[LOWS:MEAN] = np.inf
+    results[HIGHS:LEAST] = -1.0
+    results[DISTANCES:] = np.inf
     for i in range(within.shape[0]):
         p[0] = first[0] + i * step[0]
         for j in range(within.shape[1]):
             p[1] = first[1] + j * step[1]
             for k in range(within.shape[2]):
                 p[2] = first[2] + k * step[2]
-                within[i, j, k] = is_within(p[0], p[1], p[2], rounds, planes, cones, 0.0)
+                within[i, j, k] = is_within(p[0], p[1], p[2], circles, planes, cones, 0.0)
                 if not within[i, j, k]:
                     continue
-                found[COUNT] += 1.0
+                results[COUNT] += 1.0
                 for axis in range(3):
-                    at = float(i if axis == 0 else (j if axis == 1 else k))
-                    found[LOWS + axis] = min(found[LOWS + axis], at)
-                    found[HIGHS + axis] = max(found[HIGHS + axis], at)
+                    index = float(i if axis == 0 else (j if axis == 1 else k))
+                    results[LOWS + axis] = min(results[LOWS + axis], index)
+                    results[HIGHS + axis] = max(results[HIGHS + axis], index)
                 delta1 = abs(r[0, 2] * p[0] + r[1, 2] * p[1] + r[2, 2] * p[2])
                 delta2 = abs(r[1, 0] * p[2] - r[2, 0] * p[1])
                 delta3 = abs(p[2])
-                found[LEAST] = min(found[LEAST], delta1)
-                found[LEAST + 1] = min(found[LEAST + 1], delta2)
-                found[LEAST + 2] = min(found[LEAST + 2], delta3)
+                results[LEAST] = min(results[LEAST], delta1)
+                results[LEAST + 1] = min(results[LEAST + 1], delta2)
+                results[LEAST + 2] = min(results[LEAST + 2], delta3)
                 smallest = min(delta1, delta2, delta3)
-                found[MEAN] += smallest
-                counts = smallest >= margin
-                if counts:
-                    found[OFF_PLANES] += 1.0
+                results[MEAN] += smallest
+                is_off_planes = smallest >= margin
+                if is_off_planes:
+                    results[OFF_PLANES] += 1.0
                 write_ends(row, p, r, base, ends)
                 pair, is_clear = DISTANCES, True
                 for one in range(3):
                     for other in range(one + 1, 4):
-                        both = radii[pair - DISTANCES]
-                        if both >= 0.0:
-                            start, far = vector(base, one), vector(base, other)
-                            u, v = minus(vector(ends, one), start), minus(vector(ends, other), far)
-                            w = minus(start, far)
+                        radius = radii[pair - DISTANCES]
+                        if radius >= 0.0:
+                            first_base, second_base = vector(base, one), vector(base, other)
+                            u, v = (
+                                minus(vector(ends, one), first_base),
+                                minus(vector(ends, other), second_base),
+                            )
+                            w = minus(first_base, second_base)
                             s, t = closest_shares(u, v, w)
-                            clearance = math.sqrt(square_at(s, t, u, v, w)) - both
+                            clearance = math.sqrt(square_at(s, t, u, v, w)) - radius
                             is_clear = is_clear and clearance > 0.0
-                            if counts:
-                                found[pair] = min(found[pair], clearance)
+                            if is_off_planes:
+                                results[pair] = min(results[pair], clearance)
                         pair += 1
                 if is_clear:
-                    found[CLEAR] += 1.0
+                    results[CLEAR] += 1.0

@@ -1,4 +1,4 @@
-"""What the tests of the page share: a server without a browser, and a session with hands."""
+"""What the tests of the page share: a server without a browser, a session, and services."""
 
 from __future__ import annotations
 
@@ -7,9 +7,13 @@ from collections.abc import Generator
 import pytest
 import viser
 from desk import Desk
+from services import StubWorker, services_for
 
 from explorer.app.browser.viser_gaps import start_viser, stop_viser
+from explorer.app.features.feature import Services
+from explorer.app.session.jobs import Worker
 from explorer.app.state.state import opened
+from explorer.app.widgets.buttons import Buttons
 from explorer.mechanism.design_file import PRESETS
 
 
@@ -21,7 +25,30 @@ def server() -> Generator[viser.ViserServer]:
 
 
 @pytest.fixture
+def buttons(server: viser.ViserServer) -> Generator[Buttons]:
+    made = Buttons(server)
+    yield made
+    made.stop()
+
+
+@pytest.fixture
 def desk() -> Generator[Desk]:
     made = Desk(opened(PRESETS["paper-optimal"]))
     yield made
     made.session.stop()
+
+
+@pytest.fixture
+def worker() -> Generator[StubWorker]:
+    made = StubWorker()
+    yield made
+    made.stop()
+
+
+@pytest.fixture
+def services(
+    server: viser.ViserServer, desk: Desk, worker: Worker, buttons: Buttons
+) -> Generator[Services]:
+    made = services_for(server, desk.session, worker, buttons=buttons, complain=desk.complain)
+    yield made
+    made.stop()

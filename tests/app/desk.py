@@ -1,26 +1,37 @@
-"""A session with hands: what the tests of the panels share."""
+"""A session whose controls are used, and what else the tests of the panels share."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any
 
 import msgspec
 import viser
 
-from explorer.app.session.session import Session
-from explorer.app.state.actions import SetLimits
+from explorer.app.session.session import Session, Who
+from explorer.app.state.actions import Set
 from explorer.app.state.state import State
+from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.buttons import Buttons
+
+
+class Browser:
+    """A browser, as far as the buttons in markup know one."""
+
+    client_id = 1
+
+
+CLIENT: Any = Browser()
 
 
 class Desk:
-    """A session whose complaints are kept, and hands that use the page's controls."""
+    """A session whose complaints are kept, and ways to use the controls of a page."""
 
     def __init__(self, state: State) -> None:
         self.complaints: list[str] = []
-        self.session = Session(
-            state, lambda _: None, lambda message, _: self.complaints.append(message), self._fail
-        )
+        self.session = Session(state, lambda _: None, self.complain, self._fail)
 
     @property
     def state(self) -> State:
@@ -38,6 +49,15 @@ class Desk:
         for callback in handle._impl.update_cb:
             callback(event)
 
+    def press(self, buttons: Buttons, name: str, value: object = "") -> None:
+        """Press a button in markup."""
+        buttons.press(name, str(value), CLIENT)
+
+    def complain(self, message: str, who: Who = None) -> None:
+        """Keep a complaint, whoever it is for."""
+        del who
+        self.complaints.append(message)
+
     def _fail(self, error: Exception) -> None:
         raise error
 
@@ -46,7 +66,20 @@ def thick(state: State, *radii: float) -> State:
     """Return the state with radii of the legs: four, or one for all."""
     r1, r2, r3, r4 = radii if len(radii) == 4 else radii * 4
     limits = msgspec.structs.replace(state.design.limits, leg_radii=(r1, r2, r3, r4))
-    return SetLimits(limits).apply(state)
+    return Set("design.limits", limits).apply(state)
+
+
+def viewed(state: State, **changes: Any) -> State:
+    """Return the state with other values of what is shown."""
+    return Set("view", replace(state.view, **changes)).apply(state)
+
+
+def by_name(updates: Iterable[Update]) -> dict[str, dict[str, Any]]:
+    """Return the values that are assigned, by the names of node and property."""
+    found: dict[str, dict[str, Any]] = {}
+    for handle, name, value in updates:
+        found.setdefault(handle.name, {})[name] = value
+    return found
 
 
 def rows_of(html: str) -> list[list[str]]:

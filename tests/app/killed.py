@@ -1,4 +1,4 @@
-"""Writers of a session that are killed at random moments, and what they leave behind.
+"""Writers of a session that are killed at random moments, and the files that they leave.
 
 Run as `python killed.py FOLDER KILLS SEED`; prints one JSON object. Writers are forked, so that
 one process with all that it imported serves for many of them.
@@ -13,12 +13,14 @@ import signal
 import struct
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
+from explorer.app.session.history import History, Step
 from explorer.app.state.actions import SetPosition
 from explorer.app.state.state import opened
-from explorer.app.storage.autosave import Autosave
-from explorer.app.storage.document import Document, Kept, decode_document, decode_header
+from explorer.app.storage.session_file import SessionFile
+from explorer.app.storage.session_format import decode_header, decode_session
 from explorer.mechanism.design_file import PRESETS
 
 ACKNOWLEDGED = struct.Struct("qq")
@@ -29,24 +31,24 @@ LONGEST = 0.04
 def main(folder: Path, kills: int, seed: int) -> None:
     """Kill so many writers, and look at the folder after each."""
     chance = random.Random(seed)
-    documents = history()
+    samples = histories()
     seen, saves, ends = (0, 0), 0, 0
     for number in range(kills):
         reading, writing = os.pipe()
         child = os.fork()
         if child == 0:
             os.close(reading)
-            write_on(folder, documents, writing)
+            write_on(folder, samples, writing)
         os.close(writing)
-        # Some while they start, most while they write, however slow the machine is.
-        told = os.read(reading, ACKNOWLEDGED.size) if number % 5 else b""
+        # Some are killed while they start, most while they write, however slow the machine is.
+        sent = os.read(reading, ACKNOWLEDGED.size) if number % 5 else b""
         time.sleep(chance.uniform(0.0, LONGEST))
         os.kill(child, signal.SIGKILL)
         ends += os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == -signal.SIGKILL
         with os.fdopen(reading, "rb") as pipe:
-            told += pipe.read()
-        # What is acknowledged comes in whole: it is shorter than a pipe takes at once.
-        acknowledged = list(ACKNOWLEDGED.iter_unpack(told))
+            sent += pipe.read()
+        # Each acknowledgement arrives whole: it is shorter than a pipe takes at once.
+        acknowledged = list(ACKNOWLEDGED.iter_unpack(sent))
         saves += len(acknowledged)
         last = max([seen, *acknowledged])
         seen = max(seen, look(folder))
@@ -54,24 +56,24 @@ def main(folder: Path, kills: int, seed: int) -> None:
     print(json.dumps({"kills": ends, "saves": saves, "number": seen[0]}))
 
 
-def history() -> list[Document]:
-    """Return documents of several sizes, told apart by the number of their first step."""
+def histories() -> list[History]:
+    """Return histories of several sizes."""
     states = [opened(PRESETS["paper-optimal"])]
     for number in range(30):
         states.append(SetPosition(0, 5.0 + 0.1 * number).apply(states[-1]))
-    steps = [Kept("Move" * 50, state) for state in states]
-    return [Document(states[-1], tuple(steps[: 1 + 10 * size])) for size in range(4)]
+    steps = tuple(Step(0, "Move" * 50, state) for state in states)
+    return [History(steps[: 1 + 10 * size]) for size in range(4)]
 
 
-def write_on(folder: Path, documents: list[Document], pipe: int) -> None:
-    """Go on with the session in a folder until the end."""
-    store = Autosave(folder)
-    found = store.adopt().document
-    number = 0 if found is None else found.first
+def write_on(folder: Path, samples: list[History], pipe: int) -> None:
+    """Save sessions in a folder until the end, each known by the number of its first step."""
+    store = SessionFile(folder)
+    resumed = store.resume().history
+    number = 0 if resumed is None else resumed.step.number
     while True:
         number += 1
-        document = documents[number % len(documents)]
-        generation = store.save(Document(document.present, document.steps, 0, number))
+        first, *others = samples[number % len(samples)].steps
+        generation = store.save(History((replace(first, number=number), *others)))
         os.write(pipe, ACKNOWLEDGED.pack(number, generation))
 
 
@@ -88,7 +90,7 @@ def look(folder: Path) -> tuple[int, int]:
         return 0, 0
     data = sessions[0].read_bytes()
     generation = decode_header(data, "file").generation
-    return decode_document(data, "file").first, generation
+    return decode_session(data, "file").step.number, generation
 
 
 if __name__ == "__main__":

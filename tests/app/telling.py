@@ -6,53 +6,53 @@ import itertools
 import os
 import time
 
-from explorer.app.session.worker import Line
+from explorer.app.session.worker import Channel
 from explorer.errors import InputError
 
 # Seconds between two values.
 PAUSE = 0.002
 
 
-def count(most: int, line: Line) -> int:
+def count(most: int, channel: Channel) -> int:
     """Tell the numbers below some one, and return how many were told."""
     for number in range(most):
-        line.tell(number)
+        channel.send(number)
     return most
 
 
-def count_until_cut(line: Line) -> int:
+def count_until_cancelled(channel: Channel) -> int:
     """Tell numbers until it is to end; return how many."""
     for number in itertools.count():
-        if line.is_cut():
+        if channel.is_cancelled():
             return number
-        line.tell(number)
+        channel.send(number)
         time.sleep(PAUSE)
     raise AssertionError
 
 
-def end_when_cancelled(line: Line) -> None:
+def end_when_cancelled(channel: Channel) -> None:
     """Tell one number, and end by an exception once it is to end."""
-    line.tell(0)
+    channel.send(0)
     while True:
-        line.end_if_cancelled()
+        channel.raise_if_cancelled()
         time.sleep(PAUSE)
 
 
-def hang(line: Line) -> None:
+def hang(channel: Channel) -> None:
     """Tell one number, and end for no word."""
-    line.tell(0)
+    channel.send(0)
     time.sleep(3600.0)
 
 
-def refuse(line: Line) -> None:
+def refuse(channel: Channel) -> None:
     """Tell one number, then refuse."""
-    line.tell(0)
+    channel.send(0)
     raise InputError("refused on purpose")
 
 
-def fail(number: float, words: tuple[str, ...], line: Line) -> None:
+def fail(number: float, words: tuple[str, ...], channel: Channel) -> None:
     """Tell one number, then fail in a way that nobody expected."""
-    line.tell(number)
+    channel.send(number)
     raise ValueError(f"setting {number} with\n{words}")
 
 
@@ -61,9 +61,9 @@ def say(text: str) -> str:
     return text
 
 
-def die(line: Line) -> None:
+def die(channel: Channel) -> None:
     """Tell one number, then die."""
-    line.tell(0)
+    channel.send(0)
     os._exit(9)
 
 

@@ -1,4 +1,4 @@
-"""Who gets in: decided from the head of a request, by its host, its origin and a token."""
+"""Access is decided from the head of a request, by its host, its origin and a token."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def status(refusal: Refusal | None) -> HTTPStatus | None:
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "localhost", "[::1]", "LOCALHOST"])
-def test_on_loopback_its_three_names_get_in_with_no_token(host: str) -> None:
+def test_loopback_name_passes_without_a_token(host: str) -> None:
     name = f"{host}:{PORT}"
     assert OPEN.token is None
     assert OPEN.judge(page(name), PORT) is None
@@ -59,18 +59,18 @@ def test_on_loopback_its_three_names_get_in_with_no_token(host: str) -> None:
     assert OPEN.judge(websocket(name, f"https://{name}"), PORT) is None
 
 
-def test_at_the_port_of_the_web_the_port_may_be_left_out() -> None:
+def test_host_without_a_port_passes_on_port_80() -> None:
     assert OPEN.judge(websocket("localhost", "http://localhost"), 80) is None
 
 
 @pytest.mark.parametrize("host", EVIL_HOSTS)
-def test_on_loopback_every_other_host_is_refused(host: str) -> None:
+def test_other_host_is_refused_on_loopback(host: str) -> None:
     for head in (page(host), websocket(host, f"http://{host}")):
         assert status(OPEN.judge(head, PORT)) == HTTPStatus.FORBIDDEN
 
 
 @pytest.mark.parametrize("hosts", [[], [HERE, HERE], [HERE, "evil.example"]])
-def test_a_request_has_one_host(hosts: list[str]) -> None:
+def test_request_without_exactly_one_host_is_refused(hosts: list[str]) -> None:
     for access in (OPEN, CLOSED):
         head = Head("/", hosts, [], [COOKIE], upgrade=False)
         assert status(access.judge(head, PORT)) == HTTPStatus.FORBIDDEN
@@ -78,33 +78,31 @@ def test_a_request_has_one_host(hosts: list[str]) -> None:
 
 @pytest.mark.parametrize("access", [OPEN, CLOSED])
 @pytest.mark.parametrize("origin", [None, *EVIL_ORIGINS])
-def test_a_websocket_from_elsewhere_or_from_nowhere_is_refused(
-    access: Access, origin: str | None
-) -> None:
+def test_websocket_of_another_origin_is_refused(access: Access, origin: str | None) -> None:
     # Even with the cookie, which a browser may send along.
     refusal = access.judge(websocket(origin=origin, cookie=COOKIE), PORT)
     assert status(refusal) == HTTPStatus.FORBIDDEN
 
 
-def test_two_origins_are_none() -> None:
+def test_websocket_with_two_origins_is_refused() -> None:
     head = Head("/", [HERE], [f"http://{HERE}", "http://evil.example"], [], upgrade=True)
     assert status(OPEN.judge(head, PORT)) == HTTPStatus.FORBIDDEN
 
 
 @given(st.text(max_size=30) | st.from_regex(r"https?://[a-z0-9.:\[\]-]{1,30}", fullmatch=True))
-def test_no_origin_gets_in_but_that_of_the_host(origin: str) -> None:
+def test_only_the_origin_of_the_host_passes(origin: str) -> None:
     refusal = OPEN.judge(websocket(origin=origin), PORT)
     assert (refusal is None) == (origin.lower() in (f"http://{HERE}", f"https://{HERE}"))
 
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.168.1.7", "lab.example", "fe80::1"])
-def test_beyond_loopback_there_is_a_token_and_no_two_are_the_same(host: str) -> None:
+def test_server_beyond_loopback_has_a_random_token(host: str) -> None:
     first, second = Access.to(host), Access.to(host)
     assert first.token is not None
     assert len(first.token) >= 32
     assert first.token != second.token
     assert f"?token={first.token}" in first.url(PORT)
-    with pytest.raises(ServerError, match=r"^[^\n]*takes a token[^\n]*$"):
+    with pytest.raises(ServerError, match=r"^[^\n]*needs a token[^\n]*$"):
         Access(host)
 
 
@@ -122,14 +120,14 @@ def test_beyond_loopback_there_is_a_token_and_no_two_are_the_same(host: str) -> 
         "&token=" + "x" * 16,
     ],
 )
-def test_a_token_that_an_address_cannot_hold_is_refused_on_one_line(token: str) -> None:
+def test_token_that_no_address_can_hold_is_refused_in_one_line(token: str) -> None:
     for host in ("127.0.0.1", "0.0.0.0"):
         with pytest.raises(ServerError, match=r"^[^\n]*16 to 128[^\n]*$"):
             Access.to(host, token)
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "0.0.0.0"])
-def test_the_token_opens_in_the_address_and_in_the_cookie(host: str) -> None:
+def test_token_passes_in_the_address_and_in_the_cookie(host: str) -> None:
     access = Access(host, TOKEN)
     assert access.judge(page(target=f"/?token={TOKEN}"), PORT) is None
     assert access.judge(page(target=f"/?darkMode&token={TOKEN}"), PORT) is None
@@ -143,7 +141,7 @@ WRONG = ("", TOKEN[:-1], TOKEN + "x", TOKEN.upper(), "x" * 16)
 
 
 @pytest.mark.parametrize("wrong", WRONG)
-def test_any_other_token_is_refused(wrong: str) -> None:
+def test_wrong_token_is_refused(wrong: str) -> None:
     for head in (
         page(),
         page(target=f"/?token={wrong}"),
@@ -166,7 +164,7 @@ def test_any_other_token_is_refused(wrong: str) -> None:
         assert TOKEN not in refusal.reason
 
 
-def test_beyond_loopback_addresses_and_own_names_are_hosts_and_others_are_not() -> None:
+def test_host_beyond_loopback_is_an_address_or_the_machines_name() -> None:
     access = Access("lab.example", TOKEN)
     name = socket.gethostname()
     for host in ("lab.example:1", f"{name}:1", f"{name}.local", "10.1.2.3:99", "[fe80::1]:80"):
@@ -187,13 +185,13 @@ def test_beyond_loopback_addresses_and_own_names_are_hosts_and_others_are_not() 
         "a?b",
     ],
 )
-def test_no_link_can_name_another_server_for_the_page_to_follow(query: str) -> None:
+def test_query_with_another_address_is_refused(query: str) -> None:
     assert status(OPEN.judge(page(target=f"/?{query}"), PORT)) == HTTPStatus.FORBIDDEN
     with_token = page(target=f"/?token={TOKEN}&{query}")
     assert status(CLOSED.judge(with_token, PORT)) == HTTPStatus.FORBIDDEN
 
 
-def test_the_page_may_connect_only_to_where_it_came_from() -> None:
+def test_policy_lets_the_page_connect_only_to_its_server() -> None:
     headers = dict(OPEN.headers(page(), PORT))
     policy = {
         words[0]: words[1:]
@@ -207,7 +205,7 @@ def test_the_page_may_connect_only_to_where_it_came_from() -> None:
     assert "Set-Cookie" not in headers
 
 
-def test_the_cookie_is_for_this_port_and_out_of_reach_of_scripts_and_other_sites() -> None:
+def test_cookie_is_bound_to_the_port_and_hidden_from_scripts_and_other_sites() -> None:
     cookie = dict(CLOSED.headers(page(), PORT))["Set-Cookie"]
     given_cookie, *flags = cookie.split("; ")
     assert given_cookie == COOKIE
@@ -220,10 +218,10 @@ def test_the_cookie_is_for_this_port_and_out_of_reach_of_scripts_and_other_sites
      ("localhost", "http://localhost:8080"), ("0.0.0.0", "http://127.0.0.1:8080/?token=" + TOKEN),
      ("::", "http://[::1]:8080/?token=" + TOKEN)],
 )  # fmt: skip
-def test_the_address_is_one_that_a_browser_on_this_machine_opens(host: str, url: str) -> None:
+def test_url_is_one_that_a_browser_on_this_machine_opens(host: str, url: str) -> None:
     assert Access(host, None if is_loopback(host) else TOKEN).url(PORT) == url
 
 
-def test_loopback_is_what_this_machine_alone_hears() -> None:
+def test_loopback_hosts_are_known() -> None:
     assert all(map(is_loopback, ["127.0.0.1", "localhost", "::1", "127.1.2.3"]))
     assert not any(map(is_loopback, ["0.0.0.0", "::", "10.0.0.1", "lab.example", "", "127.1"]))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +14,7 @@ from page_props import shown_by
 
 from explorer.app.browser import viser_gaps
 from explorer.app.browser.viser_gaps import PLACE
+from explorer.app.features.mechanism.marks import DragHandle
 from explorer.app.features.mechanism.pose_panel import JOINT_LABELS
 from explorer.app.scene.placing import Placed
 from explorer.app.session.session import Session
@@ -76,10 +77,10 @@ def test_what_crossed_with_a_hand_is_told_again_when_it_rests(
     assigner, told, now = Assigner(server), list[object](), 1000.0
     monkeypatch.setattr(assigning.time, "time", lambda: now)
 
-    def tell_again(handle: object, name: str) -> None:
+    def resend(handle: object, name: str) -> None:
         told.append(getattr(handle, name))
 
-    monkeypatch.setattr(assigning, "tell_again", tell_again)
+    monkeypatch.setattr(assigning, "resend", resend)
 
     def frame(value: object, seconds: float) -> bool:
         nonlocal now
@@ -92,7 +93,7 @@ def test_what_crossed_with_a_hand_is_told_again_when_it_rests(
         now += seconds
         if name == "value":
             state.value, state.update_timestamp = value, now
-            viser_gaps.tell_again(handle, name)
+            viser_gaps.resend(handle, name)
         else:
             state.last_updated, handle.position[:] = now, value
 
@@ -134,7 +135,7 @@ def test_what_a_hand_sets_while_viser_takes_a_value_misleads_no_browser(
         if told == [2.0]:
             # viser holds a value after it has told of it: here a hand comes in between.
             state.value, state.update_timestamp = 7.0, now
-            viser_gaps.tell_again(slider, "value")
+            viser_gaps.resend(slider, "value")
 
     monkeypatch.setattr(interface, "queue_message", queue_message)
     assigner.assign([(slider, "value", 2.0)])
@@ -173,14 +174,14 @@ def test_a_browser_that_crossed_with_the_explorer_shows_what_its_user_set() -> N
 @pytest.mark.parametrize("step", [1e-9, 1e-7, 1.0])
 def test_the_gizmo_follows_the_smallest_steps_of_the_pose(step: float) -> None:
     with explorer_with_data() as running:
-        page, scene = running.page, cast("Any", running.page)._scene
+        page, gizmo = running.page, running.page.services.get(DragHandle)
         page.session.do(SetPosition(0, 9.0))
         page.session.do(SetAngle(0, 20.0))
         page.wait_until_drawn()
         for action in (SetPosition(0, 9.0 + step), SetAngle(0, 20.0 + step)):
             page.session.do(action)
             page.wait_until_drawn()
-            placed, handle = Placed(Frame(page.session.state)), scene.drag_handle.handle
+            placed, handle = Placed(Frame(page.session.state)), gizmo.handle
             assert handle.position.tolist() == placed.points["b4"].tolist()
             assert tuple(handle.wxyz) == page.session.state.pose.quaternion
 
@@ -197,7 +198,7 @@ def test_figures_that_a_hand_leaves_no_time_for_come_with_the_next_frame(
         before = controls()
         with monkeypatch.context() as hand:
             hand.setattr(Session, "has_more", property(lambda _: True))
-            hand.setattr("explorer.app.page.FIGURES_SECONDS", np.inf)
+            hand.setattr("explorer.app.page.PANELS_SECONDS", np.inf)
             page.session.do(SetPosition(0, 1.5))
             page.wait_until_drawn()
             assert controls() == before

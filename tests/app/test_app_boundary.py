@@ -1,4 +1,4 @@
-"""A singular pose on the page: between modes, in no one of them; and how far deeper strata are."""
+"""A singular pose on the page lies on the boundary of modes; distances of deeper strata."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import pytest
 import viser
 from desk import Desk
 from hypothesis import given
+from services import services_for
 from strategies import Case, all_cases
 
 from explorer.app.features.mechanism.pose_panel import MODES, MovePanel, mode_options
@@ -48,7 +49,7 @@ def test_modes_that_meet_in_a_pose_differ_in_the_signs_that_vanish(case: Case) -
 
 
 @pytest.mark.parametrize("incidence", [1, 2, 3])
-def test_singular_pose_is_told_as_the_boundary_of_two_modes(incidence: int) -> None:
+def test_singular_pose_is_named_as_the_boundary_of_two_modes(incidence: int) -> None:
     frame = Frame(at(incidence))
     first, second = frame.snapshot.bordering_modes
     assert second - first == 4 >> (incidence - 1)
@@ -57,17 +58,17 @@ def test_singular_pose_is_told_as_the_boundary_of_two_modes(incidence: int) -> N
     assert f"({frame.state.mode})" not in text
 
 
-def test_deeper_pose_is_told_as_the_boundary_of_four_or_eight_modes() -> None:
+def test_deeper_pose_is_named_as_the_boundary_of_four_or_eight_modes() -> None:
     assert describe_modes((1, 3, 5, 7)) == "boundary of modes 1, 3, 5 and 7"
     coinciding = GoToStratum((1, 2, 3, 4)).apply(opened(OPTIMAL))
     assert "boundary of all eight modes" in summary(Frame(coinciding))
 
 
-def test_list_of_modes_shows_the_boundary_at_a_singular_pose_alone(
+def test_list_of_modes_has_the_boundary_only_at_a_singular_pose(
     server: viser.ViserServer,
 ) -> None:
     desk = Desk(at(2))
-    panel = MovePanel(server.gui, desk.session)
+    panel = MovePanel(services_for(server, desk.session))
     first = list(panel.updates(Frame(desk.state)))
     (shown,) = (
         handle
@@ -101,7 +102,7 @@ def test_distances_of_deeper_strata_arrive_at_a_singular_pose_without_the_diagra
     frame = Frame(at(2))
     assert not frame.state.view.singular.strata
     worker = Worker(pytest.fail)
-    feed = StrataFeed(worker, lambda: None)
+    feed = StrataFeed(services_for(worker=worker))
     try:
         feed.follow(frame)
         assert worker.wait_until_idle(60.0)
@@ -110,6 +111,6 @@ def test_distances_of_deeper_strata_arrive_at_a_singular_pose_without_the_diagra
         assert "…" not in neighbours(frame, distances)
         # Nothing is computed where nothing of it is shown.
         feed.follow(Frame(opened(OPTIMAL)))
-        assert feed.asked is None
+        assert feed.request is None
     finally:
         worker.stop()

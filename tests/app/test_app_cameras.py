@@ -10,16 +10,12 @@ import numpy as np
 import pytest
 
 from explorer.app.scene.camera import FIRST_ASPECT, REMEMBERED, Cameras, framing
-from explorer.app.scene.placing import Placed
-from explorer.app.state.frame import Frame
-from explorer.app.state.state import opened
-from explorer.mechanism.design_file import PRESETS
 from explorer.numerics.arrays import FloatArray
 
-PLACED = Placed(Frame(opened(PRESETS["paper-optimal"])))
+POINTS = np.random.default_rng(5).uniform(-6.0, 9.0, (20, 3))
 # Of viser, before it is told where to begin.
 UNTOLD = np.array([3.0, 3.0, 3.0])
-FIRST = framing(PLACED, "isometric", FIRST_ASPECT)[0]
+FIRST = framing(POINTS, "isometric", FIRST_ASPECT)[0]
 
 
 class Browser:
@@ -60,12 +56,12 @@ def browser() -> Any:
 @pytest.fixture
 def cameras(browser: Any) -> Cameras:
     first: Any = SimpleNamespace()
-    made = Cameras(first, lambda: PLACED, browser.put)
+    made = Cameras(first, lambda: POINTS, browser.put)
     assert np.allclose(first.position, FIRST)
     return made
 
 
-EYE = framing(PLACED, "isometric", 0.7)[0]
+EYE = framing(POINTS, "isometric", 0.7)[0]
 
 
 @pytest.mark.parametrize("missed", [0, 1, REMEMBERED + 3])
@@ -102,22 +98,22 @@ def test_camera_is_put_last_for_the_shape_that_its_browser_told_last(browser: An
     first: Any = SimpleNamespace()
     others: list[threading.Thread] = []
 
-    def placed() -> Placed:
+    def points() -> FloatArray:
         # Another shape is told while this one is framed.
         if browser.camera.aspect == 1.6:
             browser.camera.aspect = 0.9
             others.append(threading.Thread(target=browser.camera.updated, args=(None,)))
             others[-1].start()
             others[-1].join(0.5)
-        return PLACED
+        return POINTS
 
-    cameras = Cameras(first, placed, browser.put)
+    cameras = Cameras(first, points, browser.put)
     cameras.connected(browser)
     browser.camera.aspect = 1.6
     browser.tell(EYE)
     for other in others:
         other.join()
-    assert np.allclose(browser.puts[-1], framing(PLACED, "isometric", 0.9)[0])
+    assert np.allclose(browser.puts[-1], framing(POINTS, "isometric", 0.9)[0])
 
 
 def test_a_camera_that_somebody_moved_is_left_alone(cameras: Cameras, browser: Any) -> None:
@@ -137,7 +133,7 @@ def test_a_camera_is_put_again_when_its_browser_changes_its_shape(
     cameras.connected(browser)
     browser.camera.aspect = 1.4
     browser.tell(EYE)
-    assert np.allclose(browser.puts[-1], framing(PLACED, "isometric", 1.4)[0])
+    assert np.allclose(browser.puts[-1], framing(POINTS, "isometric", 1.4)[0])
     cameras.disconnected(browser)
     browser.camera.aspect = 0.9
     browser.tell(EYE)

@@ -1,4 +1,4 @@
-"""What a browser may say, judged message by message without a server."""
+"""The messages that a browser may send, checked one by one without a server."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ from explorer.app.security.client_messages import (
     MOST_PARTS,
     MOST_UPLOADS,
     PATIENCE,
-    Held,
+    ControlValue,
     Inbox,
     fits,
 )
 
-HELD: dict[str, Held] = {
-    "slider": Held(1.5),
-    "whole": Held(3),
-    "checkbox": Held(False),
-    "button": Held(True),
-    "triple": Held((0.0, 1.0, 2.0)),
-    "list": Held("b", ("a", "b")),
-    "text": Held("words"),
-    "colour": Held((1, 2, 3)),
-    "file": Held(object()),
-    "nothing": Held(None),
-    "empty": Held(()),
+HELD: dict[str, ControlValue] = {
+    "slider": ControlValue(1.5),
+    "whole": ControlValue(3),
+    "checkbox": ControlValue(False),
+    "button": ControlValue(True),
+    "triple": ControlValue((0.0, 1.0, 2.0)),
+    "list": ControlValue("b", ("a", "b")),
+    "text": ControlValue("words"),
+    "colour": ControlValue((1, 2, 3)),
+    "file": ControlValue(object()),
+    "nothing": ControlValue(None),
+    "empty": ControlValue(()),
 }
 GOOD: dict[str, list[Any]] = {
     "slider": [0, 1.5, -1e300, 2**63],
@@ -62,7 +62,7 @@ CAMERA: dict[str, Any] = {
 class Known:
     """The controls above."""
 
-    def held(self, uuid: str) -> Held | None:
+    def value_of(self, uuid: str) -> ControlValue | None:
         return HELD.get(uuid)
 
     def takes_files(self, uuid: str) -> bool:
@@ -89,7 +89,7 @@ def part(transfer: str, index: int, size: int) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("uuid", list(HELD))
-def test_a_control_is_given_values_of_its_own_type_only(uuid: str) -> None:
+def test_control_takes_only_values_of_its_own_type(uuid: str) -> None:
     good = GOOD.get(uuid, [])
     for value in good:
         assert admits(update(uuid, value))
@@ -115,12 +115,12 @@ def is_one_of(value: Any, values: list[Any]) -> bool:
     return any(type(value) is type(other) and value == other for other in values)
 
 
-def test_what_is_for_a_control_that_has_gone_may_go_on() -> None:
+def test_message_to_a_removed_control_is_admitted() -> None:
     assert admits(update("gone", math.nan))
 
 
 @pytest.mark.parametrize("name", ["visible", "label", "disabled", "update_cb", "removed", "min"])
-def test_no_property_but_the_value_may_be_set(name: str) -> None:
+def test_property_other_than_the_value_cannot_be_set(name: str) -> None:
     message = {"type": "GuiUpdateMessage", "uuid": "slider", "updates": {name: 1.0}}
     assert not admits(message)
     message["updates"] = {"value": 1.0, name: 1.0}
@@ -128,7 +128,7 @@ def test_no_property_but_the_value_may_be_set(name: str) -> None:
 
 
 @pytest.mark.parametrize("field", [f for f in CAMERA if f != "type"])
-def test_a_camera_is_told_with_finite_numbers_of_the_right_count(field: str) -> None:
+def test_camera_has_finite_numbers_of_the_right_count(field: str) -> None:
     assert admits(CAMERA)
     value = CAMERA[field]
     bad: list[Any] = [None, "1", [], {}, math.nan, math.inf]
@@ -146,12 +146,12 @@ def test_a_camera_is_told_with_finite_numbers_of_the_right_count(field: str) -> 
      "GuiFormDirtyMessage", "GuiFormSubmitMessage", "SetPositionMessage", "GuiRemoveMessage",
      "RemoveSceneNodeMessage", "FileTransferStartDownload", "ThemeConfigurationMessage", "", "x"],
 )  # fmt: skip
-def test_messages_that_no_page_sends_are_dropped(kind: str) -> None:
+def test_message_that_no_page_sends_is_dropped(kind: str) -> None:
     assert not admits({"type": kind})
     assert not admits({"type": kind, "uuid": "slider", "name": "/platform", "source": "alert(1)"})
 
 
-def test_an_upload_is_bounded_in_size_and_number() -> None:
+def test_uploads_are_limited_in_size_and_number() -> None:
     inbox = Inbox(Known())
     for parts, size in ((1, LARGEST_UPLOAD + 1), (MOST_PARTS + 1, 9), (-1, 9), (1, -1), (0, 9),
                         (3, 0), (2**62, 2**62)):  # fmt: skip
@@ -176,7 +176,7 @@ def test_an_upload_is_bounded_in_size_and_number() -> None:
     assert not admits(part("one-more", 0, 1), Inbox(Known()))
 
 
-def test_only_a_picture_may_be_large() -> None:
+def test_large_message_is_dropped_unless_it_is_a_picture() -> None:
     picture = {"type": "GetRenderResponseMessage", "payload": b"x" * LARGEST_MESSAGE,
                "render_uuid": "x"}  # fmt: skip
     assert admits(picture)
@@ -184,7 +184,7 @@ def test_only_a_picture_may_be_large() -> None:
     assert not admits(update("text", [[]] * LARGEST_MESSAGE))
 
 
-def test_patience_ends_after_so_many_that_are_no_messages() -> None:
+def test_patience_ends_after_many_dropped_messages() -> None:
     inbox = Inbox(Known())
     for _ in range(PATIENCE):
         assert not inbox.is_out_of_patience
@@ -194,12 +194,12 @@ def test_patience_ends_after_so_many_that_are_no_messages() -> None:
 
 
 @given(st.binary(max_size=200) | st.text(max_size=50))
-def test_noise_is_never_admitted_and_never_raises(data: str | bytes) -> None:
+def test_noise_is_dropped_without_an_exception(data: str | bytes) -> None:
     assert not Inbox(Known()).admits(data)
 
 
 @given(st.integers(0, 10_000), st.binary(min_size=1, max_size=3))
-def test_a_message_with_foreign_bytes_is_judged_without_an_exception(at: int, noise: bytes) -> None:
+def test_message_with_foreign_bytes_is_checked_without_an_exception(at: int, noise: bytes) -> None:
     for message in (CAMERA, update("triple", [1.0, 2.0, 3.0]), upload("t", 2, 9)):
         data = msgspec.msgpack.encode(message)
         place = at % len(data)
@@ -207,7 +207,7 @@ def test_a_message_with_foreign_bytes_is_judged_without_an_exception(at: int, no
 
 
 @given(st.sampled_from(list(HELD)), st.floats())
-def test_what_fits_is_finite(uuid: str, value: float) -> None:
+def test_infinite_value_does_not_fit(uuid: str, value: float) -> None:
     held = HELD[uuid]
     assert math.isfinite(value) or not fits(value, held)
     assert math.isfinite(value) or not fits([value, 0.0, 0.0], held)

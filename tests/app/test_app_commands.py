@@ -10,7 +10,7 @@ import pkgutil
 import re
 import threading
 import time
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -20,25 +20,19 @@ import viser
 
 import explorer.app
 from explorer.app.browser.viser_gaps import start_viser, stop_viser
+from explorer.app.features.designs.saved_designs import SavedDesigns
+from explorer.app.features.listed import FEATURES
 from explorer.app.features.optimise.actions import Advance as ShowIterates, Compare, EndRun
 from explorer.app.features.paths.actions import (
     Advance as PlayOn,
     ChooseModes,
     SetPathTime,
-    SetPlanSeconds,
     TakePlan,
 )
 from explorer.app.features.singularity.actions import Jog
-from explorer.app.features.studies.actions import (
-    BrushAxis,
-    BrushBox,
-    PickDesign,
-    SetAxes,
-    SetStudyWish,
-)
-from explorer.app.features.studies.folders import StudyFolders
+from explorer.app.features.studies.actions import BrushAxis, BrushBox, PickDesign
 from explorer.app.server import Running, start
-from explorer.app.session.gestures import ByHand
+from explorer.app.session.gestures import UserAction
 from explorer.app.session.session import UNDO, Session
 from explorer.app.state.actions import (
     MarkSaved,
@@ -47,16 +41,15 @@ from explorer.app.state.actions import (
     SetName,
     SetPose,
     SetPosition,
-    SetUnit,
     SetVariable,
     StartThere,
 )
 from explorer.app.state.state import State
-from explorer.app.storage.keeping import take_up
+from explorer.app.storage.study_folders import StudyFolders
+from explorer.app.storage.user_data import open_user_data
 from explorer.app.widgets.commands import (
     CAMERA_KEYS,
     KEYS,
-    OPEN_LISTS,
     PALETTE_KEY,
     offers,
     with_keys,
@@ -74,20 +67,16 @@ OF_VALUES = {
     SetPose: "the handle at b4",
     Jog: "sliders of one margin",
     SetVariable: "sliders of the design",
-    SetUnit: "a number of the design",
     SetName: "the name of a design",
     ChooseModes: "lists of the path's ends",
     SetPathTime: "slider of the time",
-    SetPlanSeconds: "a number of the planner",
     PickDesign: "points of a study's plots",
     BrushAxis: "brushes of a study's plots",
     BrushBox: "brushes of a study's plots",
-    SetAxes: "lists of a study's plots",
-    SetStudyWish: "what a small study varies and measures",
 }
 """Actions that ask for a value, each with the control that gives it."""
 
-OF_NOBODY = (ByHand, MarkSaved, ShowIterates, PlayOn, EndRun, Compare, TakePlan)
+OF_NOBODY = (UserAction, MarkSaved, ShowIterates, PlayOn, EndRun, Compare, TakePlan)
 """Actions that nobody asks for: they tell of what goes on, or stand for another."""
 
 OF_BROWSERS = {f"View › {view}" for view in ("Isometric", "Front", "Side", "Top", "Fit")} | {
@@ -111,6 +100,12 @@ CHOSEN_IN_THE_PANEL = {
 }
 """Lists of which an option alone does nothing, or whose options come and go."""
 
+ALL_KEYS = {
+    **KEYS,
+    **{label: keys for feature in FEATURES for label, keys in feature.keys.items()},
+}
+OPEN_LISTS = {label for feature in FEATURES for label in feature.lists}
+
 # What browsers do with keys; undo and redo are theirs too, and meant for pages.
 BROWSER_KEYS = {f"Ctrl+{key}" for key in "ACDEFGHIJLNOPQRSTUVWX0123456789"} | {
     f"Ctrl+Shift+{key}" for key in "ABCDEIJKMNOPQRTVW"
@@ -129,14 +124,16 @@ CLIENT: Any = Browser()
 @pytest.fixture(scope="module")
 def running(tmp_path_factory: pytest.TempPathFactory) -> Generator[Running]:
     studies = StudyFolders(tmp_path_factory.mktemp("studies"))
-    made = start(PRESETS["paper-optimal"], port=0, keep=take_up(resume=False), studies=studies)
+    made = start(
+        PRESETS["paper-optimal"], port=0, user_data=open_user_data(resume=False), studies=studies
+    )
     yield made
     made.stop()
 
 
 @pytest.fixture(scope="module")
 def palette(running: Running) -> Palette:
-    return running.page.hands.palette
+    return running.page.palette
 
 
 @pytest.fixture
@@ -189,9 +186,8 @@ def test_every_action_is_a_command_or_asks_for_a_value(running: Running, palette
             if label in OF_BROWSERS or label.startswith(("Page › ", "Share › ")):
                 continue
             command.run(CLIENT)
-        shelf = running.page.shelf
-        assert shelf is not None
-        assert shelf.wait_until_idle()
+        saved = running.page.services.get(SavedDesigns)
+        assert saved.wait_until_idle()
         reached = {type(each) for each in asked}
     shown = {action for action, label in WHERE_IT_IS_SHOWN.items() if label in labelled(palette)}
     told = set(OF_VALUES) | set(OF_NOBODY)
@@ -199,26 +195,52 @@ def test_every_action_is_a_command_or_asks_for_a_value(running: Running, palette
     assert reached & told == set(), "a command after all"
 
 
+def commands_on(server: viser.ViserServer) -> dict[str, Any]:
+    """Return viser's handles of the commands that a page has, by their labels."""
+    gui: Any = server.gui
+    return {each.label: each for each in gui._command_handle_from_uuid.values()}
+
+
 def test_saved_designs_are_opened_by_name(running: Running) -> None:
-    session, shelf = running.page.session, running.page.shelf
-    assert shelf is not None
+    session, saved = running.page.session, running.page.services.get(SavedDesigns)
 
     def offered() -> dict[str, Any]:
-        assert shelf.wait_until_idle()
+        assert saved.wait_until_idle()
         assert session.wait_until_idle()
-        gui: Any = running.viser.gui
-        return {each.label: each for each in gui._command_handle_from_uuid.values()}
+        return commands_on(running.viser)
 
-    saved = msgspec.structs.replace(PRESETS["paper-initial"], name="mine")
-    shelf.save(saved)
+    design = msgspec.structs.replace(PRESETS["paper-initial"], name="mine")
+    saved.save(design)
     command = offered()["Designs › Open mine"]
     for trigger in command._impl.trigger_cb:
         trigger(viser.CommandEvent(CLIENT, CLIENT.client_id, command))
     offered()
-    assert session.state.design == saved
+    assert session.state.design == design
     session.travel(UNDO)
-    shelf.delete("mine")
+    saved.delete("mine")
     assert "Designs › Open mine" not in offered()
+
+
+def test_commands_that_stay_the_same_object_are_not_looked_at_again(
+    bare: viser.ViserServer,
+) -> None:
+    class Watched(tuple[Command, ...]):
+        looks = 0
+
+        def __iter__(self) -> Iterator[Command]:
+            self.looks += 1
+            return super().__iter__()
+
+    palette = Palette(bare)
+    ours = Watched([Command("Ours", "Open this.", lambda _: None)])
+    theirs = Watched([Command("Theirs", "Open that.", lambda _: None)])
+    for _ in range(3):
+        palette.offer("ours", ours)
+        palette.offer("theirs", theirs)
+        assert commands_on(bare).keys() == {"Ours", "Theirs"}
+    assert (ours.looks, theirs.looks) == (1, 1)
+    palette.offer("ours", ())
+    assert commands_on(bare).keys() == {"Theirs"}
 
 
 def test_names_and_keys_are_told_apart(palette: Palette) -> None:
@@ -229,12 +251,13 @@ def test_names_and_keys_are_told_apart(palette: Palette) -> None:
     assert len(set(keys)) == len(keys)
 
 
-def test_every_key_belongs_to_a_command(palette: Palette) -> None:
-    assert set(KEYS) <= set(labelled(palette))
+def test_every_key_belongs_to_a_command_and_to_one_owner(palette: Palette) -> None:
+    assert len(ALL_KEYS) == len(KEYS) + sum(len(feature.keys) for feature in FEATURES)
+    assert set(ALL_KEYS) <= set(labelled(palette))
 
 
 def test_no_key_is_taken_from_the_browser_the_camera_or_the_palette() -> None:
-    for key in itertools.chain.from_iterable(KEYS.values()):
+    for key in itertools.chain.from_iterable(ALL_KEYS.values()):
         assert str(key) not in BROWSER_KEYS
         # viser's camera looks at the letter, whatever else is held down.
         assert key.key not in CAMERA_KEYS
@@ -245,8 +268,8 @@ def test_manual_lists_every_key_and_no_other() -> None:
     section = read_page("page.md").partition("## Keys")[2].partition("\n## ")[0]
     _, *rows = re.findall(r"^\|.*\| (.+) \|$", section, flags=re.MULTILINE)
     told = {key for row in rows for key in re.split(r", | or ", row)}
-    card = {str(key) for key in KEYS["Page › Keys"]}
-    assert told | card == {str(key) for key in itertools.chain.from_iterable(KEYS.values())}
+    card = {str(key) for key in ALL_KEYS["Page › Keys"]}
+    assert told | card == {str(key) for key in itertools.chain.from_iterable(ALL_KEYS.values())}
 
 
 def test_two_commands_of_one_name_are_refused(palette: Palette) -> None:
@@ -263,9 +286,10 @@ def test_every_list_is_offered_or_chosen_in_its_panel(running: Running) -> None:
 def test_a_hint_tells_the_keys_that_do_the_same(running: Running) -> None:
     told = 0
     for widget in widgets(running.viser):
-        for key in itertools.chain.from_iterable(KEYS.get(label, ()) for label in offers(widget)):
-            assert f" {key}" in widget.hint
-            told += 1
+        for label in offers(widget, OPEN_LISTS):
+            for key in ALL_KEYS.get(label, ()):
+                assert f" {key}" in widget.hint
+                told += 1
     assert told > 20
 
 
@@ -283,11 +307,10 @@ def test_only_what_can_be_done_can_be_chosen(running: Running, palette: Palette)
     assert running.page.wait_until_drawn()
     assert session.state.view.workspace.region == "reachable"
     assert commands["Workspace › Reached from › the present position"].is_ready()
-    gui: Any = running.viser.gui
-    disabled = {each.label: each.disabled for each in gui._command_handle_from_uuid.values()}
+    disabled = {label: each.disabled for label, each in commands_on(running.viser).items()}
     assert disabled["Workspace › Reached from › the present position"] is False
     assert disabled["Optimise › Cancel"] is True
-    # What is hidden from the eye alone can be done.
+    # What the diagram leads to can be done whether or not it is shown.
     strata = [label for label in commands if label.startswith("Singularity › Go to (")]
     assert len(strata) == 23
     assert all(commands[label].is_ready() for label in strata)
@@ -379,8 +402,7 @@ def test_nothing_is_offered_of_what_holds_a_value() -> None:
     try:
         server.gui.add_slider("Long", 0.0, 1.0, 0.1, 0.5)
         server.gui.add_upload_button("File")
-        server.gui.add_button("Step 3 of the list")
-        assert [offers(widget) for widget in widgets(server)] == [{}, {}, {}]
+        assert [offers(widget) for widget in widgets(server)] == [{}, {}]
         assert isinstance(next(widgets(server)), Widget)
     finally:
         stop_viser(server)

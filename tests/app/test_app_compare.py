@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Callable, Generator
 from dataclasses import fields, replace
 from html import unescape
-from typing import Any
+from pathlib import Path
 
 import msgspec
 import numpy as np
@@ -15,23 +14,30 @@ import pytest
 import viser
 from desk import Desk
 from hypothesis import given, strategies as st
+from services import StubWorker, services_for
 
-from explorer.app.features.compare.actions import Pin, SetLook, Unpin
+from explorer.app.features.compare.actions import Pin, Unpin
 from explorer.app.features.compare.bars import DRAWN, bars
 from explorer.app.features.compare.columns import Column, best_of, columns_of, notes, value_text
-from explorer.app.features.compare.drawing import ComparedDrawing, ComparedRequest, compared_drawing
+from explorer.app.features.compare.drawing import ComparedRequest, compared_drawing
 from explorer.app.features.compare.feed import LIVE, CompareFeed
-from explorer.app.features.compare.panel import NOTHING, ComparePanel
+from explorer.app.features.compare.panel import NO_DESIGN, ComparePanel
 from explorer.app.features.compare.scene import APART, ComparedScene
 from explorer.app.features.compare.table import table
+from explorer.app.features.designs.saved_designs import SavedDesigns
+from explorer.app.features.feature import Services
 from explorer.app.scene.placing import Placed
 from explorer.app.session.jobs import Worker
 from explorer.app.session.session import UNDO
-from explorer.app.state.actions import Open, SetVariable
+from explorer.app.state.actions import Open, Set, SetVariable
 from explorer.app.state.compared import SLOTS, Compared, Look, unnamed
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, opened
+from explorer.app.storage.library import Library
+from explorer.app.storage.session_file import SessionFile
+from explorer.app.storage.user_data import UserData
 from explorer.app.widgets.assigning import Assigner
+from explorer.app.widgets.buttons import Buttons
 from explorer.app.widgets.colours import COMPARED
 from explorer.errors import InputError
 from explorer.measures.case import Case
@@ -44,7 +50,6 @@ from explorer.mechanism.pose import Pose
 from explorer.workspace.slices.volume import workspace_nodes, workspace_volume
 
 INITIAL, OPTIMAL = PRESETS.values()
-BUTTONS = [(f"open{slot}", f"unpin{slot}") for slot in range(3)]
 LISTED = measures_in("compare")
 
 
@@ -62,7 +67,7 @@ def compared(*pinned: Design, look: Look | None = None, live: Design = OPTIMAL) 
     state = opened(live)
     for design in pinned:
         state = Pin(design).apply(state)
-    return SetLook(look or Look()).apply(state)
+    return Set("compared.look", look or Look()).apply(state)
 
 
 def columns(state: State) -> tuple[Column, ...]:
@@ -128,7 +133,7 @@ def test_a_design_keeps_its_place_and_its_colour_when_another_goes() -> None:
 
 def test_what_cannot_be_pinned_is_told_in_one_line() -> None:
     state = compared(variant(1), variant(2), variant(3))
-    with pytest.raises(InputError, match=r"^variant 4 finds no place: A, B, C are taken; unpin"):
+    with pytest.raises(InputError, match=r"^variant 4 cannot be pinned: A, B, C are taken; unpin"):
         Pin(variant(4)).apply(state)
     renamed = msgspec.structs.replace(variant(2), name="other")
     with pytest.raises(InputError, match=r"^other is pinned already, as B; change it, or pin"):
@@ -136,11 +141,11 @@ def test_what_cannot_be_pinned_is_told_in_one_line() -> None:
 
 
 def test_pins_are_steps_that_are_undone(desk: Desk) -> None:
-    for action in (Pin(INITIAL), SetLook(Look(overlay=True)), Unpin(0)):
+    for action in (Pin(INITIAL), Set("compared.look.overlay", True), Unpin(0)):
         desk.session.do(action)
     assert desk.state.compared == Compared(look=Look(overlay=True))
     words = [step.words for step in desk.session.history.steps[1:]]
-    assert words == ["Pin paper-initial", "Compare: overlay on", "Unpin A"]
+    assert words == ["Pin paper-initial", "Overlay on", "Unpin A"]
     for expected in (Look(overlay=True), Look()):
         desk.session.travel(UNDO)
         assert desk.state.compared == Compared((INITIAL, None, None), expected)
@@ -154,7 +159,7 @@ def test_pins_are_steps_that_are_undone(desk: Desk) -> None:
 def test_the_table_tells_what_the_functions_tell(millimetres: bool) -> None:
     small = msgspec.structs.replace(INITIAL, unit_mm=12.0)
     state = compared(small, variant(3), look=Look(millimetres=millimetres))
-    rows = cells(table(columns(state), BUTTONS, millimetres=millimetres))
+    rows = cells(table(columns(state), millimetres=millimetres))
     assert len(rows) == len(LISTED)
     unit = "mm" if millimetres else "units"
     for place, design in enumerate((OPTIMAL, small, variant(3))):
@@ -183,14 +188,14 @@ def test_what_is_small_beside_the_others_is_not_told_as_nothing() -> None:
 
 
 def test_the_best_of_a_row_is_bold_and_only_where_better_means_something() -> None:
-    html = table(columns(compared(INITIAL)), BUTTONS, millimetres=False)
+    html = table(columns(compared(INITIAL)), millimetres=False)
     rows = {re.sub("<.*?>", "", row.partition("</td>")[0]): row for row in html.split("<tr")[2:]}
     (volume,) = (
         row for name, row in rows.items() if name.endswith("volume units³") and "node" not in name
     )
-    assert re.findall(r"font-weight:700[^>]*>([^<]*)", volume) == ["7053.04"]
+    assert re.findall(r'is-best"[^>]*>([^<]*)', volume) == ["7053.04"]
     (extent,) = (row for name, row in rows.items() if name.endswith("extent x units"))
-    assert "font-weight:700" not in extent
+    assert "is-best" not in extent
 
 
 def test_what_is_as_good_is_not_the_best() -> None:
@@ -205,7 +210,7 @@ def test_what_is_as_good_is_not_the_best() -> None:
 def test_names_are_text_whatever_they_hold() -> None:
     state = compared(msgspec.structs.replace(INITIAL, name="<b onclick=x>&"))
     found = columns(state)
-    for html in (table(found, BUTTONS, millimetres=False), "".join(notes(state, found))):
+    for html in (table(found, millimetres=False), "".join(notes(state, found))):
         assert "<b onclick" not in html
 
 
@@ -213,7 +218,7 @@ def test_an_empty_workspace_is_told_with_its_reasons() -> None:
     limits = msgspec.structs.replace(OPTIMAL.limits, l1=(1.0, 2.0), l4=(1.0, 2.0))
     state = compared(msgspec.structs.replace(OPTIMAL, name="none", limits=limits))
     found = columns(state)
-    rows = cells(table(found, BUTTONS, millimetres=False))
+    rows = cells(table(found, millimetres=False))
     assert rows["volume units³"][1] == "empty"
     assert rows["clearance units"][1] == "–"
     (note,) = notes(state, found)
@@ -269,10 +274,10 @@ def test_a_drawing_has_the_workspace_at_the_home_of_the_design_and_its_points() 
     drawing = compared_drawing(ComparedRequest(INITIAL, drawn=True))
     assert drawing.problem is None
     assert drawing.shell is not None
-    assert drawing.figures is not None
+    assert drawing.measurements is not None
     spans = np.ptp(drawing.shell.vertices, axis=0)
     assert spans == pytest.approx(
-        np.array([drawing.figures[f"exact_extent_{axis}"] for axis in "xyz"]),
+        np.array([drawing.measurements[f"exact_extent_{axis}"] for axis in "xyz"]),
         abs=0.01 * INITIAL.reach,
     )
     ends = drawing.outline.reshape(-1, 3)
@@ -283,62 +288,32 @@ def test_a_drawing_has_the_workspace_at_the_home_of_the_design_and_its_points() 
 
 def test_a_tolerance_that_is_too_fine_is_told_and_the_figures_stay() -> None:
     drawing = compared_drawing(ComparedRequest(OPTIMAL, drawn=True, tolerance=1e-9))
-    assert drawing.figures is not None
+    assert drawing.measurements is not None
     assert drawing.shell is None
     assert "tolerance" in (drawing.problem or "")
 
 
-class Helper:
-    """A worker that keeps what it is asked until it is told to do it."""
-
-    def __init__(self) -> None:
-        self.asked: list[tuple[object, ComparedRequest, Callable[[ComparedDrawing], None]]] = []
-
-    def submit(
-        self,
-        key: object,
-        task: Callable[..., Any],
-        arguments: tuple[ComparedRequest],
-        done: Callable[[ComparedDrawing], None],
-        failed: Callable[[str], None],
-    ) -> None:
-        assert task is compared_drawing
-        assert callable(failed)
-        self.asked.append((key, arguments[0], done))
-
-    def work(self) -> None:
-        asked, self.asked = self.asked, []
-        for _, request, done in asked:
-            done(compared_drawing(request))
-
-
 @pytest.fixture
-def helper() -> Helper:
-    return Helper()
-
-
-@pytest.fixture
-def feed(helper: Helper) -> CompareFeed:
-    worker: object = helper
-    return CompareFeed(worker, lambda: None)  # pyright: ignore[reportArgumentType]
+def feed(services: Services) -> CompareFeed:
+    return services.get(CompareFeed)
 
 
 def test_a_slider_asks_for_the_live_design_alone_and_nothing_without_pins(
-    feed: CompareFeed, helper: Helper
+    feed: CompareFeed, worker: StubWorker
 ) -> None:
     feed.follow(Frame(opened(OPTIMAL)))
-    assert helper.asked == []
+    assert worker.orders == []
     state = compared(INITIAL, variant(2), look=Look(overlay=True))
     feed.follow(Frame(state))
-    assert [request.design for _, request, _ in helper.asked] == [
+    assert [order.request.design for order in worker.orders] == [
         unnamed(each) for each in (OPTIMAL, INITIAL, variant(2))
     ]
-    assert len({key for key, _, _ in helper.asked}) == 3
-    helper.work()
+    assert len({order.key for order in worker.orders}) == 3
+    worker.work()
     assert feed.is_settled
     feed.follow(Frame(SetVariable("b2", 2.3).apply(state)))
-    ((_, request, _),) = helper.asked
-    assert request.design == unnamed(OPTIMAL.with_variable("b2", 2.3))
+    (order,) = worker.orders[3:]
+    assert order.request.design == unnamed(OPTIMAL.with_variable("b2", 2.3))
     # Until it comes the last one is shown, and said to be old.
     assert feed.drawing(LIVE) is not None
     assert not feed.is_current(LIVE)
@@ -346,29 +321,29 @@ def test_a_slider_asks_for_the_live_design_alone_and_nothing_without_pins(
 
 
 def test_a_place_never_shows_the_design_that_was_there_before(
-    feed: CompareFeed, helper: Helper
+    feed: CompareFeed, worker: StubWorker
 ) -> None:
     state = compared(INITIAL)
     feed.follow(Frame(state))
-    helper.work()
+    worker.work()
     assert feed.drawing(1) is not None
     feed.follow(Frame(Pin(variant(2)).apply(Unpin(0).apply(state))))
     assert feed.drawing(1) is None
-    helper.work()
+    worker.work()
     found = feed.drawing(1)
     assert found is not None
     assert found.request.design == unnamed(variant(2))
 
 
 def test_workspaces_are_drawn_to_true_size_in_their_colours(
-    server: viser.ViserServer, feed: CompareFeed, helper: Helper
+    services: Services, feed: CompareFeed, worker: StubWorker
 ) -> None:
     large = msgspec.structs.replace(INITIAL, unit_mm=25.0)
     state = compared(large, look=Look(overlay=True, outlines=True))
     feed.follow(Frame(state))
-    scene = ComparedScene(server.scene, feed)
-    assigner = Assigner(server)
-    helper.work()
+    scene = ComparedScene(services)
+    assigner = Assigner(services.server)
+    worker.work()
     feed.follow(Frame(state))
     placed = Placed(Frame(state))
     updates = scene.updates(placed)
@@ -397,60 +372,56 @@ def test_workspaces_are_drawn_to_true_size_in_their_colours(
     assert not mesh.visible
 
 
-@pytest.fixture
-def panel(server: viser.ViserServer, desk: Desk) -> ComparePanel:
-    return ComparePanel(server.gui, desk.session, lambda: (variant(7),))
-
-
-def test_the_panel_pins_opens_unpins_and_switches(
-    panel: ComparePanel, desk: Desk, feed: CompareFeed
+def test_panel_pins_opens_unpins_and_switches(
+    server: viser.ViserServer, desk: Desk, buttons: Buttons, tmp_path: Path
 ) -> None:
+    user_data = UserData(Library(tmp_path / "designs"), SessionFile())
+    user_data.library.save("variant 7", variant(7))
+    services = services_for(server, desk.session, buttons=buttons, user_data=user_data)
+    assert services.get(SavedDesigns).wait_until_idle()
+    panel = ComparePanel(services)
     own = desk.state.design
-    desk.click(panel.pin)
+    desk.press(buttons, "compare.pin")
     assert desk.state.compared.pinned == (own, None, None)
-    options = (NOTHING, "variant 7", *PRESETS)
+    options = (NO_DESIGN, "variant 7", *PRESETS)
     given = [
         value
-        for handle, name, value in panel.updates(Frame(desk.state), feed)
+        for handle, name, value in panel.updates(Frame(desk.state))
         if handle is panel.another and name == "options"
     ]
     assert given == [options]
     panel.another.options = options
     desk.use(panel.another, "variant 7")
     assert desk.state.compared.pinned == (own, variant(7), None)
-    desk.click(panel.open[1])
+    desk.press(buttons, "compare.open", "B")
     assert desk.state.design == variant(7)
     assert desk.state.compared.pinned == (own, variant(7), None)
-    desk.click(panel.pin)
-    desk.click(panel.open[2])
+    desk.press(buttons, "compare.pin")
+    desk.press(buttons, "compare.open", "C")
     assert desk.state.design == variant(7)
     assert [line.partition(";")[0] for line in desk.complaints] == [
         "variant 7 is pinned already, as B",
         "nothing is pinned as C",
     ]
-    names = [button.label for button in panel.switches]
-    desk.click(panel.switches[names.index("Overlay workspaces")])
-    desk.click(panel.switches[names.index("Bars")])
+    desk.press(buttons, "compare.turn", "Overlay workspaces")
+    desk.press(buttons, "compare.turn", "Bars")
     assert desk.state.compared.look == Look(shows="bars", overlay=True)
-    desk.click(panel.unpin[0])
+    desk.press(buttons, "compare.unpin", "A")
     assert desk.state.compared.pinned == (None, variant(7), None)
 
 
-@pytest.fixture
-def worker() -> Generator[Worker]:
-    made = Worker(lambda message: None)
-    yield made
-    made.stop()
-
-
-def test_the_worker_finds_the_columns(worker: Worker) -> None:
-    feed = CompareFeed(worker, lambda: None)
+def test_the_worker_finds_the_columns() -> None:
     state = compared(INITIAL)
-    feed.follow(Frame(state))
-    assert worker.wait_until_idle(120.0)
-    deadline = time.monotonic() + 10.0
-    while not feed.is_settled and time.monotonic() < deadline:
-        time.sleep(0.01)
+    worker = Worker(lambda _: None)
+    feed = CompareFeed(services_for(worker=worker))
+    try:
+        feed.follow(Frame(state))
+        assert worker.wait_until_idle(120.0)
+        deadline = time.monotonic() + 10.0
+        while not feed.is_settled and time.monotonic() < deadline:
+            time.sleep(0.01)
+    finally:
+        worker.stop()
     live, pinned = columns_of(state, feed)
     # Compiled or not, the last bit may differ.
     for column, design in ((live, OPTIMAL), (pinned, INITIAL)):

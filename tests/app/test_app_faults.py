@@ -1,4 +1,4 @@
-"""Requests that failed unexpectedly: kept whole, told of, bounded, and run again."""
+"""Requests that failed unexpectedly are saved, reported, limited in number and run again."""
 
 from __future__ import annotations
 
@@ -34,25 +34,25 @@ def a_fault(number: int = 0, **changes: Any) -> Fault:
         "module": TASKS,
         "task": "fail",
         "arguments": (1.5, ("δ", "−"), np.arange(3.0), StrataRequest(OPTIMAL, home_pose(OPTIMAL))),
-        "tells": True,
+        "is_sending": True,
         "problem": "ValueError: it failed",
         "trace": f'Traceback\n  File "telling.py", line {number}, in fail\nValueError: it failed\n',
     }
     return Fault(**(given | changes))
 
 
-def asked(worker: Worker, task: str, *arguments: Any, tells: bool = True) -> str:
+def asked(worker: Worker, task: str, *arguments: Any, is_sending: bool = True) -> str:
     """Return how a task failed."""
     failed: Queue[str] = Queue()
     told: Queue[object] = Queue()
-    hear = told.put if tells else None
+    hear = told.put if is_sending else None
     worker.submit(
         "task", getattr(telling, task), arguments, lambda _: failed.put("done"), failed.put, hear
     )
     return failed.get(timeout=PATIENCE)
 
 
-def test_a_fault_of_a_task_is_kept_whole_and_both_message_and_log_tell_where(
+def test_fault_of_a_task_is_saved_and_message_and_log_say_where(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     reports: list[str] = []
@@ -67,7 +67,7 @@ def test_a_fault_of_a_task_is_kept_whole_and_both_message_and_log_tell_where(
     assert problem in report
     assert str(path) in report
     kept = read_fault(path)
-    assert (kept.module, kept.task, kept.tells) == (TASKS, "fail", True)
+    assert (kept.module, kept.task, kept.is_sending) == (TASKS, "fail", True)
     assert kept.arguments == (2.5, ("a", "b"))
     assert kept.problem == problem
     assert "in fail" in kept.trace
@@ -76,11 +76,11 @@ def test_a_fault_of_a_task_is_kept_whole_and_both_message_and_log_tell_where(
     assert "Traceback" in log
 
 
-def test_a_request_that_kills_its_process_twice_is_kept(tmp_path: Path) -> None:
+def test_request_that_kills_its_process_twice_is_saved(tmp_path: Path) -> None:
     reports: list[str] = []
     worker = Worker(reports.append, died="it died", faults=Faults(tmp_path))
     try:
-        assert asked(worker, "fall", tells=False) == "it died"
+        assert asked(worker, "fall", is_sending=False) == "it died"
     finally:
         worker.stop()
     (path,) = tmp_path.iterdir()
@@ -88,7 +88,7 @@ def test_a_request_that_kills_its_process_twice_is_kept(tmp_path: Path) -> None:
     assert read_fault(path).task == "fall"
 
 
-def test_refusals_and_cancelled_tasks_are_no_faults(tmp_path: Path) -> None:
+def test_refusal_is_no_fault(tmp_path: Path) -> None:
     reports: list[str] = []
     worker = Worker(reports.append, faults=Faults(tmp_path))
     try:
@@ -99,8 +99,8 @@ def test_refusals_and_cancelled_tasks_are_no_faults(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-def test_a_kept_request_reads_back_with_all_its_arguments(tmp_path: Path) -> None:
-    Faults(tmp_path).keep(a_fault())
+def test_saved_request_is_read_back_with_all_its_arguments(tmp_path: Path) -> None:
+    Faults(tmp_path).save(a_fault())
     (path,) = tmp_path.iterdir()
     number, words, array, request = read_fault(path).arguments
     assert (number, words) == (1.5, ("δ", "−"))
@@ -113,49 +113,49 @@ def test_a_kept_request_reads_back_with_all_its_arguments(tmp_path: Path) -> Non
     assert text["versions"]["numpy"] == np.__version__
 
 
-def test_of_one_kind_of_fault_the_newest_is_kept_and_of_many_kinds_the_newest(
+def test_newest_fault_of_each_kind_and_newest_kinds_are_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(module, "MOST_FILES", 3)
     kept = Faults(tmp_path)
     for number in range(5):
-        kept.keep(a_fault(number, arguments=(number,)))
+        kept.save(a_fault(number, arguments=(number,)))
         for age, path in enumerate(sorted(tmp_path.iterdir(), key=lambda p: p.stat().st_mtime_ns)):
             os.utime(path, ns=(number * 100 + age, number * 100 + age))
     # The message of an error may have numbers in it, and is another each time.
-    kept.keep(a_fault(4, arguments=(99,), trace=a_fault(4).trace.replace("it failed", "again")))
+    kept.save(a_fault(4, arguments=(99,), trace=a_fault(4).trace.replace("it failed", "again")))
     found = sorted(read_fault(path).arguments for path in tmp_path.iterdir())
     assert found == [(2,), (3,), (99,)]
 
 
-def test_a_request_that_is_far_too_large_is_told_of_without_its_arguments(
+def test_too_large_request_is_saved_without_its_arguments(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(module, "MOST_PACKED", 1000)
     noise = np.random.default_rng(1).bytes(5000)
-    Faults(tmp_path).keep(a_fault(arguments=(noise,)))
+    Faults(tmp_path).save(a_fault(arguments=(noise,)))
     (path,) = tmp_path.iterdir()
     assert path.stat().st_size < 10_000
     with pytest.raises(InputError, match="too large"):
         read_fault(path)
 
 
-def test_a_folder_that_takes_no_file_is_told_of(tmp_path: Path) -> None:
+def test_folder_that_takes_no_file_is_reported(tmp_path: Path) -> None:
     (tmp_path / "faults").write_text("in the way")
-    assert "could not be kept" in Faults(tmp_path / "faults").keep(a_fault())
+    assert "could not be kept" in Faults(tmp_path / "faults").save(a_fault())
 
 
 @pytest.mark.parametrize("text", ["", "{}", '{"packed": 1}', "[]"])
-def test_what_is_no_file_of_a_fault_is_refused(tmp_path: Path, text: str) -> None:
+def test_other_file_is_refused(tmp_path: Path, text: str) -> None:
     path = tmp_path / "x.json"
     path.write_text(text)
     with pytest.raises(InputError):
         read_fault(path)
 
 
-def test_a_kept_request_is_run_again_by_one_command(tmp_path: Path) -> None:
-    Faults(tmp_path).keep(a_fault(arguments=(7.0, ("x",))))
-    Faults(tmp_path).keep(a_fault(task="say", arguments=("hello",), tells=False))
+def test_saved_request_is_run_again_by_one_command(tmp_path: Path) -> None:
+    Faults(tmp_path).save(a_fault(arguments=(7.0, ("x",))))
+    Faults(tmp_path).save(a_fault(task="say", arguments=("hello",), is_sending=False))
     fail, say = sorted(tmp_path.iterdir())
     command = [sys.executable, str(ROOT / "tests" / "again.py")]
     done = subprocess.run(
@@ -171,7 +171,7 @@ def test_a_kept_request_is_run_again_by_one_command(tmp_path: Path) -> None:
     assert "hello" in done.stdout
 
 
-def test_a_fault_that_no_file_and_no_log_can_take_is_told_of_all_the_same(
+def test_fault_that_neither_file_nor_log_can_take_is_reported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     closed = io.StringIO()

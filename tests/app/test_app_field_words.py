@@ -10,6 +10,7 @@ import pytest
 import viser
 from desk import Desk
 
+from explorer.app.features.feature import Services
 from explorer.app.features.mechanism.design_panel import DesignPanel
 from explorer.app.features.mechanism.pose_panel import MovePanel
 from explorer.app.session.field_words import FIELD_WORDS, message_of
@@ -24,12 +25,12 @@ BAD = (-1.0, 0.0, 181.0, 1e9, 1e45)
 
 
 def test_refusals_of_the_page_hold_no_names_of_the_code(
-    server: viser.ViserServer, desk: Desk
+    server: viser.ViserServer, desk: Desk, services: Services
 ) -> None:
     gui: Any = server.gui
     before = set(gui._gui_input_handle_from_uuid)
-    DesignPanel(server.gui, desk.session)
-    MovePanel(server.gui, desk.session)
+    DesignPanel(services)
+    MovePanel(services)
     handles = [h for u, h in gui._gui_input_handle_from_uuid.items() if u not in before]
     start, said = desk.state, list[str]()
     for handle in handles:

@@ -1,4 +1,4 @@
-"""The allocator hoards nothing, and the collector has little to look at."""
+"""Freed memory is returned to the system, and collections skip permanent objects."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import weakref
 import pytest
 
 from explorer.app.session import memory
-from explorer.app.session.memory import keep_for_good
+from explorer.app.session.memory import freeze_objects
 from explorer.numerics.compiled import warm_in_background
 
 # Prints how many arenas there are once many threads have had memory of their own.
@@ -41,12 +41,12 @@ with tempfile.NamedTemporaryFile() as told:
 # Prints how many bytes the process has less once what it freed is given back.
 RETURN = """
 import psutil
-from explorer.app.session.memory import give_back
+from explorer.app.session.memory import trim
 size = lambda: psutil.Process().memory_info().rss
 # Too small to be mapped one by one; those that stay lie between those that go.
 kept = [bytearray(3000) for _ in range(70_000)][::70]
 before = size()
-assert give_back()
+assert trim()
 print(before - size())
 """
 
@@ -54,7 +54,7 @@ only_glibc = pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="for g
 
 
 @only_glibc
-def test_many_threads_share_few_arenas() -> None:
+def test_threads_share_few_arenas() -> None:
     def count(arenas: str) -> int:
         command = [sys.executable, "-c", COUNT, arenas]
         return int(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
@@ -63,29 +63,29 @@ def test_many_threads_share_few_arenas() -> None:
 
 
 @only_glibc
-def test_what_is_freed_goes_back_to_the_system() -> None:
+def test_freed_memory_is_returned_to_the_system() -> None:
     command = [sys.executable, "-c", RETURN]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     # Of 210 MB that were freed.
     assert int(done.stdout) > 100e6
 
 
-def test_memory_is_given_back_again_and_again_until_the_end(
+def test_memory_is_trimmed_repeatedly_within_the_context(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     thrice = threading.Semaphore(0)
-    monkeypatch.setattr(memory, "GIVE_BACK_SECONDS", 0.001)
-    monkeypatch.setattr(memory, "give_back", thrice.release)
+    monkeypatch.setattr(memory, "TRIM_SECONDS", 0.001)
+    monkeypatch.setattr(memory, "trim", thrice.release)
     before = set(threading.enumerate())
-    with memory.given_back():
+    with memory.trim_repeatedly():
         assert all(thrice.acquire(timeout=60.0) for _ in range(3))
     assert set(threading.enumerate()) <= before
 
 
-def test_what_is_kept_for_good_is_looked_at_no_more_and_what_comes_later_is() -> None:
+def test_frozen_objects_are_not_collected_and_later_ones_are() -> None:
     before = gc.get_freeze_count()
     try:
-        warm_in_background(then=keep_for_good).join()
+        warm_in_background(then=freeze_objects).join()
         assert gc.get_freeze_count() > before
 
         class Ring:

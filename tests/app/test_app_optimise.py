@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 import viser
 from desk import number, rows_of
+from services import services_for
 
 from explorer.app.features.optimise import runner as optimiser
 from explorer.app.features.optimise.actions import (
@@ -23,7 +24,7 @@ from explorer.app.features.optimise.actions import (
     EndRun,
     LiftBox,
     Revert,
-    SetWish,
+    SetRequest,
     StartRun,
     TakePaperBox,
 )
@@ -32,9 +33,9 @@ from explorer.app.features.optimise.plots import curves_of, data_of
 from explorer.app.features.optimise.problem import (
     box_within,
     problem_of,
-    wished_box,
-    wished_reach,
-    wished_volume,
+    requested_box,
+    requested_reach,
+    requested_volume,
 )
 from explorer.app.features.optimise.runner import Optimiser
 from explorer.app.features.optimise.scene import FARTHEST, box_shown, edges_of, single
@@ -42,21 +43,19 @@ from explorer.app.features.optimise.tasks import compare, optimise
 from explorer.app.features.optimise.words import comparison_table, verdict_words
 from explorer.app.features.sharing.tasks import export_report
 from explorer.app.session.session import UNDO, Session
-from explorer.app.session.worker import Line
+from explorer.app.session.worker import Channel
 from explorer.app.state.action import Action
 from explorer.app.state.actions import (
     Open,
     Reset,
+    Set,
     SetAngle,
     SetJoint,
-    SetLimits,
     SetPosition,
-    SetUnit,
     SetVariable,
-    SetView,
 )
 from explorer.app.state.frame import Frame
-from explorer.app.state.optimisation import PLACE, Wish
+from explorer.app.state.optimisation import PLACE, OptimisationRequest
 from explorer.app.state.state import Run, State, opened
 from explorer.app.widgets.assigning import Assigner
 from explorer.errors import InputError
@@ -77,9 +76,9 @@ from explorer.workspace.slices.volume import workspace_volume
 
 OPTIMAL = PRESETS["paper-optimal"]
 PATIENCE = 240.0
-SMALL = Wish(volume=8000.0)
+SMALL = OptimisationRequest(volume=8000.0)
 # With so many starts a search goes on until it is ended.
-ENDLESS = Wish(objective="smallest-reach", volume=7053.0, starts=10_000)
+ENDLESS = OptimisationRequest(objective="smallest-reach", volume=7053.0, starts=10_000)
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -93,20 +92,14 @@ class Bench:
     def __init__(self, server: viser.ViserServer, state: State) -> None:
         self.complaints: list[str] = []
         self.reports: list[str] = []
-        self.sent: list[str] = []
         self.states: list[State] = []
         self._assigner = Assigner(server)
         self.session = Session(
             state, self._draw, lambda message, _: self.complaints.append(message), self._fail
         )
-        self.optimiser = Optimiser(self.session, self.reports.append, lambda: True)
-        self.panel: Any = OptimisePanel(
-            server.gui,
-            self.session,
-            lambda _: self.sent.append("hull"),
-            lambda _: self.sent.append("design"),
-            lambda _: self.sent.append("search"),
-        )
+        services = services_for(server, self.session, tell=self.reports.append)
+        self.optimiser = services.get(Optimiser)
+        self.panel: Any = OptimisePanel(services)
 
     @property
     def state(self) -> State:
@@ -149,8 +142,8 @@ class Bench:
 
         return run_of(self.wait(are_there))
 
-    def find(self, wish: Wish = SMALL) -> Run:
-        self.do(SetWish(wish), StartRun())
+    def find(self, request: OptimisationRequest = SMALL) -> Run:
+        self.do(SetRequest("optimisation.request", request), StartRun())
         return self.wait_for_end()
 
     def stop(self) -> None:
@@ -199,14 +192,14 @@ def stripped(state: State) -> State:
     )
 
 
-def started(wish: Wish = SMALL, state: State | None = None) -> State:
+def started(request: OptimisationRequest = SMALL, state: State | None = None) -> State:
     """Return a state with a run, without a process."""
-    return StartRun().apply(SetWish(wish).apply(state or own()))
+    return StartRun().apply(SetRequest("optimisation.request", request).apply(state or own()))
 
 
 def told_by(problem: Any, starts: int = 1) -> tuple[Iterate, ...]:
     told: list[Iterate] = []
-    optimise(problem, starts, Line(told.append, lambda: False))
+    optimise(problem, starts, Channel(told.append, lambda: False))
     return tuple(told)
 
 
@@ -232,14 +225,14 @@ def test_it_finds_the_design_and_the_page_goes_through_all_iterates(bench: Bench
 
 
 def test_the_search_ends_before_the_next_evaluation_once_it_is_cut() -> None:
-    problem = problem_of(SetWish(ENDLESS).apply(own()))
+    problem = problem_of(SetRequest("optimisation.request", ENDLESS).apply(own()))
     told: list[Iterate] = []
-    outcome = optimise(problem, 10_000, Line(told.append, lambda: len(told) >= 40))
+    outcome = optimise(problem, 10_000, Channel(told.append, lambda: len(told) >= 40))
     assert len(told) == 40
     assert told[-1].run == len(outcome.runs) - 1
     assert outcome.best in told
     # What comes first of all is an iterate too: there is always a best so far.
-    outcome = optimise(problem, 1, Line(told.append, lambda: True))
+    outcome = optimise(problem, 1, Channel(told.append, lambda: True))
     assert outcome.status == "cancelled"
     assert outcome.design.variables == problem.start.variables
 
@@ -249,7 +242,7 @@ def test_cancel_ends_the_search_by_a_word_and_keeps_the_best_so_far(
 ) -> None:
     # However busy the machine is, it is not the force that ends it.
     monkeypatch.setattr(optimiser, "PATIENCE", 60.0)
-    bench.ask(SetWish(ENDLESS), StartRun())
+    bench.ask(SetRequest("optimisation.request", ENDLESS), StartRun())
     bench.wait_for_iterates(60)
     process = bench.optimiser.worker.process_id
     bench.ask(CancelRun())
@@ -273,7 +266,7 @@ def test_cancel_ends_the_search_by_a_word_and_keeps_the_best_so_far(
 def test_cancel_ends_a_search_that_hears_nothing_by_force(bench: Bench) -> None:
     # The word and the force together answer within a fifth of a second.
     assert optimiser.PATIENCE < 0.2
-    bench.ask(SetWish(ENDLESS), StartRun())
+    bench.ask(SetRequest("optimisation.request", ENDLESS), StartRun())
     bench.wait_for_iterates(30)
     process = bench.optimiser.worker.process_id
     assert process is not None
@@ -295,7 +288,7 @@ def test_a_process_killed_in_mid_run_leaves_the_design_and_the_panel_says_so(
     bench: Bench,
 ) -> None:
     before = stripped(bench.state)
-    bench.ask(SetWish(ENDLESS), StartRun())
+    bench.ask(SetRequest("optimisation.request", ENDLESS), StartRun())
     bench.wait_for_iterates(10)
     assert bench.session.state.design.variables != before.design.variables
     process = bench.optimiser.worker.process_id
@@ -316,13 +309,13 @@ def test_revert_brings_the_own_design_and_pose_back_exactly(bench: Bench) -> Non
     before = bench.state
     bench.find()
     view = replace(bench.state.view, labels=False)
-    bench.do(SetView(view), SetPosition(2, 8.0), SetVariable("b2", 3.3))
+    bench.do(Set("view", view), SetPosition(2, 8.0), SetVariable("b2", 3.3))
     assert bench.state.design != before.design
     after = bench.do(Revert())
     assert stripped(after) == stripped(before)
     assert (after.hold, after.view) == (before.hold, view)
     assert after.optimisation.run is None
-    assert after.optimisation.wish == SMALL
+    assert after.optimisation.request == SMALL
     # There is nothing to return from any more.
     assert bench.do(Revert()).design == before.design
 
@@ -385,7 +378,7 @@ def test_a_run_from_an_undecided_result_still_reverts_to_the_own_design() -> Non
 def ended_with(state: State, iterates: tuple[Iterate, ...]) -> State:
     run = state.optimisation.run
     assert run is not None
-    verdict = optimiser.cut_short(run.problem, iterates)
+    verdict = optimiser.killed_result(run.problem, iterates)
     return EndRun(run.number, verdict, iterates).apply(state)
 
 
@@ -393,8 +386,8 @@ def ended_with(state: State, iterates: tuple[Iterate, ...]) -> State:
     "action",
     [
         SetVariable("b2", 3.1),
-        SetUnit(5.0),
-        SetLimits(OPTIMAL.limits),
+        Set("design.unit_mm", 5.0),
+        Set("design.limits", OPTIMAL.limits),
         Open(OPTIMAL),
         Reset(),
     ],
@@ -428,7 +421,7 @@ def test_opening_another_design_forgets_the_run_but_not_the_wish() -> None:
     first = told_by(state.optimisation.run and state.optimisation.run.problem)
     after = Open(OPTIMAL).apply(ended_with(state, first))
     assert after.optimisation.run is None
-    assert after.optimisation.wish == SMALL
+    assert after.optimisation.request == SMALL
     again = StartRun().apply(after).optimisation.run
     assert again is not None
     assert again.number == 2
@@ -440,52 +433,20 @@ SWINGING = msgspec.structs.replace(
 
 
 @pytest.mark.parametrize(
-    ("wish", "words"),
+    ("values", "words"),
     [
-        (Wish(free=()), "nothing may change"),
-        (
-            Wish(with_box=True, box=((1.0, 1.0, 1.0), (2.0, 0.0, 2.0))),
-            "required box",
-        ),
+        ({"volume": float("nan")}, "volume demanded must be"),
+        ({"volume": -1.0}, "volume demanded must be"),
+        ({"objective": "largest-volume", "reach": 0.0}, "reach demanded must be"),
+        ({"clearance": -0.1}, "clearance demanded must be"),
+        ({"clearance": float("inf")}, "clearance demanded must be"),
+        ({"starts": -3}, "number of starts must lie within 1 to 10000; got -3"),
+        ({"starts": 10_001}, "number of starts must lie within"),
     ],
 )
-def test_what_cannot_be_asked_is_told_in_one_line_and_nothing_is_lost(
-    bench: Bench, wish: Wish, words: str
-) -> None:
-    before = bench.state
-    after = bench.do(SetWish(wish), StartRun())
-    assert after.optimisation.run is None
-    assert after.optimisation.refusal is not None
-    assert words in after.optimisation.refusal
-    assert "\n" not in after.optimisation.refusal
-    assert words in bench.panel._words.content
-    assert bench.panel._words.visible
-    assert stripped(after) == stripped(before)
-    # A new wish is a new beginning.
-    assert bench.do(SetWish(SMALL)).optimisation.refusal is None
-    assert not bench.panel._words.visible
-    assert not bench.complaints
-
-
-@pytest.mark.parametrize(
-    ("wish", "words"),
-    [
-        (Wish(volume=float("nan")), "volume demanded must be"),
-        (Wish(volume=-1.0), "volume demanded must be"),
-        (Wish(objective="largest-volume", reach=0.0), "reach demanded must be"),
-        (Wish(clearance=-0.1), "clearance demanded must be"),
-        (Wish(clearance=float("inf")), "clearance demanded must be"),
-        (Wish(starts=-3), "number of starts must lie within 1 to 10000; got -3"),
-        (Wish(starts=10_001), "number of starts must lie within"),
-    ],
-)
-def test_a_number_that_nothing_can_be_asked_with_is_refused_at_once(
-    bench: Bench, wish: Wish, words: str
-) -> None:
-    before = bench.state
-    assert bench.do(SetWish(wish)) == before
-    assert len(bench.complaints) == 1
-    assert words in bench.complaints[0]
+def test_wish_with_an_unusable_number_is_refused(values: dict[str, Any], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        OptimisationRequest(**values)
 
 
 def test_a_design_whose_volume_has_no_gradient_is_told_of() -> None:
@@ -502,8 +463,10 @@ def test_what_the_process_refuses_leaves_the_design(bench: Bench) -> None:
         """What no hand can ask for."""
 
         def apply(self, state: State) -> State:
-            wish = replace(SMALL, starts=0)
-            return replace(state, optimisation=replace(state.optimisation, wish=wish))
+            request = replace(SMALL)
+            # Past the checks of the request, which refuse it.
+            object.__setattr__(request, "starts", 0)
+            return replace(state, optimisation=replace(state.optimisation, request=request))
 
     bench.do(AskForNoStart(), StartRun())
     run = bench.wait_for_end()
@@ -515,9 +478,11 @@ def test_what_the_process_refuses_leaves_the_design(bench: Bench) -> None:
 
 
 def test_margins_ask_for_what_has_an_influence_on_them() -> None:
-    state = SetWish(Wish(objective="largest-margin")).apply(own())
-    assert {YAW, PLACE} <= {*state.optimisation.wish.free}
-    run = started(Wish(objective="largest-margin")).optimisation.run
+    state = SetRequest(
+        "optimisation.request", OptimisationRequest(objective="largest-margin")
+    ).apply(own())
+    assert {YAW, PLACE} <= {*state.optimisation.request.free}
+    run = started(OptimisationRequest(objective="largest-margin")).optimisation.run
     assert run is not None
     assert {"shift-x", "shift-y", "shift-z", YAW} <= {*run.problem.names}
 
@@ -541,11 +506,13 @@ def test_what_is_suggested_suits_the_design(name: str) -> None:
     state = opened(PRESETS[name])
     design, home = state.design, home_pose(state.design)
     volume = workspace_volume(design).volume
-    assert 1.05 * volume < wished_volume(state) < 2.3 * volume
-    same = SetWish(Wish(objective="smallest-reach")).apply(state)
-    assert wished_volume(same) == pytest.approx(volume, rel=1e-5)
-    assert wished_reach(state) == design.reach
-    box = wished_box(state)
+    assert 1.05 * volume < requested_volume(state) < 2.3 * volume
+    same = SetRequest(
+        "optimisation.request", OptimisationRequest(objective="smallest-reach")
+    ).apply(state)
+    assert requested_volume(same) == pytest.approx(volume, rel=1e-5)
+    assert requested_reach(state) == design.reach
+    box = requested_box(state)
     assert box == box_within(design)
     lows, highs = np.array(box)
     assert (lows < home.position).all()
@@ -555,17 +522,17 @@ def test_what_is_suggested_suits_the_design(name: str) -> None:
 
 
 def test_the_required_box_is_drawn_where_it_is(bench: Bench) -> None:
-    wish = Wish(objective="largest-margin", free=(PLACE,))
+    request = OptimisationRequest(objective="largest-margin", free=(PLACE,))
     assert box_shown(bench.state) is None
-    state = bench.do(SetWish(wish))
-    box = wished_box(state)
+    state = bench.do(SetRequest("optimisation.request", request))
+    box = requested_box(state)
     assert box_shown(state) == box
     edges = edges_of(box)
     sides = np.ptp(np.array(box), axis=0)
     assert np.sort(np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)) == pytest.approx(
         np.sort(np.repeat(sides, 4))
     )
-    run = bench.find(wish)
+    run = bench.find(request)
     assert run.best is not None
     shown = box_shown(bench.state)
     assert shown is not None
@@ -676,9 +643,9 @@ def test_limits_that_cannot_give_a_volume_say_so_before_a_press_and_refuse_one(
     bench: Bench,
 ) -> None:
     panel = bench.panel
-    bench.do(Open(INITIAL), SetWish(Wish(volume=2400.0)))
+    bench.do(Open(INITIAL), SetRequest("optimisation.request", OptimisationRequest(volume=2400.0)))
     assert not panel._notice.visible
-    bench.do(SetWish(SMALL))
+    bench.do(SetRequest("optimisation.request", SMALL))
     assert panel._notice.visible
     assert f"T{HELD[1:]}." in panel._notice.content
     assert panel._lift.visible
@@ -694,7 +661,7 @@ def test_limits_that_cannot_give_a_volume_say_so_before_a_press_and_refuse_one(
     assert bench.state.design == INITIAL
     assert panel._notice.visible
     # What no box of the paper's holds is not to be had by taking it.
-    bench.do(SetWish(Wish(volume=20_000.0)))
+    bench.do(SetRequest("optimisation.request", OptimisationRequest(volume=20_000.0)))
     assert panel._lift.visible
     assert not panel._paper_box.visible
 
@@ -703,7 +670,12 @@ def test_limits_that_cannot_give_a_volume_say_so_before_a_press_and_refuse_one(
 def test_one_press_and_another_solve_the_papers_problem_from_its_initial_row(
     bench: Bench, remedy: Action
 ) -> None:
-    bench.do(Open(INITIAL), SetWish(Wish(volume=8000.0, clearance=0.2)), remedy, StartRun())
+    bench.do(
+        Open(INITIAL),
+        SetRequest("optimisation.request", OptimisationRequest(volume=8000.0, clearance=0.2)),
+        remedy,
+        StartRun(),
+    )
     run = bench.wait_for_end()
     assert run.verdict is not None
     assert run.verdict.status == "converged"
@@ -729,7 +701,9 @@ def test_a_design_without_a_home_of_its_own_keeps_its_pose_where_its_box_is_lift
 
 def test_a_search_that_the_box_kept_from_its_volume_offers_to_lift_it(bench: Bench) -> None:
     verdict = optimiser.SearchResult("infeasible", "the box is too small", holding="box")
-    state = bench.do(Open(INITIAL), SetWish(Wish(volume=2400.0)))
+    state = bench.do(
+        Open(INITIAL), SetRequest("optimisation.request", OptimisationRequest(volume=2400.0))
+    )
     run = run_of(StartRun().apply(state))
     best = told_by(run.problem)[0]
     ended = replace(run, phase="ended", verdict=replace(verdict, best=best))

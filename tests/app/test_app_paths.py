@@ -11,9 +11,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-import viser
 from desk import Desk
+from services import StubDownloads, services_for
 
+from explorer.app.features.feature import Services
 from explorer.app.features.paths.actions import (
     Advance,
     CancelPlan,
@@ -21,7 +22,6 @@ from explorer.app.features.paths.actions import (
     Plan,
     Play,
     SetPathTime,
-    SetPlanSeconds,
     StoreEnd,
     TakePlan,
     WatchModes,
@@ -34,7 +34,7 @@ from explorer.app.features.paths.scene import PathScene
 from explorer.app.features.paths.tasks import plan
 from explorer.app.scene.placing import Placed
 from explorer.app.session.session import Session
-from explorer.app.state.actions import SetLimits, SetPose, SetPosition, SetVariable
+from explorer.app.state.actions import Set, SetPose, SetPosition, SetVariable
 from explorer.app.state.frame import Frame
 from explorer.app.state.paths import MODES_SECONDS, Journey
 from explorer.app.state.state import State, joints_of, opened
@@ -59,7 +59,9 @@ class Bench:
         self.times: list[float] = []
         self._runner: PathRunner | None = None
         self.session = Session(state, self._draw, lambda m, _: self.problems.append(m), self._fail)
-        self._runner = self.runner = PathRunner(self.session, self.problems.append)
+        self._runner = self.runner = PathRunner(
+            services_for(session=self.session, tell=self.problems.append)
+        )
 
     def _draw(self, frame: Frame) -> None:
         if frame.state.journey is not None:
@@ -219,8 +221,8 @@ def test_the_chart_shows_the_margins_over_time(first: int, last: int, at: float)
     assert x[np.isfinite(now)].tolist() == [journey.at, journey.at]
 
 
-def test_the_path_and_its_crossings_are_drawn(server: viser.ViserServer) -> None:
-    scene = PathScene(server.scene)
+def test_the_path_and_its_crossings_are_drawn(services: Services) -> None:
+    scene = PathScene(services)
     state = watched(1, 7)
     drawn = {(h.name, n): v for h, n, v in scene.updates(Placed(Frame(state)))}
     scale = Placed(Frame(state)).scale
@@ -245,12 +247,12 @@ def test_planning_needs_both_ends_and_some_time() -> None:
         Plan().apply(StoreEnd("start").apply(opened(OPTIMAL)))
     for seconds in (0.0, -1.0, float("nan")):
         with pytest.raises(InputError, match="above zero"):
-            SetPlanSeconds(seconds).apply(opened(OPTIMAL))
+            Set("paths.seconds", seconds).apply(opened(OPTIMAL))
     assert "14.0, −2.0, 6.0" in ends_table(with_ends())
 
 
 def test_a_plan_is_made_in_a_process_of_its_own_and_keeps_everything(bench: Bench) -> None:
-    bench.session.do(SetLimits(with_radius(OPTIMAL, 0.2).limits))
+    bench.session.do(Set("design.limits", with_radius(OPTIMAL, 0.2).limits))
     for action in (StoreEnd("start"), SetPose(GOAL), StoreEnd("goal"), Plan()):
         bench.session.do(action)
     state = bench.wait(lambda state: state.paths.request == 1 and not state.paths.is_planning)
@@ -298,7 +300,7 @@ def test_planning_is_cancelled_at_once_and_begun_again(bench: Bench) -> None:
     assert "Planning, for 2 s at most" in words
     # Else it would not be begun at all, and the process need not end.
     worker: Any = bench.runner.worker
-    bench.wait(lambda _: worker._doing is not None)
+    bench.wait(lambda _: worker._current is not None)
     bench.session.do(CancelPlan())
     state = bench.wait(lambda state: not state.paths.is_planning)
     assert bench.runner.worker.wait_until_idle(10.0)
@@ -330,9 +332,8 @@ def test_an_answer_that_comes_late_or_for_another_design_is_not_taken() -> None:
 # The panel
 
 
-def test_the_panel_stores_plans_plays_and_exports(server: viser.ViserServer, desk: Desk) -> None:
-    saved: list[int | None] = []
-    panel = PathsPanel(server.gui, desk.session, saved.append)
+def test_the_panel_stores_plans_plays_and_exports(services: Services, desk: Desk) -> None:
+    panel = PathsPanel(services)
 
     def shown() -> dict[str, bool]:
         visible = {
@@ -367,11 +368,12 @@ def test_the_panel_stores_plans_plays_and_exports(server: viser.ViserServer, des
     assert journey_of(desk.state).at == 2.5
     assert desk.state.pose == journey_of(desk.state).pose
     desk.click(panel.export)
-    assert saved == [1]
+    assert isinstance(services.downloads, StubDownloads)
+    assert services.downloads.sent == [(1, "paper-optimal-path.csv")]
 
 
-def test_the_time_slider_ends_where_the_path_does(server: viser.ViserServer, desk: Desk) -> None:
-    panel = PathsPanel(server.gui, desk.session, lambda _: None)
+def test_the_time_slider_ends_where_the_path_does(services: Services, desk: Desk) -> None:
+    panel = PathsPanel(services)
     disabled = {n: v for h, n, v in panel.updates(Frame(desk.state)) if h is panel.time.handle}
     assert disabled["disabled"] is True
     updates = {n: v for h, n, v in panel.updates(Frame(watched(1, 5))) if h is panel.time.handle}

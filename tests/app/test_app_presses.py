@@ -24,10 +24,10 @@ def presses() -> Presses:
 
 
 def test_press_holds_from_its_beginning_until_the_last_values_have_come(presses: Presses) -> None:
-    presses.tell(1, 7, 10.0)
+    presses.record(1, 7, 10.0)
     assert presses.at(1, 9.9) is None
     assert presses.at(1, 10.0) == presses.at(1, 1e6) == Press(1, 7)
-    presses.tell(1, -7, 20.0)
+    presses.record(1, -7, 20.0)
     assert presses.at(1, 20.0 + 0.9 * LATE_SECONDS) == Press(1, 7)
     assert presses.at(1, 20.0 + 1.1 * LATE_SECONDS) is None
     # What was done before the release may be made after it.
@@ -35,23 +35,23 @@ def test_press_holds_from_its_beginning_until_the_last_values_have_come(presses:
 
 
 def test_press_that_goes_on_after_its_window_was_left_is_the_same(presses: Presses) -> None:
-    presses.tell(1, 7, 10.0)
-    presses.tell(1, -7, 11.0)
-    presses.tell(1, 7, 15.0)
+    presses.record(1, 7, 10.0)
+    presses.record(1, -7, 11.0)
+    presses.record(1, 7, 15.0)
     assert presses.at(1, 16.0) == Press(1, 7)
 
 
 def test_next_press_ends_one_whose_release_was_lost(presses: Presses) -> None:
-    presses.tell(1, 7, 10.0)
-    presses.tell(1, 8, 20.0)
-    presses.tell(1, -7, 20.1)
+    presses.record(1, 7, 10.0)
+    presses.record(1, 8, 20.0)
+    presses.record(1, -7, 20.1)
     assert presses.at(1, 19.0) == Press(1, 7)
     assert presses.at(1, 21.0) == Press(1, 8)
 
 
 def test_presses_of_other_browsers_and_of_those_gone_hold_nothing(presses: Presses) -> None:
-    presses.tell(1, 7, 10.0)
-    presses.tell(2, -3, 10.0)
+    presses.record(1, 7, 10.0)
+    presses.record(2, -3, 10.0)
     assert presses.at(2, 11.0) is None
     assert presses.at(None, 11.0) is None
     presses.forget(1)
@@ -61,8 +61,8 @@ def test_presses_of_other_browsers_and_of_those_gone_hold_nothing(presses: Press
 
 def test_presses_keep_the_last_ones(presses: Presses) -> None:
     for number in range(1, 3 * MOST_PRESSES):
-        presses.tell(1, number, float(number))
-        presses.tell(1, -number, number + 0.1)
+        presses.record(1, number, float(number))
+        presses.record(1, -number, number + 0.1)
     last = 3 * MOST_PRESSES - 1
     assert presses.at(1, last) == Press(1, last)
     assert presses.at(1, 1.0) is None
@@ -89,7 +89,9 @@ def test_server_makes_one_step_of_each_press_of_a_browser(
 
         def inboxes() -> list[str]:
             clients: list[Any] = list(running.viser.get_clients().values())
-            return [uuid for each in clients for uuid in each.gui._gui_input_handle_from_uuid]
+            fields = [each.gui._gui_input_handle_from_uuid for each in clients]
+            both = [pair for each in fields for pair in tuple(each.items())]
+            return [uuid for uuid, field in both if field.label == "Press"]
 
         while not inboxes():
             assert time.monotonic() < deadline

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-import pickle
 import sys
-from collections.abc import Callable, Generator
+from collections.abc import Generator
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-import viser
-from desk import Desk, number, rows_of, thick
+from desk import Desk, by_name, number, rows_of, thick, viewed
 from part_gaps import least_gap
+from services import StubWorker
 from test_app_drawing import closed_volume
 
+from explorer.app.features.feature import Services
+from explorer.app.features.mechanism.bodies import Bodies
 from explorer.app.features.mechanism.legs import Legs
 from explorer.app.features.prototype.feed import PartsFeed
 from explorer.app.features.prototype.panel import (
@@ -28,19 +29,16 @@ from explorer.app.features.prototype.panel import (
 )
 from explorer.app.features.prototype.parts import Parts, PartsRequest, parts_drawing
 from explorer.app.features.prototype.parts_list import Bar, stock_of
-from explorer.app.features.prototype.scene import PrototypeScene, part_corners, shown_places
+from explorer.app.features.prototype.scene import PrototypeScene, shown_places
 from explorer.app.features.prototype.tasks import export_assembly
-from explorer.app.scene.bodies import Bodies
-from explorer.app.scene.camera import outermost_points
 from explorer.app.scene.creases import creased
 from explorer.app.scene.placing import Placed
 from explorer.app.scene.shapes import cylinder
-from explorer.app.session.jobs import Worker
-from explorer.app.state.actions import SetPose, SetPosition, SetUnit, SetVariable, SetView
+from explorer.app.state.actions import Set, SetPose, SetPosition, SetVariable
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, opened
 from explorer.app.state.view import ALUMINIUM, PrototypeView
-from explorer.app.widgets.assigning import Assigner, Update
+from explorer.app.widgets.assigning import Assigner
 from explorer.app.widgets.colours import OUTLINE
 from explorer.errors import InputError, MissingExtraError
 from explorer.export.assembly import FORMATS, assembly_bytes
@@ -55,42 +53,16 @@ OPTIMAL = PRESETS["paper-optimal"]
 PARTS = 18
 
 
-class AtOnce(Worker):
-    """A worker that does what it is asked at once and in this process, and counts it."""
-
-    def __init__(self) -> None:
-        super().__init__(lambda _: None)
-        self.done: list[Callable[..., Any]] = []
-
-    def submit(
-        self,
-        key: object,
-        task: Callable[..., Any],
-        arguments: tuple[Any, ...],
-        done: Callable[[Any], None],
-        failed: Callable[[str], None],
-        told: Callable[[Any], None] | None = None,
-        *,
-        is_drawing: bool = False,
-    ) -> int:
-        del key, failed, told, is_drawing
-        self.done.append(task)
-        # As they go to another process and come back.
-        answer = task(*pickle.loads(pickle.dumps(arguments)))
-        done(pickle.loads(pickle.dumps(answer)))
-        return len(self.done)
-
-
 @pytest.fixture
-def worker() -> Generator[AtOnce]:
-    made = AtOnce()
+def worker() -> Generator[StubWorker]:
+    made = StubWorker(at_once=True)
     yield made
     made.stop()
 
 
 @pytest.fixture
-def feed(worker: AtOnce) -> PartsFeed:
-    return PartsFeed(worker, lambda: None)
+def feed(services: Services) -> PartsFeed:
+    return services.get(PartsFeed)
 
 
 @pytest.fixture(scope="module")
@@ -103,8 +75,7 @@ def parts() -> Parts:
 def shown(state: State | None = None, **changes: Any) -> State:
     """Return the state with the prototype drawn."""
     begin = opened(OPTIMAL) if state is None else state
-    view = replace(begin.view, prototype=PrototypeView(shown=True, **changes))
-    return SetView(view).apply(begin)
+    return viewed(begin, prototype=PrototypeView(shown=True, **changes))
 
 
 def states(count: int, **changes: Any) -> list[State]:
@@ -120,12 +91,11 @@ def states(count: int, **changes: Any) -> list[State]:
     ]
 
 
-def nodes_of(updates: list[Update]) -> dict[str, dict[str, Any]]:
-    """Return the values that are assigned, by the name of the node and the property."""
-    found: dict[str, dict[str, Any]] = {}
-    for handle, name, value in updates:
-        found.setdefault(handle.name, {})[name] = value
-    return found
+def placed_with_parts(services: Services, state: State) -> Placed:
+    """Return the state as the page places it once its parts are made."""
+    feed = services.get(PartsFeed)
+    feed.follow(Frame(state))
+    return Placed(Frame(state), floor=feed.floor)
 
 
 def in_scene(nodes: dict[str, dict[str, Any]], path: str) -> np.ndarray[Any, Any]:
@@ -145,10 +115,10 @@ def in_scene(nodes: dict[str, dict[str, Any]], path: str) -> np.ndarray[Any, Any
 
 @pytest.mark.parametrize("state", states(6))
 def test_parts_are_drawn_where_the_library_places_them(
-    state: State, server: viser.ViserServer, parts: Parts
+    state: State, services: Services, parts: Parts
 ) -> None:
-    placed = Placed(Frame(state), None, parts)
-    nodes = nodes_of(list(PrototypeScene(server.scene).updates(placed)))
+    placed = placed_with_parts(services, state)
+    nodes = by_name(PrototypeScene(services).updates(placed))
     assert len(nodes) == PARTS
     whole = parts.prototype.at(state.pose.position, state.pose.rotation)
     for part, (_, faces), corners in zip(parts.prototype.parts, parts.meshes, whole, strict=True):
@@ -159,13 +129,12 @@ def test_parts_are_drawn_where_the_library_places_them(
 
 
 def test_meshes_are_assigned_only_when_the_design_has_changed(
-    server: viser.ViserServer, feed: PartsFeed
+    services: Services,
 ) -> None:
-    scene, assigner = PrototypeScene(server.scene), Assigner(server)
+    scene, assigner = PrototypeScene(services), Assigner(services.server)
 
     def meshes_assigned(state: State) -> int:
-        feed.follow(Frame(state))
-        updates = scene.updates(Placed(Frame(state), None, feed.parts))
+        updates = scene.updates(placed_with_parts(services, state))
         return len(assigner.assign(u for u in updates if u[1] in ("vertices", "faces")))
 
     assert meshes_assigned(shown()) == 2 * PARTS
@@ -177,36 +146,37 @@ def test_meshes_are_assigned_only_when_the_design_has_changed(
 
 
 def test_parts_replace_bodies_and_legs_and_follow_their_switches(
-    server: viser.ViserServer, parts: Parts
+    services: Services,
 ) -> None:
-    drawn = (Bodies(server.scene), Legs(server.scene), PrototypeScene(server.scene))
+    drawn = (Bodies(services), Legs(services), PrototypeScene(services))
 
-    def visible(state: State, made: Parts | None) -> dict[str, bool]:
-        placed = Placed(Frame(state), None, made)
-        nodes = nodes_of([update for part in drawn for update in part.updates(placed)])
+    def visible(state: State) -> dict[str, bool]:
+        placed = placed_with_parts(services, state)
+        nodes = by_name(update for part in drawn for update in part.updates(placed))
         return {path: node["visible"] for path, node in nodes.items() if "visible" in node}
 
-    for made in (None, parts):
-        for path, is_shown in visible(shown(), made).items():
+    # The second design is too tight for parts.
+    for state, has_parts in ((shown(), True), (thick(shown(), 0.4), False)):
+        for path, is_shown in visible(state).items():
             if path != "/grid":
-                assert is_shown == (path.startswith("/prototype") == (made is not None)), path
-    view = shown().view
+                assert is_shown == (path.startswith("/prototype") == has_parts), path
     for switch, kinds in (
         ("legs", {"cross", "carriage", "cylinder", "rod"}),
         ("bodies", {"base", "platform", "ball"}),
     ):
-        without = SetView(replace(view, **{switch: False})).apply(shown())
         hidden = {
             path.rpartition("/")[2].partition(" ")[0]
-            for path, is_shown in visible(without, parts).items()
+            for path, is_shown in visible(viewed(shown(), **{switch: False})).items()
             if path.startswith("/prototype") and not is_shown
         }
         assert hidden == kinds
 
 
-def test_legs_that_collide_are_coloured(server: viser.ViserServer, parts: Parts) -> None:
-    state = thick(shown(), 0.3, 0.5, 0.5, 0.3)
-    nodes = nodes_of(list(PrototypeScene(server.scene).updates(Placed(Frame(state), None, parts))))
+def test_legs_that_collide_are_coloured(services: Services) -> None:
+    # The parts are still those of thinner legs, as while new ones are being made.
+    placed_with_parts(services, shown())
+    placed = Placed(Frame(thick(shown(), 0.3, 0.5, 0.5, 0.3)))
+    nodes = by_name(PrototypeScene(services).updates(placed))
     red = {path for path, node in nodes.items() if node.get("color") == OUTLINE}
     assert red == {f"/prototype/{kind} {leg}" for kind in ("cylinder", "rod") for leg in (2, 3)}
 
@@ -214,7 +184,7 @@ def test_legs_that_collide_are_coloured(server: viser.ViserServer, parts: Parts)
 @pytest.mark.parametrize("state", states(3, exploded=1.0))
 def test_drawn_apart_the_parts_of_a_leg_are_free_of_each_other(state: State, parts: Parts) -> None:
     frame = Frame(state)
-    places = shown_places(Placed(frame, None, parts), parts)
+    places = shown_places(Placed(frame), parts)
     moved = {
         part.name: replace(part, body="base", vertices=part.vertices @ turn.T + origin)
         for part, origin, turn in zip(
@@ -233,8 +203,7 @@ def test_drawn_apart_the_parts_of_a_leg_are_free_of_each_other(state: State, par
 
 def test_the_way_apart_is_straight_and_begins_at_the_assembly(parts: Parts) -> None:
     together, half, apart = (
-        shown_places(Placed(Frame(shown(exploded=share)), None, parts), parts)
-        for share in (0.0, 0.5, 1.0)
+        shown_places(Placed(Frame(shown(exploded=share))), parts) for share in (0.0, 0.5, 1.0)
     )
     home = opened(OPTIMAL).pose
     expected = parts.prototype.places(home.position, home.rotation)
@@ -245,9 +214,11 @@ def test_the_way_apart_is_straight_and_begins_at_the_assembly(parts: Parts) -> N
 
 
 @pytest.mark.parametrize("share", [0.0, 1.0])
-def test_what_must_be_in_the_picture_holds_all_parts(share: float, parts: Parts) -> None:
-    placed = Placed(Frame(shown(exploded=share)), None, parts)
-    corners = part_corners(placed, parts)
+def test_corners_of_the_prototype_hold_all_parts(
+    share: float, services: Services, parts: Parts
+) -> None:
+    placed = placed_with_parts(services, shown(exploded=share))
+    corners = PrototypeScene(services).corners(placed)
     places = shown_places(placed, parts)
     for (vertices, _), origin, turn in zip(
         parts.meshes, places.origin, places.rotation, strict=True
@@ -255,8 +226,6 @@ def test_what_must_be_in_the_picture_holds_all_parts(share: float, parts: Parts)
         seen = placed.scale * (vertices @ turn.T + origin)
         assert (seen >= corners.min(axis=0) - 1e-9).all()
         assert (seen <= corners.max(axis=0) + 1e-9).all()
-    outermost = outermost_points(placed)
-    assert (outermost.max(axis=0) >= corners.max(axis=0)).all()
 
 
 # The meshes
@@ -280,28 +249,29 @@ def test_edges_are_split_and_round_faces_are_not(parts: Parts) -> None:
 
 
 def test_parts_are_made_anew_when_the_design_changes_and_not_else(
-    worker: AtOnce, feed: PartsFeed
+    feed: PartsFeed, worker: StubWorker
 ) -> None:
+    orders = worker.orders
     feed.follow(Frame(opened(OPTIMAL)))
-    assert worker.done == []
+    assert orders == []
     for state in (shown(), *states(3), shown(exploded=0.3), shown(density=1.0)):
         feed.follow(Frame(state))
-    assert worker.done == [parts_drawing]
+    assert [order.task for order in orders] == [parts_drawing]
     for count, state in enumerate(
         (
             SetVariable("a3x", 19.0).apply(shown()),
             thick(shown(), 0.2),
-            SetUnit(20.0).apply(shown()),
+            Set("design.unit_mm", 20.0).apply(shown()),
         ),
         2,
     ):
         feed.follow(Frame(state))
-        assert len(worker.done) == count
+        assert len(orders) == count
         made, expected = feed.parts, make_prototype(state.design)
         assert made is not None
         assert made.prototype.sizes.radii == expected.sizes.radii
         assert np.array_equal(made.prototype.parts[0].vertices, expected.parts[0].vertices)
-    feed.follow(Frame(SetView(replace(shown().view, twin=True)).apply(shown())))
+    feed.follow(Frame(viewed(shown(), twin=True)))
     assert feed.parts is None
 
 
@@ -395,11 +365,10 @@ def test_the_table_shows_masses_and_strokes(parts: Parts) -> None:
 
 
 def test_the_panel_shows_and_changes_how_the_prototype_is_drawn(
-    desk: Desk, server: viser.ViserServer, feed: PartsFeed
+    desk: Desk, services: Services, feed: PartsFeed
 ) -> None:
-    with server.gui.add_folder("test"):
-        panel = PrototypePanel(server.gui, desk.session, lambda _format, _client: None)
-    begin = list(panel.updates(Frame(desk.state), feed))
+    panel = PrototypePanel(services)
+    begin = list(panel.updates(Frame(desk.state)))
     drawn, apart, density = (handle for handle, name, _ in begin if name == "value")
     assert not any(value for _, name, value in begin if name == "visible")
     desk.use(drawn, PROTOTYPE)
@@ -411,7 +380,7 @@ def test_the_panel_shows_and_changes_how_the_prototype_is_drawn(
     assert len(desk.complaints) == 1
     assert "positive" in desk.complaints[0]
     feed.follow(Frame(desk.state))
-    updates = list(panel.updates(Frame(desk.state), feed))
+    updates = list(panel.updates(Frame(desk.state)))
     assert feed.parts is not None
     table = parts_table(feed.parts.listed, 7850.0)
     assert table in [value for _, name, value in updates if name == "content"]
@@ -454,7 +423,7 @@ def test_step_is_exact_faces_or_a_word_on_how_to_get_it(monkeypatch: pytest.Monk
 def test_shares_and_densities_out_of_range_are_refused() -> None:
     assert PrototypeView().density == ALUMINIUM
     for share in (-0.1, 1.1, np.nan):
-        with pytest.raises(InputError, match="apart"):
+        with pytest.raises(InputError, match="exploded view"):
             PrototypeView(exploded=share)
     for density in (0.0, -1.0, np.inf, np.nan):
         with pytest.raises(InputError, match="density"):

@@ -6,7 +6,7 @@ import io
 import sys
 from collections.abc import Callable, Generator
 from dataclasses import replace
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 import msgspec
 import numpy as np
@@ -14,16 +14,23 @@ import pytest
 import viser
 from desk import Desk, number, rows_of, thick
 from hypothesis import given, strategies as st
-from PIL import Image
+from services import StubWorker, services_for
 
+from explorer.app.features.feature import Feed, Services
 from explorer.app.features.legs.feed import RadiusFeed
 from explorer.app.features.legs.panel import LegsPanel
-from explorer.app.features.legs.radius_plot import chart_of, common_radius, radius_words, volume_at
+from explorer.app.features.legs.radius_plot import (
+    chart_columns,
+    common_radius,
+    radius_words,
+    volume_at,
+)
 from explorer.app.features.legs.tasks import draw_radius_curve
 from explorer.app.features.workspace import reached
 from explorer.app.features.workspace.feed import WorkspaceFeed
+from explorer.app.features.workspace.files import FORMATS
 from explorer.app.features.workspace.numbers import workspace_summary
-from explorer.app.features.workspace.panel import FORMATS, WorkspacePanel
+from explorer.app.features.workspace.panel import WorkspacePanel
 from explorer.app.features.workspace.tasks import (
     LIVE_TOLERANCE,
     STEP,
@@ -33,7 +40,7 @@ from explorer.app.features.workspace.tasks import (
     exported_name,
 )
 from explorer.app.scene.bands import COLLIDING, PLAIN
-from explorer.app.state.actions import GoHome, SetLimits, SetPosition, SetVariable, SetView
+from explorer.app.state.actions import GoHome, Set, SetPosition, SetVariable
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, opened
 from explorer.app.widgets.assigning import Assigner, Update
@@ -51,6 +58,7 @@ from explorer.workspace.limits.constraints import constraints, slacks
 
 OPTIMAL = PRESETS["paper-optimal"]
 RADIUS = 0.2
+Followed = TypeVar("Followed", bound=Feed)
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -65,55 +73,19 @@ def desk() -> Generator[Desk]:
     made.session.stop()
 
 
-class Here:
-    """Stands for the worker: does what is asked when it is told to, here, and counts."""
-
-    def __init__(self) -> None:
-        self.asked: list[tuple[Callable[..., Any], Any]] = []
-        self._waiting: list[Callable[[], None]] = []
-
-    def submit(
-        self,
-        key: object,
-        task: Callable[..., Any],
-        arguments: tuple[Any, ...],
-        done: Callable[[Any], None],
-        failed: Callable[[str], None],
-        told: Callable[[Any], None] | None = None,
-        *,
-        is_drawing: bool = False,
-    ) -> int:
-        del key, failed, told, is_drawing
-        self.asked.append((task, arguments[0]))
-        self._waiting.append(lambda: done(task(*arguments)))
-        return len(self.asked)
-
-    def cancel(self, number: int, patience: float | None) -> None:
-        """Leave what is asked for as it is."""
-
-    def work(self) -> None:
-        """Do what waits."""
-        while self._waiting:
-            self._waiting.pop(0)()
-
-
 def shown(state: State, **changes: Any) -> State:
     """Return the state with the reachable workspace shown."""
     asked = {"solid": True, "region": "reachable", **changes}
     workspace = replace(state.view.workspace, **asked)
-    return SetView(replace(state.view, workspace=workspace)).apply(state)
-
-
-def _no_export(what: str, file_format: str, client_id: int | None) -> None:
-    pytest.fail(f"{what}, {file_format} and {client_id} were exported")
+    return Set("view", replace(state.view, workspace=workspace)).apply(state)
 
 
 def curve_shown(state: State) -> State:
-    return SetView(replace(state.view, radius_curve=True)).apply(state)
+    return Set("view", replace(state.view, radius_curve=True)).apply(state)
 
 
 def with_limits(state: State, **limits: Any) -> State:
-    return SetLimits(msgspec.structs.replace(state.design.limits, **limits)).apply(state)
+    return Set("design.limits", msgspec.structs.replace(state.design.limits, **limits)).apply(state)
 
 
 def beyond_its_limits() -> State:
@@ -121,22 +93,25 @@ def beyond_its_limits() -> State:
     return with_limits(opened(OPTIMAL), l4=(0.0, 12.5))
 
 
-def feed_of(state: State) -> tuple[WorkspaceFeed, Here]:
+def feed_of(state: State) -> tuple[WorkspaceFeed, StubWorker]:
     """Return a feed that has drawn a state."""
-    here = Here()
-    feed = WorkspaceFeed(here, lambda: None)  # pyright: ignore[reportArgumentType]
-    feed.follow(Frame(state))
-    here.work()
-    return feed, here
+    return followed(services_for(), WorkspaceFeed, state)
 
 
-def radius_feed_of(state: State) -> tuple[RadiusFeed, Here]:
+def radius_feed_of(state: State) -> tuple[RadiusFeed, StubWorker]:
     """Return a feed that has drawn the radius curve of a state."""
-    here = Here()
-    feed = RadiusFeed(here, lambda: None)  # pyright: ignore[reportArgumentType]
+    return followed(services_for(), RadiusFeed, state)
+
+
+def followed(
+    services: Services, kind: Callable[[Services], Followed], state: State
+) -> tuple[Followed, StubWorker]:
+    """Return the feed of a class, which has drawn a state, and its worker."""
+    feed, worker = services.get(kind), services.worker
+    assert isinstance(worker, StubWorker)
     feed.follow(Frame(state))
-    here.work()
-    return feed, here
+    worker.work()
+    return feed, worker
 
 
 def drawing_of(state: State) -> WorkspaceDrawing:
@@ -265,12 +240,13 @@ def test_slider_of_the_cut_spans_the_extent_and_starts_in_its_middle(
     server: viser.ViserServer,
 ) -> None:
     desk = Desk(shown(opened(OPTIMAL), region="limits"))
-    panel = WorkspacePanel(server.gui, desk.session, _no_export)
+    services = services_for(server, desk.session)
+    panel = WorkspacePanel(services)
 
     def show() -> tuple[WorkspaceDrawing, list[Update]]:
-        feed, _ = feed_of(desk.state)
+        feed, _ = followed(services, WorkspaceFeed, desk.state)
         assert feed.drawing is not None
-        return feed.drawing, list(panel.updates(Frame(desk.state), feed))
+        return feed.drawing, list(panel.updates(Frame(desk.state)))
 
     def slider(told: list[Update]) -> dict[str, Any]:
         return {name: value for handle, name, value in told if getattr(handle, "label", "") == "at"}
@@ -299,21 +275,18 @@ def test_slider_of_the_cut_spans_the_extent_and_starts_in_its_middle(
     desk.session.stop()
 
 
-def test_the_map_lets_the_page_through_where_nothing_is(
-    server: viser.ViserServer, desk: Desk
-) -> None:
+def test_the_map_lets_the_page_through_where_nothing_is(services: Services) -> None:
     state = shown(THICK, cut="z", level=0.3)
-    panel = WorkspacePanel(server.gui, desk.session, _no_export)
-    feed, _ = feed_of(state)
+    panel = WorkspacePanel(services)
+    feed, _ = followed(services, WorkspaceFeed, state)
     assert feed.drawing is not None
     drawn = feed.drawing.slice_map
     assert drawn is not None
-    for handle, name, value in panel.updates(Frame(state), feed):
-        setattr(handle, name, value)
-    assert panel._map.visible  # pyright: ignore[reportPrivateUsage]
-    data = panel._map._data  # pyright: ignore[reportPrivateUsage]
-    assert data is not None
-    sent = np.asarray(Image.open(io.BytesIO(data)))
+    images = {
+        n: v for h, n, v in panel.updates(Frame(state)) if isinstance(h, viser.GuiImageHandle)
+    }
+    assert images["visible"]
+    sent: Any = images["image"]
     np.testing.assert_array_equal(sent[::3, ::3], drawn.pixels)
     assert sent[..., 3].min() == 0
 
@@ -345,9 +318,9 @@ def test_cutting_and_colouring_reach_for_nothing_anew(monkeypatch: pytest.Monkey
 
 def test_a_move_asks_anew_only_where_it_matters() -> None:
     def asks_anew(state: State) -> bool:
-        feed, here = feed_of(state)
+        feed, worker = feed_of(state)
         feed.follow(Frame(SetPosition(2, 8.0).apply(state)))
-        return len(here.asked) > 1
+        return len(worker.orders) > 1
 
     assert not asks_anew(THICK)
     assert asks_anew(shown(THICK, start="pose"))
@@ -356,33 +329,33 @@ def test_a_move_asks_anew_only_where_it_matters() -> None:
 
 
 def test_a_failure_of_an_older_request_counts_for_nothing() -> None:
-    feed, here = feed_of(THICK)
+    feed, worker = feed_of(THICK)
     feed.follow(Frame(shown(THICK, colour="margin")))
-    first, second = 1, 2
-    feed._failed(first, "too late")  # pyright: ignore[reportPrivateUsage]
+    first, second = worker.orders
+    first.failed("too late")
     assert feed.problem is None
-    feed._failed(second, "it failed")  # pyright: ignore[reportPrivateUsage]
+    second.failed("it failed")
     assert feed.problem == "it failed"
-    here.work()
+    worker.work()
     assert feed.problem is None
     assert feed.is_current
 
 
 def test_the_curve_is_computed_on_request_only_and_not_for_other_radii() -> None:
-    feed, here = radius_feed_of(opened(OPTIMAL))
-    assert here.asked == []
+    feed, worker = radius_feed_of(opened(OPTIMAL))
+    assert worker.orders == []
     assert feed.drawing is None
     state = curve_shown(opened(OPTIMAL))
     feed.follow(Frame(state))
-    assert [task for task, _ in here.asked] == [draw_radius_curve]
+    assert [order.task for order in worker.orders] == [draw_radius_curve]
     for same in (thick(state, 0.3), SetPosition(0, 11.0).apply(state)):
         feed.follow(Frame(same))
-    assert len(here.asked) == 1
+    assert len(worker.orders) == 1
     feed.follow(Frame(with_limits(state, margin=1.0)))
-    assert len(here.asked) == 2
-    assert here.asked[-1][1].design.limits.margin == 1.0
+    assert len(worker.orders) == 2
+    assert worker.orders[-1].request.design.limits.margin == 1.0
     feed.follow(Frame(opened(OPTIMAL)))
-    assert len(here.asked) == 2
+    assert len(worker.orders) == 2
 
 
 def test_the_columns_of_a_chart_are_sent_once(server: viser.ViserServer) -> None:
@@ -428,7 +401,7 @@ def test_where_no_pair_collides_the_numbers_say_so_and_how_far_each_is_from_it()
     assert "100 % of the" in html
     least = least_clearances(state.design).clearance
     radius = 0.5 * float(least.min())
-    assert f"radii larger by up to {radius:.4g}" in html
+    assert f"all radii grow by up to {radius:.4g}" in html
     rows = [row for row in rows_of(html) if len(row) == 3][1:]
     assert [number(row[1]) for row in rows] == pytest.approx(least.tolist(), rel=5e-3)
     assert {row[2] for row in rows} == {"–"}
@@ -474,23 +447,23 @@ def test_a_home_in_trouble_leaves_the_solid_and_says_what_would_do() -> None:
 
 
 def test_legs_that_collide_everywhere_are_told_without_a_button(
-    server: viser.ViserServer, desk: Desk
+    services: Services,
 ) -> None:
     state = shown(thick(opened(OPTIMAL), 0.4))
-    panel = WorkspacePanel(server.gui, desk.session, _no_export)
-    feed, _ = feed_of(state)
-    updates = list(panel.updates(Frame(state), feed))
+    panel = WorkspacePanel(services)
+    followed(services, WorkspaceFeed, state)
+    updates = list(panel.updates(Frame(state)))
     button = next(h for h, _, _ in updates if isinstance(h, viser.GuiButtonHandle))
     assert (button, "visible", False) in updates
     assert any("legs 2 and 3 overlap" in str(v) for _, name, v in updates if name == "content")
 
 
-def test_the_button_goes_where_ways_can_start(server: viser.ViserServer, desk: Desk) -> None:
-    panel = WorkspacePanel(server.gui, desk.session, _no_export)
-    feed, here = feed_of(desk.state)
+def test_the_button_goes_where_ways_can_start(services: Services, desk: Desk) -> None:
+    panel = WorkspacePanel(services)
+    feed, worker = followed(services, WorkspaceFeed, desk.state)
     content = visible = ""
     button: Any = None
-    for handle, name, value in panel.updates(Frame(desk.state), feed):
+    for handle, name, value in panel.updates(Frame(desk.state)):
         setattr(handle, name, value)
         if isinstance(handle, viser.GuiButtonHandle) and name == "visible":
             button, visible = handle, value
@@ -510,15 +483,15 @@ def test_the_button_goes_where_ways_can_start(server: viser.ViserServer, desk: D
     assert after.view.workspace == replace(before.view.workspace, start="pose")
     assert after.design == before.design
     feed.follow(Frame(after))
-    here.work()
+    worker.work()
     assert feed.drawing is not None
     assert feed.drawing.trouble is None
     assert feed.drawing.reached is not None
-    updates = list(panel.updates(Frame(after), feed))
+    updates = list(panel.updates(Frame(after)))
     assert (button, "visible", False) in updates
     # Home again, the present position is the one in trouble.
     feed.follow(Frame(GoHome().apply(after)))
-    here.work()
+    worker.work()
     assert feed.drawing.trouble is not None
 
 
@@ -571,7 +544,7 @@ def test_step_of_what_has_facets_is_refused_with_what_would_work(
     rows = drawing_of(shown(THICK, region="limits")).request.rotation
     with pytest.raises(InputError, match=reason) as refusal:
         export_mesh(THICK.design, rows, 0.1, region, None, what, STEP)
-    assert "as 3mf, stl, glb, obj or ply it can be exported" in str(refusal.value)
+    assert "export it as 3mf, stl, glb, obj or ply" in str(refusal.value)
 
 
 def test_step_without_its_extra_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -599,7 +572,7 @@ def test_the_chart_shows_the_curve_and_marks_on_it(
     values: list[float], radius: float | None
 ) -> None:
     drawn = curve(*sorted(values, reverse=True))
-    x, y, present, most, harmless = chart_of(drawn, radius)
+    x, y, present, most, harmless = chart_columns(drawn, radius)
     assert (np.diff(x) >= 0.0).all()
     assert (np.diff(y) <= 1e-9).all()
     assert y[-1] == 0.0
@@ -623,7 +596,7 @@ def test_the_words_of_the_curve_are_those_of_the_library() -> None:
     html = radius_words(Frame(state), radius_feed_of(state)[0])
     expected = CURVE
     rows = rows_of("<tr></tr>" + html)
-    assert [row[0] for row in rows] == ["present radius", "99 % left up to", "harmless up to"]
+    assert [row[0] for row in rows] == ["present radius", "99 % reachable up to", "no loss up to"]
     assert number(rows[0][1]) == RADIUS
     share = 100.0 * volume_at(expected, RADIUS) / float(expected.volumes[0])
     assert number(rows[0][2]) == pytest.approx(share, rel=5e-3)
@@ -641,7 +614,7 @@ def test_a_harmless_radius_is_told_with_the_pair_that_ends_it() -> None:
     html = radius_words(Frame(state), radius_feed_of(state)[0])
     least = least_clearances(state.design)
     first, second = PAIRS[int(least.clearance.argmin())]
-    assert f"The first to collide within the limits: legs {first} and {second} at (" in html
+    assert f"First collision within the limits: legs {first} and {second} at (" in html
     assert f"{0.5 * least.clearance.min():.3g}" in html
 
 
@@ -659,26 +632,25 @@ def test_without_a_start_or_a_workspace_the_words_say_why() -> None:
     assert "The workspace is empty" in radius_words(Frame(empty), radius_feed_of(empty)[0])
 
 
-def test_the_chart_is_there_once_it_is_computed(server: viser.ViserServer, desk: Desk) -> None:
-    panel = LegsPanel(server.gui, desk.session)
+def test_the_chart_is_there_once_it_is_computed(services: Services, worker: StubWorker) -> None:
+    panel = LegsPanel(services)
     state = curve_shown(opened(OPTIMAL))
-    here = Here()
-    feed = RadiusFeed(here, lambda: None)  # pyright: ignore[reportArgumentType]
+    feed = services.get(RadiusFeed)
 
     def chart(state: State) -> dict[str, Any]:
         feed.follow(Frame(state))
-        updates = list(panel.updates(Frame(state), feed))
+        updates = list(panel.updates(Frame(state)))
         return {name: v for h, name, v in updates if isinstance(h, viser.GuiUplotHandle)}
 
     assert chart(opened(OPTIMAL)) == {"visible": False}
     assert chart(state) == {"visible": False}
     assert "Computing" in radius_words(Frame(state), feed)
-    here.work()
+    worker.work()
     drawn = chart(state)
     assert drawn["visible"] is True
-    expected = draw_radius_curve(here.asked[0][1]).curve
+    expected = draw_radius_curve(worker.orders[0].request).curve
     assert expected is not None
-    for got, column in zip(drawn["data"], chart_of(expected, 0.0), strict=True):
+    for got, column in zip(drawn["data"], chart_columns(expected, 0.0), strict=True):
         np.testing.assert_array_equal(got, column)
     # The very same columns again, until something changes.
     assert chart(state)["data"] is drawn["data"]
@@ -687,7 +659,7 @@ def test_the_chart_is_there_once_it_is_computed(server: viser.ViserServer, desk:
     narrow = with_limits(state, margin=1.0)
     assert chart(narrow)["visible"] is True
     assert "computing" in radius_words(Frame(narrow), feed)
-    here.work()
+    worker.work()
     assert "computing" not in radius_words(Frame(narrow), feed)
 
 

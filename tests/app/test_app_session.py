@@ -1,4 +1,4 @@
-"""The session: what is posted from many threads at once comes out whole and newest."""
+"""The session makes the newest of the changes that many threads post at once."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from explorer.app.session.jobs import LatestWins
+from explorer.app.session.latest import LatestWins
 from explorer.app.session.session import Session
 from explorer.app.state.action import Action
 from explorer.app.state.actions import SetJoint, SetPosition, SetVariable
@@ -57,7 +57,7 @@ def watched() -> Watched:
     return Watched()
 
 
-def test_of_a_burst_only_the_newest_is_computed_and_it_is_what_remains(watched: Watched) -> None:
+def test_only_the_newest_of_a_burst_is_computed(watched: Watched) -> None:
     with watched.busy():
         for i in range(500):
             value = 11.0 + 0.001 * i
@@ -70,7 +70,7 @@ def test_of_a_burst_only_the_newest_is_computed_and_it_is_what_remains(watched: 
     assert watched.frames[-1].state is watched.session.state
 
 
-def test_events_that_overtake_each_other_end_with_the_one_that_happened_last(
+def test_events_out_of_order_end_with_the_latest_one(
     watched: Watched,
 ) -> None:
     now = time.time()
@@ -82,7 +82,7 @@ def test_events_that_overtake_each_other_end_with_the_one_that_happened_last(
     assert watched.session.state.pose.position[1] == 3.0
 
 
-def test_controls_of_one_burst_are_applied_in_the_order_they_happened(watched: Watched) -> None:
+def test_changes_of_one_burst_are_made_in_the_order_of_their_stamps(watched: Watched) -> None:
     now = time.time()
     with watched.busy():
         watched.session.post("a", lambda s: SetPosition(2, 2 * s.pose.position[2]), stamp=now + 2)
@@ -90,7 +90,7 @@ def test_controls_of_one_burst_are_applied_in_the_order_they_happened(watched: W
     assert watched.session.state.pose.position[2] == 10.0
 
 
-def test_a_refused_change_tells_who_asked_keeps_the_state_and_draws_it_again(
+def test_refused_change_is_reported_to_its_client_and_the_state_is_drawn_again(
     watched: Watched,
 ) -> None:
     before = watched.session.state
@@ -103,7 +103,7 @@ def test_a_refused_change_tells_who_asked_keeps_the_state_and_draws_it_again(
     assert watched.frames[-1].state == before
 
 
-def test_an_unexpected_fault_is_reported_and_the_session_goes_on(watched: Watched) -> None:
+def test_unexpected_fault_is_reported_and_the_session_continues(watched: Watched) -> None:
     def broken(_: State) -> Action:
         raise RuntimeError("broken on purpose")
 
@@ -115,7 +115,7 @@ def test_an_unexpected_fault_is_reported_and_the_session_goes_on(watched: Watche
     assert watched.session.state.pose.position[0] == 9.0
 
 
-def test_many_threads_lose_nothing(watched: Watched) -> None:
+def test_changes_from_many_threads_are_all_made(watched: Watched) -> None:
     def run(axis: int) -> None:
         for i in range(100):
             watched.session.post(axis, lambda _, i=i: SetPosition(axis, 5.0 + 0.01 * i))
@@ -129,7 +129,7 @@ def test_many_threads_lose_nothing(watched: Watched) -> None:
     assert watched.session.state.pose.position == pytest.approx((5.99, 5.99, 5.99))
 
 
-def test_a_stopped_queue_drops_what_waits_and_ends_its_thread() -> None:
+def test_stopped_queue_drops_the_items_that_wait_and_ends_its_thread() -> None:
     handled: list[int] = []
     gate = threading.Event()
 

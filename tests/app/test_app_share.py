@@ -20,7 +20,7 @@ from hypothesis import given, strategies as st
 from numpy.testing import assert_allclose
 
 from explorer import JOINTS, VARIABLES, forward, margins as margins_of, rotation_from_quaternion
-from explorer.app.features.sharing.scene_html import Eye, caption_of, scene_html, shown
+from explorer.app.features.sharing.scene_html import FileCamera, caption_of, scene_html, shown
 from explorer.app.features.sharing.session_log import SessionLog
 from explorer.app.features.sharing.view_picture import (
     ALIKE,
@@ -33,7 +33,7 @@ from explorer.app.features.sharing.view_picture import (
     on_background,
 )
 from explorer.app.server import Running, start
-from explorer.app.state.actions import Open, SetMode, SetPosition, SetUnit, SetVariable, SetView
+from explorer.app.state.actions import Open, Set, SetMode, SetPosition, SetVariable
 from explorer.app.state.state import State, opened
 from explorer.app.state.view import View
 from explorer.errors import InputError
@@ -42,7 +42,7 @@ from explorer.mechanism.design_file import PRESETS
 
 OPTIMAL = PRESETS["paper-optimal"]
 DATE = dt.date(2031, 2, 3)
-EYE = Eye(np.array([12.0, -9.0, 7.5]), np.array([1.0, 2.0, 3.0]), 0.5)
+EYE = FileCamera(np.array([12.0, -9.0, 7.5]), np.array([1.0, 2.0, 3.0]), 0.5)
 
 
 def rows_of(table: SessionTable) -> list[dict[str, str]]:
@@ -77,7 +77,7 @@ def assert_computes_again(row: dict[str, str]) -> None:
             st.builds(SetPosition, st.integers(0, 2), st.floats(4.0, 12.0)),
             st.builds(SetMode, st.integers(0, 7)),
             st.builds(SetVariable, st.just("a3x"), st.floats(8.0, 21.0)),
-            st.builds(SetUnit, st.floats(0.5, 50.0)),
+            st.builds(Set, st.just("design.unit_mm"), st.floats(0.5, 50.0)),
             st.just(Open(PRESETS["paper-initial"])),
         ),
         max_size=12,
@@ -126,11 +126,11 @@ def test_an_empty_log_is_a_table_without_rows() -> None:
 
 def test_of_a_drag_fifty_rows_a_second_are_kept_with_its_first_and_last() -> None:
     log, state = SessionLog(), opened(OPTIMAL)
-    log.record(state, 0, "Open", log.begun)
+    log.record(state, 0, "Open", log.start_time)
     # A thousand events a second, for two seconds; then another hand at once.
     for event in range(2001):
-        log.record(at(state, 6.0 + 0.001 * event), 1, "x", log.begun + 1.0 + 0.001 * event)
-    log.record(at(state, 12.0), 2, "y", log.begun + 3.0)
+        log.record(at(state, 6.0 + 0.001 * event), 1, "x", log.start_time + 1.0 + 0.001 * event)
+    log.record(at(state, 12.0), 2, "y", log.start_time + 3.0)
     table = log.table()
     x, time = table.position[:, 0], table.time
     assert 2 * 40 <= len(x) - 2 <= 2 * 50 + 2
@@ -147,7 +147,7 @@ def test_however_a_drag_goes_its_ends_are_kept_and_no_more_than_fifty_a_second(
     events: list[tuple[float, int]],
 ) -> None:
     log, state = SessionLog(), opened(OPTIMAL)
-    now, hand = log.begun + 1.0, 0
+    now, hand = log.start_time + 1.0, 0
     wanted: list[tuple[int, float]] = []
     for number, (pause, change) in enumerate(events):
         now, hand = now + pause, hand + change
@@ -168,9 +168,9 @@ def test_however_a_drag_goes_its_ends_are_kept_and_no_more_than_fifty_a_second(
 def test_single_steps_are_kept_however_quick() -> None:
     log, state = SessionLog(), opened(OPTIMAL)
     for step in range(50):
-        log.record(at(state, 6.0 + 0.1 * step), step, "x", log.begun)
+        log.record(at(state, 6.0 + 0.1 * step), step, "x", log.start_time)
     for step in range(50):
-        log.record(at(state, 7.05 + 0.1 * step), None, "x", log.begun)
+        log.record(at(state, 7.05 + 0.1 * step), None, "x", log.start_time)
     assert len(log) == 100
 
 
@@ -189,7 +189,7 @@ def test_beyond_its_room_a_log_forgets_the_oldest() -> None:
 def test_what_moves_nothing_is_no_row() -> None:
     log, state = SessionLog(), opened(OPTIMAL)
     log.record(state, 1, "Open")
-    log.record(SetView(View(grid=False)).apply(state), 2, "View")
+    log.record(Set("view", View(grid=False)).apply(state), 2, "View")
     log.record(SetPosition(0, state.pose.position[0]).apply(state), 3, "x")
     assert len(log) == 1
 
@@ -249,14 +249,14 @@ def test_a_page_of_the_scene_holds_what_is_seen_and_nothing_else(running: Runnin
 
 def test_what_is_shown_later_is_in_a_later_page(running: Running) -> None:
     session = running.page.session
-    session.do(SetView(View(ghosts=True, labels=False)))
+    session.do(Set("view", View(ghosts=True, labels=False)))
     assert running.page.wait_until_drawn()
     packed = Packed.of(scene_html(running.viser, session.state, EYE, date=DATE))
     assert packed.named("/ghosts/")
     texts = [m["props"]["text"] for m in packed.messages if m["type"] == "LabelMessage"]
     assert "a1" not in texts
     assert len(texts) == 7
-    session.do(SetView(View()))
+    session.do(Set("view", View()))
     assert running.page.wait_until_drawn()
 
 

@@ -15,16 +15,13 @@ from explorer.app.state.actions import (
     GoHome,
     Open,
     Reset,
+    Set,
     SetAngle,
-    SetHold,
     SetJoint,
-    SetLimits,
     SetMode,
     SetPose,
     SetPosition,
-    SetUnit,
     SetVariable,
-    SetView,
     UseNearest,
 )
 from explorer.app.state.frame import Frame
@@ -109,7 +106,7 @@ def test_nearest_length_where_none_stays_clear_is_the_farthest_from_singular(
     state: State,
 ) -> None:
     _, high = Frame(state).snapshot.intervals[0][-1]
-    wary = SetView(replace(state.view, warn_below=1e3)).apply(state)
+    wary = Set("view", replace(state.view, warn_below=1e3)).apply(state)
     freed = UseNearest().apply(SetJoint(0, high + 1.0).apply(wary))
     assert closes(freed)
     assert Frame(freed).verdict.kind == "near"
@@ -170,7 +167,7 @@ def test_held_poses_stay_and_held_legs_stay_while_the_design_changes(
     by_pose = SetVariable(name, value).apply(state)
     assert by_pose.pose == state.pose
     assert closes(by_pose)
-    by_legs = SetVariable(name, value).apply(SetHold("legs").apply(state))
+    by_legs = SetVariable(name, value).apply(Set("hold", "legs").apply(state))
     assert by_legs.joints == state.joints
     assert closes(by_legs)
     assert by_legs.mode == state.mode
@@ -178,7 +175,7 @@ def test_held_poses_stay_and_held_legs_stay_while_the_design_changes(
 
 def test_held_legs_that_cannot_be_assembled_refuse_the_design(state: State) -> None:
     with pytest.raises(InputError, match=r"a3x = 80 cannot be assembled .* stays 19\.1829"):
-        SetVariable("a3x", 80.0).apply(SetHold("legs").apply(state))
+        SetVariable("a3x", 80.0).apply(Set("hold", "legs").apply(state))
 
 
 @pytest.mark.parametrize(("name", "value"), [("a3y", 0.0), ("b1y", 0.0), ("b2", OPTIMAL.b3)])
@@ -188,8 +185,10 @@ def test_a_degenerate_design_is_refused(state: State, name: str, value: float) -
 
 
 def test_reset_returns_to_the_design_as_opened_and_keeps_the_view(state: State) -> None:
-    changed = SetView(replace(state.view, twin=True)).apply(
-        SetUnit(1.0).apply(SetVariable("b2", 1.0).apply(SetPosition(0, 3.0).apply(state)))
+    changed = Set("view", replace(state.view, twin=True)).apply(
+        Set("design.unit_mm", 1.0).apply(
+            SetVariable("b2", 1.0).apply(SetPosition(0, 3.0).apply(state))
+        )
     )
     back = Reset().apply(changed)
     assert back.design == OPTIMAL
@@ -207,7 +206,7 @@ def test_home_returns_to_the_home_pose_of_the_changed_design(state: State) -> No
 
 
 def test_limits_are_judged_where_the_mechanism_stands(state: State) -> None:
-    tight = SetLimits(Limits(l1=(0.0, 5.0))).apply(state)
+    tight = Set("design.limits", Limits(l1=(0.0, 5.0))).apply(state)
     assert tight.pose == state.pose
     assert [v.limit for v in Frame(tight).snapshot.violations] == ["l1"]
 
@@ -215,7 +214,7 @@ def test_limits_are_judged_where_the_mechanism_stands(state: State) -> None:
 @pytest.mark.parametrize("length", [0.0, -1.0, float("nan")])
 def test_a_warning_length_must_be_positive(state: State, length: float) -> None:
     with pytest.raises(InputError, match="positive"):
-        SetView(replace(state.view, warn_below=length)).apply(state)
+        Set("view", replace(state.view, warn_below=length)).apply(state)
 
 
 def _length(share: float) -> float:
@@ -229,7 +228,7 @@ MAKERS: tuple[Callable[[int, float], Action], ...] = (
     lambda i, share: SetAngle(i % 3, 360.0 * share - 180.0),
     lambda i, share: SetMode(i),
     lambda i, share: SetVariable(VARIABLES[i], _length(share)),
-    lambda i, share: SetHold("pose" if share < 0.5 else "legs"),
+    lambda i, share: Set("hold", "pose" if share < 0.5 else "legs"),
     lambda i, share: Reset(),
     lambda i, share: UseNearest(),
     lambda i, share: SetPose(Pose((_length(share), 3.0, 4.0), (share, 0.3, -0.2, 1.0))),

@@ -1,4 +1,4 @@
-"""Sessions outlast kills, full disks, clocks set back and each other."""
+"""Saved sessions outlast kills, full disks, clocks set back and other explorers."""
 
 from __future__ import annotations
 
@@ -9,17 +9,22 @@ import sys
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
+from desk import Desk
 
-from explorer.app.state.actions import SetPosition
+from explorer.app.features.optimise.actions import StartRun
+from explorer.app.session.history import History, start_history
+from explorer.app.session.session import REDO, UNDO, Session
+from explorer.app.state.actions import SetName, SetPosition
 from explorer.app.state.state import opened
-from explorer.app.storage.autosave import MOST_ORPHANS, Autosave
 from explorer.app.storage.autosaver import Autosaver
-from explorer.app.storage.document import Document, decode_header, encode_document
-from explorer.app.storage.folder import alone_in, data_folder, taken
+from explorer.app.storage.folder import data_folder, lock_folder, try_lock
+from explorer.app.storage.session_file import MOST_ORPHANS, SessionFile
+from explorer.app.storage.session_format import decode_header, encode_session
+from explorer.app.storage.user_data import open_user_data
 from explorer.errors import StorageError
 from explorer.mechanism.design_file import PRESETS
 
@@ -28,18 +33,18 @@ NEVER = 1e6
 """Seconds that no test waits."""
 
 
-def numbered(number: int) -> Document:
+def numbered(number: int) -> History:
     """Return a session that is known by a number: the first coordinate of b4."""
-    return Document(SetPosition(0, float(number)).apply(opened(PRESETS["paper-optimal"])))
+    return start_history(SetPosition(0, float(number)).apply(opened(PRESETS["paper-optimal"])))
 
 
-def number_of(document: Document | None) -> float | None:
-    return None if document is None else document.present.pose.position[0]
+def number_of(history: History | None) -> float | None:
+    return None if history is None else history.step.state.pose.position[0]
 
 
-def left(folder: Path, number: int) -> Path:
-    """Leave a session as an explorer does that ends; return its file."""
-    store = Autosave(folder)
+def leave(folder: Path, number: int) -> Path:
+    """Save a session as an explorer does that ends; return its file."""
+    store = SessionFile(folder)
     store.save(numbered(number))
     path = store.path
     store.close()
@@ -47,47 +52,56 @@ def left(folder: Path, number: int) -> Path:
     return path
 
 
-def next_session(folder: Path) -> float | None:
+def resume(folder: Path) -> float | None:
     """Return the session with which the next explorer starts, and leave it again."""
-    store = Autosave(folder)
-    found = store.adopt()
+    store = SessionFile(folder)
+    resumed = store.resume()
     store.close()
-    assert found.messages == ()
-    return number_of(found.document)
+    assert resumed.messages == ()
+    return number_of(resumed.history)
 
 
 def contents(folder: Path) -> dict[str, bytes]:
-    """Return the contents of all files in a folder but locks, by name."""
+    """Return the contents of all files in a folder except locks, by name."""
     files = [path for path in folder.iterdir() if not path.name.endswith(".lock")]
     return {path.name: path.read_bytes() for path in files}
 
 
-def refuse(reason: str) -> Callable[..., None]:
-    def refused(*_: object, **__: object) -> None:
-        raise StorageError(reason)
+def run_python(*arguments: str) -> subprocess.CompletedProcess[str]:
+    done = subprocess.run(
+        [sys.executable, *arguments],
+        env={**os.environ, "PYTHONPATH": str(HERE.parents[1])},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return done
 
-    return refused
 
-
-def test_the_next_start_goes_on_in_the_same_file(tmp_path: Path) -> None:
+def test_next_explorer_continues_in_the_same_file(tmp_path: Path) -> None:
     folder = tmp_path / "new" / "sessions"
-    first = Autosave(folder)
-    assert first.adopt().document is None
+    first = SessionFile(folder)
+    assert first.resume().history is None
     assert first.path is None
-    generations = [first.save(numbered(number)) for number in range(5)]
-    assert generations == sorted({*generations})
-    path = first.path
+    for number in range(5):
+        generation = first.save(numbered(number))
+        assert first.path is not None
+        data = first.path.read_bytes()
+        assert data == encode_session(numbered(number), generation)
+        assert decode_header(data, "file").generation == generation == 1 + number
     first.close()
-    second = Autosave(folder)
-    found = second.adopt()
-    assert (found.document, found.messages) == (numbered(4), ())
-    assert second.path == path
-    assert second.save(numbered(5)) > generations[-1]
+    second = SessionFile(folder)
+    resumed = second.resume()
+    assert (resumed.history, resumed.messages) == (numbered(4), ())
+    assert second.path == first.path or first.path is None
+    assert second.save(numbered(5)) == 6
     second.close()
-    assert next_session(folder) == 5
+    assert len(contents(folder)) == 1
+    assert resume(folder) == 5
 
 
-def test_the_newest_is_told_by_generation_whatever_clocks_say(
+def test_newest_session_is_resumed_although_clocks_were_set_back(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     year = 365.25 * 86400.0
@@ -95,19 +109,19 @@ def test_the_newest_is_told_by_generation_whatever_clocks_say(
     for number in range(6):
         # Each start of the explorer is a year before the last one.
         monkeypatch.setattr(time, "time", lambda number=number: now - number * year)
-        path = left(tmp_path, number)
+        path = leave(tmp_path, number)
         os.utime(path, (now - number * year, now - number * year))
-    assert next_session(tmp_path) == 5
+    assert resume(tmp_path) == 5
 
 
-def test_two_explorers_never_share_a_file_and_the_last_to_save_is_the_newest(
+def test_explorers_side_by_side_have_a_file_each_and_the_last_save_is_the_newest(
     tmp_path: Path,
 ) -> None:
-    left(tmp_path, 0)
-    one, two, three = (Autosave(tmp_path) for _ in range(3))
-    assert number_of(one.adopt().document) == 0
-    assert two.adopt().document is None
-    # As with a design that is opened from a file: nothing is gone on with.
+    leave(tmp_path, 0)
+    one, two, three = (SessionFile(tmp_path) for _ in range(3))
+    assert number_of(one.resume().history) == 0
+    assert two.resume().history is None
+    # As with a design that is opened from a file, which resumes no session.
     three.save(numbered(30))
     for number in range(1, 10):
         one.save(numbered(number))
@@ -116,30 +130,28 @@ def test_two_explorers_never_share_a_file_and_the_last_to_save_is_the_newest(
     one.save(numbered(10))
     for store in (one, two, three):
         store.close()
-    found: list[float | None] = []
-    stores = [Autosave(tmp_path) for _ in range(4)]
-    found = [number_of(store.adopt().document) for store in stores]
-    assert found == [10, 20, 30, None]
+    stores = [SessionFile(tmp_path) for _ in range(4)]
+    assert [number_of(store.resume().history) for store in stores] == [10, 20, 30, None]
     for store in stores:
         store.close()
 
 
-def test_many_explorers_that_start_at_once_take_a_session_each(tmp_path: Path) -> None:
+def test_explorers_that_start_at_once_resume_a_session_each(tmp_path: Path) -> None:
     for number in range(4):
-        left(tmp_path, number)
-    stores = [Autosave(tmp_path) for _ in range(8)]
-    found: list[float | None] = []
+        leave(tmp_path, number)
+    stores = [SessionFile(tmp_path) for _ in range(8)]
+    resumed: list[float | None] = []
 
-    def adopt(store: Autosave) -> None:
-        found.append(number_of(store.adopt().document))
+    def start(store: SessionFile) -> None:
+        resumed.append(number_of(store.resume().history))
 
-    threads = [threading.Thread(target=adopt, args=(store,)) for store in stores]
+    threads = [threading.Thread(target=start, args=(store,)) for store in stores]
     for thread in threads:
         thread.start()
     for thread in threads:
         thread.join()
-    assert sorted(each for each in found if each is not None) == [0, 1, 2, 3]
-    assert found.count(None) == 4
+    assert sorted(each for each in resumed if each is not None) == [0, 1, 2, 3]
+    assert resumed.count(None) == 4
     for number, store in enumerate(stores):
         store.save(numbered(100 + number))
     assert len({store.path for store in stores}) == 8
@@ -148,193 +160,182 @@ def test_many_explorers_that_start_at_once_take_a_session_each(tmp_path: Path) -
 
 
 def test_only_the_newest_sessions_without_an_explorer_are_kept(tmp_path: Path) -> None:
-    living = Autosave(tmp_path)
+    living = SessionFile(tmp_path)
     living.save(numbered(-1))
     for number in range(MOST_ORPHANS + 5):
-        left(tmp_path, number)
-    store = Autosave(tmp_path)
-    assert number_of(store.adopt().document) == MOST_ORPHANS + 4
-    # Its own, those without, and that of the explorer that runs.
+        leave(tmp_path, number)
+    store = SessionFile(tmp_path)
+    assert number_of(store.resume().history) == MOST_ORPHANS + 4
+    # Its own, those without an explorer, and that of the explorer that runs.
     assert len(contents(tmp_path)) == 1 + MOST_ORPHANS + 1
     assert living.save(numbered(-2)) > 0
     store.close()
     living.close()
-    assert next_session(tmp_path) == -2
+    assert resume(tmp_path) == -2
 
 
-def test_locks_and_scratch_files_of_the_dead_are_removed_and_those_of_the_living_are_not(
-    tmp_path: Path,
-) -> None:
-    living = Autosave(tmp_path)
+def test_locks_and_scratch_files_are_removed_unless_their_explorer_runs(tmp_path: Path) -> None:
+    living = SessionFile(tmp_path)
     living.save(numbered(1))
     assert living.path is not None
-    path = left(tmp_path, 2)
+    path = leave(tmp_path, 2)
     writing = tmp_path / f".{living.path.name}.0123.part"
     dead = [tmp_path / f".{path.name}.0123.part", tmp_path / ".0123.json.4.part"]
     dead.append(tmp_path / "0123.lock")
     for each in (writing, *dead):
         each.write_bytes(b"part")
-    store = Autosave(tmp_path)
-    assert number_of(store.adopt().document) == 2
+    assert resume(tmp_path) == 2
     assert writing.exists()
     assert not any(each.exists() for each in dead)
-    store.close()
     living.close()
 
 
-@pytest.mark.parametrize("kind", ["cut", "changed", "empty", "other", "zeros"])
-def test_a_damaged_file_is_put_aside_and_the_one_before_is_opened(
-    tmp_path: Path, kind: str
+DAMAGES: dict[str, Callable[[bytes], bytes]] = {
+    "cut": lambda whole: whole[: len(whole) // 2],
+    "changed": lambda whole: whole.replace(b"2.0", b"3.0", 1),
+    "zeros": lambda whole: bytes(len(whole)),
+    "empty": lambda _: b"",
+    "other": lambda _: b'{"schema": 1}\n',
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_damaged_file_is_renamed_and_the_session_before_is_resumed(
+    tmp_path: Path, damage: str
 ) -> None:
-    left(tmp_path, 1)
-    path = left(tmp_path, 2)
-    whole = path.read_bytes()
-    damaged = {
-        "cut": whole[: len(whole) // 2],
-        "changed": whole.replace(b"2.0", b"3.0", 1),
-        "empty": b"",
-        "other": b'{"schema": 1}\n',
-        "zeros": bytes(len(whole)),
-    }[kind]
-    for number in range(2):
+    leave(tmp_path, 1)
+    path = leave(tmp_path, 2)
+    damaged = DAMAGES[damage](path.read_bytes())
+    for ending in (".broken", ".broken2"):
         path.write_bytes(damaged)
-        store = Autosave(tmp_path)
-        found = store.adopt()
+        store = SessionFile(tmp_path)
+        resumed = store.resume()
         store.close()
-        assert number_of(found.document) == 1
-        (message,) = found.messages
-        assert path.name in message
+        assert number_of(resumed.history) == 1
+        (message,) = resumed.messages
         assert "\n" not in message
-        aside = path.name + ".broken" + ("" if number == 0 else "2")
-        assert (tmp_path / aside).read_bytes() == damaged
-        assert repr(aside) in message
+        assert path.name in message
+        assert repr(path.name + ending) in message
+        assert (tmp_path / (path.name + ending)).read_bytes() == damaged
         assert not path.exists()
-    assert next_session(tmp_path) == 1
+    assert resume(tmp_path) == 1
 
 
-def test_a_file_of_a_newer_explorer_is_left_alone_and_new_ones_are_newer(tmp_path: Path) -> None:
-    left(tmp_path, 1)
+def test_file_of_a_newer_explorer_is_left_alone_and_new_saves_are_newer(tmp_path: Path) -> None:
+    leave(tmp_path, 1)
     newer = tmp_path / "newer.json"
     newer.write_bytes(b'{"schema": 99, "generation": 1000, "more": [1]}\nbinary \xff')
     before = newer.read_bytes()
-    store = Autosave(tmp_path)
-    found = store.adopt()
-    assert number_of(found.document) == 1
-    (message,) = found.messages
+    store = SessionFile(tmp_path)
+    resumed = store.resume()
+    assert number_of(resumed.history) == 1
+    (message,) = resumed.messages
     assert "newer" in message
     assert newer.read_bytes() == before
     assert store.save(numbered(2)) == 1001
     store.close()
 
 
-def test_what_is_no_file_is_passed_over(tmp_path: Path) -> None:
-    left(tmp_path, 1)
+def test_folders_links_and_pipes_named_like_sessions_are_ignored(tmp_path: Path) -> None:
+    leave(tmp_path, 1)
     (tmp_path / "folder.json").mkdir()
     (tmp_path / "gone.json").symlink_to(tmp_path / "nowhere")
     if hasattr(os, "mkfifo"):
         os.mkfifo(tmp_path / "pipe.json")
-    assert next_session(tmp_path) == 1
+    assert resume(tmp_path) == 1
 
 
-def test_a_session_is_read_where_nothing_can_be_written(
+def test_session_is_only_read_where_nothing_can_be_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    def refuse(*_: object) -> None:
+        raise StorageError("read-only")
+
     for number in (1, 2):
-        path = left(tmp_path, number)
+        path = leave(tmp_path, number)
     path.write_bytes(b"damaged")
     before = contents(tmp_path)
     with monkeypatch.context() as patch:
-        patch.setattr("explorer.app.storage.autosave.alone_in", refuse("read-only"))
-        store = Autosave(tmp_path)
-        found = store.adopt()
-        assert number_of(found.document) == 1
-        assert any("read-only" in message for message in found.messages)
-        assert any(path.name in message for message in found.messages)
+        patch.setattr("explorer.app.storage.session_file.lock_folder", refuse)
+        store = SessionFile(tmp_path)
+        resumed = store.resume()
+        assert number_of(resumed.history) == 1
+        assert any("read-only" in message for message in resumed.messages)
+        assert any(path.name in message for message in resumed.messages)
         with pytest.raises(StorageError, match="read-only"):
             store.save(numbered(3))
         assert contents(tmp_path) == before
-    # Once it can be written, the session goes on in a file of its own.
+    # Once it can be written, the session is saved in a file of its own.
     store.save(numbered(3))
     assert {*contents(tmp_path)} > {*before}
     store.close()
 
 
-def test_a_file_in_place_of_the_folder_is_told_in_one_line(tmp_path: Path) -> None:
+def test_file_in_place_of_the_folder_is_reported_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "data").write_bytes(b"")
-    store = Autosave(tmp_path / "data" / "sessions")
-    found = store.adopt()
-    assert found.document is None
+    store = SessionFile(tmp_path / "data" / "sessions")
+    resumed = store.resume()
+    assert resumed.history is None
     with pytest.raises(StorageError, match="EXPLORER_DATA") as refusal:
         store.save(numbered(1))
-    assert found.messages == (str(refusal.value),)
+    assert resumed.messages == (str(refusal.value),)
     assert "\n" not in str(refusal.value)
-    assert "Traceback" not in str(refusal.value)
 
 
-def test_a_folder_without_permission_is_told_in_one_line(tmp_path: Path) -> None:
-    left(tmp_path, 1)
+def test_folder_without_permission_is_reported(tmp_path: Path) -> None:
+    leave(tmp_path, 1)
     tmp_path.chmod(0o500)
     try:
         if os.access(tmp_path, os.W_OK):
             pytest.skip("a superuser may write anywhere")
-        store = Autosave(tmp_path)
-        assert number_of(store.adopt().document) == 1
+        store = SessionFile(tmp_path)
+        assert number_of(store.resume().history) == 1
         with pytest.raises(StorageError, match="may write"):
             store.save(numbered(2))
     finally:
         tmp_path.chmod(0o700)
 
 
-def test_a_session_goes_on_when_its_folder_is_taken_away(tmp_path: Path) -> None:
+def test_session_whose_folder_is_moved_is_saved_in_a_new_one(tmp_path: Path) -> None:
     folder = tmp_path / "sessions"
-    store = Autosave(folder)
+    store = SessionFile(folder)
     store.save(numbered(1))
     folder.rename(tmp_path / "elsewhere")
     store.save(numbered(2))
     store.close()
-    assert next_session(folder) == 2
-    assert next_session(tmp_path / "elsewhere") == 1
+    assert resume(folder) == 2
+    assert resume(tmp_path / "elsewhere") == 1
 
 
-def test_a_folder_that_another_explorer_keeps_is_told(tmp_path: Path) -> None:
-    with alone_in(tmp_path), pytest.raises(StorageError, match="another explorer"):
-        held(tmp_path)
+def test_file_that_is_locked_cannot_be_locked_again(tmp_path: Path) -> None:
+    for _ in range(2):
+        lock = try_lock(tmp_path / "x.lock")
+        assert lock is not None
+        assert try_lock(tmp_path / "x.lock") is None
+        lock.release()
 
 
-def held(folder: Path) -> None:
-    with alone_in(folder, patience=0.0):
-        pass
+def test_folder_locked_by_another_explorer_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("explorer.app.storage.folder.PATIENCE_SECONDS", 0.0)
+    with lock_folder(tmp_path), pytest.raises(StorageError, match="another explorer"):
+        SessionFile(tmp_path).save(numbered(1))
 
 
-def test_a_lock_is_had_once(tmp_path: Path) -> None:
-    lock = taken(tmp_path / "x.lock")
-    assert lock is not None
-    assert taken(tmp_path / "x.lock") is None
-    lock.release()
-    again = taken(tmp_path / "x.lock")
-    assert again is not None
-    again.release()
-
-
-def test_the_folder_of_tests_is_not_that_of_the_user(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_data_folder_is_that_of_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
     assert data_folder() == Path(os.environ["EXPLORER_DATA"])
-    assert Autosave().folder == data_folder() / "sessions"
+    assert SessionFile().folder == data_folder() / "sessions"
     monkeypatch.setenv("EXPLORER_DATA", "~/mine")
     assert data_folder() == Path.home() / "mine"
-    # An empty name names none.
     monkeypatch.setenv("EXPLORER_DATA", "")
     assert data_folder().name == "flagged-explorer"
     assert data_folder().is_absolute()
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="writers are forked")
-def test_writers_that_are_killed_at_any_moment_lose_nothing_that_was_acknowledged(
-    tmp_path: Path,
-) -> None:
-    command = [sys.executable, str(HERE / "killed.py"), str(tmp_path / "sessions"), "50", "7"]
-    environment = {**os.environ, "PYTHONPATH": str(HERE.parents[1])}
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+def test_writers_killed_at_any_moment_lose_no_acknowledged_save(tmp_path: Path) -> None:
+    done = run_python(str(HERE / "killed.py"), str(tmp_path / "sessions"), "50", "7")
     found = json.loads(done.stdout)
     assert found["kills"] == 50
     assert found["number"] >= found["saves"] >= 40
@@ -342,198 +343,218 @@ def test_writers_that_are_killed_at_any_moment_lose_nothing_that_was_acknowledge
 
 FULL = """
 import json, resource, sys
-from dataclasses import replace
 from pathlib import Path
+from explorer.app.session.history import History, Step
 from explorer.app.state.state import opened
-from explorer.app.storage.autosave import Autosave
 from explorer.app.storage.autosaver import Autosaver
-from explorer.app.storage.document import Document
+from explorer.app.storage.session_file import SessionFile
 from explorer.mechanism.design_file import PRESETS
 
-folder, told, seen = Path(sys.argv[1]), [], []
+folder, messages, seen = Path(sys.argv[1]), [], []
 state = opened(PRESETS["paper-optimal"])
-saver = Autosaver(Autosave(folder), told.append, again=1e6)
+saver = Autosaver(SessionFile(folder), messages.append, retry=1e6)
 for number, largest in enumerate((-1, 1000, 500, 0, -1)):
     resource.setrlimit(resource.RLIMIT_FSIZE, (largest, -1))
-    saver.post(Document(state, first=number))
+    saver.post(History((Step(number, "Open", state),)))
     done = saver.flush()
     seen.append((done, {path.suffix: path.stat().st_size for path in folder.iterdir()}))
 saver.stop()
-print(json.dumps([told, seen, Autosave(folder).adopt().document.first]))
+print(json.dumps([messages, seen, SessionFile(folder).resume().history.step.number]))
 """
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="files have no limit there")
-def test_where_nothing_more_can_be_written_the_last_session_stays(tmp_path: Path) -> None:
-    environment = {**os.environ, "PYTHONPATH": str(HERE.parents[1])}
-    command = [sys.executable, "-c", FULL, str(tmp_path)]
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    told, seen, number = json.loads(done.stdout)
+def test_full_disk_leaves_the_last_session_and_is_reported_once(tmp_path: Path) -> None:
+    messages, seen, number = json.loads(run_python("-c", FULL, str(tmp_path)).stdout)
     assert [is_saved for is_saved, _ in seen] == [True, False, False, False, True]
     # The file is as long as ever, and nothing lies beside it.
     assert all(files == seen[0][1] for _, files in seen[:-1])
     assert seen[-1][1].keys() == seen[0][1].keys()
     assert seen[0][1][".json"] > 1000
-    failed, works = told
+    failed, works = messages
     assert "File too large" in failed
-    assert "goes on trying" in failed
+    assert "keeps trying" in failed
     assert "saved again" in works
     assert number == 4
 
 
 @dataclass
-class Shelf:
-    """A store in memory that can be broken and held up."""
+class MemoryStore:
+    """A store in memory that can fail and block."""
 
-    saved: list[Document] = field(default_factory=list[Document])
+    saved: list[float | None] = field(default_factory=list[float | None])
     problem: Exception | None = None
-    may_go: threading.Event = field(default_factory=threading.Event)
+    may_save: threading.Event = field(default_factory=threading.Event)
     began: threading.Event = field(default_factory=threading.Event)
     is_closed: bool = False
 
     def __post_init__(self) -> None:
-        self.may_go.set()
+        self.may_save.set()
 
-    def save(self, document: Document) -> int:
+    def save(self, history: History) -> int:
         assert threading.current_thread() is not threading.main_thread()
         assert not self.is_closed
         self.began.set()
-        assert self.may_go.wait(30.0)
+        assert self.may_save.wait(30.0)
         if self.problem is not None:
             raise self.problem
-        self.saved.append(document)
+        self.saved.append(number_of(history))
         return len(self.saved)
 
     def close(self) -> None:
         self.is_closed = True
 
 
-def told_by(shelf: Shelf, quiet: float, longest: float) -> tuple[Autosaver, list[str]]:
-    told: list[str] = []
-    return Autosaver(shelf, told.append, quiet=quiet, longest=longest, again=NEVER), told
+def autosaver(store: MemoryStore, quiet: float, longest: float) -> tuple[Autosaver, list[str]]:
+    messages: list[str] = []
+    saver = Autosaver(store, messages.append, quiet=quiet, longest=longest, retry=NEVER)
+    return saver, messages
 
 
-def marked(number: int) -> Document:
-    return replace(numbered(1), first=number)
-
-
-def waited(is_so: Callable[[], bool]) -> bool:
+def wait_until(is_so: Callable[[], bool]) -> bool:
     end = time.monotonic() + 30.0
     while not is_so() and time.monotonic() < end:
         time.sleep(0.005)
     return is_so()
 
 
-def test_of_many_changes_only_the_last_is_saved() -> None:
-    shelf = Shelf()
-    saver, told = told_by(shelf, NEVER, NEVER)
+def test_only_the_last_of_many_changes_is_saved() -> None:
+    store = MemoryStore()
+    saver, messages = autosaver(store, NEVER, NEVER)
     for number in range(100):
-        saver.post(marked(number))
-    assert shelf.saved == []
+        saver.post(numbered(number))
+    assert store.saved == []
     assert saver.flush()
-    assert [each.first for each in shelf.saved] == [99]
-    # Nothing new, nothing to do; and the next change waits again.
+    assert store.saved == [99]
+    # Without a change nothing is saved; and the next change waits again.
     assert saver.flush()
-    saver.post(marked(100))
-    assert len(shelf.saved) == 1
+    saver.post(numbered(100))
+    assert store.saved == [99]
     saver.stop()
-    assert [each.first for each in shelf.saved] == [99, 100]
-    assert shelf.is_closed
-    assert told == []
+    assert store.saved == [99, 100]
+    assert store.is_closed
+    assert messages == []
 
 
-def test_a_change_is_saved_by_itself_once_it_is_quiet() -> None:
-    shelf = Shelf()
-    saver, _ = told_by(shelf, 0.01, NEVER)
-    saver.post(marked(1))
-    assert waited(lambda: [each.first for each in shelf.saved] == [1])
+@pytest.mark.parametrize(
+    ("quiet", "longest", "is_endless"), [(0.01, NEVER, False), (NEVER, 0.05, True)]
+)
+def test_change_is_saved_once_it_is_quiet_or_after_the_longest_time(
+    quiet: float, longest: float, is_endless: bool
+) -> None:
+    store = MemoryStore()
+    saver, _ = autosaver(store, quiet, longest)
+    saver.post(numbered(0))
+
+    def is_saved() -> bool:
+        if is_endless:
+            saver.post(numbered(len(store.saved)))
+        return len(store.saved) >= (3 if is_endless else 1)
+
+    assert wait_until(is_saved)
     saver.stop()
 
 
-def test_what_never_rests_is_saved_all_the_same() -> None:
-    shelf = Shelf()
-    saver, _ = told_by(shelf, NEVER, 0.05)
-    number = 0
-
-    def more() -> bool:
-        nonlocal number
-        number += 1
-        saver.post(marked(number))
-        return len(shelf.saved) >= 3
-
-    assert waited(more)
-    saver.stop()
-    assert shelf.saved[-1].first == number
-
-
-def test_a_failure_is_told_once_and_so_is_that_it_works_again() -> None:
-    shelf = Shelf(problem=StorageError("the disk is full; make room"))
-    saver, told = told_by(shelf, 0.0, 0.0)
+def test_failure_is_reported_once_and_so_is_its_end() -> None:
+    store = MemoryStore(problem=StorageError("the disk is full; make room"))
+    saver, messages = autosaver(store, 0.0, 0.0)
     for number in range(3):
-        saver.post(marked(number))
+        saver.post(numbered(number))
         assert not saver.flush()
         assert saver.is_failing
-    (message,) = told
-    assert message == ("What you do is not saved: the disk is full; make room. It goes on trying.")
-    shelf.problem = None
-    # Nothing is lost of what was posted last.
+    assert messages == [
+        "The session is not saved: the disk is full; make room. The explorer keeps trying."
+    ]
+    store.problem = None
+    # The last one posted is not lost.
     assert saver.flush()
-    assert [each.first for each in shelf.saved] == [2]
-    assert told[1:] == ["What you do is saved again."]
-    shelf.problem = ZeroDivisionError("a\nfault")
-    saver.post(marked(3))
+    assert store.saved == [2]
+    assert messages[1:] == ["The session is saved again."]
+    store.problem = ZeroDivisionError("a\nfault")
+    saver.post(numbered(3))
     assert not saver.flush()
-    assert "\n" not in told[2]
-    assert "a fault" in told[2]
-    shelf.problem = None
+    assert "\n" not in messages[2]
+    assert "a fault" in messages[2]
+    store.problem = None
     saver.stop()
-    assert [each.first for each in shelf.saved] == [2, 3]
+    assert store.saved == [2, 3]
 
 
-def test_what_fails_is_tried_again_while_changes_go_on() -> None:
-    shelf = Shelf(problem=StorageError("full"))
-    saver, told = told_by(shelf, NEVER, 0.05)
-    saver.post(marked(0))
-    assert waited(lambda: bool(told))
-    shelf.problem = None
+def test_failed_save_is_tried_again_while_changes_are_posted() -> None:
+    store = MemoryStore(problem=StorageError("full"))
+    saver, messages = autosaver(store, NEVER, 0.05)
+    saver.post(numbered(0))
+    assert wait_until(lambda: bool(messages))
+    store.problem = None
 
-    def more() -> bool:
-        saver.post(marked(1))
-        return bool(shelf.saved)
+    def is_saved() -> bool:
+        saver.post(numbered(1))
+        return bool(store.saved)
 
-    assert waited(more)
+    assert wait_until(is_saved)
     saver.stop()
 
 
-def test_what_is_posted_while_it_saves_is_saved_next() -> None:
-    shelf = Shelf()
-    shelf.may_go.clear()
-    saver, _ = told_by(shelf, 0.0, 0.0)
-    saver.post(marked(1))
-    assert shelf.began.wait(30.0)
-    saver.post(marked(2))
-    shelf.may_go.set()
+def test_change_posted_during_a_save_is_saved_next() -> None:
+    store = MemoryStore()
+    store.may_save.clear()
+    saver, _ = autosaver(store, 0.0, 0.0)
+    saver.post(numbered(1))
+    assert store.began.wait(30.0)
+    saver.post(numbered(2))
+    store.may_save.set()
     assert saver.flush()
-    assert [each.first for each in shelf.saved] == [1, 2]
+    assert store.saved == [1, 2]
     saver.stop()
 
 
-def test_a_stopped_one_that_cannot_save_ends_all_the_same() -> None:
-    shelf = Shelf(problem=StorageError("full"))
-    saver, told = told_by(shelf, NEVER, NEVER)
-    saver.post(marked(1))
+def test_autosaver_that_cannot_save_stops_all_the_same() -> None:
+    store = MemoryStore(problem=StorageError("full"))
+    saver, messages = autosaver(store, NEVER, NEVER)
+    saver.post(numbered(1))
     saver.stop()
-    assert shelf.is_closed
-    assert len(told) == 1
+    assert store.is_closed
+    assert len(messages) == 1
 
 
-def test_generations_are_those_in_the_file(tmp_path: Path) -> None:
-    store = Autosave(tmp_path)
-    for number in range(3):
-        generation = store.save(numbered(number))
-        assert store.path is not None
-        data = store.path.read_bytes()
-        assert decode_header(data, "file").generation == generation
-        assert data == encode_document(numbered(number), generation)
-    store.close()
+def test_resumed_session_is_undone_and_redone(desk: Desk, tmp_path: Path) -> None:
+    saver = Autosaver(SessionFile(tmp_path), desk.complaints.append)
+    for action in (SetName("mine"), SetPosition(0, 12.0)):
+        desk.session.do(action)
+        saver.follow(desk.state, desk.session.history)
+    # Until a search ends, the session before it is saved.
+    before = desk.session.history
+    desk.session.do(StartRun())
+    saver.follow(desk.state, desk.session.history)
+    assert desk.state.optimisation.is_on
+    saver.stop()
+
+    history = SessionFile(tmp_path).resume().history
+    assert history is not None
+    assert [(step.number, step.words, step.state) for step in history.steps] == [
+        (step.number, step.words, step.state) for step in before.steps
+    ]
+    assert history.step.state == before.step.state
+    session = Session(history.step.state, lambda _: None, print, print, history)
+    try:
+        for travel, expected in ((UNDO, before.steps[0]), (REDO, before.steps[2])):
+            for _ in range(2):
+                session.travel(travel)
+            assert session.wait_until_idle()
+            assert session.state == expected.state
+    finally:
+        session.stop()
+    assert desk.complaints == []
+
+
+def test_explorer_opened_with_a_design_leaves_the_saved_session(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("EXPLORER_DATA", str(tmp_path))
+    leave(tmp_path / "sessions", 5)
+    fresh = open_user_data(resume=False)
+    assert fresh.history is None
+    again = open_user_data(resume=True)
+    assert number_of(again.history) == 5
+    again.store.close()
+    fresh.store.close()

@@ -27,20 +27,19 @@ from explorer.app.features.studies.actions import (
     ClearBrushes,
     OpenStudy,
     PickDesign,
-    SetStudyWish,
 )
 from explorer.app.features.studies.feed import Request, StudyDrawing, StudyFeed, reasons
 from explorer.app.features.studies.figures import PAPER, packed, parallel, scatter
-from explorer.app.features.studies.folders import StudyFolders, check_given, keep_study, study_in
-from explorer.app.features.studies.plot_events import LONGEST_LINE, Boxed, Brushed, Picked, event_of
+from explorer.app.features.studies.plot_events import Boxed, Brushed, Picked, event_of
 from explorer.app.features.studies.runner import StudyRunner
 from explorer.app.features.studies.shown import Shown, default_axes, shown, thinned
 from explorer.app.features.studies.words import legend, status
 from explorer.app.session.session import UNDO
-from explorer.app.state.actions import SetVariable
+from explorer.app.state.actions import Set, SetVariable
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, opened
-from explorer.app.state.studies import Brush, Studies, StudyWish, range_around, study_around, within
+from explorer.app.state.studies import Brush, Studies, StudyPlan, range_around, study_around, within
+from explorer.app.storage.study_folders import StudyFolders, check_given, keep_study, study_in
 from explorer.errors import InputError
 from explorer.measures.catalogue import measures_in
 from explorer.mechanism.design import VARIABLES, Design
@@ -51,7 +50,7 @@ from explorer.sweep.rows import evaluate
 from explorer.sweep.study import NAMES, Objective, Sampling, Study, encode_study
 
 OPTIMAL = PRESETS["paper-optimal"]
-QUICK = StudyWish(
+QUICK = StudyPlan(
     count=16,
     percent=30.0,
     variables=("a3x", "b2"),
@@ -124,10 +123,10 @@ def test_ranges_that_are_none_are_refused(given_ranges: tuple[tuple[float, float
 def test_another_study_begins_without_brushes_and_the_same_keeps_them() -> None:
     state = OpenStudy("one").apply(opened(OPTIMAL))
     state = BrushAxis("volume", ((1.0, 2.0),)).apply(state)
-    state = SetStudyWish(QUICK).apply(state)
+    state = Set("studies.plan", QUICK).apply(state)
     assert OpenStudy("one").apply(state) is state
     other = OpenStudy("two").apply(state)
-    assert other.studies == Studies(name="two", wish=QUICK)
+    assert other.studies == Studies(name="two", plan=QUICK)
 
 
 @given(st.lists(st.booleans(), min_size=1, max_size=80).map(np.array), st.integers(2, 30))
@@ -182,46 +181,46 @@ def test_a_range_lies_around_the_live_design(
     )
 )
 def test_a_wish_makes_a_study_or_says_what_is_missing(turns: list[tuple[str, str]]) -> None:
-    wish = StudyWish()
+    plan = StudyPlan()
     for what, name in turns:
-        turn = wish.with_variable_turned if what == "variable" else wish.with_measure_turned
-        wish = turn(name)
-        assert {each for each, _ in wish.objectives} <= {*wish.measures}
-    measured = {*wish.measures} - {*wish.variables}
-    if not wish.variables or not measured:
+        turn = plan.with_variable_toggled if what == "variable" else plan.with_measure_advanced
+        plan = turn(name)
+        assert {each for each, _ in plan.objectives} <= {*plan.measures}
+    measured = {*plan.measures} - {*plan.variables}
+    if not plan.variables or not measured:
         with pytest.raises(InputError, match="choose at least one"):
-            study_around(OPTIMAL, wish, "s")
+            study_around(OPTIMAL, plan, "s")
         return
-    study = study_around(OPTIMAL, wish, "s")
-    assert {*study.variables} == {*wish.variables}
+    study = study_around(OPTIMAL, plan, "s")
+    assert {*study.variables} == {*plan.variables}
     assert {*study.measures} == measured
     assert study.chunks <= 41
 
 
 def test_a_measure_is_measured_then_large_then_small_then_left_out() -> None:
-    wish, name = StudyWish(), "extent_x"
+    plan, name = StudyPlan(), "extent_x"
     senses: list[object] = []
     for _ in range(4):
-        wish = wish.with_measure_turned(name)
-        senses.append((name in wish.measures, wish.sense_of(name)))
+        plan = plan.with_measure_advanced(name)
+        senses.append((name in plan.measures, plan.sense_of(name)))
     assert senses == [(True, None), (True, "max"), (True, "min"), (False, None)]
-    assert wish == StudyWish()
+    assert plan == StudyPlan()
 
 
 @pytest.mark.parametrize(
     ("line", "event"),
     [
         (
-            '{"do":"pick","study":"s","serial":1,"index":7}',
-            Picked(study="s", serial=1, index=7),
+            '{"do":"pick","study":"s","index":7}',
+            Picked(study="s", index=7),
         ),
         (
-            '{"do":"brush","study":"s","serial":2,"axis":"b2","ranges":[[0,1.5]]}',
-            Brushed(study="s", serial=2, axis="b2", ranges=((0.0, 1.5),)),
+            '{"do":"brush","study":"s","axis":"b2","ranges":[[0,1.5]]}',
+            Brushed(study="s", axis="b2", ranges=((0.0, 1.5),)),
         ),
         (
-            '{"do":"box","study":"s","serial":3,"axes":["b2","volume"],"box":null}',
-            Boxed(study="s", serial=3, axes=("b2", "volume"), box=None),
+            '{"do":"box","study":"s","axes":["b2","volume"],"box":null}',
+            Boxed(study="s", axes=("b2", "volume"), box=None),
         ),
     ],
 )
@@ -236,16 +235,15 @@ def test_what_the_script_says_is_understood(line: str, event: object) -> None:
         "{}",
         "null",
         "\ud800",
-        '{"do":"pick","study":"s","serial":1,"index":-1}',
-        '{"do":"pick","study":"s","serial":1,"index":1.5}',
-        '{"do":"pick","study":"s","serial":1,"index":"1"}',
-        '{"do":"pick","study":"s","serial":1,"index":1,"path":"/etc"}',
-        '{"do":"open","study":"s","serial":1}',
-        '{"do":"brush","study":"s","serial":1,"axis":"b2","ranges":[[0,NaN]]}',
-        '{"do":"brush","study":"s","serial":1,"axis":"b2","ranges":[[0]]}',
-        '{"do":"box","study":"s","serial":1,"axes":["b2"],"box":null}',
-        '{"do":"pick","study":"%s","serial":1,"index":1}' % ("s" * 300),
-        '{"do":"pick","study":"s","serial":1,"index":1}' + " " * LONGEST_LINE,
+        '{"do":"pick","study":"s","index":-1}',
+        '{"do":"pick","study":"s","index":1.5}',
+        '{"do":"pick","study":"s","index":"1"}',
+        '{"do":"pick","study":"s","index":1,"path":"/etc"}',
+        '{"do":"open","study":"s"}',
+        '{"do":"brush","study":"s","axis":"b2","ranges":[[0,NaN]]}',
+        '{"do":"brush","study":"s","axis":"b2","ranges":[[0]]}',
+        '{"do":"box","study":"s","axes":["b2"],"box":null}',
+        '{"do":"pick","study":"%s","index":1}' % ("s" * 300),
         "[" * 2000,
     ],
 )
@@ -282,7 +280,7 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def feed(home: Path) -> Generator[StudyFeed]:
-    made = StudyFeed(StudyFolders(home), lambda: None, lambda: "inbox")
+    made = StudyFeed(StudyFolders(home), lambda: None)
     yield made
     made.stop()
 
@@ -306,11 +304,11 @@ def unpacked(array: dict[str, str]) -> list[Any]:
 
 def test_only_folders_of_studies_are_offered_and_no_name_leads_elsewhere(home: Path) -> None:
     folders = StudyFolders(home, (home / "some", home / "no study"))
-    assert folders.found() == {"some": home / "some", "some (2)": home / "some"}
+    assert folders.by_name() == {"some": home / "some", "some (2)": home / "some"}
     for name in ("no study", "..", "../some", str(home / "some"), "some/", "", "\0"):
         with pytest.raises(InputError, match="there is no study"):
             folders.folder(name)
-    assert StudyFolders(home / "nowhere").found() == {}
+    assert StudyFolders(home / "nowhere").by_name() == {}
 
 
 def test_new_folders_have_plain_names_of_their_own(tmp_path: Path) -> None:
@@ -321,7 +319,7 @@ def test_new_folders_have_plain_names_of_their_own(tmp_path: Path) -> None:
         assert folder.name.startswith(slug)
         keep_study(folder, study_around(OPTIMAL, QUICK, folder.name))
         assert study_in(folder).name == folder.name
-    assert len(folders.found()) == 3
+    assert len(folders.by_name()) == 3
 
 
 def test_what_is_drawn_is_what_was_computed(feed: StudyFeed, home: Path) -> None:
@@ -365,7 +363,7 @@ def test_what_is_drawn_is_what_was_computed(feed: StudyFeed, home: Path) -> None
 def test_greater_stands_out_more_on_either_page(feed: StudyFeed, dark: bool) -> None:
     drawing = drawn(feed, Studies(name="some"))
     assert drawing.shown is not None
-    points: Any = scatter(drawing.shown, "inbox", 1, dark=dark)
+    points: Any = scatter(drawing.shown, 1, dark=dark)
     scale = [colour for _, colour in points["data"][1]["marker"]["colorscale"]]
     paper = _light(PAPER[dark])
     apart = [abs(_light(colour) - paper) for colour in scale]
@@ -442,8 +440,8 @@ def test_nothing_is_drawn_anew_while_a_hand_is_on_a_slider(feed: StudyFeed) -> N
     for step in range(5):
         state = SetVariable("b3", 5.0 + 0.1 * step).apply(state)
         feed.follow(Frame(state))
-    # A change of the wish changes no plot either.
-    feed.follow(Frame(SetStudyWish(QUICK).apply(state)))
+    # A change of the plan changes no plot either.
+    feed.follow(Frame(Set("studies.plan", QUICK).apply(state)))
     assert feed.wait_until_idle(PATIENCE)
     assert feed.drawing is drawing
 
@@ -497,17 +495,17 @@ def test_a_measure_that_some_designs_lack_hides_no_point_that_it_is_no_axis_of()
     seen = shown(results, results.front(), studies)
     assert seen is not None
     assert seen.axes == ("b2", "volume", "reach")
-    assert points_of(scatter(seen, "i", 1, dark=False)) == [0, 1, 2, 3]
-    lines = parallel(seen, "i", 1, dark=False)
+    assert points_of(scatter(seen, 1, dark=False)) == [0, 1, 2, 3]
+    lines = parallel(seen, 1, dark=False)
     # A line needs a place on each axis; what has none is told of.
     assert lines["layout"]["meta"]["designs"] == [0, 2]
     for dimension in lines["data"][0]["dimensions"]:
         assert unpacked(dimension["values"]) == [columns[dimension["name"]][k] for k in (0, 2)]
-    assert "<b>2</b> without a line, for want of reach" in status_of(results, seen)
+    assert "<b>2</b> without a line, which lack reach" in status_of(results, seen)
     # As an axis it places no design that lacks it, picked or not.
     other = shown(results, results.front(), replace(studies, up="reach", picked=1))
     assert other is not None
-    assert points_of(scatter(other, "i", 1, dark=False)) == [0, 2]
+    assert points_of(scatter(other, 1, dark=False)) == [0, 2]
 
 
 def test_a_measure_that_all_designs_lack_is_no_axis_and_hides_nothing() -> None:
@@ -516,8 +514,8 @@ def test_a_measure_that_all_designs_lack_is_no_axis_and_hides_nothing() -> None:
     seen = shown(results, results.front(), Studies(name="s"))
     assert seen is not None
     assert seen.axes == ("b2", "volume")
-    assert points_of(scatter(seen, "i", 1, dark=False)) == [0, 1, 2]
-    assert parallel(seen, "i", 1, dark=False)["layout"]["meta"]["designs"] == [0, 1, 2]
+    assert points_of(scatter(seen, 1, dark=False)) == [0, 1, 2]
+    assert parallel(seen, 1, dark=False)["layout"]["meta"]["designs"] == [0, 1, 2]
     assert "without a line" not in status_of(results, seen)
 
 
@@ -528,12 +526,12 @@ def test_where_no_design_has_all_axes_points_are_drawn_and_no_line() -> None:
     results = results_of(columns)
     seen = shown(results, results.front(), Studies(name="s"))
     assert seen is not None
-    assert points_of(scatter(seen, "i", 1, dark=False)) == []
-    assert parallel(seen, "i", 1, dark=True)["layout"]["meta"]["designs"] == []
+    assert points_of(scatter(seen, 1, dark=False)) == []
+    assert parallel(seen, 1, dark=True)["layout"]["meta"]["designs"] == []
     other = shown(results, results.front(), Studies(name="s", across="b2", up="reach"))
     assert other is not None
-    assert points_of(scatter(other, "i", 1, dark=False)) == [2, 3]
-    assert "<b>4</b> without a line, for want of volume or reach" in status_of(results, other)
+    assert points_of(scatter(other, 1, dark=False)) == [2, 3]
+    assert "<b>4</b> without a line, which lack volume or reach" in status_of(results, other)
 
 
 def points_of(figure: dict[str, Any]) -> list[int]:
@@ -545,9 +543,7 @@ def points_of(figure: dict[str, Any]) -> list[int]:
 def status_of(results: Results, seen: Shown) -> str:
     request = Request(seen.studies, 1, dark=False)
     return status(
-        StudyDrawing(request, results, np.flatnonzero(seen.front), seen.inside, seen, None, ()),
-        "",
-        "",
+        StudyDrawing(request, results, np.flatnonzero(seen.front), seen.inside, seen, None, ())
     )
 
 
@@ -558,12 +554,12 @@ def test_the_front_of_the_two_objectives_shown_is_a_line() -> None:
     results = results_of(columns, objectives=wanted)
     seen = shown(results, results.front(), Studies(name="s"))
     assert seen is not None
-    (line,) = [t for t in scatter(seen, "i", 1, dark=False)["data"] if t["mode"] == "lines"]
+    (line,) = [t for t in scatter(seen, 1, dark=False)["data"] if t["mode"] == "lines"]
     assert unpacked(line["x"]) == [2.0, 3.0, 4.0]
     other = shown(results, results.front(), Studies(name="s", across="b2"))
     assert other is not None
-    assert all(t["mode"] == "markers" for t in scatter(other, "i", 1, dark=True)["data"])
-    assert parallel(other, "i", 2, dark=True)["data"][0]["uirevision"] == 2
+    assert all(t["mode"] == "markers" for t in scatter(other, 1, dark=True)["data"])
+    assert parallel(other, 2, dark=True)["data"][0]["uirevision"] == 2
 
 
 def test_numbers_come_through_packed() -> None:
@@ -586,7 +582,7 @@ class Studio:
     def __init__(self, desk: Desk, home: Path) -> None:
         self.desk = desk
         self.folders = StudyFolders(home)
-        self.feed = StudyFeed(self.folders, lambda: None, lambda: "inbox")
+        self.feed = StudyFeed(self.folders, lambda: None)
         self.runner = StudyRunner(
             desk.session, self.feed, lambda message, _: desk.complaints.append(message)
         )
@@ -648,16 +644,16 @@ def assert_varied_around(results: Results, design: Design) -> None:
 
 
 def test_a_study_that_cannot_be_is_refused_and_leaves_nothing(studio: Studio) -> None:
-    studio.runner.start(OPTIMAL, StudyWish(variables=()))
+    studio.runner.start(OPTIMAL, StudyPlan(variables=()))
     assert studio.desk.complaints == ["choose at least one variable that varies"]
     studio.runner.go_on("nowhere")
     assert studio.desk.complaints[1:] == ["there is no study 'nowhere'; there are none yet"]
     assert studio.runner.run is None
-    assert studio.folders.found() == {}
+    assert studio.folders.by_name() == {}
 
 
 def test_a_process_that_dies_is_told_and_what_is_finished_is_kept(studio: Studio) -> None:
-    studio.runner.start(OPTIMAL, StudyWish(count=2000))
+    studio.runner.start(OPTIMAL, StudyPlan(count=2000))
     # Once there is something to keep.
     while (run := studio.runner.run) is not None and not (run.progress and run.progress.done):
         time.sleep(0.02)
@@ -665,7 +661,7 @@ def test_a_process_that_dies_is_told_and_what_is_finished_is_kept(studio: Studio
     assert number is not None
     os.kill(number, getattr(signal, "SIGKILL", signal.SIGTERM))
     assert studio.runner.wait_until_idle(PATIENCE)
-    assert any("Go on starts it again" in each for each in studio.desk.complaints)
+    assert any("Continue starts it again" in each for each in studio.desk.complaints)
     assert studio.runner.run is None
     name = studio.desk.state.studies.name
     assert name is not None

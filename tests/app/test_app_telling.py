@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 import threading
@@ -46,7 +47,7 @@ class Ear:
             arguments,
             lambda value: self._heard.put(("done", value)),
             lambda problem: self._heard.put(("failed", problem)),
-            told=(lambda value: self._heard.put(("told", value))) if tells else None,
+            receive=(lambda value: self._heard.put(("told", value))) if tells else None,
             is_drawing=is_drawing,
         )
 
@@ -86,7 +87,7 @@ def test_what_is_told_comes_whole_in_order_and_before_the_result(ear: Ear) -> No
 def test_it_comes_while_the_task_runs_and_a_word_ends_the_task(
     ear: Ear, worker: Worker, reports: list[str]
 ) -> None:
-    ear.ask("count_until_cut")
+    ear.ask("count_until_cancelled")
     # The task ends for no other reason, so this came before its end.
     assert ear.next() == ("told", 0)
     process = worker.process_id
@@ -100,17 +101,17 @@ def test_it_comes_while_the_task_runs_and_a_word_ends_the_task(
 
 
 def test_what_is_cancelled_before_it_was_begun_ends_at_once(ear: Ear, worker: Worker) -> None:
-    ear.ask("count_until_cut")
+    ear.ask("count_until_cancelled")
     worker.cancel(ear.number, NEVER)
     told, end = ear.all()
     assert end == ("done", len(told))
 
 
 def test_the_next_task_is_not_cancelled_with_the_last(ear: Ear, worker: Worker) -> None:
-    ear.ask("count_until_cut")
+    ear.ask("count_until_cancelled")
     worker.cancel(ear.number, NEVER)
     ear.all()
-    ear.ask("count_until_cut")
+    ear.ask("count_until_cancelled")
     for number in range(20):
         assert ear.next() == ("told", number)
     worker.cancel(ear.number, NEVER)
@@ -134,7 +135,7 @@ def test_who_does_not_heed_the_word_is_ended_by_force_and_nobody_complains(
 def test_what_does_not_tell_is_not_begun_once_it_is_cancelled(
     ear: Ear, worker: Worker, reports: list[str]
 ) -> None:
-    ear.ask("count_until_cut")
+    ear.ask("count_until_cancelled")
     assert ear.next() == ("told", 0)
     first, process = ear.number, worker.process_id
     ear.ask("say", "nobody asks any more", tells=False)
@@ -151,7 +152,7 @@ def test_what_does_not_tell_is_not_begun_once_it_is_cancelled(
 
 def test_a_cancelled_task_leaves_those_before_it_alone(worker: Worker) -> None:
     first, second, third = Ear(worker), Ear(worker), Ear(worker)
-    first.ask("count_until_cut")
+    first.ask("count_until_cancelled")
     assert first.next() == ("told", 0)
     # Both wait for their turn.
     second.ask("say", "still wanted", key="second", tells=False)
@@ -166,7 +167,7 @@ def test_a_long_drawing_ends_as_soon_as_a_newer_one_waits(
     ear: Ear, worker: Worker, reports: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(jobs, "LONG_SECONDS", 0.0)
-    ear.ask("count_until_cut", is_drawing=True)
+    ear.ask("count_until_cancelled", is_drawing=True)
     assert ear.next() == ("told", 0)
     process = worker.process_id
     ear.ask("count", 3, is_drawing=True)
@@ -194,13 +195,13 @@ def test_a_task_that_ends_itself_when_cancelled_answers_so(ear: Ear, worker: Wor
 
 
 def test_force_does_not_hit_the_next_task(ear: Ear, worker: Worker) -> None:
-    ear.ask("count_until_cut")
+    ear.ask("count_until_cancelled")
     ear.next()
     worker.cancel(ear.number, NEVER)
     first = ear.number
     assert ear.all()[1][0] == "done"
     process = worker.process_id
-    ear.ask("count_until_cut")
+    ear.ask("count_until_cancelled")
     ear.next()
     # As if the deadline of the first one passed only now.
     held: Any = worker
@@ -234,6 +235,63 @@ def test_work_that_kills_its_process_is_tried_twice(
     assert len(reports) == 2
 
 
+def test_only_the_newest_request_of_a_key_waits(ear: Ear, worker: Worker) -> None:
+    ear.ask("say", "first", tells=False)
+    assert ear.next() == ("done", "first")
+    process = worker.process_id
+    assert process not in (None, os.getpid())
+    assert process is not None
+    # Stopped, so that it is at the first of them while the others are posted.
+    os.kill(process, signal.SIGSTOP)
+    for number in range(40):
+        ear.ask("say", str(number), tells=False)
+    os.kill(process, signal.SIGCONT)
+    assert worker.wait_until_idle(PATIENCE)
+    ear.ask("say", "end", tells=False)
+    results: list[str] = []
+    while (result := ear.next()[1]) != "end":
+        results.append(result)
+    assert len(results) <= 2
+    assert results[-1] == "39"
+
+
+def test_killed_worker_is_reported_and_started_again(
+    ear: Ear, worker: Worker, reports: list[str]
+) -> None:
+    ear.ask("say", "first", tells=False)
+    assert ear.next() == ("done", "first")
+    first = worker.process_id
+    assert first is not None
+    # Stopped, so that the kill hits it in the middle of its work, which is done all the same.
+    os.kill(first, signal.SIGSTOP)
+    ear.ask("say", "again", tells=False)
+    os.kill(first, signal.SIGKILL)
+    assert ear.next() == ("done", "again")
+    second = worker.process_id
+    assert second not in (None, first)
+    assert second is not None
+    # And once more, while it has nothing to do.
+    os.kill(second, signal.SIGKILL)
+    ear.ask("say", "once more", tells=False)
+    assert ear.next() == ("done", "once more")
+    assert reports == [RESTARTED] * 2
+    assert worker.process_id not in (None, first, second)
+
+
+def test_stopped_worker_ends_its_process_whatever_it_does(
+    ear: Ear, worker: Worker, reports: list[str]
+) -> None:
+    ear.ask("hang")
+    assert ear.next() == ("told", 0)
+    process = worker.process_id
+    assert process is not None
+    os.kill(process, signal.SIGSTOP)
+    worker.stop()
+    with pytest.raises(ProcessLookupError):
+        os.kill(process, 0)
+    assert not reports
+
+
 def test_no_process_is_left_when_the_parent_is_gone() -> None:
     code = """
 import os, sys
@@ -244,7 +302,7 @@ def told(value):
     if value == 5:
         print(worker.process_id, flush=True)
         os._exit(0)
-worker.submit("task", telling.count_until_cut, (), print, print, told=told)
+worker.submit("task", telling.count_until_cancelled, (), print, print, receive=told)
 worker.wait_until_idle(600.0)
 """
     command = [sys.executable, "-c", code]

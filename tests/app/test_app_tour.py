@@ -12,11 +12,12 @@ import pytest
 import viser
 from desk import Desk
 
-from explorer.app.browser.browser_facts import BrowserFacts, facts_of
-from explorer.app.features.help.tour import STEPS, Tour, begun
+from explorer.app.browser.browser_facts import BrowserFacts, decode_facts
+from explorer.app.features.feature import Services
+from explorer.app.features.help.tour import STEPS, Tour, start_tour
 from explorer.app.features.help.tour_panel import TourGuide, card_words
 from explorer.app.features.optimise.actions import StartRun
-from explorer.app.hands import is_narrow
+from explorer.app.layout import is_narrow
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, opened
 from explorer.app.storage.preferences import NAME, PreferenceFile, Preferences
@@ -24,7 +25,6 @@ from explorer.app.widgets.theme import BRAND, BRAND_ON_DARK, Theme
 from explorer.errors import StorageError
 from explorer.mechanism.design_file import PRESETS
 
-IDS = {name: f"id-{name}" for name in ("Skip", "Back", "Show me", "Next")}
 OPENED = opened(PRESETS["paper-optimal"])
 
 
@@ -36,19 +36,19 @@ def after(tour: Tour, state: State) -> State:
 @pytest.mark.parametrize("preset", PRESETS)
 def test_every_step_is_done_by_what_it_shows_and_not_before(preset: str) -> None:
     state = opened(PRESETS[preset])
-    tour = begun(Frame(state))
+    tour = start_tour(Frame(state))
     for index, step in enumerate(STEPS):
         assert tour.at == index
-        assert not tour.seen(Frame(state)).is_done
+        assert not tour.after_frame(Frame(state)).is_done
         state = after(tour, state)
-        tour = tour.seen(Frame(state))
+        tour = tour.after_frame(Frame(state))
         assert tour.is_done
         # Once done it stays so, whatever is done next.
-        assert tour.seen(Frame(opened(PRESETS[preset]))).is_done
+        assert tour.after_frame(Frame(opened(PRESETS[preset]))).is_done
         if step.after is not None:
             state = step.after.apply(state)
         assert tour.is_last == (index == len(STEPS) - 1)
-        tour = tour.moved(1, Frame(state))
+        tour = tour.step_by(1, Frame(state))
     assert state.optimisation.is_on
 
 
@@ -62,7 +62,7 @@ def test_there_are_five_steps_each_in_few_words() -> None:
 
 
 def test_the_tour_comes_close_to_a_singularity_without_reaching_it() -> None:
-    tour = begun(Frame(OPENED)).moved(1, Frame(OPENED))
+    tour = start_tour(Frame(OPENED)).step_by(1, Frame(OPENED))
     found = Frame(after(tour, OPENED))
     least = float(np.abs(found.snapshot.margins).min())
     assert 0.0 < least < found.state.warn_below
@@ -71,27 +71,27 @@ def test_the_tour_comes_close_to_a_singularity_without_reaching_it() -> None:
 
 
 def test_the_tour_stops_at_both_ends() -> None:
-    tour = begun(Frame(OPENED))
-    assert tour.moved(-1, Frame(OPENED)).at == 0
-    assert tour.moved(9, Frame(OPENED)).at == len(STEPS) - 1
+    tour = start_tour(Frame(OPENED))
+    assert tour.step_by(-1, Frame(OPENED)).at == 0
+    assert tour.step_by(9, Frame(OPENED)).at == len(STEPS) - 1
 
 
 def test_a_search_for_the_best_design_ends_the_tour_only_if_it_is_new() -> None:
     running = StartRun().apply(OPENED)
-    tour = begun(Frame(running)).moved(4, Frame(running))
-    assert not tour.seen(Frame(running)).is_done
+    tour = start_tour(Frame(running)).step_by(4, Frame(running))
+    assert not tour.after_frame(Frame(running)).is_done
 
 
 def test_the_card_offers_what_can_be_pressed() -> None:
-    first = card_words(begun(Frame(OPENED)), IDS)
+    first = card_words(start_tour(Frame(OPENED)))
     assert "step 1 of 5" in first
-    assert 'for="id-Back"' not in first
-    assert 'for="id-Show me"' in first
+    assert 'data-value="Back"' not in first
+    assert 'data-value="Show me"' in first
     assert ">Next<" in first
     assert "Done" not in first
-    last = card_words(Tour(4, Frame(OPENED), is_done=True), IDS)
-    assert 'for="id-Back"' in last
-    assert 'for="id-Show me"' not in last
+    last = card_words(Tour(4, Frame(OPENED), is_done=True))
+    assert 'data-value="Back"' in last
+    assert 'data-value="Show me"' not in last
     assert ">Finish<" in last
     assert "Done" in last
     assert all(">Skip the tour<" in card for card in (first, last))
@@ -171,12 +171,12 @@ def test_a_folder_that_takes_no_file_is_told_in_a_line(tmp_path: Path) -> None:
     ],
 )
 def test_what_no_browser_says_is_not_believed(told: str) -> None:
-    assert facts_of(told) is None
+    assert decode_facts(told) is None
 
 
 def test_what_a_browser_says_is_read() -> None:
     told = '{"width": 1024, "height": 768.5, "dark": true}'
-    assert facts_of(told) == BrowserFacts(1024, 768.5, True)
+    assert decode_facts(told) == BrowserFacts(1024, 768.5, True)
 
 
 @pytest.mark.parametrize(
@@ -230,8 +230,8 @@ def test_the_theme_is_no_step_of_the_history(desk: Desk) -> None:
     assert len(desk.session.history.steps) == 1
 
 
-def test_hands_on_many_threads_leave_one_card_or_none(
-    server: viser.ViserServer, desk: Desk
+def test_tour_used_on_many_threads_leaves_one_card_or_none(
+    server: viser.ViserServer, services: Services
 ) -> None:
     class Browser:
         client_id = 3
@@ -239,7 +239,7 @@ def test_hands_on_many_threads_leave_one_card_or_none(
 
     client: Any = Browser()
     gui: Any = server.gui
-    guide = TourGuide(desk.session, lambda: None)
+    guide = TourGuide(services)
     before = set(gui._panel_handle_from_uuid)
     failed: list[BaseException] = []
 

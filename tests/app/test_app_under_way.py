@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any, cast
+from typing import Any
 
 import msgspec
 import pytest
+from desk import viewed
+from services import StubWorker, services_for
 
 from explorer.app.features.legs.tasks import RadiusRequest, draw_radius_curve
 from explorer.app.features.workspace.feed import WorkspaceFeed
@@ -18,8 +20,8 @@ from explorer.app.features.workspace.tasks import WorkspaceRequest, draw_workspa
 from explorer.app.session import feed as session_feed
 from explorer.app.session.feed import Stage
 from explorer.app.session.jobs import Worker
-from explorer.app.session.worker import CancelledError, Line
-from explorer.app.state.actions import SetLimits, SetVariable, SetView
+from explorer.app.session.worker import CancelledError, Channel
+from explorer.app.state.actions import Set, SetVariable
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, opened
 from explorer.app.state.view import WorkspaceView
@@ -59,7 +61,7 @@ class Watched:
 
     def __init__(self, last: int | None = None) -> None:
         self.stages: list[Stage] = []
-        self.line = Line(self.stages.append, lambda: len(self.stages) == last)
+        self.line = Channel(self.stages.append, lambda: len(self.stages) == last)
 
 
 def test_a_reachable_workspace_tells_each_pair_of_legs_that_it_carves() -> None:
@@ -118,37 +120,21 @@ def test_only_the_newest_reachable_workspaces_are_kept() -> None:
     assert not asked
 
 
-class Answering:
-    """A worker whose answers are given by hand."""
-
-    def __init__(self) -> None:
-        self.done: list[Callable[[Any], None]] = []
-
-    def submit(self, *order: Any, **_: Any) -> int:
-        self.done.append(order[3])
-        return len(self.done)
-
-    def cancel(self, number: int, patience: float | None) -> None:
-        pass
-
-
 def test_a_stopped_drawing_leaves_none_of_an_older_design() -> None:
-    worker = Answering()
-    feed = WorkspaceFeed(cast("Worker", worker), lambda: None)
-    view = replace(opened(THICK).view, workspace=WorkspaceView(solid=True))
-    state = SetView(view).apply(opened(THICK))
+    worker = StubWorker()
+    feed = WorkspaceFeed(services_for(worker=worker))
+    state = viewed(opened(THICK), workspace=WorkspaceView(solid=True))
     feed.follow(Frame(state))
-    assert feed.asked is not None
-    drawing = draw_workspace(feed.asked)
-    worker.done[0](drawing)
+    drawing = draw_workspace(worker.orders[0].request)
+    worker.orders[0].done(drawing)
     assert feed.drawing is drawing
     feed.follow(Frame(SetVariable("a3x", 18.0).apply(state)))
     assert feed.drawing is drawing
     feed.cancel()
     assert feed.drawing is None
-    worker.done[0](drawing)
+    worker.orders[0].done(drawing)
     assert feed.drawing is None
-    feed.ask_again()
+    feed.retry()
     assert not feed.is_settled
 
 
@@ -157,7 +143,7 @@ class Followed:
 
     def __init__(self, worker: Worker) -> None:
         self.bell = threading.Semaphore(0)
-        self.feed = WorkspaceFeed(worker, self.bell.release)
+        self.feed = WorkspaceFeed(services_for(worker=worker, redraw=self.bell.release))
 
     def wait_for(self, what: Any) -> None:
         while not what():
@@ -172,9 +158,9 @@ def worker() -> Iterator[Worker]:
 
 
 def reachable_state() -> State:
-    state = SetLimits(THICK.limits).apply(opened(PRESETS["paper-optimal"]))
+    state = Set("design.limits", THICK.limits).apply(opened(PRESETS["paper-optimal"]))
     workspace = replace(state.view.workspace, solid=True, region="reachable")
-    return SetView(replace(state.view, workspace=workspace)).apply(state)
+    return Set("view", replace(state.view, workspace=workspace)).apply(state)
 
 
 def test_a_drawing_shows_its_stage_and_can_be_cancelled_and_asked_for_again(
@@ -196,7 +182,7 @@ def test_a_drawing_shows_its_stage_and_can_be_cancelled_and_asked_for_again(
     assert worker.wait_until_idle(PATIENCE)
     assert feed.is_cancelled
     assert feed.drawing is None
-    feed.ask_again()
+    feed.retry()
     followed.wait_for(lambda: feed.is_current)
     assert not feed.is_cancelled
     assert "units³" in workspace_summary(frame, feed)
@@ -211,7 +197,7 @@ def test_what_is_shown_no_more_is_not_computed_to_its_end(
     feed.follow(Frame(state))
     followed.wait_for(lambda: feed.stage is not None)
     workspace = replace(state.view.workspace, solid=False)
-    feed.follow(Frame(SetView(replace(state.view, workspace=workspace)).apply(state)))
+    feed.follow(Frame(Set("view", replace(state.view, workspace=workspace)).apply(state)))
     assert worker.wait_until_idle(PATIENCE)
     assert feed.problem is None
     assert feed.drawing is None

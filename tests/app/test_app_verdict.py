@@ -48,7 +48,7 @@ def test_verdict_seven_degrees_from_an_incidence_is_near() -> None:
 
 def test_summary_colours_the_incidence_that_the_verdict_names() -> None:
     frame = nearly_meeting_lines()
-    colours = re.findall(r"border-radius:2px;background:(#\w+);flex:none", summary(frame))
+    colours = re.findall(r'class="ex-swatch" style="--colour:(#\w+)"', summary(frame))
     levels = frame.verdict.levels
     assert colours == [css(proximity_colour(level, 1.0)) for level in levels]
     assert [level < 1.0 for level in levels] == [False, True, False]

@@ -1,31 +1,28 @@
-"""The worker process: heavy work leaves the page alive, dies without harm, and is not stale."""
+"""Workspaces drawn by the worker follow the newest state, in bands of colour and cut open."""
 
 from __future__ import annotations
 
-import os
-import signal
 import threading
 from collections.abc import Iterator
 from dataclasses import replace
-from queue import Queue
 from typing import Any
 
 import msgspec
 import numpy as np
 import pytest
+from services import services_for
 
 from explorer.app.features.workspace.feed import WorkspaceFeed
-from explorer.app.features.workspace.tasks import WorkspaceDrawing, WorkspaceRequest, draw_workspace
+from explorer.app.features.workspace.tasks import WorkspaceRequest, draw_workspace
 from explorer.app.scene.bands import COLOURED_EDGE, MOST_COLOURED, split_at
-from explorer.app.session.jobs import RESTARTED, Worker
-from explorer.app.state.actions import SetLimits, SetVariable, SetView
+from explorer.app.session.jobs import Worker
+from explorer.app.state.actions import Set, SetVariable
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, opened
 from explorer.mechanism.design import Design, Limits
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.home import home_pose
 from explorer.singularity.colours import BAND_EDGES, band_colours
-from explorer.workspace.slices.volume import workspace_volume
 
 OPTIMAL = PRESETS["paper-optimal"]
 PATIENCE = 120.0
@@ -48,112 +45,11 @@ def a_request(**changes: Any) -> WorkspaceRequest:
     return replace(plain, **changes)
 
 
-class Answers:
-    """What came back, in order."""
-
-    def __init__(self) -> None:
-        self.queue: Queue[Any] = Queue()
-
-    def done(self, value: Any) -> None:
-        self.queue.put(value)
-
-    def failed(self, problem: str) -> None:
-        self.queue.put(problem)
-
-    def next(self) -> Any:
-        return self.queue.get(timeout=PATIENCE)
-
-
 @pytest.fixture
-def reports() -> list[str]:
-    return []
-
-
-@pytest.fixture
-def worker(reports: list[str]) -> Iterator[Worker]:
-    made = Worker(reports.append)
+def worker() -> Iterator[Worker]:
+    made = Worker(pytest.fail)
     yield made
     made.stop()
-
-
-def submit(worker: Worker, answers: Answers, key: object, request: WorkspaceRequest) -> None:
-    worker.submit(key, draw_workspace, (request,), answers.done, answers.failed)
-
-
-def test_a_task_runs_in_another_process_and_its_result_comes_back(worker: Worker) -> None:
-    answers = Answers()
-    submit(worker, answers, "w", a_request())
-    drawing = answers.next()
-    assert isinstance(drawing, WorkspaceDrawing)
-    assert drawing.volume == pytest.approx(workspace_volume(OPTIMAL).volume, rel=1e-12)
-    assert worker.process_id not in (None, os.getpid())
-
-
-def test_of_one_key_only_the_newest_request_waits(worker: Worker) -> None:
-    answers = Answers()
-    submit(worker, answers, "w", a_request())
-    answers.next()
-    pid = worker.process_id
-    assert pid is not None
-    # Stopped, so that it is surely at the first one while the others come.
-    os.kill(pid, signal.SIGSTOP)
-    for i in range(40):
-        submit(worker, answers, "w", a_request(tolerance=0.2 + 0.01 * i))
-    os.kill(pid, signal.SIGCONT)
-    assert worker.wait_until_idle(PATIENCE)
-    results = [answers.next() for _ in range(answers.queue.qsize())]
-    assert len(results) <= 2
-    assert results[-1].request.tolerance == pytest.approx(0.2 + 0.01 * 39)
-
-
-def test_a_refused_task_answers_with_its_reason_and_the_worker_goes_on(
-    worker: Worker, reports: list[str]
-) -> None:
-    answers = Answers()
-    submit(worker, answers, "w", a_request(tolerance=1e-9))
-    assert "tolerance" in answers.next()
-    assert not reports
-    submit(worker, answers, "w", a_request())
-    assert isinstance(answers.next(), WorkspaceDrawing)
-
-
-def test_a_killed_worker_is_told_of_and_started_again(worker: Worker, reports: list[str]) -> None:
-    answers = Answers()
-    submit(worker, answers, "w", a_request())
-    assert isinstance(answers.next(), WorkspaceDrawing)
-    first = worker.process_id
-    assert first is not None
-    # Stopped first, so that the next request surely finds it in the middle of its work.
-    os.kill(first, signal.SIGSTOP)
-    submit(worker, answers, "w", a_request())
-    os.kill(first, signal.SIGKILL)
-    # What it was doing is done all the same.
-    assert isinstance(answers.next(), WorkspaceDrawing)
-    assert reports == [RESTARTED]
-    second = worker.process_id
-    assert second not in (None, first)
-    assert second is not None
-    # And once more, while it has nothing to do.
-    os.kill(second, signal.SIGKILL)
-    submit(worker, answers, "w", a_request())
-    assert isinstance(answers.next(), WorkspaceDrawing)
-    assert reports == [RESTARTED] * 2
-    assert worker.process_id not in (None, first, second)
-
-
-def test_stopping_ends_the_process_whatever_it_does(reports: list[str]) -> None:
-    worker = Worker(reports.append)
-    answers = Answers()
-    submit(worker, answers, "w", a_request())
-    answers.next()
-    pid = worker.process_id
-    assert pid is not None
-    os.kill(pid, signal.SIGSTOP)
-    submit(worker, answers, "w", a_request())
-    worker.stop()
-    with pytest.raises(ProcessLookupError):
-        os.kill(pid, 0)
-    assert not reports
 
 
 class Followed:
@@ -161,7 +57,7 @@ class Followed:
 
     def __init__(self, worker: Worker) -> None:
         self.drawn = threading.Semaphore(0)
-        self.feed = WorkspaceFeed(worker, self.drawn.release)
+        self.feed = WorkspaceFeed(services_for(worker=worker, redraw=self.drawn.release))
 
     def follow(self, state: State) -> None:
         self.feed.follow(Frame(state))
@@ -169,10 +65,10 @@ class Followed:
 
 def shown(state: State, **changes: Any) -> State:
     workspace = replace(state.view.workspace, solid=True, **changes)
-    return SetView(replace(state.view, workspace=workspace)).apply(state)
+    return Set("view", replace(state.view, workspace=workspace)).apply(state)
 
 
-def test_the_drawing_follows_the_design_and_ends_with_its_newest(worker: Worker) -> None:
+def test_drawing_follows_the_design_up_to_the_newest(worker: Worker) -> None:
     followed = Followed(worker)
     state = shown(opened(OPTIMAL))
     for i in range(25):
@@ -185,7 +81,7 @@ def test_the_drawing_follows_the_design_and_ends_with_its_newest(worker: Worker)
     assert drawing.request.design.a3[0] == 18.0 + 0.05 * 24
 
 
-def test_nothing_is_asked_for_that_is_not_shown(worker: Worker) -> None:
+def test_hidden_drawing_is_not_requested(worker: Worker) -> None:
     followed = Followed(worker)
     followed.follow(opened(OPTIMAL))
     assert worker.wait_until_idle(PATIENCE)
@@ -193,9 +89,9 @@ def test_nothing_is_asked_for_that_is_not_shown(worker: Worker) -> None:
     assert followed.feed.drawing is None
 
 
-def test_an_empty_workspace_is_an_answer_that_names_what_empties_it() -> None:
+def test_empty_workspace_names_the_limit_that_empties_it() -> None:
     limits = Limits(l1=(0.0, 1.0), box=((10.0, 10.0, 10.0), (11.0, 11.0, 11.0)))
-    state = SetLimits(limits).apply(opened(OPTIMAL))
+    state = Set("design.limits", limits).apply(opened(OPTIMAL))
     drawing = draw_workspace(a_request(design=state.design, hull=True, cut="x", level=1.0))
     assert drawing.volume == 0.0
     assert drawing.shells == ()
@@ -226,7 +122,7 @@ def large_beside_its_reach(reach: float) -> Design:
 
 
 @pytest.mark.parametrize("reach", [5.0, 2.0])
-def test_a_workspace_large_beside_the_reach_is_coloured_with_a_bounded_number_of_facets(
+def test_workspace_large_beside_the_reach_has_a_bounded_number_of_facets(
     reach: float,
 ) -> None:
     design = large_beside_its_reach(reach)
@@ -242,7 +138,7 @@ def test_a_workspace_large_beside_the_reach_is_coloured_with_a_bounded_number_of
     assert draw_workspace(a_request(colour="margin")).coarse_edge is None
 
 
-def test_bands_hold_the_values_they_stand_for() -> None:
+def test_bands_contain_the_values_of_their_colour() -> None:
     for shell in draw_workspace(a_request(colour="margin")).shells:
         index = band_colours().index(shell.colour)
         # At this orientation δ1 and δ3 are ∓z, and δ2 is z times a sine below one.
@@ -253,7 +149,7 @@ def test_bands_hold_the_values_they_stand_for() -> None:
             assert values.max() <= BAND_EDGES[index + 1] + 1e-9
 
 
-def test_splitting_triangles_keeps_their_area_and_separates_their_values() -> None:
+def test_split_triangles_keep_their_area_and_separate_their_values() -> None:
     rng = np.random.default_rng(7)
     triangles = rng.normal(size=(500, 3, 3))
     values = triangles @ [0.3, -1.0, 0.5]
@@ -264,7 +160,7 @@ def test_splitting_triangles_keeps_their_area_and_separates_their_values() -> No
     assert np.allclose(high @ [0.3, -1.0, 0.5], high_values)
 
 
-def test_a_cut_shows_the_slice_where_it_cuts() -> None:
+def test_cut_shows_the_slice_at_its_level() -> None:
     drawing = draw_workspace(a_request(cut="z", level=5.0, hull=True))
     assert drawing.extent is not None
     assert drawing.extent[1][2] == pytest.approx(18.0, abs=1e-6)

@@ -1,4 +1,4 @@
-"""All benchmarks by name: the name is that of a module here with a function `run`."""
+"""All benchmarks by name: that of a module here, which runs them."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ BENCHMARKS: Mapping[str, str] = {
     "report": "the report of a design as HTML and as PDF, from the command to the file",
     "capability": "share of all orientations that a position allows",
     "drag_sockets": "lag of two long drags at once, seen by bare websocket clients",
-    "tabs": "twenty tabs at once, a hand on a control in each",
+    "tabs": "twenty tabs at once, each dragging a control",
     "undo": "undoing and redoing any step",
     "drag_browser": "lag of two long drags at once, seen in two tabs of a real browser",
     "saving": "saving a session of fifty steps, and opening it again",
@@ -41,6 +41,6 @@ BENCHMARKS: Mapping[str, str] = {
 
 def measure(name: str) -> list[Row]:
     """Run a benchmark and return its rows; only now is what it needs imported."""
-    run = importlib.import_module(f"benchmarks.{name}").run
-    rows: Iterable[Row] = run()
+    module, function = name.split("_") if name.startswith("forward_") else (name, "run")
+    rows: Iterable[Row] = getattr(importlib.import_module(f"benchmarks.{module}"), function)()
     return list(rows)

@@ -15,8 +15,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from benchmarks.ready_page import ready_page
-from benchmarks.socket_client import EVENTS_PER_SECOND
-from benchmarks.sweeps import sweep
+from benchmarks.socket_client import EVENTS_PER_SECOND, sweep
 from benchmarks.table import Row, seconds
 from explorer.app.browser.chromium import find_chromium
 from explorer.app.browser.headless import CHROMIUM_FLAGS, SWIFTSHADER
@@ -93,11 +92,8 @@ def run() -> Iterator[Row]:
     if chromium is None:
         yield Row(TITLE, "not measured: no Chromium", "150 ms")
         return
-    running = ready_page()
-    try:
+    with ready_page() as running:
         drags = asyncio.run(_drags(running, chromium))
-    finally:
-        running.stop()
     yield Row(
         TITLE,
         f"{seconds(drags.lag)}, of which to the server {seconds(drags.server_lag)}; "

@@ -37,10 +37,12 @@ ENOUGH, MOST_EVALUATIONS = 1e-9, 1000
 MET = 1e-6
 RANDOM_STARTS, CONVERGED = 100, 1e-6
 POINTS, STEP = 50, 1e-6
+# Problems without and with a clearance, by the words of the table.
+CASES = (("off", None), (f"on ({CLEARANCE:g})", CLEARANCE))
 
 
 class Solved(NamedTuple):
-    """What another solver came to."""
+    """Result of another solver."""
 
     iterations: int
     evaluations: int
@@ -49,7 +51,7 @@ class Solved(NamedTuple):
 
     @property
     def words(self) -> str:
-        """It in words."""
+        """Result in words."""
         return (
             f"F = {self.objective:.1e} after {self.iterations} iterations, "
             f"{self.evaluations} evaluations, {seconds(self.duration)}"
@@ -66,13 +68,10 @@ def run() -> Iterator[Row]:
 
 
 def _to_the_volume() -> Iterator[Row]:
-    for name, clearance in (("off", None), (f"on ({CLEARANCE:g})", CLEARANCE)):
+    for name, clearance in CASES:
         problem = paper_problem(clearance)
         outcome = min((optimise_design(problem) for _ in range(ROUNDS)), key=lambda o: o.seconds)
-        others = {
-            "trust-constr": _trust_constr(problem),
-            "COBYQA": _cobyqa(problem),
-        }
+        others = {"trust-constr": _trust_constr(problem), "COBYQA": _cobyqa(problem)}
         beside = "; ".join(
             f"{solver}: {other.words}; {times(other.duration / outcome.seconds)}"
             for solver, other in others.items()
@@ -122,30 +121,27 @@ class _Watched:
         return constraint(values, 0.0, high, jac=gradients, **options)
 
 
+def _constant(value: Any) -> Callable[[FloatArray], Any]:
+    def function(_: FloatArray) -> Any:
+        return value
+
+    return function
+
+
 def _trust_constr(problem: Problem) -> Solved:
     """Solve it as ours does: no objective, the volume as an equality, exact gradients."""
     watched = _Watched(problem)
     n, equal = len(watched.model.start), watched.model.equalities
-
-    def nothing(_: FloatArray) -> float:
-        return 0.0
-
-    def flat(_: FloatArray) -> FloatArray:
-        return np.zeros(n)
-
-    def hessian(_: FloatArray) -> FloatArray:
-        return np.zeros((n, n))
-
     return _solved(
         watched,
-        nothing,
+        _constant(0.0),
         "trust-constr",
         constraints=[
             watched.demands(equal, 0.0, hess=optimize.BFGS()),
             watched.demands(~equal, np.inf, hess=optimize.BFGS()),
         ],
-        jac=flat,
-        hess=hessian,
+        jac=_constant(np.zeros(n)),
+        hess=_constant(np.zeros((n, n))),
         options={"maxiter": MOST_EVALUATIONS, "gtol": 1e-12, "xtol": 1e-14},
     )
 
@@ -154,13 +150,9 @@ def _cobyqa(problem: Problem) -> Solved:
     """Solve it without gradients: the square of what the volume misses is minimised."""
     watched = _Watched(problem)
     equal = watched.model.equalities
-
-    def missed(u: FloatArray) -> float:
-        return float(watched.at(u).values[equal][0] ** 2)
-
     return _solved(
         watched,
-        missed,
+        lambda u: float(watched.at(u).values[equal][0] ** 2),
         "COBYQA",
         constraints=[watched.demands(~equal, np.inf)],
         options={
@@ -198,7 +190,7 @@ def _solved(
 
 
 def _random_starts() -> Iterator[Row]:
-    for name, clearance in (("off", None), (f"on ({CLEARANCE:g})", CLEARANCE)):
+    for name, clearance in CASES:
         problem = paper_problem(clearance)
         found = [
             optimise_design(msgspec.structs.replace(problem, start=problem.design_at(values)))
@@ -216,7 +208,7 @@ def _random_starts() -> Iterator[Row]:
 
 
 def _smallest_reach() -> Iterator[Row]:
-    for name, clearance in (("off", None), (f"on ({CLEARANCE:g})", CLEARANCE)):
+    for name, clearance in CASES:
         outcome = optimise_design(reach_problem(clearance), starts=STARTS)
         ends = Counter(
             f"{run.best.objective:.2f}" for run in outcome.runs if run.status == "converged"

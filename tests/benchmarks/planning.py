@@ -8,7 +8,6 @@ import itertools
 from collections.abc import Iterator
 from typing import Any
 
-import msgspec
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -18,13 +17,12 @@ from benchmarks.timing import Spread, elapsed
 from explorer import Pose, evaluate
 from explorer.numerics.compiled import warm
 from explorer.paths.planning import NoPathError, plan_path
+from explorer.workspace.accessible.radii import with_radius
 from explorer.workspace.limits.valid_poses import poses_are_valid
 
 PATHS, PLAIN, SECONDS = 100, 10, 2.0
 RADIUS = 0.2
-THICK = msgspec.structs.replace(
-    DESIGN, limits=msgspec.structs.replace(DESIGN.limits, leg_radii=(RADIUS,) * 4)
-)
+THICK = with_radius(DESIGN, RADIUS)
 LOWS, HIGHS = [0.0, -12.0, 0.0], [20.0, 22.0, 18.0]
 
 

@@ -8,16 +8,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.ready_page import ready_page
-from benchmarks.samples import DESIGN
+from benchmarks.ready_page import ready_page, timed_changes
 from benchmarks.table import Row, seconds
 from benchmarks.timing import Spread
+from explorer.app.features.prototype.feed import PartsFeed
 from explorer.app.features.prototype.scene import PrototypeScene
 from explorer.app.scene.placing import Placed
 from explorer.app.server import Running
-from explorer.app.state.actions import SetPosition, SetVariable, SetView
+from explorer.app.state.actions import Set, SetPosition
 from explorer.app.state.frame import Frame
-from explorer.app.state.state import State
 from explorer.app.state.view import PrototypeView
 from explorer.app.widgets.assigning import Assigner
 
@@ -26,36 +25,20 @@ CHANGES, MOVES, WARM_UP = 60, 300, 10
 
 def run() -> Iterator[Row]:
     """Yield the rows."""
-    running = ready_page(DESIGN)
-    try:
+    with ready_page() as running:
         session = running.page.session
         view = replace(session.state.view, prototype=PrototypeView(shown=True))
-        session.do(SetView(view))
+        session.do(Set("view", view))
         running.page.wait_until_drawn()
-        rebuilt, moved = Spread.of(_rebuilt(running)), Spread.of(_moved(running))
-    finally:
-        running.stop()
+        rebuilt, moved = timed_changes(running, CHANGES, WARM_UP), Spread.of(_moved(running))
     yield Row("design slider to the new parts of the prototype", _words(rebuilt), "300 ms")
     yield Row("move of all parts, computed and assigned", _words(moved), "1 ms")
 
 
-def _rebuilt(running: Running) -> list[float]:
-    durations: list[float] = []
-    for value in (19.0 + 0.5 * np.sin(np.arange(CHANGES + WARM_UP) / 9.0)).tolist():
-
-        def change(_: State, value: float = value) -> SetVariable:
-            return SetVariable("a3x", value)
-
-        began = time.perf_counter()
-        running.page.session.post("a3x", change)
-        running.page.wait_until_drawn()
-        durations.append(time.perf_counter() - began)
-    return durations[WARM_UP:]
-
-
 def _moved(running: Running) -> list[float]:
-    parts, state = running.page.parts_feed.parts, running.page.session.state
-    scene, assigner = PrototypeScene(running.viser.scene), Assigner(running.viser)
+    services, state = running.page.services, running.page.session.state
+    scene, assigner = PrototypeScene(services), Assigner(running.viser)
+    floor = services.get(PartsFeed).floor
     durations: list[float] = []
     for z in (9.0 + np.sin(np.arange(MOVES + WARM_UP) / 9.0)).tolist():
         state = SetPosition(2, z).apply(state)
@@ -63,7 +46,7 @@ def _moved(running: Running) -> list[float]:
         # What other parts of the scene need too is not counted.
         _ = frame.snapshot
         began = time.perf_counter()
-        assigner.assign(list(scene.updates(Placed(frame, None, parts))))
+        assigner.assign(list(scene.updates(Placed(frame, floor=floor))))
         durations.append(time.perf_counter() - began)
     return durations[WARM_UP:]
 

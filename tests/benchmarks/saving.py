@@ -12,44 +12,45 @@ import msgspec
 from benchmarks.samples import DESIGN
 from benchmarks.table import Row, seconds, times
 from benchmarks.timing import Spread, elapsed
+from explorer.app.session.history import History, Step
 from explorer.app.state.action import Action
 from explorer.app.state.actions import SetAngle, SetPosition, SetVariable
-from explorer.app.state.state import opened
-from explorer.app.storage.autosave import Autosave
-from explorer.app.storage.document import MOST_STEPS, Document, Kept
-from explorer.app.storage.saved import saved
+from explorer.app.state.state import State, opened
+from explorer.app.storage.packing import Packer
+from explorer.app.storage.session_file import SessionFile
+from explorer.app.storage.session_format import MOST_STEPS
 
 SAVES = 60
 
 
 def run() -> Iterator[Row]:
     """Yield a row for saving and one for opening."""
-    document = session()
+    history = session()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name) / "sessions"
-        store = Autosave(folder)
-        ours = Spread.of([elapsed(lambda: store.save(document)) for _ in range(SAVES)])
+        store = SessionFile(folder)
+        ours = Spread.of([elapsed(lambda: store.save(history)) for _ in range(SAVES)])
         path = store.path
         size = 0 if path is None else path.stat().st_size
         store.close()
         opening = Spread.of([elapsed(lambda: _reopened(folder)) for _ in range(SAVES)])
         base = _table(Path(name) / "session.db")
-        theirs = Spread.of([elapsed(lambda: _commit(base, document)) for _ in range(SAVES)])
+        theirs = Spread.of([elapsed(lambda: _commit(base, history)) for _ in range(SAVES)])
         base.close()
     yield Row(
         f"one save of a session, {MOST_STEPS} steps, median; p95",
         f"{seconds(ours.p50)}; {seconds(ours.p95)}, {size / 1000:.0f} kB",
         "–",
         f"a commit of each step as JSON to sqlite3: {seconds(theirs.p50)}, "
-        f"{_plain_size(document) / 1000:.0f} kB; {times(theirs.p50 / ours.p50)}",
+        f"{_plain_size(history) / 1000:.0f} kB; {times(theirs.p50 / ours.p50)}",
     )
     yield Row("opening it at the next start, median", seconds(opening.p50))
 
 
-def session() -> Document:
+def session() -> History:
     """Return a session in which pose and design were changed by turns."""
     state = opened(DESIGN)
-    steps = [Kept("Open", state)]
+    steps = [Step(0, "Open", state)]
     for number in range(1, MOST_STEPS):
         share = number / MOST_STEPS
         action: Action = (
@@ -58,13 +59,13 @@ def session() -> Document:
             SetVariable("b2", 2.6 + 0.1 * share),
         )[number % 3]
         state = action.apply(state)
-        steps.append(Kept(f"Step {number}", state))
-    return Document(state, tuple(steps), len(steps) - 1)
+        steps.append(Step(number, f"Step {number}", state))
+    return History(tuple(steps), len(steps) - 1)
 
 
 def _reopened(folder: Path) -> None:
-    store = Autosave(folder)
-    assert store.adopt().document is not None
+    store = SessionFile(folder)
+    assert store.resume().history is not None
     store.close()
 
 
@@ -76,11 +77,17 @@ def _table(path: Path) -> sqlite3.Connection:
     return base
 
 
-def _commit(base: sqlite3.Connection, document: Document) -> None:
+def _commit(base: sqlite3.Connection, history: History) -> None:
     with base:
-        rows = enumerate(msgspec.json.encode(saved(step.state)) for step in document.steps)
+        rows = enumerate(_plain(step.state) for step in history.steps)
         base.executemany("INSERT OR REPLACE INTO steps VALUES (?, ?)", rows)
 
 
-def _plain_size(document: Document) -> int:
-    return sum(len(msgspec.json.encode(saved(step.state))) for step in document.steps)
+def _plain_size(history: History) -> int:
+    return sum(len(_plain(step.state)) for step in history.steps)
+
+
+def _plain(state: State) -> bytes:
+    packer = Packer()
+    packer.add(state)
+    return msgspec.json.encode(packer.objects)

@@ -16,8 +16,7 @@ from itertools import chain
 from typing import Any
 
 from benchmarks.ready_page import ready_page
-from benchmarks.socket_client import Drag, HandleDrag, SliderDrag, dragging_process
-from benchmarks.sweeps import sweep
+from benchmarks.socket_client import Drag, HandleDrag, SliderDrag, dragging_process, sweep
 from benchmarks.table import Row, seconds
 from benchmarks.timing import Spread
 from explorer import Pose
@@ -176,21 +175,17 @@ def run() -> Iterator[Row]:
 
 def measure() -> dict[str, list[Stopwatch]]:
     """Return the stopwatch of every round, by kind."""
-    running = ready_page()
-    found: dict[str, list[Stopwatch]] = {kind.name: [] for kind in KINDS}
-    session = running.page.session
-    try:
-        with dragging_process() as drag:
-            # The kinds take turns, so that no disturbance falls on one alone.
-            for events in (WARM_UP_EVENTS, *[EVENTS] * ROUNDS):
-                for kind in KINDS:
-                    session.do(Reset())
-                    session.wait_until_idle()
-                    stopwatch = Stopwatch(kind)
-                    with timed(running, stopwatch):
-                        drag(running.url, [kind.drag(session.state, events)])
-                    if events == EVENTS:
-                        found[kind.name].append(stopwatch)
-    finally:
-        running.stop()
-    return found
+    watches: dict[str, list[Stopwatch]] = {kind.name: [] for kind in KINDS}
+    with ready_page() as running, dragging_process() as drag:
+        session = running.page.session
+        # The kinds take turns, so that no disturbance falls on one alone.
+        for events in (WARM_UP_EVENTS, *[EVENTS] * ROUNDS):
+            for kind in KINDS:
+                session.do(Reset())
+                session.wait_until_idle()
+                stopwatch = Stopwatch(kind)
+                with timed(running, stopwatch):
+                    drag(running.url, [kind.drag(session.state, events)])
+                if events == EVENTS:
+                    watches[kind.name].append(stopwatch)
+    return watches

@@ -8,6 +8,7 @@ labels and scene nodes by their names, as in a browser.
 from __future__ import annotations
 
 import asyncio
+import math
 import multiprocessing
 import time
 from collections.abc import Callable, Generator, Sequence
@@ -52,6 +53,11 @@ class HandleDrag:
 Drag = SliderDrag | HandleDrag
 
 
+def sweep(middle: float, reach: float, count: int) -> list[float]:
+    """Return values that swing about the middle, as far as the reach, in periods of two seconds."""
+    return [middle + reach * math.sin(k / 10.0) for k in range(1, count + 1)]
+
+
 @dataclass
 class Seen:
     """What one client did and saw; times are those of `time.monotonic`.
@@ -91,7 +97,7 @@ def drag_at_once(url: str, drags: Sequence[Drag], rate: float = EVENTS_PER_SECON
 async def _drag_at_once(url: str, drags: Sequence[Drag], rate: float) -> list[Seen]:
     clients = [await _Client.connected(url) for _ in drags]
     readers = [asyncio.create_task(client.read()) for client in clients]
-    # Hands do not move in step.
+    # Users do not move in step.
     starts = [time.monotonic() + 0.1 + k / (rate * len(drags)) for k in range(len(drags))]
     await asyncio.gather(
         *(c.drag(d, s, rate) for c, d, s in zip(clients, drags, starts, strict=True))

@@ -14,7 +14,6 @@ from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import warm
 from explorer.workspace.limits.constraints import BallOrCylinder, HalfSpace, constraints
 from explorer.workspace.slices.volume import home_rotation, workspace_volume
-from explorer.workspace.solids.solid import Solid
 from explorer.workspace.solids.solids import workspace_solid
 
 ERROR = 1e-3
@@ -31,15 +30,12 @@ def run() -> Iterator[Row]:
     theirs, triangles, error = _through_trimesh(exact)
     yield Row(
         "solid of the workspace at a volume error of 0.1 %",
-        f"{seconds(duration)}, error {abs(solid.volume / exact - 1.0):.1g}, {_faces(solid)} faces",
+        f"{seconds(duration)}, error {abs(solid.volume / exact - 1.0):.1g}, "
+        f"{len(solid.faces)} faces",
         "40 ms",
         f"trimesh: {seconds(theirs)}, error {error:.1g}, {triangles} faces; "
         f"{times(theirs / duration)}",
     )
-
-
-def _faces(solid: Solid) -> int:
-    return len(solid.faces)
 
 
 def _through_trimesh(exact: float) -> tuple[float, int, float]:

@@ -107,12 +107,13 @@ def _by_hand(design: Design) -> tuple[Any, ...]:
     rotation = home_pose(design).rotation
     nodes = _grid(design)
     nodes = nodes[poses_are_valid(design, nodes, rotation)]
-    kappa = np.abs(margins(nodes, rotation))
-    off = (kappa >= 0.05 * design.reach).all(axis=1)
+    distances = np.abs(margins(nodes, rotation))
+    off = (distances >= 0.05 * design.reach).all(axis=1)
     clear = leg_clearances(design, nodes, rotation).clearance
     least = clear[off].min(axis=0)
     volume = workspace_volume(design).volume
-    return volume, kappa.min(axis=0), kappa.min(axis=1).mean(), least, (clear > 0.0).all(1).mean()
+    share = (clear > 0.0).all(axis=1).mean()
+    return volume, distances.min(axis=0), distances.min(axis=1).mean(), least, share
 
 
 def _node_by_node(design: Design) -> tuple[Any, ...]:
@@ -120,13 +121,13 @@ def _node_by_node(design: Design) -> tuple[Any, ...]:
     home = home_pose(design)
     found = [evaluate(design, Pose(tuple(p), home.quaternion)) for p in _grid(design).tolist()]
     kept = [each for each in found if not each.violations]
-    kappa = np.abs([each.margins for each in kept])
+    distances = np.abs([each.margins for each in kept])
     clear = np.array([each.clearances.clearance for each in kept])
-    return workspace_volume(design).volume, kappa.min(axis=0), clear.min(axis=0)
+    return workspace_volume(design).volume, distances.min(axis=0), clear.min(axis=0)
 
 
 class Spent(NamedTuple):
-    """What a run took, in seconds: by the clock, and of processors by workers and sweep."""
+    """Seconds of a run: by the clock, and of processors by workers and sweep."""
 
     clock: float
     workers: float
@@ -138,16 +139,21 @@ class Spent(NamedTuple):
         return self.workers + self.sweep
 
 
-def _shared() -> Iterator[Row]:
+def local_cluster() -> Any:
+    """Return a Dask cluster of two processes with one thread each."""
     distributed: Any = importlib.import_module("distributed")
+    return distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+    )
+
+
+def _shared() -> Iterator[Row]:
     study = of_designs(SHARED)
     with (
         LocalWorkers(1) as one,
         LocalWorkers(2) as two,
-        distributed.LocalCluster(
-            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
-        ) as cluster,
-        distributed.Client(cluster) as client,
+        local_cluster() as cluster,
+        cluster.get_client() as client,
         DaskWorkers(cluster.scheduler_address) as dask,
     ):
         # The first round loads what tasks need.
@@ -188,8 +194,8 @@ def _most(workers: Workers, study: bytes) -> float:
     """Return how much more two processes get done here than one, when they share nothing."""
 
     def tasks(many: int) -> None:
-        asked = [workers.submit(rows.evaluate, study, 0, SHARED // 2) for _ in range(many)]
-        for each in asked:
+        futures = [workers.submit(rows.evaluate, study, 0, SHARED // 2) for _ in range(many)]
+        for each in futures:
             each.result()
 
     return 2.0 * best_of(ROUNDS, lambda: tasks(1)) / best_of(ROUNDS, lambda: tasks(2))

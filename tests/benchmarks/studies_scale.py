@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import heapq
-import importlib
 import json
 import pickle
 import subprocess
@@ -15,14 +14,15 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from sweep_faults import HereWorkers
 
 from benchmarks.processes import ROOT
-from benchmarks.studies import of_designs
+from benchmarks.studies import local_cluster, of_designs
 from benchmarks.table import Row, per_second, seconds
 from benchmarks.timing import best_of, elapsed
 from explorer import DaskWorkers, LocalWorkers
 from explorer.numerics.compiled import warm
-from explorer.sweep import rows
+from explorer.sweep import rows, run as runs
 from explorer.sweep.parts import part_path, write_part
 from explorer.sweep.run import AHEAD
 from explorer.sweep.study import encode_study
@@ -44,7 +44,7 @@ print(json.dumps([progress.done, most, progress.seconds]))
 
 
 class Cost(NamedTuple):
-    """What a chunk costs whom, in seconds."""
+    """Seconds that a chunk takes of a worker, and of the sweep itself."""
 
     worker: float
     sweep: float
@@ -63,17 +63,10 @@ def run() -> Iterator[Row]:
 
 
 def _overheads() -> dict[str, float]:
-    distributed: Any = importlib.import_module("distributed")
     with LocalWorkers(2) as local:
-        found = {"plain processes": _per_task(local)}
-    with (
-        distributed.LocalCluster(
-            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
-        ) as cluster,
-        DaskWorkers(cluster.scheduler_address) as dask,
-    ):
-        found["Dask"] = _per_task(dask)
-    return found
+        plain = _per_task(local)
+    with local_cluster() as cluster, DaskWorkers(cluster.scheduler_address) as dask:
+        return {"plain processes": plain, "Dask": _per_task(dask)}
 
 
 def _per_task(workers: Workers) -> float:
@@ -93,28 +86,14 @@ def _per_task(workers: Workers) -> float:
 
 def idle_run(count: int) -> Any:
     """Run a study whose workers compute nothing: only the sweep itself is at work."""
-    from concurrent.futures import Future
-
-    from explorer.sweep import run as runs
-
-    class Idle(Workers):
-        @property
-        def size(self) -> int:
-            return 1
-
-        def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
-            future: Future[Any] = Future()
-            future.set_result(fn(*args, **kwargs))
-            return future
-
     study = of_designs(count, CHUNK)
 
     def without_measures(_: bytes, start: int, stop: int) -> rows.Rows:
-        return rows.lost(study, range(start, stop), "")
+        return rows.rows_of_dead_workers(study, range(start, stop), "")
 
     runs.evaluate = without_measures
     with tempfile.TemporaryDirectory() as folder:
-        return runs.run_study(study, Path(folder) / "results", Idle())
+        return runs.run_study(study, Path(folder) / "results", HereWorkers())
 
 
 def _memory() -> Row:
@@ -137,7 +116,7 @@ def _million(overhead: float) -> Row:
     study = of_designs(MILLION, CHUNK)
     encoded = encode_study(study)
     timed = np.array([elapsed(lambda k=k: rows.evaluate(encoded, k, k + 1)) for k in range(TIMED)])
-    chunk = rows.lost(study, range(CHUNK), "")
+    chunk = rows.rows_of_dead_workers(study, range(CHUNK), "")
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         writing = best_of(3, lambda: write_part(folder, study, 0, [chunk]))

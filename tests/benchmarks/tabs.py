@@ -1,4 +1,4 @@
-"""Twenty tabs at once, each with a hand on a control of its own.
+"""Twenty tabs at once, each dragging a control of its own.
 
 Clients in another process send the events and read all that comes back. An event is matched
 with the first frame that was begun after it had arrived, and ends when that frame's place of
@@ -20,8 +20,7 @@ import numpy as np
 import psutil
 
 from benchmarks.ready_page import ready_page
-from benchmarks.socket_client import PLATFORM, Seen, SliderDrag, dragging_process
-from benchmarks.sweeps import sweep
+from benchmarks.socket_client import PLATFORM, Seen, SliderDrag, dragging_process, sweep
 from benchmarks.table import Row, seconds
 from benchmarks.timing import Spread
 from explorer.app.features.mechanism.pose_panel import JOINT_LABELS
@@ -59,21 +58,18 @@ def run() -> Iterator[Row]:
     Raises:
         RuntimeError: an event was lost.
     """
-    running = ready_page()
-    drags = drags_of(running.page.session.state)
     process = psutil.Process()
-    try:
-        with dragging_process(RATE) as drag:
-            # What is needed by one is not counted for twenty.
-            drag(running.url, [SliderDrag("x", drags[0].values[:20])])
-            before = memory(process)
-            with logged(running) as log:
-                sampled: list[int] = []
-                with sampling(lambda: sampled.append(process.memory_info().rss)):
-                    seen = drag(running.url, drags)
-            after = max(sampled)
-    finally:
-        running.stop()
+    with ready_page() as running, dragging_process(RATE) as drag:
+        drags = drags_of(running.page.session.state)
+        # What is needed by one is not counted for twenty.
+        drag(running.url, [SliderDrag("x", drags[0].values[:20])])
+        before, sampled = memory(process), list[int]()
+        with (
+            logged(running) as log,
+            sampling(lambda: sampled.append(process.memory_info().rss)),
+        ):
+            seen = drag(running.url, drags)
+        after = max(sampled)
     check_last(log)
     delays = np.concatenate([delays_of(log, d, s) for d, s in zip(drags, seen, strict=True)])
     spread = Spread.of(delays.tolist())
@@ -97,7 +93,7 @@ def run() -> Iterator[Row]:
 
 
 def drags_of(state: State) -> list[SliderDrag]:
-    """Return twenty drags of sliders; two of them have two hands."""
+    """Return twenty drags of sliders; two sliders are dragged by two tabs."""
     count = int(RATE * SECONDS)
     drags = [
         SliderDrag(label, sweep(value, 2.0, count))

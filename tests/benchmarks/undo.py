@@ -19,13 +19,12 @@ from explorer.app.session.session import REDO, UNDO
 from explorer.app.state.action import Action
 from explorer.app.state.actions import (
     Open,
+    Set,
     SetAngle,
     SetJoint,
     SetMode,
     SetPosition,
-    SetUnit,
     SetVariable,
-    SetView,
 )
 from explorer.app.state.state import State
 from explorer.mechanism.design import VARIABLES
@@ -35,10 +34,9 @@ STEPS = 300
 
 def run() -> Iterator[Row]:
     """Yield a row for undoing and one for redoing."""
-    running = ready_page()
-    session = running.page.session
     choose = random.Random(1)
-    try:
+    with ready_page() as running:
+        session = running.page.session
         for _ in range(STEPS):
             session.do(_action(choose, session.state))
             session.wait_until_idle()
@@ -57,8 +55,6 @@ def run() -> Iterator[Row]:
                 f"{seconds(spread.longest)} (p50 {seconds(spread.p50)}, p95 {seconds(spread.p95)})",
                 "20 ms",
             )
-    finally:
-        running.stop()
 
 
 def _action(choose: random.Random, state: State) -> Action:
@@ -72,9 +68,9 @@ def _action(choose: random.Random, state: State) -> Action:
             SetJoint(choose.randrange(6), state.joints[0] + near),
             SetMode(choose.randrange(8)),
             SetVariable(VARIABLES[variable], state.design.variables[variable] * (1.0 + 0.1 * near)),
-            SetUnit(choose.uniform(1.0, 20.0)),
-            SetView(replace(state.view, labels=not state.view.labels)),
-            SetView(replace(state.view, ghosts=not state.view.ghosts)),
+            Set("design.unit_mm", choose.uniform(1.0, 20.0)),
+            Set("view", replace(state.view, labels=not state.view.labels)),
+            Set("view", replace(state.view, ghosts=not state.view.ghosts)),
             Open(choose.choice(list(PRESETS.values()))),
         )
     )

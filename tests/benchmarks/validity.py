@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import msgspec
 import numpy as np
 
 from benchmarks.samples import DESIGN, around_home
@@ -12,14 +11,13 @@ from benchmarks.table import Row, per_second, seconds, times
 from benchmarks.timing import best_of
 from explorer import Pose, evaluate
 from explorer.numerics.compiled import warm
+from explorer.workspace.accessible.radii import with_radius
 from explorer.workspace.limits.valid_moves import moves_are_valid
 from explorer.workspace.limits.valid_poses import Rules, poses_are_valid, valid_rows
 
 POSES, MOVES, PLAIN, ROUNDS = 200_000, 5_000, 200, 10
 RADIUS = 0.2
-THICK = msgspec.structs.replace(
-    DESIGN, limits=msgspec.structs.replace(DESIGN.limits, leg_radii=(RADIUS,) * 4)
-)
+THICK = with_radius(DESIGN, RADIUS)
 
 
 def run() -> Iterator[Row]:

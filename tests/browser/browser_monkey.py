@@ -58,7 +58,7 @@ LATE = re.compile(
 # What can be clicked and lies open, as its middle and its kind; but for viser's own settings,
 # by which the page can be sent to another server.
 FIND = """() => [...document.querySelectorAll(
-    'button, [role=tab], [role=slider], input, label[for], [role=combobox], [role=option]')]
+    'button, [role=tab], [role=slider], input, [role=combobox], [role=option]')]
   .map(each => {
     const box = each.getBoundingClientRect();
     const x = box.x + box.width / 2, y = box.y + box.height / 2;

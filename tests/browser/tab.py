@@ -12,15 +12,19 @@ import viser
 from playwright.sync_api import Browser, ConsoleMessage, Locator
 
 from explorer.app.scene.camera import ViewName, framing
-from explorer.app.scene.placing import Placed
-from explorer.app.screenshot import PATIENCE_SECONDS, SCENE_CANVAS, evenly_drawn, settle
+from explorer.app.screenshot import PATIENCE_SECONDS, SCENE_CANVAS, fixed_resolution_url, settle
 from explorer.app.server import Running
-from explorer.app.state.frame import Frame
-from explorer.app.state.state import State
+from explorer.app.session.history import start_history
+from explorer.app.session.session import HistoryMove
+from explorer.app.state.state import State, opened
+from explorer.mechanism.design_file import PRESETS
 from explorer.numerics.arrays import FloatArray
 
 # Small, since what the pictures look like is tested elsewhere; panels and scene side by side.
 SIZE = (860, 480)
+
+# Far longer than a tab takes to turn.
+PRESS_AGAIN_SECONDS = 8.0
 
 # All that a console may say: what it logs, and these warnings. The first is viser's three.js
 # about itself, the second the software renderer about reading a frame back.
@@ -32,6 +36,14 @@ TOLERATED_KINDS = ("log", "info", "debug")
 
 # The slider as a whole is what its label is for; its thumb moves along it.
 TRACK = "[id]:has([role=slider])"
+
+# Take away focus, scrolling and messages.
+FORGET = """() => {
+    document.activeElement?.blur();
+    for (const box of document.querySelectorAll("*")) box.scrollTop = 0;
+    const closing = document.querySelectorAll(".mantine-Notification-closeButton");
+    for (const button of closing) button.click();
+}"""
 
 
 class Tab:
@@ -53,6 +65,9 @@ class Tab:
         dark: bool = False,
     ) -> None:
         self.running = running
+        # A software renderer draws three times faster without reflections and shadows.
+        running.viser.scene.configure_environment_map(hdri=None)
+        running.viser.scene.configure_default_lights(cast_shadow=False)
         self.requests: list[str] = []
         self._complaints: list[str] = []
         self._context = browser.new_context(
@@ -66,12 +81,32 @@ class Tab:
         self._context.on("requestfailed", lambda request: self._complaints.append(request.url))
         self.page = self._context.new_page()
         known = set(running.viser.get_clients())
-        self.page.goto(evenly_drawn(running))
+        self.page.goto(fixed_resolution_url(running))
         self._arrive(known)
 
     def close(self) -> None:
         """Close the tab."""
         self._context.close()
+
+    def begin_anew(self) -> None:
+        """Make explorer and page what they were when the page was opened.
+
+        The state, its history and the camera start again; menus, pointer, focus, chosen tabs and
+        scrolling go back.
+        """
+        page, session = self.running.page, self.running.page.session
+        self.page.keyboard.press("Escape")
+        self.page.mouse.move(0, 0)
+        self.page.evaluate(FORGET)
+        session.travel(HistoryMove(lambda _: start_history(opened(PRESETS["paper-optimal"]))))
+        assert page.wait_until_drawn(PATIENCE_SECONDS)
+        for group in self.page.get_by_role("tablist").all():
+            first = group.get_by_role("tab").first
+            if first.get_attribute("aria-selected") != "true":
+                first.click()
+        page.services.drawer.minimize()
+        page.point_cameras("isometric")
+        settle(self.page, self.client)
 
     def complaints(self) -> list[str]:
         """Return what the console said that is not tolerated, errors and failed requests."""
@@ -153,8 +188,20 @@ class Tab:
         self.page.get_by_role("button", name=words, exact=True).click()
 
     def turn_to(self, name: str) -> None:
-        """Turn to another tab of the right panel."""
-        self.page.get_by_role("tab", name=name, exact=True).click()
+        """Turn to another tab of the panels.
+
+        A busy page now and then misses a press on a tab, which then is pressed again.
+        """
+        tab = self.page.get_by_role("tab", name=name, exact=True)
+        deadline = time.monotonic() + PATIENCE_SECONDS
+        is_selected = False
+        while not is_selected:
+            assert time.monotonic() < deadline, f"never turned to: {name}"
+            tab.click()
+            again = time.monotonic() + PRESS_AGAIN_SECONDS
+            while not is_selected and time.monotonic() < again:
+                self.page.wait_for_timeout(20)
+                is_selected = tab.get_attribute("aria-selected") == "true"
 
     def wait_for(self, condition: Callable[[], bool], what: str) -> None:
         """Wait until a condition is met.
@@ -187,7 +234,7 @@ class Tab:
 
         def is_there() -> bool:
             camera = self.client.camera
-            eye, _ = framing(Placed(Frame(self.state)), view, camera.aspect)
+            eye, _ = framing(self.running.page.corners(), view, camera.aspect)
             return bool(np.allclose(camera.position, eye, atol=1e-3))
 
         self.wait_for(is_there, f"the {view} view")

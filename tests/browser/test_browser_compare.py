@@ -10,8 +10,9 @@ from likeness import decoded
 from playwright.sync_api import expect
 from tab import Tab
 
+from explorer.app.features.compare.actions import Pin
 from explorer.app.screenshot import PATIENCE_SECONDS
-from explorer.app.state.actions import SetView
+from explorer.app.state.actions import Set
 from explorer.app.state.view import View
 from explorer.mechanism.design_file import PRESETS
 from explorer.workspace.slices.volume import workspace_volume
@@ -23,14 +24,14 @@ AGAIN_SECONDS = 8.0
 
 
 def press(tab: Tab, name: str, done: Callable[[], bool]) -> None:
-    """Press what is a label of a button, by what it says it does, and wait until that is done.
+    """Press a button in markup, by its hint, and wait until that is done.
 
     The words are made anew when figures arrive: a press that meets those of before is lost.
     """
     deadline = time.monotonic() + PATIENCE_SECONDS
     while not done():
         assert time.monotonic() < deadline, f"never came about: {name}"
-        tab.page.get_by_title(name).first.evaluate("label => label.click()")
+        tab.page.get_by_title(name).first.evaluate("button => button.click()")
         again = time.monotonic() + AGAIN_SECONDS
         while not done() and time.monotonic() < again:
             tab.page.wait_for_timeout(20)
@@ -43,7 +44,7 @@ def purple_pixels(tab: Tab) -> int:
 
 
 def test_designs_are_pinned_told_overlaid_and_opened(tab: Tab) -> None:
-    tab.running.page.session.do(SetView(View(handle=False, tetrahedra=(False, False, False))))
+    tab.running.page.session.do(Set("view", View(handle=False, tetrahedra=(False, False, False))))
     tab.turn_to("Compare")
     press(tab, "Pin this design", lambda: tab.state.compared.pinned[0] is not None)
     pinned = tab.state.design
@@ -68,3 +69,25 @@ def test_designs_are_pinned_told_overlaid_and_opened(tab: Tab) -> None:
     press(tab, "Unpin paper-optimal", lambda: tab.state.compared.is_empty)
     assert page.wait_until_drawn(PATIENCE_SECONDS)
     assert np.abs(purple_pixels(tab) - before) < MANY
+
+
+def test_button_in_markup_is_pressed_by_a_key_and_keeps_the_focus(tab: Tab) -> None:
+    tab.turn_to("Compare")
+    session = tab.running.page.session
+    session.do(Pin(PRESETS["paper-initial"]))
+    bars = tab.page.get_by_role("button", name="Bars", exact=True)
+    bars.wait_for()
+    tab.page.get_by_role("button", name="Pin this design").focus()
+    for _ in range(2):
+        tab.page.keyboard.press("Tab")
+    expect(bars).to_be_focused()
+    tab.page.keyboard.press("Enter")
+    tab.wait_for(lambda: tab.state.compared.look.shows == "bars", "bars")
+    # The markup is another by then.
+    expect(bars).to_have_attribute("aria-pressed", "true")
+    expect(bars).to_be_focused()
+    # Neither is lost by what is pressed twice.
+    mm = tab.page.get_by_role("button", name="mm", exact=True)
+    for pressed in ("true", "false"):
+        mm.click()
+        expect(mm).to_have_attribute("aria-pressed", pressed)

@@ -9,7 +9,7 @@ import socket
 import threading
 import time
 from collections.abc import Callable, Generator, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from http import HTTPStatus
 from typing import Any
 from urllib.error import HTTPError
@@ -25,7 +25,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin, Subprotocol
 
-from explorer.app.browser.viser_gaps import start_viser, stop_viser
+from explorer.app.browser.viser_gaps import ServerControls, start_viser, stop_viser
 from explorer.app.features.optimise.panel import DESIGN_FILE
 from explorer.app.screenshot import PATIENCE_SECONDS
 from explorer.app.security import client_messages
@@ -477,7 +477,7 @@ def test_a_viser_that_serves_in_another_way_is_not_used(monkeypatch: pytest.Monk
         stop_viser(server)
 
     # As if viser had come to serve from elsewhere.
-    monkeypatch.setattr("explorer.app.browser.viser_gaps.SERVES", "viser.elsewhere")
+    monkeypatch.setattr("explorer.app.browser.viser_gaps.SERVING_MODULE", "viser.elsewhere")
     monkeypatch.setattr("explorer.app.browser.viser_gaps.stop_viser", stop)
     with pytest.raises(
         ServerError, match=r"^viser [^\n]* does not guard; [^\n]*pip install[^\n]*$"
@@ -535,6 +535,27 @@ def test_a_server_that_stops_waits_for_nobody_who_says_nothing() -> None:
         assert set(threading.enumerate()) <= before
         with suppress(ConnectionError):
             assert not line.recv(1)
+
+
+def test_client_before_the_page_is_served_once_the_page_is_there() -> None:
+    guard = Guard(Access.to("127.0.0.1", None))
+    server = start_viser("127.0.0.1", 0, guard.guarded)
+    try:
+        with closing(opened(f"http://127.0.0.1:{server.get_port()}")) as connection:
+            with pytest.raises(TimeoutError):
+                connection.recv(timeout=0.3)
+            guard.let_in(ServerControls(server), lambda: 0)
+            assert connection.recv(timeout=PATIENCE_SECONDS)
+    finally:
+        stop_viser(server)
+
+
+def test_client_before_the_page_is_let_go_by_a_server_that_stops() -> None:
+    server = start_viser("127.0.0.1", 0, Guard(Access.to("127.0.0.1", None)).guarded)
+    with closing(opened(f"http://127.0.0.1:{server.get_port()}")) as connection:
+        stop_viser(server)
+        with pytest.raises(ConnectionClosed):
+            connection.recv(timeout=PATIENCE_SECONDS)
 
 
 @contextmanager

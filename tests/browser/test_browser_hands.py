@@ -5,20 +5,18 @@ from __future__ import annotations
 from collections.abc import Generator
 from contextlib import closing, contextmanager
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from playwright.sync_api import Browser, Locator
 from tab import Tab
 
+from explorer.app.features.feature import DRAWER_HEIGHT, TALL_DRAWER
 from explorer.app.features.help.tour import STEPS
-from explorer.app.hands import DRAWER_HEIGHT, NARROW, TALL_DRAWER
+from explorer.app.layout import NARROW
 from explorer.app.scene.camera import framing
-from explorer.app.scene.placing import Placed
 from explorer.app.screenshot import SCENE_CANVAS, settle
 from explorer.app.server import Running, start
-from explorer.app.state.frame import Frame
 from explorer.app.storage.preferences import PreferenceFile, Preferences
 from explorer.mechanism.design_file import PRESETS
 
@@ -180,9 +178,7 @@ def test_drawer_that_was_moved_grows_and_shrinks_within_the_window(
         tab.page.mouse.down()
         tab.page.mouse.move(grip["x"] + 0.5 * grip["width"], grip["y"] + 30, steps=4)
         tab.page.mouse.up()
-        hands: Any = tab.running.page.hands
-        _, panel = hands._stacked
-        hands.set_drawer(tab.client, panel, tall=True)
+        tab.running.page.services.resize_drawer(tab.client, tall=True)
         tab.wait_for(lambda: _bottom(drawer) - _top(drawer) > TALL_DRAWER - 8, "a tall drawer")
         tab.wait_for(lambda: _bottom(drawer) <= height + 1 and _top(drawer) >= 0, "all of it")
         for less in (200, 300):
@@ -224,7 +220,7 @@ def is_framed(tab: Tab) -> bool:
     x, y, z, aspect = tab.page.evaluate(
         "(({camera: {position: p, aspect}}) => [p.x, p.y, p.z, aspect])(window.__viserMutable)"
     )
-    eye, _ = framing(Placed(Frame(tab.state)), "isometric", aspect)
+    eye, _ = framing(tab.running.page.corners(), "isometric", aspect)
     # In the page, y is up.
     return bool(np.allclose((-z, -x, y), eye, rtol=0.01))
 
@@ -309,4 +305,4 @@ def test_the_tour_leads_through_five_steps_once(browser: Browser, tmp_path: Path
 
 
 def _words(tab: Tab, words: str) -> Locator:
-    return tab.page.locator("label").filter(has_text=words).last
+    return tab.page.get_by_role("button", name=words, exact=True)

@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 from client import Client, opened
 
-from explorer.app.storage.document import decode_document
+from explorer.app.storage.session_format import decode_session
 
 PATIENCE_SECONDS = 60.0
 
@@ -77,8 +77,8 @@ def wait_until_saved(data: Path, x: float) -> None:
     deadline = time.monotonic() + PATIENCE_SECONDS
     while time.monotonic() < deadline:
         for file in (data / "sessions").glob("*.json"):
-            document = decode_document(file.read_bytes(), "file")
-            if document.present.pose.position[0] == x:
+            history = decode_session(file.read_bytes(), "file")
+            if history.step.state.pose.position[0] == x:
                 return
         time.sleep(0.02)
     raise AssertionError("it was not saved")

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import re
+from contextlib import closing
 from typing import cast
 
 import numpy as np
 import pytest
 from conftest import OpenTab
-from playwright.sync_api import expect
+from playwright.sync_api import Browser, expect
 from tab import Tab
 
-from explorer.app.features.mechanism.marks import HANDLE_REACH
+from explorer.app.features.mechanism.marks import ARROW_LENGTH
 from explorer.app.features.mechanism.pose_panel import JOINT_LABELS, MODES
 from explorer.app.scene.placing import Placed
+from explorer.app.server import Running
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, joints_of
 from explorer.mechanism.design import JOINTS
@@ -38,12 +40,15 @@ def values_of(state: State) -> tuple[float, ...]:
     return (*state.joints, *state.pose.position, *state.yaw_pitch_roll)
 
 
-def test_the_page_loads_without_a_complaint_and_asks_nobody_else(tab: Tab) -> None:
-    assert_page_shows_state(tab)
-    tab.picture()
-    own = (tab.running.url, f"blob:{tab.running.url}", "data:")
-    assert [url for url in tab.requests if not url.startswith(own)] == []
-    assert tab.complaints() == []
+def test_page_loads_without_a_complaint_and_asks_nobody_else(
+    browser: Browser, running: Running
+) -> None:
+    with closing(Tab(browser, running)) as tab:
+        assert_page_shows_state(tab)
+        tab.picture()
+        own = (tab.running.url, f"blob:{tab.running.url}", "data:")
+        assert [url for url in tab.requests if not url.startswith(own)] == []
+        assert tab.complaints() == []
 
 
 @pytest.mark.parametrize(("joint", "typed"), [(0, 12.5), (1, 10.4), (5, 14.25)])
@@ -141,7 +146,7 @@ def test_dragging_an_arrow_of_the_gizmo_moves_the_platform_along_it(tab: Tab, ax
     before = tab.state
     placed = Placed(Frame(before))
     arrow = before.pose.rotation[:, axis]
-    tip = placed.points["b4"] + 0.7 * HANDLE_REACH * arrow
+    tip = placed.points["b4"] + 0.7 * ARROW_LENGTH * arrow
     mouse = tab.page.mouse
     mouse.move(*tab.on_screen(tip))
     mouse.down()

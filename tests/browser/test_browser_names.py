@@ -9,7 +9,7 @@ from monkey import explorer_with_data
 from playwright.sync_api import Browser
 from tab import Tab
 
-from explorer.app.state.actions import SetUnit
+from explorer.app.state.actions import Set
 
 ROLES = {"slider", "spinbutton", "textbox", "searchbox", "combobox", "checkbox", "button", "tab"}
 SIZE = (1280, 720)
@@ -44,7 +44,7 @@ def test_every_control_has_a_name_in_every_tab(browser: Browser) -> None:
         # What comes later has one too.
         tab.page.keyboard.press("k")
         tab.page.get_by_role("dialog").wait_for()
-        running.page.session.do(SetUnit(0.0))
+        running.page.session.do(Set("design.unit_mm", 0.0))
         # As the page says it.
         tab.page.get_by_text("The unit must be positive; got 0").wait_for()
         tab.wait_for(lambda: all(named for _, named in controls(tab)), "names of what came")

@@ -24,7 +24,7 @@ def test_one_press_finds_a_design_that_is_seen_in_every_tab_and_accepted(
     tab.push("Optimise")
     # The process starts first, so that there is time to change one's mind in any tab.
     other.page.get_by_role("button", name="Cancel", exact=True).wait_for()
-    tab.page.get_by_text("Found", exact=True).wait_for()
+    tab.page.get_by_text("Converged", exact=True).wait_for()
     found = tab.state.design
     assert workspace_volume(found).volume >= 7053.04 * (1.0 - 1e-6)
     assert found.reach < 17.9

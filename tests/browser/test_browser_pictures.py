@@ -15,13 +15,13 @@ from pictures import DESIGN, FOLDER, SCENES, draw
 from playwright.sync_api import Browser, Page
 from scipy import ndimage
 
-from explorer.app.drawing import Scene
+from explorer.app.features.listed import FEATURES
 from explorer.app.features.mechanism.legs import Telescopes
 from explorer.app.scene.placing import Placed
 from explorer.app.screenshot import SCENE_ALONE, open_page, settle, stable_picture
 from explorer.app.server import Running, start
 from explorer.app.state.action import Action
-from explorer.app.state.actions import SetPose, SetPosition, SetView
+from explorer.app.state.actions import Set, SetPose, SetPosition
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, opened
 from explorer.app.widgets.assigning import Update
@@ -123,7 +123,7 @@ def stage(opened_stage: Stage) -> Iterator[Stage]:
     """The home scene as it is stored, and so again afterwards."""
     opened_stage.running.page.point_cameras("isometric")
     yield opened_stage
-    opened_stage.do(SetView(opened_stage.start.view))
+    opened_stage.do(Set("view", opened_stage.start.view))
     opened_stage.do(SetPose(opened_stage.start.pose))
 
 
@@ -132,13 +132,13 @@ def without_tetrahedron(index: int) -> Alteration:
 
     def alter(stage: Stage) -> None:
         tetrahedra = (shown[0], shown[1], shown[2])
-        stage.do(SetView(replace(stage.start.view, tetrahedra=tetrahedra)))
+        stage.do(Set("view", replace(stage.start.view, tetrahedra=tetrahedra)))
 
     return alter
 
 
 def with_flags_turned_orange(stage: Stage) -> None:
-    stage.do(SetView(replace(stage.start.view, warn_below=8.8)))
+    stage.do(Set("view", replace(stage.start.view, warn_below=8.8)))
 
 
 def with_the_platform_aside(stage: Stage) -> None:
@@ -214,8 +214,10 @@ def test_lines_are_made_with_the_kind_of_colours_that_they_get(running: Running)
             return handle
 
     running.viser.scene.__class__ = Recorder
-    scene = Scene(running.viser, running.page.feed, running.page.compare_feed)
-    updates = scene.updates(Placed(Frame(opened(DESIGN))))
+    # Parts are made anew; feeds and what else the page has stay.
+    services, placed = running.page.services, Placed(Frame(opened(DESIGN)))
+    parts = [part(services) for feature in FEATURES for part in feature.scene]
+    updates = [update for part in parts for update in part.updates(placed)]
     given = {id(h): np.shape(np.asarray(v)) for h, name, v in updates if name == "colors"}
     assert len(given) > 3
     assert given == {number: made[number] for number in given}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from tab import TRACK, Tab
 
-from explorer.app.features.mechanism.marks import HANDLE_REACH
+from explorer.app.features.mechanism.marks import ARROW_LENGTH
 from explorer.app.scene.placing import Placed
 from explorer.app.screenshot import settle
 from explorer.app.session.gestures import PAUSE_SECONDS
@@ -61,7 +61,7 @@ def test_drag_of_the_gizmo_that_rests_is_one_step(tab: Tab) -> None:
     tab.look_from("isometric")
     placed = Placed(Frame(tab.state))
     arrow = tab.state.pose.rotation[:, 0]
-    tip = placed.points["b4"] + 0.7 * HANDLE_REACH * arrow
+    tip = placed.points["b4"] + 0.7 * ARROW_LENGTH * arrow
     tab.page.mouse.move(*tab.on_screen(tip))
     tab.page.mouse.down()
     for share in (0.5, 1.0, 1.5):

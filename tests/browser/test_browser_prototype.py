@@ -8,8 +8,9 @@ from likeness import decoded, likeness
 from playwright.sync_api import expect
 from tab import Tab
 
+from explorer.app.features.prototype.feed import PartsFeed
 from explorer.app.screenshot import PATIENCE_SECONDS
-from explorer.app.state.actions import SetLimits, SetPosition, SetView
+from explorer.app.state.actions import Set, SetPosition
 from explorer.workspace.accessible.radii import with_radius
 
 # A difference of two pictures that the eye cannot miss.
@@ -29,7 +30,7 @@ def difference(before: bytes, after: bytes) -> float:
 def test_the_prototype_takes_the_place_of_the_schematic_moves_and_is_exported(tab: Tab) -> None:
     page, session = tab.running.page, tab.running.page.session
     bare = replace(tab.state.view, handle=False, flags=False, tetrahedra=(False, False, False))
-    session.do(SetView(bare))
+    session.do(Set("view", bare))
     tab.turn_to("View")
     schematic = tab.picture()
     expect(tab.page.get_by_role("button", name="Export assembly")).to_be_hidden()
@@ -38,7 +39,7 @@ def test_the_prototype_takes_the_place_of_the_schematic_moves_and_is_exported(ta
     wait_until_drawn(tab)
     together = tab.picture()
     assert difference(schematic, together) > PLAIN_TO_SEE
-    made = page.parts_feed.parts
+    made = page.services.get(PartsFeed).parts
 
     home = tab.state.pose.position
     session.do(SetPosition(2, home[2] - 2.0))
@@ -47,10 +48,10 @@ def test_the_prototype_takes_the_place_of_the_schematic_moves_and_is_exported(ta
     session.do(SetPosition(2, home[2]))
     assert difference(together, tab.picture()) < ALIKE
 
-    goal = tab.drag("Drawn apart", 0.5)
+    goal = tab.drag("Exploded", 0.5)
     tab.wait_for(lambda: abs(tab.state.view.prototype.exploded - goal) < 0.05, "parts apart")
     assert difference(together, tab.picture()) > PLAIN_TO_SEE
-    assert page.parts_feed.parts is made
+    assert page.services.get(PartsFeed).parts is made
 
     assert made is not None
     expect(tab.page.get_by_text(f"{made.listed.mass(2700.0):.1f} g")).to_be_visible()
@@ -67,7 +68,7 @@ def test_the_prototype_takes_the_place_of_the_schematic_moves_and_is_exported(ta
 
 def test_a_design_too_tight_is_told_and_stays_schematic(tab: Tab) -> None:
     tab.turn_to("View")
-    tab.running.page.session.do(SetLimits(with_radius(tab.state.design, 0.4).limits))
+    tab.running.page.session.do(Set("design.limits", with_radius(tab.state.design, 0.4).limits))
     schematic = tab.picture()
     tab.choose("Drawn as", "prototype")
     alert = tab.page.get_by_role("alert").filter(has_text="No prototype of this design")
@@ -76,7 +77,7 @@ def test_a_design_too_tight_is_told_and_stays_schematic(tab: Tab) -> None:
     expect(tab.page.get_by_role("button", name="Export assembly")).to_be_hidden()
     wait_until_drawn(tab)
     assert difference(schematic, tab.picture()) < ALIKE
-    tab.running.page.session.do(SetLimits(with_radius(tab.state.design, 0.3).limits))
+    tab.running.page.session.do(Set("design.limits", with_radius(tab.state.design, 0.3).limits))
     tab.page.get_by_role("button", name="Export assembly").wait_for()
     expect(alert).to_be_hidden()
     wait_until_drawn(tab)

@@ -12,8 +12,9 @@ from playwright.sync_api import expect
 from tab import Tab
 
 from explorer.app.features.mechanism.pose_panel import JOINT_LABELS
+from explorer.app.features.workspace.feed import WorkspaceFeed
 from explorer.app.screenshot import PATIENCE_SECONDS
-from explorer.app.state.actions import SetLimits
+from explorer.app.state.actions import Set
 from explorer.workspace.accessible.radii import with_radius
 
 # Pixels that tell a surface from the edges that a moved leg brings.
@@ -24,9 +25,9 @@ MANY = 800
 def tab(tab: Tab) -> Tab:
     """A tab with legs of radius 0.2, both its workspace tabs open."""
     limits = with_radius(tab.state.design, 0.2).limits
-    tab.running.page.session.do(SetLimits(limits))
-    for each in tab.page.get_by_role("tab", name="Workspace", exact=True).all():
-        each.click()
+    tab.running.page.session.do(Set("design.limits", limits))
+    for panel in range(2):
+        tab.page.get_by_role("tab", name="Workspace", exact=True).nth(panel).click()
     return tab
 
 
@@ -62,15 +63,15 @@ def test_the_reachable_solid_takes_the_place_of_the_other_and_the_page_stays_ali
         tab.wait_until_shown(JOINT_LABELS["l4"], tab.state.joints[5])
         assert tab.state.pose != before.pose
         assert red_pixels(tab) < without + MANY
-        assert not page.feed.is_current
+        assert not page.services.get(WorkspaceFeed).is_current
         tab.push("Home pose")
         tab.wait_for(lambda: tab.state.pose == before.pose, "the home pose")
     finally:
         os.kill(process, signal.SIGCONT)
-    tab.page.get_by_text("can be reached").wait_for()
+    tab.page.get_by_text("reachable volume").wait_for()
     wait_until_drawn(tab)
     expect(tab.page.get_by_text("computing …")).to_be_hidden()
-    drawing = page.feed.drawing
+    drawing = page.services.get(WorkspaceFeed).drawing
     assert drawing is not None
     assert drawing.reached is not None
     expect(tab.page.get_by_text(f"{drawing.reached.volume:.6g} units³")).to_be_visible()
@@ -84,7 +85,7 @@ def test_the_reachable_solid_takes_the_place_of_the_other_and_the_page_stays_ali
 
 def test_a_home_that_is_no_start_is_told_and_the_button_goes_to_one(tab: Tab) -> None:
     limits = msgspec.structs.replace(tab.state.design.limits, l4=(0.0, 12.5))
-    tab.running.page.session.do(SetLimits(limits))
+    tab.running.page.session.do(Set("design.limits", limits))
     tab.switch("Solid", on=True)
     tab.choose("Region", "reachable")
     alert = tab.page.get_by_role("alert").filter(has_text="The home position is no start")
@@ -96,7 +97,7 @@ def test_a_home_that_is_no_start_is_told_and_the_button_goes_to_one(tab: Tab) ->
     tab.push("Go there")
     tab.wait_for(lambda: tab.state.pose != home, "another pose")
     expect(alert).to_be_hidden()
-    tab.page.get_by_text("can be reached").wait_for()
+    tab.page.get_by_text("reachable volume").wait_for()
 
 
 def test_the_curve_is_drawn_when_it_is_asked_for(tab: Tab) -> None:
@@ -105,7 +106,7 @@ def test_the_curve_is_drawn_when_it_is_asked_for(tab: Tab) -> None:
     expect(chart).to_be_hidden()
     tab.switch("Volume against radius", on=True)
     chart.wait_for()
-    expect(tab.page.get_by_text("harmless up to")).to_be_visible()
+    expect(tab.page.get_by_text("no loss up to")).to_be_visible()
     expect(tab.page.get_by_text("legs 1 and 4 at (0, 0, 0)")).to_be_visible()
     tab.switch("Volume against radius", on=False)
     expect(chart).to_be_hidden()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,15 +11,18 @@ from typing import Any
 import msgspec
 import numpy as np
 import pytest
+from playwright.sync_api import Browser
 from tab import Tab
 
-from explorer.app.features.studies.actions import OpenStudy, SetStudyWish
-from explorer.app.features.studies.feed import NO_WISH, PlotJson
-from explorer.app.features.studies.folders import StudyFolders
+from explorer.app.features.studies.actions import OpenStudy
+from explorer.app.features.studies.feed import NO_PLAN, PlotJson
+from explorer.app.features.studies.panel import StudiesPanel
 from explorer.app.screenshot import settle
 from explorer.app.server import Running, start
 from explorer.app.session.session import UNDO
-from explorer.app.state.studies import MOST, StudyWish
+from explorer.app.state.actions import Set
+from explorer.app.state.studies import MOST, StudyPlan
+from explorer.app.storage.study_folders import StudyFolders
 from explorer.mechanism.design_file import PRESETS
 from explorer.sweep.parts import write_part
 from explorer.sweep.results import Results, load_results
@@ -81,20 +85,29 @@ def running(home: Path, capfd: pytest.CaptureFixture[str]) -> Iterator[Running]:
     assert capfd.readouterr().err == ""
 
 
+@pytest.fixture
+def tab(browser: Browser, running: Running) -> Iterator[Tab]:
+    with closing(Tab(browser, running)) as tab:
+        yield tab
+        assert tab.complaints() == []
+
+
 def looked_at(tab: Tab) -> None:
     tab.page.set_viewport_size({"width": WINDOW["width"], "height": WINDOW["height"]})
     tab.turn_to("Studies")
     settle(tab.page, tab.client)
 
 
+def panel_of(tab: Tab) -> StudiesPanel:
+    return tab.running.page.services.get(StudiesPanel)
+
+
 def settled(tab: Tab) -> None:
     """Wait until the plots are those of the state, and are listened to."""
-    panel = tab.running.page.studies
-    assert panel is not None
-    feed = panel.feed
+    feed = panel_of(tab).feed
 
     def plots() -> tuple[PlotJson, PlotJson] | None:
-        drawing, studies = feed.drawing, replace(tab.state.studies, wish=NO_WISH)
+        drawing, studies = feed.drawing, replace(tab.state.studies, plan=NO_PLAN)
         is_new = drawing is not None and drawing.request.studies == studies and feed.is_current
         return drawing.plots if drawing is not None and is_new else None
 
@@ -185,13 +198,10 @@ def test_what_hands_do_in_the_plots(tab: Tab, home: Path) -> None:
     _assert_left_out(tab, results)
     assert 0 < len(tab.page.evaluate(LEFT_OUT)) < COUNT
 
-    # The links of the list push buttons out of sight.
     tab.page.get_by_title("Clear all brushes").click()
     tab.wait_for(lambda: not studies_of(tab).brushes, "no brush")
     settled(tab)
-    panel = tab.running.page.studies
-    assert panel is not None
-    drawing = panel.feed.drawing
+    drawing = panel_of(tab).feed.drawing
     assert drawing is not None
     best = int(results.columns["index"][drawing.front[0]])
     tab.page.get_by_title(f"Open design {best}", exact=True).click()
@@ -201,14 +211,13 @@ def test_what_hands_do_in_the_plots(tab: Tab, home: Path) -> None:
 
 def test_a_small_study_is_started_and_cancelled(tab: Tab, home: Path) -> None:
     # So many, of something so slow, that even a slow browser can cancel it on the way.
-    wish = StudyWish(MOST, 20.0, ("a3x", "b2"), ("volume", "reachable_volume"), ())
-    tab.running.page.session.do(SetStudyWish(wish))
+    plan = StudyPlan(MOST, 20.0, ("a3x", "b2"), ("volume", "reachable_volume"), ())
+    tab.running.page.session.do(Set("studies.plan", plan))
     looked_at(tab)
     tab.page.get_by_text("New study", exact=True).click()
     tab.push("Start study")
     tab.push("Cancel study")
-    panel = tab.running.page.studies
-    assert panel is not None
+    panel = panel_of(tab)
     tab.wait_for(lambda: panel.runner.run is None, "the end of a cancelled study")
     name = studies_of(tab).name
     assert name is not None
@@ -219,7 +228,7 @@ def test_a_study_that_was_cut_off_is_gone_on_with(tab: Tab, home: Path) -> None:
     session = tab.running.page.session
     looked_at(tab)
     session.do(OpenStudy("half"))
-    tab.push("Go on with the study")
+    tab.push("Continue the study")
     tab.wait_for(lambda: _count(home / "half") == COUNT, "the whole study")
     settled(tab)
     tab.wait_for(lambda: tab.page.locator(".js-plotly-plot").count() == 2, "both plots")

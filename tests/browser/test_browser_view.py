@@ -8,7 +8,7 @@ from collections.abc import Callable
 from likeness import decoded, likeness
 from tab import Tab
 
-from explorer.app.features.mechanism.show_panel import SWITCHES
+from explorer.app.features.view.panel import SWITCHES
 from explorer.app.scene.camera import VIEWS
 from explorer.app.state.view import View
 from explorer.mechanism.margins import TETRAHEDRA

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
-from typing import Any
 
 import msgspec
 import numpy as np
 import pytest
+from command_line import CommandLine
 
 import explorer
-from explorer.cli import run
 from explorer.mechanism.feasible_intervals import feasible_intervals
 
 POSITION = (8.0, -2.5, 1.1e1)
@@ -27,20 +25,8 @@ def snapshot() -> explorer.Snapshot:
     return explorer.evaluate(PRESET, explorer.Pose.of_yaw_pitch_roll(POSITION, ANGLES))
 
 
-def answer(capsys: pytest.CaptureFixture[str], *argv: str, status: int = 0) -> dict[str, Any]:
-    """Return the one JSON object that a command writes, and nothing else."""
-    assert run([*argv, "--json"]) == status
-    captured = capsys.readouterr()
-    assert captured.out.endswith("}\n")
-    assert captured.out.count("\n") == 1
-    assert bool(captured.err) == bool(status)
-    found = json.loads(captured.out)
-    assert isinstance(found, dict)
-    return found  # pyright: ignore[reportUnknownVariableType]
-
-
-def test_inverse_json_has_joints_in_order(capsys: pytest.CaptureFixture[str]) -> None:
-    found = answer(capsys, "inverse", *POSE)
+def test_inverse_json_has_joints_in_order(cli: CommandLine) -> None:
+    found = cli.answer("inverse", *POSE)
     expected = snapshot()
     assert set(found) == {"joints", "within_limits", "violations"}
     assert found["joints"] == expected.joints.tolist()
@@ -49,30 +35,28 @@ def test_inverse_json_has_joints_in_order(capsys: pytest.CaptureFixture[str]) ->
 
 
 def test_inverse_pose_outside_limits_names_them(
-    capsys: pytest.CaptureFixture[str],
+    cli: CommandLine,
 ) -> None:
-    found = answer(capsys, "inverse", "--position", "30", "5", "9")
+    found = cli.answer("inverse", "--position", "30", "5", "9")
     assert found["within_limits"] is False
     assert any("box x" in each for each in found["violations"])
 
 
-def test_inverse_swapped_carriages_names_their_order(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_inverse_swapped_carriages_names_their_order(cli: CommandLine, tmp_path: Path) -> None:
     other = ["--position", "10", "5", "9", "--yaw-pitch-roll", "-106.9", "0", "0"]
-    found = answer(capsys, "inverse", *other)
+    found = cli.answer("inverse", *other)
     assert found["within_limits"] is False
-    (told,) = found["violations"]
-    assert told.startswith("carriage order: d3 − d1 = −0.66")
+    (violation,) = found["violations"]
+    assert violation.startswith("carriage order: d3 − d1 = −0.66")
     limits = msgspec.structs.replace(PRESET.limits, carriage_order="any")
     plain = msgspec.structs.replace(PRESET, limits=limits)
     file = tmp_path / "plain.json"
     file.write_bytes(explorer.encode_design(plain))
-    assert answer(capsys, "inverse", *other, "--design", str(file))["within_limits"] is True
+    assert cli.answer("inverse", *other, "--design", file)["within_limits"] is True
 
 
-def test_singularity_json_has_the_snapshot(capsys: pytest.CaptureFixture[str]) -> None:
-    found = answer(capsys, "singularity", *POSE)
+def test_singularity_json_has_the_snapshot(cli: CommandLine) -> None:
+    found = cli.answer("singularity", *POSE)
     expected = snapshot()
     assert found == {
         "margins": expected.margins.tolist(),
@@ -97,8 +81,8 @@ def test_singularity_json_has_the_snapshot(capsys: pytest.CaptureFixture[str]) -
     }
 
 
-def test_singularity_singular_pose_has_status_0(capsys: pytest.CaptureFixture[str]) -> None:
-    found = answer(capsys, "singularity", "--position", "0", "0", "0")
+def test_singularity_singular_pose_has_status_0(cli: CommandLine) -> None:
+    found = cli.answer("singularity", "--position", "0", "0", "0")
     assert found["determinant"] == 0.0
     assert found["stratum_dimension"] < 5
     assert found["incidences"] == [1, 2, 3]
@@ -106,10 +90,9 @@ def test_singularity_singular_pose_has_status_0(capsys: pytest.CaptureFixture[st
     assert all(each["position"] == [0.0, 0.0, 0.0] for each in found["nearest"])
 
 
-def test_singularity_singular_pose_names_its_incidence(capsys: pytest.CaptureFixture[str]) -> None:
+def test_singularity_singular_pose_names_its_incidence(cli: CommandLine) -> None:
     argv = ["singularity", "--position", "10", "5", "0", "--yaw-pitch-roll", "-70", "20", "30"]
-    assert run(argv) == 0
-    text = capsys.readouterr().out
+    text = cli.text(*argv)
     (row,) = [line for line in text.splitlines() if line.startswith("singular ")]
     assert row.split(maxsplit=1)[1] == "b4 on the base plane"
     assert "stratum            4 3 1 2, dimension 5: b4 on the base plane" in text
@@ -118,10 +101,10 @@ def test_singularity_singular_pose_names_its_incidence(capsys: pytest.CaptureFix
 
 
 def test_forward_joints_of_inverse_give_the_pose_in_its_mode(
-    capsys: pytest.CaptureFixture[str],
+    cli: CommandLine,
 ) -> None:
     expected = snapshot()
-    found = answer(capsys, "forward", "--joints", *map(repr, expected.joints.tolist()))
+    found = cli.answer("forward", "--joints", *map(repr, expected.joints.tolist()))
     assert set(found) == {"feasible", "discriminants", "modes"}
     assert found["feasible"] is True
     np.testing.assert_allclose(found["discriminants"], expected.margins**2, rtol=1e-9)
@@ -135,9 +118,9 @@ def test_forward_joints_of_inverse_give_the_pose_in_its_mode(
 
 
 def test_forward_modes_have_margins_of_their_signs(
-    capsys: pytest.CaptureFixture[str],
+    cli: CommandLine,
 ) -> None:
-    found = answer(capsys, "forward", "--joints", *map(repr, snapshot().joints.tolist()))
+    found = cli.answer("forward", "--joints", *map(repr, snapshot().joints.tolist()))
     for mode in found["modes"]:
         rotation = explorer.rotation_from_quaternion(mode["quaternion"])
         np.testing.assert_allclose(
@@ -149,11 +132,11 @@ def test_forward_modes_have_margins_of_their_signs(
 
 
 def test_forward_infeasible_joints_have_status_1(
-    capsys: pytest.CaptureFixture[str],
+    cli: CommandLine,
 ) -> None:
     joints = snapshot().joints.copy()
     joints[0] = 0.5
-    found = answer(capsys, "forward", "--joints", *map(repr, joints.tolist()), status=1)
+    found = cli.answer("forward", "--joints", *map(repr, joints.tolist()), status=1)
     assert found["feasible"] is False
     assert found["modes"] == []
     assert found["discriminants"] == explorer.discriminants(PRESET, joints).tolist()
@@ -162,82 +145,76 @@ def test_forward_infeasible_joints_have_status_1(
 
 @pytest.mark.parametrize("joint", range(6))
 def test_forward_infeasible_joints_suggested_value_is_feasible(
-    capsys: pytest.CaptureFixture[str], joint: int
+    cli: CommandLine, joint: int
 ) -> None:
     joints = snapshot().joints.copy()
     intervals = feasible_intervals(PRESET, joints)[joint]
     joints[joint] = intervals[-1][1] + 0.25
-    assert run(["forward", "--joints", *map(repr, joints.tolist())]) == 1
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    assert "tetrahedron" in captured.err
-    advice = captured.err.strip().rpartition(" is ")[2].split()
+    refused = cli.refusal("forward", "--joints", *map(repr, joints.tolist()), status=1)
+    assert "tetrahedron" in refused
+    advice = refused.strip().rpartition(" is ")[2].split()
     name, _, _, _, closing = advice
     joints[explorer.JOINTS.index(name)] = float(closing)
     assert explorer.forward(PRESET, joints).feasible
 
 
 def test_forward_infeasible_joints_name_the_tetrahedron(
-    capsys: pytest.CaptureFixture[str],
+    cli: CommandLine,
 ) -> None:
     joints = snapshot().joints.copy()
     joints[5] = 60.0
     squares = explorer.discriminants(PRESET, joints)
     assert [square < 0 for square in squares.tolist()] == [False, False, True]
-    assert run(["forward", "--joints", *map(repr, joints.tolist())]) == 1
-    message = capsys.readouterr().err
+    message = cli.refusal("forward", "--joints", *map(repr, joints.tolist()), status=1)
     assert message.startswith("explorer: ")
     assert "trilateration 3 (tetrahedron b4 a1 a2 a3)" in message
     assert f"{squares[2]:.4g}" in message
     assert "l4 from 60 to " in message
 
 
-def test_pose_options_none_give_the_home_pose(capsys: pytest.CaptureFixture[str]) -> None:
+def test_pose_options_none_give_the_home_pose(cli: CommandLine) -> None:
     home = explorer.evaluate(PRESET, explorer.home_pose(PRESET))
-    assert answer(capsys, "inverse")["joints"] == home.joints.tolist()
+    assert cli.answer("inverse")["joints"] == home.joints.tolist()
 
 
 def test_pose_options_position_keeps_the_home_orientation(
-    capsys: pytest.CaptureFixture[str],
+    cli: CommandLine,
 ) -> None:
     home = explorer.home_pose(PRESET)
-    found = answer(capsys, "inverse", *POSE[:4])
+    found = cli.answer("inverse", *POSE[:4])
     assert found["joints"] == explorer.inverse(PRESET, POSITION, home.rotation).tolist()
 
 
 def test_pose_options_orientation_keeps_the_home_position(
-    capsys: pytest.CaptureFixture[str],
+    cli: CommandLine,
 ) -> None:
     home = explorer.home_pose(PRESET)
     rotation = explorer.rotation_from_yaw_pitch_roll(ANGLES)
-    found = answer(capsys, "inverse", *POSE[4:])
+    found = cli.answer("inverse", *POSE[4:])
     np.testing.assert_allclose(
         found["joints"], explorer.inverse(PRESET, home.position, rotation), rtol=1e-12
     )
 
 
-def test_pose_options_quaternion_and_angles_agree(capsys: pytest.CaptureFixture[str]) -> None:
+def test_pose_options_quaternion_and_angles_agree(cli: CommandLine) -> None:
     quaternion = explorer.quaternion_from_rotation(explorer.rotation_from_yaw_pitch_roll(ANGLES))
     # Of any length, and -q is the same rotation as q.
     words = map(repr, (-3.0 * quaternion).tolist())
-    by_quaternion = answer(capsys, "inverse", *POSE[:4], "--quaternion", *words)
-    by_angles = answer(capsys, "inverse", *POSE)
+    by_quaternion = cli.answer("inverse", *POSE[:4], "--quaternion", *words)
+    by_angles = cli.answer("inverse", *POSE)
     np.testing.assert_allclose(by_quaternion["joints"], by_angles["joints"], rtol=1e-12)
 
 
-def test_design_option_file_equals_its_preset(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_design_option_file_equals_its_preset(cli: CommandLine, tmp_path: Path) -> None:
     file = tmp_path / "my design.json"
     file.write_bytes(explorer.encode_design(explorer.PRESETS["paper-initial"]))
-    by_file = answer(capsys, "inverse", "--design", str(file), *POSE)
-    assert by_file == answer(capsys, "inverse", "--design", "paper-initial", *POSE)
-    assert by_file != answer(capsys, "inverse", *POSE)
+    by_file = cli.answer("inverse", "--design", file, *POSE)
+    assert by_file == cli.answer("inverse", "--design", "paper-initial", *POSE)
+    assert by_file != cli.answer("inverse", *POSE)
 
 
-def test_text_answers_show_units_and_millimetres(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["inverse", *POSE]) == 0
-    text = capsys.readouterr().out
+def test_text_answers_show_units_and_millimetres(cli: CommandLine) -> None:
+    text = cli.text("inverse", *POSE)
     joints = snapshot().joints
     for name, value in zip(explorer.JOINTS, joints.tolist(), strict=True):
         (row,) = [line.split() for line in text.splitlines() if line.startswith(f"{name} ")]
@@ -246,29 +223,25 @@ def test_text_answers_show_units_and_millimetres(capsys: pytest.CaptureFixture[s
 
 
 @pytest.mark.parametrize("command", ["inverse", "singularity"])
-def test_text_answers_have_no_colour_and_no_trailing_spaces(
-    capsys: pytest.CaptureFixture[str], command: str
-) -> None:
-    assert run([command, *POSE]) == 0
-    captured = capsys.readouterr()
-    assert "\x1b" not in captured.out
-    assert all(line == line.rstrip() for line in captured.out.splitlines())
-    assert captured.err == ""
+def test_text_answers_have_no_colour_and_no_trailing_spaces(cli: CommandLine, command: str) -> None:
+    assert cli.text(command, *POSE)
 
 
-def test_forward_text_has_a_row_per_mode(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["forward", "--joints", *map(repr, snapshot().joints.tolist())]) == 0
-    rows = [line.split() for line in capsys.readouterr().out.splitlines()]
+def test_forward_text_has_a_row_per_mode(cli: CommandLine) -> None:
+    rows = [
+        line.split()
+        for line in cli.text(
+            "forward", "--joints", *map(repr, snapshot().joints.tolist())
+        ).splitlines()
+    ]
     assert [row[0] for row in rows[-8:]] == list("01234567")
     assert [float(value) for value in rows[-8 + snapshot().mode][4:7]] == pytest.approx(POSITION)
 
 
-@pytest.mark.parametrize("form", [[], ["--json"]])
 def test_answers_are_free_of_messages_of_libraries(
-    capsys: pytest.CaptureFixture[str],
+    cli: CommandLine,
     monkeypatch: pytest.MonkeyPatch,
     tmp_path: Path,
-    form: list[str],
 ) -> None:
     def chatty(design: object, pose: explorer.Pose, **options: object) -> None:
         print("(a library) did this")
@@ -277,11 +250,7 @@ def test_answers_are_free_of_messages_of_libraries(
 
     out = tmp_path / "shot.png"
     monkeypatch.setattr("explorer.app.screenshot.take", chatty)
-    words = ["--view", "top", "--out", str(out), "--size", "640x480", "--panels"]
-    assert run(["screenshot", *POSE, *words, *form]) == 0
-    captured = capsys.readouterr()
-    assert captured.err == ""
-    if form:
-        assert json.loads(captured.out) == {"file": str(out), "size": [640, 480]}
-    else:
-        assert captured.out == f"{out}\n"
+    words = ["--view", "top", "--out", out, "--size", "640x480", "--panels"]
+    argv = ["screenshot", *POSE, *words]
+    assert cli.text(*argv) == f"{out}\n"
+    assert cli.answer(*argv) == {"file": str(out), "size": [640, 480]}

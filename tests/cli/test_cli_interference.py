@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 import msgspec
 import numpy as np
 import pytest
+from command_line import CommandLine
 
 import explorer
-from explorer.cli import run
 from explorer.legs.clearance import leg_axes
 
+COMMAND = ("interference",)
 OPTIMAL = explorer.PRESETS["paper-optimal"]
 HOME = explorer.home_pose(OPTIMAL)
 POSITION = (8.0, -2.5, 11.0)
@@ -22,35 +22,6 @@ POSE = ["--position", "8", "-2.5", "1.1e1", "--yaw-pitch-roll", "-60", "12.5", "
 END = explorer.Pose.of_yaw_pitch_roll((14.0, -2.0, 6.0), (-20.0, 0.0, 15.0))
 MOVE = ["--to", "14", "-2", "6", "--to-yaw-pitch-roll", "-20", "0", "15"]
 RADII = (0.1, 0.2, 0.6, 0.3)
-
-
-def answer(capsys: pytest.CaptureFixture[str], *argv: str) -> dict[str, Any]:
-    """Return the one JSON object that the command writes, and nothing else."""
-    assert run(["interference", *argv, "--json"]) == 0
-    captured = capsys.readouterr()
-    assert captured.err == ""
-    assert captured.out.count("\n") == 1
-    found: dict[str, Any] = json.loads(captured.out)
-    return found
-
-
-def text(capsys: pytest.CaptureFixture[str], *argv: str) -> str:
-    """Return what the command writes for people."""
-    assert run(["interference", *argv]) == 0
-    captured = capsys.readouterr()
-    assert captured.err == ""
-    assert "\x1b" not in captured.out
-    assert all(line == line.rstrip() for line in captured.out.splitlines())
-    return captured.out
-
-
-def refusal(capsys: pytest.CaptureFixture[str], *argv: str) -> str:
-    """Return the one line on standard error of arguments that are refused with status 2."""
-    assert run(["interference", *argv]) == 2
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    assert captured.err.count("\n") == 1
-    return captured.err
 
 
 def column(found: dict[str, Any], key: str) -> list[Any]:
@@ -73,9 +44,9 @@ def joined(tmp_path: Path) -> str:
 
 
 def test_interference_pose_has_clearances_of_pairs(
-    capsys: pytest.CaptureFixture[str],
+    cli: CommandLine,
 ) -> None:
-    found = answer(capsys, *POSE, "--radii", *map(str, RADII))
+    found = cli.answer(*POSE, "--radii", *map(str, RADII))
     expected = explorer.evaluate(
         with_radii(RADII), explorer.Pose.of_yaw_pitch_roll(POSITION, ANGLES)
     )
@@ -94,37 +65,35 @@ def test_interference_pose_has_clearances_of_pairs(
     assert found["within_limits"] is (not expected.violations)
 
 
-def test_interference_default_is_the_home_pose(capsys: pytest.CaptureFixture[str]) -> None:
+def test_interference_default_is_the_home_pose(cli: CommandLine) -> None:
     legs = explorer.evaluate(OPTIMAL, HOME).clearances
-    assert column(answer(capsys), "clearance") == legs.clearance.tolist()
+    assert column(cli.answer(), "clearance") == legs.clearance.tolist()
 
 
-def test_interference_one_radius_is_for_all_legs(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
-    thick = answer(capsys, "--radii", "0.4")
+def test_interference_one_radius_is_for_all_legs(cli: CommandLine, tmp_path: Path) -> None:
+    thick = cli.answer("--radii", "0.4")
     assert thick["radii"] == [0.4] * 4
     assert thick["is_clear"] is False
     assert thick["closest"] == [2, 3]
     file = tmp_path / "thick.json"
     file.write_bytes(explorer.encode_design(with_radii((0.4, 0.4, 0.4, 0.4))))
-    assert answer(capsys, "--design", str(file)) == thick
-    assert answer(capsys, "--design", str(file), "--radii", "0") == answer(capsys)
+    assert cli.answer("--design", file) == thick
+    assert cli.answer("--design", file, "--radii", "0") == cli.answer()
 
 
-def test_interference_pose_outside_limits_names_them(capsys: pytest.CaptureFixture[str]) -> None:
+def test_interference_pose_outside_limits_names_them(cli: CommandLine) -> None:
     words = ["--position", "30", "5", "9"]
-    found = answer(capsys, *words)
+    found = cli.answer(*words)
     assert found["within_limits"] is False
     assert any("box x" in each for each in found["violations"])
-    shown = text(capsys, *words)
+    shown = cli.text(*words)
     assert "outside the limits" in shown
     assert all(each in shown for each in found["violations"])
-    assert "the pose is within the limits" in text(capsys)
+    assert "the pose is within the limits" in cli.text()
 
 
-def test_interference_move_has_exact_and_swept_tests(capsys: pytest.CaptureFixture[str]) -> None:
-    found = answer(capsys, *MOVE, "--steps", "3", "--radii", *map(str, RADII))
+def test_interference_move_has_exact_and_swept_tests(cli: CommandLine) -> None:
+    found = cli.answer(*MOVE, "--steps", "3", "--radii", *map(str, RADII))
     expected = explorer.move_clearance(with_radii(RADII), HOME, END, steps=3)
     for key in ("clearance", "bound", "share", "points", "overlaps"):
         np.testing.assert_allclose(column(found, key), getattr(expected, key), atol=1e-12)
@@ -137,14 +106,13 @@ def test_interference_move_has_exact_and_swept_tests(capsys: pytest.CaptureFixtu
 
 
 def test_interference_move_clearance_is_that_of_its_pose(
-    capsys: pytest.CaptureFixture[str],
+    cli: CommandLine,
 ) -> None:
     start, end = np.array(HOME.position), np.array(END.position)
-    for index, pair in enumerate(answer(capsys, *MOVE, "--radii", "0.2")["pairs"]):
+    for index, pair in enumerate(cli.answer(*MOVE, "--radii", "0.2")["pairs"]):
         along = start + pair["share"] * (end - start)
         np.testing.assert_allclose(pair["position"], along, atol=1e-12)
-        there = answer(
-            capsys,
+        there = cli.answer(
             *("--position", *map(repr, pair["position"])),
             *("--quaternion", *map(repr, pair["quaternion"])),
             *("--radii", "0.2"),
@@ -156,10 +124,10 @@ def test_interference_move_clearance_is_that_of_its_pose(
 @pytest.mark.parametrize("preset", ["paper-initial", "paper-optimal"])
 @pytest.mark.parametrize("words", [MOVE, MOVE[:4], ["--to-quaternion", "1", "0.5", "-0.2", "0"]])
 def test_interference_default_steps_are_within_the_node_step(
-    capsys: pytest.CaptureFixture[str], preset: str, words: list[str]
+    cli: CommandLine, preset: str, words: list[str]
 ) -> None:
     design = explorer.PRESETS[preset]
-    found = answer(capsys, "--design", preset, *words)
+    found = cli.answer("--design", preset, *words)
     start, end = (
         explorer.Pose(tuple(found[key]["position"]), tuple(found[key]["quaternion"]))
         for key in ("start", "end")
@@ -178,62 +146,60 @@ def test_interference_default_steps_are_within_the_node_step(
 
 
 def test_interference_orientation_only_rotates_in_place(
-    capsys: pytest.CaptureFixture[str],
+    cli: CommandLine,
 ) -> None:
-    by_angles = answer(capsys, "--to-yaw-pitch-roll", "-20", "0", "15")
+    by_angles = cli.answer("--to-yaw-pitch-roll", "-20", "0", "15")
     assert by_angles["start"]["position"] == by_angles["end"]["position"] == list(HOME.position)
     quaternion = map(repr, END.quaternion)
-    by_quaternion = answer(capsys, "--to-quaternion", *quaternion)
+    by_quaternion = cli.answer("--to-quaternion", *quaternion)
     np.testing.assert_allclose(
         column(by_angles, "clearance"), column(by_quaternion, "clearance"), rtol=1e-9
     )
 
 
 def test_interference_position_only_keeps_the_orientation(
-    capsys: pytest.CaptureFixture[str],
+    cli: CommandLine,
 ) -> None:
-    found = answer(capsys, *POSE, "--to", "14", "-2", "6")
+    found = cli.answer(*POSE, "--to", "14", "-2", "6")
     assert found["end"]["quaternion"] == found["start"]["quaternion"]
 
 
 def test_interference_move_outside_limits_names_the_end(
-    capsys: pytest.CaptureFixture[str],
+    cli: CommandLine,
 ) -> None:
-    found = answer(capsys, "--to", "30", "5", "9")
+    found = cli.answer("--to", "30", "5", "9")
     assert found["within_limits"] is found["end"]["within_limits"] is False
     assert found["start"]["within_limits"] is True
     assert any("box x" in each for each in found["end"]["violations"])
-    shown = text(capsys, "--to", "30", "5", "9")
+    shown = cli.text("--to", "30", "5", "9")
     assert "the start is within the limits" in shown
     assert "the end is outside the limits" in shown
 
 
-def test_interference_joined_legs_are_null_and_in_words(
-    capsys: pytest.CaptureFixture[str], joined: str
-) -> None:
+def test_interference_joined_legs_are_null_and_in_words(cli: CommandLine, joined: str) -> None:
     index = explorer.PAIRS.index((2, 4))
-    pair = answer(capsys, "--design", joined)["pairs"][index]
+    pair = cli.answer("--design", joined)["pairs"][index]
     assert pair["distance"] is pair["clearance"] is None
     assert pair["collides"] is False
-    moved = answer(capsys, "--design", joined, *MOVE)["pairs"][index]
+    moved = cli.answer("--design", joined, *MOVE)["pairs"][index]
     assert moved["clearance"] is moved["bound"] is None
     assert moved["overlaps"] is False
     for words in ([], MOVE):
         (row,) = [
             line
-            for line in text(capsys, "--design", joined, *words).splitlines()
+            for line in cli.text("--design", joined, *words).splitlines()
             if line.startswith("2–4")
         ]
         assert "joined" in row
         assert "inf" not in row
 
 
-def test_interference_text_has_a_row_per_pair(capsys: pytest.CaptureFixture[str]) -> None:
+def test_interference_text_has_a_row_per_pair(cli: CommandLine) -> None:
     for words in ([], MOVE):
-        found = answer(capsys, "--radii", "0.4", *words)
+        found = cli.answer("--radii", "0.4", *words)
         rows = [
             line.split()
-            for line in text(capsys, "--radii", "0.4", *words).splitlines()
+            for line in cli.text("--radii", "0.4", *words).splitlines()
             if line[1:2] == "–"
         ]
         assert [row[0] for row in rows] == [f"{i}–{j}" for i, j in explorer.PAIRS]
@@ -247,12 +213,12 @@ def test_interference_text_has_a_row_per_pair(capsys: pytest.CaptureFixture[str]
 
 
 def test_interference_verdict_separates_clear_touching_and_colliding(
-    capsys: pytest.CaptureFixture[str],
+    cli: CommandLine,
 ) -> None:
-    assert "the legs are clear; closest 2–3" in text(capsys)
-    assert "legs collide: 2–3; closest 2–3" in text(capsys, "--radii", "0.4")
+    assert "the legs are clear; closest 2–3" in cli.text()
+    assert "legs collide: 2–3; closest 2–3" in cli.text("--radii", "0.4")
     # With the two lines perpendicular both carriages stand in one place.
-    assert "legs touch: 2–3; closest 2–3" in text(capsys, "--quaternion", "1", "0", "0", "-1")
+    assert "legs touch: 2–3; closest 2–3" in cli.text("--quaternion", "1", "0", "0", "-1")
 
 
 @pytest.mark.parametrize(
@@ -273,12 +239,12 @@ def test_interference_verdict_separates_clear_touching_and_colliding(
     ],
 )
 def test_interference_bad_input_is_refused_with_advice(
-    capsys: pytest.CaptureFixture[str], words: list[str], reason: str
+    cli: CommandLine, words: list[str], reason: str
 ) -> None:
-    assert reason in refusal(capsys, *words)
+    assert reason in cli.refusal(*words)
 
 
 def test_interference_many_steps_are_accepted(
-    capsys: pytest.CaptureFixture[str],
+    cli: CommandLine,
 ) -> None:
-    assert answer(capsys, "--to", "1e9", "2", "3", "--steps", "7")["steps"] == 7
+    assert cli.answer("--to", "1e9", "2", "3", "--steps", "7")["steps"] == 7

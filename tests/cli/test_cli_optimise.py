@@ -10,12 +10,11 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import Any
 
 import pytest
+from command_line import CommandLine
 
 import explorer
-from explorer.cli import run
 from explorer.cli.answers.optimisation import findings_table
 from explorer.measures.case import Case
 from explorer.measures.catalogue import measures_in
@@ -24,35 +23,16 @@ from explorer.numerics.compiled import warm
 from explorer.optimise.findings import Finding
 from explorer.optimise.record import load_record
 
+COMMAND = ("optimise",)
 BOX = ["--box", "0", "-12", "0", "20", "22", "18"]
 PAPER = ["--design", "paper-initial", *BOX, "--target-volume", "8000"]
 CONTRACT = {"design", "objective", "volume", "iterations", "evaluations", "seconds", "converged"}
 IMPOSSIBLE = ["--target-volume", "12000", "--bounds", "a3x=5:22", "a3y=1:12"]
 
 
-def answer(capsys: pytest.CaptureFixture[str], *argv: str, status: int = 0) -> dict[str, Any]:
-    """Return the one JSON object that the command writes on standard output."""
-    assert run(["optimise", *argv, "--json"]) == status
-    captured = capsys.readouterr()
-    assert captured.out.count("\n") == 1
-    found: dict[str, Any] = json.loads(captured.out)
-    return found
-
-
-def refusal(capsys: pytest.CaptureFixture[str], *argv: str) -> str:
-    """Return the one line on standard error of arguments that are refused with status 2."""
-    assert run(["optimise", *argv]) == 2
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    assert captured.err.count("\n") == 1
-    return captured.err
-
-
-def test_optimise_paper_problem_converges(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_optimise_paper_problem_converges(cli: CommandLine, tmp_path: Path) -> None:
     out = tmp_path / "design.json"
-    found = answer(capsys, *PAPER, "--clearance", "0.2", "--out", str(out))
+    found = cli.answer(*PAPER, "--clearance", "0.2", "--out", out)
     assert set(found) >= CONTRACT
     assert found["converged"] is True
     assert found["objective"] <= 1e-9
@@ -61,7 +41,7 @@ def test_optimise_paper_problem_converges(
     assert json.loads(explorer.encode_design(design)) == found["design"]
     assert explorer.workspace_volume(design).volume == found["volume"]
     assert found["volume"] == pytest.approx(8000.0, rel=1e-9)
-    # The box is the one asked for; the orientation and the ties to the reach are the start's.
+    # The box is that of the option; the orientation and the ties to the reach are the start's.
     start = explorer.PRESETS["paper-initial"]
     assert design.limits.box == ((0.0, -12.0, 0.0), (20.0, 22.0, 18.0))
     assert design.home == start.home
@@ -69,34 +49,29 @@ def test_optimise_paper_problem_converges(
     assert found["files"] == [str(out), str(tmp_path / "design.record.json")]
 
 
-def test_optimise_repeat_gives_the_same_outcome(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_optimise_repeat_gives_the_same_outcome(cli: CommandLine, tmp_path: Path) -> None:
     kept = tmp_path / "run.json"
-    first = answer(capsys, *PAPER, "--seed", "3", "--record", str(kept))
+    first = cli.answer(*PAPER, "--seed", "3", "--record", str(kept))
     record = load_record(kept)
     assert record.settings.seed == 3
     assert record.design.variables[0] == first["design"]["a3"][0]
-    again = answer(capsys, "--repeat", str(kept))
+    again = cli.answer("--repeat", str(kept))
     assert {**again, "seconds": 0, "files": []} == {**first, "seconds": 0, "files": []}
 
 
-def test_optimise_text_has_start_beside_optimum(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["optimise", *PAPER]) == 0
-    captured = capsys.readouterr()
-    assert "converged: F = " in captured.out
-    lines = {line.split("  ")[0]: line.split() for line in captured.out.splitlines() if line}
+def test_optimise_text_has_start_beside_optimum(cli: CommandLine) -> None:
+    out, progress = cli.run(*PAPER)
+    assert "converged: F = " in out
+    lines = {line.split("  ")[0]: line.split() for line in out.splitlines() if line}
     assert lines["a3x"][1] == "10.0000"
     assert lines["volume"][1:3] == ["870.697", "8000.00"]
-    assert "start 1 of 1" in captured.err
+    assert "start 1 of 1" in progress
 
 
-def test_optimise_without_convergence_writes_no_design(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_optimise_without_convergence_writes_no_design(cli: CommandLine, tmp_path: Path) -> None:
     out, kept = tmp_path / "design.json", tmp_path / "run.json"
     out.write_text("as it was")
-    found = answer(capsys, *IMPOSSIBLE, "--out", str(out), "--record", str(kept), status=1)
+    found = cli.answer(*IMPOSSIBLE, "--out", out, "--record", str(kept), status=1)
     assert found["converged"] is False
     assert found["status"] == "infeasible"
     assert found["volume"] == pytest.approx(float(found["message"].rsplit(" ", 1)[1]), rel=1e-3)
@@ -107,17 +82,16 @@ def test_optimise_without_convergence_writes_no_design(
     assert out.read_text() == "as it was"
     assert found["files"] == [str(kept)]
     assert load_record(kept).runs[0].status == "infeasible"
-    assert run(["optimise", *IMPOSSIBLE]) == 1
-    captured = capsys.readouterr()
-    last = captured.err.splitlines()[-1]
+    page, complaint = cli.run(*IMPOSSIBLE, status=1)
+    last = complaint.splitlines()[-1]
     assert last.startswith("explorer: no design within the bounds was found with a volume of 12000")
-    assert "best so far" in captured.out
+    assert "best so far" in page
     assert sorted(path.name for path in tmp_path.iterdir()) == ["design.json", "run.json"]
 
 
 @pytest.mark.parametrize("json_too", [False, True])
 def test_optimise_volume_beyond_the_box_is_refused_at_once(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, json_too: bool
+    cli: CommandLine, monkeypatch: pytest.MonkeyPatch, json_too: bool
 ) -> None:
     def never(*_: object, **__: object) -> None:
         pytest.fail("it searches, or compiles for a search")
@@ -130,53 +104,42 @@ def test_optimise_volume_beyond_the_box_is_refused_at_once(
     )
     argv = ["--design", "paper-initial", "--target-volume", "8000", "--clearance", "0.2"]
     if json_too:
-        found = answer(capsys, *argv, status=1)
+        found = cli.answer(*argv, status=1)
         assert set(found) >= CONTRACT
-        assert (found["converged"], found["status"], found["holding"]) == (
-            False,
-            "infeasible",
-            "box",
-        )
+        assert found["converged"] is False
+        assert (found["status"], found["holding"]) == ("infeasible", "box")
         assert (found["message"], found["iterations"], found["volume"]) == (words, 0, None)
     else:
-        assert run(["optimise", *argv]) == 1
-        assert capsys.readouterr() == ("", f"explorer: {words}\n")
+        assert cli.refusal(*argv, status=1) == f"explorer: {words}"
     huge = ["--design", "paper-initial", "--target-volume", "20000"]
-    assert run(["optimise", *huge]) == 1
-    assert capsys.readouterr().err.endswith("asked for: lift the box with --box none\n")
+    assert cli.refusal(*huge, status=1).endswith("asked for: lift the box with --box none")
 
 
-def test_optimise_box_none_lifts_the_box(capsys: pytest.CaptureFixture[str]) -> None:
+def test_optimise_box_none_lifts_the_box(cli: CommandLine) -> None:
     argv = ["--design", "paper-initial", "--target-volume", "8000", "--clearance", "0.2"]
-    found = answer(capsys, *argv, "--box", "none")
+    found = cli.answer(*argv, "--box", "none")
     assert found["converged"] is True
     assert found["objective"] <= 1e-9
     assert found["design"]["limits"]["box"] is None
-    assert "none lifts that of the design" in " ".join(help_of(capsys).split())
+    assert "none lifts that of the design" in " ".join(cli.text("--help").split())
 
 
-def help_of(capsys: pytest.CaptureFixture[str]) -> str:
-    assert run(["optimise", "--help"]) == 0
-    return capsys.readouterr().out
-
-
-def test_optimise_other_objectives_and_variables(capsys: pytest.CaptureFixture[str]) -> None:
+def test_optimise_other_objectives_and_variables(cli: CommandLine) -> None:
     required = ["--required-box", "8", "4", "6", "12", "8", "10"]
-    margin = answer(
-        capsys, "--objective", "largest-margin", *required, "--free", "yaw", "--least", "0.5"
+    margin = cli.answer(
+        "--objective", "largest-margin", *required, "--free", "yaw", "--least", "0.5"
     )
     assert margin["objective"] == pytest.approx(6.0, abs=1e-6)
     assert set(margin["values"]) == {"a3x", "a3y", "b1x", "b1y", "b2", "b3", "yaw"}
-    smallest = answer(
-        capsys,
+    smallest = cli.answer(
         *("--objective", "smallest-reach", "--starts", "2", "--least", "1"),
         *("--bounds", "b1x=-10:10", "b1y=-10:10", "b2=-10:10", "b3=-10:10", "a3y=1:40"),
     )
     assert smallest["objective"] == smallest["reach"] <= 17.90
     assert len(smallest["runs"]) == 2
-    largest = answer(capsys, "--objective", "largest-volume", "--target-reach", "15")
+    largest = cli.answer("--objective", "largest-volume", "--target-reach", "15")
     assert largest["reach"] <= 15.0 + 1e-6
-    stroke = answer(capsys, "--target-volume", "5000", "--stroke-ratio", "2")
+    stroke = cli.answer("--target-volume", "5000", "--stroke-ratio", "2")
     low, high = stroke["design"]["limits"]["l1"]
     assert (low, high) == (pytest.approx(stroke["reach"] / 2.0), None)
 
@@ -204,17 +167,15 @@ def test_optimise_other_objectives_and_variables(capsys: pytest.CaptureFixture[s
         (["--objective", "largest"], "--objective"),
     ],
 )
-def test_optimise_bad_input_is_one_line(
-    capsys: pytest.CaptureFixture[str], argv: list[str], words: str
-) -> None:
-    assert words in refusal(capsys, *argv)
+def test_optimise_bad_input_is_one_line(cli: CommandLine, argv: list[str], words: str) -> None:
+    assert words in cli.refusal(*argv)
 
 
 def test_optimise_interrupt_leaves_files_unchanged(tmp_path: Path) -> None:
     warm()
     out = tmp_path / "design.json"
     out.write_text("as it was")
-    argv = ["--objective", "smallest-reach", "--starts", "5000", "--out", str(out)]
+    argv = ["--objective", "smallest-reach", "--starts", "5000", "--out", out]
     process = subprocess.Popen(
         [sys.executable, "-m", "explorer", "optimise", *argv],
         stdout=subprocess.PIPE,

@@ -3,35 +3,24 @@
 from __future__ import annotations
 
 import csv
-import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
+from command_line import CommandLine
 
 import explorer
-from explorer.cli import run
 from explorer.mechanism.pose import rotation_from_yaw_pitch_roll
 
+COMMAND = ("path",)
 PRESET = explorer.PRESETS["paper-optimal"]
 HOME = explorer.home_pose(PRESET)
 
 
-def answer(capsys: pytest.CaptureFixture[str], *argv: str, status: int = 0) -> dict[str, Any]:
-    assert run(["path", *argv, "--json"]) == status
-    captured = capsys.readouterr()
-    assert captured.out.count("\n") == 1
-    assert bool(captured.err) == bool(status)
-    return json.loads(captured.out)
-
-
-def test_path_json_has_poses_and_trajectory(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_path_json_has_poses_and_trajectory(cli: CommandLine, tmp_path: Path) -> None:
     file = tmp_path / "path.csv"
     words = ["--to", "12", "8", "7", "--radii", "0.2", "--samples", "21", "--speed", "2"]
-    found = answer(capsys, *words, "--out", str(file))
+    found = cli.answer(*words, "--out", file)
     assert found["found"] is True
     assert found["reason"] is None
     assert found["poses"][0]["position"] == list(HOME.position)
@@ -61,8 +50,8 @@ def test_path_json_has_poses_and_trajectory(
         ],
     ],
 )
-def test_path_forms_of_a_pose_agree(capsys: pytest.CaptureFixture[str], words: list[str]) -> None:
-    found = answer(capsys, *words)
+def test_path_forms_of_a_pose_agree(cli: CommandLine, words: list[str]) -> None:
+    found = cli.answer(*words)
     rotation = rotation_from_yaw_pitch_roll((-70.0, 5.0, 3.0))
     for end, place in ((0, [9.0, 6.0, 8.0]), (-1, [10.0, 6.0, 8.0])):
         assert found["poses"][end]["position"] == place
@@ -73,28 +62,26 @@ def test_path_forms_of_a_pose_agree(capsys: pytest.CaptureFixture[str], words: l
         )
 
 
-def test_path_quaternion_after_position_is_used(capsys: pytest.CaptureFixture[str]) -> None:
+def test_path_quaternion_after_position_is_used(cli: CommandLine) -> None:
     words = [*map(repr, HOME.quaternion)]
-    found = answer(capsys, "--to", "11", "6", "8", *words)
+    found = cli.answer("--to", "11", "6", "8", *words)
     assert found["poses"][-1] == {"position": [11.0, 6.0, 8.0], "quaternion": list(HOME.quaternion)}
 
 
 def test_path_without_solution_has_status_1_and_reason(
-    capsys: pytest.CaptureFixture[str],
+    cli: CommandLine,
 ) -> None:
-    found = answer(capsys, "--to", "12", "8", "-7", status=1)
+    found = cli.answer("--to", "12", "8", "-7", status=1)
     assert found == {"found": False, "reason": "other mode", "poses": []}
-    assert run(["path", "--to", "12", "8", "-7"]) == 1
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    assert "mode 1 (− − +)" in captured.err
+    refused = cli.refusal("--to", "12", "8", "-7", status=1)
+    assert "mode 1 (− − +)" in refused
 
 
 @pytest.mark.parametrize(("height", "reason"), [("30", "outside limits"), ("0", "singular")])
 def test_path_invalid_end_has_status_2_and_reason(
-    capsys: pytest.CaptureFixture[str], height: str, reason: str
+    cli: CommandLine, height: str, reason: str
 ) -> None:
-    found = answer(capsys, "--to", "12", "8", height, status=2)
+    found = cli.answer("--to", "12", "8", height, status=2)
     assert found == {"found": False, "reason": reason, "poses": []}
 
 
@@ -114,20 +101,16 @@ def test_path_invalid_end_has_status_2_and_reason(
     ],
 )
 def test_path_bad_input_is_one_line_and_status_2(
-    capsys: pytest.CaptureFixture[str], words: list[str], message: str
+    cli: CommandLine, words: list[str], message: str
 ) -> None:
-    assert run(["path", *words]) == 2
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    assert captured.err.count("\n") == 1
-    assert message in captured.err
+    refused = cli.refusal(*words)
+    assert message in refused
 
 
 def test_path_text_has_ends_length_and_margins(
-    capsys: pytest.CaptureFixture[str],
+    cli: CommandLine,
 ) -> None:
-    assert run(["path", "--to", "12", "8", "7"]) == 0
-    text = capsys.readouterr().out
+    text = cli.text("--to", "12", "8", "7")
     assert "moves       1, each proved to keep limits and clearances" in text
     assert "least |δ|" in text
     assert all(line == line.rstrip() for line in text.splitlines())

@@ -11,9 +11,10 @@ import sys
 from pathlib import Path
 
 import pytest
+from command_line import CommandLine
 
 import explorer
-from explorer.cli import COMMANDS, run
+from explorer.cli import COMMANDS, main, run
 from explorer.cli.parsing import load_command
 
 PROGRAM = [sys.executable, "-m", "explorer"]
@@ -36,17 +37,20 @@ def test_process_answer_is_one_json_object_and_status_0() -> None:
     assert set(json.loads(done.stdout)) == {"joints", "within_limits", "violations"}
 
 
-def test_process_no_answer_is_status_1_and_one_line() -> None:
-    done = process("forward", "--joints", "1", "1", "1", "1", "1", "1", "--json")
-    assert done.returncode == 1
-    assert json.loads(done.stdout)["feasible"] is False
-    assert done.stderr.count("\n") == 1
-
-
-def test_process_bad_input_is_status_2_and_one_line() -> None:
-    done = process("forward", "--joints", "1", "2", "x")
-    assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr.count("\n") == 1
+@pytest.mark.parametrize(("words", "status"), [(["1"] * 6, 1), (["1", "2", "x"], 2)])
+def test_main_without_answer_exits_with_status_and_one_line(
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    words: list[str],
+    status: int,
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["explorer", "forward", "--joints", *words])
+    with pytest.raises(SystemExit) as leave:
+        main()
+    assert leave.value.code == status
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.count("\n") == 1
 
 
 def test_installed_script_runs_the_module() -> None:
@@ -58,30 +62,23 @@ def test_installed_script_runs_the_module() -> None:
 
 
 @pytest.mark.parametrize("flag", ["--help", "-h"])
-def test_help_lists_every_command(capsys: pytest.CaptureFixture[str], flag: str) -> None:
-    assert run([flag]) == 0
-    listed = capsys.readouterr().out
+def test_help_lists_every_command(cli: CommandLine, flag: str) -> None:
+    listed = cli.text(flag)
     for name, summary in COMMANDS.items():
         assert f"{name} " in listed
         assert summary in listed
 
 
 @pytest.mark.parametrize("name", COMMANDS)
-def test_help_of_a_command_describes_every_option(
-    capsys: pytest.CaptureFixture[str], name: str
-) -> None:
-    assert run([name, "--help"]) == 0
-    captured = capsys.readouterr()
-    assert captured.err == ""
-    assert captured.out.startswith(f"usage: explorer {name} ")
-    assert COMMANDS[name] in captured.out
+def test_help_of_a_command_describes_every_option(cli: CommandLine, name: str) -> None:
+    page = cli.text(name, "--help")
+    assert page.startswith(f"usage: explorer {name} ")
+    assert COMMANDS[name] in page
     for field in dataclasses.fields(load_command(name, COMMANDS)):
         option = f"--{field.name.replace('_', '-')}"
-        is_placed = (
-            field.default is dataclasses.MISSING or f"[{field.name.upper()}]" in captured.out
-        )
-        has_place = is_placed and "positional" in captured.out
-        assert option in captured.out or has_place
+        is_placed = field.default is dataclasses.MISSING or f"[{field.name.upper()}]" in page
+        has_place = is_placed and "positional" in page
+        assert option in page or has_place
 
 
 @pytest.mark.parametrize("name", COMMANDS)
@@ -91,54 +88,49 @@ def test_summary_of_a_command_is_its_first_line(name: str) -> None:
     assert doc.splitlines()[0] == COMMANDS[name]
 
 
-def test_version_is_that_of_the_package(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["--version"]) == 0
-    assert capsys.readouterr().out == f"explorer {explorer.__version__}\n"
+def test_version_is_that_of_the_package(cli: CommandLine) -> None:
+    assert cli.text("--version") == f"explorer {explorer.__version__}\n"
 
 
-@pytest.mark.parametrize("argv", [["inverse"], ["forward", "--joints", *"123456"], ["--help"]])
-def test_small_commands_import_no_slow_library(argv: list[str]) -> None:
+def test_small_commands_import_no_slow_library() -> None:
     code = (
-        "import sys; from explorer.cli import run; run(sys.argv[1:]); "
+        "import sys; from explorer.cli import run; "
+        "run(['inverse']); run(['forward', '--joints', *'123456']); run(['--help']); "
         "large = {'viser', 'numba', 'trimesh', 'manifold3d', 'playwright', 'scipy.optimize'}; "
         "sys.stderr.write(repr(sorted(large & set(sys.modules))))"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code, *argv], capture_output=True, text=True, check=True
-    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stderr.endswith("[]")
+
+
+def raise_in_command(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> None:
+    """Make each command that loads a design raise an error."""
+
+    def load(name: str) -> object:
+        raise error
+
+    monkeypatch.setattr("explorer.cli.options.load_design", load)
 
 
 def test_interrupt_is_silent_with_status_130(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def interrupted(name: str) -> object:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("explorer.cli.options.load_design", interrupted)
+    raise_in_command(monkeypatch, KeyboardInterrupt())
     assert run(["inverse"]) == 130
-    captured = capsys.readouterr()
-    assert (captured.out, captured.err) == ("", "")
+    assert capsys.readouterr() == ("", "")
 
 
 def test_internal_error_is_one_line_with_status_70(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    cli: CommandLine, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def faulty(name: str) -> object:
-        raise ZeroDivisionError("a\nb")
-
-    monkeypatch.setattr("explorer.cli.options.load_design", faulty)
+    raise_in_command(monkeypatch, ZeroDivisionError("a\nb"))
     monkeypatch.delenv("EXPLORER_DEBUG", raising=False)
-    assert run(["inverse", "--json"]) == 70
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    assert captured.err.count("\n") == 1
-    assert "ZeroDivisionError" in captured.err
-    assert "report" in captured.err
-
+    refused = cli.refusal("inverse", "--json", status=70)
+    assert "ZeroDivisionError" in refused
+    assert "report" in refused
     monkeypatch.setenv("EXPLORER_DEBUG", "1")
     assert run(["inverse", "--json"]) == 70
-    assert "Traceback" in capsys.readouterr().err
+    assert "Traceback" in cli.capsys.readouterr().err
 
 
 @pytest.mark.skipif(os.name != "posix", reason="pipes of POSIX")

@@ -2,32 +2,20 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import pytest
+from command_line import CommandLine
 
-from explorer.cli import COMMANDS, run
+from explorer.cli import COMMANDS
 from explorer.cli.parsing import condense
 
 SIX = ["1", "2", "3", "4", "5", "6"]
 
 
-def refusal(capsys: pytest.CaptureFixture[str], *argv: str) -> str:
-    """Return the one line on standard error of arguments that are refused with status 2."""
-    assert run(argv) == 2
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    assert captured.err.endswith("\n")
-    assert captured.err.count("\n") == 1
-    assert "Traceback" not in captured.err
-    assert not re.search("[│╭╰─]|--- ", captured.err)
-    return captured.err.strip()
-
-
 @pytest.mark.parametrize("count", [0, 1, 5, 7])
-def test_joints_wrong_count_names_the_order(capsys: pytest.CaptureFixture[str], count: int) -> None:
-    message = refusal(capsys, "forward", "--joints", *(["2"] * count))
+def test_joints_wrong_count_names_the_order(cli: CommandLine, count: int) -> None:
+    message = cli.refusal("forward", "--joints", *(["2"] * count))
     assert "six numbers in the order l1 d1 d2 d3 d4 l4" in message
     assert f"got {count}" in message
 
@@ -41,80 +29,79 @@ def test_joints_wrong_count_names_the_order(capsys: pytest.CaptureFixture[str], 
     ],
 )
 def test_pose_wrong_count_names_the_order(
-    capsys: pytest.CaptureFixture[str], option: str, words: list[str], order: str
+    cli: CommandLine, option: str, words: list[str], order: str
 ) -> None:
-    assert f"{option} needs {order}; got {len(words)}" in refusal(capsys, "inverse", option, *words)
+    assert f"{option} needs {order}; got {len(words)}" in cli.refusal("inverse", option, *words)
 
 
 @pytest.mark.parametrize("word", ["nan", "inf", "-inf", "1e999"])
-def test_numbers_not_finite_are_refused(capsys: pytest.CaptureFixture[str], word: str) -> None:
-    assert "y must be a finite number" in refusal(capsys, "inverse", "--position", "1", word, "2")
+def test_numbers_not_finite_are_refused(cli: CommandLine, word: str) -> None:
+    assert "y must be a finite number" in cli.refusal("inverse", "--position", "1", word, "2")
     joints = [*SIX[:3], word, *SIX[4:]]
-    assert "d3 must be a finite number" in refusal(capsys, "forward", "--joints", *joints)
+    assert "d3 must be a finite number" in cli.refusal("forward", "--joints", *joints)
 
 
-def test_numbers_too_large_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    assert "±1e+30" in refusal(capsys, "singularity", "--position", "1e200", "1", "1")
+def test_numbers_too_large_are_refused(cli: CommandLine) -> None:
+    assert "±1e+30" in cli.refusal("singularity", "--position", "1e200", "1", "1")
 
 
 @pytest.mark.parametrize("word", ["x", "1,2,3", "--5", "1e", "0x10", ""])
-def test_numbers_other_words_are_quoted(capsys: pytest.CaptureFixture[str], word: str) -> None:
-    assert word in refusal(capsys, "inverse", "--position", "1", "2", word)
+def test_numbers_other_words_are_quoted(cli: CommandLine, word: str) -> None:
+    assert word in cli.refusal("inverse", "--position", "1", "2", word)
 
 
-def test_numbers_negative_and_scientific_are_values(capsys: pytest.CaptureFixture[str]) -> None:
+def test_numbers_negative_and_scientific_are_values(cli: CommandLine) -> None:
     words = ["-1", "-2.5e-3", "+.5E1"]
-    assert run(["inverse", "--position", *words, "--yaw-pitch-roll", "-1e2", "-.5", "-0"]) == 0
-    assert capsys.readouterr().err == ""
+    assert cli.text("inverse", "--position", *words, "--yaw-pitch-roll", "-1e2", "-.5", "-0")
 
 
-def test_joints_negative_lengths_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    message = refusal(capsys, "forward", "--joints", "-1", *SIX[1:])
+def test_joints_negative_lengths_are_refused(cli: CommandLine) -> None:
+    message = cli.refusal("forward", "--joints", "-1", *SIX[1:])
     assert message.startswith("explorer: l1 ")
     assert "negative" in message
 
 
-def test_quaternion_of_zeros_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    assert "quaternion" in refusal(capsys, "inverse", "--quaternion", "0", "0", "0", "0")
+def test_quaternion_of_zeros_is_refused(cli: CommandLine) -> None:
+    assert "quaternion" in cli.refusal("inverse", "--quaternion", "0", "0", "0", "0")
 
 
-def test_pose_two_orientations_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
+def test_pose_two_orientations_are_refused(cli: CommandLine) -> None:
     options = ["--quaternion", "1", "0", "0", "0", "--yaw-pitch-roll", "1", "2", "3"]
     for command in ("inverse", "singularity", "screenshot"):
-        message = refusal(capsys, command, *options)
+        message = cli.refusal(command, *options)
         assert "--quaternion" in message
         assert "--yaw-pitch-roll" in message
 
 
-def test_missing_option_is_named(capsys: pytest.CaptureFixture[str]) -> None:
-    assert refusal(capsys, "forward").startswith("explorer forward: missing --joints; see ")
+def test_missing_option_is_named(cli: CommandLine) -> None:
+    assert cli.refusal("forward").startswith("explorer forward: missing --joints; see ")
 
 
-def test_option_without_value_is_named(capsys: pytest.CaptureFixture[str]) -> None:
-    assert "--design needs a value" in refusal(capsys, "inverse", "--design")
+def test_option_without_value_is_named(cli: CommandLine) -> None:
+    assert "--design needs a value" in cli.refusal("inverse", "--design")
 
 
-def test_misspelt_option_gets_a_suggestion(capsys: pytest.CaptureFixture[str]) -> None:
-    message = refusal(capsys, "forward", "--joint", *SIX)
+def test_misspelt_option_gets_a_suggestion(cli: CommandLine) -> None:
+    message = cli.refusal("forward", "--joint", *SIX)
     assert message == (
         "explorer forward: no option --joint (did you mean --joints?); see explorer forward --help"
     )
 
 
-def test_misspelt_command_gets_a_suggestion(capsys: pytest.CaptureFixture[str]) -> None:
-    assert "did you mean forward?" in refusal(capsys, "foward")
+def test_misspelt_command_gets_a_suggestion(cli: CommandLine) -> None:
+    assert "did you mean forward?" in cli.refusal("foward")
     for command in COMMANDS:
-        assert command in refusal(capsys, "xyzzy")
+        assert command in cli.refusal("xyzzy")
 
 
 @pytest.mark.parametrize("stray", ["stray", "-x", "a" * 200])
-def test_stray_argument_is_quoted(capsys: pytest.CaptureFixture[str], stray: str) -> None:
-    assert repr(stray) in refusal(capsys, "inverse", "--json", stray)
+def test_stray_argument_is_quoted(cli: CommandLine, stray: str) -> None:
+    assert repr(stray) in cli.refusal("inverse", "--json", stray)
 
 
-def test_unknown_preset_lists_the_presets(capsys: pytest.CaptureFixture[str]) -> None:
+def test_unknown_preset_lists_the_presets(cli: CommandLine) -> None:
     for command in ("inverse", "singularity", "screenshot", "serve"):
-        message = refusal(capsys, command, "--design", "no-such")
+        message = cli.refusal(command, "--design", "no-such")
         assert "paper-initial, paper-optimal" in message
 
 
@@ -131,44 +118,42 @@ def test_unknown_preset_lists_the_presets(capsys: pytest.CaptureFixture[str]) ->
     ],
 )
 def test_invalid_design_file_gives_reason(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, text: str, word: str
+    cli: CommandLine, tmp_path: Path, text: str, word: str
 ) -> None:
     file = tmp_path / "design.json"
     file.write_text(text)
-    assert word in refusal(capsys, "inverse", "--design", str(file))
+    assert word in cli.refusal("inverse", "--design", file)
 
 
-def test_design_folder_is_refused(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    assert "directory" in refusal(capsys, "inverse", "--design", str(tmp_path)).lower()
+def test_design_folder_is_refused(cli: CommandLine, tmp_path: Path) -> None:
+    assert "directory" in cli.refusal("inverse", "--design", str(tmp_path)).lower()
 
 
 @pytest.mark.parametrize("port", ["-1", "65536", "http", "80.5", ""])
-def test_port_outside_range_is_refused(capsys: pytest.CaptureFixture[str], port: str) -> None:
-    message = refusal(capsys, "serve", "--port", port)
+def test_port_outside_range_is_refused(cli: CommandLine, port: str) -> None:
+    message = cli.refusal("serve", "--port", port)
     assert message.startswith("explorer serve: --port must ")
 
 
-def test_no_command_is_serve(capsys: pytest.CaptureFixture[str]) -> None:
-    assert refusal(capsys, "--port", "x").startswith("explorer serve: --port")
-    assert "no-such" in refusal(capsys, "--design", "no-such")
+def test_no_command_is_serve(cli: CommandLine) -> None:
+    assert cli.refusal("--port", "x").startswith("explorer serve: --port")
+    assert "no-such" in cli.refusal("--design", "no-such")
 
 
 @pytest.mark.parametrize("size", ["1280", "1280*800", "63x800", "800x8193", "-1x5", "1e3x800"])
-def test_size_outside_range_is_refused(capsys: pytest.CaptureFixture[str], size: str) -> None:
-    assert "--size" in refusal(capsys, "screenshot", "--size", size)
+def test_size_outside_range_is_refused(cli: CommandLine, size: str) -> None:
+    assert "--size" in cli.refusal("screenshot", "--size", size)
 
 
-def test_unknown_view_lists_the_views(capsys: pytest.CaptureFixture[str]) -> None:
-    message = refusal(capsys, "screenshot", "--view", "below")
+def test_unknown_view_lists_the_views(cli: CommandLine) -> None:
+    message = cli.refusal("screenshot", "--view", "below")
     for view in ("isometric", "front", "side", "top"):
         assert view in message
 
 
-def test_screenshot_unwritable_file_is_refused_first(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_screenshot_unwritable_file_is_refused_first(cli: CommandLine, tmp_path: Path) -> None:
     def out(path: str) -> str:
-        return refusal(capsys, "screenshot", "--out", path)
+        return cli.refusal("screenshot", "--out", path)
 
     assert "must end in .png" in out(str(tmp_path / "shot.jpg"))
     assert "must end in .png" in out("shot")
@@ -180,8 +165,8 @@ def test_screenshot_unwritable_file_is_refused_first(
 
 
 @pytest.mark.skipif(not Path("/proc/self").is_dir(), reason="needs a folder that takes no file")
-def test_screenshot_unwritable_folder_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    assert "cannot write" in refusal(capsys, "screenshot", "--out", "/proc/self/shot.png")
+def test_screenshot_unwritable_folder_is_refused(cli: CommandLine) -> None:
+    assert "cannot write" in cli.refusal("screenshot", "--out", "/proc/self/shot.png")
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 import shlex
 import sys
@@ -10,23 +9,21 @@ from pathlib import Path
 
 import msgspec
 import pytest
+from command_line import CommandLine
 from report_page import read, table_of
 
 import explorer
-from explorer.cli import run
 from explorer.mechanism.design_file import encode_design
 from explorer.optimise.findings import paper_problem
 from explorer.optimise.record import Record, RunRecord, Settings, Step, encode_record
 
+COMMAND = ("report",)
 OPTIMAL = explorer.PRESETS["paper-optimal"]
 
 
-def test_report_json_is_one_object(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_report_json_is_one_object(cli: CommandLine, tmp_path: Path) -> None:
     out = tmp_path / "report.HTM"
-    assert run(["report", "--out", str(out), "--json"]) == 0
-    captured = capsys.readouterr()
-    assert captured.err == ""
-    answer = json.loads(captured.out)
+    answer = cli.answer("--out", out)
     assert answer.pop("seconds") > 0.0
     assert answer == {"out": str(out), "format": "html", "bytes": out.stat().st_size}
     assert [each.name for each in tmp_path.iterdir()] == [out.name]
@@ -34,36 +31,34 @@ def test_report_json_is_one_object(capsys: pytest.CaptureFixture[str], tmp_path:
 
 
 def test_report_commands_reproduce_its_figures(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    cli: CommandLine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     design = msgspec.structs.replace(OPTIMAL, name="my; rm -rf $(own) 'design'", unit_mm=25.0)
     Path("mine.json").write_bytes(encode_design(design))
     turned = ["--position", "9", "4.5", "8", "--yaw-pitch-roll", "-70", "3", "2"]
-    assert run(["report", "--design", "mine.json", "--out", "first.html", *turned]) == 0
+    cli.text("--design", "mine.json", "--out", "first.html", *turned)
     page = read(Path("first.html").read_text(encoding="utf-8"))
     Path("design.json").write_bytes(page.one(id="design").text.encode())
-    capsys.readouterr()
     lines = page.one(id="commands").text.splitlines()
     assert len(lines) == 5
-    told: dict[str, dict[str, object]] = {}
+    answers: dict[str, dict[str, object]] = {}
     for line in lines:
         program, *argv = shlex.split(line)
         assert program == "explorer"
-        assert run([*argv, "--json"]) == 0
-        told[argv[0]] = json.loads(capsys.readouterr().out)
+        answers[argv[0]] = CommandLine(cli.capsys).answer(*argv)
     undated = [
         re.sub(r"<time.*?</time>", "", Path(name).read_text(encoding="utf-8"))
         for name in ("first.html", "report.html")
     ]
     assert undated[0] == undated[1]
     volume = table_of(page, "Volumes")["exact volume"].values[0]
-    assert told["workspace"]["volume"] == volume
+    assert answers["workspace"]["volume"] == volume
     condition = table_of(page, "Measures")["inverse condition number, with the reach"].values
-    assert [told["singularity"]["inverse_condition"]] == condition
+    assert [answers["singularity"]["inverse_condition"]] == condition
 
 
-def test_report_record_adds_its_history(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_report_record_adds_its_history(cli: CommandLine, tmp_path: Path) -> None:
     problem = paper_problem()
     step = Step(
         number=0,
@@ -97,8 +92,7 @@ def test_report_record_adds_its_history(capsys: pytest.CaptureFixture[str], tmp_
     )
     file, out = tmp_path / "run.record.json", tmp_path / "report.html"
     file.write_bytes(encode_record(record))
-    assert run(["report", "--out", str(out), "--record", str(file)]) == 0
-    assert capsys.readouterr().out == f"{out}\n"
+    assert cli.text("--out", out, "--record", file) == f"{out}\n"
     heads = [each.text for each in read(out.read_text(encoding="utf-8")).all("h2")]
     assert "Optimisation" in heads
 
@@ -117,46 +111,36 @@ def test_report_record_adds_its_history(capsys: pytest.CaptureFixture[str], tmp_
     ],
 )
 def test_report_bad_input_is_one_line(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, name: str, options: list[str], words: str
+    cli: CommandLine, tmp_path: Path, name: str, options: list[str], words: str
 ) -> None:
-    assert run(["report", "--out", str(tmp_path / name), *options]) == 2
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    assert captured.err.count("\n") == 1
-    assert words in captured.err
+    refused = cli.refusal("--out", str(tmp_path / name), *options)
+    assert words in refused
     assert list(tmp_path.iterdir()) == []
 
 
-def test_report_degenerate_design_is_refused(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_report_degenerate_design_is_refused(cli: CommandLine, tmp_path: Path) -> None:
     flat = tmp_path / "flat.json"
     text = encode_design(OPTIMAL).decode().replace("7.0062", "0.0")
     flat.write_text(text, encoding="utf-8")
-    assert run(["report", "--design", str(flat), "--out", str(tmp_path / "r.html")]) == 2
-    assert "degenerate design: a3y = 0" in capsys.readouterr().err
+    assert "degenerate design: a3y = 0" in cli.refusal(
+        "--design", flat, "--out", str(tmp_path / "r.html")
+    )
     assert [each.name for each in tmp_path.iterdir()] == ["flat.json"]
 
 
-def test_report_empty_workspace_is_written(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_report_empty_workspace_is_written(cli: CommandLine, tmp_path: Path) -> None:
     out = tmp_path / "report.html"
-    assert run(["report", "--out", str(out), "--yaw-pitch-roll", "0", "0", "0"]) == 0
-    assert capsys.readouterr().err == ""
+    assert cli.text("--out", out, "--yaw-pitch-roll", "0", "0", "0") == f"{out}\n"
     assert "The workspace is empty" in out.read_text(encoding="utf-8")
 
 
 def test_report_without_browser_refuses_pdf_only(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    cli: CommandLine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "playwright.sync_api", None)
     out = tmp_path / "report.pdf"
     out.write_bytes(b"old")
-    assert run(["report", "--out", str(out)]) == 2
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    assert captured.err.count("\n") == 1
-    assert 'pip install "flagged-explorer[screenshot]"' in captured.err
+    refused = cli.refusal("--out", out)
+    assert 'pip install "flagged-explorer[screenshot]"' in refused
     assert out.read_bytes() == b"old"
-    assert run(["report", "--out", str(tmp_path / "report.html")]) == 0
+    assert cli.text("--out", tmp_path / "report.html")

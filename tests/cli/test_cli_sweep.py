@@ -14,15 +14,16 @@ from typing import Any
 
 import msgspec
 import pytest
+from command_line import CommandLine
 
 import explorer
 from explorer.app.storage.library import Library
-from explorer.cli import run
 from explorer.sweep import cluster
 from explorer.sweep.parts import part_paths
 from explorer.sweep.results import load_results
 from explorer.sweep.study import Objective, Sampling, Study, decode_study, encode_study
 
+COMMAND = ("sweep",)
 STUDY = Study(
     name="small",
     design="paper-initial",
@@ -45,39 +46,20 @@ def file(tmp_path: Path) -> Path:
     return path
 
 
-def answer(capsys: pytest.CaptureFixture[str], *argv: object) -> dict[str, Any]:
-    """Return the one JSON object that the command writes on standard output."""
-    assert run(["sweep", *map(str, argv), "--json"]) == 0
-    captured = capsys.readouterr()
-    assert captured.out.count("\n") == 1
-    found: dict[str, Any] = json.loads(captured.out)
-    return found
-
-
-def refusal(capsys: pytest.CaptureFixture[str], *argv: object) -> str:
-    """Return the one line on standard error of arguments that are refused with status 2."""
-    assert run(["sweep", *map(str, argv)]) == 2
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    assert captured.err.count("\n") == 1
-    assert "Traceback" not in captured.err
-    return captured.err
-
-
 def test_sweep_study_continues_and_is_summarised(
-    capsys: pytest.CaptureFixture[str], file: Path, tmp_path: Path
+    cli: CommandLine, file: Path, tmp_path: Path
 ) -> None:
     out = tmp_path / "results"
-    begun = answer(capsys, file, "--out", out, "--workers", 1, "--limit", 7)
-    assert begun["done"] == begun["computed"] == 8
-    assert begun["complete"] is False
-    rest = answer(capsys, file, "--out", out, "--workers", 1)
+    first = cli.answer(file, "--out", out, "--workers", 1, "--limit", 7)
+    assert first["done"] == first["computed"] == 8
+    assert first["complete"] is False
+    rest = cli.answer(file, "--out", out, "--workers", 1)
     assert (rest["done"], rest["computed"], rest["total"]) == (20, 12, 20)
     # b1y = 0 is degenerate.
     assert rest["counts"] == {"done": 16, "invalid design": 4}
-    assert answer(capsys, file, "--out", out)["computed"] == 0
+    assert cli.answer(file, "--out", out)["computed"] == 0
 
-    summary = answer(capsys, "--out", out, "--summary")
+    summary = cli.answer("--out", out, "--summary")
     assert summary["complete"] is True
     assert summary["counts"] == rest["counts"]
     assert summary["objectives"] == [
@@ -86,31 +68,27 @@ def test_sweep_study_continues_and_is_summarised(
     ]
     results = load_results(out)
     assert {row["index"] for row in summary["front"]} == {*results.front().nonzero()[0].tolist()}
-    assert run(["sweep", "--out", str(out), "--summary"]) == 0
-    page = capsys.readouterr().out
+    page = cli.text("--out", out, "--summary")
     assert "small: 20 of 20 designs" in page
     assert "invalid design: 4" in page
     assert f"Pareto front (volume max, reach min): {len(summary['front'])} designs" in page
 
 
 def test_sweep_summary_names_damaged_parts_and_strays(
-    capsys: pytest.CaptureFixture[str], file: Path, tmp_path: Path
+    cli: CommandLine, file: Path, tmp_path: Path
 ) -> None:
     out = tmp_path / "results"
-    answer(capsys, file, "--out", out, "--workers", 1, "--limit", 8)
+    cli.answer(file, "--out", out, "--workers", 1, "--limit", 8)
     (out / "part-000001 copy.parquet").write_bytes((out / "part-000001.parquet").read_bytes())
     (out / "part-000001.parquet").write_bytes(b"")
-    assert run(["sweep", "--out", str(out), "--summary"]) == 0
-    told = capsys.readouterr()
-    assert "small: 4 of 20 designs" in told.out
-    first, second = told.err.splitlines()
+    page, remarks = cli.run("--out", out, "--summary")
+    assert "small: 4 of 20 designs" in page
+    first, second = remarks.splitlines()
     assert "1 damaged part is left out; a run computes it again" in first
     assert "has that name: 'part-000001 copy.parquet'; move" in second
 
 
-def test_sweep_summary_counts_incomparable_designs(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_sweep_summary_counts_incomparable_designs(cli: CommandLine, tmp_path: Path) -> None:
     file, out = tmp_path / "study.json", tmp_path / "results"
     study = msgspec.structs.replace(
         STUDY,
@@ -120,39 +98,37 @@ def test_sweep_summary_counts_incomparable_designs(
         clearance_margin=50.0,
     )
     file.write_bytes(encode_study(study))
-    answer(capsys, file, "--out", out, "--workers", 1)
-    summary = answer(capsys, "--out", out, "--summary")
+    cli.answer(file, "--out", out, "--workers", 1)
+    summary = cli.answer("--out", out, "--summary")
     assert summary["incomparable"] == summary["counts"]["done"] == 16
     assert summary["front"] == []
-    assert run(["sweep", "--out", str(out), "--summary"]) == 0
-    assert "without a value of an objective, so not in the front: 16" in capsys.readouterr().out
+    assert "without a value of an objective, so not in the front: 16" in cli.text(
+        "--out", out, "--summary"
+    )
 
 
-def test_sweep_row_is_a_design_file(
-    capsys: pytest.CaptureFixture[str], file: Path, tmp_path: Path
-) -> None:
+def test_sweep_row_is_a_design_file(cli: CommandLine, file: Path, tmp_path: Path) -> None:
     out = tmp_path / "results"
-    answer(capsys, file, "--out", out, "--workers", 1, "--limit", 4)
-    assert run(["sweep", "--out", str(out), "--row", "3"]) == 0
-    design = explorer.decode_design(capsys.readouterr().out.encode(), "row")
+    cli.answer(file, "--out", out, "--workers", 1, "--limit", 4)
+    design = explorer.decode_design(cli.text("--out", out, "--row", "3").encode(), "row")
     row = load_results(out)
     assert design.name == "small #3"
     assert explorer.workspace_volume(design).volume == row.columns["volume"][3]
-    assert "design 19 has not been computed yet" in refusal(capsys, "--out", out, "--row", 19)
-    assert "degenerate" in refusal(capsys, "--out", out, "--row", 2)
+    assert "design 19 has not been computed yet" in cli.refusal("--out", out, "--row", 19)
+    assert "degenerate" in cli.refusal("--out", out, "--row", 2)
 
 
 def test_sweep_design_replaces_that_of_the_study(
-    capsys: pytest.CaptureFixture[str], file: Path, tmp_path: Path
+    cli: CommandLine, file: Path, tmp_path: Path
 ) -> None:
     out = tmp_path / "results"
-    answer(capsys, file, "--design", "paper-optimal", "--out", out, "--limit", 1, "--workers", 1)
+    cli.answer(file, "--design", "paper-optimal", "--out", out, "--limit", 1, "--workers", 1)
     assert load_results(out).study.base.name == "paper-optimal"
-    assert "another study" in refusal(capsys, file, "--out", out)
+    assert "another study" in cli.refusal(file, "--out", out)
 
 
 def test_sweep_saved_design_is_found_by_name(
-    capsys: pytest.CaptureFixture[str],
+    cli: CommandLine,
     monkeypatch: pytest.MonkeyPatch,
     file: Path,
     tmp_path: Path,
@@ -162,28 +138,24 @@ def test_sweep_saved_design_is_found_by_name(
     for number, name in enumerate(("mine", 100 * "あ")):
         Library().save(name, explorer.PRESETS["paper-optimal"])
         out = tmp_path / f"results-{number}"
-        answer(capsys, file, "--design", name, "--out", out, "--limit", 1, "--workers", 1)
+        cli.answer(file, "--design", name, "--out", out, "--limit", 1, "--workers", 1)
         assert load_results(out).study.base.name == name
 
 
-def test_sweep_new_study_can_be_loaded(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["sweep", "--new"]) == 0
-    study = decode_study(capsys.readouterr().out.encode(), "new")
+def test_sweep_new_study_can_be_loaded(cli: CommandLine) -> None:
+    study = decode_study(cli.text("--new").encode(), "new")
     assert study.name == "trade-off"
 
 
-def test_sweep_study_without_objectives_has_no_front(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_sweep_study_without_objectives_has_no_front(cli: CommandLine, tmp_path: Path) -> None:
     file = tmp_path / "study.json"
     file.write_bytes(encode_study(msgspec.structs.replace(STUDY, objectives=())))
-    answer(capsys, file, "--out", tmp_path / "results", "--workers", 1, "--limit", 1)
-    assert run(["sweep", "--out", str(tmp_path / "results"), "--summary"]) == 0
-    assert "names no objectives" in capsys.readouterr().out
+    cli.answer(file, "--out", tmp_path / "results", "--workers", 1, "--limit", 1)
+    assert "names no objectives" in cli.text("--out", str(tmp_path / "results"), "--summary")
 
 
 def test_sweep_bad_input_is_one_line_and_writes_nothing(
-    capsys: pytest.CaptureFixture[str],
+    cli: CommandLine,
     monkeypatch: pytest.MonkeyPatch,
     file: Path,
     tmp_path: Path,
@@ -219,21 +191,21 @@ def test_sweep_bad_input_is_one_line_and_writes_nothing(
         ([file, "--out", LONG], "choose a shorter name"),
     ]
     for argv, words in cases:
-        assert words in refusal(capsys, *argv)
+        assert words in cli.refusal(*argv)
         assert not out.exists()
     for field, value, words in [
         ("variables", {"a3x": [5, 5]}, "the range of a3x is empty"),
         ("sampling", {"method": "sobol", "count": 0}, "sampling.count must lie within 1"),
         ("colour", "red", "unknown field"),
     ]:
-        assert words in refusal(capsys, changed(**{field: value}), "--out", out)
+        assert words in cli.refusal(changed(**{field: value}), "--out", out)
         assert not out.exists()
 
 
 def test_sweep_scheduler_without_workers_is_reported(
     file: Path,
     tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
+    cli: CommandLine,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     distributed: Any = importlib.import_module("distributed")
@@ -248,7 +220,7 @@ def test_sweep_scheduler_without_workers_is_reported(
 
         monkeypatch.setattr("explorer.cli.commands.sweep.write_error", send_one)
         scheduler = farm.scheduler_address
-        found = answer(capsys, file, "--out", tmp_path / "out", "--scheduler", scheduler)
+        found = cli.answer(file, "--out", tmp_path / "out", "--scheduler", scheduler)
     assert (found["done"], found["complete"]) == (20, True)
     assert said == [f"the scheduler has no worker yet: start one with dask worker {scheduler}"]
 
@@ -260,7 +232,7 @@ def test_sweep_interrupt_keeps_finished_parts(file: Path, tmp_path: Path) -> Non
     file.write_bytes(encode_study(many))
     out = tmp_path / "results"
     process = subprocess.Popen(
-        [sys.executable, "-m", "explorer", "sweep", str(file), "--out", str(out)],
+        [sys.executable, "-m", "explorer", "sweep", file, "--out", out],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import msgspec
 import numpy as np
 import pytest
+from command_line import CommandLine
 
 import explorer
-from explorer.cli import run
 from explorer.workspace.accessible.radii import with_radius
 from explorer.workspace.orientations import (
     cone_of_directions,
@@ -28,6 +26,7 @@ from explorer.workspace.solids.solids import (
     workspace_solid,
 )
 
+COMMAND = ("workspace",)
 OPTIMAL = explorer.PRESETS["paper-optimal"]
 COARSE = ["--tolerance", "0.4"]
 KEYS = {
@@ -36,27 +35,8 @@ KEYS = {
 }
 
 
-def answer(capsys: pytest.CaptureFixture[str], *argv: str) -> dict[str, Any]:
-    """Return the one JSON object that the command writes, and nothing else."""
-    assert run(["workspace", *argv, "--json"]) == 0
-    captured = capsys.readouterr()
-    assert captured.err == ""
-    assert captured.out.count("\n") == 1
-    found: dict[str, Any] = json.loads(captured.out)
-    return found
-
-
-def refusal(capsys: pytest.CaptureFixture[str], *argv: str) -> str:
-    """Return the one line on standard error of arguments that are refused with status 2."""
-    assert run(["workspace", *argv]) == 2
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    assert captured.err.count("\n") == 1
-    return captured.err
-
-
-def test_workspace_json_has_the_public_measures(capsys: pytest.CaptureFixture[str]) -> None:
-    found = answer(capsys)
+def test_workspace_json_has_the_public_measures(cli: CommandLine) -> None:
+    found = cli.answer()
     assert set(found) == KEYS
     volume, nodes, solid = (
         workspace_volume(OPTIMAL),
@@ -76,7 +56,7 @@ def test_workspace_json_has_the_public_measures(capsys: pytest.CaptureFixture[st
 
 
 def test_workspace_disagreeing_mesh_is_reported(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    cli: CommandLine, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     wrong = replace(workspace_solid(OPTIMAL), agrees=False)
 
@@ -84,15 +64,14 @@ def test_workspace_disagreeing_mesh_is_reported(
         return wrong
 
     monkeypatch.setattr("explorer.workspace.solids.solids.workspace_solid", make)
-    assert answer(capsys)["mesh_agrees"] is False
-    assert run(["workspace"]) == 0
-    assert "its volume does not agree with the exact one" in capsys.readouterr().out
+    assert cli.answer()["mesh_agrees"] is False
+    assert "its volume does not agree with the exact one" in cli.text()
 
 
 def test_workspace_orientation_step_and_tolerance_are_used(
-    capsys: pytest.CaptureFixture[str],
+    cli: CommandLine,
 ) -> None:
-    found = answer(capsys, "--yaw-pitch-roll", "-60", "5", "2", "--step", "3", *COARSE, "--hull")
+    found = cli.answer("--yaw-pitch-roll", "-60", "5", "2", "--step", "3", *COARSE, "--hull")
     rotation = explorer.rotation_from_yaw_pitch_roll([-60.0, 5.0, 2.0])
     assert found["volume"] == pytest.approx(workspace_volume(OPTIMAL, rotation).volume, rel=1e-9)
     assert found["node_count"] == workspace_nodes(OPTIMAL, rotation, 3.0).count
@@ -102,9 +81,9 @@ def test_workspace_orientation_step_and_tolerance_are_used(
 
 
 def test_workspace_table1_has_printed_and_computed_values(
-    capsys: pytest.CaptureFixture[str],
+    cli: CommandLine,
 ) -> None:
-    found = answer(capsys, "--table1")
+    found = cli.answer("--table1")
     initial, optimal = found["table1"]
     assert (initial["node_count"], optimal["node_count"]) == (2468, 999)
     assert optimal["printed"]["node_volume"] == optimal["node_volume"] == 7992.0
@@ -115,31 +94,29 @@ def test_workspace_table1_has_printed_and_computed_values(
         assert row["volume"] < row["node_volume"]
     assert optimal["volume"] == pytest.approx(7053.044, abs=1e-3)
     assert "node volume exceeds" in found["note"]
-    assert run(["workspace", "--table1"]) == 0
-    text = capsys.readouterr().out
+    text = cli.text("--table1")
     for word in ("paper-initial", "paper-optimal", "10.052", "7992", "7053.04", "2468", "999"):
         assert word in text
     assert found["note"] in text
 
 
-def test_workspace_empty_has_status_0(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_workspace_empty_has_status_0(cli: CommandLine, tmp_path: Path) -> None:
     limits = msgspec.structs.replace(OPTIMAL.limits, gap=50.0)
     file = tmp_path / "empty.json"
     file.write_bytes(explorer.encode_design(msgspec.structs.replace(OPTIMAL, limits=limits)))
-    found = answer(capsys, "--design", str(file), "--hull")
+    found = cli.answer("--design", file, "--hull")
     assert found["volume"] == found["node_count"] == found["hull_volume"] == 0
     assert found["extent"] is None
     assert found["empty_because"] == ["gap |d1 − d3|"]
     assert found["mesh"] == {"volume": 0.0, "triangles": 0, "watertight": False}
-    assert run(["workspace", "--design", str(file)]) == 0
-    assert "empty because of gap |d1 − d3|" in capsys.readouterr().out
+    assert "empty because of gap |d1 − d3|" in cli.text("--design", file)
 
 
 def test_workspace_ranges_and_tilts_add_two_volumes(
-    capsys: pytest.CaptureFixture[str],
+    cli: CommandLine,
 ) -> None:
-    found = answer(
-        capsys, "--yaw-range", "-80", "-65", "--roll-range", "0", "6", "--samples", "3", *COARSE
+    found = cli.answer(
+        "--yaw-range", "-80", "-65", "--roll-range", "0", "6", "--samples", "3", *COARSE
     )
     home = explorer.yaw_pitch_roll_from_rotation(explorer.home_pose(OPTIMAL).rotation)
     pitch = float(home[1])
@@ -150,7 +127,7 @@ def test_workspace_ranges_and_tilts_add_two_volumes(
         assert found[key]["volume"] == pytest.approx(make(OPTIMAL, rotations, 0.4).volume, rel=1e-6)
     assert found["dexterous_mesh"]["volume"] < found["mesh"]["volume"]
     assert found["mesh"]["volume"] < found["reachable_mesh"]["volume"]
-    tilted = answer(capsys, "--tilt", "8", "--samples", "5", *COARSE)
+    tilted = cli.answer("--tilt", "8", "--samples", "5", *COARSE)
     rotations = cone_of_directions(explorer.home_pose(OPTIMAL).rotation, 8.0, 5)
     assert tilted["orientations"] == 5
     volume = reachable_solid(OPTIMAL, rotations, 0.4).volume
@@ -158,27 +135,24 @@ def test_workspace_ranges_and_tilts_add_two_volumes(
 
 
 def test_workspace_capability_is_over_the_given_orientations(
-    capsys: pytest.CaptureFixture[str],
+    cli: CommandLine,
 ) -> None:
     position = ["--capability", "10", "5", "9"]
-    found = answer(capsys, *position, "--samples", "2000", *COARSE)
+    found = cli.answer(*position, "--samples", "2000", *COARSE)
     share = orientation_capability(OPTIMAL, [10.0, 5.0, 9.0], 2000)
     assert found["orientation_capability"] == pytest.approx(share, abs=1e-12)
     assert 0.0 < share < 1.0
-    near = answer(capsys, *position, "--tilt", "1", *COARSE)
+    near = cli.answer(*position, "--tilt", "1", *COARSE)
     assert near["orientation_capability"] == 1.0
 
 
-def test_workspace_text_has_every_measure(capsys: pytest.CaptureFixture[str]) -> None:
+def test_workspace_text_has_every_measure(cli: CommandLine) -> None:
     words = ["--hull", "--tilt", "5", "--samples", "3", "--capability", "10", "5", "9", *COARSE]
-    assert run(["workspace", *words]) == 0
-    captured = capsys.readouterr()
-    assert captured.err == ""
+    page = cli.text(*words)
     for word in ("exact volume", "node volume", "999 nodes", "mesh", "convex hull", "reachable"):
-        assert word in captured.out
+        assert word in page
     for word in ("dexterous", "3 orientations", "watertight", "b1x", "capability"):
-        assert word in captured.out
-    assert all(line == line.rstrip() for line in captured.out.splitlines())
+        assert word in page
 
 
 @pytest.mark.parametrize(
@@ -201,15 +175,15 @@ def test_workspace_text_has_every_measure(capsys: pytest.CaptureFixture[str]) ->
     ],
 )
 def test_workspace_unusable_options_are_refused(
-    capsys: pytest.CaptureFixture[str], argv: list[str], words: str
+    cli: CommandLine, argv: list[str], words: str
 ) -> None:
-    assert words in refusal(capsys, *argv)
+    assert words in cli.refusal(*argv)
 
 
 def test_workspace_interference_adds_the_accessible_volume(
-    capsys: pytest.CaptureFixture[str],
+    cli: CommandLine,
 ) -> None:
-    found = answer(capsys, "--interference", "--radii", "0.2")
+    found = cli.answer("--interference", "--radii", "0.2")
     assert set(found) == KEYS | {
         *("reachable_volume", "reachable_node_count", "harmless_radius", "pairs"),
         "reachable_solid",
@@ -224,30 +198,28 @@ def test_workspace_interference_adds_the_accessible_volume(
         assert set(pair) == {"legs", "clearance", "bound", "blocked_volume"}
         assert pair["clearance"] == pytest.approx(own.clearance, abs=1e-9)
         assert pair["blocked_volume"] == pytest.approx(own.blocked_volume, rel=1e-6)
-    assert run(["workspace", "--interference", "--radii", "0.2", "--radius-curve"]) == 0
-    text = capsys.readouterr().out
+    text = cli.text("--interference", "--radii", "0.2", "--radius-curve")
     assert "943 of 999 nodes" in text
     assert "no radius is harmless" in text
 
 
 def test_workspace_interference_empty_workspace_has_no_accessible_volume(
-    capsys: pytest.CaptureFixture[str],
+    cli: CommandLine,
 ) -> None:
     level = ("--yaw-pitch-roll", "0", "0", "0")
-    found = answer(capsys, "--interference", *level)
+    found = cli.answer("--interference", *level)
     assert found["reachable_volume"] == found["reachable_node_count"] == 0
     assert [pair["clearance"] for pair in found["pairs"]] == [None] * 6
-    assert run(["workspace", "--interference", *level]) == 0
-    assert "joined" not in capsys.readouterr().out
+    assert "joined" not in cli.text("--interference", *level)
 
 
 def test_workspace_interference_joined_pair_has_no_clearance(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
+    cli: CommandLine, tmp_path: Path
 ) -> None:
     joined = explorer.Design(a3=(10.0, 4.0), b1=(4.0, -3.0), b2=0.0, b3=2.0)
     file = tmp_path / "joined.json"
     file.write_bytes(explorer.encode_design(joined))
-    found = answer(capsys, "--design", str(file), "--interference", "--radius-curve", *COARSE)
+    found = cli.answer("--design", file, "--interference", "--radius-curve", *COARSE)
     assert found["pairs"][4] == {
         "legs": [2, 4],
         "clearance": None,
@@ -270,6 +242,6 @@ def test_workspace_interference_joined_pair_has_no_clearance(
     ],
 )
 def test_workspace_interference_unusable_input_is_refused(
-    capsys: pytest.CaptureFixture[str], words: tuple[str, ...], reason: str
+    cli: CommandLine, words: tuple[str, ...], reason: str
 ) -> None:
-    assert reason in refusal(capsys, *words)
+    assert reason in cli.refusal(*words)

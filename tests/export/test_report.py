@@ -234,7 +234,7 @@ def test_report_bill_is_that_of_the_prototype() -> None:
     for row, item in zip(rows.values(), bill.items, strict=True):
         assert row.values == [*item.size, item.volume / 1000.0, item.mass * 1000.0]
     for row, each in zip(table_of(paper_page(), "Actuators").values(), bill.actuators, strict=True):
-        assert row.values == [*each.stroke, *each.asked, each.diameter, each.mass * 1000.0]
+        assert row.values == [*each.stroke, *each.required, each.diameter, each.mass * 1000.0]
 
 
 def test_report_slice_areas_are_exact() -> None:

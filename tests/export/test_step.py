@@ -24,7 +24,7 @@ from explorer import (
 from explorer.export.mesh import colour_of
 from explorer.export.opencascade import coordinates, faces_of, occ, volume_of
 from explorer.export.step import exact_workspace, step_bytes, workspace_step
-from explorer.export.step_assembly import exact_parts, write_assembly_step
+from explorer.export.step_assembly import assembly_step, exact_parts
 from explorer.mechanism.design import Swing
 
 OPTIMAL, INITIAL = PRESETS["paper-optimal"], PRESETS["paper-initial"]
@@ -150,8 +150,8 @@ def test_exact_parts_volumes_match_the_meshes(below: bool) -> None:
 def test_step_assembly_reads_back_the_places_of_parts(tmp_path: Path) -> None:
     prototype = make_prototype(OPTIMAL)
     path = tmp_path / "mechanism.step"
-    write_assembly_step(prototype.sizes, path)
-    data = path.read_bytes()
+    data = assembly_step(prototype.sizes)
+    path.write_bytes(data)
     assert b"AP242" in data[:600]
     for part in prototype.parts:
         assert f"PRODUCT('{part.name}'".encode() in data

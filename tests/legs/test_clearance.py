@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-import json
 import math
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
+from limited_designs import limited
+from reference import read_reference
 from strategies import Case, ordinary_cases, uniform_rotations
 
-from explorer import PAIRS, PRESETS, Design, InputError, Limits, home_pose, leg_clearances
+from explorer import PAIRS, PRESETS, Design, home_pose, leg_clearances
 from explorer.legs.clearance import joined_pairs, leg_axes, pair_rows
+from explorer.mechanism.kinematics import platform_points
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import MANY_ROWS
 
-REFERENCE: dict[str, list[dict[str, Any]]] = json.loads(
-    (Path(__file__).parents[1] / "data" / "interference.json").read_text(encoding="utf-8")
-)
 OPTIMAL = PRESETS["paper-optimal"]
 SCALES = (1e-30, 1e-3, 1.0, 1e5, 1e30)
 
@@ -77,7 +74,7 @@ def searched_distance(a: FloatArray, b: FloatArray) -> FloatArray:
 
 
 def test_closest_points_reference_segments_have_its_distances() -> None:
-    cases = REFERENCE["segments"]
+    cases = read_reference("interference")["segments"]
     assert len(cases) == 200
     a, b = (np.array([case[key] for case in cases]) for key in "ab")
     expected = np.array([case["distance"] for case in cases])
@@ -137,24 +134,17 @@ def test_closest_points_few_and_many_pairs_agree() -> None:
 @given(ordinary_cases())
 def test_leg_axes_any_pose_run_from_base_ends_to_platform_ends(case: Case) -> None:
     axes = leg_axes(case.design, case.position, case.rotation)
-    d = case.design
-    platform = np.array([[*d.b1, 0.0], [d.b2, 0.0, 0.0], [d.b3, 0.0, 0.0], [0.0, 0.0, 0.0]])
-    ends = case.position + platform @ case.rotation.T
+    ends = case.position + platform_points(case.design) @ case.rotation.T
     np.testing.assert_allclose(axes[:, 1], ends, atol=1e-12 * case.size)
-    base = [[0.0, 0.0, 0.0], [ends[1, 0], 0.0, 0.0], [ends[2, 0], 0.0, 0.0], [*d.a3, 0.0]]
+    a3 = [*case.design.a3, 0.0]
+    base = [[0.0, 0.0, 0.0], [ends[1, 0], 0.0, 0.0], [ends[2, 0], 0.0, 0.0], a3]
     np.testing.assert_allclose(axes[:, 0], base, atol=1e-12 * case.size)
 
 
 @given(ordinary_cases())
 def test_leg_clearances_any_pose_are_axis_distances_less_radii(case: Case) -> None:
     radii = (0.1, 0.2, 0.4, 0.8)
-    design = Design(
-        a3=case.design.a3,
-        b1=case.design.b1,
-        b2=case.design.b2,
-        b3=case.design.b3,
-        limits=Limits(leg_radii=radii),
-    )
+    design = limited(case.design, leg_radii=radii)
     axes = leg_axes(design, case.position, case.rotation)
     found = leg_clearances(design, case.position, case.rotation)
     for index, (i, j) in enumerate(PAIRS):
@@ -180,16 +170,3 @@ def test_leg_clearances_pair_with_a_shared_joint_is_infinite(
         assert infinite == [pair]
         np.testing.assert_allclose(found.points[PAIRS.index(pair)], [position] * 2)
         assert PAIRS[int(found.closest)] != pair
-
-
-def test_leg_clearances_batch_matches_its_poses() -> None:
-    home = home_pose(OPTIMAL)
-    positions = np.array(home.position) + np.random.default_rng(5).uniform(-2, 2, (20, 20, 3))
-    batch = leg_clearances(OPTIMAL, positions, home.rotation)
-    assert batch.clearance.shape == (20, 20, 6)
-    assert batch.points.shape == (20, 20, 6, 2, 3)
-    assert batch.closest.shape == (20, 20)
-    alone = leg_clearances(OPTIMAL, positions[3, 4], home.rotation)
-    np.testing.assert_allclose(batch.clearance[3, 4], alone.clearance, atol=1e-14)
-    with pytest.raises(InputError, match="position"):
-        leg_clearances(OPTIMAL, [1.0, 2.0, math.nan], home.rotation)

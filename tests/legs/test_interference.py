@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import math
+from functools import partial
+from typing import Any
 
-import msgspec
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
+from limited_designs import limited
+from numpy.typing import ArrayLike
+from refusals import refusal
 from strategies import ordinary_designs, positions, rotations
 
 from explorer import (
     PAIRS,
     PRESETS,
     Design,
-    InputError,
-    Limits,
     Pose,
     home_pose,
     leg_clearances,
@@ -38,10 +40,6 @@ HOME = home_pose(OPTIMAL)
 JOINED = Design(a3=(10, 4), b1=(4, -1), b2=0.0, b3=2.0)
 
 
-def with_radii(design: Design, radii: tuple[float, float, float, float]) -> Design:
-    return msgspec.structs.replace(design, limits=Limits(leg_radii=radii))
-
-
 @st.composite
 def moves(draw: st.DrawFn) -> tuple[Design, Pose, Pose]:
     """Draw a design and two poses, of one orientation in a third of the cases."""
@@ -55,7 +53,7 @@ def moves(draw: st.DrawFn) -> tuple[Design, Pose, Pose]:
 
 
 def random_moves(seed: int, count: int) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return moves about the optimal design's home: some keep the orientation."""
+    """Return moves about the optimal design's home, a third of them at constant orientation."""
     rng = np.random.default_rng(seed)
     first = np.array(HOME.position) + rng.uniform(-8.0, 8.0, (count, 3))
     last = first + rng.uniform(-5.0, 5.0, (count, 3))
@@ -64,6 +62,10 @@ def random_moves(seed: int, count: int) -> tuple[FloatArray, FloatArray, FloatAr
     kept = np.arange(count) % 3 == 0
     turned[kept] = turn[kept]
     return first, turn, last, turned
+
+
+def arrays(start: Pose, end: Pose) -> tuple[ArrayLike, ArrayLike, ArrayLike, ArrayLike]:
+    return start.position, start.rotation, end.position, end.rotation
 
 
 def sampled(design: Design, start: Pose, end: Pose, count: int = 1001) -> FloatArray:
@@ -78,7 +80,7 @@ def test_swept_tetrahedra_constant_orientation_hold_the_legs(
 ) -> None:
     design, start, end = move
     end = Pose(end.position, start.quaternion)
-    swept = swept_tetrahedra(design, start.position, start.rotation, end.position, end.rotation)
+    swept = swept_tetrahedra(design, *arrays(start, end))
     assert swept.shape == (4, 4, 3)
     axis = leg_axes(design, *poses_between(start, end, share))[leg]
     point = axis[0] + along * (axis[1] - axis[0])
@@ -97,11 +99,11 @@ def test_step_is_free_constant_orientation_has_no_crossing(
 ) -> None:
     design, start, end = move
     end = Pose(end.position, start.quaternion)
-    overlaps = step_overlaps(design, start.position, start.rotation, end.position, end.rotation)
-    free = step_is_free(design, start.position, start.rotation, end.position, end.rotation)
+    overlaps = step_overlaps(design, *arrays(start, end))
+    free = step_is_free(design, *arrays(start, end))
     assert bool(free) is not bool(overlaps.any())
     least = sampled(design, start, end, 101)
-    # What the tetrahedra keep apart, the legs within them keep apart.
+    # Legs within disjoint tetrahedra are apart.
     assert (least[~overlaps] > 0.0).all()
 
 
@@ -128,8 +130,7 @@ def test_move_clearance_pair_with_a_shared_joint_is_left_out() -> None:
     assert found.closest != joined
     others = np.arange(6) != joined
     assert np.isfinite(found.bound[others]).all()
-    arrays = (start.position, start.rotation, end.position, end.rotation)
-    assert bool(moves_are_clear(JOINED, *arrays)) is found.is_clear
+    assert bool(moves_are_clear(JOINED, *arrays(start, end))) is found.is_clear
 
 
 def crossing() -> tuple[Design, Pose, Pose]:
@@ -154,9 +155,8 @@ def test_move_clearance_legs_that_cross_fail_both_tests() -> None:
     assert found.clearance[pair] <= found.tolerance
     assert found.bound[pair] == pytest.approx(0.0, abs=1e-15)
     assert found.share[pair] == pytest.approx(0.5, abs=1e-4)
-    arrays = (start.position, start.rotation, end.position, end.rotation)
-    assert not moves_are_clear(design, *arrays)
-    assert not step_is_free(design, *arrays)
+    assert not moves_are_clear(design, *arrays(start, end))
+    assert not step_is_free(design, *arrays(start, end))
 
 
 @given(moves(), st.sampled_from((None, 1e-2, 1e-6)))
@@ -165,7 +165,7 @@ def test_move_clearance_bound_holds_and_is_nearly_attained(
 ) -> None:
     design, start, end = move
     radii = (0.1, 0.2, 0.3, 0.4)
-    design = with_radii(design, radii)
+    design = limited(design, leg_radii=radii)
     longest = 10.0 * design.reach
     tolerance = None if share is None else share * longest
     found = move_clearance(design, start, end, tolerance=tolerance)
@@ -201,13 +201,13 @@ def test_move_clearances_batch_meets_the_tolerance() -> None:
 
 
 def test_moves_are_clear_any_clearance_agrees_with_the_least() -> None:
-    design = with_radii(OPTIMAL, (0.1, 0.2, 0.2, 0.3))
+    design = limited(OPTIMAL, leg_radii=(0.1, 0.2, 0.2, 0.3))
     many = random_moves(4, 2000)
     least = move_clearances(design, *many).bound.min(axis=-1)
-    for asked in (-0.2, 0.0, 0.5):
-        clear = moves_are_clear(design, *many, clearance=asked)
-        decided = np.abs(least - asked) > 1e-4
-        np.testing.assert_array_equal(clear[decided], least[decided] > asked)
+    for clearance in (-0.2, 0.0, 0.5):
+        clear = moves_are_clear(design, *many, clearance=clearance)
+        decided = np.abs(least - clearance) > 1e-4
+        np.testing.assert_array_equal(clear[decided], least[decided] > clearance)
         assert 0.02 < clear.mean() < 0.98
 
 
@@ -216,7 +216,7 @@ def test_move_clearance_clear_move_is_free_at_fine_steps() -> None:
     end = Pose((13.0, 2.0, 5.0), (0.7, 0.2, -0.3, -0.5))
     coarse = move_clearance(OPTIMAL, start, end, steps=1)
     fine = move_clearance(OPTIMAL, start, end, steps=200)
-    # One step sees a crossing of legs 2 and 3 that there is none of.
+    # In one step the tetrahedra of legs 2 and 3 overlap, although the legs do not cross.
     assert coarse.is_clear
     assert not coarse.is_free
     assert [PAIRS[k] for k in np.flatnonzero(coarse.overlaps)] == [(2, 3)]
@@ -243,21 +243,20 @@ def test_poses_between_shares_zero_and_one_are_the_ends() -> None:
 
 
 def test_move_clearance_no_length_is_refused() -> None:
-    with pytest.raises(InputError, match="two poses that differ"):
-        move_clearance(OPTIMAL, HOME, HOME)
+    assert "two poses that differ" in refusal(move_clearance, OPTIMAL, HOME, HOME)
     turned = Pose(HOME.position, (1.0, 0.0, 0.0, 0.0))
     moved = Pose((10.0, 5.0, 9.0 + 1e-6), HOME.quaternion)
     for end in (turned, moved):
         assert move_clearance(OPTIMAL, HOME, end).is_clear
 
 
-@pytest.mark.parametrize("steps", [0, -3])
-def test_move_clearance_no_steps_is_refused(steps: int) -> None:
-    with pytest.raises(InputError, match=f"at least one step; got {steps}"):
-        move_clearance(OPTIMAL, HOME, Pose((9, 5, 9), HOME.quaternion), steps=steps)
-
-
-@pytest.mark.parametrize("tolerance", [0.0, -1.0, 1e-12, math.nan])
-def test_move_clearance_tolerance_too_small_is_refused(tolerance: float) -> None:
-    with pytest.raises(InputError, match="tolerance must be at least"):
-        move_clearance(OPTIMAL, HOME, Pose((9, 5, 9), HOME.quaternion), tolerance=tolerance)
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        *(({"steps": x}, f"at least one step; got {x}") for x in (0, -3)),
+        *(({"tolerance": x}, "tolerance must be at least") for x in (0.0, -1.0, 1e-12, math.nan)),
+    ],
+)
+def test_move_clearance_unusable_option_is_refused(options: dict[str, Any], words: str) -> None:
+    end = Pose((9, 5, 9), HOME.quaternion)
+    assert words in refusal(partial(move_clearance, **options), OPTIMAL, HOME, end)

@@ -75,7 +75,7 @@ def scaled(design: Design, factor: float) -> Design:
 
 
 @pytest.mark.parametrize("design", CASES, ids=lambda d: d.name)
-def test_measures_are_those_of_the_functions(design: Design) -> None:
+def test_measures_of_compare_equal_their_functions(design: Design) -> None:
     found, home = compared(design), home_pose(design)
     snapshot, nodes = evaluate(design, home), workspace_nodes(design)
     assert found["volume"] == workspace_volume(design).volume
@@ -89,7 +89,7 @@ def test_measures_are_those_of_the_functions(design: Design) -> None:
 
 
 @pytest.mark.parametrize("design", CASES, ids=lambda d: d.name)
-def test_extents_and_least_margins_hold_for_all_positions_and_are_reached(design: Design) -> None:
+def test_extremes_of_random_designs_hold_for_samples_and_are_reached(design: Design) -> None:
     r, reach = home_pose(design).rotation, design.reach
     rough = workspace_solid(design, r, 0.01 * reach)
     fine = workspace_solid(design, r, 0.0005 * reach)
@@ -107,22 +107,30 @@ def test_extents_and_least_margins_hold_for_all_positions_and_are_reached(design
     assert (on_mesh - least).max() < 0.001 * reach
 
 
-def test_the_extent_of_the_papers_optimum_is_that_of_its_box() -> None:
-    (lows, highs), box = (
-        extent_of(OPTIMAL, home_pose(OPTIMAL).rotation, workspace_solid(OPTIMAL)),
-        OPTIMAL.limits.box,
-    )
-    assert box is not None
-    assert np.array([lows, highs]) == pytest.approx(np.array(box), abs=1e-9)
+def test_measures_at_a_pose_are_of_its_orientation() -> None:
+    pose = Pose.of_yaw_pitch_roll((9.0, 4.0, 8.0), (-60.0, 5.0, 2.0))
+    names = [*measures_in("compare"), "worst_margin", "reachable_volume"]
+    turned = msgspec.structs.replace(OPTIMAL, home=pose)
+    assert home_pose(turned) == pose
+    at_pose = measure_design(Case(OPTIMAL, pose=pose), names)
+    assert at_pose["volume"] == workspace_volume(OPTIMAL, pose.rotation).volume
+    own = measure_design(Case(turned), [name for name in names if name != "reachable_volume"])
+    assert own.values == {name: at_pose[name] for name in own.values}
 
 
-def test_a_direction_may_have_any_length() -> None:
+def test_extent_of_paper_optimum_is_its_box() -> None:
+    extent = extent_of(OPTIMAL, home_pose(OPTIMAL).rotation, workspace_solid(OPTIMAL))
+    assert OPTIMAL.limits.box is not None
+    assert np.array(extent) == pytest.approx(np.array(OPTIMAL.limits.box), abs=1e-9)
+
+
+def test_farthest_scales_with_its_direction() -> None:
     r, solid = home_pose(OPTIMAL).rotation, workspace_solid(OPTIMAL)
     one, two = farthest(OPTIMAL, r, solid, [(1.0, 2.0, -1.0), (3.0, 6.0, -3.0)])
     assert two == pytest.approx(3.0 * one, rel=1e-9)
 
 
-def test_parts_on_either_side_of_a_singular_plane_are_looked_at_one_by_one() -> None:
+def test_least_margins_of_separate_parts_are_of_each_part() -> None:
     design = limited(OPTIMAL, margin=None, box=((0.0, -12.0, -3.0), (20.0, 22.0, 18.0)))
     r = home_pose(design).rotation
     assert least_margins(design, r, workspace_solid(design)).tolist() == [0.0, 0.0, 0.0]
@@ -133,7 +141,7 @@ def test_parts_on_either_side_of_a_singular_plane_are_looked_at_one_by_one() -> 
 
 
 @pytest.mark.parametrize("seed", range(24))
-def test_the_least_of_all_clearances_is_the_same_without_the_others(seed: int) -> None:
+def test_least_clearance_alone_equals_that_of_all_pairs(seed: int) -> None:
     design, rotation = ordinary_case(seed) if seed % 2 else troubled_case(seed)
     radii = np.random.default_rng(seed).uniform(0.0, 0.05, 4) * design.reach
     design, tolerance = limited(design, leg_radii=tuple(radii.tolist())), 1e-3 * design.reach
@@ -151,7 +159,7 @@ def test_the_least_of_all_clearances_is_the_same_without_the_others(seed: int) -
     assert own.clearance[pair] == pytest.approx(other, abs=2e-9 * design.reach)
 
 
-def test_clearances_count_off_the_singular_planes_only() -> None:
+def test_clearance_beyond_counts_off_singular_planes_only() -> None:
     margin = clearance_margin_of(OPTIMAL)
     clearance, pair = clearance_beyond(OPTIMAL, margin)
     full = least_clearances(limited(OPTIMAL, margin=margin))
@@ -175,7 +183,7 @@ def test_measures_of_scaled_design_have_their_power_of_length(seed: int, factor:
 
 
 @pytest.mark.parametrize("seed", range(30))
-def test_designs_in_trouble_have_finite_measures_or_none(seed: int) -> None:
+def test_measures_of_troubled_designs_are_finite_or_none(seed: int) -> None:
     found = compared(troubled_case(seed)[0])
     assert bool(found["volume"]) != bool(found.empty_because)
     assert all(value is None or math.isfinite(value) for value in found.values.values())
@@ -183,7 +191,7 @@ def test_designs_in_trouble_have_finite_measures_or_none(seed: int) -> None:
         assert found["mean_inverse_condition"] is found["clear_share"] is None
 
 
-def test_an_empty_workspace_has_no_more_than_its_reasons() -> None:
+def test_measures_of_empty_workspace_are_none_with_reasons() -> None:
     found = compared(limited(OPTIMAL, l1=(1.0, 2.0), l4=(1.0, 2.0)))
     assert found["volume"] == 0.0
     assert {"l1 maximum", "l4 maximum"} & {*found.empty_because}
@@ -191,7 +199,7 @@ def test_an_empty_workspace_has_no_more_than_its_reasons() -> None:
         assert found[name] is None
 
 
-def test_a_home_at_which_the_lines_are_parallel_has_no_margin() -> None:
+def test_margins_of_parallel_lines_at_home_are_zero() -> None:
     home = Pose(home_pose(OPTIMAL).position, (1.0, 0.0, 0.0, 0.0))
     found = compared(msgspec.structs.replace(limited(OPTIMAL, margin=None), home=home))
     assert found["home_margin"] == found["least_margin"] == found["mean_margin"] == 0.0
@@ -199,7 +207,7 @@ def test_a_home_at_which_the_lines_are_parallel_has_no_margin() -> None:
     assert found["volume"]
 
 
-def test_too_fine_a_grid_leaves_out_the_nodes_and_nothing_else() -> None:
+def test_measures_of_too_fine_grid_lack_nodes_only() -> None:
     found = compared(msgspec.structs.replace(OPTIMAL, node_step=1e-4))
     assert found["node_count"] is found["node_volume"] is found["node_step"] is None
     assert found["volume"] == workspace_volume(OPTIMAL).volume
@@ -207,7 +215,7 @@ def test_too_fine_a_grid_leaves_out_the_nodes_and_nothing_else() -> None:
 
 
 @pytest.mark.parametrize("index", range(0, 24, 5))
-def test_the_mesh_that_is_there_already_tells_the_same(index: int) -> None:
+def test_extremes_from_given_mesh_are_equal(index: int) -> None:
     design, rotation, _ = reference_case(index)
     design = msgspec.structs.replace(design, home=Pose.of((1.0, 2.0, 3.0), rotation))
     solid = workspace_solid(design, rotation, 0.002 * design.reach)
@@ -218,7 +226,7 @@ def test_the_mesh_that_is_there_already_tells_the_same(index: int) -> None:
 
 
 @pytest.mark.parametrize("design", CASES, ids=lambda d: d.name)
-def test_gradients_are_those_of_finite_differences(design: Design) -> None:
+def test_gradients_of_measures_equal_finite_differences(design: Design) -> None:
     # Limits that are tied to the reach would change with the design.
     reach = 1.2 * design.reach
     limits = dict.fromkeys(LENGTHS, (0.0, reach))

@@ -1,19 +1,19 @@
-"""One measure has one value: what two places call by the same name is the same there."""
+"""One measure has one value: two places that list a label list the same value."""
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 
 import msgspec
 import pytest
+from command_line import CommandLine
 
 from explorer.app.features.optimise.tasks import compare
 from explorer.app.features.optimise.words import measure_rows
-from explorer.app.state.studies import spoken
-from explorer.cli import run
+from explorer.app.state.studies import label_of
 from explorer.cli.answers.optimisation import measure_rows as measure_rows_of_command
+from explorer.export.report.data import gather_report_data
 from explorer.measures.case import Case
 from explorer.measures.catalogue import CATALOGUE, measures_in
 from explorer.measures.measurements import measure_design
@@ -49,29 +49,31 @@ def found() -> Design:
 
 
 def values_of_places(design: Design, folder: Path, capsys: pytest.CaptureFixture[str]) -> Places:
-    """Return what each place shows of a design, by place and label."""
-    asked = problem()
-    margin = asked.demands.clearance_margin
-    both = compare(asked.start, design, margin, (BOX, BOX))
+    """Return the values that each place shows of a design, by place and label."""
+    paper = problem()
+    margin = paper.demands.clearance_margin
+    both = compare(paper.start, design, margin, (BOX, BOX))
     compared = measure_design(Case(design), measures_in("compare")).values
     studied = measure_design(Case(design), SWIFT).values
     path = folder / "design.json"
     path.write_bytes(encode_design(design))
-    assert run(["workspace", "--design", str(path), "--json"]) == 0
-    measured = json.loads(capsys.readouterr().out)
+    measured = CommandLine(capsys).answer("workspace", "--design", path)
     return {
         "Compare": {CATALOGUE[name].label: value for name, value in compared.items()},
         "Optimise": {
             row.name.removesuffix(", units³").removesuffix(", units"): row.after
-            for row in measure_rows(asked, both.before, both.after)
+            for row in measure_rows(paper, both.before, both.after)
         },
         "explorer optimise": {
             label: after for label, (_, after) in measure_rows_of_command(both.before, both.after)
         },
-        "Studies": {spoken(name): value for name, value in studied.items()},
+        "Studies": {label_of(name): value for name, value in studied.items()},
         "explorer workspace": {
-            name.replace("_", " "): measured[name]
-            for name in ("volume", "node_step", "node_volume")
+            each.label: measured[name] for name, each in measures_in("workspace").items()
+        },
+        "report": {
+            CATALOGUE[name].label: value
+            for name, value in gather_report_data(design).measured.values.items()
         },
     }
 
@@ -98,9 +100,9 @@ def test_measures_of_one_label_have_one_value(
 
 
 def test_optimised_demanded_clearance_stands_beside_own() -> None:
-    asked = problem()
-    both = compare(asked.start, found(), asked.demands.clearance_margin, (None, None))
-    rows = {row.name: row for row in measure_rows(asked, both.before, both.after)}
+    paper = problem()
+    both = compare(paper.start, found(), paper.demands.clearance_margin, (None, None))
+    rows = {row.name: row for row in measure_rows(paper, both.before, both.after)}
     demanded, own = rows["demanded clearance, |δ| ≥ 0.539"], rows["clearance, units"]
     assert demanded.after == both.after["demanded_clearance"]
     assert own.after == both.after["least_clearance"]
@@ -109,7 +111,7 @@ def test_optimised_demanded_clearance_stands_beside_own() -> None:
     assert own.after is not None
     assert own.after > demanded.after
     free = msgspec.structs.replace(
-        asked, demands=msgspec.structs.replace(asked.demands, clearance=None)
+        paper, demands=msgspec.structs.replace(paper.demands, clearance=None)
     )
     names = [row.name for row in measure_rows(free, both.before, both.after)]
     assert [name for name in names if "clearance" in name] == ["clearance, units"]

@@ -1,4 +1,4 @@
-"""Kernels: each is compiled once on a machine, requested ones first."""
+"""The cache of kernels: each is compiled once on a machine, requested ones first."""
 
 from __future__ import annotations
 
@@ -6,21 +6,22 @@ import os
 import subprocess
 import sys
 import threading
-from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from types import FunctionType
 from typing import Any
 
 import pytest
+from filelock import FileLock
 
 import explorer
 from explorer.legs import clearance, tetrahedra
 from explorer.numerics import kernel_cache
-from explorer.numerics.compiled import Kernel
-from explorer.numerics.kernel_cache import Cacheable, await_cached, compile_all, fingerprint_of
+from explorer.numerics.kernel_cache import Entry, await_cached, compile_all, fingerprint_of
 from explorer.optimise.defaults import make_problem
 from explorer.optimise.solver import optimise_design
 from explorer.workspace.slices import nodes
+
+KERNELS = (nodes.count_nodes, clearance.pair_rows, tetrahedra.overlap_rows)
 
 
 @pytest.fixture
@@ -30,133 +31,111 @@ def empty_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def function_of(source: str, module: str) -> Callable[..., Any]:
-    names: dict[str, Any] = {"__name__": module}
-    exec(source, names)
-    return names["area"]
-
-
-HELPER = """
-SCALE = {scale}
+SOURCE = """
+from typing import NamedTuple
+class Sides(NamedTuple):
+    {fields}: float
 def square(x):
     return {body}
 def unused(x):
     return {other}
+SCALE = {scale}
 def area(x):
-    return SCALE * square(x)
+    return SCALE * square(Sides(x)[0])
 """
 
 
-def fingerprint(
-    scale: str = "2.0",
-    body: str = "x * x",
-    other: str = "x",
-    options: object = "f8(f8)",
-    module: str = "areas",
-) -> str:
-    area = function_of(HELPER.format(scale=scale, body=body, other=other), module)
-    assert isinstance(area, FunctionType)
-    helpers = {area.__globals__["square"], area.__globals__["unused"]}
-    return fingerprint_of(area, helpers, options)[0]
+def fingerprint(options: object = "f8(f8)", module: str = "areas", **changed: str) -> str:
+    """Return the fingerprint of the function `area` in changed source code."""
+    code = {"scale": "2.0", "body": "x * x", "other": "x", "fields": "a"} | changed
+    names: dict[str, Any] = {"__name__": module}
+    exec(SOURCE.format(**code), names)
+    return fingerprint_of(names["area"], {names["square"], names["unused"]}, options)[0]
 
 
-def test_fingerprint_changes_with_what_the_code_depends_on_and_nothing_else() -> None:
+def test_fingerprint_changes_with_the_code_and_constants_that_a_kernel_uses() -> None:
     assert fingerprint() == fingerprint(other="x + 1.0")
     assert fingerprint() != fingerprint(body="x * x * x")
     assert fingerprint() != fingerprint(scale="3.0")
     assert fingerprint() != fingerprint(options="f4(f4)")
-    # Compiled code names the modules of its functions: what was moved is compiled again.
+    assert fingerprint() != fingerprint(fields="b")
+    # Compiled code holds the names of its functions' modules.
     assert fingerprint() != fingerprint(module="rooms.areas")
 
 
-def test_kernels_have_fingerprints_of_their_own() -> None:
-    kernels = (clearance.pair_rows, tetrahedra.overlap_rows, nodes.count_nodes)
-    assert len({each.entry.fingerprint for each in kernels}) == len(kernels)
+def test_fingerprints_of_kernels_differ() -> None:
+    assert len({each.entry.fingerprint for each in KERNELS}) == len(KERNELS)
 
 
-class Stand:
-    """A kernel whose compilation writes a file and records the order."""
+@pytest.fixture
+def order(empty_cache: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Let compiling write an empty file into the cache; return the names in their order."""
+    names: list[str] = []
 
-    def __init__(self, kernel: Cacheable, folder: Path, order: list[str]) -> None:
-        self.entry = kernel.entry
-        self._folder = folder
-        self._order = order
+    def compile_into_cache(entry: Entry) -> None:
+        names.append(entry.name)
+        (empty_cache / f"stand-{entry.fingerprint}.nbc").touch()
 
-    def compile_here(self) -> None:
-        self._order.append(self.entry.name)
-        (self._folder / f"stand-{self.entry.fingerprint}.nbc").touch()
-
-
-def stand_in(
-    monkeypatch: pytest.MonkeyPatch, folder: Path, *kernels: Kernel[...]
-) -> tuple[list[Stand], list[str]]:
-    order: list[str] = []
-    stands = [Stand(each, folder, order) for each in kernels]
-    for each, stand in zip(kernels, stands, strict=True):
-        module = {clearance: "pair_rows", tetrahedra: "overlap_rows", nodes: "count_nodes"}
-        for place, name in module.items():
-            if getattr(place, name) is each:
-                monkeypatch.setattr(place, name, stand)
-    return stands, order
+    for each in KERNELS:
+        monkeypatch.setattr(each.entry, "compile_here", partial(compile_into_cache, each.entry))
+    return names
 
 
-def test_compiling_takes_requested_kernels_first_then_the_shortest(
-    empty_cache: Path, monkeypatch: pytest.MonkeyPatch
+def test_compiling_takes_requested_kernels_first_then_the_shortest(order: list[str]) -> None:
+    entries = sorted((each.entry for each in KERNELS), key=lambda entry: entry.effort)
+    longest = entries[-1]
+    for _ in range(2):
+        # The second time all are in the cache, and none is compiled again.
+        longest.request()
+        assert compile_all([entry.label for entry in entries]) == 0
+        assert order == [longest.name, *(entry.name for entry in entries[:-1])]
+        assert all(entry.is_filled for entry in entries)
+
+
+def test_request_of_another_version_or_package_is_ignored(
+    empty_cache: Path, order: list[str]
 ) -> None:
-    kernels = (nodes.count_nodes, clearance.pair_rows, tetrahedra.overlap_rows)
-    stands, order = stand_in(monkeypatch, empty_cache, *kernels)
-    by_effort = sorted(stands, key=lambda each: each.entry.effort)
-    longest = by_effort[-1].entry
-    longest.request()
-    assert compile_all([each.entry.label for each in stands]) == 0
-    assert order == [longest.name, *(each.entry.name for each in by_effort[:-1])]
-    assert all(each.entry.is_filled for each in stands)
-    # What is there is not compiled again, whoever asks for it.
-    longest.request()
-    assert compile_all([each.entry.label for each in stands]) == 0
-    assert len(order) == len(stands)
-
-
-def test_request_of_another_version_is_ignored(
-    empty_cache: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (stand,), order = stand_in(monkeypatch, empty_cache, clearance.pair_rows)
     requests = empty_cache / "requests"
     requests.mkdir()
-    other = requests / f"pair_rows-{'0' * 16}"
-    other.write_text(stand.entry.label, encoding="utf-8")
-    foreign = requests / f"system-{'1' * 16}"
-    foreign.write_text("os:system", encoding="utf-8")
+    label = clearance.pair_rows.entry.label
+    for name, text in ((f"pair_rows-{'0' * 16}", label), (f"system-{'1' * 16}", "os:system")):
+        (requests / name).write_text(text, encoding="utf-8")
     assert compile_all([]) == 0
     assert order == []
-    assert other.exists()
+    assert len(list(requests.iterdir())) == 2
 
 
 def test_kernel_compiled_by_another_process_is_awaited_not_compiled_again(
-    empty_cache: Path, monkeypatch: pytest.MonkeyPatch
+    empty_cache: Path, order: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (stand,), order = stand_in(monkeypatch, empty_cache, clearance.pair_rows)
+    entry = clearance.pair_rows.entry
     started: list[object] = []
 
     def start(*given: object, **_: object) -> None:
         started.append(given)
 
     monkeypatch.setattr(subprocess, "Popen", start)
-    lock = kernel_cache.FileLock(empty_cache / "compiling.lock", is_singleton=False)
-    ready: list[Stand] = []
+    lock = FileLock(empty_cache / "compiling.lock", is_singleton=False)
+    ready: list[Entry] = []
     with lock.acquire():
-        assert compile_all([stand.entry.label]) == kernel_cache.BUSY
-        waiter = threading.Thread(target=lambda: ready.extend(await_cached([stand], urgent=True)))
+        assert compile_all([entry.label]) == kernel_cache.BUSY
+        waiter = threading.Thread(target=lambda: ready.extend(await_cached([entry], urgent=True)))
         waiter.start()
         while not any((empty_cache / "requests").glob("*")):
             waiter.join(0.01)
         assert not ready
-        stand.compile_here()
+        entry.compile_here()
         waiter.join(30.0)
-    assert ready == [stand]
+    assert ready == [entry]
     assert not started
     assert order == ["pair_rows"]
     assert not any((empty_cache / "requests").glob("*"))
+
+
+def run_program(program: str, cache: Path) -> None:
+    """Run a program in a process of its own, with its cache in a folder."""
+    environment = {**os.environ, "XDG_CACHE_HOME": str(cache)}
+    subprocess.run([sys.executable, "-c", program], check=True, env=environment)
 
 
 def test_kernel_with_many_rows_is_compiled_by_a_child_into_the_cache(tmp_path: Path) -> None:
@@ -173,12 +152,10 @@ assert pair_rows.ready
 assert pair_rows.entry.is_filled
 np.testing.assert_allclose(found, same, rtol=1e-12)
 """
-    environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path), "LOCALAPPDATA": str(tmp_path)}
     for _ in range(2):
-        subprocess.run([sys.executable, "-c", program], check=True, env=environment)
+        run_program(program, tmp_path)
     made = [path.name for path in tmp_path.rglob("*.nbc") if "pair_rows" in path.name]
     assert len(made) == 1
-    # The code of helpers, requests and the lock aside, nothing else was made.
     assert not any("overlap_rows" in path.name for path in tmp_path.rglob("*"))
 
 
@@ -193,11 +170,10 @@ pair_rows(300, axes, np.zeros((300, 6)), np.zeros((300, 6, 2, 3)))
 assert pair_rows.ready
 assert not pair_rows.entry.is_filled
 """
-    environment = {**os.environ, "XDG_CACHE_HOME": str(blocked), "LOCALAPPDATA": str(blocked)}
-    subprocess.run([sys.executable, "-c", program], check=True, env=environment)
+    run_program(program, blocked)
 
 
-def test_search_needs_no_compiled_volume(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_optimisation_needs_no_compiled_volume(monkeypatch: pytest.MonkeyPatch) -> None:
     from explorer.workspace.slices.integration import integrate_slices
 
     monkeypatch.setattr(integrate_slices, "_compiled", None)

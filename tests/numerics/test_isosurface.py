@@ -1,4 +1,4 @@
-"""The surface around negative values: closed and correctly oriented for any values."""
+"""The surface around negative values, which is closed and oriented for any values."""
 
 from __future__ import annotations
 

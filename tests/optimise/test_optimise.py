@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 import pickle
-from collections.abc import Callable
 from typing import Any
 
 import msgspec
 import numpy as np
 import pytest
+from limited_designs import limited
 
 from explorer import (
     PRESETS,
@@ -29,7 +29,7 @@ from explorer import (
 )
 from explorer.measures.case import Case
 from explorer.optimise.findings import paper_problem, paper_start, reach_problem
-from explorer.optimise.problem import DISTANCES, distance_of
+from explorer.optimise.problem import DISTANCES, ObjectiveName, distance_of
 from explorer.optimise.record import (
     Settings,
     decode_record,
@@ -39,17 +39,13 @@ from explorer.optimise.record import (
 )
 from explorer.optimise.search.crossings import crossings
 from explorer.optimise.search.model import Model
-from explorer.optimise.search.opening import opened, room
+from explorer.optimise.search.opening import open_workspace, room
 from explorer.optimise.search.optimality import optimality
 from explorer.optimise.search.starts import more_starts
 from explorer.optimise.search.state import State
 from explorer.workspace.limits.constraints import constraints, slacks
 
 OPTIMAL = PRESETS["paper-optimal"]
-
-
-def with_limits(design: Design, **limits: object) -> Design:
-    return msgspec.structs.replace(design, limits=msgspec.structs.replace(design.limits, **limits))
 
 
 def started_at(problem: Problem, values: tuple[float, ...]) -> Problem:
@@ -90,7 +86,7 @@ def assert_is_sound(outcome: Outcome) -> None:
 
 
 @pytest.mark.parametrize("clearance", [None, 0.1, 0.2, 0.5])
-def test_the_papers_problem_is_solved_to_machine_precision(clearance: float | None) -> None:
+def test_search_for_paper_volume_matches_it_to_rounding(clearance: float | None) -> None:
     outcome = optimise_design(paper_problem(clearance))
     assert_is_sound(outcome)
     assert outcome.converged
@@ -101,7 +97,7 @@ def test_the_papers_problem_is_solved_to_machine_precision(clearance: float | No
 
 
 @pytest.mark.parametrize("clearance", [0.2, 0.5])
-def test_a_clearance_is_kept_between_the_positions_that_the_solver_looks_at(
+def test_optimum_keeps_clearance_between_the_positions_of_the_solver(
     clearance: float,
 ) -> None:
     problem = paper_problem(clearance)
@@ -114,7 +110,7 @@ def test_a_clearance_is_kept_between_the_positions_that_the_solver_looks_at(
     assert found >= 0.98 * clearance
 
 
-def test_random_starts_converge() -> None:
+def test_search_from_random_starts_converges() -> None:
     problem = paper_problem(0.2)
     for values in more_starts(problem, 3, seed=3):
         outcome = optimise_design(started_at(problem, values))
@@ -123,14 +119,14 @@ def test_random_starts_converge() -> None:
         assert outcome.best.objective <= 1e-6
 
 
-def test_a_search_that_legs_wall_in_goes_on_elsewhere() -> None:
+def test_search_enclosed_by_crossing_legs_restarts_elsewhere() -> None:
     problem = paper_problem(0.2)
     tried = [optimise_design(started_at(problem, v)) for v in more_starts(problem, 2, seed=1)]
     assert any(outcome.run.attempts > 1 for outcome in tried)
     assert all(outcome.converged for outcome in tried)
 
 
-def test_a_volume_that_is_there_already_takes_no_step() -> None:
+def test_search_for_the_start_volume_takes_no_step() -> None:
     problem = make_problem(OPTIMAL, "match-volume", volume=workspace_volume(OPTIMAL).volume)
     outcome = optimise_design(problem)
     assert outcome.converged
@@ -139,7 +135,7 @@ def test_a_volume_that_is_there_already_takes_no_step() -> None:
 
 
 @pytest.mark.parametrize("objective", ["match-volume", "smallest-reach"])
-def test_a_volume_out_of_reach_is_told_with_the_largest_found(objective: Any) -> None:
+def test_search_for_impossible_volume_names_the_largest_found(objective: Any) -> None:
     bounds = [Variable("a3x", 5.0, 12.0), Variable("a3y", 1.0, 6.0)]
     problem = make_problem(paper_start(), objective, volume=8000.0, bounds=bounds)
     outcome = optimise_design(problem)
@@ -159,7 +155,7 @@ def test_a_volume_out_of_reach_is_told_with_the_largest_found(objective: Any) ->
 # Optima
 
 
-def test_the_smallest_reach_for_the_volume_of_the_papers_optimum() -> None:
+def test_smallest_reach_for_the_paper_volume_is_below_17_90() -> None:
     outcome = optimise_design(reach_problem())
     assert_is_sound(outcome)
     assert outcome.converged
@@ -167,7 +163,7 @@ def test_the_smallest_reach_for_the_volume_of_the_papers_optimum() -> None:
     assert workspace_volume(outcome.design).volume == pytest.approx(7053.044190625, rel=1e-8)
 
 
-def test_several_starts_find_an_optimum_that_one_misses() -> None:
+def test_several_starts_reach_an_optimum_that_one_misses() -> None:
     problem = reach_problem()
     # The second start of the sequence ends in the worse optimum near 22.9.
     worse = started_at(problem, next(more_starts(problem, 1, seed=0)))
@@ -182,7 +178,7 @@ def test_several_starts_find_an_optimum_that_one_misses() -> None:
     assert {each.run for each in several.history} == set(range(4))
 
 
-def test_an_optimum_in_a_kink_of_the_volume_is_seen_as_one() -> None:
+def test_optimum_in_a_kink_of_the_volume_converges() -> None:
     # With more room for b1 the balls of legs 1 and 4 become one: −R b1 = a3.
     outcome = optimise_design(make_problem(OPTIMAL, "smallest-reach"))
     assert outcome.converged
@@ -192,7 +188,7 @@ def test_an_optimum_in_a_kink_of_the_volume_is_seen_as_one() -> None:
     assert design.reach < 17.1
 
 
-def test_the_conditions_of_an_optimum_fail_off_it() -> None:
+def test_optimality_off_the_optimum_fails() -> None:
     problem = reach_problem()
     outcome = optimise_design(problem)
     best = Model(problem, outcome.best.values)
@@ -214,7 +210,7 @@ def test_the_conditions_of_an_optimum_fail_off_it() -> None:
         ),
     ],
 )
-def test_no_design_near_an_optimum_is_better(problem: Problem) -> None:
+def test_designs_near_an_optimum_are_no_better(problem: Problem) -> None:
     outcome = optimise_design(problem)
     assert_is_sound(outcome)
     assert outcome.converged
@@ -236,7 +232,7 @@ def test_no_design_near_an_optimum_is_better(problem: Problem) -> None:
     assert compared > 5
 
 
-def test_margins_over_a_required_box_grow_with_yaw_and_height() -> None:
+def test_largest_margin_with_free_yaw_and_shifts_is_the_height() -> None:
     box = ((8.0, 4.0, 6.0), (12.0, 8.0, 10.0))
     turned = optimise_design(
         make_problem(OPTIMAL, "largest-margin", required_box=box, free=["yaw"])
@@ -267,10 +263,10 @@ def test_margins_over_a_required_box_grow_with_yaw_and_height() -> None:
     assert np.abs(margins(corners, rotation)).min() == pytest.approx(14.0, abs=1e-6)
 
 
-def test_a_reach_of_its_own_is_the_maximum_of_all_lengths() -> None:
+def test_reach_variable_sets_the_maximum_of_all_lengths() -> None:
     lengths = dict.fromkeys(("l1", "d2", "d4", "l4"), (0.0, 15.0))
     problem = make_problem(
-        with_limits(OPTIMAL, **lengths), "smallest-reach", volume=3000.0, free=["reach"]
+        limited(OPTIMAL, **lengths), "smallest-reach", volume=3000.0, free=["reach"]
     )
     outcome = optimise_design(problem)
     assert_is_sound(outcome)
@@ -280,7 +276,7 @@ def test_a_reach_of_its_own_is_the_maximum_of_all_lengths() -> None:
     assert outcome.best.objective < 15.0
 
 
-def test_a_stroke_ratio_is_that_of_the_actuators() -> None:
+def test_stroke_ratio_sets_the_minimum_of_all_lengths() -> None:
     problem = make_problem(OPTIMAL, "match-volume", volume=5000.0, stroke_ratio=2.0)
     outcome = optimise_design(problem)
     assert_is_sound(outcome)
@@ -293,9 +289,9 @@ def test_a_stroke_ratio_is_that_of_the_actuators() -> None:
 # Empty workspaces
 
 
-def test_an_empty_workspace_is_opened_first() -> None:
+def test_search_from_empty_workspace_opens_it_first() -> None:
     box = ((14.0, 14.0, 14.0), (20.0, 20.0, 20.0))
-    start = with_limits(PRESETS["paper-initial"], box=box)
+    start = limited(PRESETS["paper-initial"], box=box)
     assert workspace_volume(start).volume == 0.0
     problem = make_problem(start, "match-volume", volume=100.0)
     model = Model(problem, problem.start_values)
@@ -304,7 +300,7 @@ def test_an_empty_workspace_is_opened_first() -> None:
         assert worst in model.names or worst in {limit.name for limit in limits}
 
     limits = State(problem, model.start).limits
-    u = opened(problem, model.start, see=see)
+    u = open_workspace(problem, model.start, see=see)
     assert u is not None
     radius = room(problem)
     assert State(problem, u).volume >= 4.0 / 3.0 * math.pi * radius**3 * (1.0 - 1e-6)
@@ -315,9 +311,8 @@ def test_an_empty_workspace_is_opened_first() -> None:
     assert outcome.history[0].worst
 
 
-def test_a_workspace_that_nothing_opens_names_what_empties_it() -> None:
-    start = with_limits(OPTIMAL, guide=(100.0, 101.0))
-    outcome = optimise_design(make_problem(start, "match-volume", volume=10.0))
+def test_search_that_cannot_open_the_workspace_names_what_empties_it() -> None:
+    outcome = optimise_design(make_problem(EMPTY, "match-volume", volume=10.0))
     assert outcome.status == "infeasible"
     assert "empty because of" in outcome.run.message
     assert outcome.run.holding in outcome.run.message
@@ -327,7 +322,7 @@ def test_a_workspace_that_nothing_opens_names_what_empties_it() -> None:
 # Ends other than convergence
 
 
-def test_too_few_iterations_are_told_with_the_best_so_far() -> None:
+def test_search_with_too_few_iterations_returns_the_best_so_far() -> None:
     outcome = optimise_design(reach_problem(), iterations=4)
     assert_is_sound(outcome)
     assert outcome.status == "not converged"
@@ -337,7 +332,7 @@ def test_too_few_iterations_are_told_with_the_best_so_far() -> None:
 
 
 @pytest.mark.parametrize("after", [0, 1, 7, 40])
-def test_a_search_ends_when_it_is_told_to(after: int) -> None:
+def test_search_that_stop_ends_is_cancelled(after: int) -> None:
     asked = 0
 
     def stop() -> bool:
@@ -357,7 +352,7 @@ def test_a_search_ends_when_it_is_told_to(after: int) -> None:
         assert outcome.best.spare >= -1e-8
 
 
-def test_what_watches_sees_each_iterate_as_it_is_found() -> None:
+def test_watch_receives_each_iterate() -> None:
     seen: list[Iterate] = []
     outcome = optimise_design(reach_problem(), starts=2, watch=seen.append)
     assert tuple(seen) == outcome.history
@@ -365,7 +360,7 @@ def test_what_watches_sees_each_iterate_as_it_is_found() -> None:
         assert each.volume == workspace_volume(each.design).volume
 
 
-def test_an_error_of_what_watches_is_not_swallowed() -> None:
+def test_watch_that_raises_ends_the_search() -> None:
     def watch(_: Iterate) -> None:
         raise RuntimeError("the pipe is gone")
 
@@ -373,19 +368,19 @@ def test_an_error_of_what_watches_is_not_swallowed() -> None:
         optimise_design(paper_problem(), watch=watch)
 
 
-def test_the_same_search_finds_the_same() -> None:
+def test_search_repeated_has_the_same_history() -> None:
     first, second = (optimise_design(paper_problem(0.2), starts=2, seed=5) for _ in range(2))
     assert first.history == second.history
     assert first.runs == second.runs
 
 
-def test_problems_and_outcomes_go_to_another_process_and_back() -> None:
+def test_outcome_pickled_is_unchanged() -> None:
     outcome = optimise_design(paper_problem(0.2))
     assert pickle.loads(pickle.dumps(outcome)) == outcome
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_searches_from_random_designs_of_any_size_end_with_a_word(seed: int) -> None:
+def test_search_from_random_design_of_any_size_ends_with_a_message(seed: int) -> None:
     random = np.random.default_rng(seed)
     size = float(random.choice([1e-20, 1e-6, 1.0, 1e6, 1e20]))
     a3x, a3y, b1x, b1y, b2, b3 = (size * random.uniform(-1.0, 1.0, 6)).tolist()
@@ -399,7 +394,7 @@ def test_searches_from_random_designs_of_any_size_end_with_a_word(seed: int) -> 
     }
     design = Design(a3=(a3x, a3y), b1=(b1x, b1y), b2=b2, b3=b3)
     problem = make_problem(
-        with_limits(design, **limits),
+        limited(design, **limits),
         "match-volume" if seed % 4 else "largest-volume",
         volume=0.1 * size**3,
         clearance=0.02 * size if seed % 2 else None,
@@ -414,7 +409,7 @@ def test_searches_from_random_designs_of_any_size_end_with_a_word(seed: int) -> 
 # Where a clearance is not kept
 
 
-def test_crossings_are_found_where_there_are_any_and_nowhere_else() -> None:
+def test_crossings_agree_with_random_positions() -> None:
     random = np.random.default_rng(2)
     verdicts: set[bool] = set()
     for _ in range(12):
@@ -435,7 +430,7 @@ def test_crossings_are_found_where_there_are_any_and_nowhere_else() -> None:
 # Records
 
 
-def test_a_record_reads_back_and_repeats_the_search() -> None:
+def test_record_read_back_repeats_the_search() -> None:
     settings = Settings(starts=2, seed=7)
     outcome = optimise_design(paper_problem(0.2), starts=settings.starts, seed=settings.seed)
     record = decode_record(encode_record(record_of(outcome, settings)), "here")
@@ -449,12 +444,12 @@ def test_a_record_reads_back_and_repeats_the_search() -> None:
 
 
 @pytest.mark.parametrize("data", [b"", b"{}", b"[1]", b'{"schema": 2}', b"\xff\xfe", b"[" * 10_000])
-def test_what_is_no_record_is_refused(data: bytes) -> None:
+def test_decode_record_of_other_data_is_refused(data: bytes) -> None:
     with pytest.raises(InputError, match="elsewhere"):
         decode_record(data, "elsewhere")
 
 
-def test_a_record_that_is_not_there_is_told(tmp_path: Any) -> None:
+def test_load_record_without_a_file_is_refused(tmp_path: Any) -> None:
     with pytest.raises(InputError, match="cannot read"):
         load_record(tmp_path / "nothing.json")
 
@@ -462,124 +457,70 @@ def test_a_record_that_is_not_there_is_told(tmp_path: Any) -> None:
 # Bad input
 
 
-Change = Callable[[], Problem]
+SWING = limited(OPTIMAL, swing=msgspec.convert({"a1": 40.0}, type(OPTIMAL.limits.swing)))
+EMPTY = limited(OPTIMAL, guide=(100.0, 101.0))
+VOLUME = {"volume": 9.0}
+UNIT_BOX = ((0.0, 0.0, 5.0), (1.0, 1.0, 6.0))
+
+
+def make_from(start: Design = OPTIMAL, *, bound: Any = None, **arguments: Any) -> Problem:
+    bounds = [] if bound is None else [Variable(*bound)]
+    return make_problem(start, bounds=bounds, **arguments)
 
 
 @pytest.mark.parametrize(
-    ("make", "words"),
+    ("objective", "arguments", "words"),
     [
+        ("match-volume", VOLUME | {"bound": ("b2", 5.0, 3.0)}, "bounds of b2 cross: low 5, high 3"),
         (
-            lambda: make_problem(
-                OPTIMAL, "match-volume", volume=9.0, bounds=[Variable("b2", 5.0, 3.0)]
-            ),
-            "bounds of b2 cross: low 5, high 3",
-        ),
-        (
-            lambda: make_problem(
-                OPTIMAL, "match-volume", volume=9.0, bounds=[Variable("b2", 5.0, 9.0)]
-            ),
+            "match-volume",
+            VOLUME | {"bound": ("b2", 5.0, 9.0)},
             "b2 = 2.6067, outside its bounds 5 to 9",
         ),
+        ("match-volume", VOLUME | {"bound": ("b2", math.nan, 9.0)}, "b2 must be a finite number"),
+        ("match-volume", VOLUME | {"bound": ("b2", 0.0, math.inf)}, "b2 must be a finite number"),
+        ("match-volume", VOLUME | {"bound": ("b4", 0.0, 1.0)}, "no variable 'b4'"),
+        ("match-volume", VOLUME | {"free": ["b5"]}, "no variable"),
+        ("match-volume", {}, "match-volume needs a volume"),
+        ("match-volume", {"volume": math.nan}, "must be a positive, finite number; got nan"),
+        ("match-volume", {"volume": -1.0}, "must be a positive, finite number; got -1"),
+        ("match-volume", VOLUME | {"clearance": math.nan}, "clearance demanded must be a finite"),
         (
-            lambda: make_problem(
-                OPTIMAL, "match-volume", volume=9.0, bounds=[Variable("b2", math.nan, 9.0)]
-            ),
-            "bound of b2 must be a finite number",
-        ),
-        (
-            lambda: make_problem(
-                OPTIMAL, "match-volume", volume=9.0, bounds=[Variable("b2", 0.0, math.inf)]
-            ),
-            "bound of b2 must be a finite number",
-        ),
-        (
-            lambda: make_problem(
-                OPTIMAL, "match-volume", volume=9.0, bounds=[Variable("b4", 0.0, 1.0)]
-            ),
-            "no variable 'b4'",
-        ),
-        (lambda: make_problem(OPTIMAL, "match-volume", volume=9.0, free=["b5"]), "no variable"),
-        (lambda: make_problem(OPTIMAL, "match-volume"), "match-volume needs a volume"),
-        (
-            lambda: make_problem(OPTIMAL, "match-volume", volume=math.nan),
-            "volume demanded must be a positive, finite number; got nan",
-        ),
-        (
-            lambda: make_problem(OPTIMAL, "match-volume", volume=-1.0),
-            "volume demanded must be a positive, finite number; got -1",
-        ),
-        (
-            lambda: make_problem(OPTIMAL, "match-volume", volume=9.0, clearance=math.nan),
-            "clearance demanded must be a finite number",
-        ),
-        (
-            lambda: make_problem(
-                OPTIMAL, "match-volume", volume=9.0, clearance=0.1, clearance_margin=0.0
-            ),
+            "match-volume",
+            VOLUME | {"clearance": 0.1, "clearance_margin": 0.0},
             "positive clearance margin",
         ),
+        ("match-volume", VOLUME | {"least": math.nan}, "least must be a finite number"),
+        ("match-volume", VOLUME | {"least": 5.0}, "below the least allowed 5"),
+        ("match-volume", VOLUME | {"stroke_ratio": 1.0}, "stroke ratio is longest over shortest"),
+        ("largest-margin", {"free": ["yaw"]}, "needs a required box"),
+        ("largest-margin", {"required_box": UNIT_BOX}, "do not depend on the design variables"),
         (
-            lambda: make_problem(OPTIMAL, "match-volume", volume=9.0, least=math.nan),
-            "least must be a finite number",
-        ),
-        (
-            lambda: make_problem(OPTIMAL, "match-volume", volume=9.0, least=5.0),
-            "below the least allowed 5",
-        ),
-        (
-            lambda: make_problem(OPTIMAL, "match-volume", volume=9.0, stroke_ratio=1.0),
-            "stroke ratio is longest over shortest",
-        ),
-        (lambda: make_problem(OPTIMAL, "largest-margin", free=["yaw"]), "needs a required box"),
-        (
-            lambda: make_problem(
-                OPTIMAL, "largest-margin", required_box=((0.0, 0.0, 5.0), (1.0, 1.0, 6.0))
-            ),
-            "margins do not depend on the design variables",
-        ),
-        (
-            lambda: make_problem(
-                OPTIMAL,
-                "match-volume",
-                volume=9.0,
-                required_box=((0.0, 0.0, 5.0), (1.0, -1.0, 6.0)),
-            ),
+            "match-volume",
+            VOLUME | {"required_box": ((0.0, 0.0, 5.0), (1.0, -1.0, 6.0))},
             "required box y: the low end 0 exceeds the high end -1",
         ),
         (
-            lambda: make_problem(OPTIMAL, "match-volume", volume=9.0, free=["shift-x"]),
-            "shift-x shifts the required box, and none is given",
+            "match-volume",
+            VOLUME | {"free": ["shift-x"]},
+            "shift-x shifts the required box",
         ),
-        (
-            lambda: make_problem(with_limits(OPTIMAL, l1=(0.0, 20.0)), "smallest-reach"),
-            "let the reach change",
-        ),
-        (
-            lambda: make_problem(
-                with_limits(
-                    OPTIMAL, swing=msgspec.convert({"a1": 40.0}, type(OPTIMAL.limits.swing))
-                ),
-                "largest-volume",
-            ),
-            "swing",
-        ),
-        (
-            lambda: make_problem(
-                with_limits(OPTIMAL, guide=(100.0, 101.0)), "smallest-reach", free=["yaw"]
-            ),
-            "the start has an empty workspace",
-        ),
+        ("smallest-reach", {"start": limited(OPTIMAL, l1=(0.0, 20.0))}, "let the reach change"),
+        ("largest-volume", {"start": SWING}, "swing"),
+        ("smallest-reach", {"start": EMPTY, "free": ["yaw"]}, "the start has an empty workspace"),
     ],
 )
-def test_bad_problems_are_refused_with_what_would_work(make: Change, words: str) -> None:
+def test_make_problem_with_bad_input_says_what_would_work(
+    objective: ObjectiveName, arguments: dict[str, Any], words: str
+) -> None:
     with pytest.raises(InputError) as caught:
-        make()
+        make_from(objective=objective, **arguments)
     assert words in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize(("option", "value"), [("starts", 0), ("starts", 10**6), ("iterations", 0)])
-def test_bad_settings_are_refused(option: str, value: int) -> None:
+def test_search_with_bad_settings_is_refused(option: str, value: int) -> None:
     options: dict[str, Any] = {option: value}
     with pytest.raises(InputError, match=option):
         optimise_design(paper_problem(), **options)
@@ -593,7 +534,7 @@ def test_default_bounds_hold_every_start_and_keep_lines_apart() -> None:
         assert math.sin(math.radians(yaw.low)) * math.sin(math.radians(yaw.high)) > 0.0
 
 
-def test_a_problem_that_demands_nothing_is_solved_within_its_bounds() -> None:
+def test_problem_without_demands_is_solved_within_its_bounds() -> None:
     problem = Problem(
         start=OPTIMAL,
         objective="largest-volume",

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import msgspec
 import numpy as np
 import pytest
+from limited_designs import limited
 from numpy.testing import assert_allclose
 
 from explorer import PRESETS, Design, Limits, make_problem, workspace_volume
@@ -29,14 +30,10 @@ OPTIMAL = PRESETS["paper-optimal"]
 REQUIRED = ((8.0, 4.0, 6.0), (12.0, 8.0, 10.0))
 
 
-def with_limits(design: Design, **limits: object) -> Design:
-    return msgspec.structs.replace(design, limits=msgspec.structs.replace(design.limits, **limits))
-
-
 def many_limits() -> Design:
     """Return a design with every limit there is a gradient for."""
     lengths: dict[str, Range] = {"l1": (6.0, None), "d2": (2.0, None), "l4": (3.0, None)}
-    return with_limits(
+    return limited(
         OPTIMAL, **lengths, guide=(-5.0, 25.0), gap=0.2, margin=0.5, leg_radii=(0.1, 0.2, 0.1, 0.3)
     )
 
@@ -86,7 +83,7 @@ def around(model: Model, u: FloatArray) -> list[tuple[Evaluation, Evaluation]]:
 
 
 @pytest.mark.parametrize("name", list(DESIGNS))
-def test_gradients_of_demands_are_those_of_central_differences(name: str) -> None:
+def test_gradients_of_demands_match_central_differences(name: str) -> None:
     warm()
     for seed, problem in enumerate(problems(name)):
         model = Model(problem, problem.start_values)
@@ -99,7 +96,7 @@ def test_gradients_of_demands_are_those_of_central_differences(name: str) -> Non
 
 @pytest.mark.parametrize("name", list(DESIGNS))
 @pytest.mark.parametrize("objective", OBJECTIVES)
-def test_slopes_of_objectives_are_those_of_central_differences(
+def test_slopes_of_objectives_match_central_differences(
     objective: ObjectiveName, name: str
 ) -> None:
     problem = make_problem(
@@ -115,7 +112,7 @@ def test_slopes_of_objectives_are_those_of_central_differences(
         assert_allclose(model.at(u).slope, slope, rtol=0, atol=TOLERANCE)
 
 
-def test_what_a_volume_is_matched_by_vanishes_with_the_slope_of_its_cube_root() -> None:
+def test_volume_demand_at_its_volume_is_zero() -> None:
     problem = make_problem(OPTIMAL, "match-volume", volume=workspace_volume(OPTIMAL).volume)
     model = Model(problem, problem.start_values)
     at = model.at(model.start)
@@ -124,14 +121,14 @@ def test_what_a_volume_is_matched_by_vanishes_with_the_slope_of_its_cube_root() 
     assert model.equalities.tolist() == [True, False, False, False]
 
 
-def test_all_kinds_of_demands_have_been_looked_at() -> None:
+def test_problems_with_all_demands_cover_every_kind() -> None:
     problem = next(problems("many limits"))
     model = Model(problem, problem.start_values)
     kinds = {name.split(" ")[0] for name in model.names}
     assert kinds == {"volume", "reach", "distance", "gap", "required", "margin", "clearance"}
 
 
-def test_a_slack_is_that_of_its_limit() -> None:
+def test_slack_of_state_matches_its_limit() -> None:
     problem = next(problems("many limits"))
     model = Model(problem, problem.start_values)
     state = model.at(model.start).state
@@ -145,9 +142,9 @@ def test_a_slack_is_that_of_its_limit() -> None:
             assert_allclose(by_p[:, axis], (ahead - behind) / 2e-5, rtol=0, atol=1e-7)
 
 
-def test_a_required_box_is_within_when_all_of_its_positions_are() -> None:
+def test_required_box_demand_agrees_with_all_positions_of_the_box() -> None:
     random = np.random.default_rng(3)
-    design = with_limits(OPTIMAL, l1=(8.0, None), d4=(3.0, None), box=None)
+    design = limited(OPTIMAL, l1=(8.0, None), d4=(3.0, None), box=None)
     verdicts: set[bool] = set()
     for _ in range(40):
         middle = np.array([8.0, 4.0, 8.0]) + 5.0 * random.normal(size=3)
@@ -168,7 +165,7 @@ def test_a_required_box_is_within_when_all_of_its_positions_are() -> None:
     assert verdicts == {True, False}
 
 
-def test_limits_of_a_design_are_kept_as_they_are() -> None:
+def test_design_of_problem_keeps_its_limits() -> None:
     assert isinstance(many_limits().limits, Limits)
     problem = next(problems("many limits"))
     design = problem.design_at(problem.start_values)

@@ -8,6 +8,7 @@ from typing import Any
 import msgspec
 import numpy as np
 import pytest
+from limited_designs import limited
 from numpy.testing import assert_allclose
 
 from explorer import InputError, workspace_volume
@@ -40,10 +41,6 @@ PROBLEMS, DESIGNS = 100, 4
 @pytest.fixture(autouse=True, scope="module")
 def _warm_kernels() -> None:  # pyright: ignore[reportUnusedFunction]
     warm()
-
-
-def limited(design: Design, **limits: Any) -> Design:
-    return msgspec.structs.replace(design, limits=msgspec.structs.replace(design.limits, **limits))
 
 
 def random_problem(rng: np.random.Generator) -> Problem:
@@ -120,7 +117,7 @@ def meets(problem: Problem, values: tuple[float, ...]) -> bool:
     return clearance is None or clearance >= wanted - CERTAIN * at.state.design.reach
 
 
-def test_no_workspace_is_larger_than_any_ceiling_and_what_is_refuted_is_never_met() -> None:
+def test_refutations_of_random_problems_are_never_contradicted() -> None:
     rng = np.random.default_rng(15)
     refuted, nearest = Counter[str](), 0.0
     for _ in range(PROBLEMS):
@@ -170,7 +167,7 @@ def limits_of(problem: Problem) -> list[str]:
     return [each.limit for each in refutations(problem)]
 
 
-def test_the_papers_start_is_told_what_its_box_holds_and_the_papers_box_is_enough() -> None:
+def test_box_of_the_paper_start_is_too_small_and_the_paper_box_is_enough() -> None:
     problem = paper_problem(clearance=0.2)
     assert words_of(refutations(problem)) == "the box holds at most 2,499 of the 8,000 asked for"
     assert paper_box(problem) == PAPER_BOX == OPTIMAL.limits.box
@@ -234,25 +231,25 @@ def test_the_papers_start_is_told_what_its_box_holds_and_the_papers_box_is_enoug
         ),
     ],
 )
-def test_the_limit_that_binds_is_told_with_what_it_gives(
+def test_refutation_names_the_limit_and_the_most_that_it_allows(
     start: Design, demands: dict[str, Any], words: str
 ) -> None:
     told = words_of(refutations(paper_problem(start, **demands)))
     assert (words in told) if words else told == ""
 
 
-def test_reasons_that_do_not_exclude_each_other_are_all_told() -> None:
+def test_refutations_by_several_limits_are_all_listed() -> None:
     start = limited(INITIAL, l1=(0.0, 12.0))
     assert limits_of(paper_problem(start)) == ["box", "l1 maximum"]
     assert limits_of(paper_problem(with_box(start, None))) == ["l1 maximum"]
 
 
-def test_volumes_that_nearly_agree_are_told_with_the_digits_in_which_they_differ() -> None:
+def test_refutation_of_nearly_equal_volumes_shows_the_digits_that_differ() -> None:
     (found,) = refutations(paper_problem(volume=2499.0))
     assert found.message == "the box holds at most 2,498.7 of the 2,499.0 asked for"
 
 
-def test_a_free_yaw_refutes_nothing_that_another_yaw_gives() -> None:
+def test_free_yaw_refutes_nothing_that_another_yaw_gives() -> None:
     # The margins of a tilted platform turn with it: those of one yaw cut off most of the box.
     tilted = Pose.of_yaw_pitch_roll((10.0, 5.0, 9.0), (-73.0, 60.0, 0.0))
     start = msgspec.structs.replace(limited(OPTIMAL, margin=7.0), home=tilted)
@@ -260,7 +257,7 @@ def test_a_free_yaw_refutes_nothing_that_another_yaw_gives() -> None:
     assert limits_of(paper_problem(start, 5000.0, free=("yaw",))) == []
 
 
-def test_a_box_cut_by_planes_has_the_volume_of_what_is_left() -> None:
+def test_box_cut_by_planes_has_the_volume_of_the_rest() -> None:
     box = ((-1.0, 0.0, 2.0), (3.0, 2.0, 5.0))
     x, z = np.eye(3)[[0, 2]]
     assert_allclose(cut_volume(box, []), 24.0)
@@ -273,7 +270,7 @@ def test_a_box_cut_by_planes_has_the_volume_of_what_is_left() -> None:
 
 
 @pytest.mark.parametrize("foot", [-9.0, -0.7, 0.0, 0.4, 1.5, 9.0])
-def test_what_lies_over_a_height_of_a_ball_and_of_a_disc(foot: float) -> None:
+def test_ball_and_disc_above_a_height_match_sums_of_slices(foot: float) -> None:
     middles = (np.arange(4000) + 0.5) / 1000.0 - 2.0
     middles = middles[middles >= foot]
     wide, narrow = (np.maximum(0.0, r * r - middles**2) for r in (2.0, 0.5))
@@ -282,7 +279,7 @@ def test_what_lies_over_a_height_of_a_ball_and_of_a_disc(foot: float) -> None:
     assert_allclose([ball_above(2.0, 0.5, foot), disc_above(2.0, 0.5, foot)], slices, atol=2e-3)
 
 
-def test_a_limit_that_is_in_the_way_of_a_volume_is_the_one_without_which_it_is_there() -> None:
+def test_binding_limit_lifted_gives_the_volume() -> None:
     grown = OPTIMAL.with_variables([25.0, 12.0, 4.0, -4.0, 2.6, 4.9])
     assert workspace_volume(grown).volume < 11_000.0
     found = find_binding_limit(grown, 11_000.0)

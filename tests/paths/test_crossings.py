@@ -1,4 +1,4 @@
-"""Where paths cross singularities, and that paths between two modes always do."""
+"""Singular poses on paths: all are found, and a path between two modes has one."""
 
 from __future__ import annotations
 
@@ -8,13 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, strategies as st
 from scipy.spatial.transform import Rotation
-from strategies import (
-    WAYS,
-    Case,
-    cases,
-    ordinary_cases,
-    singular_cases,
-)
+from strategies import WAYS, Case, cases, ordinary_cases, singular_cases
 
 from explorer import PRESETS, InputError, Pose, forward, home_pose, inverse, margins, poses_between
 from explorer.mechanism.margins import mode_of
@@ -30,7 +24,7 @@ def random_pose(rng: np.random.Generator, size: float = 5.0) -> Pose:
 
 
 def sign_changes(start: Pose, end: Pose, samples: int = 4001) -> FloatArray:
-    """Return how often each margin is seen to change its sign, shape (3,)."""
+    """Return the number of changes of sign of each margin between samples, shape (3,)."""
     shares = np.linspace(0.0, 1.0, samples)
     signs = margins(*poses_between(start, end, shares)) > 0.0
     return (signs[1:] != signs[:-1]).sum(axis=0).astype(np.float64)
@@ -110,8 +104,7 @@ def test_margins_smooth_path_between_modes_change_sign(case: Case, seed: int) ->
 @pytest.mark.parametrize("last", range(8))
 def test_path_margins_straight_move_between_modes_has_its_crossings(last: int) -> None:
     joints = inverse(OPTIMAL, HOME.position, HOME.rotation)
-    first = 3
-    modes = forward(OPTIMAL, joints)
+    first, modes = 3, forward(OPTIMAL, joints)
     ends = [Pose.of(modes.position[mode], modes.rotation[mode]) for mode in (first, last)]
     found = path_margins(ends)
     assert found.margins.shape == (len(found.at), 3)

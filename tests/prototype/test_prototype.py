@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator
 from typing import Any
@@ -19,16 +20,10 @@ from explorer import PRESETS, Design, InputError, Pose, home_pose, leg_clearance
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.assembly import Prototype, make_prototype
 from explorer.prototype.bill import bill_of_materials
-from explorer.prototype.chains import BODIES, LEGS, ON_GUIDE, Places
-from explorer.prototype.dimensions import (
-    CLEARANCE,
-    FIRST_SWING,
-    SECOND_SWING,
-    LegSizes,
-    Stroke,
-)
+from explorer.prototype.chains import BODIES, LEGS, ON_GUIDE, Places, joints_of_leg
+from explorer.prototype.dimensions import CLEARANCE, FIRST_SWING, SECOND_SWING, LegSizes, Stroke
+from explorer.prototype.part import Part
 
-untyped: Any = trimesh
 OPTIMAL, INITIAL = PRESETS["paper-optimal"], PRESETS["paper-initial"]
 HALF_TURN_X, HALF_TURN_Z = np.diag([1.0, -1.0, -1.0]), np.diag([-1.0, -1.0, 1.0])
 
@@ -71,14 +66,22 @@ PROTOTYPES = {design.name: make_prototype(design) for design in (*DESIGNS, UNBOX
 NAMES = [design.name for design in DESIGNS]
 
 
+def parts_named(prototype: Prototype, *names: str) -> list[Part]:
+    return [part for part in prototype.parts if part.name in names]
+
+
 def pose_overlaps(prototype: Prototype, position: FloatArray, rotation: FloatArray) -> list[Any]:
     places = prototype.chains.places_at(position, rotation)
     return list(overlaps(prototype.parts, places))
 
 
-def at_home(prototype: Prototype) -> Places:
+def pose_of(prototype: Prototype) -> tuple[FloatArray, FloatArray]:
     home = home_pose(prototype.design)
-    return prototype.chains.places_at(home.position, home.rotation)
+    return np.array(home.position), home.rotation
+
+
+def at_home(prototype: Prototype) -> Places:
+    return prototype.chains.places_at(*pose_of(prototype))
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -127,11 +130,6 @@ def test_parts_of_turned_frames_are_those_of_the_same_mechanism(design: Design) 
     np.testing.assert_allclose(np.sort(one @ turn.T, axis=1), np.sort(two, axis=1), atol=0.02)
 
 
-def pose_of(prototype: Prototype) -> tuple[FloatArray, FloatArray]:
-    home = home_pose(prototype.design)
-    return np.array(home.position), home.rotation
-
-
 @pytest.mark.parametrize("name", NAMES)
 def test_parts_keep_their_clearance_at_home(name: str) -> None:
     prototype = PROTOTYPES[name]
@@ -157,20 +155,20 @@ def motion(prototype: Prototype, many: int) -> Iterator[tuple[FloatArray, FloatA
         return position + width * 0.5 * reach * shift, rotation @ turn
 
     for phase in np.linspace(0.0, 2.0 * math.pi, many, endpoint=False).tolist():
-        width = 1.0
-        while prototype.broken_joint_limits(*pose(phase, width)) or not clear(
-            prototype, *pose(phase, width)
-        ):
-            width *= 0.85
-        assert width > 0.01
-        yield pose(phase, width)
+        for width in np.geomspace(1.0, 0.01, 29).tolist():
+            found = pose(phase, width)
+            if not prototype.broken_joint_limits(*found) and clear(prototype, *found):
+                yield found
+                break
+        else:
+            pytest.fail("no pose in this direction is clear")
 
 
 def clear(prototype: Prototype, position: FloatArray, rotation: FloatArray) -> bool:
     """Return whether the legs as capsules, as thick as cups and forks, keep apart."""
     unit = prototype.design.unit_mm
-    wide = tuple(own.cup / unit for own in prototype.sizes.legs)
-    wide = (wide[0], prototype.sizes.radii[1] / unit, prototype.sizes.radii[2] / unit, wide[3])
+    cups, radii = [own.cup for own in prototype.sizes.legs], prototype.sizes.radii
+    wide = tuple(width / unit for width in (cups[0], *radii[1:3], cups[3]))
     design = limited(prototype.design, leg_radii=wide)
     return bool((leg_clearances(design, position, rotation).clearance > 0.0).all())
 
@@ -190,18 +188,13 @@ def test_universal_joints_within_their_swings_are_clear(name: str) -> None:
     prototype = PROTOTYPES[name]
     chains, (position, rotation) = prototype.chains, pose_of(prototype)
     home = chains.joints(position, rotation)
-    for leg in (1, 4):
-        own = [
-            part
-            for part in prototype.parts
-            if part.name in ("base", f"cross {leg}", f"cylinder {leg}")
-        ]
-        for first in np.linspace(-FIRST_SWING, FIRST_SWING, 5):
-            for second in np.linspace(-SECOND_SWING, SECOND_SWING, 5):
-                joints = home.copy()
-                joints[3 * leg - 3 : 3 * leg - 1] = first, second
-                places = chains.places(joints, position, rotation)
-                assert list(overlaps(own, places)) == [], (leg, first, second)
+    swings = (np.linspace(-most, most, 5) for most in (FIRST_SWING, SECOND_SWING))
+    for leg, swing in itertools.product((1, 4), itertools.product(*swings)):
+        joints = home.copy()
+        joints_of_leg(joints, leg)[:2] = swing
+        places = chains.places(joints, position, rotation)
+        own = parts_named(prototype, "base", f"cross {leg}", f"cylinder {leg}")
+        assert list(overlaps(own, places)) == [], (leg, swing)
 
 
 @pytest.mark.parametrize("name", [OPTIMAL.name, UPSIDE_DOWN.name, LARGE.name])
@@ -209,11 +202,7 @@ def test_ball_joints_up_to_nearly_a_right_angle_are_clear(name: str) -> None:
     prototype = PROTOTYPES[name]
     places = at_home(prototype)
     for leg in LEGS:
-        own = [
-            part
-            for part in prototype.parts
-            if part.name in ("platform", f"ball {leg}", f"rod {leg}")
-        ]
+        own = parts_named(prototype, f"rod {leg}", "platform", f"ball {leg}")
         index = BODIES.index(f"rod {leg}")
         normal = -prototype.chains.platform_side * places.rotation[-1][:, 2]
         for azimuth in np.linspace(0.0, 2.0 * math.pi, 6):
@@ -232,15 +221,12 @@ def test_rods_over_their_stroke_stay_within_their_cylinders(name: str) -> None:
     chains, (position, rotation) = prototype.chains, pose_of(prototype)
     unit = prototype.design.unit_mm
     for leg, (low, high) in zip(LEGS, prototype.sizes.strokes, strict=True):
-        cylinder, rod = (
-            next(part for part in prototype.parts if part.name == f"{kind} {leg}")
-            for kind in ("cylinder", "rod")
-        )
+        cylinder, rod = parts_named(prototype, f"cylinder {leg}", f"rod {leg}")
         radius = prototype.sizes.radii[leg - 1]
 
         def placed(length: float, leg: int = leg) -> Places:
             joints = chains.joints(position, rotation)
-            joints[3 * leg - 1] = length / unit
+            joints_of_leg(joints, leg)[-1] = length / unit
             return chains.places(joints, position, rotation)
 
         for length in (low, 0.5 * (low + high), high):
@@ -263,14 +249,14 @@ def test_strokes_of_random_legs_hold_home_and_fit_one_rod(
 ) -> None:
     own = LegSizes(radius, floor * radius)
     at_home = home * own.dead
-    asked = Stroke(ends[0] * at_home, ends[1] * at_home)
-    found = own.stroke(asked, at_home)
+    required = Stroke(ends[0] * at_home, ends[1] * at_home)
+    found = own.stroke(required, at_home)
     slack = 1e-9 * at_home
-    assert asked.shortest - slack <= found.shortest <= at_home + slack
-    assert at_home - slack <= found.longest <= asked.longest + slack
+    assert required.shortest - slack <= found.shortest <= at_home + slack
+    assert at_home - slack <= found.longest <= required.longest + slack
     assert found.longest <= 2.0 * found.shortest - own.dead + slack
-    if asked.longest <= 2.0 * asked.shortest - own.dead:
-        assert found == pytest.approx(asked, rel=1e-9)
+    if required.longest <= 2.0 * required.shortest - own.dead:
+        assert found == pytest.approx(required, rel=1e-9)
 
 
 def test_stroke_that_fits_one_rod_is_that_of_the_limits() -> None:
@@ -332,10 +318,6 @@ def test_places_of_random_poses_lie_along_the_legs(name: str) -> None:
             np.testing.assert_allclose(along[:, 0], 0.0, atol=1e-12 * design.reach)
 
 
-def least_named(message: str, words: str) -> float:
-    return float(message.partition(words)[2].split()[0].rstrip(";,"))
-
-
 TIGHT = (
     (limited(OPTIMAL, leg_radii=(0.4,) * 4), "carriages 2 and 3 at home are 6.69 mm apart"),
     (limited(OPTIMAL, leg_radii=(0.05,) * 4), "the radius of leg 1 is 0.5 mm"),
@@ -361,21 +343,20 @@ def test_design_too_tight_for_parts_names_what_would_fit(design: Design, words: 
     assert words in message
     assert "\n" not in message
     unit, offers = "unit of at least ", ("radius at most ", "radius at least ")
-    offered = [phrase for phrase in (unit, *offers) if phrase in message]
+    offered = {
+        phrase: float(message.partition(phrase)[2].split()[0].rstrip(";,"))
+        for phrase in (unit, *offers)
+        if phrase in message
+    }
     assert offered or "no unit makes that fit" in message
-    for phrase in offered:
-        value = least_named(message, phrase)
-        if phrase != unit:
-            make_prototype(scaled_radii(design, value))
-            continue
-        make_prototype(msgspec.structs.replace(design, unit_mm=value))
+    if unit in offered:
+        make_prototype(msgspec.structs.replace(design, unit_mm=offered[unit]))
         with pytest.raises(InputError):
-            make_prototype(msgspec.structs.replace(design, unit_mm=0.98 * value))
-
-
-def scaled_radii(design: Design, largest: float) -> Design:
-    factor = largest / max(design.limits.leg_radii)
-    return limited(design, leg_radii=tuple(factor * r for r in design.limits.leg_radii))
+            make_prototype(msgspec.structs.replace(design, unit_mm=0.98 * offered[unit]))
+    for phrase in set(offers) & set(offered):
+        factor = offered[phrase] / max(design.limits.leg_radii)
+        radii = tuple(factor * radius for radius in design.limits.leg_radii)
+        make_prototype(limited(design, leg_radii=radii))
 
 
 def test_homes_beyond_joint_limits_are_refused() -> None:
@@ -384,9 +365,8 @@ def test_homes_beyond_joint_limits_are_refused() -> None:
     leaning = msgspec.structs.replace(
         OPTIMAL, home=Pose((12.0, 5.0, 4.0), home_pose(OPTIMAL).quaternion)
     )
-    with pytest.raises(
-        InputError, match=r"at home the universal joint at a\d leans .* choose another"
-    ):
+    leans = r"at home the universal joint at a\d leans .* choose another"
+    with pytest.raises(InputError, match=leans):
         make_prototype(leaning)
     parallel = msgspec.structs.replace(OPTIMAL, home=Pose.of_yaw_pitch_roll((10, 5, 9), (90, 0, 0)))
     with pytest.raises(InputError, match="no unit makes that fit"):
@@ -410,6 +390,6 @@ def test_bill_of_materials_has_every_part_and_actuator(name: str) -> None:
         assert actuator.mass == pytest.approx(cylinder.mass + rod.mass, rel=1e-12)
         # Together they span the longest length, and neither exceeds the shortest.
         assert rod.size[2] < low < high < cylinder.size[2] + rod.size[2]
-        assert actuator.asked.shortest <= low
-        assert high <= actuator.asked.longest
+        assert actuator.required.shortest <= low
+        assert high <= actuator.required.longest
         assert actuator.diameter == pytest.approx(2.0 * prototype.sizes.radii[actuator.leg - 1])

@@ -1,4 +1,4 @@
-"""The closure order of the strata against other definitions of it, and their descriptions."""
+"""The closure order of the strata against other definitions, and their descriptions."""
 
 from __future__ import annotations
 
@@ -6,8 +6,7 @@ import itertools
 
 import numpy as np
 import pytest
-from incidence import permutation_of_flags
-from test_strata import REPRESENTATIVES, is_below as is_below_by_tableaux
+from incidence import REPRESENTATIVES, is_below as is_below_by_tableaux, permutation_of_flags
 
 from explorer import margins
 from explorer.singularity.bruhat import (
@@ -25,22 +24,17 @@ from explorer.singularity.strata import GENERIC, STRATA, inversions
 
 
 def swaps(w: Stratum) -> set[Stratum]:
-    """Return what a swap of two entries makes of a permutation with one inversion less."""
-    found: set[Stratum] = set()
-    for i, j in itertools.combinations(range(4), 2):
-        entries = list(w)
-        entries[i], entries[j] = entries[j], entries[i]
-        if inversions(tuple(entries)) == inversions(w) - 1:
-            found.add(tuple(entries))
-    return found
+    """Return the permutations with one inversion less that a swap of two entries makes."""
+    swapped = [tuple({a: b, b: a}.get(v, v) for v in w) for a, b in itertools.combinations(w, 2)]
+    return {v for v in swapped if inversions(v) == inversions(w) - 1}
 
 
-def test_the_order_is_that_of_the_tableau_criterion() -> None:
+def test_order_is_that_of_the_tableau_criterion() -> None:
     for lower, upper in itertools.product(STRATA, STRATA):
         assert is_below(lower, upper) == is_below_by_tableaux(lower, upper)
 
 
-def test_the_edges_are_the_swaps_that_lower_the_dimension_by_one() -> None:
+def test_edges_are_the_swaps_that_lower_the_dimension_by_one() -> None:
     assert {w: set(COVERED[w]) for w in STRATA} == {w: swaps(w) for w in STRATA}
     assert sum(map(len, COVERED.values())) == 58
 
@@ -60,7 +54,7 @@ def test_codimensions_count_from_the_generic_stratum() -> None:
 
 
 @pytest.mark.parametrize("w", STRATA)
-def test_the_essential_conditions_hold_in_the_closure_and_nowhere_else(w: Stratum) -> None:
+def test_essential_conditions_hold_in_the_closure_and_nowhere_else(w: Stratum) -> None:
     def holds(stratum: Stratum) -> bool:
         ranks = [[sum(v <= j for v in stratum[:i]) for j in range(5)] for i in range(5)]
         return all(ranks[i][j] >= least for i, j, least in conditions(w))
@@ -76,7 +70,7 @@ def test_description_of_every_stratum_is_distinct() -> None:
 
 
 @pytest.mark.parametrize("w", STRATA)
-def test_the_incidences_are_the_margins_that_vanish(w: Stratum) -> None:
+def test_incidences_are_the_margins_that_vanish(w: Stratum) -> None:
     position, rotation = REPRESENTATIVES[w]
     assert permutation_of_flags(position, rotation) == w
     zero = np.flatnonzero(np.abs(margins(position, rotation)) < 1e-12) + 1

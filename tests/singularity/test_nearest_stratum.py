@@ -1,15 +1,15 @@
-"""The nearest pose in each stratum: in its closure, and globally nearest."""
+"""The nearest pose in each stratum, which is in its closure and globally nearest."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 from hypothesis import example, given, settings, strategies as st
+from incidence import REPRESENTATIVES, is_clear_cut
 from multistart import searched_least
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 from strategies import QUARTER_TURNS, Case, designs, ordinary_cases, positions, rotations
-from test_strata import REPRESENTATIVES, is_clear_cut
 
 from explorer import PRESETS, Design, InputError, Pose, home_pose, nearest_singularities
 from explorer.mechanism.displacement import displacement
@@ -19,15 +19,11 @@ from explorer.singularity.nearest_stratum import nearest_in_strata, nearest_in_s
 from explorer.singularity.strata import GENERIC, STRATA
 
 OPTIMAL = PRESETS["paper-optimal"]
-# Where the conditions in words are as many as the codimension, SLSQP can take them as they are.
+# Strata with as many conditions as their codimension, which SLSQP needs.
 SEARCHED = (
     ((3, 4, 1, 2), (2, 4, 3, 1), (4, 1, 3, 2), (3, 2, 4, 1), (4, 2, 1, 3), (1, 4, 3, 2))
     + ((3, 2, 1, 4), (2, 3, 4, 1), (2, 1, 4, 3))
 )  # fmt: skip
-
-
-def pose_of(case: Case) -> Pose:
-    return Pose.of(case.position, case.rotation)
 
 
 def way(case: Case, one: Pose, other: Pose) -> float:
@@ -37,7 +33,7 @@ def way(case: Case, one: Pose, other: Pose) -> float:
 
 
 def vanishing(w: Stratum, p: FloatArray, r: FloatArray) -> list[float]:
-    """Return what the words of a stratum say is zero, each only once."""
+    """Return the values that vanish in the closure of a stratum, each once."""
     u, v, n = r.T
     meanings = {
         (1, 3, 1): {"np": n @ p},
@@ -66,8 +62,8 @@ def vanishing(w: Stratum, p: FloatArray, r: FloatArray) -> list[float]:
     )
 )
 @settings(max_examples=10)
-def test_each_pose_is_in_its_stratum_or_one_in_its_closure(case: Case) -> None:
-    pose = pose_of(case)
+def test_nearest_pose_lies_in_the_closure_of_its_stratum(case: Case) -> None:
+    pose = case.pose
     for w, found in nearest_in_strata(case.design, pose).items():
         assert found.stratum == w
         seen, reach = seen_stratum(case.design, found.pose), case.design.reach
@@ -75,7 +71,7 @@ def test_each_pose_is_in_its_stratum_or_one_in_its_closure(case: Case) -> None:
         if is_below(seen, w) or is_clear_cut(place, reach):
             assert found.seen == seen
         else:
-            # Its incidences hold, but at the tolerance others do too, which need not agree.
+            # At the tolerance other incidences hold as well, which need not agree.
             assert found.seen == w
             assert_allclose(vanishing(w, place.position / reach, place.rotation), 0.0, atol=1e-9)
         assert is_below(found.seen, w)
@@ -83,7 +79,7 @@ def test_each_pose_is_in_its_stratum_or_one_in_its_closure(case: Case) -> None:
 
 
 @pytest.mark.parametrize("w", SEARCHED)
-def test_nearest_pose_is_as_near_as_slsqp_from_many_starts(w: Stratum) -> None:
+def test_nearest_pose_is_as_near_as_that_of_slsqp_from_many_starts(w: Stratum) -> None:
     rng = np.random.default_rng(sum(10**i * x for i, x in enumerate(w)))
     position, rotation = rng.uniform(-8.0, 8.0, 3), Rotation.random(random_state=rng).as_matrix()
     found = nearest_in_stratum(OPTIMAL, Pose.of(position, rotation), w)
@@ -103,8 +99,8 @@ def test_nearest_pose_is_as_near_as_slsqp_from_many_starts(w: Stratum) -> None:
     )
 )
 @settings(max_examples=10)
-def test_a_stratum_in_a_closure_is_no_nearer(case: Case) -> None:
-    found = nearest_in_strata(case.design, pose_of(case))
+def test_stratum_in_a_closure_is_no_nearer(case: Case) -> None:
+    found = nearest_in_strata(case.design, case.pose)
     for upper in STRATA:
         for lower in COVERED[upper]:
             assert found[lower].distance >= found[upper].distance - 1e-9 * case.size
@@ -112,18 +108,18 @@ def test_a_stratum_in_a_closure_is_no_nearer(case: Case) -> None:
 
 @given(ordinary_cases(), positions(), rotations(), st.sampled_from((1.0, 1e-2, 1e-5)))
 @settings(max_examples=10)
-def test_a_distance_changes_no_more_than_the_platform_moves(
+def test_distances_change_no_more_than_the_platform_moves(
     case: Case, shift: FloatArray, turn: FloatArray, share: float
 ) -> None:
     turned = Rotation.from_rotvec(share * Rotation.from_matrix(turn).as_rotvec()).as_matrix()
-    pose, other = pose_of(case), Pose.of(case.position + share * shift, turned @ case.rotation)
+    pose, other = case.pose, Pose.of(case.position + share * shift, turned @ case.rotation)
     moved = way(case, pose, other)
     here, there = (nearest_in_strata(case.design, each) for each in (pose, other))
     for w in STRATA:
         assert abs(here[w].distance - there[w].distance) <= moved + 1e-8 * case.size
 
 
-def test_a_pose_at_the_tolerance_of_incidences_is_in_the_stratum_asked_for() -> None:
+def test_nearest_pose_at_the_tolerance_of_incidences_lies_in_the_requested_closure() -> None:
     # b4 comes so near to a1, and b2b3 to the guide, that a1 counts as on the line, too.
     design = Design(a3=(10.0, 10.0), b1=(0.0, 10.0), b2=0.0, b3=2.5)
     pose = Pose.of([0.0, 0.15625, 0.0], QUARTER_TURNS[4])
@@ -135,10 +131,9 @@ def test_a_pose_at_the_tolerance_of_incidences_is_in_the_stratum_asked_for() -> 
 
 @given(designs(), positions(), rotations())
 @settings(max_examples=10)
-def test_designs_of_any_size_have_their_nearest_poses(
-    design: object, place: FloatArray, rotation: FloatArray
+def test_nearest_poses_of_designs_of_any_size_are_finite(
+    design: Design, place: FloatArray, rotation: FloatArray
 ) -> None:
-    assert isinstance(design, type(OPTIMAL))
     size = max(map(abs, design.variables))
     for w in STRATA:
         found = nearest_in_stratum(design, Pose.of(size * place, rotation), w)
@@ -147,7 +142,7 @@ def test_designs_of_any_size_have_their_nearest_poses(
 
 
 @pytest.mark.parametrize("w", STRATA)
-def test_a_pose_in_the_closure_is_its_own_nearest(w: Stratum) -> None:
+def test_nearest_pose_of_a_pose_in_the_closure_is_itself(w: Stratum) -> None:
     for v in STRATA:
         position, rotation = REPRESENTATIVES[v]
         pose = Pose.of(position, rotation)
@@ -160,7 +155,7 @@ def test_a_pose_in_the_closure_is_its_own_nearest(w: Stratum) -> None:
             assert found.distance > 1e-3
 
 
-def test_strata_of_codimension_one_have_the_nearest_singular_poses() -> None:
+def test_nearest_poses_in_strata_of_codimension_one_are_the_nearest_singular_ones() -> None:
     home = home_pose(OPTIMAL)
     for w, nearest in zip(OF_INCIDENCES, nearest_singularities(OPTIMAL, home), strict=True):
         found = nearest_in_stratum(OPTIMAL, home, w)
@@ -168,7 +163,7 @@ def test_strata_of_codimension_one_have_the_nearest_singular_poses() -> None:
         assert found.seen == w
 
 
-def test_special_strata_have_their_closed_forms() -> None:
+def test_nearest_poses_in_special_strata_have_closed_forms() -> None:
     home = home_pose(OPTIMAL)
     found = nearest_in_strata(OPTIMAL, home)
     assert found[GENERIC].pose is home

@@ -34,13 +34,14 @@ from explorer.mechanism.pose import Pose
 from explorer.singularity.jacobian import inverse_condition, jacobian
 from explorer.sweep.front import front, undominated
 from explorer.sweep.rows import (
+    Value,
     check_study,
     columns_of,
     design_of,
+    end_values,
     evaluate,
-    found_values,
-    lost,
     problem_of,
+    rows_of_dead_workers,
 )
 from explorer.sweep.sampling import ROUNDS, permuted, samples
 from explorer.sweep.study import (
@@ -75,11 +76,15 @@ def decoded(**changes: Any) -> Study:
     return decode_study(json.dumps({**PLAIN, **changes}).encode(), "study.json")
 
 
+def columns(study: Study, start: int, stop: int) -> dict[str, list[Value]]:
+    return evaluate(encode_study(study), start, stop).columns
+
+
 def sampled(method: Method, count: Any, seed: int = 0, **changes: Any) -> Study:
     return decoded(sampling={"method": method, "count": count, "seed": seed}, **changes)
 
 
-def test_a_study_survives_its_file() -> None:
+def test_study_encoded_and_decoded_is_unchanged() -> None:
     study = decoded(polish={"objective": "largest-volume"}, clearance_margin=0.5)
     again = decode_study(encode_study(study), "again")
     assert again == study
@@ -88,7 +93,7 @@ def test_a_study_survives_its_file() -> None:
     assert study.varied == ("a3y", "yaw", "radius")
 
 
-def test_every_change_makes_another_study() -> None:
+def test_study_hash_differs_for_every_change() -> None:
     changes: list[dict[str, Any]] = [
         {},
         {"design": "paper-initial"},
@@ -101,7 +106,7 @@ def test_every_change_makes_another_study() -> None:
     assert len({study_hash(decoded(**each)) for each in changes}) == len(changes)
 
 
-def test_the_studies_that_come_along_can_be_run() -> None:
+def test_packaged_studies_can_be_run() -> None:
     for name, study in STUDIES.items():
         assert load_study(name) is study
         check_study(study)
@@ -126,7 +131,7 @@ def test_the_studies_that_come_along_can_be_run() -> None:
         ({"sampling": {"method": "grid", "count": 10_000_000}}, "the grid has 1e+21 designs"),
         ({"sampling": {"method": "random", "count": 8}}, "Invalid enum value 'random'"),
         ({"measures": ["mass"]}, "no measure 'mass'; there are volume"),
-        ({"measures": []}, "measure something"),
+        ({"measures": []}, "measures must name at least one"),
         ({"measures": ["volume", "volume"]}, "may name each once"),
         ({"objectives": [{"measure": "mass", "sense": "min"}]}, "neither measured nor a variable"),
         ({"objectives": [{"measure": "volume", "sense": "best"}]}, "Invalid enum value 'best'"),
@@ -145,7 +150,7 @@ def test_the_studies_that_come_along_can_be_run() -> None:
         ({"colour": "red"}, "unknown field `colour`"),
     ],
 )
-def test_a_study_that_cannot_be_meant_is_one_line(changes: dict[str, Any], words: str) -> None:
+def test_study_with_bad_field_is_refused_in_one_line(changes: dict[str, Any], words: str) -> None:
     with pytest.raises(InputError) as caught:
         decoded(**changes)
     message = str(caught.value)
@@ -157,7 +162,7 @@ def test_a_study_that_cannot_be_meant_is_one_line(changes: dict[str, Any], words
 @pytest.mark.parametrize(
     "data", [b"", b"[]", b'{"a": NaN}', b"\xff", b"[" * 100_000, b"{}", b" " * 2_000_000]
 )
-def test_what_is_no_study_is_one_line(data: bytes) -> None:
+def test_data_of_no_study_are_refused_in_one_line(data: bytes) -> None:
     with pytest.raises(InputError, match=r"^study: [^\n]+$"):
         decode_study(data, "study")
 
@@ -171,7 +176,7 @@ def test_what_is_no_study_is_one_line(data: bytes) -> None:
         (f'"chunk": {5000 * "9"},', "chunk"),
     ],
 )
-def test_what_a_refusal_quotes_can_be_shown(inserted: str, words: str) -> None:
+def test_refusal_of_a_study_is_short_and_printable(inserted: str, words: str) -> None:
     data = b"{" + inserted.encode() + encode_study(STUDIES["trade-off"]).lstrip()[1:]
     with pytest.raises(InputError) as caught:
         decode_study(data, "study.json")
@@ -181,7 +186,7 @@ def test_what_a_refusal_quotes_can_be_shown(inserted: str, words: str) -> None:
     assert len(message) <= LONGEST_LINE + 1
 
 
-def test_a_study_none_of_whose_designs_can_be_made_is_told_at_once() -> None:
+def test_study_without_any_valid_design_is_refused() -> None:
     demands = {"volume": 7000, "clearance": 0.1}
     study = decoded(polish={"objective": "match-volume", "demands": demands})
     with pytest.raises(InputError, match=r"none of the designs all over.*clearance margin"):
@@ -195,9 +200,7 @@ def test_a_study_none_of_whose_designs_can_be_made_is_told_at_once() -> None:
 @pytest.mark.parametrize("method", ["grid", "sobol", "latin-hypercube"])
 @pytest.mark.parametrize("order", [1, -1])
 @pytest.mark.parametrize("many", [2, 3, 8, 16])
-def test_a_study_some_of_whose_designs_can_be_made_is_none_to_refuse(
-    method: Method, order: int, many: int
-) -> None:
+def test_study_with_few_valid_designs_is_accepted(method: Method, order: int, many: int) -> None:
     # Only near its upper end is a3y not below the least allowed.
     variables = [("a3y", [0.01, 1.0]), ("a3x", [12, 20])][::order]
     study = sampled(
@@ -213,7 +216,7 @@ def test_a_study_some_of_whose_designs_can_be_made_is_none_to_refuse(
 @pytest.mark.parametrize("method", ["sobol", "latin-hypercube", "grid"])
 @settings(max_examples=25)
 @given(seed=st.integers(0, 2**31 - 1), size=st.integers(5, 40), count=st.integers(1, 200))
-def test_a_sample_depends_on_the_study_and_its_index_alone(
+def test_samples_by_chunks_equal_all_at_once(
     method: Method, seed: int, size: int, count: int
 ) -> None:
     shape = {"a3y": 7, "yaw": 1, "radius": 5} if method == "grid" else count
@@ -227,9 +230,7 @@ def test_a_sample_depends_on_the_study_and_its_index_alone(
 
 
 @given(count=st.integers(1, 2000), seed=st.integers(0, 2**31 - 1))
-def test_a_latin_hypercube_has_one_design_in_every_slice_of_every_variable(
-    count: int, seed: int
-) -> None:
+def test_latin_hypercube_has_one_design_in_every_slice(count: int, seed: int) -> None:
     study = sampled("latin-hypercube", count, seed)
     ends = np.array(list(study.variables.values()))
     shares = (samples(study, range(count)) - ends[:, 0]) / (ends[:, 1] - ends[:, 0])
@@ -240,19 +241,19 @@ def test_a_latin_hypercube_has_one_design_in_every_slice_of_every_variable(
 
 
 @given(st.integers(1, 5000), st.lists(st.integers(0, 2**64 - 1), min_size=ROUNDS, max_size=ROUNDS))
-def test_the_permutation_is_one(count: int, keys: list[int]) -> None:
+def test_permuted_numbers_are_a_permutation(count: int, keys: list[int]) -> None:
     found = permuted(np.arange(count, dtype=np.uint64), count, np.array(keys, dtype=np.uint64))
     assert np.array_equal(np.sort(found), np.arange(count))
 
 
-def test_variables_of_a_latin_hypercube_are_independent() -> None:
+def test_latin_hypercube_variables_are_uncorrelated() -> None:
     study = sampled("latin-hypercube", 4000, 5)
     found = np.corrcoef(samples(study, range(4000)).T) - np.eye(3)
     # Five standard deviations.
     assert np.abs(found).max() < 5.0 / math.sqrt(4000.0)
 
 
-def test_sobol_samples_are_those_of_scipy() -> None:
+def test_sobol_samples_match_scipy() -> None:
     from scipy.stats import qmc
 
     study = sampled("sobol", 64, 9)
@@ -261,7 +262,7 @@ def test_sobol_samples_are_those_of_scipy() -> None:
     assert samples(study, range(64)) == pytest.approx(expected, rel=1e-15)
 
 
-def test_a_grid_has_every_combination_once_ends_included() -> None:
+def test_grid_has_every_combination_once() -> None:
     study = sampled("grid", {"radius": 3, "a3y": 5, "yaw": 1})
     found = samples(study, range(study.count))
     assert study.count == 15
@@ -271,13 +272,13 @@ def test_a_grid_has_every_combination_once_ends_included() -> None:
     assert {tuple(row) for row in found.tolist()} == expected
 
 
-def test_memory_of_late_chunks_is_that_of_early_ones() -> None:
+def test_samples_of_the_last_chunk_need_no_others() -> None:
     for method in ("sobol", "latin-hypercube"):
         study = sampled(method, 2**26 - 1)
         assert samples(study, study.rows_of(study.chunks - 1)).shape == (63, 3)
 
 
-def test_variables_make_the_design_that_they_name() -> None:
+def test_design_of_values_has_these_values() -> None:
     values = {"a3x": 17.0, "b2": 2.0, "yaw": -65.0, "reach": 15.0, "radius": 0.2}
     study = decoded(
         variables={
@@ -315,7 +316,7 @@ def nodes_of(design: Any, rotation: Any, count: int) -> Any:
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_what_the_nodes_tell_is_what_each_position_tells(seed: int) -> None:
+def test_node_measures_match_each_position(seed: int) -> None:
     design, rotation = ordinary_case(seed)
     design = msgspec.structs.replace(
         design, limits=msgspec.structs.replace(design.limits, leg_radii=(0.3, 0.2, 0.1, 0.4))
@@ -334,19 +335,19 @@ def test_what_the_nodes_tell_is_what_each_position_tells(seed: int) -> None:
     )
     assert len(kept)
     assert found.positions == pytest.approx(kept, rel=1e-12)
-    kappa = np.abs(margins(kept, rotation))
+    distances = np.abs(margins(kept, rotation))
     clear = leg_clearances(design, kept, rotation).clearance
     assert found.extent == pytest.approx(np.ptp(kept, axis=0), abs=1e-12)
-    assert found.margins == pytest.approx(kappa.min(axis=0), rel=1e-12)
-    assert found.mean_margin == pytest.approx(kappa.min(axis=1).mean(), rel=1e-12)
+    assert found.margins == pytest.approx(distances.min(axis=0), rel=1e-12)
+    assert found.mean_margin == pytest.approx(distances.min(axis=1).mean(), rel=1e-12)
     assert found.clear_share == (clear > 0.0).all(axis=1).mean()
-    off = (kappa >= margin).all(axis=1)
+    off = (distances >= margin).all(axis=1)
     expected = clear[off].min(axis=0) if off.any() else np.full(6, math.inf)
     assert found.clearances == pytest.approx(expected, rel=1e-9, abs=1e-12)
 
 
 @pytest.mark.parametrize("seed", range(40))
-def test_the_nodes_of_any_design_fill_about_its_volume(seed: int) -> None:
+def test_nodes_of_any_design_lie_in_a_workspace(seed: int) -> None:
     design, rotation = troubled_case(seed)
     found = node_measures(design, rotation, nodes=12)
     volume = workspace_volume(design, rotation, explain=False).volume
@@ -357,11 +358,11 @@ def test_the_nodes_of_any_design_fill_about_its_volume(seed: int) -> None:
         assert not math.isnan(found.mean_margin)
 
 
-def test_measures_are_those_of_the_explorers_own_functions() -> None:
+def test_measures_of_a_row_match_the_public_functions() -> None:
     study = decoded(
         measures=list(MEASURES), variables={"a3y": [5, 8], "b3": [4, 6], "radius": [0, 0.05]}
     )
-    rows = evaluate(encode_study(study), 3, 4).columns
+    rows = columns(study, 3, 4)
     values = {name: rows[name][0] for name in study.variables}
     design = design_of(study, values)  # pyright: ignore[reportArgumentType]
     found = {name: rows[name][0] for name in MEASURES}
@@ -386,7 +387,7 @@ def test_measures_are_those_of_the_explorers_own_functions() -> None:
     assert found["least_clearance"] <= min(nodes.clearances) + 1e-3 * design.reach
 
 
-def test_extents_agree_with_the_papers_nodes_to_a_cell() -> None:
+def test_extents_match_the_nodes_of_the_paper_to_a_cell() -> None:
     case = Case(OPTIMAL, nodes=40)
     paper = workspace_nodes(OPTIMAL, step=0.5).extent
     assert paper is not None
@@ -395,13 +396,13 @@ def test_extents_agree_with_the_papers_nodes_to_a_cell() -> None:
         assert own == pytest.approx(high - low, abs=2.0 * (high - low) / 40.0 + 1.0)
 
 
-def test_an_empty_workspace_is_a_row_that_says_why() -> None:
+def test_empty_workspace_is_a_row_with_a_reason() -> None:
     limits = Limits(box=((100.0, 100.0, 100.0), (101.0, 101.0, 101.0)))
     study = decoded(measures=list(MEASURES))
     study = msgspec.structs.replace(
         study, design=msgspec.structs.replace(study.base, limits=limits)
     )
-    rows = evaluate(encode_study(study), 0, 2).columns
+    rows = columns(study, 0, 2)
     assert rows["status"] == ["empty workspace"] * 2
     assert "box" in str(rows["reason"][0])
     assert rows["volume"] == [0.0, 0.0]
@@ -419,7 +420,7 @@ def test_an_empty_workspace_is_a_row_that_says_why() -> None:
         ({"nodes": 2, "design": "slit"}, "none of 2 nodes an axis lies in the workspace"),
     ],
 )
-def test_a_design_that_is_done_but_not_whole_says_why(changes: dict[str, Any], words: str) -> None:
+def test_row_without_a_measure_has_a_reason(changes: dict[str, Any], words: str) -> None:
     designs = {
         "slit": msgspec.structs.replace(OPTIMAL, limits=Limits(margin=14.0)),
         "joined": OPTIMAL.with_variables([*OPTIMAL.variables[:4], 0.0, OPTIMAL.b3]),
@@ -427,32 +428,32 @@ def test_a_design_that_is_done_but_not_whole_says_why(changes: dict[str, Any], w
     base = designs.get(changes.pop("design", ""), OPTIMAL)
     study = decoded(variables={"a3y": [6.9, 7.1]}, **changes)
     study = msgspec.structs.replace(study, design=base)
-    rows = evaluate(encode_study(study), 0, 1).columns
+    rows = columns(study, 0, 1)
     assert rows["status"] == ["done"]
     assert words in str(rows["reason"][0])
     assert any(rows[name] == [None] for name in study.measures)
 
 
-def test_an_invalid_design_is_a_row_that_says_why() -> None:
+def test_invalid_design_is_a_row_with_a_reason() -> None:
     study = sampled("grid", 3, variables={"a3y": [-2, 2]}, measures=["volume"])
-    rows = evaluate(encode_study(study), 0, 3).columns
+    rows = columns(study, 0, 3)
     assert rows["status"] == ["done", "invalid design", "done"]
     assert "degenerate design: a3y = 0" in str(rows["reason"][1])
     assert rows["a3y"] == [-2.0, 0.0, 2.0]
     assert rows["volume"][1] is None
 
 
-def test_a_home_that_collides_leaves_the_reachable_volume_out_and_says_why() -> None:
+def test_home_that_collides_has_no_reachable_volume_and_a_reason() -> None:
     study = sampled("grid", 2, variables={"radius": [0, 3]}, measures=["reachable_volume"])
-    rows = evaluate(encode_study(study), 0, 2).columns
+    rows = columns(study, 0, 2)
     assert rows["reachable_volume"][1] is None
     assert rows["reason"][0] == ""
     assert "legs" in str(rows["reason"][1])
 
 
-def test_designs_whose_workers_died_are_rows_too() -> None:
+def test_lost_designs_are_rows() -> None:
     study = decoded(polish={"objective": "largest-volume"})
-    rows = lost(study, range(7, 9), "2 workers died")
+    rows = rows_of_dead_workers(study, range(7, 9), "2 workers died")
     assert list(rows.columns) == list(columns_of(study))
     assert rows.columns["index"] == [7, 8]
     assert rows.columns["status"] == ["worker died"] * 2
@@ -460,7 +461,7 @@ def test_designs_whose_workers_died_are_rows_too() -> None:
     assert rows.columns["volume"] == [None, None]
 
 
-def test_polished_designs_meet_the_demand_and_keep_the_ranges() -> None:
+def test_polished_designs_meet_the_demand_within_the_ranges() -> None:
     study = sampled(
         "sobol",
         6,
@@ -469,7 +470,7 @@ def test_polished_designs_meet_the_demand_and_keep_the_ranges() -> None:
         measures=["volume"],
         polish={"objective": "match-volume", "demands": {"volume": 5000}},
     )
-    rows = evaluate(encode_study(study), 0, 6).columns
+    rows = columns(study, 0, 6)
     done = [row for row in range(6) if rows["status"][row] == "done"]
     assert len(done) >= 3
     for row in range(6):
@@ -486,7 +487,7 @@ def test_polished_designs_meet_the_demand_and_keep_the_ranges() -> None:
 
 @pytest.mark.parametrize("ends", [(170.0, 190.0), (270.0, 300.0), (-460.0, -400.0), (-85.0, -60.0)])
 @pytest.mark.parametrize("is_sampled", [True, False])
-def test_a_polished_yaw_stays_in_its_range_whatever_turn_that_lies_in(
+def test_polished_yaw_of_any_turn_stays_in_its_range(
     ends: tuple[float, float], is_sampled: bool
 ) -> None:
     middle = (ends[0] + ends[1]) / 2.0
@@ -504,7 +505,7 @@ def test_a_polished_yaw_stays_in_its_range_whatever_turn_that_lies_in(
     )
     study = msgspec.structs.replace(study, design=msgspec.structs.replace(study.base, home=home))
     check_study(study)
-    rows = evaluate(encode_study(study), 0, study.count).columns
+    rows = columns(study, 0, study.count)
     starts = rows["sample_yaw"] if is_sampled else [middle] * 2
     for row, start in enumerate(starts):
         assert rows["status"][row] in {"done", "not converged"}
@@ -521,12 +522,12 @@ def test_a_polished_yaw_stays_in_its_range_whatever_turn_that_lies_in(
         assert (bounds.low - at, bounds.high - at) == pytest.approx(
             (ends[0] - float(start or 0.0), ends[1] - float(start or 0.0)), abs=1e-9
         )
-        assert found_values(study, {"yaw": float(start or 0.0)}, problem, problem.start_values)[
+        assert end_values(study, {"yaw": float(start or 0.0)}, problem, problem.start_values)[
             "yaw"
         ] == pytest.approx(start, abs=1e-9)
 
 
-def test_a_polish_that_cannot_get_there_says_so() -> None:
+def test_polish_that_misses_its_demand_has_a_reason() -> None:
     study = sampled(
         "grid",
         2,
@@ -534,7 +535,7 @@ def test_a_polish_that_cannot_get_there_says_so() -> None:
         measures=["volume"],
         polish={"objective": "match-volume", "demands": {"volume": 1e6}, "iterations": 5},
     )
-    rows = evaluate(encode_study(study), 0, 2).columns
+    rows = columns(study, 0, 2)
     assert rows["status"] == ["not converged"] * 2
     assert rows["converged"] == [False, False]
     assert all(rows["reason"])
@@ -543,7 +544,7 @@ def test_a_polish_that_cannot_get_there_says_so() -> None:
     assert all(isinstance(value, float) for value in rows["volume"])
 
 
-def test_what_a_search_may_change_beyond_the_samples_is_a_column() -> None:
+def test_polish_variables_are_columns() -> None:
     study = sampled(
         "grid",
         2,
@@ -555,7 +556,7 @@ def test_what_a_search_may_change_beyond_the_samples_is_a_column() -> None:
             "variables": {"a3x": [10, 25], "yaw": [-90, -50]},
         },
     )
-    rows = evaluate(encode_study(study), 0, 2).columns
+    rows = columns(study, 0, 2)
     assert study.varied == ("b2", "a3x", "yaw")
     assert rows["status"] == ["done", "done"]
     assert rows["b2"] == rows["sample_b2"] == [1.0, 2.0]
@@ -573,7 +574,7 @@ def test_what_a_search_may_change_beyond_the_samples_is_a_column() -> None:
         elements=st.integers(0, 4).map(float),
     )
 )
-def test_the_front_is_what_its_definition_says(cost: Any) -> None:
+def test_undominated_rows_match_the_definition(cost: Any) -> None:
     expected = [
         row
         for row in range(len(cost))
@@ -582,22 +583,22 @@ def test_the_front_is_what_its_definition_says(cost: Any) -> None:
     assert undominated(cost).tolist() == expected
 
 
-def test_only_rows_that_are_done_and_complete_are_on_the_front() -> None:
-    columns = {
+def test_front_has_only_complete_rows_that_are_done() -> None:
+    table = {
         "volume": np.array([5.0, 9.0, np.nan, 5.0, 4.0]),
         "reach": np.array([2.0, 1.0, 0.0, 2.0, 3.0]),
         "status": np.array(["done", "not converged", "done", "done", "done"], dtype=object),
     }
     objectives = (Objective("volume", "max"), Objective("reach", "min"))
-    assert front(columns, objectives).tolist() == [True, False, False, True, False]
-    assert front(columns, (Objective("reach", "max"),)).tolist() == [False] * 4 + [True]
+    assert front(table, objectives).tolist() == [True, False, False, True, False]
+    assert front(table, (Objective("reach", "max"),)).tolist() == [False] * 4 + [True]
 
 
-def test_every_variable_has_a_column_of_its_own() -> None:
+def test_variables_and_measures_share_no_column() -> None:
     assert not {*NAMES} & ({*MEASURES} - {"reach"})
 
 
-def test_studies_can_be_made_in_python() -> None:
+def test_study_made_in_python_is_encoded_and_decoded() -> None:
     study = Study(
         design=OPTIMAL,
         variables={"b2": (1.0, 2.0)},

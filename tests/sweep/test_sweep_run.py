@@ -54,6 +54,35 @@ STUDY = Study(
 )
 
 
+ENVIRONMENT = {**os.environ, "PYTHONPATH": str(Path(explorer.__file__).parents[1])}
+
+
+def last_line(*words: str, cwd: Path | None = None) -> str:
+    """Run Python, which must fail, and return the last line of its standard error."""
+    ended = subprocess.run(
+        [sys.executable, *words],
+        cwd=cwd,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+        env=ENVIRONMENT,
+    )
+    assert ended.returncode == 1
+    return ended.stderr.splitlines()[-1]
+
+
+def copy_parts(source: Path, target: Path) -> None:
+    for path in part_paths(source):
+        (target / path.name).write_bytes(path.read_bytes())
+
+
+def changed_files(folder: Path, other: Path) -> list[str]:
+    """Return the names of the files of a folder whose bytes differ in another."""
+    before, after = contents(folder), contents(other)
+    return [name for name in before if before[name] != after[name]]
+
+
 def contents(folder: Path) -> dict[str, bytes]:
     """Return the bytes of every file that a run leaves behind but the lock."""
     return {
@@ -75,7 +104,7 @@ def two() -> Iterator[LocalWorkers]:
         yield workers
 
 
-def test_every_design_has_one_row_in_order(whole: Path) -> None:
+def test_run_writes_one_row_of_every_design_in_order(whole: Path) -> None:
     results = load_results(whole)
     assert results.columns["index"].tolist() == list(range(83))
     assert list(results.columns) == list(columns_of(STUDY))
@@ -85,7 +114,7 @@ def test_every_design_has_one_row_in_order(whole: Path) -> None:
     assert set(results.columns["status"]) == {"done"}
 
 
-def test_a_row_is_the_design_that_was_measured(whole: Path) -> None:
+def test_design_of_row_has_the_volume_of_the_row(whole: Path) -> None:
     results = load_results(whole)
     for row in (0, 40, 82):
         design = results.design_of_row(row)
@@ -98,7 +127,7 @@ def test_a_row_is_the_design_that_was_measured(whole: Path) -> None:
         design_at(whole, 83)
 
 
-def test_a_summary_part_by_part_is_that_of_the_whole(whole: Path) -> None:
+def test_summary_matches_the_results(whole: Path) -> None:
     results, summary = load_results(whole), summarise(whole)
     assert summary.counts == {"done": 83}
     assert summary.damaged == 0
@@ -109,7 +138,7 @@ def test_a_summary_part_by_part_is_that_of_the_whole(whole: Path) -> None:
     assert volumes == sorted(volumes, reverse=True)  # pyright: ignore[reportArgumentType]
 
 
-def test_parts_say_what_they_are_of(whole: Path) -> None:
+def test_parts_carry_study_chunk_and_versions(whole: Path) -> None:
     for chunk, path in enumerate(part_paths(whole)):
         part, table = read_part(path)
         assert part.chunk == chunk
@@ -120,7 +149,21 @@ def test_parts_say_what_they_are_of(whole: Path) -> None:
         assert {"python", "scipy", "flagged-explorer"} <= set(part.versions)
 
 
-def test_pandas_polars_and_duckdb_read_the_folder_as_it_is(whole: Path) -> None:
+def test_parts_with_the_other_key_of_the_versions_are_read(whole: Path, tmp_path: Path) -> None:
+    path = part_paths(whole)[0]
+    part, table = read_part(path)
+    metadata = dict(table.schema.metadata)
+    metadata[b"explorer.files.versions"] = metadata.pop(b"explorer.versions")
+    other = tmp_path / path.name
+    importlib.import_module("pyarrow.parquet").write_table(
+        table.replace_schema_metadata(metadata), other
+    )
+    again, same = read_part(other)
+    assert again == part
+    assert same.equals(table)
+
+
+def test_pandas_polars_and_duckdb_read_the_same_columns(whole: Path) -> None:
     expected = load_results(whole).columns
     pandas, polars, duckdb = (
         importlib.import_module(name) for name in ("pandas", "polars", "duckdb")
@@ -135,7 +178,7 @@ def test_pandas_polars_and_duckdb_read_the_folder_as_it_is(whole: Path) -> None:
         assert [row[0] for row in by_duckdb.select(name).fetchall()] == column.tolist()
 
 
-def test_what_is_missing_is_null_in_files_and_nan_in_columns(tmp_path: Path) -> None:
+def test_missing_values_are_null_in_files_and_nan_in_columns(tmp_path: Path) -> None:
     study = msgspec.structs.replace(
         STUDY,
         variables={"b1y": (-1.0, 1.0)},
@@ -153,19 +196,21 @@ def test_what_is_missing_is_null_in_files_and_nan_in_columns(tmp_path: Path) -> 
         results.design_of_row(1)
 
 
-def test_processes_make_the_same_bytes(whole: Path, two: LocalWorkers, tmp_path: Path) -> None:
-    told: list[Progress] = []
-    progress = run_study(STUDY, tmp_path, two, told=told.append)
+def test_run_on_processes_has_the_same_bytes(
+    whole: Path, two: LocalWorkers, tmp_path: Path
+) -> None:
+    seen: list[Progress] = []
+    progress = run_study(STUDY, tmp_path, two, watch=seen.append)
     assert contents(tmp_path) == contents(whole)
     assert progress.counts == {"done": 83}
-    assert [each.done for each in told] == sorted(each.done for each in told)
-    assert told[0].done == 0
-    assert told[0].seconds_left is None
-    assert told[-1].is_complete
+    assert [each.done for each in seen] == sorted(each.done for each in seen)
+    assert seen[0].done == 0
+    assert seen[0].seconds_left is None
+    assert seen[-1].is_complete
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_a_run_in_pieces_makes_the_same_bytes_and_computes_nothing_twice(
+def test_interrupted_runs_write_the_same_bytes_and_repeat_no_part(
     seed: int, whole: Path, tmp_path: Path
 ) -> None:
     rng = random.Random(seed)
@@ -179,7 +224,7 @@ def test_a_run_in_pieces_makes_the_same_bytes_and_computes_nothing_twice(
             tmp_path,
             workers,
             limit=rng.choice([None, 9, 20]),
-            is_cut=functools.partial(next, looks, True),
+            stop=functools.partial(next, looks, True),
         )
         pieces += workers.pieces
         kept = {part.name for part in part_paths(tmp_path)}
@@ -193,18 +238,18 @@ def test_a_run_in_pieces_makes_the_same_bytes_and_computes_nothing_twice(
     assert idle.tasks == []
 
 
-def test_a_limit_counts_whole_chunks(tmp_path: Path) -> None:
+def test_run_with_limit_ends_after_whole_chunks(tmp_path: Path) -> None:
     assert run_study(STUDY, tmp_path, HereWorkers(), limit=9).done == 16
     assert run_study(STUDY, tmp_path, HereWorkers(), limit=1).done == 24
 
 
-def test_damaged_parts_are_computed_again(whole: Path, tmp_path: Path) -> None:
+def test_run_computes_damaged_parts_again(whole: Path, tmp_path: Path) -> None:
     run_study(STUDY, tmp_path, HereWorkers())
     paths = [part_path(tmp_path, chunk) for chunk in range(STUDY.chunks)]
     data = [path.read_bytes() for path in paths]
     paths[0].write_bytes(data[0][: len(data[0]) // 2])
     paths[1].write_bytes(b"")
-    # One bit within a column, which only its checksum tells.
+    # One bit within a column, which only its checksum shows.
     spoilt = bytearray(data[2])
     spoilt[40] ^= 1
     paths[2].write_bytes(spoilt)
@@ -212,7 +257,7 @@ def test_damaged_parts_are_computed_again(whole: Path, tmp_path: Path) -> None:
     paths[3].write_bytes(data[4])
     paths[5].unlink()
     (tmp_path / ".part-000006.0123.part").write_bytes(b"half")
-    # The part under another's name too, whose rows would be told of twice.
+    # The part under another's name too, whose rows would come twice.
     assert summarise(tmp_path).damaged == 4
     assert load_results(tmp_path).columns["index"].tolist() == [*range(32, 40), *range(48, 83)]
     workers = HereWorkers()
@@ -222,7 +267,7 @@ def test_damaged_parts_are_computed_again(whole: Path, tmp_path: Path) -> None:
     assert contents(tmp_path) == contents(whole)
 
 
-def test_copies_of_parts_are_no_parts_and_are_told_of(whole: Path, tmp_path: Path) -> None:
+def test_copies_of_parts_are_listed_as_strays(whole: Path, tmp_path: Path) -> None:
     run_study(STUDY, tmp_path, HereWorkers(), limit=40)
     # One of a chunk that is still missing, one beyond the last, and others.
     strays = [
@@ -244,17 +289,16 @@ def test_copies_of_parts_are_no_parts_and_are_told_of(whole: Path, tmp_path: Pat
 
 
 @pytest.mark.parametrize("name", columns_of(STUDY))
-def test_a_run_computes_again_what_the_summary_leaves_out(
+def test_part_with_a_damaged_column_is_computed_again(
     name: str, whole: Path, tmp_path: Path
 ) -> None:
-    for path in part_paths(whole):
-        (tmp_path / path.name).write_bytes(path.read_bytes())
+    copy_parts(whole, tmp_path)
     path = part_path(tmp_path, 4)
     with importlib.import_module("pyarrow.parquet").ParquetFile(path) as file:
         group = file.metadata.row_group(0)
         columns = [group.column(k) for k in range(group.num_columns)]
     (column,) = [each for each in columns if each.path_in_schema == name]
-    # The last byte of its pages is of their data, and not of what is said of them.
+    # The last byte of its pages belongs to their data, not to their headers.
     start = column.dictionary_page_offset or column.data_page_offset
     spoilt = bytearray(path.read_bytes())
     spoilt[start + column.total_compressed_size - 1] ^= 4
@@ -268,9 +312,7 @@ def test_a_run_computes_again_what_the_summary_leaves_out(
     assert contents(tmp_path) == contents(whole)
 
 
-def test_with_any_bit_flipped_a_part_is_left_out_or_tells_the_same(
-    whole: Path, tmp_path: Path
-) -> None:
+def test_part_with_any_flipped_bit_is_damaged_or_equal(whole: Path, tmp_path: Path) -> None:
     ((_, _, expected),) = [each for each in sound_parts(whole, []) if each[1] == 1]
     data = part_path(whole, 1).read_bytes()
     rng = random.Random(5)
@@ -288,10 +330,9 @@ def test_with_any_bit_flipped_a_part_is_left_out_or_tells_the_same(
     assert left_out > 200
 
 
-def test_a_part_whose_study_is_damaged_is_damaged(whole: Path, tmp_path: Path) -> None:
-    for path in part_paths(whole):
-        (tmp_path / path.name).write_bytes(path.read_bytes())
-    # The first one is who tells what the study is.
+def test_part_with_a_damaged_study_is_damaged(whole: Path, tmp_path: Path) -> None:
+    copy_parts(whole, tmp_path)
+    # The study is read from the first part.
     path = part_path(tmp_path, 0)
     data = path.read_bytes()
     assert data.count(b'"paper-optimal"') == 1
@@ -302,10 +343,10 @@ def test_a_part_whose_study_is_damaged_is_damaged(whole: Path, tmp_path: Path) -
     assert contents(tmp_path) == contents(whole)
 
 
-def test_another_studys_folder_is_refused_and_left_alone(whole: Path, tmp_path: Path) -> None:
+def test_folder_of_another_study_is_refused_unchanged(whole: Path, tmp_path: Path) -> None:
     before = contents(whole)
     other = msgspec.structs.replace(STUDY, name="other")
-    # The first part may be damaged: the others tell.
+    # The first part may be damaged: the others name their study.
     for path in part_paths(whole):
         (tmp_path / path.name).write_bytes(
             b"" if path.name.endswith("0.parquet") else path.read_bytes()
@@ -318,7 +359,7 @@ def test_another_studys_folder_is_refused_and_left_alone(whole: Path, tmp_path: 
     assert contents(tmp_path) == damaged
 
 
-def test_a_strange_part_in_a_folder_is_refused(whole: Path, tmp_path: Path) -> None:
+def test_part_of_another_study_is_refused(whole: Path, tmp_path: Path) -> None:
     other = msgspec.structs.replace(STUDY, name="other", sampling=Sampling(count=8))
     run_study(other, tmp_path, HereWorkers())
     part_path(tmp_path, 5).write_bytes(part_path(whole, 5).read_bytes())
@@ -329,7 +370,7 @@ def test_a_strange_part_in_a_folder_is_refused(whole: Path, tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize("name", ["thesis.txt", "part-000000.parquet", ".profile"])
-def test_a_folder_with_other_things_in_it_is_refused(name: str, tmp_path: Path) -> None:
+def test_folder_of_other_files_is_refused_unchanged(name: str, tmp_path: Path) -> None:
     (tmp_path / name).write_text("mine")
     with pytest.raises(InputError, match="is not empty, and holds no results"):
         run_study(STUDY, tmp_path, HereWorkers())
@@ -339,7 +380,7 @@ def test_a_folder_with_other_things_in_it_is_refused(name: str, tmp_path: Path) 
         load_results(tmp_path)
 
 
-def test_where_all_parts_are_damaged_they_are_named_and_what_works_is_told(tmp_path: Path) -> None:
+def test_folder_with_only_damaged_parts_names_them(tmp_path: Path) -> None:
     study = msgspec.structs.replace(STUDY, sampling=Sampling(count=16))
     run_study(study, tmp_path, HereWorkers())
     before = contents(tmp_path)
@@ -356,21 +397,21 @@ def test_where_all_parts_are_damaged_they_are_named_and_what_works_is_told(tmp_p
     assert contents(tmp_path) == before
 
 
-def test_a_folder_that_is_in_use_is_refused(tmp_path: Path) -> None:
+def test_folder_in_use_is_refused(tmp_path: Path) -> None:
     with FileLock(tmp_path / LOCK_FILE), pytest.raises(InputError, match="another process"):
         run_study(STUDY, tmp_path, HereWorkers())
     # Another lock object of this process would share the file handle.
     assert run_study(STUDY, tmp_path, HereWorkers(), limit=1).done == 8
 
 
-def test_a_place_that_takes_no_folder_is_refused(tmp_path: Path) -> None:
+def test_folder_that_is_a_file_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "file"
     file.write_text("")
     with pytest.raises(explorer.ExplorerError, match="file"):
         run_study(STUDY, file, HereWorkers())
 
 
-def test_without_pyarrow_the_extra_is_named(
+def test_run_without_pyarrow_names_the_extra(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "pyarrow", None)
@@ -379,7 +420,7 @@ def test_without_pyarrow_the_extra_is_named(
     assert not (tmp_path / "new").exists()
 
 
-def test_a_design_that_kills_its_workers_is_a_row_and_the_others_are_done(
+def test_design_that_kills_workers_is_a_row_beside_the_others(
     whole: Path, two: LocalWorkers, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(runs, "evaluate", deadly)
@@ -394,12 +435,11 @@ def test_a_design_that_kills_its_workers_is_a_row_and_the_others_are_done(
     others = np.arange(83) != DEADLY
     assert lost["volume"][others].tolist() == intact["volume"][others].tolist()
     # Only the chunk with that design is another.
-    before, after = contents(whole), contents(tmp_path)
-    assert [name for name in before if before[name] != after[name]] == ["part-000001.parquet"]
+    assert changed_files(whole, tmp_path) == ["part-000001.parquet"]
 
 
 class LongTasks(HereWorkers):
-    """Asks for tasks as long as they can be, and dies of one design."""
+    """Workers that want the longest tasks, and die of one design."""
 
     task_seconds = 1e9
     deadly: int | None = None
@@ -417,9 +457,7 @@ class LongTasks(HereWorkers):
         return dead
 
 
-def test_chunks_go_together_where_tasks_are_dear_and_make_the_same_bytes(
-    whole: Path, tmp_path: Path
-) -> None:
+def test_chunks_in_long_tasks_write_the_same_bytes(whole: Path, tmp_path: Path) -> None:
     workers = LongTasks()
     run_study(STUDY, tmp_path, workers)
     assert contents(tmp_path) == contents(whole)
@@ -429,7 +467,7 @@ def test_chunks_go_together_where_tasks_are_dear_and_make_the_same_bytes(
 
 
 @pytest.mark.parametrize("design", [0, 17, 82])
-def test_of_chunks_that_went_together_only_the_deadly_design_is_lost(
+def test_deadly_design_in_a_long_task_is_lost_alone(
     whole: Path, tmp_path: Path, design: int
 ) -> None:
     workers = LongTasks()
@@ -437,13 +475,10 @@ def test_of_chunks_that_went_together_only_the_deadly_design_is_lost(
     progress = run_study(STUDY, tmp_path, workers)
     assert progress.counts == {"done": 82, "worker died": 1}
     assert load_results(tmp_path).columns["status"][design] == "worker died"
-    before, after = contents(whole), contents(tmp_path)
-    assert [name for name in before if before[name] != after[name]] == [
-        part_path(tmp_path, design // 8).name
-    ]
+    assert changed_files(whole, tmp_path) == [part_path(tmp_path, design // 8).name]
 
 
-def test_workers_that_are_killed_now_and_then_lose_no_row(whole: Path, tmp_path: Path) -> None:
+def test_run_with_killed_workers_writes_the_same_bytes(whole: Path, tmp_path: Path) -> None:
     killed: list[int] = []
     rng = random.Random(0)
     study = msgspec.structs.replace(STUDY, nodes=30, chunk=4)
@@ -456,7 +491,7 @@ def test_workers_that_are_killed_now_and_then_lose_no_row(whole: Path, tmp_path:
                 killed.append(rng.choice(workers.process_ids))
                 os.kill(killed[-1], signal.SIGKILL)
 
-        progress = run_study(study, tmp_path / "killed", workers, told=kill_one)
+        progress = run_study(study, tmp_path / "killed", workers, watch=kill_one)
     assert len(killed) >= 2
     assert progress.counts == {"done": 83}
     assert load_results(tmp_path / "killed").columns["index"].tolist() == list(range(83))
@@ -464,7 +499,7 @@ def test_workers_that_are_killed_now_and_then_lose_no_row(whole: Path, tmp_path:
     assert contents(tmp_path / "killed") == contents(tmp_path / "whole")
 
 
-def test_a_process_that_is_killed_goes_on_with_the_same_bytes(tmp_path: Path) -> None:
+def test_run_killed_and_continued_writes_the_same_bytes(tmp_path: Path) -> None:
     # So many designs that they are not done before it is killed, however late that is.
     study = msgspec.structs.replace(STUDY, nodes=40, sampling=Sampling(count=400, seed=2), chunk=2)
     file, folder = tmp_path / "study.json", tmp_path / "killed"
@@ -476,7 +511,7 @@ def test_a_process_that_is_killed_goes_on_with_the_same_bytes(tmp_path: Path) ->
             [sys.executable, "-m", "explorer", *command],
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
-            env={**os.environ, "PYTHONPATH": str(Path(explorer.__file__).parents[1])},
+            env=ENVIRONMENT,
         )
         before = len(part_paths(folder))
         # Killed some moments after it has written something new.
@@ -492,7 +527,7 @@ def test_a_process_that_is_killed_goes_on_with_the_same_bytes(tmp_path: Path) ->
     assert contents(folder) == contents(tmp_path / "whole")
 
 
-def test_workers_end_with_the_process_that_started_them(tmp_path: Path) -> None:
+def test_workers_of_a_killed_process_end(tmp_path: Path) -> None:
     code = (
         "import time\n"
         "from explorer.sweep.workers import LocalWorkers\n"
@@ -509,12 +544,12 @@ def test_workers_end_with_the_process_that_started_them(tmp_path: Path) -> None:
         [sys.executable, str(script)],
         stdout=subprocess.PIPE,
         text=True,
-        env={**os.environ, "PYTHONPATH": str(Path(explorer.__file__).parents[1])},
+        env=ENVIRONMENT,
     )
     assert process.stdout is not None
     ids = [int(word) for word in process.stdout.readline().split()]
     assert len(ids) == 2
-    # They are at work, and do not look at their pipes.
+    # They are at work and do not read their pipes.
     time.sleep(0.5)
     process.kill()
     process.wait()
@@ -525,7 +560,7 @@ def test_workers_end_with_the_process_that_started_them(tmp_path: Path) -> None:
     assert not any(_lives(each) for each in ids)
 
 
-def test_a_script_that_its_workers_cannot_import_ends_in_one_line_and_no_rows(
+def test_script_without_main_guard_ends_in_one_line_without_rows(
     tmp_path: Path,
 ) -> None:
     (tmp_path / "study.json").write_bytes(encode_study(STUDY))
@@ -538,23 +573,13 @@ def test_a_script_that_its_workers_cannot_import_ends_in_one_line_and_no_rows(
         "with LocalWorkers(2) as workers:\n"
         "    run_study(load_study('study.json'), 'results', workers)\n"
     )
-    ended = subprocess.run(
-        [sys.executable, str(script)],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-        env={**os.environ, "PYTHONPATH": str(Path(explorer.__file__).parents[1])},
-    )
-    assert ended.returncode == 1
-    last = ended.stderr.splitlines()[-1]
+    last = last_line(str(script), cwd=tmp_path)
     assert "RunError: no worker process stays alive until it is ready" in last
     assert "__main__" in last
     assert part_paths(tmp_path / "results") == []
 
 
-def test_processes_that_are_killed_while_they_start_are_started_again() -> None:
+def test_workers_killed_at_their_start_are_started_again() -> None:
     with LocalWorkers(1) as workers:
         found = workers.submit(os.getpid)
         killed: set[int] = set()
@@ -566,7 +591,7 @@ def test_processes_that_are_killed_while_they_start_are_started_again() -> None:
         assert found.result(60.0) not in killed
 
 
-def test_a_process_that_cannot_be_started_is_told_and_is_no_death(
+def test_workers_that_cannot_start_end_the_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refuse(self: object) -> None:
@@ -589,13 +614,13 @@ def _lives(process_id: int) -> bool:
     return state != "Z"
 
 
-def test_a_run_on_this_machine_ends_at_once_when_it_is_cut(tmp_path: Path) -> None:
+def test_run_that_stop_ends_writes_nothing_more(tmp_path: Path) -> None:
     # A chunk of these takes minutes.
     study = msgspec.structs.replace(STUDY, nodes=200, chunk=83)
     looks = iter([False, False])
     workers = LocalWorkers(1)
     try:
-        progress = run_study(study, tmp_path, workers, is_cut=functools.partial(next, looks, True))
+        progress = run_study(study, tmp_path, workers, stop=functools.partial(next, looks, True))
     finally:
         workers.shutdown(cancel_futures=True)
     assert progress.done == 0
@@ -611,15 +636,13 @@ def test_workers_of_other_versions_are_refused(
     assert part_paths(tmp_path) == []
 
 
-def test_workers_that_cannot_do_their_task_end_the_run(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_workers_that_fail_end_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(runs, "evaluate", broken)
     with pytest.raises(RunError, match="cannot do the tasks: ModuleNotFoundError"):
         run_study(STUDY, tmp_path, HereWorkers())
 
 
-def test_tasks_under_way_stay_few(tmp_path: Path) -> None:
+def test_run_keeps_few_tasks_under_way(tmp_path: Path) -> None:
     class Watched(HereWorkers):
         """Counts the tasks whose rows have not become a part yet."""
 
@@ -639,11 +662,11 @@ def test_tasks_under_way_stay_few(tmp_path: Path) -> None:
 
     workers = Watched()
     study = msgspec.structs.replace(STUDY, chunk=2)
-    run_study(study, tmp_path, workers, told=workers.see)
+    run_study(study, tmp_path, workers, watch=workers.see)
     assert workers.most == 2 * AHEAD < study.chunks
 
 
-def test_local_workers_do_tasks_tell_errors_and_outlive_deaths() -> None:
+def test_local_workers_return_results_raise_errors_and_survive_deaths() -> None:
     with LocalWorkers(2) as workers:
         assert [f.result() for f in [workers.submit(pow, k, 2) for k in range(9)]] == [
             k * k for k in range(9)
@@ -651,7 +674,7 @@ def test_local_workers_do_tasks_tell_errors_and_outlive_deaths() -> None:
         assert isinstance(workers.submit(int, "x").exception(), ValueError)
         assert isinstance(workers.submit(os._exit, 3).exception(), WorkerDiedError)
         assert workers.submit(max, 1, 2).result() == 2
-        # What cannot be sent either way is told, and ends nothing.
+        # Arguments and results that cannot be pickled raise, and end nothing.
         assert workers.submit(lambda: 1).exception() is not None
         assert "cannot be sent" in str(workers.submit(eval, "lambda: 1").exception())
         assert workers.submit(os.getenv, "OMP_NUM_THREADS").result() == "1"
@@ -669,7 +692,7 @@ def test_local_workers_do_tasks_tell_errors_and_outlive_deaths() -> None:
             LocalWorkers(size)
 
 
-def test_dask_makes_the_same_bytes_and_outlives_a_death(
+def test_run_on_dask_with_a_killed_worker_writes_the_same_bytes(
     whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     distributed: Any = importlib.import_module("distributed")
@@ -689,11 +712,11 @@ def test_dask_makes_the_same_bytes_and_outlives_a_death(
 
         with DaskWorkers(farm.scheduler_address) as workers:
             assert workers.size == 2
-            run_study(STUDY, tmp_path, workers, told=kill_one)
-            # Dask tells of lost connections at any time; we do, in one line.
+            run_study(STUDY, tmp_path, workers, watch=kill_one)
+            # Dask logs lost connections at any time; the explorer writes one line.
             log = logging.getLogger("distributed.batched")
             assert log.getEffectiveLevel() == logging.CRITICAL
-            # Of a scheduler that is gone its tasks tell, not whoever counts its workers.
+            # The tasks of a scheduler that is gone raise, not the count of its workers.
             known, within = workers.size, cast("Any", workers)
             within._counted = -math.inf
 
@@ -707,29 +730,32 @@ def test_dask_makes_the_same_bytes_and_outlives_a_death(
     assert contents(tmp_path) == contents(whole)
 
 
+ADDRESS = "an address such as tcp://"
+
+
 @pytest.mark.parametrize(
     ("address", "words"),
     [
         ("tcp://127.0.0.1:9", r"no Dask scheduler answers at tcp://127.0.0.1:9"),
-        ("127.0.0.1:8786", "an address such as tcp://"),
-        ("tcp://", "an address such as tcp://"),
-        ("http://127.0.0.1:8786", "an address such as tcp://"),
-        ("tcp://127.0.0.1:port", "an address such as tcp://"),
+        ("127.0.0.1:8786", ADDRESS),
+        ("tcp://", ADDRESS),
+        ("http://127.0.0.1:8786", ADDRESS),
+        ("tcp://127.0.0.1:port", ADDRESS),
         ("tcp://127.0.0.1", "an address such as tcp://.*got 'tcp://127.0.0.1'"),
-        ("tcp://127.0.0.1:", "an address such as tcp://"),
-        ("tcp://127.0.0.1:99999", "an address such as tcp://"),
-        ("tcp://:8786", "an address such as tcp://"),
-        ("tcp://[::1", "an address such as tcp://"),
+        ("tcp://127.0.0.1:", ADDRESS),
+        ("tcp://127.0.0.1:99999", ADDRESS),
+        ("tcp://:8786", ADDRESS),
+        ("tcp://[::1", ADDRESS),
     ],
 )
-def test_a_scheduler_that_is_not_there_is_one_line(address: str, words: str) -> None:
+def test_missing_scheduler_is_refused_in_one_line(address: str, words: str) -> None:
     with pytest.raises(InputError, match=words) as caught:
         DaskWorkers(address, patience=0.5)
     assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("greeting", [b"", b"SSH-2.0-OpenSSH_9.2\r\n"], ids=["mute", "another"])
-def test_what_listens_there_but_is_no_scheduler_is_one_line(greeting: bytes) -> None:
+def test_listener_that_is_no_scheduler_is_refused_in_one_line(greeting: bytes) -> None:
     """Dask's client waited for ever for the answer to its greeting."""
     with socket.create_server(("127.0.0.1", 0)) as server, ExitStack() as callers:
 
@@ -751,26 +777,19 @@ def test_what_listens_there_but_is_no_scheduler_is_one_line(greeting: bytes) -> 
         assert "\n" not in str(caught.value)
 
 
-def test_what_dask_itself_refuses_is_one_line_too() -> None:
+def test_error_of_dask_is_one_line() -> None:
     code = (
         "from explorer.sweep import cluster\n"
-        "cluster._check = str\n"
+        "cluster._check_address = str\n"
         "cluster.DaskWorkers('tcp://127.0.0.1', patience=0.1)\n"
     )
-    ended = subprocess.run(
-        [sys.executable, "-c", code],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-        env={**os.environ, "PYTHONPATH": str(Path(explorer.__file__).parents[1])},
+    # Unfinished connections write nothing more when the process ends.
+    assert "InputError: no Dask scheduler answers at tcp://127.0.0.1 within 0.1 s" in last_line(
+        "-c", code
     )
-    # Nor does what is half made complain when the process ends.
-    last = ended.stderr.splitlines()[-1]
-    assert "InputError: no Dask scheduler answers at tcp://127.0.0.1 within 0.1 s" in last
 
 
-def test_without_dask_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_workers_without_dask_name_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(MissingExtraError, match="cluster"):
         DaskWorkers("tcp://127.0.0.1:8786")

@@ -7,7 +7,7 @@ import math
 import msgspec
 import numpy as np
 import pytest
-from limited_designs import limited
+from limited_designs import limited, ordinary_case, scaled_design
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import breadth_first_order
 
@@ -30,6 +30,7 @@ from explorer import (
     workspace_volume,
 )
 from explorer.legs.clearance import distance_gradients
+from explorer.mechanism.design import Swing
 from explorer.numerics.arrays import FloatArray
 from explorer.workspace.accessible.nodes import Grid, make_grid, survey
 from explorer.workspace.accessible.radii import with_radius
@@ -44,23 +45,6 @@ ROWS = (OPTIMAL, INITIAL)
 
 def thick(design: Design, radius: float) -> Design:
     return with_radius(design, radius * design.reach)
-
-
-def scaled(design: Design, by: float) -> Design:
-    """Return a design of another size, with its limits and home."""
-    limits, home = design.limits, home_pose(design)
-    box = limits.box and tuple(tuple(by * x for x in ends) for ends in limits.box)
-    one, two, three, four = (by * x for x in limits.leg_radii)
-    return msgspec.structs.replace(
-        design,
-        a3=(by * design.a3[0], by * design.a3[1]),
-        b1=(by * design.b1[0], by * design.b1[1]),
-        b2=by * design.b2,
-        b3=by * design.b3,
-        node_step=design.node_step and by * design.node_step,
-        limits=msgspec.structs.replace(limits, box=box, leg_radii=(one, two, three, four)),
-        home=Pose.of([by * x for x in home.position], home.rotation),
-    )
 
 
 def random_design(seed: int) -> Design | None:
@@ -152,11 +136,9 @@ def test_accessible_volume_agrees_with_random_positions(design: Design, radius: 
     design, r = thick(design, radius), home_rotation(design)
     found = reachable_workspace(design)
     rng = np.random.default_rng(5)
-    lows, highs = np.array(design.limits.box) if design.limits.box else (-1.0, 1.0)
-    lows, highs = (np.full(3, x) * design.reach if np.ndim(x) == 0 else x for x in (lows, highs))
+    lows, highs = design.limits.box or (-design.reach, design.reach)
     points = rng.uniform(lows, highs, (400_000, 3))
-    kept = (slacks(constraints(design, r), points) >= 0.0).all(axis=-1)
-    points = points[kept]
+    points = points[(slacks(constraints(design, r), points) >= 0.0).all(axis=-1)]
     clear = (leg_clearances(design, points, r).clearance > 0.0).all(axis=-1)
     # In these designs everything that is clear hangs together.
     share, error = clear.mean(), clear.std() / math.sqrt(len(points))
@@ -168,16 +150,11 @@ def test_accessible_solid_faces_name_their_limit_or_pair() -> None:
     solid = reachable_workspace(design).solid
     centres = solid.vertices[solid.faces].mean(axis=1)
     clearance = leg_clearances(design, centres, home_rotation(design)).clearance
-    seen: set[str] = set()
+    seen: set[str] = {solid.limits[index] for index in solid.limit_of_face.tolist()}
     offs: FloatArray = np.zeros(0)
-    for index, name in enumerate(solid.limits):
-        own = solid.limit_of_face == index
-        if not own.any():
-            continue
-        seen.add(name)
-        if name.startswith("legs"):
-            pair = [f"legs {i}–{j}" for i, j in PAIRS].index(name)
-            offs = np.append(offs, np.abs(clearance[own, pair]))
+    for pair, (i, j) in enumerate(PAIRS):
+        own = solid.limit_of_face == solid.limits.index(f"legs {i}–{j}")
+        offs = np.append(offs, np.abs(clearance[own, pair]))
     # Where legs 3 and 4 collide in these orientations 2 and 4 do too.
     assert {"legs 2–4", "l4 maximum"} <= seen
     # A quarter of a cell at the most where two walls meet.
@@ -201,7 +178,7 @@ def test_blocked_volume_is_that_of_a_pair_alone() -> None:
 
 @pytest.mark.parametrize("by", [1e-6, 1e6])
 def test_accessible_workspace_of_a_scaled_design_is_scaled(by: float) -> None:
-    small, large = thick(OPTIMAL, 0.01), scaled(thick(OPTIMAL, 0.01), by)
+    small, large = thick(OPTIMAL, 0.01), scaled_design(thick(OPTIMAL, 0.01), by)
     one, other = reachable_workspace(small, nodes=20), reachable_workspace(large, nodes=20)
     assert other.reachable_volume / by**3 == pytest.approx(one.reachable_volume, rel=2e-5)
     assert other.reachable_node_count == one.reachable_node_count
@@ -231,20 +208,15 @@ def test_accessible_workspace_without_volume_counts_its_nodes(home_z: float) -> 
     assert found.reachable_node_count == (count if home_z == 8.0 else 0)
 
 
+HUNDREDTH = 0.01 * OPTIMAL.reach
+
+
 @pytest.mark.parametrize(
     ("radii", "home", "words"),
     [
-        (
-            (0.0,) * 4,
-            (10.0, 5.0, 19.0),
-            r"box z = 19 is above its maximum 18; the nearest valid",
-        ),
+        ((0.0,) * 4, (10.0, 5.0, 19.0), r"box z = 19 is above its maximum 18; the nearest valid"),
         ((0.0, 0.4, 0.4, 0.0), (10.0, 5.0, 9.0), r"legs 2 and 3 overlap by 0.1306; no valid pos"),
-        (
-            (0.01 * OPTIMAL.reach,) * 4,
-            (10.0, -8.0, 0.3),
-            r"legs 3 and 4 overlap by .* the nearest valid",
-        ),
+        ((HUNDREDTH,) * 4, (10.0, -8.0, 0.3), r"legs 3 and 4 overlap by .* the nearest valid"),
     ],
 )
 def test_accessible_workspace_from_an_invalid_home_names_cause_and_remedy(
@@ -306,6 +278,19 @@ def test_grid_within_its_box_ends_on_the_faces() -> None:
     assert len(cell) == 8
     assert (cell.min(axis=0) <= [1.2, 0.1, 2.9]).all()
     assert (cell.max(axis=0) >= [1.2, 0.1, 2.9]).all()
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_least_clearances_below_a_demand_are_those_of_all_positions(seed: int) -> None:
+    design, rotation = ordinary_case(seed)
+    design, demand = limited(design, swing=Swing(a1=50.0, b3=70.0)), 0.05 * design.reach
+    every = least_clearances(design, rotation)
+    found = least_clearances(design, rotation, 0.1 * demand, below=demand)
+    assert np.isfinite(found.clearance[every.clearance < 0.89 * demand]).all()
+    assert np.isinf(found.clearance[every.clearance > demand]).all()
+    is_near = np.isfinite(found.clearance)
+    assert (slacks(constraints(design, rotation), found.position[is_near]) >= 0.0).all()
+    assert found.clearance[is_near] == pytest.approx(every.clearance[is_near], abs=0.11 * demand)
 
 
 @pytest.mark.parametrize("margin", [0.0, 0.5, 1.0])

@@ -64,21 +64,12 @@ def volume_in_parts(design: Design, rotation: FloatArray) -> tuple[float, float]
     lows, highs = bounds(region)
     if region.is_empty or not (lows < highs).all():
         return 0.0, 0.0
-    by_circle, by_plane = np.zeros((len(region.circles), 4)), np.zeros((len(region.planes), 4))
+    rates = np.zeros((len(region.circles) + len(region.planes), 4))
     result, total, error = np.zeros(RESULTS), 0.0, 0.0
     ends = np.linspace(region.low, region.high, PARTS + 1).tolist()
     for low, high in itertools.pairwise(ends):
-        integrate_slices(
-            1,
-            region.circles,
-            region.planes,
-            low,
-            high,
-            quadrature(),
-            result,
-            by_circle,
-            by_plane,
-        )
+        rows = region.circles, region.planes, low, high
+        integrate_slices(1, *rows, quadrature(), result, rates)
         total += float(result[TOTAL])
         error += float(result[TOTAL_ERROR])
     return total, error

@@ -12,23 +12,15 @@ from hypothesis import given, strategies as st
 from strategies import Case, ordinary_cases
 
 from explorer import JOINTS, PRESETS, Design, Limits, evaluate, home_pose, inverse, margins
+from explorer.mechanism.design import LENGTHS
 from explorer.mechanism.margins import mode_of, signs_of
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.workspace.limits.broken import Violation, violations
 
 Signs = tuple[int, int, int]
-ALL_POSITIVE: Signs = (1, 1, 1)
-FREE = Limits(
-    l1=(0.0, 1e6),
-    d2=(0.0, 1e6),
-    d4=(0.0, 1e6),
-    l4=(0.0, 1e6),
-    gap=0.0,
-    carriage_order="any",
-    box=None,
-    margin=None,
-)
+ANY: dict[str, Any] = dict.fromkeys(LENGTHS, (0.0, 1e6))
+FREE = Limits(**ANY, carriage_order="any", margin=None)
 
 
 def limited(design: Design, **limits: Any) -> Design:
@@ -37,33 +29,29 @@ def limited(design: Design, **limits: Any) -> Design:
 
 
 def broken(
-    design: Design, position: FloatArray, rotation: FloatArray, signs: Signs = ALL_POSITIVE
+    design: Design, position: FloatArray, rotation: FloatArray, signs: Signs = (1, 1, 1)
 ) -> tuple[Violation, ...]:
     joints = inverse(design, position, rotation)
     return violations(design, position, rotation, joints, margins(position, rotation), signs)
 
 
-ranges = st.tuples(st.floats(0.0, 20.0), st.floats(0.0, 20.0)).map(
-    lambda ends: (min(ends), max(ends))
-)
+def ranges(low: float, high: float) -> st.SearchStrategy[tuple[float, float]]:
+    ends = st.tuples(st.floats(low, high), st.floats(low, high))
+    return ends.map(lambda pair: (min(pair), max(pair)))
 
 
-@given(ordinary_cases(), st.tuples(*[ranges] * 4))
+@given(ordinary_cases(), st.tuples(*[ranges(0.0, 20.0)] * 4))
 def test_length_outside_its_range_is_a_violation(
     case: Case, bounds: tuple[tuple[float, float], ...]
 ) -> None:
-    names = ("l1", "d2", "d4", "l4")
-    design = limited(case.design, **dict(zip(names, bounds, strict=True)))
+    design = limited(case.design, **dict(zip(LENGTHS, bounds, strict=True)))
     joints = dict(zip(JOINTS, inverse(design, case.position, case.rotation).tolist(), strict=True))
     found = {v.limit: v for v in broken(design, case.position, case.rotation)}
-    for name, (low, high) in zip(names, bounds, strict=True):
-        outside = joints[name] < low - 1e-9 or joints[name] > high + 1e-9
-        within = low <= joints[name] <= high
-        if outside:
-            assert found[name].value == joints[name]
-            assert found[name].bound == (high if found[name].above else low)
-            assert found[name].above == (joints[name] > high)
-        if within:
+    for name, (low, high) in zip(LENGTHS, bounds, strict=True):
+        if not low - 1e-9 <= joints[name] <= high + 1e-9:
+            above = joints[name] > high
+            assert found[name] == Violation(name, joints[name], high if above else low, above)
+        elif low <= joints[name] <= high:
             assert name not in found
 
 
@@ -77,16 +65,17 @@ def test_maximum_of_none_is_the_reach(case: Case) -> None:
     assert all(v.bound == reach for v in found)
 
 
-@given(ordinary_cases(), st.floats(-20.0, 20.0), st.floats(0.0, 30.0))
-def test_carriage_beyond_the_guide_is_a_violation(case: Case, low: float, width: float) -> None:
-    design = limited(case.design, guide=(low, low + width))
-    joints = inverse(design, case.position, case.rotation)
+@given(ordinary_cases(), ranges(-20.0, 50.0))
+def test_carriage_beyond_the_guide_is_a_violation(case: Case, guide: tuple[float, float]) -> None:
+    design, (low, high) = limited(case.design, guide=guide), guide
+    joints = inverse(design, case.position, case.rotation).tolist()
     found = {v.limit for v in broken(design, case.position, case.rotation)}
     assert found <= {"d1", "d3"}
-    for name, value in (("d1", float(joints[1])), ("d3", float(joints[3]))):
-        if not low - 1e-9 <= value <= low + width + 1e-9:
+    for name in ("d1", "d3"):
+        value = joints[JOINTS.index(name)]
+        if not low - 1e-9 <= value <= high + 1e-9:
             assert name in found
-        elif low <= value <= low + width:
+        elif low <= value <= high:
             assert name not in found
 
 
@@ -104,12 +93,11 @@ def test_carriages_closer_than_the_gap_are_a_violation(case: Case, gap: float) -
         assert found == ()
 
 
-@given(ordinary_cases(), st.tuples(*[st.tuples(st.floats(-30, 30), st.floats(-30, 30))] * 3))
+@given(ordinary_cases(), st.tuples(*[ranges(-30.0, 30.0)] * 3))
 def test_coordinate_outside_the_box_is_a_violation(
     case: Case, sides: tuple[tuple[float, float], ...]
 ) -> None:
-    lows = tuple(min(side) for side in sides)
-    highs = tuple(max(side) for side in sides)
+    lows, highs = zip(*sides, strict=True)
     design = limited(case.design, box=(lows, highs))
     found = {v.limit: v for v in broken(design, case.position, case.rotation)}
     assert set(found) <= {"box x", "box y", "box z"}
@@ -126,17 +114,14 @@ def test_margin_of_another_sign_or_too_small_is_a_violation(
 ) -> None:
     design = limited(case.design, margin=least)
     signs = signs_of(mode)
-    found = broken(design, case.position, case.rotation, signs)
-    by_name = {v.limit: v for v in found}
+    found = {v.limit: v for v in broken(design, case.position, case.rotation, signs)}
     margin = margins(case.position, case.rotation).tolist()
     for index, (value, sign) in enumerate(zip(margin, signs, strict=True), 1):
         name = f"margin δ{index}"
         if sign * value < least - 1e-9:
-            assert by_name[name].value == value
-            assert by_name[name].bound == sign * least
-            assert by_name[name].above == (sign < 0)
+            assert found[name] == Violation(name, value, sign * least, sign < 0)
         elif sign * value >= least:
-            assert name not in by_name
+            assert name not in found
 
 
 @given(ordinary_cases())
@@ -155,10 +140,7 @@ def test_pose_on_every_limit_at_once_violates_none(case: Case) -> None:
     signs = signs_of(int(mode_of(margin)))
     design = limited(
         case.design,
-        l1=(l1, l1),
-        d2=(d2, d2),
-        d4=(d4, d4),
-        l4=(l4, l4),
+        **{name: (x, x) for name, x in zip(LENGTHS, (l1, d2, d4, l4), strict=True)},
         guide=(min(d1, d3), max(d1, d3)),
         gap=abs(d1 - d3),
         box=(position, position),
@@ -183,10 +165,7 @@ def test_pose_just_beyond_a_limit_violates_it(beyond: float) -> None:
 def test_violations_are_in_the_order_of_the_design_file() -> None:
     design = limited(
         PRESETS["paper-initial"],
-        l1=(0.0, 0.0),
-        d2=(0.0, 0.0),
-        d4=(0.0, 0.0),
-        l4=(0.0, 0.0),
+        **dict.fromkeys(LENGTHS, (0.0, 0.0)),
         guide=(100.0, 101.0),
         gap=50.0,
         box=((100.0, 100.0, 100.0), (101.0, 101.0, 101.0)),
@@ -194,19 +173,10 @@ def test_violations_are_in_the_order_of_the_design_file() -> None:
     )
     found = broken(design, np.array([3.0, 4.0, 5.0]), np.eye(3), (1, -1, 1))
     assert [v.limit for v in found] == [
-        "l1",
-        "d2",
-        "d4",
-        "l4",
-        "d1",
-        "d3",
-        "gap |d1 − d3|",
-        "box x",
-        "box y",
-        "box z",
-        "margin δ1",
-        "margin δ2",
-        "margin δ3",
+        *LENGTHS,
+        *("d1", "d3", "gap |d1 − d3|"),
+        *("box x", "box y", "box z"),
+        *("margin δ1", "margin δ2", "margin δ3"),
     ]
 
 

@@ -16,9 +16,9 @@ from explorer.mechanism.design import Swing
 from explorer.mechanism.pose import checked_rotation, yaw_pitch_roll_from_rotation
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import warm
+from explorer.workspace.limits.valid_poses import valid_rows
 from explorer.workspace.orientations import (
     cone_of_directions,
-    keep_limits,
     orientation_capability,
     orientations_within,
     uniform_rotations,
@@ -130,9 +130,8 @@ def test_swing_of_a_leg_is_its_angle_to_the_direction_at_home() -> None:
     home = evaluate(OPTIMAL, HOME)
     turned = Pose.of([14.0, 5.0, 9.0], HOME.rotation)
     one, other = home.points.b1, evaluate(OPTIMAL, turned).points.b1
-    angle = math.degrees(
-        math.acos(float(one @ other) / float(np.linalg.norm(one) * np.linalg.norm(other)))
-    )
+    cosine = float(one @ other) / float(np.linalg.norm(one) * np.linalg.norm(other))
+    angle = math.degrees(math.acos(cosine))
     assert evaluate(design, HOME).violations == ()
     for bound in (angle - 0.01, angle + 0.01):
         found = evaluate(limited(OPTIMAL, swing=Swing(a1=bound)), turned).violations
@@ -181,7 +180,7 @@ def test_orientations_within_interpreted_and_compiled_agree(
     monkeypatch: pytest.MonkeyPatch, seed: int
 ) -> None:
     warm()
-    untyped: Any = keep_limits
+    untyped: Any = valid_rows
     assert untyped.ready
     design, rotation = ordinary_case(seed)
     design = limited(design, swing=Swing(a1=40.0, b3=70.0))
@@ -193,7 +192,7 @@ def test_orientations_within_interpreted_and_compiled_agree(
     def interpreted(_: int, *arguments: Any) -> None:
         untyped.__wrapped__(*arguments)
 
-    monkeypatch.setattr("explorer.workspace.orientations.keep_limits", interpreted)
+    monkeypatch.setattr("explorer.workspace.orientations.valid_rows", interpreted)
     np.testing.assert_array_equal(orientations_within(design, position, rotations), compiled)
     assert 0 < compiled.sum() < len(rotations)
 

@@ -125,11 +125,10 @@ def test_outline_of_a_scaled_design_scales(size: float) -> None:
 
 def test_outline_outside_a_workspace_has_no_loops() -> None:
     rotation = explorer.home_pose(OPTIMAL).rotation
-    beyond = slice_outline(OPTIMAL, rotation, "z", 30.0)
-    below = slice_outline(OPTIMAL, rotation, "z", -0.1)
-    level = slice_outline(OPTIMAL, np.eye(3), "z", 9.0)
-    assert all(each is not None and each.loops == () for each in (beyond, below, level))
-    assert all(each is not None and each.area == 0.0 for each in (beyond, below, level))
+    for r, level in ((rotation, 30.0), (rotation, -0.1), (np.eye(3), 9.0)):
+        outline = slice_outline(OPTIMAL, r, "z", level)
+        assert outline is not None
+        assert (outline.loops, outline.area) == ((), 0.0)
 
 
 def test_outline_with_cones_is_none_and_unknown_axes_are_refused() -> None:

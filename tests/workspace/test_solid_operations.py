@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from limited_designs import ordinary_case
@@ -14,7 +17,6 @@ from explorer.workspace.limits.constraints import HalfSpace, constraints
 from explorer.workspace.slices.volume import home_rotation
 from explorer.workspace.solids.solids import (
     HULL,
-    Solid,
     convex_hull,
     cut_solid,
     dexterous_solid,
@@ -39,22 +41,17 @@ def test_cut_divides_a_solid_in_two(seed: int) -> None:
     below = cut_solid(solid, HalfSpace("cut", normal, level))
     above = cut_solid(solid, HalfSpace("cut", -normal, -level))
     assert below.volume + above.volume == pytest.approx(solid.volume, rel=1e-9)
+    near = 1e-9 * np.abs(heights).max()
     for part, sign in ((below, 1.0), (above, -1.0)):
         assert part.is_watertight
-        assert (sign * (part.vertices @ normal - level) <= 1e-9 * np.abs(heights).max()).all()
+        off = part.vertices @ normal - level
+        assert (sign * off <= near).all()
         # Faces in the plane are the cut's, and the others those of the limits as before.
         assert part.limits == (*solid.limits, "cut")
-        in_plane = (np.abs(part.vertices @ normal - level) <= 1e-9 * np.abs(heights).max())[
-            part.faces
-        ].all(axis=1)
+        in_plane = (np.abs(off) <= near)[part.faces].all(axis=1)
         np.testing.assert_array_equal(part.limit_of_face == len(solid.limits), in_plane)
-        kept = Solid(
-            part.vertices,
-            part.faces[~in_plane],
-            part.limit_of_face[~in_plane],
-            solid.limits,
-            solid.tolerance,
-        )
+        rest, of_face = part.faces[~in_plane], part.limit_of_face[~in_plane]
+        kept = replace(part, faces=rest, limit_of_face=of_face, limits=solid.limits)
         assert_lies_on_its_limits(kept, design, rotation)
 
 
@@ -131,12 +128,8 @@ def test_reachable_and_dexterous_solids_lie_on_their_limits() -> None:
 
 
 def test_reachable_solid_of_many_orientations_has_few_faces() -> None:
-    angles = [
-        (yaw, pitch, roll)
-        for yaw in (-81.0, -73.0, -65.0)
-        for pitch in (-8.0, 0.0, 8.0)
-        for roll in (-8.0, 0.0, 8.0)
-    ]
+    tilts = (-8.0, 0.0, 8.0)
+    angles = list(itertools.product((-81.0, -73.0, -65.0), tilts, tilts))
     solid = reachable_solid(OPTIMAL, rotation_from_yaw_pitch_roll(angles), 0.2)
     assert solid.is_watertight
     assert len(solid.faces) < 2000

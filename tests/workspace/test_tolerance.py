@@ -70,11 +70,9 @@ def free_case(seed: int) -> tuple[Design, Pose]:
     while True:
         position = rng.integers(-6, 7, 3).astype(float)
         rotation = Rotation.random(random_state=rng).as_matrix()
-        found = margins(position, rotation) * signs
-        if found.min() > 0.3 and rotation[0, 0] * u > 0.02:
-            pose = Pose.of(position, rotation)
-            if poses_are_valid(design, pose.position, pose.rotation):
-                return design, pose
+        regular = (margins(position, rotation) * signs).min() > 0.3 and rotation[0, 0] * u > 0.02
+        if regular and poses_are_valid(design, position, rotation):
+            return design, Pose.of(position, rotation)
 
 
 def touching(design: Design, pose: Pose, little: float) -> Iterator[tuple[str, Design]]:
@@ -152,20 +150,11 @@ def has_node(design: Design, place: FloatArray, rotation: FloatArray) -> bool:
 
 
 @pytest.mark.parametrize("seed", range(10))
-def test_pose_on_a_limit_satisfies_it_everywhere(seed: int) -> None:
+def test_pose_on_a_limit_satisfies_it_and_one_a_little_beyond_violates_it(seed: int) -> None:
     design, pose = free_case(seed)
-    for name, touched in touching(design, pose, 0.0):
-        assert answers_of(touched, pose) == dict.fromkeys(PARTS, True), name
-
-
-@pytest.mark.parametrize("seed", range(10))
-def test_pose_a_little_beyond_a_limit_violates_it_everywhere(seed: int) -> None:
-    design, pose = free_case(seed)
-    for name, touched in touching(design, pose, LITTLE * design.reach):
-        assert answers_of(touched, pose) == dict.fromkeys(PARTS, False), name
-
-
-PARTS = ("limits of a pose", "validity", "orientations", "constraints", "nodes")
+    for beyond in (0.0, LITTLE):
+        for name, touched in touching(design, pose, beyond * design.reach):
+            assert set(answers_of(touched, pose).values()) == {beyond == 0.0}, name
 
 
 @pytest.mark.parametrize("seed", range(10))
@@ -211,7 +200,7 @@ def test_optimum_on_the_gap_has_a_workspace(index: int) -> None:
     outcome = optimise_design(problem)
     assert outcome.best.volume > 0.0
     assert_file_meets_demands(outcome)
-    assert outcome.converged or index > 0
+    assert outcome.converged
 
 
 @pytest.mark.parametrize("seed", range(10))

@@ -51,6 +51,10 @@ def poses_about(design: Design, seed: int, count: int) -> list[Pose]:
     return [Pose.of(p, turn @ home.rotation) for p, turn in zip(places, turns, strict=True)]
 
 
+def arrays_of(poses: list[Pose]) -> tuple[FloatArray, FloatArray]:
+    return np.array([each.position for each in poses]), np.array([p.rotation for p in poses])
+
+
 def with_swing(design: Design, seed: int) -> Design:
     rng = np.random.default_rng(seed)
     angles = {name: float(rng.uniform(20.0, 180.0)) for name in ("a1", "a3", "b1", "b2", "b3")}
@@ -60,19 +64,11 @@ def with_swing(design: Design, seed: int) -> Design:
 
 @given(st.integers(0, 2**32))
 def test_pose_without_violations_or_collisions_is_valid(seed: int) -> None:
-    kind = seed % 4
-    if kind == 0:
-        design = troubled_case(seed)[0]
-    elif kind == 1:
-        design = ordinary_case(seed)[0]
-    elif kind == 2:
-        design = with_swing(ordinary_case(seed)[0], seed)
-    else:
-        design = THICK
+    ordinary = ordinary_case(seed)[0]
+    designs = troubled_case(seed)[0], ordinary, with_swing(ordinary, seed), THICK
+    design = designs[seed % 4]
     poses = poses_about(design, seed, 12)
-    found = poses_are_valid(
-        design, [each.position for each in poses], [each.rotation for each in poses]
-    )
+    found = poses_are_valid(design, *arrays_of(poses))
     for pose, valid in zip(poses, found.tolist(), strict=True):
         expected, nearness = verdict_of(design, pose)
         if nearness > 1e-12 * design.reach:
@@ -80,10 +76,7 @@ def test_pose_without_violations_or_collisions_is_valid(seed: int) -> None:
 
 
 def test_random_poses_are_valid_and_invalid() -> None:
-    poses = poses_about(THICK, 1, 400)
-    found = poses_are_valid(
-        THICK, [each.position for each in poses], [each.rotation for each in poses]
-    )
+    found = poses_are_valid(THICK, *arrays_of(poses_about(THICK, 1, 400)))
     assert 40 < found.sum() < 360
 
 
@@ -151,10 +144,9 @@ def test_move_poses_are_those_between_its_ends(
     found_axis, p, r = np.zeros(3), np.zeros(3), np.zeros((3, 3))
     found = write_turn(start.rotation, end.rotation, found_axis)
     step = np.array(end.position) - np.array(start.position)
+    first = np.array(start.position), start.rotation
     for share in (0.0, 0.3, 1.0):
-        write_pose_at(
-            share, np.array(start.position), start.rotation, step, found_axis, found, p, r
-        )
+        write_pose_at(share, *first, step, found_axis, found, p, r)
         expected = poses_between(start, end, share)
         np.testing.assert_allclose(p, expected[0], atol=1e-14)
         np.testing.assert_allclose(r, expected[1], atol=1e-9)
@@ -196,10 +188,8 @@ def test_move_to_another_mode_is_invalid() -> None:
 def test_rules_given_or_computed_have_the_same_answers() -> None:
     rules = Rules.of(THICK)
     moves = random_moves(2, 5, 1.0)
-    assert (moves_are_valid(THICK, *moves, rules=rules) == moves_are_valid(THICK, *moves)).all()
-    assert (
-        poses_are_valid(THICK, *moves[:2], rules=rules) == poses_are_valid(THICK, *moves[:2])
-    ).all()
+    for check, arrays in ((moves_are_valid, moves), (poses_are_valid, moves[:2])):
+        assert (check(THICK, *arrays, rules=rules) == check(THICK, *arrays)).all()
 
 
 def test_poses_and_moves_few_or_many_have_the_same_answers() -> None:
@@ -215,16 +205,14 @@ def test_poses_and_moves_few_or_many_have_the_same_answers() -> None:
 
 @pytest.mark.parametrize("count", [3, MANY_ROWS])
 def test_poses_of_broadcast_arrays_have_the_same_answers(count: int) -> None:
-    poses = poses_about(THICK, 5, count)
-    p, r = (np.array([pose.position for pose in poses]), np.array([q.rotation for q in poses]))
+    p, r = arrays_of(poses_about(THICK, 5, count))
     one = np.broadcast_to(r[0], r.shape).copy()
     assert np.array_equal(poses_are_valid(THICK, p, r[0]), poses_are_valid(THICK, p, one))
     same = np.broadcast_to(p[0], p.shape).copy()
     assert np.array_equal(poses_are_valid(THICK, p[0], r), poses_are_valid(THICK, same, r))
     # Nor need they be rows of one block.
-    assert np.array_equal(
-        poses_are_valid(THICK, p.T.copy().T, r[::-1]), poses_are_valid(THICK, p, r[::-1].copy())
-    )
+    back = poses_are_valid(THICK, p, r[::-1].copy())
+    assert np.array_equal(poses_are_valid(THICK, p.T.copy().T, r[::-1]), back)
 
 
 def test_poses_not_finite_are_refused() -> None:

@@ -1,6 +1,6 @@
-"""Where a Chromium lies on this machine, for pictures and tests; the standard library alone.
+"""Finding a Chromium on this machine, for pictures and tests; by the standard library alone.
 
-Looked for in this order: what EXPLORER_CHROMIUM names, the programs on the PATH, the usual
+The search goes in this order: what EXPLORER_CHROMIUM names, the programs on the PATH, the usual
 places of macOS and Windows, and the one that Playwright has downloaded.
 """
 
@@ -46,21 +46,21 @@ def find_chromium() -> str | None:
     Raises:
         InputError: EXPLORER_CHROMIUM is set, but names no program.
     """
-    wanted = os.environ.get(VARIABLE)
-    if wanted:
-        chosen = shutil.which(wanted)
-        if chosen is None:
+    name = os.environ.get(VARIABLE)
+    if name:
+        program = shutil.which(name)
+        if program is None:
             raise InputError(
-                f"{VARIABLE} names no program: {wanted!r}; set it to the path of a Chromium, "
+                f"{VARIABLE} names no program: {name!r}; set it to the path of a Chromium, "
                 "or unset it to have one looked for"
             )
-        return chosen
-    on_path = (found for found in map(shutil.which, NAMES) if found and not _is_hollow(found))
-    return next(itertools.chain(on_path, _usual_places()), None) or _of_playwright()
+        return program
+    on_path = (path for path in map(shutil.which, NAMES) if path and not _is_snap_stub(path))
+    return next(itertools.chain(on_path, _usual_places()), None) or _find_playwrights()
 
 
-def _is_hollow(program: str) -> bool:
-    """Whether it is Ubuntu's script that only tells how to install the real one."""
+def _is_snap_stub(program: str) -> bool:
+    """Whether a program is Ubuntu's script that only says how to install Chromium."""
     with Path(program).open("rb") as file:
         start = file.read(4096)
     snap = "/snap/bin/chromium"
@@ -81,7 +81,7 @@ def _usual_places() -> Iterator[str]:
             yield str(place)
 
 
-def _of_playwright() -> str | None:
+def _find_playwrights() -> str | None:
     if importlib.util.find_spec("playwright") is None:
         return None
     answer = subprocess.run(  # noqa: S603 - our own interpreter and our own words

@@ -13,11 +13,8 @@ from explorer.errors import ExplorerError, MissingExtraError
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
 
-
-# The renderer that every Chromium brings along.
+# Flags of the software renderer that every Chromium brings along.
 SWIFTSHADER = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")
-
-
 CHROMIUM_FLAGS = (
     "--no-sandbox",
     "--disable-background-networking",
@@ -41,8 +38,8 @@ def headless_browser(
     """Start a headless Chromium and close it in the end.
 
     Args:
-        graphics: Its flags that choose what draws.
-        environment: Variables that it is to have beside those of this process.
+        graphics: Flags that choose the renderer.
+        environment: Environment variables to add to those of this process.
 
     Raises:
         MissingExtraError: Playwright or a Chromium is missing.

@@ -1,4 +1,4 @@
-"""What viser does but offers no public name for; every private name of it is in here."""
+"""Features of viser without a public name; only this module uses its private names."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ import viser
 import websockets.asyncio.server
 from numpy.typing import ArrayLike
 
-from explorer.app.security.client_messages import Held
+from explorer.app.security.client_messages import ControlValue
 from explorer.errors import ServerError
 from explorer.numerics.arrays import FloatArray
 
 Mark = tuple[float, str]
 SceneMessage = dict[str, Any]
-"""What makes or changes a part of the scene: its type, its fields by name."""
+"""A message that makes or changes a part of the scene: its type, its fields by name."""
 Serve = Callable[..., Any]
 
-# Where a node of the scene is, by the names of its properties.
+# Properties that place a node of the scene.
 PLACE = ("position", "wxyz")
 
-# The module of viser that serves.
-SERVES = "viser.infra._infra"
-_serving = threading.Lock()
+# Name of the module of viser that serves.
+SERVING_MODULE = "viser.infra._infra"
+_serving_lock = threading.Lock()
 
 
 def start_viser(
@@ -39,13 +39,13 @@ def start_viser(
     Args:
         host: The address to listen on.
         port: The port to listen on; any free one if 0.
-        guarded: Returns what viser shall call in place of the function of websockets by
-            which it serves; everybody gets in if None.
+        guarded: Returns a replacement for websockets' function by which viser serves; with
+            None everybody gets in.
 
     Raises:
         ServerError: this viser does not serve in the way that is guarded.
     """
-    # A tab may close while something is on its way to it; that is no news.
+    # A tab may close while a message is on its way to it; that needs no warning.
     warnings.filterwarnings("ignore", "Queued a .* on a closed connection")
     with contextlib.redirect_stdout(io.StringIO()), _serving_through(guarded) as is_guarded:
         server = viser.ViserServer(host=host, port=port, verbose=False)
@@ -60,7 +60,7 @@ def start_viser(
 
 @contextlib.contextmanager
 def _serving_through(guarded: Callable[[Serve], Serve] | None) -> Generator[Callable[[], bool]]:
-    """Let viser, and nobody else, serve through `guarded`; what is yielded says if it did."""
+    """Let viser alone serve through `guarded`; yield a function that returns whether it did."""
     if guarded is None:
         yield lambda: True
         return
@@ -69,13 +69,13 @@ def _serving_through(guarded: Callable[[Serve], Serve] | None) -> Generator[Call
     used: list[Serve] = []
 
     def serve(handler: Any, *args: Any, **options: Any) -> Any:
-        if handler.__module__ != SERVES:
+        if handler.__module__ != SERVING_MODULE:
             return plain(handler, *args, **options)
         # viser tries port after port; each time it is the same guard.
         used[:] = used or [guarded(plain)]
         return used[0](handler, *args, **options)
 
-    with _serving:
+    with _serving_lock:
         websockets_server.serve = serve
         try:
             yield lambda: bool(used)
@@ -93,7 +93,7 @@ def stop_viser(server: viser.ViserServer) -> None:
             thread.join(timeout=5.0)
 
 
-class MarksOf:
+class SliderMarks:
     """The marks below a slider: its constructor takes them, its handle does not."""
 
     def __init__(self, slider: viser.GuiSliderHandle[float]) -> None:
@@ -119,20 +119,20 @@ def refuse_tunnels(server: viser.ViserServer) -> None:
     internals._websock_server.unregister_handler(_messages.ShareUrlRequest)
 
 
-def tell_uploads_to_their_senders(server: viser.ViserServer) -> None:
-    """Tell how far an upload is to the browser that sends it alone.
+def report_uploads_to_senders(server: viser.ViserServer) -> None:
+    """Report the progress of an upload only to the browser that sends it.
 
-    viser tells all of them, and those that come later, which then announce a file of no name.
+    viser reports it to all browsers, also later ones, which then show a file without a name.
     """
     from viser import _messages
 
     gui: Any = server.gui
     interface = gui._websock_interface
-    tell_all = interface.queue_message
+    queue_for_all = interface.queue_message
 
     def queue_message(message: Any) -> None:
         if not isinstance(message, _messages.FileTransferPartAck):
-            tell_all(message)
+            queue_for_all(message)
             return
         upload = gui._current_file_upload_states.get(message.transfer_uuid)
         sender: Any = server.get_clients().get(upload["client_id"]) if upload else None
@@ -167,10 +167,10 @@ def _send_place(node: viser.SceneNodeHandle, name: str) -> None:
 def put_camera(
     client: viser.ClientHandle, eye: FloatArray, target: FloatArray, field_of_view: float
 ) -> None:
-    """Put a browser's camera at an eye, upright, looking at a target; the browser then tells of it.
+    """Put a browser's camera at an eye, upright, looking at a target; the browser then reports it.
 
-    viser's own handle takes what was sent for what is there: it sends nothing twice, although
-    a browser that is still loading goes back to its first camera after all that it was sent.
+    viser's own handle never sends the same place twice, although a browser that is still loading
+    returns to its first camera after all messages.
     """
     from viser import _messages
 
@@ -188,7 +188,7 @@ def put_camera(
         connection.queue_message(_messages.SetCameraFovMessage(field_of_view))
 
 
-def tell_again(handle: Any, name: str) -> None:
+def resend(handle: Any, name: str) -> None:
     """Send browsers a property that they have already: `value` of a control, or a node's place."""
     from viser import _messages
 
@@ -200,11 +200,11 @@ def tell_again(handle: Any, name: str) -> None:
         state.gui_api._websock_interface.queue_message(message)
 
 
-def is_misled(handle: Any, name: str) -> bool:
-    """Whether browsers were told another `value` of a control last than the one it holds.
+def is_stale(handle: Any, name: str) -> bool:
+    """Whether browsers were last sent another `value` of a control than the one it holds.
 
-    viser's setter tells them first and holds it after: what a hand sets in between is told
-    last, and then overwritten.
+    viser's setter sends a value first and stores it after: a value that a user sets in between is
+    sent last, and then overwritten here.
     """
     from viser import _messages
 
@@ -215,10 +215,10 @@ def is_misled(handle: Any, name: str) -> bool:
     message = _messages.GuiUpdateMessage(state.uuid, {name: held})
     buffer = state.gui_api._websock_interface.get_message_buffer()
     with buffer.buffer_lock:
-        told = buffer.message_from_id.get(
+        sent = buffer.message_from_id.get(
             buffer.id_from_redundancy_key.get(message.redundancy_key())
         )
-    return told is not None and told.updates[name] != held
+    return sent is not None and sent.updates[name] != held
 
 
 def element_id(control: viser.GuiInputHandle[Any] | viser.GuiButtonHandle) -> str:
@@ -229,36 +229,43 @@ def element_id(control: viser.GuiInputHandle[Any] | viser.GuiButtonHandle) -> st
 
 def run_script(server: viser.ViserServer, source: str) -> None:
     """Run a script of ours in every browser, also in those that come later."""
-    from viser import _messages
-
     internals: Any = server
-    internals._websock_server.queue_message(_messages.RunJavascriptMessage(source=source))
+    internals._websock_server.queue_message(_script(source))
 
 
 def run_script_in(client: viser.ClientHandle, source: str) -> None:
     """Run a script of ours in one browser."""
+    internals: Any = client
+    internals._websock_connection.queue_message(_script(source))
+
+
+def _script(source: str) -> Any:
+    """Return the message that runs a script, whose errors a browser logs.
+
+    An error that viser's page meets at a message takes all messages that wait with it.
+    """
     from viser import _messages
 
-    internals: Any = client
-    internals._websock_connection.queue_message(_messages.RunJavascriptMessage(source=source))
+    guarded = f"try {{\n{source}\n}} catch (error) {{ console.error(error); }}"
+    return _messages.RunJavascriptMessage(source=guarded)
 
 
-class ControlsOf:
-    """What the controls of a server and of its clients hold, by their ids."""
+class ServerControls:
+    """The values of the controls of a server and of its clients, by their ids."""
 
     def __init__(self, server: viser.ViserServer) -> None:
         self._server = server
-        # A viser without them is found out now, rather than when somebody comes.
+        # A viser without these names fails here, rather than when a browser connects.
         self._inputs()
 
-    def held(self, uuid: str) -> Held | None:
-        """Return what a control holds; None if there is no such control."""
+    def value_of(self, uuid: str) -> ControlValue | None:
+        """Return the value of a control; None if there is no such control."""
         handle = self._handle(uuid)
         if handle is None:
             return None
         state = handle._impl
         options = getattr(state.props, "options", None)
-        return Held(state.value, None if options is None else tuple(options))
+        return ControlValue(state.value, None if options is None else tuple(options))
 
     def takes_files(self, uuid: str) -> bool:
         """Whether this is a button to upload files with."""
@@ -275,18 +282,18 @@ class ControlsOf:
 
 def scene_as_html(
     server: viser.ViserServer,
-    chosen: Callable[[list[SceneMessage]], list[SceneMessage]],
+    select: Callable[[list[SceneMessage]], list[SceneMessage]],
 ) -> str:
     """Return viser's page with a scene in it that it plays by itself.
 
     Args:
-        server: Whose scene it is.
-        chosen: Returns of all that makes the scene what goes into the page.
+        server: Server of the scene.
+        select: Returns the messages for the page from all messages that make the scene.
     """
     serializer: Any = server.get_scene_serializer()
-    # It would go on to record.
+    # Otherwise it would go on recording.
     serializer._filter = _nothing
-    messages = chosen([message for _, message in serializer._messages])
+    messages = select([message for _, message in serializer._messages])
     serializer._messages = [(0.0, message) for message in messages]
     used = set(_arrays_in(messages))
     serializer._binary_buffers = [
@@ -314,8 +321,8 @@ def _arrays_in(value: object) -> Generator[int]:
             yield from _arrays_in(each)
 
 
-def placed_for(client: viser.ClientHandle, panel: viser.PanelHandle) -> viser.PanelHandle:
-    """Return a handle by which a panel that all browsers share is placed in one of them."""
+def panel_in(client: viser.ClientHandle, panel: viser.PanelHandle) -> viser.PanelHandle:
+    """Return a handle that places a panel, which all browsers share, in one browser alone."""
     own = viser.PanelHandle.__new__(viser.PanelHandle)
     own.__dict__.update({**panel.__dict__, "_placement_gui_api": client.gui})
     return own

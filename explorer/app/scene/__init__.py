@@ -1,1 +1,1 @@
-"""What the drawings of all features share: shapes, places and the camera."""
+"""The scene of all features: its parts, shapes, scale and cameras."""

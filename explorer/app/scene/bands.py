@@ -1,4 +1,4 @@
-"""Surfaces in bands of colour: by how near a singularity is, or by what bounds them."""
+"""Surfaces in bands of colour: by the proximity to singularities, or by what bounds them."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ WARN_CONDITION = 0.01
 PLAIN: Rgb = (110, 150, 196)
 # Where legs begin to collide: what collides has this colour all over the page.
 COLLIDING: Rgb = OUTLINE
-# A share of the reach: the longest edge of a coloured facet, unless that takes too many facets.
+# Longest edge of a coloured facet as a share of the reach, unless that takes too many facets.
 COLOURED_EDGE = 0.08
-# The most facets that a surface is cut into to be coloured.
+# Most facets into which a surface is cut to be coloured.
 MOST_COLOURED = 100_000
 
 
@@ -40,13 +40,13 @@ class Shell:
 
 @dataclass(frozen=True)
 class Colouring:
-    """By what positions are coloured at one orientation.
+    """A colouring of positions by a measure, at one orientation.
 
     Attributes:
         design: The manipulator.
-        rotation: Platform to base, shape (3, 3).
-        measure: What counts.
-        warn_below: The length below which margins are warned of.
+        rotation: Rotation from platform to base, shape (3, 3).
+        measure: Measure that gives the colours.
+        warn_below: Length below which margins raise a warning, in design units.
     """
 
     design: Design
@@ -55,17 +55,17 @@ class Colouring:
     warn_below: float
 
     def values(self, points: FloatArray) -> FloatArray:
-        """Return what colours points (n, 3), as multiples of the value to warn below."""
+        """Return the measure at points (n, 3), as multiples of its value for a warning."""
         if self.measure != "condition":
             return np.abs(margins(points, self.rotation)).min(axis=-1) / self.warn_below
         rates = jacobian(self.design, points, self.rotation)
         return inverse_condition(rates, self.design.reach) / WARN_CONDITION
 
     def shells(self, solid: Solid) -> tuple[tuple[Shell, ...], float | None]:
-        """Return a surface in its colours, each of them once.
+        """Return the parts of a surface, one for each colour, and its longest edge.
 
-        The second value is the longest edge of a coloured facet in design units if that is
-        longer than usual, because the surface is large beside the reach; None if not.
+        The longest edge of a coloured facet, in design units, is given if it is longer than usual,
+        because the surface is large beside the reach; it is None otherwise.
         """
         if solid.is_empty:
             return (), None
@@ -92,8 +92,8 @@ def cut_to_size(solid: Solid, edge: float) -> tuple[FloatArray, IntArray]:
     it makes at most `MOST_COLOURED` facets.
 
     Args:
-        solid: With the surface; not empty.
-        edge: The longest edge that is wanted, in design units.
+        solid: Solid with the surface; not empty.
+        edge: Longest edge to aim at, in design units.
     """
     from trimesh import remesh
 
@@ -103,11 +103,11 @@ def cut_to_size(solid: Solid, edge: float) -> tuple[FloatArray, IntArray]:
         lengths = edge_lengths(vertices, faces)
         longest = float(lengths.max())
         shorter = max(edge, 0.5 * longest)
-        # Each edge that is cut makes two facets of either facet beside it.
+        # Each edge that is cut divides both facets beside it in two.
         if longest <= edge or len(faces) + int((lengths > shorter).sum()) > MOST_COLOURED:
             return vertices, faces
-        made = untyped.subdivide_to_size(vertices, faces, shorter, max_iter=12)
-        vertices, faces = np.asarray(made[0], dtype=np.float64), np.asarray(made[1])
+        subdivided = untyped.subdivide_to_size(vertices, faces, shorter, max_iter=12)
+        vertices, faces = np.asarray(subdivided[0], dtype=np.float64), np.asarray(subdivided[1])
 
 
 def edge_lengths(vertices: FloatArray, faces: IntArray) -> FloatArray:
@@ -117,7 +117,7 @@ def edge_lengths(vertices: FloatArray, faces: IntArray) -> FloatArray:
 
 
 def _by_cause(solid: Solid) -> tuple[Shell, ...]:
-    """Return what limits bound in one colour, and in another where legs collide."""
+    """Return the surface along limits in one colour, and that along collisions in another."""
     pairs = [index for index, name in enumerate(solid.limits) if name in PAIR_NAMES]
     collide = np.isin(solid.limit_of_face, pairs)
     parts = ((PLAIN, solid.faces[~collide]), (COLLIDING, solid.faces[collide]))
@@ -127,12 +127,12 @@ def _by_cause(solid: Solid) -> tuple[Shell, ...]:
 def split_at(
     triangles: FloatArray, values: FloatArray, level: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Split triangles along the line where a value that is linear on each is a level.
+    """Split triangles along the line where a value, linear on each triangle, equals a level.
 
     Args:
-        triangles: Shape (n, 3, 3).
-        values: At their corners, shape (n, 3).
-        level: Where to split.
+        triangles: Corners of the triangles, shape (n, 3, 3).
+        values: Values at the corners, shape (n, 3).
+        level: Level at which to split.
 
     Returns:
         The triangles below, the triangles above, and the values of those above.
@@ -145,7 +145,7 @@ def split_at(
         if not mixed.any():
             continue
         t, v, h = triangles[mixed], values[mixed], high[mixed]
-        # Turn each so that the corner alone on its side comes first.
+        # The corner that is alone on its side comes first.
         lone = np.argmax(h == lone_is_high, axis=1)
         order = (lone[:, None] + np.arange(3)) % 3
         t = np.take_along_axis(t, order[:, :, None], axis=1)

@@ -1,7 +1,7 @@
 """Meshes whose edges look sharp and whose round faces look round.
 
-Browsers shade by normals of vertices, the mean over the faces about each. So vertices are
-split where faces meet at an edge, and shared where they go on smoothly.
+Browsers shade by the normals of vertices, each the mean over the faces about it. So vertices are
+split where faces meet at a sharp edge, and shared elsewhere.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from explorer.numerics.arrays import FloatArray
 Drawn: TypeAlias = tuple[NDArray[np.float32], NDArray[np.uint32]]
 """Vertices (n, 3) and faces (m, 3)."""
 
-# Faces that turn by more meet at an edge; those of the parts' circles turn by 7.5°.
+# Faces at a larger angle meet at a sharp edge; neighbours on the parts' circles are 7.5° apart.
 CREASE = math.radians(30.0)
 
 
 def creased(vertices: FloatArray, faces: NDArray[np.int32]) -> Drawn:
-    """Return a closed mesh with vertices of their own on either side of its edges.
+    """Return a closed mesh whose faces on either side of a sharp edge share no vertices.
 
     Args:
-        vertices: Shape (n, 3).
+        vertices: Positions of the vertices, shape (n, 3).
         faces: Indices of vertices, each edge shared by two, shape (m, 3).
     """
     corners = vertices[faces]
@@ -37,9 +37,9 @@ def creased(vertices: FloatArray, faces: NDArray[np.int32]) -> Drawn:
     edges = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1), axis=-1).reshape(-1, 2)
     owners = np.repeat(np.arange(count), 3)
     order = np.lexsort((edges[:, 1], edges[:, 0]))
-    one, other = owners[order[::2]], owners[order[1::2]]
-    smooth = np.einsum("ij,ij->i", normals[one], normals[other]) > math.cos(CREASE)
-    links = (np.ones(int(smooth.sum())), (one[smooth], other[smooth]))
+    first, second = owners[order[::2]], owners[order[1::2]]
+    smooth = np.einsum("ij,ij->i", normals[first], normals[second]) > math.cos(CREASE)
+    links = (np.ones(int(smooth.sum())), (first[smooth], second[smooth]))
     _, patches = csgraph.connected_components(sparse.coo_matrix(links, shape=(count, count)))
     keys = faces.astype(np.int64) * count + patches[:, None]
     unique, indices = np.unique(keys.ravel(), return_inverse=True)

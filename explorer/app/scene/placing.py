@@ -12,15 +12,14 @@ from functools import cached_property
 
 import numpy as np
 
-from explorer.app.features.prototype.parts import Parts
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.numerics.arrays import FloatArray
 
-# What the reach of a design measures in the scene, roughly.
+# Approximate reach of a design in scene units.
 SCENE_REACH = 10.0
-# Of every two of the platform's points.
-PAIRS = np.triu_indices(4, 1)
+# Indices of every two of the platform's points.
+POINT_PAIRS = np.triu_indices(4, 1)
 
 
 def round_step(length: float) -> float:
@@ -42,16 +41,20 @@ class Placed:
     """A frame with its points in scene units.
 
     Attributes:
-        frame: What is drawn.
-        extent: (lows, highs) of a workspace that is drawn too, in design units, or None.
-        parts: Of the prototype, where they replace the schematic legs and bodies.
-        dark: Whether it is drawn on a dark page.
+        frame: The frame that is drawn.
+        dark: Whether the page is dark.
+        floor: Height, in design units, of the lowest point of what is drawn in place of the
+            schematic legs and bodies; None while these are drawn.
     """
 
     frame: Frame
-    extent: FloatArray | None = None
-    parts: Parts | None = None
     dark: bool = False
+    floor: float | None = None
+
+    @property
+    def is_schematic(self) -> bool:
+        """Whether the schematic legs and bodies are drawn."""
+        return self.floor is None
 
     @cached_property
     def scale(self) -> float:
@@ -60,12 +63,12 @@ class Placed:
 
     @cached_property
     def points(self) -> dict[str, FloatArray]:
-        """a1 … b4 in the scene, each (3,)."""
+        """Points a1 … b4 in scene units, each (3,)."""
         return {n: self.scale * p for n, p in self.frame.snapshot.points._asdict().items()}
 
     @cached_property
     def platform_points(self) -> dict[str, FloatArray]:
-        """b1 … b4 in the platform frame, in scene units, each (3,)."""
+        """Points b1 … b4 in the platform frame, in scene units, each (3,)."""
         design = self.frame.state.design
         local = {
             "b1": (*design.b1, 0.0),
@@ -77,19 +80,19 @@ class Placed:
 
     @cached_property
     def reach(self) -> float:
-        """|a3| in the scene."""
+        """The reach |a3| in scene units."""
         return self.scale * self.frame.state.design.reach
 
     @cached_property
     def thickness(self) -> float:
-        """How thick parts are drawn: 1, and less where the platform's points are close."""
+        """The scale of thicknesses: 1, and less if the platform's points are close."""
         points = np.array(list(self.platform_points.values()))
-        gaps = np.linalg.norm(points[PAIRS[0]] - points[PAIRS[1]], axis=1)
+        gaps = np.linalg.norm(points[POINT_PAIRS[0]] - points[POINT_PAIRS[1]], axis=1)
         # b4 and b2 or b3 may coincide; the legs then simply share a joint.
         apart = gaps[gaps > 0.05]
         return float(np.clip(apart.min(initial=1.2) / 1.2, 0.3, 1.0))
 
     @cached_property
     def facing(self) -> float:
-        """On which side of the platform plane its body lies: away from a1 at home."""
+        """The side of the platform plane on which its body lies, ±1; away from a1 at home."""
         return 1.0 if self.frame.state.mode & 4 == 0 else -1.0

@@ -1,14 +1,14 @@
-"""Primitive meshes, and nodes that hold many of one kind and move in one message.
+"""Primitive meshes, and nodes of many copies that move in one message.
 
-viser is slow with many nodes and fast with one that is instanced, so rods, balls and
-boxes are each one node however many there are.
+viser is slow with many nodes and fast with one instanced node, so all rods are one node, and all
+balls, and all boxes.
 """
 
 from __future__ import annotations
 
 import functools
 from collections.abc import Iterator
-from typing import Any, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 import viser
@@ -21,9 +21,79 @@ from explorer.numerics.arrays import FloatArray, IntArray
 
 Mesh: TypeAlias = tuple[FloatArray, IntArray]
 
+# Number of points on a circle.
 SECTIONS = 28
-# The ends of the four sides of a quadrilateral.
-HEM = np.array([[0, 1], [1, 2], [2, 3], [3, 0]])
+# Ends of the four sides of a quadrilateral.
+SIDES = np.array([[0, 1], [1, 2], [2, 3], [3, 0]])
+NO_MESH: Mesh = (np.zeros((3, 3)), np.array([[0, 1, 2]]))
+"""The mesh before the first frame, where each frame has its own."""
+
+
+def add_lines(
+    scene: viser.SceneApi,
+    name: str,
+    count: int,
+    colour: Rgb | None,
+    thickness: float,
+    *,
+    visible: bool = False,
+) -> viser.LineSegmentsHandle:
+    """Add line segments.
+
+    Args:
+        scene: Where they are added.
+        name: Their node.
+        count: Number of segments.
+        colour: Colour of all; None where each has its own.
+        thickness: Thickness in pixels.
+        visible: Whether they are visible before the first frame.
+    """
+    # One colour for all could not become many: the browser would draw white.
+    colours = np.zeros((count, 2, 3), dtype=np.uint8) if colour is None else colour
+    return scene.add_line_segments(
+        name,
+        np.zeros((count, 2, 3)),
+        colours,
+        thickness=thickness,
+        thickness_units="screen",
+        visible=visible,
+    )
+
+
+def add_translucent(
+    scene: viser.SceneApi,
+    name: str,
+    mesh: Mesh,
+    opacity: float,
+    *,
+    colour: Rgb = (0, 0, 0),
+    side: Literal["front", "double"] = "double",
+    is_flat: bool = False,
+    visible: bool = False,
+) -> viser.MeshHandle:
+    """Add a translucent mesh, which casts and receives no shadow.
+
+    Args:
+        scene: Where it is added.
+        name: Its node.
+        mesh: Its shape.
+        opacity: Its opacity, 0 to 1.
+        colour: Its colour.
+        side: Which sides of its faces are drawn.
+        is_flat: Whether each face is shaded by itself.
+        visible: Whether it is visible before the first frame.
+    """
+    return scene.add_mesh_simple(
+        name,
+        *mesh,
+        color=colour,
+        opacity=opacity,
+        side=side,
+        flat_shading=is_flat,
+        cast_shadow=False,
+        receive_shadow=False,
+        visible=visible,
+    )
 
 
 class Instances:
@@ -49,25 +119,25 @@ class Instances:
             batched_scales=np.ones((count, 3)),
             batched_colors=np.array(colours, dtype=np.uint8),
             opacity=opacity,
-            # What is seen through casts no shadow.
+            # Translucent bodies cast no shadow.
             cast_shadow=opacity is None,
             lod="off",
         )
 
-    def placed(
+    def place(
         self, positions: FloatArray, wxyzs: FloatArray, scales: FloatArray
     ) -> Iterator[Update]:
-        """Yield what puts the copies there; shapes (n, 3), (n, 4), (n, 3)."""
+        """Yield the updates that place the copies; shapes (n, 3), (n, 4), (n, 3)."""
         yield self.handle, "batched_positions", positions.astype(np.float32)
         yield self.handle, "batched_wxyzs", wxyzs.astype(np.float32)
         yield self.handle, "batched_scales", scales.astype(np.float32)
 
-    def coloured(self, colours: list[Rgb]) -> Iterator[Update]:
-        """Yield what gives each its colour."""
+    def colour(self, colours: list[Rgb]) -> Iterator[Update]:
+        """Yield the updates that give each copy its colour."""
         yield self.handle, "batched_colors", np.array(colours, dtype=np.uint8)
 
-    def shown(self, visible: bool) -> Iterator[Update]:
-        """Yield what shows or hides all of them."""
+    def show(self, visible: bool) -> Iterator[Update]:
+        """Yield the updates that show or hide all copies."""
         yield self.handle, "visible", visible
 
 
@@ -85,11 +155,11 @@ class Rods(Instances):
         super().__init__(scene, name, cylinder(), colours, opacity=opacity)
 
     def between(self, starts: FloatArray, ends: FloatArray, radii: FloatArray) -> Iterator[Update]:
-        """Yield what lays the cylinders from starts (n, 3) to ends (n, 3)."""
+        """Yield the updates that lay the cylinders from starts (n, 3) to ends (n, 3)."""
         spans = ends - starts
         lengths = np.linalg.norm(spans, axis=1)
         scales = np.stack([radii, radii, np.maximum(lengths, 1e-9)], axis=1)
-        yield from self.placed(starts, turned_to(spans), scales)
+        yield from self.place(starts, turned_to(spans), scales)
 
 
 class Balls(Instances):
@@ -106,9 +176,9 @@ class Balls(Instances):
         super().__init__(scene, name, sphere(), colours, opacity=opacity)
 
     def at(self, centres: FloatArray, radii: FloatArray) -> Iterator[Update]:
-        """Yield what puts the spheres at centres (n, 3)."""
+        """Yield the updates that put the spheres at centres (n, 3)."""
         upright = np.tile([1.0, 0.0, 0.0, 0.0], (len(centres), 1))
-        yield from self.placed(centres, upright, np.repeat(radii[:, None], 3, axis=1))
+        yield from self.place(centres, upright, np.repeat(radii[:, None], 3, axis=1))
 
 
 class Boxes(Instances):
@@ -117,49 +187,33 @@ class Boxes(Instances):
     def __init__(self, scene: viser.SceneApi, name: str, colours: list[Rgb]) -> None:
         super().__init__(scene, name, box(), colours)
 
-    def spanning(self, lows: FloatArray, highs: FloatArray) -> Iterator[Update]:
-        """Yield what spans the boxes from lows (n, 3) to highs (n, 3)."""
+    def span(self, lows: FloatArray, highs: FloatArray) -> Iterator[Update]:
+        """Yield the updates that span the boxes from lows (n, 3) to highs (n, 3)."""
         upright = np.tile([1.0, 0.0, 0.0, 0.0], (len(lows), 1))
-        yield from self.placed(0.5 * (lows + highs), upright, highs - lows)
+        yield from self.place(0.5 * (lows + highs), upright, highs - lows)
 
 
 class Patch:
-    """A translucent quadrilateral with a hem."""
+    """A translucent quadrilateral with an outline."""
 
     def __init__(
         self, scene: viser.SceneApi, name: str, *, opacity: float, visible: bool = True
     ) -> None:
-        self._plane = scene.add_mesh_simple(
-            f"{name}/plane",
-            np.zeros((4, 3)),
-            np.array([[0, 1, 2], [0, 2, 3]]),
-            opacity=opacity,
-            side="double",
-            cast_shadow=False,
-            receive_shadow=False,
-            visible=visible,
-        )
-        self._hem = scene.add_line_segments(
-            f"{name}/hem",
-            np.zeros((4, 2, 3)),
-            # One colour for all could not become many: the browser would draw white.
-            np.zeros((4, 2, 3), dtype=np.uint8),
-            thickness=1.5,
-            thickness_units="screen",
-            visible=visible,
-        )
+        square = np.zeros((4, 3)), np.array([[0, 1, 2], [0, 2, 3]])
+        self._plane = add_translucent(scene, f"{name}/plane", square, opacity, visible=visible)
+        self._outline = add_lines(scene, f"{name}/hem", len(SIDES), None, 1.5, visible=visible)
 
-    def shown(self, visible: bool) -> Iterator[Update]:
-        """Yield what shows or hides it."""
+    def show(self, visible: bool) -> Iterator[Update]:
+        """Yield the updates that show or hide the patch."""
         yield self._plane, "visible", visible
-        yield self._hem, "visible", visible
+        yield self._outline, "visible", visible
 
-    def spanned(self, corners: FloatArray, colour: Rgb) -> Iterator[Update]:
-        """Yield what spans it between corners (4, 3)."""
+    def span(self, corners: FloatArray, colour: Rgb) -> Iterator[Update]:
+        """Yield the updates that span the patch between corners (4, 3)."""
         yield self._plane, "color", colour
         yield self._plane, "vertices", corners.astype(np.float32)
-        yield self._hem, "points", corners[HEM].astype(np.float32)
-        yield self._hem, "colors", of_one_colour(colour, len(HEM))
+        yield self._outline, "points", corners[SIDES].astype(np.float32)
+        yield self._outline, "colors", of_one_colour(colour, len(SIDES))
 
 
 @functools.lru_cache(maxsize=256)

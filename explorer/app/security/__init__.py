@@ -1,1 +1,1 @@
-"""Who may connect to the server, and what a browser may send."""
+"""Rules for who may connect to the server, and for the messages of browsers."""

@@ -1,8 +1,8 @@
-"""Who may load the page and who may open a websocket, decided from a request's head alone.
+"""The rule for who may load the page and open a websocket, from a request's head alone.
 
 On loopback every program of this machine may, but no web site: a page from elsewhere that
-the user's browser shows has another `Origin`, and a foreign name that was made to lead here
-(DNS rebinding) is another `Host`. Wherever else the explorer listens, a token is asked for:
+the user's browser shows has another `Origin`, and a foreign name that resolves to this machine
+(DNS rebinding) is another `Host`. On any other address the explorer requires a token:
 in the address of the page, then in a cookie, since the page itself chooses the address of
 its websocket.
 """
@@ -22,16 +22,16 @@ from http.cookies import CookieError, SimpleCookie
 from explorer.errors import ServerError
 
 LOOPBACK_NAMES = ("127.0.0.1", "localhost", "[::1]")
-# What stands for every address of this machine, and the loopback address among them.
+# Addresses that stand for every address of this machine, and the loopback address among them.
 EVERYWHERE = {"0.0.0.0": "127.0.0.1", "::": "::1"}  # noqa: S104 - a comparison
 TOKEN_BYTES = 24
 TOKEN = re.compile(r"[A-Za-z0-9_-]{16,128}")
-# Plain words, into which no address of another server fits: viser's page would connect to it.
+# Plain words, since viser's page would connect to the address of another server in its query.
 PLAIN_QUERY = re.compile(r"[A-Za-z0-9_.~,=&-]*")
 HOST = re.compile(r"(?P<name>\[[0-9a-f:.]+\]|[a-z0-9._-]+)(:(?P<port>[0-9]{1,5}))?")
 HTTP_PORT = 80
-# What the page may do. Its program, its styles and its workers are all inside one file; it
-# connects to nobody but the server that it came from, so that no link can turn it elsewhere.
+# Permissions of the page. Its program, its styles and its workers are all inside one file; it
+# connects to no other server than its own, so that no link can make it connect elsewhere.
 # Plots of studies come as text that viser's page runs, and compile their shaders from text.
 POLICY = (
     "default-src 'none'; "
@@ -50,12 +50,12 @@ POLICY = (
 
 @dataclass(frozen=True)
 class Head:
-    """The head of a request, all that is judged.
+    """The head of a request, from which access is decided.
 
     Attributes:
         target: Path and query, as sent.
-        hosts, origins, cookies: Every value of these headers.
-        upgrade: Whether it asks to become a websocket, or anything else but a page.
+        hosts, origins, cookies: All values of these headers.
+        upgrade: Whether it requests a websocket, or anything else than a page.
     """
 
     target: str
@@ -79,10 +79,10 @@ class Access:
 
     Attributes:
         host: The address that it listens on.
-        token: What has to be known to get in; None for no token, on loopback only.
+        token: The token that a request must have; None for no token, on loopback only.
 
     Raises:
-        ServerError: a host beyond loopback without a token, or a token that is none.
+        ServerError: a host beyond loopback without a token, or an invalid token.
     """
 
     host: str
@@ -90,7 +90,7 @@ class Access:
 
     def __post_init__(self) -> None:
         if self.token is None and not is_loopback(self.host):
-            raise ServerError(f"listening on {self.host!r} takes a token; others could get in")
+            raise ServerError(f"listening on {self.host!r} needs a token; others could connect")
         if self.token is not None and TOKEN.fullmatch(self.token) is None:
             raise ServerError(
                 "a token has 16 to 128 letters, digits, - and _; leave it out to get a random one"
@@ -108,11 +108,11 @@ class Access:
         return Access(host, token)
 
     def url(self, port: int, host: str | None = None) -> str:
-        """Return where the page is found, token included.
+        """Return the address of the page, token included.
 
         Args:
-            port: On which the server listens.
-            host: As others call this machine; as a browser on it does if None.
+            port: Port of the server.
+            host: Name of this machine for others; for a browser on this machine if None.
         """
         name = EVERYWHERE.get(self.host, self.host) if host is None else host
         address = f"http://{_in_address(name)}:{port}"
@@ -122,11 +122,11 @@ class Access:
         """Return why a request is refused, or None if it may pass.
 
         Args:
-            head: Of the request.
-            port: On which the server listens.
+            head: Head of the request.
+            port: Port of the server.
         """
         host = head.hosts[0].lower() if len(head.hosts) == 1 else ""
-        if not self._is_ours(host, port):
+        if not self._is_own_host(host, port):
             return Refusal(
                 HTTPStatus.FORBIDDEN,
                 f"This address is not one of the explorer's; open {self.url(port).split('?')[0]}",
@@ -142,16 +142,16 @@ class Access:
                 HTTPStatus.FORBIDDEN,
                 "Only the explorer's own page may connect: the Origin must be that of this Host.",
             )
-        if self.token is not None and not self._knows(query, head.cookies, port):
+        if self.token is not None and not self._has_token(query, head.cookies, port):
             return Refusal(
                 HTTPStatus.UNAUTHORIZED,
-                "This explorer asks for a token: open the whole address that it told on start, "
+                "This explorer needs a token: open the whole address that it printed on start, "
                 "with ?token=...",
             )
         return None
 
     def headers(self, head: Head, port: int) -> list[tuple[str, str]]:
-        """Return the headers that go with the page, for a request that may pass."""
+        """Return the headers of the page, for a request that may pass."""
         host = head.hosts[0].lower()
         headers = [
             ("Content-Security-Policy", POLICY.format(host=host)),
@@ -164,28 +164,28 @@ class Access:
             headers.append(("Set-Cookie", cookie))
         return headers
 
-    def _is_ours(self, host: str, port: int) -> bool:
-        found = HOST.fullmatch(host)
-        if found is None:
+    def _is_own_host(self, host: str, port: int) -> bool:
+        parts = HOST.fullmatch(host)
+        if parts is None:
             return False
-        name = found["name"]
+        name = parts["name"]
         if self.token is None:
             return name in {*LOOPBACK_NAMES, _in_address(self.host).lower()} and port == int(
-                found["port"] or HTTP_PORT
+                parts["port"] or HTTP_PORT
             )
-        # Rebinding takes a name, so any address will do; and a container's port is mapped to ours.
+        # Rebinding takes a name, so any address may pass; a container may map another port.
         short = name.partition(".")[0]
         known = (self.host.lower(), "localhost", socket.gethostname().lower())
         return _is_address(name.strip("[]")) or name in known or short == known[-1]
 
     def _is_own_page(self, origins: Sequence[str], host: str) -> bool:
-        # A program that is no browser can say what it likes, so it can say this as well.
+        # A program that is no browser can send any origin, so it can send this one as well.
         if len(origins) != 1:
             return False
         scheme, _, rest = origins[0].lower().partition("://")
         return scheme in ("http", "https") and rest == host
 
-    def _knows(self, query: str, cookies: Sequence[str], port: int) -> bool:
+    def _has_token(self, query: str, cookies: Sequence[str], port: int) -> bool:
         given = [
             value
             for name, _, value in (pair.partition("=") for pair in query.split("&"))
@@ -203,7 +203,7 @@ class Access:
 
 
 def is_loopback(host: str) -> bool:
-    """Whether what listens on this host is heard on this machine alone."""
+    """Whether only this machine reaches a server that listens on this host."""
     if host == "localhost":
         return True
     try:

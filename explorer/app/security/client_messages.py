@@ -1,10 +1,9 @@
-"""What a browser may say to the server, read strictly before viser sees it.
+"""The messages that a browser may send to the server, read strictly before viser reads them.
 
-viser decodes any of its messages from any client, sets whatever property of a control it is
-told to, and keeps uploads of any declared size. Here each message must be one that the page
-sends, with all its fields and no other, its numbers finite; a control is only ever given a
-value of the type that it holds. What is no such message is dropped, and a client that keeps
-sending it is let go.
+viser decodes any of its messages from any client, sets any property of a control, and stores
+uploads of any declared size. Here each message must be one that the page sends, with all its
+fields and no other, its numbers finite; a control gets only values of the type that it holds.
+Any other message is dropped, and a client that keeps sending such messages is disconnected.
 """
 
 from __future__ import annotations
@@ -12,26 +11,27 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal, Protocol, cast
+from typing import Annotated, Any, Literal, Protocol, TypeVar, cast
 
 import msgspec
 
-# No honest message is longer, in bytes, but a picture of the scene.
+# Largest size of a message in bytes, and of a picture of the scene.
 LARGEST_MESSAGE = 1_000_000
 LARGEST_PICTURE = 24_000_000
-# The page cuts files into parts of 512 KiB. Larger files than these are dropped here; what is
-# too large for its purpose is refused in words by whoever reads it.
+# The page cuts files into parts of 512 KiB. Larger files than these are dropped here; the reader
+# of a file refuses one that is too large for its purpose with a message.
 MOST_PARTS = 64
 LARGEST_UPLOAD = MOST_PARTS * 512 * 1024
-# Files of one client on their way at once.
+# Largest number of files that one client uploads at once.
 MOST_UPLOADS = 2
-# A client that sends so much that is no message of the page is not the page.
+# Number of dropped messages after which a client is disconnected.
 PATIENCE = 100
 
 Word = Annotated[str, msgspec.Meta(max_length=200)]
-Text = Annotated[str, msgspec.Meta(max_length=100_000)]
-# Beyond it not every whole number is a number of JavaScript.
+# Number up to which JavaScript represents every whole number.
 LARGEST_WHOLE = 2**53
+
+Described = TypeVar("Described")
 
 Pair = tuple[float, float]
 Triple = tuple[float, float, float]
@@ -41,11 +41,11 @@ Pixels = Annotated[float, msgspec.Meta(ge=0, le=100_000)]
 
 
 class Message(msgspec.Struct, forbid_unknown_fields=True, tag_field="type", tag=str):
-    """A message as the page sends it; each has the name of viser's."""
+    """A message of the page; each class has the name of viser's message."""
 
 
 class ViewerCameraMessage(Message):
-    """Where the camera stands."""
+    """The camera has moved."""
 
     wxyz: Quadruple
     position: Triple
@@ -114,22 +114,14 @@ class CommandTriggerMessage(Message):
 
 
 class GetRenderResponseMessage(Message):
-    """A picture of the scene that was asked for."""
+    """A picture of the scene that the server requested."""
 
     payload: bytes
     render_uuid: Word
 
 
-class LocalStorageGetItemResponseMessage(Message):
-    """What the browser remembers, as it was asked."""
-
-    request_uuid: Word
-    value: Text | None
-    error: Text | None
-
-
 class FileTransferStartUpload(Message):
-    """A file is about to come."""
+    """The upload of a file begins."""
 
     source_component_uuid: Word
     transfer_uuid: Word
@@ -167,7 +159,6 @@ Sendable = (
     | GuiButtonHoldMessage
     | CommandTriggerMessage
     | GetRenderResponseMessage
-    | LocalStorageGetItemResponseMessage
     | FileTransferStartUpload
     | FileTransferPart
     | FileTransferPartAck
@@ -177,12 +168,12 @@ _PICTURE = msgspec.msgpack.Decoder(GetRenderResponseMessage)
 
 
 @dataclass(frozen=True)
-class Held:
-    """What a control holds.
+class ControlValue:
+    """The value of a control.
 
     Attributes:
         value: Its present value.
-        options: Those that it has to be one of; None if it may be any.
+        options: The values that it may have; None for any.
     """
 
     value: object
@@ -190,22 +181,22 @@ class Held:
 
 
 class Controls(Protocol):
-    """What is known of the page's controls by their ids."""
+    """The controls of the page by their ids."""
 
-    def held(self, uuid: str) -> Held | None:
-        """Return what a control holds; None if there is no such control."""
+    def value_of(self, uuid: str) -> ControlValue | None:
+        """Return the value of a control; None if there is no such control."""
         ...
 
     def takes_files(self, uuid: str) -> bool:
-        """Whether this is a button to upload files with."""
+        """Whether this is a button that uploads files."""
         ...
 
 
 class Inbox:
-    """Judges the messages of one client.
+    """Checks the messages of one client.
 
     Args:
-        controls: Of the page.
+        controls: The controls of the page.
     """
 
     def __init__(self, controls: Controls) -> None:
@@ -215,31 +206,31 @@ class Inbox:
 
     @property
     def is_out_of_patience(self) -> bool:
-        """Whether too much came that was no message of the page."""
+        """Whether the client is to be disconnected."""
         return self._patience <= 0
 
     def admits(self, data: str | bytes) -> bool:
-        """Whether a message may go on to viser; what may not is counted."""
+        """Return whether a message may go on to viser; count it if it may not."""
         message = _decoded(data) if isinstance(data, bytes) else None
-        if message is not None and self._is_in_place(message):
+        if message is not None and self._is_allowed(message):
             return True
         self._patience -= 1
         return False
 
-    def _is_in_place(self, message: Sendable) -> bool:
+    def _is_allowed(self, message: Sendable) -> bool:
         match message:
             case GuiUpdateMessage():
-                held = self._controls.held(message.uuid)
-                # A control may have gone while the message was on its way.
-                return held is None or all(fits(v, held) for v in message.updates.values())
+                control = self._controls.value_of(message.uuid)
+                # A control may be removed while the message is under way.
+                return control is None or all(fits(v, control) for v in message.updates.values())
             case FileTransferStartUpload():
-                return self._starts(message)
+                return self._start_upload(message)
             case FileTransferPart():
-                return self._takes(message)
+                return self._take_part(message)
             case _:
                 return _is_finite(msgspec.structs.astuple(message))
 
-    def _starts(self, message: FileTransferStartUpload) -> bool:
+    def _start_upload(self, message: FileTransferStartUpload) -> bool:
         if (
             not self._controls.takes_files(message.source_component_uuid)
             or len(self._uploads) >= MOST_UPLOADS
@@ -251,9 +242,9 @@ class Inbox:
             self._uploads[message.transfer_uuid] = _Upload(message.part_count, message.size_bytes)
         return True
 
-    def _takes(self, part: FileTransferPart) -> bool:
+    def _take_part(self, part: FileTransferPart) -> bool:
         upload = self._uploads.get(part.transfer_uuid)
-        if upload is None or not upload.takes(part.part_index, len(part.content)):
+        if upload is None or not upload.take(part.part_index, len(part.content)):
             return False
         if upload.is_complete:
             del self._uploads[part.transfer_uuid]
@@ -269,7 +260,7 @@ class _Upload:
     def is_complete(self) -> bool:
         return not self._missing
 
-    def takes(self, part: int, size: int) -> bool:
+    def take(self, part: int, size: int) -> bool:
         if part not in self._missing or size > self._left:
             return False
         if self._missing == {part} and size < self._left:
@@ -279,15 +270,23 @@ class _Upload:
         return True
 
 
-def fits(value: Any, held: Held) -> bool:
-    """Whether a control that holds one value may be given another.
+def fits(value: Any, control: ControlValue) -> bool:
+    """Return whether a control that holds one value may be given another.
 
-    A number may be any finite one, since ranges change while a hand is on the slider;
-    whether it is possible is said by the session.
+    A number may be any finite one, since ranges change while a slider is dragged; the session
+    refuses impossible values.
     """
-    if held.options is not None:
-        return isinstance(value, str) and value in held.options
-    return _is_like(value, held.value)
+    if control.options is not None:
+        return isinstance(value, str) and value in control.options
+    return _is_like(value, control.value)
+
+
+def decode_text(text: str, decoder: msgspec.json.Decoder[Described]) -> Described | None:
+    """Return what a text of a client describes; None if no script of the page wrote it."""
+    try:
+        return decoder.decode(text)
+    except (msgspec.MsgspecError, UnicodeEncodeError, RecursionError):
+        return None
 
 
 def _decoded(data: bytes) -> Sendable | None:
@@ -309,7 +308,7 @@ def _is_like(value: object, present: object) -> bool:
     if isinstance(present, int | float):
         if isinstance(value, bool) or not isinstance(value, int | float):
             return False
-        # viser makes a whole number of what a whole number is given, and can send no larger one.
+        # viser rounds the value of a control of whole numbers, and can send no larger one.
         largest = LARGEST_WHOLE if isinstance(present, int) else math.inf
         return math.isfinite(value) and abs(value) <= largest
     return isinstance(present, str) and isinstance(value, str)

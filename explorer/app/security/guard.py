@@ -1,7 +1,7 @@
-"""The guard at the server's door: every request is judged, every message is read strictly.
+"""Checks of every request and every message before they reach viser.
 
-It stands between websockets, which speaks the protocol, and viser, which serves whoever
-comes and believes whatever it is told.
+The guard is called by websockets, which speaks the protocol, and calls viser, which serves any
+client and trusts any message.
 """
 
 from __future__ import annotations
@@ -25,27 +25,27 @@ from websockets.protocol import State
 from explorer.app.security.access import Access, Head, Refusal
 from explorer.app.security.client_messages import LARGEST_PICTURE, Controls, Inbox
 
-# Tabs at once. Each is sent the whole scene and keeps its messages until it has read them.
+# Largest number of tabs. Each is sent the whole scene, and unread messages are kept for it.
 MOST_TABS = 100
-# What one tab may send: a page sends 20 a second of each control that a hand is on.
+# Limits of one tab's messages: a page sends 20 a second of each control that is dragged.
 MESSAGES_PER_SECOND = 1000.0
 MESSAGES_AT_ONCE = 200.0
-# While so many changes wait for the session, nobody is listened to.
+# Number of waiting changes of the session beyond which no message is read.
 MOST_WAITING = 200
 WAIT_SECONDS = 0.02
-# Messages of one client that lie unread in memory; more stay in its network.
+# Number of unread messages of one client in memory; more stay in the network.
 MOST_UNREAD = 4
-# Turns of the event loop from taking up a connection to its being known to websockets.
-TAKE_UP_TURNS = 3
+# Turns of the event loop between accepting a connection and its handler's start.
+ACCEPT_TURNS = 3
 
 Serve = Callable[..., Any]
 
 
 class Guard:
-    """Stands at the door of one server.
+    """Checks the requests and messages to one server.
 
     Args:
-        access: Who may come in.
+        access: The rule for requests.
     """
 
     def __init__(self, access: Access) -> None:
@@ -55,16 +55,16 @@ class Guard:
         self._tabs: set[ServerConnection] = set()
 
     def let_in(self, controls: Controls, waiting: Callable[[], int]) -> None:
-        """Open the door, once the page is there.
+        """Pass messages on from now on, since the page is complete.
 
         Args:
-            controls: Of the page.
-            waiting: Tells how many changes wait for the session.
+            controls: The controls of the page.
+            waiting: Returns the number of changes that wait for the session.
         """
         self._controls, self._waiting = controls, waiting
 
     def guarded(self, serve: Serve) -> Serve:
-        """Return the function of websockets that serves, with this guard in front."""
+        """Return websockets' function that serves, with the checks of this guard."""
 
         def guarded_serve(handler: Any, *args: Any, **options: Any) -> Any:
             answer = options["process_request"]
@@ -77,17 +77,17 @@ class Guard:
 
             options |= {
                 "process_request": process_request,
-                "create_connection": functools.partial(_Guarded, self),
+                "create_connection": functools.partial(_GuardedConnection, self),
                 "max_size": LARGEST_PICTURE,
                 "max_queue": MOST_UNREAD,
                 "logger": _logger(),
             }
-            return _hung_up(serve(handle, *args, **options))
+            return _closing(serve(handle, *args, **options))
 
         return guarded_serve
 
     async def inbox(self) -> Inbox:
-        """Return a new judge of one client's messages, once the page is there."""
+        """Return a new inbox for one client's messages, once the page is complete."""
         while self._controls is None:
             await asyncio.sleep(WAIT_SECONDS)
         return Inbox(self._controls)
@@ -111,7 +111,7 @@ class Guard:
                 HTTPStatus.SERVICE_UNAVAILABLE, f"{MOST_TABS} tabs are open; close one."
             )
         if refusal is not None:
-            return _refusing(refusal)
+            return _refusal_response(refusal)
         response = answer(connection, request)
         if response is not None:
             for name, value in self._access.headers(head, port):
@@ -122,8 +122,13 @@ class Guard:
         self, connection: ServerConnection, handler: Callable[[ServerConnection], Awaitable[None]]
     ) -> None:
         if connection.subprotocol != f"viser-v{viser.__version__}":
-            # viser would print what it was told.
+            # viser would print the message.
             await connection.close(CloseCode.PROTOCOL_ERROR, "Version mismatch: reload the page")
+            return
+        # A page that was open before the explorer comes while its server is half made.
+        while self._controls is None and connection.state is State.OPEN:
+            await asyncio.sleep(WAIT_SECONDS)
+        if self._controls is None:
             return
         self._tabs.add(connection)
         try:
@@ -133,39 +138,39 @@ class Guard:
 
 
 @asynccontextmanager
-async def _hung_up(serving: AbstractAsyncContextManager[Server]) -> AsyncGenerator[Server]:
-    """Serve, and at the end leave no caller waiting and wait for none.
+async def _closing(serving: AbstractAsyncContextManager[Server]) -> AsyncGenerator[Server]:
+    """Serve, and at the end close all connections at once.
 
-    asyncio takes up a connection some turns before websockets knows it, and websockets closes
+    asyncio accepts a connection some turns before websockets knows it, and websockets closes
     those that it knows: another would stay open and silent (python/cpython issue 79033). For
-    who calls and says nothing, as browsers do to be ready, websockets waits ten seconds.
+    connections without a request, as browsers open them in advance, websockets waits ten seconds.
     """
     async with serving as server:
         yield server
         loop = server.get_loop()
-        # Windows' own loop has no such way.
+        # The event loop of Windows has no readers.
         with suppress(NotImplementedError):
             for listening in server.sockets:
                 loop.remove_reader(listening.fileno())
-        for _ in range(TAKE_UP_TURNS):
+        for _ in range(ACCEPT_TURNS):
             await asyncio.sleep(0.0)
         for connection in list(server.handlers):
             if connection.request is None:
                 connection.transport.abort()
 
 
-class _Guarded(ServerConnection):
-    """A connection that hands on only what its inbox admits, and not faster than it may."""
+class _GuardedConnection(ServerConnection):
+    """A connection that passes on only messages that its inbox admits, at a limited rate."""
 
     def __init__(self, guard: Guard, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)
         self._guard = guard
         self._inbox: Inbox | None = None
         self._allowance = MESSAGES_AT_ONCE
-        self._counted = time.monotonic()
+        self._counted_at = time.monotonic()
 
     async def recv(self, decode: bool | None = None) -> Any:
-        """Return the next message that is one of the page."""
+        """Return the next message that the page may send."""
         while True:
             data = await super().recv(decode)
             await self._pace()
@@ -177,10 +182,10 @@ class _Guarded(ServerConnection):
 
     async def _pace(self) -> None:
         now = time.monotonic()
-        earned = (now - self._counted) * MESSAGES_PER_SECOND
+        earned = (now - self._counted_at) * MESSAGES_PER_SECOND
         self._allowance = min(MESSAGES_AT_ONCE, self._allowance + earned) - 1.0
-        self._counted = now
-        # What is left of a client that has gone is done with at once.
+        self._counted_at = now
+        # The messages of a client that has gone are read without a delay.
         if self._allowance < 0.0 and self.state is State.OPEN:
             await asyncio.sleep(-self._allowance / MESSAGES_PER_SECOND)
         await self._guard.wait_for_room()
@@ -195,7 +200,7 @@ def _head(request: Request) -> Head:
     )
 
 
-def _refusing(refusal: Refusal) -> Response:
+def _refusal_response(refusal: Refusal) -> Response:
     body = f"{refusal.reason}\n".encode()
     headers = Headers(
         {
@@ -211,6 +216,6 @@ def _refusing(refusal: Refusal) -> Response:
 def _logger() -> logging.Logger:
     logger = logging.getLogger("explorer.websockets")
     if not logger.filters:
-        # Whoever does not speak HTTP is turned away without a word.
+        # Clients that do not speak HTTP are not logged.
         logger.addFilter(lambda record: record.getMessage() != "opening handshake failed")
     return logger

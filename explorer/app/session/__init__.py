@@ -1,1 +1,1 @@
-"""The one door through which the state changes, and the processes that work for it."""
+"""The session, through which the state changes, and the processes that compute for it."""

@@ -1,9 +1,8 @@
-"""Requests to a worker that failed through no fault of theirs, kept to be run again.
+"""Requests to a worker that failed unexpectedly, saved to be run again.
 
-Each is a JSON file: what people need to know is text, and the request itself is in it whole, as
-a pickle. A request holds designs, poses and options, and that of a study the path of its folder, as
-the traceback holds paths. Of each kind of fault the newest request is kept, and of many kinds the
-newest.
+Each is a JSON file: text for people, and the whole request as a pickle. A request holds designs,
+poses and options, and that of a study the path of its folder, as the traceback holds paths. Of
+each kind of fault the newest request is kept, and of many kinds the newest.
 """
 
 from __future__ import annotations
@@ -29,16 +28,16 @@ from explorer.files.versions import versions
 from explorer.files.writing import make_folder, read_at_most, write_whole
 
 FAULTS_FOLDER = "faults"
-"""The name of the folder in the user's data."""
+"""Name of the folder in the user's data folder."""
 
 MOST_FILES = 20
-# Characters of the packed request, of the file, and of each argument as it is shown to people.
+# Largest number of characters of the packed request, of the file, and of each argument's text.
 MOST_PACKED = 8_000_000
 MOST_FILE = MOST_PACKED + 1_000_000
-MOST_SHOWN = 2_000
-# Characters of a traceback, of which the end says most.
+MOST_TEXT = 2_000
+# Number of characters of a traceback that are kept, those at its end.
 MOST_TRACE = 100_000
-# The lines of a traceback that tell a place in the code.
+# A line of a traceback that names a place in the code.
 PLACE = re.compile(r'^  File ".*$', re.MULTILINE)
 
 
@@ -47,10 +46,10 @@ class Fault:
     """A request that failed, and how.
 
     Attributes:
-        module: The module that holds the task.
-        task: The name of the task in it.
-        arguments: All arguments of the task, but for its line to the parent.
-        tells: Whether the task takes such a line.
+        module: Module of the task.
+        task: Name of the task in its module.
+        arguments: All arguments of the task, except its channel.
+        is_sending: Whether the task takes a channel to its parent.
         problem: The error in one line.
         trace: The traceback; "" if the process died.
     """
@@ -58,77 +57,75 @@ class Fault:
     module: str
     task: str
     arguments: tuple[Any, ...]
-    tells: bool
+    is_sending: bool
     problem: str
     trace: str = ""
 
     @property
     def kind(self) -> str:
-        """Sixteen characters, the same for faults that were raised in the same place."""
-        # The message, which may have numbers in it, is left out.
+        """Sixteen hexadecimal digits, the same for faults that were raised in the same place."""
+        # The message is left out, as it may have numbers in it.
         place = "\n".join(PLACE.findall(self.trace)) or self.problem
         text = "\n".join((self.module, self.task, place))
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 class Faults:
-    """The folder in which requests that failed are kept.
+    """The folder in which requests that failed are saved.
 
     Args:
-        folder: The folder; it is made when it is first needed.
+        folder: The folder, made when it is first needed.
     """
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
 
-    def keep(self, fault: Fault) -> str:
-        """Keep a request, and return in words where it is, or why it could not be kept."""
+    def save(self, fault: Fault) -> str:
+        """Save a request; return a message that says where it is, or why it is not saved."""
         path = self.folder / f"{fault.task}-{fault.kind}.json"
         try:
             make_folder(self.folder)
             write_whole(path, encode_fault(fault))
-        # Text with half a character in it cannot be encoded.
+        # Text with half of a surrogate pair cannot be encoded.
         except (StorageError, OSError, UnicodeError) as error:
             return f"the request could not be kept: {error}"
         # Another explorer may remove the same files.
         with contextlib.suppress(OSError):
-            self._forget_oldest()
+            self._remove_oldest()
         return f"the request is kept in {str(path)!r}"
 
-    def _forget_oldest(self) -> None:
+    def _remove_oldest(self) -> None:
         paths = sorted(self.folder.glob("*.json"), key=lambda path: path.stat().st_mtime_ns)
         for path in paths[:-MOST_FILES]:
             path.unlink(missing_ok=True)
 
 
 def log_fault(fault: Fault, message: str, faults: Faults | None) -> str:
-    """Keep a fault, write its traceback and the message to the log, and return the message.
-
-    The log is standard error. The message returned tells where the request is kept.
+    """Save a fault, write its traceback and the message to standard error; return the message.
 
     Args:
         fault: The request, and how it failed.
-        message: For people.
-        faults: Where to keep the request; None to keep nothing.
+        message: Message for people; it is extended by where the request is saved.
+        faults: Where to save the request; None to save nothing.
     """
     if faults is not None:
-        message = f"{message}; {faults.keep(fault)}"
+        message = f"{message}; {faults.save(fault)}"
     # A process started with its output closed has no log.
     log: TextIO | None = sys.stderr
     if log is not None:
-        # What is raised here would end the thread that serves the worker.
+        # An exception here would end the thread that serves the worker.
         with contextlib.suppress(OSError, ValueError):
             log.write(f"{fault.trace}{message}\n")
     return message
 
 
 class _File(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What a file holds; `packed` is None where the request was far too large."""
+    """The contents of a file; `packed` is None where the request was far too large."""
 
     problem: str
     module: str
     task: str
-    tells: bool
+    is_sending: bool = msgspec.field(name="tells")
     when: str
     versions: dict[str, str]
     traceback: tuple[str, ...]
@@ -137,18 +134,18 @@ class _File(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def encode_fault(fault: Fault) -> bytes:
-    """Return the file of a fault; a request that is far too large is left out of it."""
+    """Return the file of a fault, without the request if that is far too large."""
     data = pickle.dumps(fault.arguments, protocol=pickle.HIGHEST_PROTOCOL)
     packed = base64.b64encode(zlib.compress(data)).decode()
     file = _File(
         problem=fault.problem,
         module=fault.module,
         task=fault.task,
-        tells=fault.tells,
+        is_sending=fault.is_sending,
         when=dt.datetime.now(dt.UTC).isoformat(timespec="seconds"),
         versions=versions(),
         traceback=tuple(fault.trace[-MOST_TRACE:].splitlines()),
-        arguments=tuple(map(_shown, fault.arguments)),
+        arguments=tuple(map(_short_text, fault.arguments)),
         packed=packed if len(packed) <= MOST_PACKED else None,
     )
     return msgspec.json.format(msgspec.json.encode(file), indent=1)
@@ -177,9 +174,9 @@ def read_fault(path: Path) -> Fault:
             f"the request in {str(path)!r} was made by other versions ({made_by}): {error}"
         ) from None
     trace = "\n".join(file.traceback)
-    return Fault(file.module, file.task, tuple(arguments), file.tells, file.problem, trace)
+    return Fault(file.module, file.task, tuple(arguments), file.is_sending, file.problem, trace)
 
 
-def _shown(argument: object) -> str:
+def _short_text(argument: object) -> str:
     text = repr(argument)
-    return text if len(text) <= MOST_SHOWN else f"{text[:MOST_SHOWN]} …"
+    return text if len(text) <= MOST_TEXT else f"{text[:MOST_TEXT]} …"

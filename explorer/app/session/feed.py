@@ -1,16 +1,19 @@
-"""Drawings that the worker makes, kept in step with the state."""
+"""Drawings that the worker computes, kept in step with the state."""
 
 from __future__ import annotations
 
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Generic, Protocol, TypeVar
+from dataclasses import dataclass, replace
+from typing import Any, Generic, Protocol, TypeVar, cast
 
 from explorer.app.session.jobs import LONG_SECONDS, Worker
-from explorer.app.session.worker import CANCELLED, Line
+from explorer.app.session.worker import CANCELLED, Channel
 from explorer.app.state.frame import Frame
+
+# Seconds after which a drawing that the user cancelled ends with its process.
+CANCEL_SECONDS = 2.0
 
 
 @dataclass(frozen=True)
@@ -18,46 +21,65 @@ class Stage:
     """A stage of a drawing that takes long.
 
     Attributes:
-        words: What is computed.
-        share: Of the stages, those that are done, from 0 to 1.
+        words: What is computed, in words.
+        share: Share of the stages that are done, from 0 to 1.
     """
 
     words: str
     share: float
 
 
-# Seconds after which a drawing that a person cancelled ends with its process.
-CANCEL_SECONDS = 2.0
-
-
-Request = TypeVar("Request")
-
-
-class _Answer(Protocol):
+class _Drawn(Protocol):
     @property
     def request(self) -> object: ...
 
 
-Drawing = TypeVar("Drawing", bound=_Answer)
+Request = TypeVar("Request")
+Drawing = TypeVar("Drawing", bound=_Drawn)
+
+
+@dataclass(frozen=True)
+class _Status(Generic[Request, Drawing]):
+    """The status of a feed; a new value replaces it as a whole, so that readers need no lock.
+
+    Attributes:
+        request: The newest request; None if nothing is to be drawn.
+        drawing: The newest drawing; None before the first.
+        problem: Why there is no newer drawing, if the last request failed.
+        count: Number of requests that were submitted so far.
+        submitted: Time of the newest request in seconds, by the monotonic clock.
+        order: Number of the newest request in the worker; None once it is answered.
+        stage: Stage of its drawing; None before the first.
+    """
+
+    request: Request | None = None
+    drawing: Drawing | None = None
+    problem: str | None = None
+    count: int = 0
+    submitted: float = 0.0
+    order: int | None = None
+    stage: Stage | None = None
 
 
 class Feed(Generic[Request, Drawing]):
-    """Asks for drawings of one kind and keeps the newest.
+    """Requests drawings of one kind and holds the newest.
+
+    The session, the worker and the browsers change it, each on a thread of its own.
 
     Args:
-        worker: That computes them.
+        worker: The worker that computes them.
         task: A function of the worker, from requests to drawings.
-        wanted: The request of a frame, None if nothing is to be drawn.
-        redraw: Called when a new one is there.
-        key: Of the requests, of which the newest counts; the task if None.
-        has_stages: Whether the task tells each `Stage`, and can be cancelled.
+        request_of: Returns the request of a frame; None if nothing is to be drawn.
+        redraw: Called when there is a new drawing, stage or problem.
+        key: Key of the requests, of which the newest counts; the task if None.
+        has_stages: Whether the task sends each `Stage`, and can be cancelled.
     """
 
     def __init__(
         self,
         worker: Worker,
-        task: Callable[[Request], Drawing] | Callable[[Request, Line], Drawing],
-        wanted: Callable[[Frame], Request | None],
+        task: Callable[[Request], Drawing] | Callable[[Request, Channel], Drawing],
+        request_of: Callable[[Frame], Request | None],
         redraw: Callable[[], None],
         key: object = None,
         *,
@@ -66,130 +88,144 @@ class Feed(Generic[Request, Drawing]):
         self._worker = worker
         self._task = task
         self._has_stages = has_stages
-        # How many drawings were asked for; of the newest, when that was, its order until it is
-        # answered, and the stage that it is in.
-        self._count = 0
-        self._asked_at = 0.0
-        self._order: int | None = None
-        self._stage: Stage | None = None
         self._key = task if key is None else key
-        self._wanted = wanted
+        self._request_of = request_of
         self._redraw = redraw
-        self._asked: Request | None = None
-        self._drawing: Drawing | None = None
-        self._problem: str | None = None
+        self._lock = threading.RLock()
+        self._status = cast("_Status[Request, Drawing]", _Status())
 
     @property
     def drawing(self) -> Drawing | None:
-        """The newest drawing; None if there is none, none is wanted, or it was cancelled."""
-        return self._drawing if self._asked is not None and not self.is_cancelled else None
+        """The newest drawing; None if there is none, none is requested, or it was cancelled."""
+        status = self._status
+        is_shown = status.request is not None and status.problem != CANCELLED
+        return status.drawing if is_shown else None
 
     @property
-    def asked(self) -> Request | None:
-        """What was asked for last, None if nothing is to be drawn."""
-        return self._asked
+    def request(self) -> Request | None:
+        """The newest request; None if nothing is to be drawn."""
+        return self._status.request
 
     @property
     def problem(self) -> str | None:
         """Why there is no newer drawing, if the last request failed."""
-        return self._problem
+        return self._status.problem
 
     @property
     def stage(self) -> Stage | None:
-        """The stage of a drawing that takes long; None if none does, or it has told none."""
-        is_long = time.monotonic() - self._asked_at >= LONG_SECONDS
-        return self._stage if is_long and not self.is_settled else None
+        """The stage of a drawing that takes long; None if none does, or before the first stage."""
+        status = self._status
+        is_long = time.monotonic() - status.submitted >= LONG_SECONDS
+        return status.stage if is_long and not self.is_settled else None
 
     @property
     def is_cancelled(self) -> bool:
-        """Whether the drawing that was asked for last was cancelled."""
-        return self._asked is not None and self._problem == CANCELLED
+        """Whether the newest request was cancelled."""
+        status = self._status
+        return status.request is not None and status.problem == CANCELLED
 
     @property
     def is_current(self) -> bool:
-        """Whether the drawing is what was last asked for."""
-        return self._drawing is not None and self._drawing.request == self._asked
+        """Whether the drawing is that of the newest request."""
+        status = self._status
+        return status.drawing is not None and status.drawing.request == status.request
 
     @property
     def is_settled(self) -> bool:
-        """Whether nothing newer is on its way."""
-        return self._asked is None or self.is_current or self._problem is not None
+        """Whether no newer drawing is being computed."""
+        status = self._status
+        return status.request is None or status.problem is not None or self.is_current
 
     def follow(self, frame: Frame) -> None:
-        """Ask for the drawing that a frame wants, unless it is asked for already."""
-        wanted = self._wanted(frame)
-        if wanted == self._asked:
-            return
-        if wanted is None:
-            self._end(None)
-        self._asked, self._problem = wanted, None
-        self._submit()
+        """Request the drawing of a frame, unless it is the newest request already."""
+        request = self._request_of(frame)
+        with self._lock:
+            if request == self._status.request:
+                return
+            if request is None:
+                self._cancel_order(None)
+            self._set(request=request, problem=None)
+            self._submit()
 
     def cancel(self) -> None:
-        """End the drawing under way, if it can be cancelled; it is asked for again on request."""
-        if self._has_stages and not self.is_settled:
-            self._problem = CANCELLED
-            self._end(CANCEL_SECONDS)
-            self._redraw()
+        """Cancel the drawing being computed, if it can be; `retry` requests it again."""
+        with self._lock:
+            if not self._has_stages or self.is_settled:
+                return
+            self._set(problem=CANCELLED)
+            self._cancel_order(CANCEL_SECONDS)
+        self._redraw()
 
-    def ask_again(self) -> None:
-        """Ask once more for a drawing that was cancelled."""
-        if self.is_cancelled:
-            self._problem = None
+    def retry(self) -> None:
+        """Request a drawing again that was cancelled."""
+        with self._lock:
+            if not self.is_cancelled:
+                return
+            self._set(problem=None)
             self._submit()
-            self._redraw()
+        self._redraw()
+
+    def _set(self, **changes: Any) -> None:
+        with self._lock:
+            self._status = replace(self._status, **changes)
 
     def _submit(self) -> None:
-        if self._asked is None:
+        request = self._status.request
+        if request is None:
             return
-        self._stage, self._asked_at = None, time.monotonic()
-        self._count += 1
-        count, order = self._count, (self._key, self._task, (self._asked,), self._arrived)
+        count = self._status.count + 1
+        self._set(count=count, submitted=time.monotonic(), stage=None)
 
         def failed(problem: str) -> None:
-            self._failed(count, problem)
+            self._show_problem(count, problem)
 
-        def told(stage: Stage) -> None:
-            self._told(count, stage)
+        def receive(stage: Stage) -> None:
+            self._receive(count, stage)
 
+        order = (self._key, self._task, (request,), self._show_drawing, failed)
         if self._has_stages:
-            self._order = self._worker.submit(*order, failed, told, is_drawing=True)
+            number = self._worker.submit(*order, receive, is_drawing=True)
         else:
-            self._order = self._worker.submit(*order, failed)
+            number = self._worker.submit(*order)
+        self._set(order=number)
 
-    def _end(self, patience: float | None) -> None:
-        """Cancel the newest order, if it has no answer yet."""
-        if self._has_stages and self._order is not None:
-            self._worker.cancel(self._order, patience)
-        self._order = None
+    def _cancel_order(self, patience: float | None) -> None:
+        """Cancel the newest order, if it is not answered yet."""
+        order = self._status.order
+        if self._has_stages and order is not None:
+            self._worker.cancel(order, patience)
+        self._set(order=None)
 
-    def _told(self, count: int, stage: Stage) -> None:
-        if count != self._count:
-            return
-        is_first = self._stage is None
-        self._stage = stage
+    def _receive(self, count: int, stage: Stage) -> None:
+        with self._lock:
+            if count != self._status.count:
+                return
+            is_first = self._status.stage is None
+            self._set(stage=stage)
         if self.stage is not None:
             self._redraw()
         elif is_first:
-            # A drawing that is done by then is not worth a word.
-            later = threading.Timer(LONG_SECONDS, self._show_stage, (count,))
-            later.daemon = True
-            later.start()
+            # The stage of a drawing that is done by then is not shown.
+            timer = threading.Timer(LONG_SECONDS, self._show_stage, (count,))
+            timer.daemon = True
+            timer.start()
 
     def _show_stage(self, count: int) -> None:
-        if count == self._count and not self.is_settled:
+        if count == self._status.count and not self.is_settled:
             self._redraw()
 
-    def _arrived(self, drawing: Drawing) -> None:
-        # An older one is shown until the newest is there.
-        self._drawing = drawing
-        if drawing.request == self._asked:
-            self._problem, self._order = None, None
+    def _show_drawing(self, drawing: Drawing) -> None:
+        with self._lock:
+            # An older drawing is shown until the newest has arrived.
+            self._set(drawing=drawing)
+            if self.is_current:
+                self._set(problem=None, order=None)
         self._redraw()
 
-    def _failed(self, count: int, problem: str) -> None:
-        # Of an older request it is of no interest, and who cancelled it knows.
-        is_newest = count == self._count and self._asked is not None
-        if is_newest and not self.is_cancelled:
-            self._drawing, self._problem, self._order = None, problem, None
-            self._redraw()
+    def _show_problem(self, count: int, problem: str) -> None:
+        with self._lock:
+            is_newest = count == self._status.count and self._status.request is not None
+            if not is_newest or self.is_cancelled:
+                return
+            self._set(drawing=None, problem=problem, order=None)
+        self._redraw()

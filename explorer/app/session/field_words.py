@@ -1,6 +1,6 @@
-"""What the page calls the fields of a design file where it refuses their values.
+"""Names of the fields of a design file in the messages of the page.
 
-Who edits a file needs the names of its fields; who moves a slider needs the words beside it.
+The editor of a file needs the names of its fields; the user of a slider needs the words beside it.
 """
 
 from __future__ import annotations
@@ -37,11 +37,11 @@ FIELD_WORDS = {
     **{f"limits.{name} maximum": f"The greatest length {name}" for name in LENGTHS},
     **{f"limits.swing.{name}": f"The swing of the {name} {kind}" for name, kind in SWINGS.items()},
 }
-"""What each field is called where a sentence begins with it."""
+"""Name of each field at the beginning of a sentence."""
 
 
 def message_of(error: ExplorerError) -> str:
-    """Return the message of an error as the page tells it."""
+    """Return the message of an error in the words of the page."""
     if isinstance(error, DesignError) and error.field in FIELD_WORDS:
         return error.message_about(FIELD_WORDS[error.field])
     return str(error)

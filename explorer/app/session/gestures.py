@@ -1,32 +1,29 @@
-"""What hands do: an action with the control that it came from, its press and its time.
-
-The many events of one drag are one gesture, of which the pose where it began is kept.
-"""
+"""Gestures: the events of one drag count as one move, from the pose where the drag began."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from explorer.app.session.drawable import check_drawable
 from explorer.app.state.action import Action
 from explorer.app.state.actions import Open, Reset, SetMode
-from explorer.app.state.drawable import check_drawable
 from explorer.app.state.presses import Press
 from explorer.app.state.state import Gesture, State
 
-# Where no press is told of, a hand that has not moved a control for longer, in seconds, begins a
-# new gesture with it.
+# Seconds without an event of a control after which the next one begins a new gesture, where no
+# press is known.
 PAUSE_SECONDS = 1.0
 
 
 @dataclass(frozen=True)
-class ByHand:
-    """An action with its origin, by which the many events of one drag become one gesture.
+class UserAction:
+    """An action with its origin, which makes the events of one drag one gesture.
 
     Attributes:
-        action: What is done.
-        source: The control that it came from; one of its own for what is no drag.
-        time: When it happened, in seconds.
-        press: During which it happened; None for keys, and where no press is told of.
+        action: The action.
+        source: The control that it came from; a new object for an event that is part of no drag.
+        time: Time of the event, in seconds.
+        press: The press during which it happened; None for keys, and where none is known.
     """
 
     action: Action
@@ -34,16 +31,16 @@ class ByHand:
     time: float
     press: Press | None = None
 
-    def goes_on(self, source: object, last: float, press: Press | None) -> bool:
-        """Whether this belongs to what was done before with the same control.
+    def continues(self, source: object, last: float, press: Press | None) -> bool:
+        """Return whether this continues an earlier gesture with the same control.
 
-        From press to release is one, and two presses of one browser are two; all else is told
-        apart by pauses.
+        All events from press to release are one gesture, and two presses of one browser are two;
+        where no press is known, a pause ends a gesture.
 
         Args:
-            source: The control of what was done before.
-            last: When its last event happened, in seconds.
-            press: The last press that it had, if any.
+            source: The control of the earlier gesture.
+            last: Time of its last event, in seconds.
+            press: Its last press, if any.
         """
         if self.source != source:
             return False
@@ -55,7 +52,7 @@ class ByHand:
         """Return the next state, with the gesture that led to its pose.
 
         Raises:
-            ExplorerError: the change is not possible, or leads to what cannot be drawn.
+            ExplorerError: the change is not possible, or its result cannot be drawn.
         """
         after = self.action.apply(state)
         check_drawable(after)
@@ -64,10 +61,10 @@ class ByHand:
     def _gesture(self, before: State, after: State) -> Gesture | None:
         is_jump = isinstance(self.action, Open | Reset | SetMode)
         if is_jump or after.design.variables != before.design.variables:
-            # The legs did not go from one to the other.
+            # The legs did not move from one pose to the other.
             return None
         gesture = before.gesture
-        if gesture is not None and self.goes_on(gesture.source, gesture.last, gesture.press):
+        if gesture is not None and self.continues(gesture.source, gesture.last, gesture.press):
             last = max(gesture.last, self.time)
             return replace(gesture, last=last, press=self.press or gesture.press)
         if after.pose == before.pose:

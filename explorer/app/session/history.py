@@ -1,35 +1,35 @@
-"""What was done, step by step, to be undone, redone and gone back to.
+"""The history: steps that can be undone, redone and gone back to.
 
-A step is what one hand does with one control from press to release, however long it rests, so
-that a drag of many events is one step; without a press, as with keys, a pause ends it. What
-happens by itself, such as a path that plays on, belongs to the step before it. Steps hold whole
-states, which share all that did not change.
+A step is one gesture with one control, from press to release, so that a drag of many events is
+one step; without a press, as with keys, a pause ends it. A change that happens by itself, such as
+a path that plays on, belongs to the step before it. Steps hold whole states, which share all that
+did not change.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from explorer.app.session.gestures import ByHand
+from explorer.app.session.gestures import UserAction
 from explorer.app.state.presses import Press
 from explorer.app.state.state import State
 from explorer.errors import InputError
 
-# Beyond so many the oldest are forgotten.
+# Number of steps beyond which the oldest are dropped.
 MOST_STEPS = 1000
 
 
 @dataclass(frozen=True)
 class Step:
-    """What was done at one time.
+    """One step of the history.
 
     Attributes:
-        number: From 0, the opening; it stays as long as the step does.
+        number: Number from 0, the opening; it stays as long as the step does.
         words: What was done.
-        state: After it.
+        state: The state after it.
         source: The control that it came from.
-        last: When its last event happened, in seconds.
-        press: The last press of a browser that it was part of; None if it is not known.
+        last: Time of its last event, in seconds.
+        press: The last press of a browser that was part of it; None if none is known.
     """
 
     number: int
@@ -42,12 +42,12 @@ class Step:
 
 @dataclass(frozen=True)
 class History:
-    """All steps, and which of them the page shows.
+    """All steps, and the one that the page shows.
 
     Attributes:
-        steps: In the order in which they were done; at least the opening.
-        at: The index of the step at which the page is; those after it were undone.
-        is_open: Whether the step at hand may go on; not once it was gone back to.
+        steps: The steps in order of time; at least the opening.
+        at: Index of the step that the page shows; those after it were undone.
+        is_open: Whether further events may extend the present step; not after undo or redo.
     """
 
     steps: tuple[Step, ...]
@@ -56,59 +56,50 @@ class History:
 
     @property
     def step(self) -> Step:
-        """The step at which the page is."""
+        """The step that the page shows."""
         return self.steps[self.at]
 
-    @property
-    def can_undo(self) -> bool:
-        """Whether there is a step before."""
-        return self.at > 0
-
-    @property
-    def can_redo(self) -> bool:
-        """Whether a step was undone."""
-        return self.at < len(self.steps) - 1
-
-    def recorded(self, act: ByHand, state: State) -> History:
+    def record(self, event: UserAction, state: State) -> History:
         """Return the history after an action that led to a state.
 
         A search for a better design is one step, made when it ends.
         """
-        here, kept = self.step, document(state)
-        if state.optimisation.is_on or kept == here.state:
+        present, settled = self.step, settle(state)
+        if state.optimisation.is_on or settled == present.state:
             return self
-        if act.action.continues:
-            return replace(self, steps=_with(self.steps, self.at, replace(here, state=kept)))
-        done = self.steps[: self.at + 1]
-        if self._goes_on(act):
-            if self.at > 0 and self.steps[self.at - 1].state == kept:
-                # Back where it began.
-                return History(done[:-1], self.at - 1)
-            before = self.steps[max(self.at - 1, 0)].state
-            called, press = act.action.describe(before, kept), act.press or here.press
-            step = Step(here.number, called, kept, here.source, act.time, press)
-            return History((*done[:-1], step), self.at, is_open=True)
-        called = act.action.describe(here.state, kept)
-        step = Step(here.number + 1, called, kept, act.source, act.time, act.press)
-        done = (*done, step)[-MOST_STEPS:]
-        return History(done, len(done) - 1, is_open=True)
+        earlier = self.steps[: self.at]
+        if event.action.continues:
+            steps = (*earlier, replace(present, state=settled), *self.steps[self.at + 1 :])
+            return replace(self, steps=steps)
+        if self.is_open and event.continues(present.source, present.last, present.press):
+            if earlier and earlier[-1].state == settled:
+                # The gesture ended where it began, so that its step is dropped.
+                return History(earlier, self.at - 1)
+            before = earlier[-1].state if earlier else present.state
+            words, press = event.action.describe(before, settled), event.press or present.press
+            step = Step(present.number, words, settled, present.source, event.time, press)
+            return History((*earlier, step), self.at, is_open=True)
+        words = event.action.describe(present.state, settled)
+        step = Step(present.number + 1, words, settled, event.source, event.time, event.press)
+        steps = (*earlier, present, step)[-MOST_STEPS:]
+        return History(steps, len(steps) - 1, is_open=True)
 
-    def moved(self, steps: int) -> History:
-        """Return the history so many steps later, or earlier.
+    def move(self, steps: int) -> History:
+        """Return the history moved by a number of steps; a negative number undoes.
 
         Raises:
-            InputError: there are not so many.
+            InputError: there are not that many steps.
         """
         at = self.at + steps
         if not 0 <= at < len(self.steps):
             raise InputError("there is nothing to undo" if at < 0 else "there is nothing to redo")
         return replace(self, at=at, is_open=False)
 
-    def moved_to(self, number: int) -> History:
+    def move_to(self, number: int) -> History:
         """Return the history at the step with a number.
 
         Raises:
-            InputError: there is none, or no more.
+            InputError: there is no such step, or it was dropped.
         """
         first = self.steps[0].number
         if not first <= number <= self.steps[-1].number:
@@ -117,18 +108,14 @@ class History:
             )
         return replace(self, at=number - first, is_open=False)
 
-    def _goes_on(self, act: ByHand) -> bool:
-        here = self.step
-        return self.is_open and act.goes_on(here.source, here.last, here.press)
+
+def start_history(state: State) -> History:
+    """Return the history of a design that has just been opened."""
+    return History((Step(0, f"Open {state.design.name}", settle(state)),))
 
 
-def begun(state: State) -> History:
-    """Return the history of a state that has just been opened."""
-    return History((Step(0, f"Open {state.design.name}", document(state)),))
-
-
-def document(state: State) -> State:
-    """Return what of a state is a step: all that does not go on by itself."""
+def settle(state: State) -> State:
+    """Return the state that a step holds: without gesture, planning and playing."""
     paths = state.paths
     journey = paths.journey
     if journey is not None and journey.is_playing:
@@ -138,8 +125,8 @@ def document(state: State) -> State:
     return replace(state, gesture=None, paths=paths)
 
 
-def restored(step: Step, present: State) -> State:
-    """Return the state of a step, to follow on the present one.
+def restore(step: Step, present: State) -> State:
+    """Return the state of a step, with the counts of requests that the present state has.
 
     Raises:
         InputError: a design is being optimised.
@@ -149,7 +136,7 @@ def restored(step: Step, present: State) -> State:
             "the design is being optimised: cancel that first, then undo what led to it"
         )
     state = step.state
-    # Numbers of requests are given once.
+    # No number of a request is used twice.
     request = max(state.paths.request, present.paths.request)
     count = max(state.optimisation.count, present.optimisation.count)
     return replace(
@@ -157,7 +144,3 @@ def restored(step: Step, present: State) -> State:
         paths=replace(state.paths, request=request),
         optimisation=replace(state.optimisation, count=count),
     )
-
-
-def _with(steps: tuple[Step, ...], at: int, step: Step) -> tuple[Step, ...]:
-    return (*steps[:at], step, *steps[at + 1 :])

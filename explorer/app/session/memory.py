@@ -1,9 +1,9 @@
-"""Memory over a long day: the allocator may not hoard, and the collector has little to look at.
+"""Memory of a process that runs for long: few arenas, freed memory returned, short collections.
 
-glibc gives each busy thread an arena of its own, up to eight a core, and what is freed in
-one is of no use to the others. A page has dozens of threads, of which the interpreter lets
-one run at a time: few arenas serve them as well. And of what is freed glibc returns to the
-system only what lies at the very end: the rest it is asked to return now and then.
+glibc gives each busy thread an arena of its own, up to eight a core, and no other thread uses the
+memory freed in it. A page has dozens of threads, of which the interpreter lets one run at a time:
+few arenas serve them as well. And glibc returns freed memory to the system only at the end of an
+arena, unless `malloc_trim` is called.
 """
 
 from __future__ import annotations
@@ -15,38 +15,35 @@ import threading
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 
-# Of mallopt in glibc's malloc.h.
+# Parameter of mallopt in glibc's malloc.h, and its value.
 M_ARENA_MAX = -8
 ARENAS = 2
-# Seconds between two times that memory is given back; each takes some milliseconds.
-GIVE_BACK_SECONDS = 10.0
+# Seconds between two calls of malloc_trim; each takes some milliseconds.
+TRIM_SECONDS = 10.0
 
 
 def limit_arenas() -> bool:
-    """Have glibc use few arenas in this process; return whether that is done.
-
-    Other C libraries are left as they are.
-    """
-    mallopt = _of_glibc("mallopt")
+    """Have glibc use few arenas in this process; return False with another C library."""
+    mallopt = _glibc_function("mallopt")
     return mallopt is not None and mallopt(M_ARENA_MAX, ARENAS) == 1
 
 
-def give_back() -> bool:
+def trim() -> bool:
     """Have glibc return freed memory to the system; return whether it returned any."""
-    malloc_trim = _of_glibc("malloc_trim")
+    malloc_trim = _glibc_function("malloc_trim")
     return malloc_trim is not None and malloc_trim(0) == 1
 
 
 @contextmanager
-def given_back() -> Generator[None]:
-    """Give back freed memory now and then, as long as this lasts."""
+def trim_repeatedly() -> Generator[None]:
+    """Return freed memory to the system now and then, within the context."""
     ended = threading.Event()
 
-    def attend() -> None:
-        while not ended.wait(GIVE_BACK_SECONDS):
-            give_back()
+    def run() -> None:
+        while not ended.wait(TRIM_SECONDS):
+            trim()
 
-    thread = threading.Thread(target=attend, name="memory", daemon=True)
+    thread = threading.Thread(target=run, name="memory", daemon=True)
     thread.start()
     try:
         yield
@@ -55,16 +52,16 @@ def given_back() -> Generator[None]:
         thread.join()
 
 
-def keep_for_good() -> None:
-    """Have the collector never look at what is there now.
+def freeze_objects() -> None:
+    """Exclude all present objects from garbage collection.
 
-    Modules, kernels and the page stay anyway, and to look at all of them takes a tenth of a
-    second, in mid-drag as likely as at any time.
+    Modules, kernels and the page stay anyway, and to visit all of them takes a tenth of a second,
+    in the middle of a drag as likely as at any time.
     """
     gc.collect()
     gc.freeze()
 
 
-def _of_glibc(name: str) -> Callable[..., int] | None:
+def _glibc_function(name: str) -> Callable[..., int] | None:
     """Return a function of glibc; None where another C library is used."""
     return getattr(ctypes.CDLL(None), name, None) if sys.platform == "linux" else None

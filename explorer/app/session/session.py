@@ -1,4 +1,4 @@
-"""The one door through which the state changes, and from which each new frame goes out.
+"""The session: all changes of the state go through it, and each new frame comes from it.
 
 A change is posted from any thread, as a function from the present state to an action, so
 that it is made from the newest state and the newest value of its control.
@@ -11,9 +11,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from explorer.app.session.field_words import message_of
-from explorer.app.session.gestures import ByHand
-from explorer.app.session.history import History, begun, restored
-from explorer.app.session.jobs import LatestWins
+from explorer.app.session.gestures import UserAction
+from explorer.app.session.history import History, restore, start_history
+from explorer.app.session.latest import LatestWins
 from explorer.app.state.action import Action
 from explorer.app.state.frame import Frame
 from explorer.app.state.presses import Press
@@ -22,47 +22,43 @@ from explorer.errors import ExplorerError
 
 Change = Callable[[State], Action]
 Who = int | None
+"""Id of a client; None for all clients, or for none in particular."""
 
 
 @dataclass(frozen=True)
-class Travel:
-    """A way through the history.
+class HistoryMove:
+    """A move through the history.
 
     Attributes:
-        go: From the history as it is to the one at another step.
+        move: Function from the present history to the one at another step.
     """
 
-    go: Callable[[History], History]
+    move: Callable[[History], History]
 
 
-UNDO = Travel(lambda history: history.moved(-1))
-REDO = Travel(lambda history: history.moved(1))
-
-
-def to_step(number: int) -> Travel:
-    """Return the way to the step with a number."""
-    return Travel(lambda history: history.moved_to(number))
+UNDO = HistoryMove(lambda history: history.move(-1))
+REDO = HistoryMove(lambda history: history.move(1))
 
 
 @dataclass(frozen=True)
 class _Posted:
-    change: Change | Travel
+    change: Change | HistoryMove
     key: object
     stamp: float
     who: Who
 
 
 class Session:
-    """Holds the state, applies what is posted, and hands each new frame to be drawn.
+    """Holds the state, makes the changes that are posted, and passes each new frame on.
 
     Args:
-        state: The first one.
+        state: The first state.
         draw: Called on the session's thread with each new frame.
         complain: Called with a message for people and the client it is for (None: all).
         report: Called with an unexpected exception; the session goes on.
-        history: That led to the state; None where it begins with it.
-        press_at: Tells the press of a client at a time, if it held anything then; None if no
-            client tells of presses.
+        history: History that led to the state; None to start one with it.
+        press_at: Returns the press of a client at a time, if there was one; None if no client
+            reports presses.
     """
 
     def __init__(
@@ -76,7 +72,7 @@ class Session:
         press_at: Callable[[Who, float], Press | None] | None = None,
     ) -> None:
         self._state = state
-        self._history = begun(state) if history is None else history
+        self._history = start_history(state) if history is None else history
         self._draw = draw
         self._complain = complain
         self._report = report
@@ -90,36 +86,36 @@ class Session:
 
     @property
     def history(self) -> History:
-        """What was done so far."""
+        """The history so far."""
         return self._history
 
     def post(
         self, key: object, change: Change, *, stamp: float | None = None, who: Who = None
     ) -> None:
-        """Ask for a change; of one key only the newest that waits is made.
+        """Queue a change, in place of one with the same key that waits.
 
         Args:
-            key: What it is about, for instance the slider.
+            key: Key of the change, for instance its slider.
             change: Makes the action from the state at the time.
-            stamp: When the event happened; now if None.
-            who: The client to tell should it not be possible.
+            stamp: Time of the event, in seconds; now if None.
+            who: The client to tell if the change is not possible.
         """
         self._post(key, change, stamp, who)
 
     def do(self, action: Action, *, who: Who = None) -> None:
-        """Ask for an action that must not be merged with another of its kind."""
+        """Queue an action that no other may replace."""
         self.post(object(), lambda _: action, who=who)
 
-    def travel(self, travel: Travel, *, who: Who = None) -> None:
-        """Ask to go through the history; no way is left out."""
+    def travel(self, travel: HistoryMove, *, who: Who = None) -> None:
+        """Queue a move through the history that no other may replace."""
         self._post(object(), travel, None, who)
 
     def travel_to(self, key: object, number: int, *, stamp: float | None, who: Who) -> None:
-        """Ask for the step with a number; of one key only the newest that waits is done."""
-        self._post(key, to_step(number), stamp, who)
+        """Queue a move to the step with a number, in place of one with the same key."""
+        self._post(key, HistoryMove(lambda history: history.move_to(number)), stamp, who)
 
     def is_waiting(self, key: object) -> bool:
-        """Whether a change of this key waits."""
+        """Whether a change with this key waits."""
         return self._jobs.is_waiting(key)
 
     @property
@@ -129,11 +125,11 @@ class Session:
 
     @property
     def waiting(self) -> int:
-        """How many changes wait."""
+        """Number of changes that wait."""
         return self._jobs.waiting
 
     def wait_until_idle(self, timeout: float = 10.0) -> bool:
-        """Wait until all that was posted is done and drawn; say whether it is."""
+        """Wait until all changes are made and drawn; return whether they are."""
         return self._jobs.wait_until_idle(timeout)
 
     def redraw(self) -> None:
@@ -144,7 +140,9 @@ class Session:
         """End the session's thread."""
         self._jobs.stop()
 
-    def _post(self, key: object, change: Change | Travel, stamp: float | None, who: Who) -> None:
+    def _post(
+        self, key: object, change: Change | HistoryMove, stamp: float | None, who: Who
+    ) -> None:
         at = time.time() if stamp is None else stamp
         self._jobs.post(key, at, _Posted(change, key, at, who))
 
@@ -152,24 +150,24 @@ class Session:
         try:
             for item in items:
                 try:
-                    self._make(item)
+                    self._apply(item)
                 except ExplorerError as error:
                     self._complain(message_of(error), item.who)
-            # Drawn also after a refusal: the control that asked for it must go back.
+            # A refusal is drawn too: the control that was moved must go back.
             self._draw(Frame(self._state))
         except Exception as error:  # noqa: BLE001 - one bad frame must not end the session
             self._report(error)
 
-    def _make(self, item: _Posted) -> None:
-        if isinstance(item.change, Travel):
-            history = item.change.go(self._history)
-            self._state = restored(history.step, self._state)
+    def _apply(self, item: _Posted) -> None:
+        if isinstance(item.change, HistoryMove):
+            history = item.change.move(self._history)
+            self._state = restore(history.step, self._state)
             self._history = history
             return
         press = None if self._press_at is None else self._press_at(item.who, item.stamp)
-        action = ByHand(item.change(self._state), item.key, item.stamp, press)
-        self._state = action.apply(self._state)
-        self._history = self._history.recorded(action, self._state)
+        event = UserAction(item.change(self._state), item.key, item.stamp, press)
+        self._state = event.apply(self._state)
+        self._history = self._history.record(event, self._state)
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
-"""The child process that does heavy work, one task at a time, and nothing else.
+"""The child process that does heavy work, one task at a time.
 
-It talks to its parent in pickled frames over its own standard input and output; only our
-own parent writes to it. A task may tell of itself while it runs, and is told to end early.
+It exchanges pickled frames with its parent over its own standard input and output; only our own
+parent writes to it. A task may send values while it runs, and may be cancelled.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from explorer.errors import ExplorerError
 from explorer.numerics.compiled import warm_in_background
 
 CANCELLED = "cancelled"
-"""What a task that ended early answers with."""
+"""Problem in the reply of a task that was cancelled."""
 
 
 @dataclass(frozen=True)
@@ -29,30 +29,30 @@ class Order:
     """A task to do.
 
     Attributes:
-        number: Of the order.
-        module: The module that holds the task.
-        task: The name of the task, a function, in its module.
-        arguments: For it.
-        tells: Whether it takes a `Line` to its parent as its last argument.
+        number: Number of the order.
+        module: Module of the task.
+        task: Name of the task, a function, in its module.
+        arguments: Its arguments.
+        is_sending: Whether it takes a `Channel` to its parent as its last argument.
     """
 
     number: int
     module: str
     task: str
     arguments: tuple[Any, ...]
-    tells: bool = False
+    is_sending: bool = False
 
 
 @dataclass(frozen=True)
 class Cancel:
-    """A request to end the order with this number early."""
+    """A request to cancel the order with this number."""
 
     number: int
 
 
 @dataclass(frozen=True)
-class Told:
-    """What a task tells before it is done."""
+class Message:
+    """A value that a task sends before it is done."""
 
     number: int
     value: Any
@@ -60,9 +60,9 @@ class Told:
 
 @dataclass(frozen=True)
 class Reply:
-    """What came of an order: a value, or a message for people and whether it was expected.
+    """The result of an order: a value, or a message for people and whether it was expected.
 
-    What was not expected comes with its traceback.
+    An unexpected problem comes with its traceback.
     """
 
     number: int
@@ -73,25 +73,25 @@ class Reply:
 
 
 @dataclass(frozen=True)
-class Line:
-    """What a task that tells has of its parent.
+class Channel:
+    """The connection of a task to its parent.
 
     Attributes:
-        tell: Sends a value; it must pickle.
-        is_cut: Asked now and then whether the task is to end early.
+        send: Sends a value; it must pickle.
+        is_cancelled: Returns whether the task is cancelled; called now and then.
     """
 
-    tell: Callable[[Any], None]
-    is_cut: Callable[[], bool]
+    send: Callable[[Any], None]
+    is_cancelled: Callable[[], bool]
 
-    def end_if_cancelled(self) -> None:
-        """Raise `CancelledError` if the task is to end early."""
-        if self.is_cut():
+    def raise_if_cancelled(self) -> None:
+        """Raise `CancelledError` if the task is cancelled."""
+        if self.is_cancelled():
             raise CancelledError
 
 
 class CancelledError(Exception):
-    """The task ends early because the parent asked for that."""
+    """The task ends early because its parent cancelled it."""
 
 
 def write_frame(stream: IO[bytes], value: object) -> None:
@@ -104,32 +104,32 @@ def read_frame(stream: IO[bytes]) -> Any:
     """Read one object.
 
     Raises:
-        EOFError: the other side is gone.
+        EOFError: the other process has ended.
     """
     return pickle.load(stream)  # noqa: S301 - from our own process, over a pipe of our own
 
 
 class Inbox:
-    """What the parent asks, read on a thread of its own, so that it is heard during a task.
+    """The orders of the parent, read on a thread of its own, so that a cancel is read in time.
 
     Args:
-        stream: From the parent. Its end cuts whatever is being done.
+        stream: Stream from the parent; its end cancels the task under way.
     """
 
     def __init__(self, stream: IO[bytes]) -> None:
         self._stream = stream
         self._orders: queue.SimpleQueue[Order | None] = queue.SimpleQueue()
         self._cancelled = -1
-        self._is_over = threading.Event()
+        self._is_closed = threading.Event()
         threading.Thread(target=self._read, name="inbox", daemon=True).start()
 
     def next(self) -> Order | None:
-        """Wait for the next order; None once there will be none."""
+        """Wait for the next order and return it; None once the parent closed the pipe."""
         return self._orders.get()
 
-    def is_cut(self, number: int) -> bool:
-        """Whether an order is to end early."""
-        return self._is_over.is_set() or self._cancelled == number
+    def is_cancelled(self, number: int) -> bool:
+        """Whether an order is cancelled."""
+        return self._is_closed.is_set() or self._cancelled == number
 
     def _read(self) -> None:
         try:
@@ -140,25 +140,25 @@ class Inbox:
                 else:
                     self._orders.put(frame)
         except (EOFError, OSError, pickle.UnpicklingError):
-            self._is_over.set()
+            self._is_closed.set()
             self._orders.put(None)
 
 
-def ready() -> None:
-    """Do nothing: the process that was asked has started."""
+def do_nothing() -> None:
+    """Do nothing: a task that is done as soon as the process has started."""
 
 
 def main(preload: Sequence[str]) -> None:
-    """Do what the parent asks until it closes the pipe.
+    """Do the tasks that the parent orders until it closes the pipe.
 
     Args:
         preload: The modules to import first, so that the first task starts at once.
     """
-    # A terminal sends Ctrl-C to us too; it is the parent who ends us.
+    # A terminal sends Ctrl-C to this process too; its parent ends it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     inbox = Inbox(os.fdopen(os.dup(0), "rb"))
-    answers = os.fdopen(os.dup(1), "wb")
-    # Whatever a library prints must not get between the frames.
+    replies = os.fdopen(os.dup(1), "wb")
+    # The output of libraries must not get between the frames.
     os.dup2(2, 1)
     for module in preload:
         importlib.import_module(module)
@@ -166,21 +166,21 @@ def main(preload: Sequence[str]) -> None:
     warm_in_background()
     while (order := inbox.next()) is not None:
         try:
-            write_frame(answers, _done(order, inbox, answers))
+            write_frame(replies, _reply(order, inbox, replies))
         except BrokenPipeError:
-            # The parent is gone: nobody is left to write to, not even on the way out.
+            # The parent has ended; nothing can be written, not even at the exit.
             os._exit(1)
 
 
-def _done(order: Order, inbox: Inbox, answers: IO[bytes]) -> Reply:
+def _reply(order: Order, inbox: Inbox, replies: IO[bytes]) -> Reply:
     number = order.number
     arguments = order.arguments
-    if order.tells:
-        line = Line(
-            lambda value: write_frame(answers, Told(number, value)),
-            lambda: inbox.is_cut(number),
+    if order.is_sending:
+        channel = Channel(
+            lambda value: write_frame(replies, Message(number, value)),
+            lambda: inbox.is_cancelled(number),
         )
-        arguments = (*arguments, line)
+        arguments = (*arguments, channel)
     try:
         task: Callable[..., Any] = getattr(importlib.import_module(order.module), order.task)
         return Reply(number, task(*arguments))
@@ -190,6 +190,6 @@ def _done(order: Order, inbox: Inbox, answers: IO[bytes]) -> Reply:
         return Reply(number, problem=CANCELLED)
     except BrokenPipeError:
         raise
-    except Exception as error:  # noqa: BLE001 - the parent tells, and the worker goes on
+    except Exception as error:  # noqa: BLE001 - the parent reports it, and the worker goes on
         problem = " ".join(f"{type(error).__name__}: {error}".split())
         return Reply(number, problem=problem, expected=False, trace=traceback.format_exc())

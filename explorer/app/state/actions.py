@@ -11,10 +11,10 @@ from typing import ClassVar
 import msgspec
 import numpy as np
 
-from explorer.app.state.action import Action, changes
+from explorer.app.state.action import Action, value_text
 from explorer.app.state.clear_length import clear_length
+from explorer.app.state.parts import kept_on_open
 from explorer.app.state.state import (
-    Hold,
     Joints,
     State,
     Taken,
@@ -24,9 +24,9 @@ from explorer.app.state.state import (
     mode_at,
     opened,
 )
-from explorer.app.state.view import View
+from explorer.app.state.values import with_value
 from explorer.errors import InputError
-from explorer.mechanism.design import JOINTS, VARIABLES, Design, Limits
+from explorer.mechanism.design import JOINTS, VARIABLES, Design
 from explorer.mechanism.feasible_intervals import feasible_intervals, nearest_feasible
 from explorer.mechanism.kinematics import discriminants, forward
 from explorer.mechanism.margins import mode_name
@@ -36,7 +36,7 @@ from explorer.numerics.number_text import format_ascii
 
 @dataclass(frozen=True)
 class Open(Action):
-    """Open a design in its home pose; the view, comparisons and studies stay."""
+    """Open a design in its home pose; parts of the state stay as they declare."""
 
     template: ClassVar[str] = "Open {design}"
 
@@ -49,15 +49,7 @@ class Open(Action):
             InputError: the design is being optimised.
         """
         check_free(state)
-        optimisation = replace(state.optimisation, run=None, refusal=None)
-        after = opened(self.design, view=state.view)
-        return replace(
-            after,
-            hold=state.hold,
-            optimisation=optimisation,
-            compared=state.compared,
-            studies=state.studies,
-        )
+        return replace(opened(self.design), **kept_on_open(state))
 
 
 @dataclass(frozen=True)
@@ -91,10 +83,10 @@ class SetJoint(Action):
 
     def apply(self, state: State) -> State:
         """Return the next state; where the lengths cannot close, with the last pose."""
-        asked = list(state.joints)
-        asked[self.joint] = self.value
-        solution = forward(state.design, asked)
-        joints = _six(asked)
+        values = list(state.joints)
+        values[self.joint] = self.value
+        solution = forward(state.design, values)
+        joints = _as_joints(values)
         if not solution.feasible:
             return replace(state, joints=joints, unclosed=_unclosed(state.design, joints, self))
         pose = Pose.of(solution.position[state.mode], solution.rotation[state.mode])
@@ -109,19 +101,19 @@ class SetJoint(Action):
 
 @dataclass(frozen=True)
 class UseNearest(Action):
-    """Take the nearest length that closes and stays clear, where the one asked for does not."""
+    """Set the nearest length that closes and stays clear, in place of one that does not close."""
 
     template: ClassVar[str] = "Nearest usable length"
 
     def apply(self, state: State) -> State:
-        """Return the next state, with a remark on what was taken."""
+        """Return the next state, with a remark on why this length was taken."""
         unclosed = state.unclosed
         if unclosed is None:
             return state
-        found = clear_length(state)
-        if found is None:
+        nearest = clear_length(state)
+        if nearest is None:
             return moved(state, state.pose)
-        value, words = found
+        value, words = nearest
         after = SetJoint(unclosed.joint, value).apply(state)
         return replace(after, taken=Taken(after.joints, words))
 
@@ -184,7 +176,7 @@ class SetPose(Action):
 
 @dataclass(frozen=True)
 class StartThere(Action):
-    """Move to a pose, and let what can be reached be reached from there."""
+    """Move to a pose, and let the accessible workspace start there."""
 
     template: ClassVar[str] = "Start where nothing is in the way"
 
@@ -223,7 +215,7 @@ class SetMode(Action):
 
 @dataclass(frozen=True)
 class SetVariable(Action):
-    """Set one design variable, named as in `VARIABLES`; pose or legs are held."""
+    """Set one design variable, named as in `VARIABLES`; `State.hold` says what stays."""
 
     template: ClassVar[str] = "{action.name} = {action.value:.6g}"
 
@@ -244,10 +236,10 @@ class SetVariable(Action):
             return moved(replace(state, design=design), state.pose, state.yaw_pitch_roll)
         solution = forward(design, state.joints)
         if not solution.feasible:
-            was = state.design.variables[VARIABLES.index(self.name)]
+            present = state.design.variables[VARIABLES.index(self.name)]
             raise InputError(
                 f"{self.name} = {self.value:.6g} cannot be assembled while the legs are held; "
-                f"it stays {was:.6g}. Hold the pose to go further."
+                f"it stays {present:.6g}. Hold the pose to go further."
             )
         pose = Pose.of(solution.position[state.mode], solution.rotation[state.mode])
         return replace(
@@ -267,8 +259,8 @@ class SetName(Action):
         """Return the next state.
 
         Raises:
-            DesignError: not one printable line.
-            InputError: no name at all, or the design is being optimised.
+            DesignError: the name is not one printable line.
+            InputError: the name is empty, or the design is being optimised.
         """
         check_free(state)
         name = self.name.strip()
@@ -289,86 +281,49 @@ class MarkSaved(Action):
         """Return the next state; the design has the name under which it was saved."""
         renamed = msgspec.structs.replace(state.design, name=self.design.name)
         if renamed != self.design:
-            # It went on meanwhile.
+            # The design was changed while it was being saved.
             return replace(state, base=self.design)
         return replace(state, design=renamed, base=self.design)
 
 
 @dataclass(frozen=True)
-class SetUnit(Action):
-    """Set the millimetres in one design unit."""
+class Set(Action):
+    """Set one value of the state.
 
-    template: ClassVar[str] = "Design unit = {action.unit_mm:.6g} mm"
+    Attributes:
+        at: Path of the value in the state, such as "view.singular.ball".
+        value: The new value.
+        name: Name of the value in the history; the last name in the path if empty.
+        text: The new value in the history; made from the value if empty.
+    """
 
-    unit_mm: float
-
-    def apply(self, state: State) -> State:
-        """Return the next state.
-
-        Raises:
-            InputError: the design is being optimised.
-        """
-        check_free(state)
-        return replace(state, design=msgspec.structs.replace(state.design, unit_mm=self.unit_mm))
-
-
-@dataclass(frozen=True)
-class SetLimits(Action):
-    """Set the limits; the mechanism stays where it is, within them or not."""
-
-    limits: Limits
+    at: str
+    value: object
+    name: str = ""
+    text: str = ""
 
     def apply(self, state: State) -> State:
         """Return the next state.
 
         Raises:
-            InputError: the design is being optimised.
+            InputError: the state refuses the value, or it belongs to a design that is being
+                optimised.
         """
-        check_free(state)
-        return replace(state, design=msgspec.structs.replace(state.design, limits=self.limits))
+        if self.at.startswith("design."):
+            check_free(state)
+        return with_value(state, self.at, self.value)
 
-    def describe(self, before: State, after: State) -> str:
-        """Return what the step did."""
-        return changes("Limits", before.design.limits, after.design.limits)
-
-
-@dataclass(frozen=True)
-class SetHold(Action):
-    """Choose what stays when the design changes."""
-
-    template: ClassVar[str] = "Hold the {action.hold}"
-
-    hold: Hold
-
-    def apply(self, state: State) -> State:
-        """Return the next state."""
-        return replace(state, hold=self.hold)
-
-
-@dataclass(frozen=True)
-class SetView(Action):
-    """Change what is shown."""
-
-    view: View
-
-    def apply(self, state: State) -> State:
-        """Return the next state.
-
-        Raises:
-            InputError: the warning length is not positive.
-        """
-        warn = self.view.warn_below
-        if warn is not None and not (np.isfinite(warn) and warn > 0.0):
-            raise InputError(f"the warning length must be positive; got {warn:g}")
-        return replace(state, view=self.view)
-
-    def describe(self, before: State, after: State) -> str:
-        """Return what the step did."""
-        return changes("View", before.view, after.view)
+    def words(self) -> str:
+        """Return what the action does."""
+        name = self.name or self.at.rpartition(".")[2].replace("_", " ").capitalize()
+        if self.text:
+            return f"{name}: {self.text}"
+        text = value_text(self.value)
+        return f"{name} {text}" if isinstance(self.value, bool) else f"{name} = {text}"
 
 
 def moved(state: State, pose: Pose, yaw_pitch_roll: Triple | None = None) -> State:
-    """Return the state in another pose, its joints and mode following."""
+    """Return the state in another pose, with the joints and the mode of that pose."""
     return replace(
         state,
         pose=pose,
@@ -380,10 +335,10 @@ def moved(state: State, pose: Pose, yaw_pitch_roll: Triple | None = None) -> Sta
 
 
 def check_free(state: State) -> None:
-    """Refuse to change the design while it is being optimised.
+    """Check that the design may be changed.
 
     Raises:
-        InputError: it is.
+        InputError: the design is being optimised.
     """
     if state.optimisation.is_on:
         raise InputError("the design is being optimised: wait until that is done, or cancel it")
@@ -402,6 +357,6 @@ def _unclosed(design: Design, joints: Joints, cause: SetJoint) -> Unclosed:
     )
 
 
-def _six(values: list[float]) -> Joints:
+def _as_joints(values: list[float]) -> Joints:
     l1, d1, d2, d3, d4, l4 = values
     return (l1, d1, d2, d3, d4, l4)

@@ -1,7 +1,7 @@
 """The nearest length that closes and stays clear of singularities.
 
 Lengths that just close lie on the singular set, since there a tetrahedron is flat. So the length
-to go to is a little inside the interval of those that close: the first from its end at which the
+taken lies a little inside the interval of those that close: the first from its end at which the
 verdict on the pose is clear, or where there is none, the one that is farthest from singular.
 """
 
@@ -20,7 +20,7 @@ from explorer.mechanism.kinematics import forward
 from explorer.mechanism.pose import Pose
 from explorer.numerics.number_text import format_number
 
-# The lengths between both ends of an interval that are tried, and the halvings that follow.
+# Number of lengths tried within an interval, and of halvings that refine the first clear one.
 TRIALS, HALVINGS = 24, 14
 
 
@@ -28,7 +28,7 @@ def clear_length(state: State) -> tuple[float, str] | None:
     """Return the nearest clear length of the joint that does not close, and why it is taken.
 
     Args:
-        state: With lengths that do not close.
+        state: A state whose joints do not close.
 
     Returns:
         The length with a sentence for people; None if no length closes, or if every one that
@@ -39,16 +39,16 @@ def clear_length(state: State) -> tuple[float, str] | None:
         return None
     joint, end = unclosed.joint, unclosed.nearest
     intervals = feasible_intervals(state.design, np.array(state.joints))[joint]
-    low, high = min(intervals, key=lambda each: min(abs(each[0] - end), abs(each[1] - end)))
+    low, high = min(intervals, key=lambda ends: min(abs(ends[0] - end), abs(ends[1] - end)))
     far = high if abs(end - low) < abs(high - end) else low
 
     def length(share: float) -> float:
         return end + share * (far - end)
 
-    found, is_clear = _first_clear(lambda share: _level(state, joint, length(share)))
-    if found == 0.0:
+    best, is_clear = _first_clear(lambda share: _level(state, joint, length(share)))
+    if best == 0.0:
         return None
-    value = length(found)
+    value = length(best)
     taken, singular = format_number(value), format_number(end)
     instead = f"{JOINTS[joint]} = {taken} instead of {format_number(unclosed.asked, 6)}. "
     why = f"{instead}The nearest value that closes, {singular}, is singular; "
@@ -78,7 +78,7 @@ def _first_clear(level: Callable[[float], float]) -> tuple[float, bool]:
 
 
 def _level(state: State, joint: int, value: float) -> float:
-    """Return how near the pose is to a singularity, as levels of a verdict; 0 without a pose."""
+    """Return the lowest level of the verdict on the pose; 0 where the joints do not close."""
     trial = np.array(state.joints)
     trial[joint] = value
     solution = forward(state.design, trial)

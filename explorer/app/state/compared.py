@@ -1,4 +1,4 @@
-"""What is compared with the live design, and how: a part of the state, frozen as all of it."""
+"""Designs that are compared with the live one, and how: a part of the state."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import msgspec
 from explorer.mechanism.design import Design
 
 SLOTS = ("A", "B", "C")
-"""What people call the places for pinned designs."""
+"""Names of the places for pinned designs."""
 
 Pinned: TypeAlias = tuple[Design | None, Design | None, Design | None]
 
@@ -20,11 +20,11 @@ class Look:
     """How designs are compared.
 
     Attributes:
-        shows: Whether figures stand in a table or are drawn as bars.
-        millimetres: Whether lengths are told in millimetres, or in units of the live design.
+        shows: Whether measures stand in a table or are drawn as bars.
+        millimetres: Whether lengths are in millimetres, rather than in units of the live design.
         overlay: Whether the workspaces are drawn over one another.
-        at_pose: Whether that of the live design is drawn at its present orientation, rather
-            than at that of its home.
+        at_pose: Whether the workspace of the live design is drawn at its present orientation,
+            rather than at that of its home.
         outlines: Whether the pinned designs are outlined in their home poses.
     """
 
@@ -37,7 +37,7 @@ class Look:
 
 @dataclass(frozen=True)
 class Compared:
-    """What the live design is compared with.
+    """The designs that the live one is compared with.
 
     Attributes:
         pinned: Copies of designs, in the order of `SLOTS`; None where a place is free.
@@ -53,10 +53,10 @@ class Compared:
         return not any(self.pinned)
 
     def slot_of(self, design: Design) -> int | None:
-        """Return where a design is pinned, by whatever name; None if it is not."""
+        """Return the index of the place of a design under any name; None if it is not pinned."""
         plain = unnamed(design)
-        found = (slot for slot, each in enumerate(self.pinned) if each and unnamed(each) == plain)
-        return next(found, None)
+        slots = (i for i, pinned in enumerate(self.pinned) if pinned and unnamed(pinned) == plain)
+        return next(slots, None)
 
 
 def unnamed(design: Design) -> Design:

@@ -52,12 +52,12 @@ class Frame:
 
     @cached_property
     def last_move(self) -> MoveClearance | None:
-        """The straight move from where the last gesture began, in one step; None without one."""
+        """The straight move from the start of the last gesture to here; None if there is none."""
         gesture = self.state.gesture
         if gesture is None:
             return None
         try:
             return move_clearance(self.state.design, gesture.start, self.state.pose)
         except InputError:
-            # There and back again: a move of no length, the one thing that is refused.
+            # The gesture ended where it began: only a move without length is refused.
             return None

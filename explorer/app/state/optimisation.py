@@ -1,7 +1,7 @@
-"""What is to be optimised and how far that has got: a part of the state, frozen as all of it.
+"""The request for an optimisation and its result: a part of the state.
 
-The user's own state is kept aside while the page shows the iterates, so that it comes back
-exactly. What people ask for is a `Wish`; a `Problem` is made of it when they press the button.
+The state before a run is kept while the page shows the iterates, so that it can be restored
+exactly. The user fills in an `OptimisationRequest`; a `Problem` is made of it when the run begins.
 """
 
 from __future__ import annotations
@@ -9,36 +9,36 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from explorer.errors import InputError
 from explorer.measures.measurements import Measurements
 from explorer.mechanism.design import VARIABLES
 from explorer.optimise.outcome import Iterate, Outcome, Status
-from explorer.optimise.problem import (
-    Box,
-    Demands,
-    ObjectiveName,
-    Problem,
-)
+from explorer.optimise.problem import YAW, Box, Demands, ObjectiveName, Problem
 from explorer.optimise.record import Record, Settings, record_of
 from explorer.optimise.search.starts import check_starts
 from explorer.optimise.search.trail import Trail
 
 PLACE = "place"
-"""Stands for the three shifts of the required box."""
+"""Name in `OptimisationRequest.free` for the three shifts of the required box."""
 
 
 @dataclass(frozen=True)
-class Wish:
-    """What people ask for; lengths in design units.
+class OptimisationRequest:
+    """What the user requests; lengths in design units.
 
     Attributes:
-        objective: What is wanted.
-        volume: To match, or at least; None for one that suits the design.
-        reach: The largest allowed; None for that of the design.
-        clearance: Every two legs are to keep; 0 for no demand.
-        free: What may change: of `VARIABLES`, `YAW` and `PLACE`.
-        starts: From how many designs to start.
-        with_box: Whether a box must lie within the workspace, whatever is wanted.
-        box: Which; None for one that suits the design.
+        objective: Name of the objective.
+        volume: Volume to match, or the least one; None for one that suits the design.
+        reach: Largest reach; None for that of the design.
+        clearance: Least clearance of every two legs; 0 for no demand.
+        free: Names of what may change, out of `VARIABLES`, `YAW` and `PLACE`.
+        starts: Number of designs to start from.
+        with_box: Whether a box must lie within the workspace, whatever the objective.
+        box: The required box; None for one that suits the design.
+
+    Raises:
+        InputError: a volume or reach that is not positive, a clearance below zero, too few or too
+            many starts, or an unknown name in `free`.
     """
 
     objective: ObjectiveName = "match-volume"
@@ -50,29 +50,26 @@ class Wish:
     with_box: bool = False
     box: Box | None = None
 
-    def check(self) -> None:
-        """Refuse numbers that nothing can be asked with, whatever the design.
-
-        Raises:
-            InputError: a volume or reach that is not positive, a clearance below zero, or too
-                few or too many starts.
-        """
+    def __post_init__(self) -> None:
+        unknown = {*self.free} - {*VARIABLES, YAW, PLACE}
+        if unknown:
+            raise InputError(f"nothing named {min(unknown)!r} can be free in an optimisation")
         check_starts(self.starts)
         Demands(volume=self.volume, reach=self.reach, clearance=self.clearance or None)
 
     @property
     def needs_volume(self) -> bool:
-        """Whether a volume is asked for."""
+        """Whether the objective takes a volume."""
         return self.objective in ("match-volume", "smallest-reach")
 
     @property
     def needs_reach(self) -> bool:
-        """Whether a reach is asked for."""
+        """Whether the objective takes a reach."""
         return self.objective == "largest-volume"
 
     @property
     def needs_box(self) -> bool:
-        """Whether a box is asked for."""
+        """Whether a box is required."""
         return self.with_box or self.objective == "largest-margin"
 
 
@@ -84,12 +81,12 @@ class SearchResult:
         status: That of the outcome; "failed" if there is none.
         message: One line for people.
         best: The best iterate; None if there is none.
-        starts: That were tried.
-        converged: How many of them converged.
-        iterations: Of the best.
-        seconds: It took.
-        record: By which it can be repeated; None if it had to be ended or failed.
-        holding: The limit, demand or bound that kept it from more, "" if none is known.
+        starts: Number of starts that were tried.
+        converged: Number of starts that converged.
+        iterations: Number of iterations from the best start.
+        seconds: Duration in seconds.
+        record: Record from which to repeat the run; None if it was killed or failed.
+        holding: The limit, demand or bound that kept it from a better value; "" if unknown.
     """
 
     status: Status | Literal["failed"]
@@ -105,21 +102,21 @@ class SearchResult:
 
 @dataclass(frozen=True)
 class Comparison:
-    """The measures of the user's own design and of the one found."""
+    """The measures of the user's design and of the optimised one."""
 
     before: Measurements
     after: Measurements
 
 
-def verdict_of(outcome: Outcome, starts: int) -> SearchResult:
-    """Return how a search from so many starts ended."""
+def result_of(outcome: Outcome, starts: int) -> SearchResult:
+    """Return the result of a search that was to try a number of starts."""
     run = outcome.run
     return SearchResult(
         status=run.status,
         message=run.message,
         best=run.best,
         starts=len(outcome.runs),
-        converged=sum(each.status == "converged" for each in outcome.runs),
+        converged=sum(tried.status == "converged" for tried in outcome.runs),
         iterations=run.iterations,
         seconds=outcome.seconds,
         record=record_of(outcome, Settings(starts=starts)),
@@ -127,8 +124,8 @@ def verdict_of(outcome: Outcome, starts: int) -> SearchResult:
     )
 
 
-def cut_short(problem: Problem, iterates: tuple[Iterate, ...]) -> SearchResult:
-    """Return how a run ended whose process had to be ended to end it."""
+def killed_result(problem: Problem, iterates: tuple[Iterate, ...]) -> SearchResult:
+    """Return the result of a run that ended because its process was killed."""
     if not iterates:
         return SearchResult("cancelled", "cancelled before the first iterate")
     best = min(iterates, key=Trail(problem, None, None).rank)
@@ -137,5 +134,5 @@ def cut_short(problem: Problem, iterates: tuple[Iterate, ...]) -> SearchResult:
         f"cancelled: {best.objective:.6g} is the best of {len(iterates)} iterates",
         best,
         starts=iterates[-1].run + 1,
-        iterations=sum(each.run == best.run for each in iterates) - 1,
+        iterations=sum(iterate.run == best.run for iterate in iterates) - 1,
     )

@@ -1,16 +1,21 @@
-"""A path that is played on the page: between assembly modes, or planned; and what is stored for it.
+"""The path that is played on the page, and the settings from which one is planned.
 
-A path belongs to the design that it was made for; with another design there is none.
+A path leads between two assembly modes, or was planned. It belongs to the design that it was made
+for; with another design there is none.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import Literal
+from typing import Annotated, Literal
 
+import msgspec
 import numpy as np
 
+from explorer.app.state.parts import TRANSIENT
+from explorer.errors import InputError
 from explorer.legs.moves import poses_between
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose
@@ -18,9 +23,12 @@ from explorer.paths.crossings import PathMargins, path_margins
 from explorer.paths.planning import DEFAULT_SECONDS
 from explorer.paths.trajectory import DEFAULT_SPEED, Trajectory, trajectory
 
-# Paths whose margins and times are kept: the one that is played, and the one before.
-KEPT = 2
-# The legs end where they began, and go a short way between: they go it in this time.
+Mode = Annotated[int, msgspec.Meta(ge=0, le=7)]
+"""Index of an assembly mode."""
+
+# Number of paths whose margins and times are cached: the present one and the one before.
+MOST_CACHED = 2
+# Duration of a path between modes: its legs move too little for a speed to give one.
 MODES_SECONDS = 8.0
 
 
@@ -29,12 +37,15 @@ class Journey:
     """A path and how far along it the platform is.
 
     Attributes:
-        kind: Between two modes of the same joints, or planned.
-        title: What it is, for people.
-        design: For which it was made.
-        poses: Its corners.
-        at: How far it has been played, in seconds.
-        is_playing: Whether time goes on.
+        kind: Whether it leads between two modes of the same joints, or was planned.
+        title: Title on the page.
+        design: The design that it was made for.
+        poses: The corners of the path.
+        at: Time up to which it has been played, in seconds.
+        is_playing: Whether it is being played.
+
+    Raises:
+        InputError: fewer than two corners.
     """
 
     kind: Literal["modes", "plan"]
@@ -42,7 +53,11 @@ class Journey:
     design: Design
     poses: tuple[Pose, ...]
     at: float = 0.0
-    is_playing: bool = False
+    is_playing: bool = field(default=False, metadata=TRANSIENT)
+
+    def __post_init__(self) -> None:
+        if len(self.poses) < 2:
+            raise InputError(f"a path has at least two corners; got {len(self.poses)}")
 
     @property
     def trajectory(self) -> Trajectory:
@@ -56,11 +71,11 @@ class Journey:
 
     @property
     def pose(self) -> Pose:
-        """Where the platform is on it."""
+        """The pose up to which it has been played."""
         return self.pose_at(self.at)
 
     def pose_at(self, seconds: float) -> Pose:
-        """Return the pose at a time, exactly on the path; its corners to the last bit."""
+        """Return the pose at a time in seconds; each corner is kept to the last bit."""
         timed = self.trajectory
         at = float(np.interp(seconds, timed.time, timed.at))
         move = min(int(at), len(self.poses) - 2)
@@ -71,30 +86,37 @@ class Journey:
 
 @dataclass(frozen=True)
 class Paths:
-    """What is stored for paths.
+    """The path of the page, and the settings of the next one.
 
     Attributes:
-        modes: From which assembly mode to which to go; None for the present one, and for
+        modes: First and last assembly mode of a path; None for the present mode, and for
             the one beyond δ1 = 0 from the first.
-        start, goal: Of the path to plan; None until they are stored.
-        seconds: For planning.
-        request: The number of the last request to plan; 0 before the first.
-        is_planning: Whether it is being worked on.
-        problem: Why it came to nothing.
-        journey: The path at hand.
+        start, goal: Poses between which to plan a path; None until they are stored.
+        seconds: Longest time of planning, in seconds.
+        request: Number of the last request to plan; 0 before the first.
+        is_planning: Whether that path is being planned.
+        problem: Why planning it failed; None if it did not.
+        journey: The present path; None if there is none.
+
+    Raises:
+        InputError: a time for planning that is not above zero.
     """
 
-    modes: tuple[int | None, int | None] = (None, None)
+    modes: tuple[Mode | None, Mode | None] = (None, None)
     start: Pose | None = None
     goal: Pose | None = None
     seconds: float = DEFAULT_SECONDS
-    request: int = 0
-    is_planning: bool = False
-    problem: str | None = None
+    request: int = field(default=0, metadata=TRANSIENT)
+    is_planning: bool = field(default=False, metadata=TRANSIENT)
+    problem: str | None = field(default=None, metadata=TRANSIENT)
     journey: Journey | None = None
 
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.seconds) and self.seconds > 0.0):
+            raise InputError(f"planning needs a time above zero; got {self.seconds:g} seconds")
 
-@lru_cache(maxsize=KEPT)
+
+@lru_cache(maxsize=MOST_CACHED)
 def _trajectory(design: Design, poses: tuple[Pose, ...], seconds: float | None) -> Trajectory:
     timed = trajectory(design, poses)
     if seconds is None or timed.duration == 0.0:
@@ -102,6 +124,6 @@ def _trajectory(design: Design, poses: tuple[Pose, ...], seconds: float | None) 
     return trajectory(design, poses, speed=DEFAULT_SPEED * design.reach * timed.duration / seconds)
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=MOST_CACHED)
 def _margins(poses: tuple[Pose, ...]) -> PathMargins:
     return path_margins(poses)

@@ -1,7 +1,7 @@
-"""Presses: the times during which a hand holds something, as each browser tells of them.
+"""Presses: the times during which a user holds a control, as each browser reports them.
 
-From press to release is one step of the history and one move of the platform, however long the
-hand rests in between. Browsers that tell of no press, and keys, are told apart by pauses.
+All events from press to release are one step of the history and one move of the platform,
+whatever the pauses between them. Where no press is reported, as with keys, pauses end a step.
 """
 
 from __future__ import annotations
@@ -10,9 +10,10 @@ import threading
 from collections import deque
 from dataclasses import dataclass
 
-# A page sends the last value of a control up to 0.05 s after the hand let go of it.
+# Time after a release in which values still count as of the press: a page sends the last value
+# of a control up to 0.05 s after its release.
 LATE_SECONDS = 0.3
-# Of one browser; changes may wait for the session while the hand goes on.
+# Number of presses kept of each browser: changes may wait for the session during later presses.
 MOST_PRESSES = 16
 
 
@@ -22,7 +23,7 @@ class Press:
 
     Attributes:
         client: The browser's id.
-        number: Of the press among those of this browser.
+        number: Number of the press among those of this browser.
     """
 
     client: int
@@ -30,12 +31,12 @@ class Press:
 
 
 @dataclass
-class _Held:
+class _Period:
     number: int
     began: float
     ended: float | None = None
 
-    def holds(self, time: float) -> bool:
+    def contains(self, time: float) -> bool:
         return self.began <= time and (self.ended is None or time <= self.ended + LATE_SECONDS)
 
 
@@ -43,11 +44,11 @@ class Presses:
     """The last presses of every browser."""
 
     def __init__(self) -> None:
-        self._held: dict[int, deque[_Held]] = {}
+        self._periods: dict[int, deque[_Period]] = {}
         self._lock = threading.Lock()
 
-    def tell(self, client: int, number: int, time: float) -> None:
-        """Take note of a press or a release.
+    def record(self, client: int, number: int, time: float) -> None:
+        """Record a press or a release.
 
         Args:
             client: The browser's id.
@@ -56,27 +57,27 @@ class Presses:
             time: When that happened, in seconds.
         """
         with self._lock:
-            held = self._held.setdefault(client, deque(maxlen=MOST_PRESSES))
-            last = held[-1] if held else None
+            periods = self._periods.setdefault(client, deque(maxlen=MOST_PRESSES))
+            last = periods[-1] if periods else None
             if number <= 0:
                 if last is not None and last.number == -number:
                     last.ended = time
             elif last is not None and last.number == number:
                 last.ended = None
             else:
-                held.append(_Held(number, time))
+                periods.append(_Period(number, time))
 
     def at(self, client: int | None, time: float) -> Press | None:
-        """Return the press of a browser at a time; None if it held nothing, or is unknown."""
+        """Return the press of a browser at a time; None if there is none, or no such browser."""
         if client is None:
             return None
         with self._lock:
-            for held in reversed(self._held.get(client, ())):
-                if held.began <= time:
-                    return Press(client, held.number) if held.holds(time) else None
+            for period in reversed(self._periods.get(client, ())):
+                if period.began <= time:
+                    return Press(client, period.number) if period.contains(time) else None
         return None
 
     def forget(self, client: int) -> None:
-        """Forget a browser that has gone, whether or not it told of a release."""
+        """Forget a browser that has disconnected, even in the middle of a press."""
         with self._lock:
-            self._held.pop(client, None)
+            self._periods.pop(client, None)

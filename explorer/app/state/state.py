@@ -1,37 +1,39 @@
-"""The state of the application, a frozen value, and the frame that is drawn from it.
+"""The state of the application, a frozen value from which the page is drawn.
 
-There is one state for the whole server, shared by every tab. It changes through one
-door, `explorer.app.session.session`, by the actions of `explorer.app.state.actions`.
+There is one state for the whole server, shared by every tab. It changes only through
+`explorer.app.session.session`, by the actions of `explorer.app.state.actions` and of the features.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Literal
+from dataclasses import dataclass, field, replace
+from typing import Annotated, Literal
 
+import msgspec
 import numpy as np
 
 from explorer.app.state.compared import Compared
 from explorer.app.state.jog import Jog
-from explorer.app.state.optimisation import Comparison, SearchResult, Wish
-from explorer.app.state.paths import Journey, Paths
+from explorer.app.state.optimisation import Comparison, OptimisationRequest, SearchResult
+from explorer.app.state.parts import STAYS, TRANSIENT
+from explorer.app.state.paths import Journey, Mode, Paths
 from explorer.app.state.presses import Press
 from explorer.app.state.studies import Studies
 from explorer.app.state.view import View
+from explorer.errors import InputError
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.kinematics import inverse
 from explorer.mechanism.margins import TETRAHEDRA, margins, mode_of
 from explorer.mechanism.pose import Pose, Triple, yaw_pitch_roll_from_rotation
 from explorer.optimise.outcome import Iterate
-from explorer.optimise.problem import (
-    Problem,
-)
+from explorer.optimise.problem import Problem
 from explorer.optimise.record import Record
 from explorer.singularity.colours import WARN_SHARE
 
 Joints = tuple[float, float, float, float, float, float]
 Hold = Literal["pose", "legs"]
+Count = Annotated[int, msgspec.Meta(ge=0)]
 
 
 @dataclass(frozen=True)
@@ -45,13 +47,13 @@ class Unclosed:
         failing: Which of the three trilaterations have no solution, 0 to 2.
     """
 
-    joint: int
+    joint: Annotated[int, msgspec.Meta(ge=0, le=5)]
     asked: float
     nearest: float | None
     failing: tuple[int, ...]
 
     def __str__(self) -> str:
-        which = " and ".join(" ".join(TETRAHEDRA[i]) for i in self.failing)
+        tetrahedra = " and ".join(" ".join(TETRAHEDRA[i]) for i in self.failing)
         kind = "tetrahedron" if len(self.failing) == 1 else "tetrahedra"
         advice = (
             f"the nearest value that closes is {self.nearest:.6g}, where the pose is singular; "
@@ -60,7 +62,7 @@ class Unclosed:
             else "with the other legs as they are, no value works"
         )
         name = JOINTS[self.joint]
-        return f"{name} = {self.asked:.6g} cannot close the {kind} {which}; {advice}."
+        return f"{name} = {self.asked:.6g} cannot close the {kind} {tetrahedra}; {advice}."
 
 
 @dataclass(frozen=True)
@@ -78,12 +80,12 @@ class Taken:
 
 @dataclass(frozen=True)
 class Gesture:
-    """A move of the platform by one hand, however many events it came in.
+    """A move of the platform by one control, from press to release, in however many events.
 
     Attributes:
         start: The pose in which it began.
-        source: What was moved by it, for instance a slider.
-        last: When its last event happened, in seconds.
+        source: The control, for instance a slider.
+        last: Time of its last event, in seconds.
         press: The last press of a browser that it was part of; None if it is not known.
     """
 
@@ -98,26 +100,41 @@ class Run:
     """A run of the optimiser.
 
     Attributes:
-        number: Of the run, from 1.
-        problem: That is solved.
-        starts: From how many designs.
-        own: The state before it, to which to return.
-        phase: Whether it goes on, has been asked to end, or has ended.
-        iterates: Those that have been shown; the last one is what is drawn.
-        verdict: How it ended, once it has.
-        comparison: Of own and found design, once it is there.
+        number: Number of the run, from 1.
+        problem: The problem that it solves.
+        starts: Number of designs to start from.
+        own: The state before the run, to which cancelling returns.
+        phase: Whether it is running, was told to end, or has ended.
+        iterates: The iterates shown so far; the last one is drawn.
+        verdict: How it ended; None until then.
+        comparison: Measures of the own and the optimised design; None until they are known.
         accepted: Whether the result was accepted.
+
+    Raises:
+        InputError: a run within the state before it, or one that has ended without a verdict.
     """
 
-    number: int
+    number: Count
     problem: Problem
-    starts: int
+    starts: Count
     own: State
     phase: Literal["running", "cancelling", "ended"] = "running"
     iterates: tuple[Iterate, ...] = ()
     verdict: SearchResult | None = None
-    comparison: Comparison | None = None
+    comparison: Comparison | None = field(default=None, metadata=TRANSIENT)
     accepted: bool = False
+
+    def __post_init__(self) -> None:
+        if self.own.optimisation.run is not None:
+            raise InputError("the state before a run has none itself")
+        if self.phase == "ended" and self.verdict is None:
+            raise InputError(f"run {self.number} has ended without a verdict")
+
+    def for_file(self) -> Run:
+        """Return the run as a file holds it: only with the iterates of the best start."""
+        best = self.best
+        iterates = () if best is None else tuple(i for i in self.iterates if i.run == best.run)
+        return replace(self, iterates=iterates)
 
     @property
     def is_undecided(self) -> bool:
@@ -126,60 +143,64 @@ class Run:
 
     @property
     def best(self) -> Iterate | None:
-        """What was found, once it has ended."""
+        """The best iterate; None until the run has ended, or if there is none."""
         return None if self.verdict is None else self.verdict.best
 
 
 @dataclass(frozen=True)
 class Optimisation:
-    """All that the state knows of it.
+    """The request for an optimisation, and its last run.
 
     Attributes:
-        wish: What is asked for.
-        run: The last run, or the one that goes on; None if there is none of this design.
-        count: Of all runs so far.
-        refusal: Why the last one was not begun, if it was not.
+        request: What the user requests.
+        run: The last run; None if there is none of this design.
+        count: Number of runs so far.
+        refusal: Why the last run could not start; None if it could.
     """
 
-    wish: Wish = field(default_factory=Wish)
+    request: OptimisationRequest = field(default_factory=OptimisationRequest)
     run: Run | None = None
-    count: int = 0
-    refusal: str | None = None
+    count: Count = 0
+    refusal: str | None = field(default=None, metadata=TRANSIENT)
 
     @property
     def is_on(self) -> bool:
-        """Whether a run goes on."""
+        """Whether a run has not ended yet."""
         return self.run is not None and self.run.phase != "ended"
+
+    def without_run(self) -> Optimisation:
+        """Return what stays when another design is opened: the request and the count of runs."""
+        return replace(self, run=None, refusal=None)
 
     @property
     def record(self) -> Record | None:
-        """Of the search that ended last; None where there is none to repeat."""
+        """The record of the search that ended last; None where there is none to repeat."""
         verdict = None if self.run is None else self.run.verdict
         return None if verdict is None else verdict.record
 
 
 @dataclass(frozen=True)
 class State:
-    """Everything that the page shows follows from this.
+    """The state, from which everything on the page follows.
 
     Attributes:
         design: The manipulator.
         base: The design as it was opened, to which reset returns.
         pose: The last pose that closes.
-        yaw_pitch_roll: Its angles in degrees, kept as they were given.
-        joints: As asked for; those of the pose unless `unclosed` says otherwise.
-        mode: The assembly mode; at a singular pose the one it came from.
-        hold: What stays when the design changes.
-        unclosed: Why the joints asked for do not close, if they do not.
+        yaw_pitch_roll: The angles of the pose in degrees, as the user gave them.
+        joints: The joints as last set; those of the pose unless `unclosed` is given.
+        mode: The assembly mode; at a singular pose the one before it.
+        hold: Whether the pose or the legs stay when the design changes.
+        unclosed: Why the joints do not close; None if they do.
         view: What is shown.
         taken: The length that was last taken in the place of one that does not close.
-        gesture: What brought the platform to its pose; None where nothing moved it there,
-            as after a change of the design.
+        gesture: The gesture that led to the pose; None if none did, as after a change of the
+            design.
         jog: The uncoupled motion that was last used.
-        paths: The path that is played, and what is stored to plan one.
-        optimisation: What is to be optimised, and how far that has got.
-        compared: What the design is compared with.
-        studies: Which study of designs is looked at, and how.
+        paths: The path that is played, and the settings of the next one.
+        optimisation: The request for an optimisation, and its last run.
+        compared: The designs that this one is compared with.
+        studies: The open study of designs, and how it is shown.
     """
 
     design: Design
@@ -187,17 +208,26 @@ class State:
     pose: Pose
     yaw_pitch_roll: Triple
     joints: Joints
-    mode: int
-    hold: Hold = "pose"
+    mode: Mode
+    hold: Hold = field(default="pose", metadata=STAYS)
     unclosed: Unclosed | None = None
-    view: View = field(default_factory=View)
-    taken: Taken | None = field(default=None, compare=False)
-    gesture: Gesture | None = None
+    view: View = field(default_factory=View, metadata=STAYS)
+    taken: Taken | None = field(default=None, compare=False, metadata=TRANSIENT)
+    gesture: Gesture | None = field(default=None, metadata=TRANSIENT)
     jog: Jog | None = None
     paths: Paths = field(default_factory=Paths)
-    optimisation: Optimisation = field(default_factory=Optimisation)
-    compared: Compared = field(default_factory=Compared)
-    studies: Studies = field(default_factory=Studies)
+    optimisation: Optimisation = field(
+        default_factory=Optimisation, metadata={"on_open": Optimisation.without_run}
+    )
+    compared: Compared = field(default_factory=Compared, metadata=STAYS)
+    studies: Studies = field(default_factory=Studies, metadata=STAYS)
+
+    def for_file(self) -> State:
+        """Return the state as a file holds it: while a run goes on, the state before the run."""
+        optimisation = self.optimisation
+        if optimisation.run is None or not optimisation.is_on:
+            return self
+        return replace(optimisation.run.own, optimisation=optimisation.without_run())
 
     @property
     def jog_in_use(self) -> Jog | None:
@@ -206,13 +236,13 @@ class State:
 
     @property
     def remark(self) -> str | None:
-        """Why the present length is not the one that was asked for; None where it is."""
+        """Why the present length is not the one that the user set; None where it is."""
         taken = self.taken
         return taken.words if taken is not None and taken.joints == self.joints else None
 
     @property
     def journey(self) -> Journey | None:
-        """The path at hand; None where it was made for another design."""
+        """The present path; None where there is none, or one made for another design."""
         journey = self.paths.journey
         return journey if journey is not None and journey.design == self.design else None
 
@@ -224,7 +254,7 @@ class State:
 
 
 def opened(design: Design, pose: Pose | None = None, view: View | None = None) -> State:
-    """Return the state in which a design opens: in its home pose unless told otherwise."""
+    """Return the state in which a design opens: in its home pose unless another is given."""
     at = home_pose(design) if pose is None else pose
     return State(
         design=design,

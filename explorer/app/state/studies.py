@@ -1,6 +1,6 @@
-"""Which study is looked at, and how: a part of the state, frozen as all of it.
+"""The open study, and how it is shown: a part of the state.
 
-A study is named, not where it lies: only the server knows the folders.
+A study is known by its name, not by its folder: only the server knows the folders.
 """
 
 from __future__ import annotations
@@ -30,24 +30,24 @@ from explorer.sweep.study import (
 Range: TypeAlias = tuple[float, float]
 
 FEWEST, MOST = 16, 2000
-"""How many designs a study from the page may have."""
+"""Smallest and largest number of designs of a study from the page."""
 
 LEAST_PERCENT, MOST_PERCENT = 1.0, 95.0
-"""How far variables may vary; with more a3y or b1y would come to zero."""
+"""Least and most that variables may vary, in per cent; with more a3y or b1y could be zero."""
 
 # A variable near zero varies as if it were this share of the reach; an angle by a share of this.
 LEAST_SHARE, RIGHT_ANGLE = 0.05, 90.0
-# A study from the page has about so many parts, each of which is shown when it is there.
+# Number of parts of a study from the page, about; each is shown as soon as it is computed.
 PARTS = 40
 
 
 @dataclass(frozen=True)
 class Brush:
-    """What is asked of one axis: to lie within one of its ranges, ends included.
+    """A filter on one axis: values must lie within one of its ranges, ends included.
 
     Attributes:
         axis: The name of a variable or measure.
-        ranges: At least one, low and high end of each.
+        ranges: Low and high end of each range; at least one range.
     """
 
     axis: str
@@ -55,15 +55,15 @@ class Brush:
 
 
 @dataclass(frozen=True)
-class StudyWish:
+class StudyPlan:
     """A small study around the live design.
 
     Attributes:
-        count: How many designs.
+        count: Number of designs.
         percent: How far each variable varies, in per cent.
-        variables: Those that vary, out of `NAMES`.
-        measures: What is measured.
-        objectives: What the front is of, out of the measures, and what is wanted of each.
+        variables: Names of the variables that vary, out of `NAMES`.
+        measures: Names of the measures.
+        objectives: Measures that span the Pareto front, each with its sense.
     """
 
     count: int = 256
@@ -77,44 +77,44 @@ class StudyWish:
     )
 
     def sense_of(self, measure: str) -> Sense | None:
-        """Return what is wanted of a measure, None if nothing is."""
+        """Return the sense of a measure that is an objective; None if it is none."""
         return dict(self.objectives).get(measure)
 
-    def with_variable_turned(self, name: str) -> StudyWish:
-        """Return the wish in which a variable varies if it did not, and else does not."""
-        return replace(self, variables=_turned(NAMES, self.variables, name))
+    def with_variable_toggled(self, name: str) -> StudyPlan:
+        """Return the plan in which a variable varies if it did not, and else stays fixed."""
+        return replace(self, variables=_toggled(NAMES, self.variables, name))
 
-    def with_measure_turned(self, name: str) -> StudyWish:
-        """Return the wish with the next use of a measure.
+    def with_measure_advanced(self, name: str) -> StudyPlan:
+        """Return the plan with the next use of a measure.
 
-        First it is measured, then to be large, then small, then left out again.
+        The uses in order: it is measured, then maximised, then minimised, then left out again.
         """
-        wanted = dict(self.objectives)
+        senses = dict(self.objectives)
         measures = self.measures
         if name not in measures:
-            measures = _turned(tuple(measures_in("studies")), measures, name)
-        elif name not in wanted:
-            wanted[name] = "max"
-        elif wanted[name] == "max":
-            wanted[name] = "min"
+            measures = _toggled(tuple(measures_in("studies")), measures, name)
+        elif name not in senses:
+            senses[name] = "max"
+        elif senses[name] == "max":
+            senses[name] = "min"
         else:
-            del wanted[name]
-            measures = _turned(tuple(measures_in("studies")), measures, name)
-        ordered = tuple((each, wanted[each]) for each in CATALOGUE if each in wanted)
+            del senses[name]
+            measures = _toggled(tuple(measures_in("studies")), measures, name)
+        ordered = tuple((other, senses[other]) for other in CATALOGUE if other in senses)
         return replace(self, measures=measures, objectives=ordered)
 
 
 @dataclass(frozen=True)
 class Studies:
-    """What is looked at.
+    """The open study, and how it is shown.
 
     Attributes:
-        name: Of the open study; None if none is.
-        brushes: At most one for each axis.
-        across, up: What the scatter plot shows; None for the first two objectives.
-        colour: What colours both plots; None for the first objective.
-        picked: The index of the design that was picked last.
-        wish: The small study that can be started.
+        name: Name of the open study; None if none is.
+        brushes: The filters, at most one for each axis.
+        across, up: Names of the axes of the scatter plot; None for the first two objectives.
+        colour: Name of what colours both plots; None for the first objective.
+        picked: Index of the design that was picked last.
+        plan: The small study that can be started.
     """
 
     name: str | None = None
@@ -123,29 +123,29 @@ class Studies:
     up: str | None = None
     colour: str | None = None
     picked: int | None = None
-    wish: StudyWish = StudyWish()
+    plan: StudyPlan = StudyPlan()
 
-    def brushed(self, axis: str, ranges: tuple[Range, ...]) -> Studies:
-        """Return the same with other ranges of one axis; with none the axis is free."""
-        others = tuple(each for each in self.brushes if each.axis != axis)
+    def with_ranges(self, axis: str, ranges: tuple[Range, ...]) -> Studies:
+        """Return the studies with new ranges of one axis; with none the axis has no filter."""
+        others = tuple(brush for brush in self.brushes if brush.axis != axis)
         return replace(self, brushes=(*others, Brush(axis, ranges)) if ranges else others)
 
     def ranges_of(self, axis: str) -> tuple[Range, ...]:
-        """Return the ranges of an axis, none where it is free."""
-        return next((each.ranges for each in self.brushes if each.axis == axis), ())
+        """Return the ranges of an axis; none if it has no filter."""
+        return next((brush.ranges for brush in self.brushes if brush.axis == axis), ())
 
 
 def within(columns: Mapping[str, Any], brushes: tuple[Brush, ...]) -> BoolArray:
     """Return which rows lie within all brushes, shape (n,).
 
-    A row lies within a brush if its value lies in one of the ranges, ends included; what has
-    no value lies in none. Brushes of axes that a study does not have ask for nothing.
+    A row lies within a brush if its value lies in one of the ranges, ends included; a missing
+    value (NaN) lies in none. Brushes of axes that a study does not have are passed over.
 
     Args:
-        columns: By name, shape (n,) each, with the index among them.
-        brushes: At most one for each axis.
+        columns: Columns by name, shape (n,) each, with the index among them.
+        brushes: The filters, at most one for each axis.
     """
-    found = np.ones(len(columns["index"]), dtype=np.bool_)
+    chosen = np.ones(len(columns["index"]), dtype=np.bool_)
     for brush in brushes:
         if brush.axis not in columns:
             continue
@@ -153,15 +153,15 @@ def within(columns: Mapping[str, Any], brushes: tuple[Brush, ...]) -> BoolArray:
         inside = np.zeros(len(values), dtype=np.bool_)
         for low, high in brush.ranges:
             inside |= (values >= low) & (values <= high)
-        found &= inside
-    return found
+        chosen &= inside
+    return chosen
 
 
 def range_around(design: Design, name: str, percent: float) -> Range:
-    """Return how far a variable of a study varies around a design.
+    """Return the range of a variable of a study around its value in a design.
 
-    By the per cent of its value, of a 20th of the reach where that is larger; the yaw by
-    those of a right angle, a radius down to zero at most.
+    The range extends to both sides by a percentage of the value, or of a 20th of the reach where
+    that is larger; for the yaw, of a right angle. A radius stays at zero or above.
 
     Raises:
         InputError: no such variable.
@@ -178,73 +178,73 @@ def range_around(design: Design, name: str, percent: float) -> Range:
         span = share * max(abs(value), LEAST_SHARE * design.reach)
     low = value - span
     if name == REACH:
-        # Halfway to the longest minimum at the most.
+        # The reach goes at most halfway down to the longest minimum.
         low = max(low, 0.5 * (value + longest_minimum(design)))
     return low, value + span
 
 
-def study_around(design: Design, wish: StudyWish, name: str) -> Study:
+def study_around(design: Design, plan: StudyPlan, name: str) -> Study:
     """Return a small study around a design.
 
     Args:
         design: The design.
-        wish: What varies and what is measured.
-        name: Of the study.
+        plan: The variables and measures.
+        name: Name of the study.
 
     Raises:
-        InputError: nothing varies or nothing is measured, or far too many designs.
+        InputError: no variable or no measure, or a number that is out of its range.
     """
-    if not FEWEST <= wish.count <= MOST:
-        raise InputError(f"a study from the page has {FEWEST} to {MOST} designs; got {wish.count}")
-    if not LEAST_PERCENT <= wish.percent <= MOST_PERCENT:
+    if not FEWEST <= plan.count <= MOST:
+        raise InputError(f"a study from the page has {FEWEST} to {MOST} designs; got {plan.count}")
+    if not LEAST_PERCENT <= plan.percent <= MOST_PERCENT:
         raise InputError(
-            f"variables vary by {LEAST_PERCENT:g} to {MOST_PERCENT:g} %; got {wish.percent:g} %"
+            f"variables vary by {LEAST_PERCENT:g} to {MOST_PERCENT:g} %; got {plan.percent:g} %"
         )
-    if not wish.variables:
+    if not plan.variables:
         raise InputError("choose at least one variable that varies")
-    measures = tuple(each for each in wish.measures if each not in wish.variables)
+    measures = tuple(measure for measure in plan.measures if measure not in plan.variables)
     if not measures:
         raise InputError("choose at least one measure")
-    ranges = {each: range_around(design, each, wish.percent) for each in wish.variables}
+    ranges = {v: range_around(design, v, plan.percent) for v in plan.variables}
     return Study(
         name=name[:LONGEST_NAME],
         design=design,
         variables=ranges,
-        sampling=Sampling(method="sobol", count=wish.count),
+        sampling=Sampling(method="sobol", count=plan.count),
         measures=measures,
-        objectives=tuple(Objective(measure, sense) for measure, sense in wish.objectives),
-        chunk=max(4, -(-wish.count // PARTS)),
+        objectives=tuple(Objective(measure, sense) for measure, sense in plan.objectives),
+        chunk=max(4, -(-plan.count // PARTS)),
     )
 
 
 def unit_of(name: str) -> str:
-    """Return the unit of a variable or measure as people read it, "" for a plain number."""
+    """Return the unit of a variable or measure as the page writes it; "" for a plain number."""
     if name in CATALOGUE:
         return CATALOGUE[name].unit_in("units")
     return "°" if name == YAW else "units" if name in NAMES else ""
 
 
-def spoken(name: str) -> str:
-    """Return what people call a variable or measure."""
+def label_of(name: str) -> str:
+    """Return the name of a variable or measure on the page."""
     is_measure = name in measures_in("studies")
     return CATALOGUE[name].label if is_measure else name.replace("_", " ")
 
 
-def titled(name: str) -> str:
+def title_of(name: str) -> str:
     """Return the title of an axis, with its unit."""
     unit = unit_of(name)
-    return f"{spoken(name)} [{unit}]" if unit else spoken(name)
+    return f"{label_of(name)} [{unit}]" if unit else label_of(name)
 
 
-def briefly(name: str) -> str:
+def short_title_of(name: str) -> str:
     """Return the title of an axis where there is little room, with its unit: u is one unit."""
     unit = unit_of(name).replace("units", "u")
-    words = spoken(name).replace("inverse condition", "inv. cond.")
+    words = label_of(name).replace("inverse condition", "inv. cond.")
     return f"{words} [{unit}]" if unit else words
 
 
-def _turned(order: tuple[str, ...], chosen: tuple[str, ...], name: str) -> tuple[str, ...]:
+def _toggled(order: tuple[str, ...], chosen: tuple[str, ...], name: str) -> tuple[str, ...]:
     if name not in order:
         raise InputError(f"there is no {name!r}; there are {', '.join(order)}")
-    kept = {*chosen} ^ {name}
-    return tuple(each for each in order if each in kept)
+    toggled = {*chosen} ^ {name}
+    return tuple(other for other in order if other in toggled)

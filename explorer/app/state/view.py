@@ -9,7 +9,7 @@ from typing import Literal
 from explorer.errors import InputError
 
 ALUMINIUM = 2700.0
-"""Its density, in kg/m³."""
+"""Density of aluminium, in kg/m³."""
 
 
 @dataclass(frozen=True)
@@ -18,13 +18,12 @@ class WorkspaceView:
 
     Attributes:
         solid: Whether the solid is drawn.
-        region: Whether it is all that is within the limits, or what of it can be reached
-            without a collision of legs.
-        start: Whether it is to be reached from the home position, or from the present one.
+        region: Whether the solid is all that is within the limits, or its accessible part alone.
+        start: Whether the accessible part starts at the home position, or at the present one.
         hull: Whether its convex hull is drawn.
         planes: Whether the three singularity planes are drawn.
-        orientation: Whether it is that of the present pose, or of the home pose.
-        colour: By what its surface is coloured.
+        orientation: Whether the orientation is that of the present pose, or of the home pose.
+        colour: The quantity by which the surface is coloured.
         cut: The axis along which it is cut open, or None.
         level: The coordinate at which it is cut, in design units; None for the middle of its
             extent, which also counts where this is beyond it.
@@ -50,8 +49,8 @@ class PrototypeView:
 
     Attributes:
         shown: Whether its parts replace the schematic legs and bodies.
-        exploded: How far they are drawn apart, 0 to 1.
-        density: Of all parts, in kg/m³.
+        exploded: How far the exploded view moves the parts apart, 0 to 1.
+        density: Density of all parts, in kg/m³.
 
     Raises:
         InputError: a share beyond 0 to 1, or a density that is not positive.
@@ -63,7 +62,7 @@ class PrototypeView:
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.exploded <= 1.0:
-            raise InputError(f"parts are drawn apart by 0 to 1; got {self.exploded:g}")
+            raise InputError(f"the exploded view takes 0 to 1; got {self.exploded:g}")
         if not (math.isfinite(self.density) and self.density > 0.0):
             raise InputError(
                 f"the density must be positive; got {self.density:g} (aluminium: 2700 kg/m³)"
@@ -71,11 +70,7 @@ class PrototypeView:
 
 
 Ghost = Literal["none", "δ1 = 0", "δ2 = 0", "δ3 = 0", "nearest"]
-
-
 Arrows = Literal["one in use", "all six", "none"]
-
-
 Gain = Literal["none", "speed", "force"]
 
 
@@ -87,7 +82,7 @@ class SingularView:
         ghost: Which of the nearest singular poses is drawn.
         strata: Whether the diagram of the strata is drawn.
         arrows: Which of the six uncoupled motions are drawn.
-        ellipsoid: Which of them is drawn at b4, of speeds or of forces.
+        ellipsoid: Which ellipsoid is drawn at b4, that of speeds or that of forces.
         ball: Whether the largest ball without singular positions is drawn.
     """
 
@@ -116,6 +111,9 @@ class View:
         prototype: How the prototype is shown.
         workspace: How the workspace is shown.
         singular: How singularities are shown.
+
+    Raises:
+        InputError: the warning length is not positive.
     """
 
     flags: bool = True
@@ -134,3 +132,8 @@ class View:
     prototype: PrototypeView = field(default_factory=PrototypeView)
     workspace: WorkspaceView = field(default_factory=WorkspaceView)
     singular: SingularView = field(default_factory=SingularView)
+
+    def __post_init__(self) -> None:
+        warn = self.warn_below
+        if warn is not None and not (math.isfinite(warn) and warn > 0.0):
+            raise InputError(f"the warning length must be positive; got {warn:g}")

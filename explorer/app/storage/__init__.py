@@ -1,1 +1,1 @@
-"""What is kept in the user's data folder: the session as it was left, and named designs."""
+"""Storage in the user's data folder: the saved session, the library of designs, the preferences."""

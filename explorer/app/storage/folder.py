@@ -19,22 +19,22 @@ OVERRIDE = "EXPLORER_DATA"
 """The environment variable that names another folder."""
 
 LOCK = ".lock"
-"""The file in a folder that is locked while one explorer changes what is in it."""
+"""Name of the file in a folder that is locked while one explorer changes the folder."""
 
-# What is done in a folder takes milliseconds; who holds it longer is stuck.
+# Changes to a folder take milliseconds; an explorer that locks it for longer is stuck.
 PATIENCE_SECONDS = 5.0
 
 
 def data_folder() -> Path:
-    """Return the folder of the user's data; it need not be there yet."""
+    """Return the folder of the user's data; it need not exist yet."""
     named = os.environ.get(OVERRIDE)
     if named:
         return Path(named).expanduser().absolute()
     return user_data_path(NAME, appauthor=False)
 
 
-def made_folder(folder: Path) -> Path:
-    """Return a folder of the user's data, made if it was not there.
+def make_data_folder(folder: Path) -> Path:
+    """Make a folder of the user's data unless it exists; return it.
 
     Raises:
         StorageError: it cannot be made.
@@ -47,43 +47,38 @@ def made_folder(folder: Path) -> Path:
 
 
 @contextlib.contextmanager
-def alone_in(folder: Path, patience: float | None = None) -> Generator[None]:
-    """Keep other explorers from changing what is in a folder, which is made if need be.
-
-    Args:
-        folder: The folder.
-        patience: Seconds to wait for another explorer.
+def lock_folder(folder: Path) -> Generator[None]:
+    """Keep other explorers from changing a folder, which is made if need be.
 
     Raises:
-        StorageError: it cannot be had, or another explorer keeps it for too long.
+        StorageError: it cannot be made or locked, or another explorer locks it for too long.
     """
-    made_folder(folder)
-    patience = PATIENCE_SECONDS if patience is None else patience
-    lock = FileLock(folder / LOCK, thread_local=False)
-    try:
-        lock.acquire(timeout=patience)
-    except Timeout:
+    make_data_folder(folder)
+    lock = _lock(folder / LOCK, PATIENCE_SECONDS)
+    if lock is None:
         raise StorageError(
-            f"another explorer has been working in {str(folder)!r} for {patience:g} seconds; "
-            "try again, or close it"
-        ) from None
-    except OSError as error:
-        raise storage_error("lock", folder / LOCK, error) from None
+            f"another explorer has been working in {str(folder)!r} for {PATIENCE_SECONDS:g} "
+            "seconds; try again, or close it"
+        )
     try:
         yield
     finally:
         lock.release()
 
 
-def taken(path: Path) -> FileLock | None:
-    """Return a lock file, locked until it is released or this process ends; None if it is taken.
+def try_lock(path: Path) -> FileLock | None:
+    """Lock a file until the lock is released or this process ends; None if it is locked already.
 
     Raises:
         StorageError: it can be neither opened nor made.
     """
+    return _lock(path, 0.0)
+
+
+def _lock(path: Path, patience: float) -> FileLock | None:
     lock = FileLock(path, thread_local=False)
     try:
-        lock.acquire(blocking=False)
+        lock.acquire(timeout=patience, blocking=patience > 0.0)
     except Timeout:
         return None
     except OSError as error:

@@ -1,8 +1,8 @@
 """Designs by name, in the user's data folder; each is a design file of its own.
 
-A name is what people call a design and never a path: a file is called after a part of it
-and a hash, and the name itself lies within. So design files that are copied into the folder
-by hand appear too. Several explorers may share the folder; each sees what the others did.
+A name is never a path: the name of a file is made of a part of the design's name and a hash, and
+the design's name itself is in the file. So design files that are copied into the folder by hand
+appear too. Several explorers may share the folder; each sees the changes of the others.
 """
 
 from __future__ import annotations
@@ -17,31 +17,31 @@ from typing import Annotated
 
 import msgspec
 
-from explorer.app.storage.folder import alone_in, data_folder
+from explorer.app.storage.folder import data_folder, lock_folder
 from explorer.errors import InputError, StorageError
 from explorer.files.writing import make_folder, move, read_at_most, write_whole
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import LARGEST_FILE, decode_design, encode_design
 
 DESIGNS = "designs"
-"""The folder of named designs, in that of the user's data."""
+"""Name of the folder of designs in the user's data folder."""
 
 TRASH = "trash"
-"""Where deleted ones go, within the folder of designs."""
+"""Name of the folder of deleted designs in the folder of designs."""
 
 MOST_DELETED = 20
-"""Deleted designs that are kept, the newest of them."""
+"""Largest number of deleted designs that are kept; the newest are."""
 
 LONGEST_NAME = 100
 
-# The names of files by the order in which they were saved; without it the order is lost.
+# File of the numbers by which designs are ordered, the newest last.
 _ORDER = ".order"
-# Characters of a name that its file is called after, and digits of the hash.
+# Number of characters of a design's name in its file's name, and of digits of the hash.
 _SLUG, _DIGITS = 40, 12
-# Characters of a file's name that it keeps in the trash, where it gets a number too.
+# Number of characters of a file's name that it keeps in the trash, after a number.
 _ENDING = 60
 
-# What tells a copy from its original.
+# Suffix of the name of a copy.
 _COPY = re.compile(r" copy( \d+)?$")
 
 _Order = dict[str, Annotated[int, msgspec.Meta(ge=0, le=2**53)]]
@@ -52,11 +52,11 @@ class Entry:
     """A file in the library.
 
     Attributes:
-        name: Of the design; of the file where there is no design to be had from it.
-        file: The name of the file.
-        design: The design, None if it cannot be used.
-        problem: Why it cannot, None if it can.
-        generation: Larger than that of all that were saved before it; 0 if unknown.
+        name: Name of the design; of the file if it holds no usable design.
+        file: Name of the file.
+        design: The design; None if it cannot be used.
+        problem: Why it cannot be used; None if it can.
+        generation: A number larger than those of all designs saved before; 0 if unknown.
     """
 
     name: str
@@ -65,29 +65,14 @@ class Entry:
     problem: str | None = None
     generation: int = 0
 
-    @property
-    def reach(self) -> float | None:
-        """The characteristic length |a3| in design units."""
-        return None if self.design is None else self.design.reach
-
-    @property
-    def unit_mm(self) -> float | None:
-        """The millimetres in one design unit."""
-        return None if self.design is None else self.design.unit_mm
-
-    @property
-    def variables(self) -> tuple[float, ...] | None:
-        """X = (a3x, a3y, b1x, b1y, b2, b3) in design units."""
-        return None if self.design is None else self.design.variables
-
 
 @dataclass(frozen=True)
 class Deleted:
     """A design that was deleted and is still kept.
 
     Attributes:
-        name: It had; of the file where there is no design to be had from it.
-        file: The name of the file in the trash, by which `restore` knows it.
+        name: Name that it had; name of the file if it holds no usable design.
+        file: Name of the file in the trash, the argument of `restore`.
     """
 
     name: str
@@ -98,20 +83,20 @@ class Library:
     """The user's named designs.
 
     Args:
-        folder: That they are in; that in the user's data folder if None.
+        folder: The folder of designs; that in the user's data folder if None.
     """
 
     def __init__(self, folder: Path | None = None) -> None:
         self.folder = data_folder() / DESIGNS if folder is None else folder
 
     def list(self) -> tuple[Entry, ...]:
-        """Return what is in the library, the one saved last first, files of no use last."""
+        """Return all entries: the design saved last first, unusable files last."""
         order = self._order()
         entries: dict[str, Entry] = {}
         problems: list[Entry] = []
-        # A file of the library's own goes before one that was copied in under its name.
-        found = [_read(path, order) for path in _files(self.folder)]
-        for entry in sorted(found, key=lambda each: each.file != file_of(each.name)):
+        # A file that the library wrote takes precedence over one copied in with the same name.
+        files = [_read(path, order) for path in _files(self.folder)]
+        for entry in sorted(files, key=lambda each: each.file != file_of(each.name)):
             if entry.problem is not None:
                 problems.append(entry)
             elif entry.name in entries:
@@ -124,50 +109,46 @@ class Library:
         return (*good, *sorted(problems, key=lambda each: each.file))
 
     def open(self, name: str) -> Design:
-        """Return the design of a name.
+        """Return the design with a name.
 
         Raises:
-            InputError: there is none, or its file is of no use.
+            InputError: there is no such design, or its file cannot be used.
         """
         return _design_of(self._entry(name))
 
     def save(self, name: str, design: Design, *, replace: bool = False) -> Design:
-        """Save a design under a name, which it has from then on.
+        """Save a design under a name; return the design with this name.
 
         Args:
-            name: One printable line of at most 100 characters; surrounding space is left out.
-            design: What to save.
-            replace: Whether it takes the place of the one that has the name; that goes to the
-                trash unless it is the same.
-
-        Returns:
-            The design with its new name.
+            name: One printable line of at most 100 characters; surrounding space is removed.
+            design: The design.
+            replace: Whether to replace a design with this name; the old one goes to the trash
+                unless both are the same.
 
         Raises:
-            InputError: no such name can be had, or another design has it.
+            InputError: a name that cannot be used, or that another design has.
             StorageError: it cannot be written.
         """
-        named = _named(design, name)
-        with alone_in(self.folder):
+        named = _with_name(design, name)
+        with lock_folder(self.folder):
             if replace:
-                self._keep_copies(named)
+                self._copy_to_trash(named)
             else:
                 self._check_free(named.name)
             self._write(named)
         return named
 
-    def duplicate(self, name: str, new: str | None = None) -> Design:
-        """Save a design of the library again, as "… copy" unless told otherwise.
+    def duplicate(self, name: str) -> Design:
+        """Save a design of the library again, as "… copy".
 
         Raises:
-            InputError: there is no such design, or the new name cannot be had.
+            InputError: there is no such design.
             StorageError: it cannot be written.
         """
-        with alone_in(self.folder):
+        with lock_folder(self.folder):
             design = _design_of(self._entry(name))
             taken = {each.name for each in self.list()}
-            copy = _named(design, copy_name(design.name, taken) if new is None else new)
-            self._check_free(copy.name)
+            copy = _with_name(design, copy_name(design.name, taken))
             self._write(copy)
         return copy
 
@@ -175,29 +156,29 @@ class Library:
         """Give a design of the library another name.
 
         Raises:
-            InputError: there is no such design, or the new name cannot be had.
+            InputError: there is no such design, or the new name cannot be used.
             StorageError: it cannot be written.
         """
-        with alone_in(self.folder):
+        with lock_folder(self.folder):
             entry = self._entry(name)
-            renamed = _named(_design_of(entry), new)
+            renamed = _with_name(_design_of(entry), new)
             if renamed.name == entry.name:
                 return renamed
             self._check_free(renamed.name)
-            # Killed between the two, it has both names; never none.
+            # A process killed in between leaves the design under both names, never under none.
             self._write(renamed)
             with contextlib.suppress(FileNotFoundError):
                 (self.folder / entry.file).unlink()
         return renamed
 
     def delete(self, name: str) -> Deleted:
-        """Move a design, or a file of no use by its own name, to the trash.
+        """Move a design, or an unusable file by the file's name, to the trash.
 
         Raises:
             InputError: there is no such design.
             StorageError: it cannot be moved.
         """
-        with alone_in(self.folder):
+        with lock_folder(self.folder):
             entry = self._entry(name)
             place = self._place_in_trash(entry)
             move(self.folder / entry.file, place)
@@ -205,27 +186,27 @@ class Library:
         return Deleted(entry.name, place.name)
 
     def deleted(self) -> tuple[Deleted, ...]:
-        """Return what is in the trash, the one deleted last first."""
+        """Return the designs in the trash, the one deleted last first."""
         return tuple(Deleted(_name_in(path), path.name) for path in reversed(_files(self._trash)))
 
     def restore(self, file: str, name: str | None = None) -> Design:
         """Bring a deleted design back.
 
         Args:
-            file: Of `Deleted`.
-            name: Another one than it had.
+            file: Name of the file in the trash.
+            name: New name of the design; its old one if None.
 
         Raises:
-            InputError: it is not in the trash, is of no use, or its name is taken.
+            InputError: it is not in the trash, cannot be used, or its name is taken.
             StorageError: it cannot be written.
         """
-        with alone_in(self.folder):
-            # Looked up, so that no text of anyone's is used as a path.
+        with lock_folder(self.folder):
+            # Looked up, so that no argument is used as a path.
             path = next((each for each in _files(self._trash) if each.name == file), None)
             if path is None:
                 raise InputError(f"{file!r} is not in the trash any more")
             design = _design_of(_read(path, {}))
-            restored = _named(design, design.name if name is None else name)
+            restored = _with_name(design, design.name if name is None else name)
             self._check_free(restored.name)
             self._write(restored)
             path.unlink(missing_ok=True)
@@ -237,19 +218,19 @@ class Library:
 
     def _entry(self, name: str) -> Entry:
         entries = self.list()
-        wanted = _tidy(name)
+        tidy = _tidy(name)
         for entry in entries:
-            if entry.name in (name, wanted):
+            if entry.name in (name, tidy):
                 return entry
-        names = [_shown(each.name) for each in entries if each.problem is None]
+        names = [_quoted(each.name) for each in entries if each.problem is None]
         known = ", ".join(names[:8]) + (", …" if len(names) > 8 else "")
         raise InputError(
-            f"no design is called {_shown(name)}; "
+            f"no design is called {_quoted(name)}; "
             + (f"there are {known}" if names else "none has been saved yet")
         )
 
-    def _keep_copies(self, design: Design) -> None:
-        """Put copies of what is to be replaced by a design into the trash."""
+    def _copy_to_trash(self, design: Design) -> None:
+        """Copy the designs that a design is about to replace into the trash."""
         for entry in self.list():
             if entry.design is not None and entry.name == design.name and entry.design != design:
                 write_whole(self._place_in_trash(entry), encode_design(entry.design))
@@ -261,7 +242,7 @@ class Library:
         return self._trash / f"{number:08d}-{entry.file[-_ENDING:]}"
 
     def _empty_trash(self) -> None:
-        """Remove from the trash what has been there longest."""
+        """Remove the oldest files from the trash."""
         for old in _files(self._trash)[:-MOST_DELETED]:
             with contextlib.suppress(OSError):
                 old.unlink()
@@ -275,10 +256,10 @@ class Library:
             )
 
     def _write(self, design: Design) -> None:
-        """Write a design, alone in the folder."""
+        """Write a design while the folder is locked."""
         for folder in (self.folder, self._trash):
             for scratch in folder.glob(".*.part"):
-                # Of a writer that was killed.
+                # A writer was killed before it renamed this file.
                 with contextlib.suppress(OSError):
                     scratch.unlink()
         order = self._order()
@@ -286,12 +267,12 @@ class Library:
         replaced = [each.file for each in self.list() if each.name == design.name and each.design]
         write_whole(self.folder / file, encode_design(design))
         for other in replaced:
-            # One that was copied in by hand is called what it likes.
+            # A file that was copied in by hand may have any name.
             if other != file:
                 (self.folder / other).unlink(missing_ok=True)
         order[file] = 1 + max(order.values(), default=0)
-        kept = {name: number for name, number in order.items() if (self.folder / name).exists()}
-        write_whole(self.folder / _ORDER, msgspec.json.encode(kept))
+        existing = {name: number for name, number in order.items() if (self.folder / name).exists()}
+        write_whole(self.folder / _ORDER, msgspec.json.encode(existing))
 
     def _order(self) -> dict[str, int]:
         try:
@@ -302,7 +283,7 @@ class Library:
 
 
 def file_of(name: str) -> str:
-    """Return what the file of a name is called: plain on every system, its own for each name."""
+    """Return the name of a design's file: plain on every system, different for each name."""
     plain = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode().lower()
     slug = "-".join("".join(c if c.isalnum() else " " for c in plain).split())[:_SLUG].strip("-")
     digest = hashlib.blake2b(name.encode("utf-8", "surrogatepass")).hexdigest()[:_DIGITS]
@@ -310,21 +291,21 @@ def file_of(name: str) -> str:
 
 
 def _tidy(name: str) -> str:
-    """Return a name as it is kept: what looks the same is the same."""
+    """Return a name without surrounding space, in normal form, so that equal looks are equal."""
     return unicodedata.normalize("NFC", name).strip()
 
 
-def _named(design: Design, name: str) -> Design:
+def _with_name(design: Design, name: str) -> Design:
     tidy = _tidy(name)
     if not tidy or len(tidy) > LONGEST_NAME or not tidy.isprintable():
         raise InputError(
-            f"a name is one printable line of 1 to {LONGEST_NAME} characters; got {_shown(name)}"
+            f"a name is one printable line of 1 to {LONGEST_NAME} characters; got {_quoted(name)}"
         )
     return msgspec.structs.replace(design, name=tidy)
 
 
 def copy_name(name: str, taken: set[str]) -> str:
-    """Return the name of a copy: that of the original with "copy" and perhaps a number."""
+    """Return the name of a copy: that of the original with "copy", and a number if need be."""
     name = _COPY.sub("", name)
     number = 1
     while True:
@@ -336,7 +317,7 @@ def copy_name(name: str, taken: set[str]) -> str:
 
 
 def _files(folder: Path) -> list[Path]:
-    """Return the files in a folder that are meant as designs, by name."""
+    """Return the files of designs in a folder, by name."""
     try:
         return sorted(
             each
@@ -348,14 +329,15 @@ def _files(folder: Path) -> list[Path]:
 
 
 def _read(path: Path, order: dict[str, int]) -> Entry:
-    shown = "".join(c if c.isprintable() else "�" for c in path.name)
+    printable = "".join(c if c.isprintable() else "�" for c in path.name)
     try:
-        design = decode_design(read_at_most(path, LARGEST_FILE), repr(shown))
+        design = decode_design(read_at_most(path, LARGEST_FILE), repr(printable))
     except InputError as error:
-        return Entry(shown, path.name, None, str(error))
+        return Entry(printable, path.name, None, str(error))
     name = _tidy(design.name)
     if not name:
-        return Entry(shown, path.name, None, f"{shown!r}: the design has no name; give it one")
+        problem = f"{printable!r}: the design has no name; give it one"
+        return Entry(printable, path.name, None, problem)
     return Entry(name, path.name, design, None, order.get(path.name, 0))
 
 
@@ -375,5 +357,5 @@ def _number(path: Path) -> int:
     return int(number) if number.isascii() and number.isdigit() and len(number) < 18 else 0
 
 
-def _shown(name: str) -> str:
+def _quoted(name: str) -> str:
     return repr(name if len(name) <= 40 else f"{name[:39]}…")

@@ -1,7 +1,7 @@
-"""What the page remembers of its user beside the work: the theme, and that the tour was seen.
+"""The user's preferences: the theme of the page, and whether the tour was seen.
 
-Neither belongs to a design nor to the history: to undo a step must not turn the lights on.
-It is one small file in the user's data folder, which several explorers may share.
+Neither belongs to a design nor to the history, so that no undo changes them. They are one small
+file in the user's data folder, which several explorers may share.
 """
 
 from __future__ import annotations
@@ -11,20 +11,20 @@ from pathlib import Path
 
 import msgspec
 
-from explorer.app.storage.folder import made_folder
+from explorer.app.storage.folder import make_data_folder
 from explorer.errors import StorageError
 from explorer.files.writing import read_at_most, write_whole
 
 NAME = "preferences.json"
-# In bytes; more was not written by this.
+# Size in bytes beyond which no explorer wrote the file.
 LARGEST = 10_000
 
 
 class Preferences(msgspec.Struct, frozen=True):
-    """What is remembered.
+    """The preferences.
 
     Attributes:
-        dark: Whether the page is dark; None until somebody chose.
+        dark: Whether the page is dark; None until the user chose.
         tour_seen: Whether the tour was seen to its end, or skipped.
     """
 
@@ -33,10 +33,10 @@ class Preferences(msgspec.Struct, frozen=True):
 
 
 class PreferenceFile:
-    """The file of the preferences; what it cannot be read as counts as never chosen.
+    """The file of the preferences; one that cannot be read gives the defaults.
 
     Args:
-        folder: In which it lies, made when something is first remembered.
+        folder: The folder of the file, made at the first choice.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -46,23 +46,23 @@ class PreferenceFile:
 
     @property
     def chosen(self) -> Preferences:
-        """What was chosen last."""
+        """The preferences chosen last."""
         return self._chosen
 
     def choose(self, *, dark: bool | None = None, tour_seen: bool | None = None) -> None:
-        """Remember what is given; what is None stays.
+        """Set the preferences that are given; those that are None stay.
 
         Raises:
-            StorageError: it cannot be written; it is remembered until this process ends.
+            StorageError: the file cannot be written; the choice holds until this process ends.
         """
         with self._lock:
-            # Another explorer may have remembered something meanwhile.
+            # Another explorer may have written the file meanwhile.
             last = self._read()
             self._chosen = Preferences(
                 last.dark if dark is None else dark,
                 last.tour_seen if tour_seen is None else tour_seen,
             )
-            made_folder(self._path.parent)
+            make_data_folder(self._path.parent)
             write_whole(self._path, msgspec.json.encode(self._chosen))
 
     def _read(self) -> Preferences:

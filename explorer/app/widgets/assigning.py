@@ -1,4 +1,4 @@
-"""Assigning to viser's handles: only what differs, and all of one frame together.
+"""Assignments to viser's handles: only values that differ, and all of one frame together.
 
 An assignment costs viser some 30 µs even when nothing changes, and a frame has hundreds,
 so the last value of each property is remembered here.
@@ -14,48 +14,48 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from explorer.app.browser.viser_gaps import PLACE, is_misled, place, tell_again
+from explorer.app.browser.viser_gaps import PLACE, is_stale, place, resend
 from explorer.numerics.arrays import FloatArray
 
 Update: TypeAlias = tuple[Any, str, object]
-"""A handle, the property to assign, and its value: computed first, assigned together."""
+"""A handle, the property to assign, and its value; all updates are computed before any is made."""
 
-# A hand may not have seen what was sent so many seconds before, on a slow connection.
+# On a slow connection a user may not have seen a value that was sent at most so long before.
 CROSSING_SECONDS = 5.0
-# Hands that have done nothing for so long rest.
+# A user who has changed nothing for so long has paused.
 QUIET_SECONDS = 0.6
-# Types of most values, which compare at once.
+# Types of most values; they compare fast.
 PLAIN = (bool, int, float, str)
 
 
 class Assigner:
-    """Remembers what was assigned, and assigns what differs.
+    """Remembers the values that were assigned, and assigns those that differ.
 
-    What is sent to a browser may cross with what a hand sets there: the hand is followed,
-    and the browser then shows what was sent before. Such controls are told again.
+    A value that is sent to a browser may cross with a change by the user there. The change counts,
+    but the browser still shows the value that was sent; such values are sent again.
     """
 
     def __init__(self, server: viser.ViserServer) -> None:
         self._server = server
-        # The handles are held too, so that no identity is used again.
+        # The last value of each property. Handles are kept too, so that no `id` is used again.
         self._last: dict[tuple[int, str], tuple[Any, object]] = {}
-        # Of what browsers change too: when it was sent last.
+        # When each property that browsers change too was sent last.
         self._sent: dict[tuple[int, str], tuple[Any, float]] = {}
 
     def assign(self, updates: Iterable[Update], *, since: float | None = None) -> list[Update]:
-        """Assign in one block, which the browsers apply together; return what differed.
+        """Assign in one block, which the browsers apply together; return the updates that differed.
 
         Args:
-            updates: What to assign.
-            since: When their computing began: what a hand has set since then stays, since
-                a frame that knows of it follows.
+            updates: Updates to assign.
+            since: Time at which their computation began: a value that a user has set since then
+                stays, since a newer frame follows.
         """
         new = [update for update in updates if self._is_new(update)]
         if since is not None:
             new = [update for update in new if not _is_overtaken(update, since)]
         if not new:
             return new
-        # Nothing is computed in here: the block holds up every browser.
+        # Nothing is computed in this block, since it holds up every browser.
         with self._server.atomic():
             for handle, name, value in new:
                 if name in PLACE:
@@ -63,24 +63,24 @@ class Assigner:
                 else:
                     setattr(handle, name, value)
                 if is_set_by_clients(handle, name):
-                    # After it, since viser takes an assignment for a touch too.
+                    # After the assignment, since viser sets the time of the last change by it too.
                     self._sent[id(handle), name] = handle, time.time()
         return new
 
     def settle(self) -> bool:
-        """Tell again what may have crossed, once hands rest; return whether any is to wait."""
+        """Send again what may have crossed, once the user pauses; return whether any wait."""
         waits = False
         now = time.time()
         for key, (handle, sent) in tuple(self._sent.items()):
-            touched = handle.update_timestamp
-            has_crossed = sent < touched <= sent + CROSSING_SECONDS or is_misled(handle, key[1])
+            changed = handle.update_timestamp
+            has_crossed = sent < changed <= sent + CROSSING_SECONDS or is_stale(handle, key[1])
             if not has_crossed:
                 if not sent <= now <= sent + CROSSING_SECONDS:
                     del self._sent[key]
-            elif touched <= now < touched + QUIET_SECONDS:
+            elif changed <= now < changed + QUIET_SECONDS:
                 waits = True
             else:
-                tell_again(handle, key[1])
+                resend(handle, key[1])
                 self._sent[key] = handle, now
         return waits
 
@@ -97,7 +97,7 @@ class Assigner:
 
 
 def is_set_by_clients(handle: object, name: str) -> bool:
-    """Whether browsers change this property too, so that what was assigned says little."""
+    """Whether browsers change this property too, so that its last assignment may not hold."""
     if name in PLACE:
         return isinstance(handle, viser.TransformControlsHandle)
     return name == "value"
@@ -105,7 +105,7 @@ def is_set_by_clients(handle: object, name: str) -> bool:
 
 def _is_overtaken(update: Update, since: float) -> bool:
     handle, name, _ = update
-    # A clock that was set back leaves times behind that have not come yet.
+    # A clock that was set back leaves timestamps in the future.
     return is_set_by_clients(handle, name) and since < handle.update_timestamp <= time.time()
 
 
@@ -125,4 +125,4 @@ def is_columns(value: object) -> TypeGuard[tuple[NDArray[Any], ...]]:
     """Whether a value is the data of a chart, a tuple of arrays."""
     if not isinstance(value, tuple):
         return False
-    return any(isinstance(each, np.ndarray) for each in cast("tuple[object, ...]", value))
+    return any(isinstance(column, np.ndarray) for column in cast("tuple[object, ...]", value))

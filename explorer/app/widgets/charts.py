@@ -1,14 +1,16 @@
-"""What charts on the page have in common."""
+"""The parts that charts on the page share: axes, lines, dots and their colours."""
 
 from __future__ import annotations
 
+import numpy as np
+import viser
 from viser import uplot
 
-from explorer.app.widgets.colours import GHOST, Rgb
+from explorer.app.widgets.colours import GHOST, Rgb, css
 
 FONT = "11px system-ui, sans-serif"
 
-# Of lines and points: seen on white and on dark panels alike, since a chart cannot follow the
+# Colours of lines and points, visible on light and dark panels alike: a chart cannot follow the
 # theme as words do.
 BLUE: Rgb = (46, 116, 208)
 TEAL: Rgb = (30, 150, 135)
@@ -16,15 +18,18 @@ VIOLET: Rgb = (150, 120, 190)
 ORANGE: Rgb = (214, 74, 24)
 NEUTRAL: Rgb = GHOST
 
+BLANK = np.zeros(2)
+"""A column to begin with: no chart of viser is without data."""
+
 
 def axis(label: str, *, label_size: int, size: int, space: int = 30) -> uplot.Axis:
     """Return an axis.
 
     Args:
-        label: What it measures, with its unit.
-        label_size: Of the room for that, in pixels.
-        size: Of the room for its numbers, in pixels.
-        space: Between two numbers, at least, in pixels.
+        label: Its quantity and unit.
+        label_size: Room for the label, in pixels.
+        size: Room for its numbers, in pixels.
+        space: Least distance of two numbers, in pixels.
     """
     return {
         "label": label,
@@ -36,3 +41,63 @@ def axis(label: str, *, label_size: int, size: int, space: int = 30) -> uplot.Ax
         "labelFont": FONT,
         "space": space,
     }
+
+
+def line(
+    label: str, colour: Rgb, *, width: float = 2.0, dash: tuple[float, ...] = ()
+) -> uplot.Series:
+    """Return a series that is drawn as a line.
+
+    Args:
+        label: Its name.
+        colour: Its colour.
+        width: Its width in pixels.
+        dash: Lengths of dashes and gaps in pixels; none for a solid line.
+    """
+    return {
+        "label": label,
+        "stroke": css(colour),
+        "width": width,
+        "dash": dash,
+        "points": {"show": False},
+    }
+
+
+def dots(label: str, colour: Rgb, size: float) -> uplot.Series:
+    """Return a series that is drawn as dots of a size in pixels."""
+    return {
+        "label": label,
+        "stroke": css(colour),
+        "width": 0.0,
+        "points": {"show": True, "size": size, "fill": css(colour)},
+    }
+
+
+def add_chart(
+    gui: viser.GuiApi,
+    series: tuple[uplot.Series, ...],
+    axes: tuple[uplot.Axis, uplot.Axis],
+    *,
+    height: int,
+    padding: tuple[int, int, int, int],
+) -> viser.GuiUplotHandle:
+    """Add a chart, hidden until it has data.
+
+    Args:
+        gui: Where it is added.
+        series: Its columns but that of the horizontal axis.
+        axes: The horizontal and the vertical axis.
+        height: Its height in pixels.
+        padding: Room above, at the right, below and at the left, in pixels.
+    """
+    return gui.add_uplot(
+        (BLANK,) * (1 + len(series)),
+        ({}, *series),
+        scales={"x": {"time": False}, "y": {}},
+        axes=axes,
+        legend={"show": False},
+        cursor={"drag": {"x": False, "y": False}},
+        height=height,
+        padding=padding,
+        visible=False,
+    )

@@ -48,8 +48,8 @@ CARRIAGE: Rgb = (104, 115, 132)
 GHOST: Rgb = (120, 134, 156)
 SWEPT: Rgb = (92, 60, 156)
 COMPARED: tuple[Rgb, ...] = ((0, 158, 115), (120, 70, 200), (225, 110, 190), (170, 150, 20))
-"""Of the live design and of the pinned ones.
+"""Colours of the live design and of the pinned ones.
 
-Apart from each other for every common colour-vision deficiency, from the scale of proximity,
+They are distinct for every common colour-vision deficiency, and differ from the scale of proximity
 and from light and dark pages. A letter stands beside each.
 """

@@ -1,18 +1,18 @@
-"""What the command palette offers, by which names, and the keys that do the same.
+"""The names of the commands in the palette, and their keys.
 
-Every button, switch and list of the page is offered under the names that it has there, so
-that a new control is found without more ado; what has no control of its own is added by
-the page. Keys are those of other programs that show things in space: 0, 1, 3 and 7 for the
-views, as on their number pads, F to fit, H for home, letters for what is shown. None is one
-of the browser's, and W, A, S, D, Q, E and the arrows move the camera.
+The palette offers every button, switch and list of the page under its name there; the page adds
+commands that have no control. Keys are those of other 3D programs: 0, 1, 3 and 7 for the views,
+F to fit, H for home, letters for visible parts. None is a key of the browser, and W, A, S, D, Q, E
+and the arrows move the camera.
 """
 
 from __future__ import annotations
 
+from collections.abc import Container
 from dataclasses import dataclass
 from typing import Protocol
 
-# Between the parts of a command's name, from the tab to the option.
+# Separator of the parts of a command's name, from the tab to the option.
 STEP = " › "
 
 Modifier = str
@@ -20,11 +20,11 @@ Modifier = str
 
 @dataclass(frozen=True)
 class Key:
-    """A key with those that are held down with it.
+    """A key with its modifiers.
 
     Attributes:
-        key: The key, as viser calls it.
-        modifier: Such as "cmd/ctrl+shift", None without any.
+        key: Name of the key in viser.
+        modifier: Keys that are held down with it, such as "cmd/ctrl+shift"; None without any.
     """
 
     key: str
@@ -32,21 +32,22 @@ class Key:
 
     def __str__(self) -> str:
         parts = [] if self.modifier is None else self.modifier.split("+")
-        held = [WORDS.get(part, part.capitalize()) for part in parts]
-        return "+".join([*held, self.key if len(self.key) == 1 else self.key.capitalize()])
+        modifiers = [MODIFIER_NAMES.get(part, part.capitalize()) for part in parts]
+        return "+".join([*modifiers, self.key if len(self.key) == 1 else self.key.capitalize()])
 
 
-WORDS = {"cmd/ctrl": "Ctrl"}
-"""What modifiers are called; on a Mac the Command key does the same."""
+MODIFIER_NAMES = {"cmd/ctrl": "Ctrl"}
+"""Names of modifiers on the page; on a Mac the Command key does the same as Ctrl."""
 
 PALETTE_KEY = Key("K", "cmd/ctrl")
-"""By which viser opens the palette."""
+"""The key that opens the palette, in viser."""
 
 CAMERA_KEYS = frozenset("WASDQE")
-"""Letters by which viser moves the camera, whatever is held down with them."""
+"""Letters by which viser moves the camera, with any modifier."""
 
 
-def _shift(key: str) -> Key:
+def shift(key: str) -> Key:
+    """Return a key with Shift held down."""
     return Key(key, "shift")
 
 
@@ -58,83 +59,20 @@ KEYS: dict[str, tuple[Key, ...]] = {
     "View › Side": (Key("3"),),
     "View › Top": (Key("7"),),
     "View › Fit": (Key("F"),),
-    "Move › Home pose": (Key("H"),),
-    "Move › Next assembly mode": (Key("N"),),
-    "Move › Previous assembly mode": (_shift("N"),),
-    "Move › Use the nearest length": (Key("U"),),
-    "Move › Other modes as ghosts": (Key("M"),),
-    "View › Flags": (_shift("F"),),
-    "View › Bodies": (Key("B"),),
-    "View › Legs": (_shift("B"),),
-    "View › Labels": (Key("L"),),
-    "View › Grid": (Key("G"),),
-    "View › Drag handle": (_shift("H"),),
-    "View › All tetrahedra": (Key("T"),),
-    "View › 6-4 twin": (_shift("T"),),
-    "View › Closest pair": (_shift("C"),),
-    "View › Prototype": (Key("R"),),
-    "Workspace › Solid": (Key("V"),),
-    "Workspace › Convex hull": (_shift("V"),),
-    "Workspace › Singular planes": (_shift("P"),),
-    "Workspace › Cut open › across x": (Key("X"),),
-    "Workspace › Cut open › across y": (Key("Y"),),
-    "Workspace › Cut open › across z": (Key("Z"),),
-    "Workspace › Cut open › no cut": (Key("C"),),
-    "Singularity › Go to the nearest one": (_shift("G"),),
-    "Optimise › Optimise": (Key("O"),),
-    "Optimise › Cancel": (_shift("O"),),
-    "Paths › Watch": (_shift("M"),),
-    "Paths › Plan": (Key("J"),),
-    "Paths › Play or pause": (Key("P"),),
-    "Page › Theme": (_shift("L"),),
-    "Page › Keys": (Key("K"),),
 }
-"""Keys by the names of commands."""
+"""Keys of the commands above all tabs, by name; features bring their own keys."""
 
 NAMES = {"δ1 δ2 δ3": "Assembly mode"}
-"""Of controls whose label alone would not be searched for."""
+"""Names of commands by the label of their control, where nobody would search for the label."""
 
 PAGE = "Page"
-"""The place of what stands above all tabs."""
+"""First part of the names of commands above all tabs."""
 
-TOLD_WITH_FOLDER = frozenset({"What may change", "Tetrahedra"})
-"""Folders whose title is part of what their switches mean."""
-
-OPEN_LISTS = frozenset(
-    {
-        "δ1 δ2 δ3",
-        "Arrows",
-        "Preset",
-        "On a change",
-        "Region",
-        "Reached from",
-        "Orientation",
-        "Colour by",
-        "Cut open",
-        "Objective",
-        "Drawn as",
-        "Ghost",
-        "Ellipsoid",
-    }
-)
-"""Lists of which every option is a command; what is chosen in the others alone does nothing."""
+NAMED_WITH_FOLDER = frozenset({"Free variables", "Tetrahedra"})
+"""Folders whose title is part of the names of their switches."""
 
 NO_OPTION = "—"
-"""What a list shows when none of its options is the case."""
-
-ALWAYS = ("Go to (",)
-"""Beginnings of buttons that are hidden from the eye, and do what they say at any time."""
-
-NEVER = (
-    "Step ",
-    "Front row ",
-    "Vary ",
-    "Measure ",
-    "Open design ",
-    "Duplicate design ",
-    "Delete design ",
-)
-"""Beginnings of buttons that mean something only where they are shown."""
+"""The text of a list when none of its options applies."""
 
 
 class Offering(Protocol):
@@ -142,37 +80,42 @@ class Offering(Protocol):
 
     @property
     def kind(self) -> str:
-        """Such as "button"."""
+        """The kind of control, such as "button"."""
         ...
 
     @property
     def label(self) -> str:
-        """The words beside it."""
+        """The words beside the control."""
         ...
 
     @property
     def path(self) -> tuple[str, ...]:
-        """The titles of what it stands in."""
+        """The titles of its tab and folders, the outermost first."""
         ...
 
     @property
     def options(self) -> tuple[str, ...]:
-        """Of which it offers one."""
+        """The options to choose from."""
         ...
 
 
-def offers(control: Offering) -> dict[str, str | None]:
-    """Return the names of the commands of a control, each with the option that it chooses."""
-    if control.label.startswith(NEVER) or control.kind in ("value", "upload"):
+def offers(control: Offering, lists: Container[str] = ()) -> dict[str, str | None]:
+    """Return the options that the commands of a control choose, by the names of the commands.
+
+    Args:
+        control: The control.
+        lists: Labels of the lists whose every option is a command.
+    """
+    if control.kind in ("value", "upload"):
         return {}
     label = NAMES.get(control.label, " ".join(control.label.split()))
-    folders = [title for title in control.path[1:] if title in TOLD_WITH_FOLDER]
+    folders = [title for title in control.path[1:] if title in NAMED_WITH_FOLDER]
     tab = control.path[0] if control.path else PAGE
-    # A row of buttons above the tabs is a place of its own.
+    # The label of a row of buttons above the tabs takes the place of a tab.
     parts = [label] if control.kind == "choice" and not control.path else [tab, *folders, label]
     if control.kind in ("button", "switch"):
         return {STEP.join(parts): None}
-    if control.kind == "list" and control.label not in OPEN_LISTS:
+    if control.kind == "list" and control.label not in lists:
         return {}
     return {
         STEP.join([*parts, " ".join(option.split())]): option
@@ -182,7 +125,7 @@ def offers(control: Offering) -> dict[str, str | None]:
 
 
 def with_keys(hint: str, keys: tuple[Key, ...]) -> str:
-    """Return what is told of a control, and after it the keys that do the same."""
+    """Return the hint of a control with its keys at the end."""
     if not keys:
         return hint
     return f"{hint} {'Key' if len(keys) == 1 else 'Keys'}: {', '.join(map(str, keys))}."

@@ -1,28 +1,32 @@
-"""Controls bound to the state: each knows how to read its value and what a change means.
+"""Controls bound to the state: each reads its value from a frame and turns changes into actions.
 
-A control posts where it was changed and nothing else; its value is read when the session
-comes to it. A value goes back to a control only if it is not the one that it just gave,
-so that a hand on a slider is never fought.
+A control posts only that it was changed; its value is read when the session handles the change. A
+value is assigned to a control only if it differs from the one that the user just set, so that a
+slider never moves under the pointer.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, TypeAlias, TypeVar
 
 import viser
 
-from explorer.app.browser.viser_gaps import Mark, MarksOf
+from explorer.app.browser.viser_gaps import Mark, SliderMarks
 from explorer.app.session.session import Session
 from explorer.app.state.action import Action
+from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
+from explorer.app.state.values import value_at
 from explorer.app.widgets.assigning import Update
 from explorer.mechanism.pose import Triple
 from explorer.numerics.number_text import drop_rounding
 
 Value = TypeVar("Value", float, bool, str, Triple)
+Condition = Callable[[State], bool]
+"""A function that tells whether a condition holds in a state."""
 
 
 @dataclass(frozen=True)
@@ -34,38 +38,102 @@ class Span:
     step: float
 
 
+@dataclass(frozen=True)
+class Bound(Generic[Value]):
+    """The binding of a control to the state.
+
+    Attributes:
+        read: Function that returns the control's value in a frame.
+        write: Function that returns the action for a new value.
+    """
+
+    read: Callable[[Frame], Value]
+    write: Callable[[State, Value], Action]
+
+
+def _unchanged(value: Any) -> Any:
+    return value
+
+
+@dataclass(frozen=True)
+class At:
+    """A plain value of the state, shown and set by a control.
+
+    Attributes:
+        path: Path of the value, such as "view.warn_below".
+        default: Function that returns the control's value where the state has None.
+        convert: Function from the control's value to that of the state.
+        action: Class of the action that sets the value.
+    """
+
+    path: str
+    default: Callable[[State], Any] | None = None
+    convert: Callable[[Any], Any] = _unchanged
+    action: type[Set] = Set
+
+    def bound(self, name: str, options: Mapping[str, object] | None = None) -> Bound[Any]:
+        """Return the binding.
+
+        Args:
+            name: Name of the value in the history, such as the label of its control.
+            options: Values by the words of a list; None if the control holds the value itself.
+        """
+        if options is not None:
+            texts = {value: text for text, value in options.items()}
+            return Bound(
+                lambda frame: texts[self._read(frame)],
+                lambda _, text: self.action(self.path, options[text], name, text),
+            )
+        return Bound(self._read, lambda _, value: self.action(self.path, self.convert(value), name))
+
+    def _read(self, frame: Frame) -> Any:
+        value = value_at(frame.state, self.path)
+        return self.default(frame.state) if value is None and self.default else value
+
+
+Source: TypeAlias = str | At | Bound[Value]
+"""The source of a control's value; a text is the path of a plain value."""
+
+
+def bound_to(
+    at: Source[Value], name: str, options: Mapping[str, object] | None = None
+) -> Bound[Value]:
+    """Return a binding itself, or the binding to the value at a path."""
+    if isinstance(at, Bound):
+        return at
+    return (At(at) if isinstance(at, str) else at).bound(name, options)
+
+
 class Control(Generic[Value]):
-    """An input of the page and what it stands for.
+    """An input of the page, bound to the state.
 
     Args:
-        session: To which changes are posted.
+        session: Session to which changes are posted.
         handle: The input.
-        read: Its value in a frame.
-        write: The action that a new value asks for.
-        disabled: Whether it is out of use in a state.
-        visible: Whether it is there at all in a state.
+        bound: Binding of its value.
+        disabled: Condition in which it is disabled; None for never.
+        visible: Condition in which it is visible; None for always.
     """
 
     def __init__(
         self,
         session: Session,
         handle: viser.GuiInputHandle[Value],
-        read: Callable[[Frame], Value],
-        write: Callable[[State, Value], Action],
-        disabled: Callable[[State], bool] | None = None,
-        visible: Callable[[State], bool] | None = None,
+        bound: Bound[Value],
+        *,
+        disabled: Condition | None = None,
+        visible: Condition | None = None,
     ) -> None:
         self.handle = handle
         self._session = session
-        self._read = read
-        self._write = write
+        self._bound = bound
         self._disabled = disabled
         self._visible = visible
-        self._given: Value | None = None
-        handle.on_update(self._changed)
+        self._last_value: Value | None = None
+        handle.on_update(self._post_change)
 
-    def _changed(self, event: viser.GuiEvent[Any]) -> None:
-        # Assignments from here come without a client.
+    def _post_change(self, event: viser.GuiEvent[Any]) -> None:
+        # Assignments by the explorer itself have no client.
         if event.client_id is None:
             return
         self._session.post(
@@ -73,19 +141,19 @@ class Control(Generic[Value]):
         )
 
     def _change(self, state: State) -> Action:
-        self._given = self.handle.value
-        return self._write(state, self._given)
+        self._last_value = self.handle.value
+        return self._bound.write(state, self._last_value)
 
     def updates(self, frame: Frame) -> Iterator[Update]:
-        """Yield what makes the control show the frame."""
+        """Yield the updates that make the control show the frame."""
         if self._disabled is not None:
             yield self.handle, "disabled", self._disabled(frame.state)
         if self._visible is not None:
             yield self.handle, "visible", self._visible(frame.state)
-        value = self._read(frame)
-        # A newer change is on its way: what it says counts.
-        if value != self._given and not self._session.is_waiting(self):
-            self._given = value
+        value = self._bound.read(frame)
+        # While a newer change waits, its value counts.
+        if value != self._last_value and not self._session.is_waiting(self):
+            self._last_value = value
             yield self.handle, "value", value
 
 
@@ -96,30 +164,28 @@ class Slider(Control[float]):
         self,
         session: Session,
         handle: viser.GuiSliderHandle[float],
-        read: Callable[[Frame], float],
-        write: Callable[[State, float], Action],
-        span: Callable[[State], Span],
-        *,
-        disabled: Callable[[State], bool] | None = None,
-        marks: Callable[[Frame], tuple[Mark, ...]] | None = None,
+        bound: Bound[float],
+        span: Span | Callable[[State], Span],
+        disabled: Condition | None,
+        marks: Callable[[Frame], tuple[Mark, ...]] | None,
     ) -> None:
 
         def shown(frame: Frame) -> float:
             # A field would show rounding as −0.00.
-            span_now = span(frame.state)
-            return drop_rounding(read(frame), max(abs(span_now.low), abs(span_now.high)))
+            span = self._span_in(frame.state)
+            return drop_rounding(bound.read(frame), max(abs(span.low), abs(span.high)))
 
-        super().__init__(session, handle, shown, write, disabled)
+        super().__init__(session, handle, Bound(shown, bound.write), disabled=disabled)
         self._slider = handle
         self._span = span
         self._marks = marks
-        self._marks_of = MarksOf(handle)
+        self._marks_of = SliderMarks(handle)
         self._range: tuple[float, float, float] | None = None
 
     def updates(self, frame: Frame) -> Iterator[Update]:
-        """Yield what makes the slider show the frame, its range and marks first."""
-        span = self._span(frame.state)
-        value = self._read(frame)
+        """Yield the updates that make the slider show the frame, its range and marks first."""
+        span = self._span_in(frame.state)
+        value = self._bound.read(frame)
         low, high = min(span.low, value), max(span.high, value)
         if (low, high, span.step) != self._range:
             self._range = (low, high, span.step)
@@ -131,6 +197,9 @@ class Slider(Control[float]):
             yield self._marks_of, "marks", self._marks(frame)
         yield from super().updates(frame)
 
+    def _span_in(self, state: State) -> Span:
+        return self._span if isinstance(self._span, Span) else self._span(state)
+
 
 class Number(Control[float]):
     """A number field, whose step follows the state."""
@@ -139,18 +208,16 @@ class Number(Control[float]):
         self,
         session: Session,
         handle: viser.GuiNumberHandle[float],
-        read: Callable[[Frame], float],
-        write: Callable[[State, float], Action],
+        bound: Bound[float],
         step: Callable[[State], float],
-        *,
-        visible: Callable[[State], bool] | None = None,
+        visible: Condition | None,
     ) -> None:
-        super().__init__(session, handle, read, write, visible=visible)
+        super().__init__(session, handle, bound, visible=visible)
         self._number = handle
         self._step = step
 
     def updates(self, frame: Frame) -> Iterator[Update]:
-        """Yield what makes the field show the frame, its step first."""
+        """Yield the updates that make the field show the frame, its step first."""
         step = self._step(frame.state)
         yield self._number, "step", step
         yield self._number, "precision", decimals(step)
@@ -164,16 +231,15 @@ class Choice(Control[str]):
         self,
         session: Session,
         handle: viser.GuiDropdownHandle[str],
-        read: Callable[[Frame], str],
-        write: Callable[[State, str], Action],
+        bound: Bound[str],
         options: Callable[[Frame], tuple[str, ...]],
-        disabled: Callable[[State], bool] | None,
+        disabled: Condition | None,
     ) -> None:
-        super().__init__(session, handle, read, write, disabled)
+        super().__init__(session, handle, bound, disabled=disabled)
         self._options = options
 
     def updates(self, frame: Frame) -> Iterator[Update]:
-        """Yield what makes the list show the frame, its options first."""
+        """Yield the updates that make the list show the frame, its options first."""
         yield self.handle, "options", self._options(frame)
         yield from super().updates(frame)
 
@@ -181,9 +247,13 @@ class Choice(Control[str]):
 class Controls:
     """Makes controls and keeps them in step with the state.
 
+    Most controls name the path of a plain value of the state, such as "view.singular.ball", from
+    which reading, writing and the words of the history follow; `At` says more of it. A `Bound`
+    binds a control to a value that is not plain.
+
     Args:
-        gui: Where they are added, in the order of the calls.
-        session: To which they post.
+        gui: Controls of the page, added in the order of the calls.
+        session: Session to which they post.
     """
 
     def __init__(self, gui: viser.GuiApi, session: Session) -> None:
@@ -195,14 +265,13 @@ class Controls:
         self,
         label: str,
         hint: str,
-        read: Callable[[Frame], float],
-        write: Callable[[State, float], Action],
-        span: Callable[[State], Span],
+        at: Source[float],
+        span: Span | Callable[[State], Span],
         *,
-        disabled: Callable[[State], bool] | None = None,
+        disabled: Condition | None = None,
         marks: Callable[[Frame], tuple[Mark, ...]] | None = None,
     ) -> Slider:
-        """Add a slider with a number field."""
+        """Add a slider with a number field; its range may follow the state."""
         handle = self._gui.add_slider(
             label,
             min=0.0,
@@ -212,7 +281,7 @@ class Controls:
             hint=hint,
             marks=() if marks is not None else None,
         )
-        slider = Slider(self._session, handle, read, write, span, disabled=disabled, marks=marks)
+        slider = Slider(self._session, handle, bound_to(at, label), span, disabled, marks)
         self._controls.append(slider)
         return slider
 
@@ -220,80 +289,85 @@ class Controls:
         self,
         label: str,
         hint: str,
-        read: Callable[[Frame], float],
-        write: Callable[[State, float], Action],
+        at: Source[float],
         *,
         least: float,
         step: float | Callable[[State], float],
-        visible: Callable[[State], bool] | None = None,
+        visible: Condition | None = None,
     ) -> None:
-        """Add a number field, of which the step may follow the state."""
+        """Add a number field; its step may follow the state."""
+        bound = bound_to(at, label)
         if callable(step):
             handle = self._gui.add_number(label, least, min=least, hint=hint)
-            control = Number(self._session, handle, read, write, step, visible=visible)
+            control = Number(self._session, handle, bound, step, visible)
         else:
             handle = self._gui.add_number(label, least, min=least, step=step, hint=hint)
-            control = Control(self._session, handle, read, write, visible=visible)
+            control = Control(self._session, handle, bound, visible=visible)
         self._controls.append(control)
 
     def triple(
         self,
         label: str,
         hint: str,
-        read: Callable[[Frame], Triple],
-        write: Callable[[State, Triple], Action],
+        at: Source[Triple],
         *,
         step: float,
-        visible: Callable[[State], bool] | None = None,
+        visible: Condition | None = None,
     ) -> None:
         """Add three number fields side by side."""
         handle = self._gui.add_vector3(label, (0.0, 0.0, 0.0), step=step, hint=hint)
-        self._controls.append(Control(self._session, handle, read, write, visible=visible))
+        bound = bound_to(at, label)
+        self._controls.append(Control(self._session, handle, bound, visible=visible))
 
     def checkbox(
         self,
         label: str,
         hint: str,
-        read: Callable[[Frame], bool],
-        write: Callable[[State, bool], Action],
+        at: Source[bool],
         *,
-        disabled: Callable[[State], bool] | None = None,
+        disabled: Condition | None = None,
     ) -> None:
         """Add a checkbox."""
         handle = self._gui.add_checkbox(label, initial_value=False, hint=hint)
-        self._controls.append(Control(self._session, handle, read, write, disabled))
+        bound = bound_to(at, label)
+        self._controls.append(Control(self._session, handle, bound, disabled=disabled))
 
     def dropdown(
         self,
         label: str,
         hint: str,
-        options: tuple[str, ...],
-        read: Callable[[Frame], str],
-        write: Callable[[State, str], Action],
+        options: Mapping[str, object] | tuple[str, ...],
+        at: Source[str],
         *,
-        disabled: Callable[[State], bool] | None = None,
-        more: Callable[[Frame], tuple[str, ...]] | None = None,
+        disabled: Condition | None = None,
+        options_of: Callable[[Frame], tuple[str, ...]] | None = None,
     ) -> None:
-        """Add a list to choose from; `more` are the options of a frame, where they vary."""
-        handle = self._gui.add_dropdown(label, options, hint=hint)
-        if more is not None:
-            control: Control[str] = Choice(self._session, handle, read, write, more, disabled)
+        """Add a list to choose from.
+
+        Args:
+            label: Words beside the list.
+            hint: Sentence on what it chooses.
+            options: Words of the options, with their values if `at` is a path.
+            at: Source of its value.
+            disabled: Condition in which it is disabled; None for never.
+            options_of: Function that returns the options of a frame; None if they never vary.
+        """
+        handle = self._gui.add_dropdown(label, tuple(options), hint=hint)
+        values = options if isinstance(options, Mapping) else {text: text for text in options}
+        bound: Bound[str] = bound_to(at, label, values)
+        if options_of is not None:
+            control: Control[str] = Choice(self._session, handle, bound, options_of, disabled)
         else:
-            control = Control[str](self._session, handle, read, write, disabled)
+            control = Control[str](self._session, handle, bound, disabled=disabled)
         self._controls.append(control)
 
     def text(
-        self,
-        label: str,
-        hint: str,
-        read: Callable[[Frame], str],
-        write: Callable[[State, str], Action],
-        *,
-        disabled: Callable[[State], bool] | None = None,
+        self, label: str, hint: str, at: Source[str], *, disabled: Condition | None = None
     ) -> None:
         """Add a line of text."""
         handle = self._gui.add_text(label, "", hint=hint)
-        self._controls.append(Control[str](self._session, handle, read, write, disabled))
+        bound = bound_to(at, label)
+        self._controls.append(Control(self._session, handle, bound, disabled=disabled))
 
     def button(
         self,
@@ -303,7 +377,7 @@ class Controls:
         *,
         icon: viser.IconName | None = None,
     ) -> viser.GuiButtonHandle:
-        """Add a button that asks for an action."""
+        """Add a button that does an action."""
         handle = self._gui.add_button(label, hint=hint, icon=icon)
 
         @handle.on_click
@@ -313,13 +387,13 @@ class Controls:
         return handle
 
     def updates(self, frame: Frame) -> Iterator[Update]:
-        """Yield what makes every control show the frame."""
+        """Yield the updates that make every control show the frame."""
         for control in self._controls:
             yield from control.updates(frame)
 
 
 def decimals(step: float) -> int:
-    """Return how many decimals a step needs."""
+    """Return the number of decimals of a step."""
     digits = 0
     while digits < 12 and round(step, digits) != step:
         digits += 1

@@ -1,51 +1,124 @@
-"""The few pieces of HTML that the panels share; they follow the light and the dark theme."""
+"""The HTML that panels share; `look/page.css` describes its classes."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Sequence
 from html import escape
+from typing import Literal
 
-from explorer.app.widgets.colours import OUTLINE, css
+from explorer.app.widgets.colours import Rgb, css
 from explorer.numerics.number_text import drop_rounding, format_fixed, format_number, set_true_minus
 
 
 def by_theme(light: str, dark: str) -> str:
-    """Return the colour of CSS that is one on light pages and another on dark ones."""
+    """Return the CSS colour that is `light` on light pages and `dark` on dark ones."""
     return f"light-dark({light},{dark})"
 
 
-# On light panels and on dark ones, each legible there.
-GREY = ("#5f666e", "#a3a9b1")
-GREEN = ("#1f7a4a", "#5fca90")
-RED = ("#c43408", "#ff8f66")
-AMBER = ("#96590a", "#f0b04c")
+Look = Literal["within", "close", "beyond"]
+"""Whether a value keeps its bounds, is close to them, or beyond."""
 
-DIM = "color:var(--mantine-color-dimmed)"
-# What keeps its bounds, and what does not.
-WITHIN = by_theme(*GREEN)
-BEYOND = by_theme(*RED)
-# What is close to its bounds.
-CLOSE = by_theme(*AMBER)
+
+def box(*parts: str) -> str:
+    """Return the box of a panel's own markup."""
+    return f'<div class="ex-box">{"".join(parts)}</div>'
+
+
+def status(words: str, look: Look) -> str:
+    """Return the result of a panel in large words."""
+    return f'<div class="ex-status ex-{look}">{escape(words)}</div>'
+
+
+def caption(words: str, hint: str = "") -> str:
+    """Return the caption of a part of a panel."""
+    return f'<div class="ex-caption"{_title(hint)}>{escape(words)}</div>'
+
+
+def dim(content: str) -> str:
+    """Return less important content, such as units and notes."""
+    return f'<span class="ex-dim">{content}</span>'
+
+
+def swatch(colour: Rgb, look: str = "ex-swatch") -> str:
+    """Return a mark in a colour: a square, or what another class of the stylesheet draws."""
+    return f'<span class="{look}" style="--colour:{css(colour)}"></span>'
+
+
+def table(rows: Iterable[str], head: Sequence[str] = ()) -> str:
+    """Return a table of a word and numbers in each row.
+
+    Args:
+        rows: Rows, made by `row`.
+        head: Names of the columns.
+    """
+    first = row(*head, look="ex-dim") if head else ""
+    return f'<table class="ex-numbers">{first}{"".join(rows)}</table>'
+
+
+def row(*cells: str, look: str = "", hint: str = "") -> str:
+    """Return a row of a table.
+
+    Args:
+        cells: Content of each cell, HTML.
+        look: Classes of the stylesheet.
+        hint: Meaning of the row, shown when a pointer rests on it.
+    """
+    classes = f' class="{look}"' if look else ""
+    content = "".join(f"<td>{cell}</td>" for cell in cells)
+    return f"<tr{classes}{_title(hint)}>{content}</tr>"
+
+
+def ticks(*places: tuple[float, str]) -> str:
+    """Return the values below a legend, each with its place from 0 to 100 %."""
+    texts = "".join(
+        f'<span{" class=is-end" if left == 100.0 else ""} style="--left:{left:g}%">{text}</span>'
+        for left, text in places
+    )
+    return f'<div class="ex-ticks">{texts}</div>'
+
+
+def note(content: str) -> str:
+    """Return a line of less important content below a control."""
+    return f'<div class="ex-note ex-dim">{content}</div>'
+
+
+def meter(
+    percent: float,
+    colour: Rgb | None = None,
+    rest: Rgb | None = None,
+    *,
+    look: str = "ex-meter",
+) -> str:
+    """Return a bar filled to a percentage.
+
+    Args:
+        percent: Length of the filled part, from 0 to 100.
+        colour: Colour of the filled part; None for the main one of the page.
+        rest: Colour of the other part; None for grey.
+        look: Classes of the stylesheet.
+    """
+    colours = {"--colour": colour, "--ex-track": rest}
+    set_colours = "".join(f";{name}:{css(rgb)}" for name, rgb in colours.items() if rgb)
+    return f'<div class="{look}" style="--share:{percent:.2f}%{set_colours}"></div>'
+
+
+def _title(hint: str) -> str:
+    return f' title="{escape(hint)}"' if hint else ""
 
 
 def alert(title: str, body: str) -> str:
     """Return a box that says what is wrong and what would work."""
-    return (
-        f'<div role="alert" style="margin:6px 10px;padding:7px 10px;border-left:4px solid '
-        f"{css(OUTLINE)};background:color-mix(in srgb,{css(OUTLINE)} 9%,transparent);"
-        f'border-radius:3px;font-size:12.5px;line-height:1.4"><b>{escape(title)}</b><br>'
-        f"{escape(body)}</div>"
-    )
+    return _message("alert", "ex-alert", title, body)
 
 
 def remark(title: str, body: str) -> str:
-    """Return a box that says what was done, where that is not quite what was asked for."""
-    return (
-        '<div role="status" style="margin:6px 10px;padding:7px 10px;border-left:4px solid '
-        f"{CLOSE};border-radius:3px;font-size:12.5px;line-height:1.4;"
-        'background:color-mix(in srgb,currentColor 6%,transparent)">'
-        f"<b>{escape(title)}</b><br>{escape(body)}</div>"
-    )
+    """Return a box that says what was done instead of exactly what was requested."""
+    return _message("status", "ex-remark", title, body)
+
+
+def _message(role: str, look: str, title: str, body: str) -> str:
+    return f'<div role="{role}" class="{look}"><b>{escape(title)}</b><br>{escape(body)}</div>'
 
 
 def signed(value: float, digits: int = 3) -> str:
@@ -53,22 +126,22 @@ def signed(value: float, digits: int = 3) -> str:
     return set_true_minus(format_fixed(value, digits))
 
 
-# Beyond these sizes numbers are told with a power of ten.
+# Numbers beyond these sizes have a power of ten.
 LEAST, MOST = 1e-3, 1e7
 
 
 def decimals_for(size: float, digits: int) -> int:
-    """Return how many decimals give a number of a size so many digits."""
+    """Return the decimals that give a number of a size so many digits."""
     return max(0, digits - 1 - math.floor(math.log10(size))) if size > 0.0 else digits - 1
 
 
 def fitted(value: float, size: float, digits: int) -> str:
-    """Return a number with as many decimals as others of a size have, so that it holds still.
+    """Return a number whose decimals depend on a size alone, so that it holds still.
 
     Args:
         value: The number.
-        size: Of the largest that is to be expected.
-        digits: That one of this size has.
+        size: Size of the largest number expected.
+        digits: Number of digits at this size.
     """
     if size != 0.0 and not LEAST <= size < MOST:
         return format_number(value, digits, size=size)

@@ -1,31 +1,32 @@
-"""The command palette: all that can be done, found by its name, and by keys."""
+"""The command palette: all commands of the page, by name and by key."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import viser
 
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.commands import ALWAYS, KEYS, STEP, Key, offers, with_keys
+from explorer.app.widgets.commands import STEP, Key, offers, with_keys
 from explorer.app.widgets.pieces import Widget, widgets
 
 Run = Callable[[viser.ClientHandle], None]
-"""Does something for the browser that asked."""
+"""Runs a command for the browser that requested it."""
 
 
 @dataclass(frozen=True)
 class Command:
-    """Something that can be done.
+    """A command of the palette.
 
     Attributes:
-        label: Its name, unlike any other, from the tab to the option.
-        does: What it does, in a sentence.
-        run: Does it.
-        is_ready: Whether it can be done now.
-        stands_alone: Whether it has no control that decides about that.
+        label: Unique name, from the tab to the option.
+        does: Sentence on what it does.
+        run: Function that runs it.
+        is_ready: Function that tells whether it can run now.
+        stands_alone: Whether it has no control, which would decide whether it is ready.
+        keys: Keys that run it.
     """
 
     label: str
@@ -33,47 +34,60 @@ class Command:
     run: Run
     is_ready: Callable[[], bool] = lambda: True
     stands_alone: bool = True
+    keys: tuple[Key, ...] = ()
 
-    @property
-    def keys(self) -> tuple[Key, ...]:
-        """The keys that do it."""
-        return KEYS.get(self.label, ())
+
+@dataclass
+class _Passing:
+    """The commands of a group that come and go."""
+
+    commands: tuple[Command, ...] = ()
+    handles: dict[str, viser.CommandHandle] = field(default_factory=dict[str, viser.CommandHandle])
 
 
 class Palette:
-    """Registers what the page's controls offer, and what has no control.
+    """Registers the commands of the page's controls, and those without a control.
 
-    It is made after all controls that it is to offer.
+    The palette must be made after all controls.
 
     Args:
-        server: Whose browsers have the palette.
-        more: What has no control of its own.
+        server: Server whose browsers have the palette.
+        more: Commands without a control.
+        keys: Keys by the names of commands.
+        lists: Labels of the lists whose every option is a command.
     """
 
-    def __init__(self, server: viser.ViserServer, more: tuple[Command, ...] = ()) -> None:
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        more: Iterable[Command] = (),
+        keys: Mapping[str, tuple[Key, ...]] | None = None,
+        lists: Container[str] = (),
+    ) -> None:
         self._gui = server.gui
+        self._keys = keys or dict[str, tuple[Key, ...]]()
         self._registered: list[tuple[Command, viser.CommandHandle]] = []
         for widget in widgets(server):
-            found = tuple(commands_of(widget))
-            for command in found:
+            commands = tuple(map(self._with_keys, commands_of(widget, lists)))
+            for command in commands:
                 self.add(command)
-            keys = tuple(key for command in found for key in command.keys)
-            if keys:
-                widget.handle.hint = with_keys(widget.hint, keys)
+            widget_keys = tuple(key for command in commands for key in command.keys)
+            if widget_keys:
+                widget.handle.hint = with_keys(widget.hint, widget_keys)
         for command in more:
-            self.add(command)
-        self._passing: dict[str, viser.CommandHandle] = {}
+            self.add(self._with_keys(command))
+        self._passing: dict[str, _Passing] = {}
 
     @property
     def commands(self) -> tuple[Command, ...]:
-        """All that stays on offer."""
+        """The commands that stay in the palette."""
         return tuple(dict.fromkeys(command for command, _ in self._registered))
 
     def add(self, command: Command) -> None:
-        """Offer something more.
+        """Add a command that stays.
 
         Raises:
-            ValueError: there is a command of that name.
+            ValueError: another command has this name.
         """
         if any(command.label == known.label for known, _ in self._registered):
             raise ValueError(f"two commands are called {command.label!r}")
@@ -83,35 +97,45 @@ class Palette:
             label = command.label if index == 0 else f"{command.label}  ({key})"
             self._register(command, label, key)
 
-    def offer(self, passing: Iterable[Command]) -> None:
-        """Offer some commands besides those that stay, and no more those of the last time."""
-        wanted = {command.label: command for command in passing}
-        for label in self._passing.keys() - wanted.keys():
-            self._passing.pop(label).remove()
-        for label in wanted.keys() - self._passing.keys():
-            self._passing[label] = self._made(wanted[label], label, None)
+    def _with_keys(self, command: Command) -> Command:
+        return replace(command, keys=self._keys.get(command.label, ()))
+
+    def offer(self, group: str, passing: tuple[Command, ...]) -> None:
+        """Offer these commands besides those that stay; remove the others of the group.
+
+        The same object as in the last call changes nothing and takes no time.
+        """
+        offered = self._passing.setdefault(group, _Passing())
+        if passing is offered.commands:
+            return
+        offered.commands, handles = passing, offered.handles
+        commands = {command.label: command for command in passing}
+        for label in handles.keys() - commands.keys():
+            handles.pop(label).remove()
+        for label in commands.keys() - handles.keys():
+            handles[label] = self._add_to_page(commands[label], label, None)
 
     def updates(self, *, controls: bool) -> Iterator[Update]:
-        """Yield what leaves those to be chosen that can be done.
+        """Yield the updates that enable the commands that are ready, and disable the others.
 
         Args:
-            controls: Whether any control has come into use or gone out of it; without that
-                what is the command of a control is left as it is.
+            controls: Whether any control was enabled, disabled, shown or hidden; if not, the
+                commands of controls stay as they are.
         """
         for command, handle in self._registered:
             if controls or command.stands_alone:
                 yield handle, "disabled", not command.is_ready()
 
     def _register(self, command: Command, label: str, key: Key | None) -> None:
-        self._registered.append((command, self._made(command, label, key)))
+        self._registered.append((command, self._add_to_page(command, label, key)))
 
-    def _made(self, command: Command, label: str, key: Key | None) -> viser.CommandHandle:
-        key_of: Any = key
+    def _add_to_page(self, command: Command, label: str, key: Key | None) -> viser.CommandHandle:
+        untyped: Any = key
         handle = self._gui.add_command(
             label,
             description=command.does,
-            hotkey=None if key is None else key_of.key,
-            modifier=None if key is None else key_of.modifier,
+            hotkey=None if key is None else untyped.key,
+            modifier=None if key is None else untyped.modifier,
         )
 
         @handle.on_trigger
@@ -122,15 +146,14 @@ class Palette:
         return handle
 
 
-def commands_of(widget: Widget) -> Iterator[Command]:
-    """Yield what a control offers, to be done as if by hand."""
-    for label, option in offers(widget).items():
-        is_always = widget.label.startswith(ALWAYS)
+def commands_of(widget: Widget, lists: Container[str] = ()) -> Iterator[Command]:
+    """Yield the commands that use a control as a user would."""
+    for label, option in offers(widget, lists).items():
         yield Command(
             label,
             widget.hint,
             lambda client, option=option: _use(widget, client, option),
-            (lambda: True) if is_always else lambda: widget.is_in_use,
+            lambda: widget.is_in_use,
             stands_alone=False,
         )
 
@@ -140,5 +163,5 @@ def _use(widget: Widget, client: viser.ClientHandle, option: str | None) -> None
 
 
 def group_of(command: Command) -> str:
-    """Return the tab to which a command belongs, or what it is about."""
+    """Return the first part of a command's name, such as its tab."""
     return command.label.split(STEP)[0]

@@ -1,8 +1,7 @@
-"""The controls of a page as they are: where they stand, what they say, and how to use one.
+"""The controls of a page as viser holds them: places, words, options, and a way to use one.
 
-What the command palette offers and what the tests look at is read from the controls
-themselves, so that it can lag behind none of them. Beside `explorer.app.browser.viser_gaps` this is
-the one module that uses private names of viser.
+The command palette and the tests read them here, so that neither lags behind the page. Beside
+`explorer.app.browser.viser_gaps` this is the one module that uses private names of viser.
 """
 
 from __future__ import annotations
@@ -22,11 +21,11 @@ class Widget:
     """A control of the page.
 
     Attributes:
-        handle: viser's.
-        kind: A button, a row of buttons, a checkbox, a list to choose from, a button for
-            files, or what holds a value such as a slider.
-        path: The titles of what it stands in, the outermost first: its tab, then folders.
-        containers: What it stands in, from the inside out.
+        handle: Handle of viser.
+        kind: A button, a row of buttons ("choice"), a checkbox ("switch"), a list, a button for
+            files ("upload"), or a control that holds a value, such as a slider.
+        path: Titles of its tab and folders, the outermost first.
+        containers: Handles of its folders and tab, from the inside out.
     """
 
     handle: Any
@@ -36,32 +35,32 @@ class Widget:
 
     @property
     def label(self) -> str:
-        """The words beside it, or on it."""
+        """The words beside or on the control."""
         return str(self.handle.label)
 
     @property
     def hint(self) -> str:
-        """What is told of it when a pointer rests on it."""
+        """The hint that is shown when a pointer rests on the control."""
         return str(getattr(self.handle, "hint", None) or "")
 
     @property
     def options(self) -> tuple[str, ...]:
-        """Of which it offers one, if it does."""
+        """The options to choose from, if any."""
         return tuple(getattr(self.handle, "options", ()))
 
     @property
     def is_in_use(self) -> bool:
-        """Whether it can be seen, its tab open, and be used."""
+        """Whether the control is enabled, and visible once its tab is open."""
         return not self.handle.disabled and all(
-            getattr(each, "visible", True) for each in (self.handle, *self.containers)
+            getattr(handle, "visible", True) for handle in (self.handle, *self.containers)
         )
 
     def use(self, client: viser.ClientHandle, value: Any = None) -> None:
-        """Use it as this browser would: all others see its new value, and who listens is told.
+        """Use the control as a browser would: the others get its new value, callbacks are called.
 
         Args:
             client: The browser.
-            value: That it is given; what it holds if None, as with a button.
+            value: New value; None to leave the value, as with a button.
         """
         from viser import _messages
 
@@ -70,8 +69,8 @@ class Widget:
         if value is not None:
             state.value = value
             if not state.is_button:
-                changed = _messages.GuiUpdateMessage(state.uuid, {"value": value})
-                state.gui_api._websock_interface.queue_message(changed)
+                message = _messages.GuiUpdateMessage(state.uuid, {"value": value})
+                state.gui_api._websock_interface.queue_message(message)
         for callback in tuple(state.update_cb):
             callback(viser.GuiEvent(client, client.client_id, self.handle))
 
@@ -81,7 +80,7 @@ def widgets(server: viser.ViserServer) -> Iterator[Widget]:
     gui: Any = server.gui
     for handle in tuple(gui._gui_input_handle_from_uuid.values()):
         containers = tuple(_containers(handle))
-        titles = tuple(title for each in containers if (title := _title(each)))
+        titles = tuple(title for container in containers if (title := _title(container)))
         yield Widget(handle, _kind(handle), titles[::-1], containers)
 
 
@@ -102,7 +101,7 @@ def _kind(handle: Any) -> Kind:
 
 
 def _containers(handle: Any) -> Iterator[Any]:
-    """Yield what a control stands in, from the inside out."""
+    """Yield the folders and the tab of a control, from the inside out."""
     gui = handle._impl.gui_api
     inside: str | None = handle._impl.parent_container_id
     while inside is not None:

@@ -8,8 +8,8 @@ import math
 from explorer.app.state.state import State
 from explorer.app.widgets.controls import Span
 
-# Sliders reach somewhat beyond what the limits usually allow, to let people feel them.
-REACHES = 1.5
+# Ends of sliders over the size of the design: beyond usual limits, so that users run into them.
+BEYOND = 1.5
 
 
 def fine_step(size: float, parts: float) -> float:
@@ -24,7 +24,7 @@ def length_span(state: State) -> Span:
 
 @functools.lru_cache(64)
 def _length_span(reach: float) -> Span:
-    return Span(0.0, round_up(REACHES * reach), fine_step(reach, 2e3))
+    return Span(0.0, round_up(BEYOND * reach), fine_step(reach, 2e3))
 
 
 def radius_span(state: State) -> Span:
@@ -40,7 +40,7 @@ def coordinate_span(state: State) -> Span:
 
 @functools.lru_cache(64)
 def _coordinate_span(reach: float) -> Span:
-    edge = round_up(REACHES * reach)
+    edge = round_up(BEYOND * reach)
     return Span(-edge, edge, fine_step(reach, 2e3))
 
 
@@ -51,7 +51,7 @@ def variable_span(state: State) -> Span:
 
 @functools.lru_cache(64)
 def _variable_span(size: float) -> Span:
-    edge = round_up(REACHES * size)
+    edge = round_up(BEYOND * size)
     return Span(-edge, edge, fine_step(size, 1e5))
 
 

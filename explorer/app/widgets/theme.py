@@ -1,7 +1,7 @@
 """The light and the dark theme of the page, one for all its browsers.
 
-The scene is shared by all browsers, and its grid has to suit what is behind it; so the theme
-is the server's. Until somebody chooses, it is what the first browser's user prefers.
+All browsers share the scene, whose grid must suit the background, so they share the theme too.
+Until a user chooses one, it follows the first browser.
 """
 
 from __future__ import annotations
@@ -12,23 +12,27 @@ import viser
 
 from explorer.app.widgets.colours import Rgb
 
-# Of buttons and of the tab in front. The dark one is light enough to be read on dark panels.
+# Colours of buttons and of the tab in front; the second is light enough for dark panels.
 BRAND: Rgb = (24, 74, 150)
 BRAND_ON_DARK: Rgb = (104, 162, 236)
 
 
 class Theme:
-    """Which theme the page has.
+    """The theme of the page.
 
     Args:
-        gui: The page's.
+        gui: Controls of the page.
+        dark: Whether the page is dark; None to follow the first browser.
         changed: Called after a change.
     """
 
-    def __init__(self, gui: viser.GuiApi, *, dark: bool, changed: Callable[[], None]) -> None:
+    def __init__(
+        self, gui: viser.GuiApi, *, dark: bool | None, changed: Callable[[], None]
+    ) -> None:
         self._gui = gui
         self._changed = changed
-        self._dark = dark
+        self._is_chosen = dark is not None
+        self._dark = dark is True
         self._configure()
 
     @property
@@ -38,10 +42,16 @@ class Theme:
 
     def choose(self, *, dark: bool) -> None:
         """Make all pages dark, or light."""
+        self._is_chosen = True
         if dark != self._dark:
             self._dark = dark
             self._configure()
             self._changed()
+
+    def follow_browser(self, *, dark: bool) -> None:
+        """Give all pages the theme that a browser prefers, unless a user has chosen one."""
+        if not self._is_chosen:
+            self.choose(dark=dark)
 
     def _configure(self) -> None:
         self._gui.configure_theme(

@@ -1,4 +1,4 @@
-"""A drawing that takes long: how far it is, and the buttons to cancel it and to ask again."""
+"""The progress of a drawing that takes long, and buttons that stop and repeat it."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ AnyFeed = Feed[Any, Any]
 
 
 class UnderWay:
-    """Two buttons that are shown when they are of use.
+    """Two buttons, each visible while it has an effect.
 
     Args:
-        gui: On which they are added, here and now.
-        what: What is drawn, such as "workspace".
+        gui: Controls of the page, to which the buttons are added.
+        what: Name of the drawing, such as "workspace".
     """
 
     def __init__(self, gui: viser.GuiApi, what: str) -> None:
@@ -27,41 +27,41 @@ class UnderWay:
         self._cancel = gui.add_button(
             f"Stop computing the {what}",
             icon=viser.Icon.PLAYER_STOP,
-            hint=f"End the computation of the {what} that is under way.",
+            hint=f"End the present computation of the {what}.",
             visible=False,
         )
-        self._again = gui.add_button(
+        self._retry = gui.add_button(
             f"Compute the {what}",
             icon=viser.Icon.REFRESH,
-            hint=f"Compute the {what} whose computation was cancelled.",
+            hint=f"Compute the {what} again after it was stopped.",
             visible=False,
         )
         self._cancel.on_click(lambda _: self._feed and self._feed.cancel())
-        self._again.on_click(lambda _: self._feed and self._feed.ask_again())
+        self._retry.on_click(lambda _: self._feed and self._feed.retry())
 
     def updates(self, feed: AnyFeed) -> Iterator[Update]:
-        """Yield what makes the buttons follow a feed."""
+        """Yield the updates that show the stage of a feed."""
         self._feed = feed
         yield self._cancel, "visible", feed.stage is not None
-        yield self._again, "visible", feed.is_cancelled
+        yield self._retry, "visible", feed.is_cancelled
 
 
 def progress(feed: AnyFeed) -> str:
-    """Return in words that a drawing is being computed, and how far it is if that is known."""
+    """Return the progress of a drawing that is being computed, in words."""
     stage = feed.stage
     if stage is None:
         return "computing …"
     return f"computing the {stage.words}, {100.0 * stage.share:.0f} % done …"
 
 
-def problem(feed: AnyFeed, title: str, again: str) -> str:
+def problem(feed: AnyFeed, title: str, button: str) -> str:
     """Return why there is no newer drawing, as HTML.
 
     Args:
-        feed: Whose last request failed or was cancelled.
-        title: Of a failure.
-        again: The button that computes what was cancelled.
+        feed: Feed whose last request failed or was cancelled.
+        title: Title of a failure.
+        button: Label of the button that repeats a cancelled computation.
     """
     if feed.is_cancelled:
-        return alert("Stopped", f"Press “{again}”, or change something, to compute it.")
+        return alert("Stopped", f"Press “{button}”, or change something, to compute it.")
     return alert(title, feed.problem or "")

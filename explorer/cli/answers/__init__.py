@@ -1,1 +1,1 @@
-"""What commands answer, as plain values for JSON and as lines of text."""
+"""The answers of commands, as plain values for JSON and as lines of text."""

@@ -5,7 +5,15 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from explorer.cli.output import figure, mesh_json, table
+from explorer.cli.output import (
+    attributes,
+    figure,
+    finite,
+    lengths,
+    mesh_json,
+    radii_line,
+    table,
+)
 from explorer.mechanism.design import Design
 
 if TYPE_CHECKING:
@@ -19,15 +27,13 @@ ROWS = 10
 def interference_json(workspace: ReachableWorkspace) -> dict[str, object]:
     """Return the accessible workspace as plain values, added to those of the workspace."""
     return {
-        "reachable_volume": workspace.reachable_volume,
-        "reachable_node_count": workspace.reachable_node_count,
-        "harmless_radius": _finite(workspace.harmless_radius),
+        **attributes(workspace, "reachable_volume reachable_node_count"),
+        "harmless_radius": finite(workspace.harmless_radius),
         "pairs": [
             {
-                "legs": list(pair.legs),
-                # A pair that shares a joint has no clearance.
-                "clearance": _finite(pair.clearance),
-                "bound": _finite(pair.bound),
+                "legs": pair.legs,
+                "clearance": finite(pair.clearance),
+                "bound": finite(pair.bound),
                 "blocked_volume": pair.blocked_volume,
             }
             for pair in workspace.pairs
@@ -38,28 +44,22 @@ def interference_json(workspace: ReachableWorkspace) -> dict[str, object]:
 
 def interference_table(design: Design, workspace: ReachableWorkspace) -> str:
     """Return the table of pairs of legs and the volumes that they block."""
-    radii = "  ".join(f"{radius:g}" for radius in design.limits.leg_radii)
-    rows = [("legs", "least clearance", "certified", "blocked alone (units³)")]
+    rows: list[tuple[str, ...]] = [
+        ("legs", "least clearance", "certified", "blocked alone (units³)")
+    ]
     for pair in workspace.pairs:
         legs = f"{pair.legs[0]} and {pair.legs[1]}"
         if math.isinf(pair.clearance):
             rows.append((legs, "none" if workspace.solid.is_empty else "joined", "", figure(0.0)))
         else:
-            rows.append(
-                (legs, figure(pair.clearance), figure(pair.bound), figure(pair.blocked_volume))
-            )
-    return f"radii of the legs  {radii}\n" + table(rows, "<>>>")
+            rows.append((legs, *map(figure, (pair.clearance, pair.bound, pair.blocked_volume))))
+    return f"{radii_line(design)}\n{table(rows, '<>>>')}"
 
 
 def curve_json(curve: RadiusCurve) -> dict[str, object]:
     """Return a radius curve as plain values."""
-    return {
-        "radii": curve.radii.tolist(),
-        "volumes": curve.volumes.tolist(),
-        "harmless": curve.harmless,
-        "harmless_bound": curve.harmless_bound,
-        "closest": None if curve.closest_legs is None else list(curve.closest_legs),
-    }
+    answer = attributes(curve, "radii volumes harmless harmless_bound")
+    return {**answer, "closest": curve.closest_legs}
 
 
 def curve_table(design: Design, curve: RadiusCurve) -> str:
@@ -70,8 +70,7 @@ def curve_table(design: Design, curve: RadiusCurve) -> str:
     for index in sorted({round(last * row / ROWS) for row in range(ROWS + 1)}):
         radius, volume = float(curve.radii[index]), float(curve.volumes[index])
         share = volume / float(curve.volumes[0]) if curve.volumes[0] > 0.0 else 0.0
-        millimetres = figure(radius * design.unit_mm)
-        rows.append((figure(radius), millimetres, figure(volume), f"{100.0 * share:.1f} %"))
+        rows.append((*lengths(design, radius), figure(volume), f"{100.0 * share:.1f} %"))
     lines = [table(rows, ">>>>")]
     if curve.closest_legs is not None:
         i, j = curve.closest_legs
@@ -82,7 +81,3 @@ def curve_table(design: Design, curve: RadiusCurve) -> str:
         else:
             lines.append(f"no radius is harmless: legs {i} and {j} touch at ({place})")
     return "\n".join(lines)
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None

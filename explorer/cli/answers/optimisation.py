@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import msgspec
 
-from explorer.cli.output import figure, table
+from explorer.cli.output import attributes, figure, table
+from explorer.measures.case import Case
+from explorer.measures.catalogue import CATALOGUE, measures_in
+from explorer.measures.measurements import Measurements, measure_design
+from explorer.measures.size import reach_of
 from explorer.mechanism.design import VARIABLES, Design
-from explorer.mechanism.design_file import encode_design
 
 if TYPE_CHECKING:
-    from explorer.measures.measurements import Measurements
     from explorer.optimise.findings import Finding
     from explorer.optimise.outcome import Outcome
     from explorer.optimise.problem import Problem
@@ -28,33 +29,26 @@ def optimised_design(outcome: Outcome) -> Design:
 
 def outcome_json(outcome: Outcome, written: Sequence[Path]) -> dict[str, object]:
     """Return an outcome as plain values."""
-    from explorer.measures.size import reach_of
-
-    best, run = outcome.best, outcome.run
+    best, run, problem = outcome.best, outcome.run, outcome.problem
     return {
-        "design": _design_json(optimised_design(outcome)),
+        "design": optimised_design(outcome),
         "objective": best.objective,
-        "objective_name": outcome.problem.objective,
+        "objective_name": problem.objective,
         "volume": best.volume,
         "reach": reach_of(outcome.design),
-        "iterations": run.iterations,
-        "evaluations": run.evaluations,
-        "seconds": outcome.seconds,
-        "converged": outcome.converged,
-        "status": run.status,
-        "holding": run.holding,
-        "message": run.message,
-        "values": dict(zip(outcome.problem.names, best.values, strict=True)),
+        **attributes(run, "iterations evaluations"),
+        **attributes(outcome, "seconds converged"),
+        **attributes(run, "status holding message"),
+        "values": dict(zip(problem.names, best.values, strict=True)),
         "runs": [
             {
-                "status": each.status,
-                "objective": each.best.objective,
-                "iterations": each.iterations,
-                "attempts": each.attempts,
+                "status": start.status,
+                "objective": start.best.objective,
+                **attributes(start, "iterations attempts"),
             }
-            for each in outcome.runs
+            for start in outcome.runs
         ],
-        "files": [str(path) for path in written],
+        "files": written,
     }
 
 
@@ -66,10 +60,8 @@ def infeasible_json(problem: Problem, limit: str, message: str) -> dict[str, obj
         limit: Limit that contradicts the demands.
         message: Reason, in one line.
     """
-    from explorer.measures.size import reach_of
-
     return {
-        "design": _design_json(problem.start),
+        "design": problem.start,
         "objective": None,
         "objective_name": problem.objective,
         "volume": None,
@@ -87,35 +79,33 @@ def infeasible_json(problem: Problem, limit: str, message: str) -> dict[str, obj
     }
 
 
-def outcome_lines(outcome: Outcome, written: Sequence[Path]) -> list[str]:
-    """Return an outcome as lines of text, with the start and the best design side by side."""
-    from explorer.measures.case import Case
-    from explorer.measures.catalogue import measures_in
-    from explorer.measures.measurements import measure_design
-
-    problem, best = outcome.problem, outcome.best
+def outcome_lines(outcome: Outcome, written: Sequence[Path]) -> Iterator[str]:
+    """Yield an outcome as lines of text, with the start and the best design side by side."""
+    problem = outcome.problem
     margin = None if problem.demands.clearance is None else problem.demands.clearance_margin
     box = problem.demands.required_box
     if box is not None:
-        box = problem.required_box_at(best.values)
+        box = problem.required_box_at(outcome.best.values)
     before, after = (
         measure_design(Case(design, demanded_margin=margin, box=box), measures_in("optimise"))
         for design in (problem.start, outcome.design)
     )
-    rows = [("", "start", "optimum" if outcome.converged else "best so far", "change")]
-    for name, (old, new) in measure_rows(before, after):
+    optimum = "optimum" if outcome.converged else "best so far"
+    rows: list[tuple[str, ...]] = [("", "start", optimum, "change")]
+    for name, values in measure_rows(before, after):
+        old, new = values
         change = "" if old is None or new is None else f"{new - old:+.6g}"
-        cells = ["none" if each is None else figure(each) for each in (old, new)]
-        rows.append((name, cells[0], cells[1], change))
-    lines = [outcome.run.message, ""] if outcome.converged else []
-    lines.append(table(rows, "<>>>"))
-    lines.append(
+        cells = ("none" if value is None else figure(value) for value in values)
+        rows.append((name, *cells, change))
+    if outcome.converged:
+        yield from (outcome.run.message, "")
+    yield table(rows, "<>>>")
+    yield (
         f"\n{len(outcome.runs)} start{'s' if len(outcome.runs) > 1 else ''}, "
         f"{outcome.run.iterations} iterations and {outcome.run.evaluations} evaluations of the "
         f"best, {outcome.seconds:.2f} s in all"
     )
-    lines += [str(path) for path in written]
-    return lines
+    yield from map(str, written)
 
 
 def measure_rows(
@@ -127,8 +117,6 @@ def measure_rows(
         before: The measures of one design.
         after: The same measures of another.
     """
-    from explorer.measures.catalogue import CATALOGUE
-
     yield from zip(
         VARIABLES, zip(before.design.variables, after.design.variables, strict=True), strict=True
     )
@@ -145,18 +133,12 @@ def measure_rows(
 def finding_json(finding: Finding) -> dict[str, object]:
     """Return a finding as plain values; null is not available."""
     measured = finding.measured
+    names = ("volume", "node_step", "node_count", "node_volume", "reach", "box_margin")
     return {
         "name": finding.name,
-        "design": _design_json(measured.design),
-        "iterations": finding.iterations,
-        "objective": finding.objective,
-        "seconds": finding.seconds,
-        "volume": measured["volume"],
-        "node_step": measured["node_step"],
-        "node_count": measured["node_count"],
-        "node_volume": measured["node_volume"],
-        "reach": measured["reach"],
-        "box_margin": measured["box_margin"],
+        "design": measured.design,
+        **attributes(finding, "iterations objective seconds"),
+        **{name: measured[name] for name in names},
         "clearance": measured["least_clearance"],
         "nearest_legs": measured.nearest,
         "demanded_margin": measured.demanded_margin,
@@ -164,41 +146,28 @@ def finding_json(finding: Finding) -> dict[str, object]:
     }
 
 
-def findings_table(found: Sequence[Finding]) -> str:
+def findings_table(findings: Sequence[Finding]) -> str:
     """Return the table of findings with notes."""
     from explorer.optimise.findings import BOX, CLEARANCE, PAPER_VOLUME, STARTS, STEP
 
-    demanded = found[0].measured.demanded_margin or 0.0
-    rows: list[tuple[str, ...]] = [
-        (
-            "",
-            "iterations",
-            "F",
-            "exact volume",
-            f"nodes, step {STEP:g}",
-            "reach",
-            "margin / reach",
-            f"clearance, margins ≥ {demanded:.4g}",
-            "seconds",
-        )
-    ]
-    for each in found:
-        measured = each.measured
+    demanded = findings[0].measured.demanded_margin or 0.0
+    clearance = f"clearance, margins ≥ {demanded:.4g}"
+    heads = ("", "iterations", "F", "exact volume", f"nodes, step {STEP:g}", "reach")
+    rows: list[tuple[str, ...]] = [(*heads, "margin / reach", clearance, "seconds")]
+    for finding in findings:
+        measured = finding.measured
         reach, margin = measured["reach"], measured["box_margin"]
-        cells = [
-            _cell(measured["volume"], ".3f"),
-            _cell(measured["node_count"], "d"),
-            _cell(reach, ".4f"),
-            _cell(margin and reach and margin / reach, ".4f"),
-            _cell(measured["demanded_clearance"], ".4f"),
-        ]
         rows.append(
             (
-                each.name,
-                _cell(each.iterations, "d"),
-                _cell(each.objective, ".1e"),
-                *cells,
-                _cell(each.seconds, ".2f"),
+                finding.name,
+                _cell(finding.iterations, "d"),
+                _cell(finding.objective, ".1e"),
+                _cell(measured["volume"], ".3f"),
+                _cell(measured["node_count"], "d"),
+                _cell(reach, ".4f"),
+                _cell(margin and reach and margin / reach, ".4f"),
+                _cell(measured["demanded_clearance"], ".4f"),
+                _cell(finding.seconds, ".2f"),
             )
         )
     lows, highs = BOX
@@ -217,10 +186,6 @@ def findings_table(found: Sequence[Finding]) -> str:
 
 def _cell(value: float | None, form: str) -> str:
     return "–" if value is None else format(value, form)
-
-
-def _design_json(design: Design) -> Any:
-    return json.loads(encode_design(design))
 
 
 def _point_text(p: tuple[float, float, float]) -> str:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -30,8 +29,8 @@ def progress_line(progress: Progress) -> str:
     left = progress.seconds_left
     if left:
         text += f", {_duration(left)} left"
-    odd = progress.done - progress.counts.get("done", 0)
-    return text + (f", {odd} not done" if odd else "")
+    failed = progress.done - progress.counts.get("done", 0)
+    return text + (f", {failed} not done" if failed else "")
 
 
 def progress_json(progress: Progress) -> dict[str, object]:
@@ -46,18 +45,15 @@ def progress_json(progress: Progress) -> dict[str, object]:
     }
 
 
-def progress_lines(study: Study, folder: Path, progress: Progress) -> list[str]:
-    """Return the progress at the end of a run as lines of text."""
+def progress_lines(study: Study, folder: Path, progress: Progress) -> Iterator[str]:
+    """Yield the progress at the end of a run as lines of text."""
     computed = progress.done - progress.kept
-    lines = [
-        f"{study.name}: {progress.done} of {progress.total} designs in {folder}",
-        f"computed now: {computed} in {_duration(progress.seconds)}"
-        + (f", {progress.rate:.3g}/s" if computed else ""),
-        *_count_lines(progress.counts),
-    ]
+    rate = f", {progress.rate:.3g}/s" if computed else ""
+    yield f"{study.name}: {progress.done} of {progress.total} designs in {folder}"
+    yield f"computed now: {computed} in {_duration(progress.seconds)}{rate}"
+    yield from _count_lines(progress.counts)
     if not progress.is_complete:
-        lines.append("not complete: the same command continues")
-    return lines
+        yield "not complete: the same command continues"
 
 
 def summary_json(summary: Summary, folder: Path) -> dict[str, object]:
@@ -72,41 +68,34 @@ def summary_json(summary: Summary, folder: Path) -> dict[str, object]:
         "incomparable": summary.incomparable,
         "damaged_parts": summary.damaged,
         "stray_files": summary.strays,
-        "objectives": json.loads(msgspec.json.encode(summary.study.objectives)),
+        "objectives": msgspec.to_builtins(summary.study.objectives),
         "front": summary.front,
     }
 
 
-def summary_lines(summary: Summary) -> list[str]:
-    """Return the results of a study as lines of text, with the Pareto front."""
+def summary_lines(summary: Summary) -> Iterator[str]:
+    """Yield the results of a study as lines of text, with the Pareto front."""
     study = summary.study
-    lines = [
-        f"{study.name}: {summary.count} of {study.count} designs",
-        *_count_lines(summary.counts),
-        "",
-    ]
+    yield f"{study.name}: {summary.count} of {study.count} designs"
+    yield from (*_count_lines(summary.counts), "")
     if not study.objectives:
-        return [*lines, "the study names no objectives, so it has no front"]
-    named = [each.measure for each in study.objectives]
-    objectives = ", ".join(f"{each.measure} {each.sense}" for each in study.objectives)
-    lines.append(f"Pareto front ({objectives}): {len(summary.front)} designs")
+        yield "the study names no objectives, so it has no front"
+        return
+    objectives = ", ".join(f"{goal.measure} {goal.sense}" for goal in study.objectives)
+    yield f"Pareto front ({objectives}): {len(summary.front)} designs"
     if summary.incomparable:
-        lines.append(
-            f"without a value of an objective, so not in the front: {summary.incomparable}"
-        )
-    others = [name for name in study.varied if name not in named]
+        yield f"without a value of an objective, so not in the front: {summary.incomparable}"
+    names = [*dict.fromkeys([*(goal.measure for goal in study.objectives), *study.varied])]
     shown = _spread(summary.front)
-    cells = [("index", *named, *others)]
-    cells += [_cells(row, [*named, *others]) for row in shown]
     if shown:
-        lines.append(table(cells, ">" * len(cells[0])))
+        rows = [("index", *names)]
+        rows += [
+            (str(row["index"]), *(figure(float(row[name] or 0.0)) for name in names))
+            for row in shown
+        ]
+        yield table(rows, ">" * len(rows[0]))
     if len(shown) < len(summary.front):
-        lines.append(f"{len(shown)} of them, evenly spread; --json has all")
-    return lines
-
-
-def _cells(row: Mapping[str, Value], names: Sequence[str]) -> tuple[str, ...]:
-    return (str(row["index"]), *(figure(float(row[name] or 0.0)) for name in names))
+        yield f"{len(shown)} of them, evenly spread; --json has all"
 
 
 def _spread(rows: list[dict[str, Value]]) -> list[dict[str, Value]]:
@@ -122,7 +111,7 @@ def _count_lines(counts: Mapping[str, int]) -> list[str]:
 
 def _ordered(counts: Mapping[str, int]) -> dict[str, int]:
     """Return counts of statuses, most frequent first."""
-    return dict(sorted(counts.items(), key=lambda each: (-each[1], each[0])))
+    return dict(sorted(counts.items(), key=lambda count: (-count[1], count[0])))
 
 
 def _duration(seconds: float) -> str:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from explorer.cli.output import figure, table
+from explorer.cli.output import figure, measure_text, table
+from explorer.measures.case import Case
+from explorer.measures.catalogue import CATALOGUE
+from explorer.measures.measurements import measure_design
 from explorer.mechanism.design_file import PRESETS
-from explorer.workspace.slices.volume import NodeCount, workspace_nodes, workspace_volume
 
 Extent = tuple[tuple[float, float, float], tuple[float, float, float]]
 
@@ -40,53 +42,39 @@ PRINTED: Mapping[str, Printed] = MappingProxyType(
 )
 """The rows by preset."""
 
-
-@dataclass(frozen=True)
-class Row:
-    """A row of the table, as printed and as computed by this program."""
-
-    name: str
-    printed: Printed
-    nodes: NodeCount
-    volume: float
+_MEASURES = ("node_step", "node_count", "node_volume", "volume")
 
 
-def compute_table_one() -> list[Row]:
-    """Compute both rows of the table."""
-    return [
-        Row(name, printed, workspace_nodes(PRESETS[name]), workspace_volume(PRESETS[name]).volume)
-        for name, printed in PRINTED.items()
-    ]
+def as_json() -> dict[str, object]:
+    """Return both rows of the table as plain values; null is not printed in the paper."""
+    rows: list[dict[str, object]] = []
+    for name, printed in PRINTED.items():
+        case = Case(PRESETS[name])
+        row: dict[str, object] = {
+            "design": name,
+            "printed": {"extent": printed.extent, "node_volume": printed.volume},
+            **measure_design(case, _MEASURES[:3]).values,
+            "extent": case.paper_nodes.extent,
+            "volume": case.volume.volume,
+        }
+        rows.append(row)
+    return {"table1": rows, "note": WHY_THEY_DIFFER}
 
 
-def as_json(row: Row) -> dict[str, object]:
-    """Return a row as plain values; null is not printed in the paper."""
-    return {
-        "design": row.name,
-        "printed": {
-            "extent": [list(ends) for ends in row.printed.extent],
-            "node_volume": row.printed.volume,
-        },
-        "node_step": row.nodes.step,
-        "node_count": row.nodes.count,
-        "node_volume": row.nodes.volume,
-        "extent": None if row.nodes.extent is None else [list(ends) for ends in row.nodes.extent],
-        "volume": row.volume,
-    }
-
-
-def as_lines(row: Row) -> str:
-    """Return a row as lines of text."""
-    volume, nothing = row.printed.volume, "not printed"
-    own = row.nodes.extent or ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-    cells = [(row.name, "printed", "here")]
-    for axis, low, high, own_low, own_high in zip("xyz", *row.printed.extent, *own, strict=True):
-        cells.append((axis, f"{low:.3f} to {high:.3f}", f"{own_low:z.3f} to {own_high:z.3f}"))
-    cells += [
-        ("node step", nothing, figure(row.nodes.step)),
-        ("nodes", nothing, str(row.nodes.count)),
-        ("node volume", nothing if volume is None else figure(volume), figure(row.nodes.volume)),
-        ("exact volume", nothing, figure(row.volume)),
-        ("node / exact", "", f"{row.nodes.volume / row.volume:.4f}"),
-    ]
-    return table(cells, "<>>")
+def as_lines() -> Iterator[str]:
+    """Yield both rows of the table as lines of text."""
+    yield "Table 1 of the paper, and the values of this program, in design units"
+    for name, printed in PRINTED.items():
+        case = Case(PRESETS[name])
+        extent = case.paper_nodes.extent or ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+        rows = [(name, "printed", "here")]
+        for axis, low, high, own_low, own_high in zip("xyz", *printed.extent, *extent, strict=True):
+            rows.append((axis, f"{low:.3f} to {high:.3f}", f"{own_low:z.3f} to {own_high:z.3f}"))
+        for measure_name, value in measure_design(case, _MEASURES).values.items():
+            measure = CATALOGUE[measure_name]
+            printed_value = printed.volume if measure_name == "node_volume" else None
+            text = "not printed" if printed_value is None else figure(printed_value)
+            rows.append((measure.heading, text, measure_text(measure, value)))
+        ratio = case.paper_nodes.volume / case.volume.volume
+        yield from ("", table([*rows, ("node / exact", "", f"{ratio:.4f}")], "<>>"))
+    yield from ("", WHY_THEY_DIFFER)

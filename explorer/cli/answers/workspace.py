@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -11,14 +12,25 @@ from explorer.cli.answers.accessible import (
     interference_json,
     interference_table,
 )
-from explorer.cli.output import DISAGREES, figure, mesh_json, table
-from explorer.mechanism.design import Design
-from explorer.workspace.slices.volume import NodeCount, Volume
+from explorer.cli.output import (
+    DISAGREES,
+    attributes,
+    figure,
+    measure_text,
+    mesh_json,
+    table,
+)
+from explorer.measures.case import Case
+from explorer.measures.catalogue import CATALOGUE, measures_in
+from explorer.measures.measurements import Measurements, measure_design
 
 if TYPE_CHECKING:
     from explorer.workspace.accessible.radii import RadiusCurve
     from explorer.workspace.accessible.workspace import ReachableWorkspace
     from explorer.workspace.solids.solid import Solid
+
+# The measures of nodes that the remark on their volume gives.
+_IN_REMARK = ("node_count", "node_step")
 
 
 @dataclass(frozen=True)
@@ -26,8 +38,7 @@ class WorkspaceMeasures:
     """The measures of a workspace; None if not requested.
 
     Attributes:
-        volume: Exact volume and its gradient.
-        nodes: Nodes of the paper's grid.
+        case: Design and orientation, with the mesh of the workspace.
         solid: Mesh of the workspace.
         hull: Convex hull of the mesh.
         orientations: Number of orientations of the next three.
@@ -38,8 +49,7 @@ class WorkspaceMeasures:
         curve: Accessible volume as a function of the radius of all legs.
     """
 
-    volume: Volume
-    nodes: NodeCount
+    case: Case
     solid: Solid
     hull: Solid | None
     orientations: int | None
@@ -49,17 +59,18 @@ class WorkspaceMeasures:
     interference: ReachableWorkspace | None
     curve: RadiusCurve | None
 
+    def _measured(self) -> Measurements:
+        return measure_design(self.case, measures_in("workspace"))
+
     def as_json(self) -> dict[str, object]:
         """Return the measures as plain values."""
-        extent = self.nodes.extent
+        measured = self._measured()
         answer: dict[str, object] = {
-            "volume": self.volume.volume,
-            "gradient": self.volume.gradient,
-            "empty_because": list(self.volume.empty_because),
-            "node_step": self.nodes.step,
-            "node_count": self.nodes.count,
-            "node_volume": self.nodes.volume,
-            "extent": None if extent is None else [list(ends) for ends in extent],
+            "volume": measured["volume"],
+            **attributes(self.case.volume, "gradient empty_because"),
+            "node_step": measured["node_step"],
+            **measured.values,
+            "extent": self.case.paper_nodes.extent,
             "mesh": mesh_json(self.solid),
         }
         if self.solid.agrees is False:
@@ -78,51 +89,53 @@ class WorkspaceMeasures:
             answer["radius_curve"] = curve_json(self.curve)
         return answer
 
-    def as_lines(self, design: Design) -> list[str]:
-        """Return the measures as lines of text."""
-        rows = [("", "units³", "cm³", "")]
-
-        def add(name: str, volume: float, remark: str = "") -> None:
-            rows.append(
-                (name, figure(volume), figure(volume * (0.1 * design.unit_mm) ** 3), remark)
-            )
-
-        add("exact volume", self.volume.volume)
-        add(
-            "node volume",
-            self.nodes.volume,
-            f"{self.nodes.count} nodes at multiples of {self.nodes.step:.6g}",
-        )
-        add("mesh", self.solid.volume, _mesh_remark(self.solid))
+    def as_lines(self) -> Iterator[str]:
+        """Yield the measures as lines of text."""
+        design, nodes, volume = self.case.design, self.case.paper_nodes, self.case.volume
+        remarks = {"node_volume": f"{nodes.count} nodes at multiples of {nodes.step:.6g}"}
+        volumes: list[tuple[str, float, str]] = []
+        others: list[tuple[str, str]] = []
+        for name, value in self._measured().values.items():
+            measure = CATALOGUE[name]
+            if measure.power == CATALOGUE["volume"].power:
+                volumes.append((measure.heading, value or 0.0, remarks.get(name, "")))
+            elif name not in _IN_REMARK:
+                text = f"{measure_text(measure, value)} {measure.unit_in('units')}"
+                others.append((measure.heading, text.rstrip()))
+        volumes.append(("mesh", self.solid.volume, _mesh_remark(self.solid)))
         if self.hull is not None:
-            add("convex hull", self.hull.volume)
+            volumes.append(("convex hull", self.hull.volume, ""))
         for name, solid in (("reachable", self.reachable), ("dexterous", self.dexterous)):
             if solid is not None:
-                add(name, solid.volume, f"{self.orientations} orientations, {_mesh_remark(solid)}")
-        found = self.interference
-        if found is not None:
-            remark = f"{found.reachable_node_count} of {found.node_count} nodes"
-            add("accessible", found.reachable_volume, remark)
-        lines = [table(rows, "<>><")]
-        if self.nodes.extent is not None:
-            lines += ["", "extent of the nodes"]
-            lines += [
-                f"  {axis}  {figure(low)} to {figure(high)}"
-                for axis, low, high in zip("xyz", *self.nodes.extent, strict=True)
-            ]
-        if self.volume.empty_because:
-            lines += ["", f"empty because of {', '.join(self.volume.empty_because)}"]
-        if self.volume.gradient:
-            moves = [("moves with", "units² (yaw: units³ a radian)")]
-            moves += [(name, figure(rate)) for name, rate in self.volume.gradient.items()]
-            lines += ["", table(moves, "<>")]
+                remark = f"{self.orientations} orientations, {_mesh_remark(solid)}"
+                volumes.append((name, solid.volume, remark))
+        accessible = self.interference
+        if accessible is not None:
+            remark = f"{accessible.reachable_node_count} of {accessible.node_count} nodes"
+            title = CATALOGUE["reachable_volume"].heading
+            volumes.append((title, accessible.reachable_volume, remark))
+        cubic = (0.1 * design.unit_mm) ** 3
+        rows = [("", "units³", "cm³", "")]
+        rows += [(name, figure(v), figure(v * cubic), remark) for name, v, remark in volumes]
+        yield table(rows, "<>><")
+        if others:
+            yield table(others, "<<")
+        if nodes.extent is not None:
+            yield from ("", "extent of the nodes")
+            for axis, low, high in zip("xyz", *nodes.extent, strict=True):
+                yield f"  {axis}  {figure(low)} to {figure(high)}"
+        if volume.empty_because:
+            yield from ("", f"empty because of {', '.join(volume.empty_because)}")
+        if volume.gradient:
+            rates = [("moves with", "units² (yaw: units³ a radian)")]
+            rates += [(name, figure(rate)) for name, rate in volume.gradient.items()]
+            yield from ("", table(rates, "<>"))
         if self.capability is not None:
-            lines += ["", f"orientation capability {100.0 * self.capability:.2f} %"]
-        if found is not None:
-            lines += ["", interference_table(design, found)]
+            yield from ("", f"orientation capability {100.0 * self.capability:.2f} %")
+        if accessible is not None:
+            yield from ("", interference_table(design, accessible))
         if self.curve is not None:
-            lines += ["", curve_table(design, self.curve)]
-        return lines
+            yield from ("", curve_table(design, self.curve))
 
 
 def _mesh_remark(solid: Solid) -> str:

@@ -11,7 +11,12 @@ from explorer.cli.values import numbers
 from explorer.errors import NoAnswerError
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.feasible_intervals import feasible_intervals, nearest_feasible
-from explorer.mechanism.kinematics import checked_joints, discriminants, forward
+from explorer.mechanism.kinematics import (
+    ForwardKinematics,
+    checked_joints,
+    discriminants,
+    forward,
+)
 from explorer.mechanism.margins import TETRAHEDRA, margins, mode_name, signs_of
 from explorer.mechanism.pose import quaternion_from_rotation, yaw_pitch_roll_from_rotation
 from explorer.numerics.arrays import FloatArray
@@ -34,69 +39,55 @@ class Forward(JsonOptions, DesignOptions):
         """Write all eight poses of the joints.
 
         Raises:
-            InputError: a design or joints that cannot be used.
-            NoAnswerError: the lengths do not close.
+            NoAnswerError: The lengths do not close.
         """
         design = self.load()
         joints = checked_joints(design, self.joints)
-        squares = discriminants(design, joints)
-        solution = forward(design, joints)
-        feasible = bool(solution.feasible)
+        squares, modes = discriminants(design, joints), forward(design, joints)
         if self.json:
-            write_json(
-                {
-                    "feasible": feasible,
-                    "discriminants": squares.tolist(),
-                    "modes": _modes(solution.position, solution.rotation) if feasible else [],
-                }
-            )
-        elif feasible:
-            write_lines(
-                heading(design),
-                table(
-                    [("joint", *JOINTS), ("units", *figures(self.joints))],
-                    "<>>>>>>",
-                ),
-                "",
-                _mode_table(solution.position, solution.rotation),
-            )
-        if not feasible:
-            raise NoAnswerError(_why_not(design, joints, squares))
+            listed = _modes_json(modes) if modes.feasible else []
+            answer = {"feasible": modes.feasible, "discriminants": squares, "modes": listed}
+            write_json(answer)
+        elif modes.feasible:
+            rows = [("joint", *JOINTS), ("units", *figures(self.joints))]
+            write_lines(heading(design), table(rows, "<>>>>>>"), "", _mode_table(modes))
+        if not modes.feasible:
+            raise NoAnswerError(_failure_message(design, joints, squares))
 
 
-def _modes(position: FloatArray, rotation: FloatArray) -> list[dict[str, object]]:
-    quaternion = quaternion_from_rotation(rotation)
-    margin = margins(position, rotation)
+def _modes_json(modes: ForwardKinematics) -> list[dict[str, object]]:
+    quaternion = quaternion_from_rotation(modes.rotation)
+    margin = margins(modes.position, modes.rotation)
     return [
         {
             "mode": mode,
-            "signs": list(signs_of(mode)),
-            "position": position[mode].tolist(),
-            "quaternion": quaternion[mode].tolist(),
-            "margins": margin[mode].tolist(),
+            "signs": signs_of(mode),
+            "position": modes.position[mode],
+            "quaternion": quaternion[mode],
+            "margins": margin[mode],
         }
-        for mode in range(len(position))
+        for mode in range(len(margin))
     ]
 
 
-def _mode_table(position: FloatArray, rotation: FloatArray) -> str:
-    angles = yaw_pitch_roll_from_rotation(rotation)
-    margin = margins(position, rotation)
+def _mode_table(modes: ForwardKinematics) -> str:
+    angles = yaw_pitch_roll_from_rotation(modes.rotation)
+    margin = margins(modes.position, modes.rotation)
     rows = [("mode", "signs", *"xyz", "yaw", "pitch", "roll", "δ1", "δ2", "δ3")]
     rows += [
         (
             str(mode),
             mode_name(mode),
-            *figures(position[mode].tolist()),
+            *figures(modes.position[mode].tolist()),
             *degrees(angles[mode].tolist()),
             *figures(margin[mode].tolist()),
         )
-        for mode in range(len(position))
+        for mode in range(len(margin))
     ]
     return table(rows, "<<" + ">" * 9)
 
 
-def _why_not(design: Design, joints: FloatArray, squares: FloatArray) -> str:
+def _failure_message(design: Design, joints: FloatArray, squares: FloatArray) -> str:
     failures = [
         f"trilateration {index + 1} (tetrahedron {' '.join(TETRAHEDRA[index])}) has "
         f"δ{index + 1}² = {square:.4g}"
@@ -105,11 +96,11 @@ def _why_not(design: Design, joints: FloatArray, squares: FloatArray) -> str:
     ]
     return (
         f"the lengths do not close: {' and '.join(failures)}, which must not be negative; "
-        f"{_way_out(design, joints)}"
+        f"{_least_change(design, joints)}"
     )
 
 
-def _way_out(design: Design, joints: FloatArray) -> str:
+def _least_change(design: Design, joints: FloatArray) -> str:
     """Return the smallest change of a single joint with which the lengths close, in words."""
     moves: list[tuple[float, str]] = []
     for index, intervals in enumerate(feasible_intervals(design, joints)):
@@ -117,14 +108,14 @@ def _way_out(design: Design, joints: FloatArray) -> str:
         if nearest is None:
             continue
         value, name = float(joints[index]), JOINTS[index]
-        closing = _in_few_digits(design, joints, index, nearest)
+        closing = _shortest_text(design, joints, index, nearest)
         moves.append((abs(nearest - value), f"{name} from {value:.10g} to {closing}"))
     if not moves:
         return "no change of a single joint closes them"
     return f"the least change of one joint that closes them is {min(moves)[1]}"
 
 
-def _in_few_digits(design: Design, joints: FloatArray, joint: int, closing: float) -> str:
+def _shortest_text(design: Design, joints: FloatArray, joint: int, closing: float) -> str:
     """Return a closing value of a joint in the fewest digits with which it still closes."""
     trial = joints.copy()
     for digits in range(6, 17):

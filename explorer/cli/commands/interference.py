@@ -4,26 +4,25 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import numpy as np
-import tyro
 
 from explorer.cli.answers.clearances import move_json, move_lines, pose_json, pose_lines
-from explorer.cli.options import DesignOptions, JsonOptions, PoseOptions, RadiiOptions
-from explorer.cli.output import write_json, write_lines
-from explorer.cli.values import numbers, whole_number
+from explorer.cli.options import (
+    DesignOptions,
+    JsonOptions,
+    PoseOptions,
+    RadiiOptions,
+    make_pose,
+)
+from explorer.cli.values import OPTIONAL, hint, numbers, whole_number
 from explorer.errors import InputError
-from explorer.measures.snapshot import Snapshot, evaluate
+from explorer.measures.snapshot import evaluate
 from explorer.mechanism.design import Design
-from explorer.mechanism.pose import Pose, Quadruple, Triple, rotation_from_yaw_pitch_roll
-
-if TYPE_CHECKING:
-    from explorer.legs.moves import MoveClearance
+from explorer.mechanism.pose import Pose, Quadruple, Triple
 
 MOST_STEPS = 100_000
-
-_OPTIONAL = tyro.conf.arg(help_behavior_hint="(optional)")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,10 +34,10 @@ class Interference(JsonOptions, RadiiOptions, PoseOptions, DesignOptions):
     paper's test of swept tetrahedra, which ignores radii and depends on the number of steps.
     """
 
-    to: Annotated[Triple | None, numbers("--to", "x y z"), _OPTIONAL] = None
+    to: Annotated[Triple | None, numbers("--to", "x y z"), OPTIONAL] = None
     """Move b4 straight to this position, in design units."""
 
-    to_quaternion: Annotated[Quadruple | None, numbers("--to-quaternion", "w x y z"), _OPTIONAL] = (
+    to_quaternion: Annotated[Quadruple | None, numbers("--to-quaternion", "w x y z"), OPTIONAL] = (
         None
     )
     """Rotate the platform to this orientation on the move, by the smaller angle."""
@@ -46,69 +45,45 @@ class Interference(JsonOptions, RadiiOptions, PoseOptions, DesignOptions):
     to_yaw_pitch_roll: Annotated[
         Triple | None,
         numbers("--to-yaw-pitch-roll", "yaw pitch roll"),
-        tyro.conf.arg(help_behavior_hint="(instead of --to-quaternion)"),
+        hint("instead of --to-quaternion"),
     ] = None
     """Rotate the platform to this orientation on the move, in degrees."""
 
     steps: Annotated[
         int | None,
         whole_number("--steps", 1, MOST_STEPS),
-        tyro.conf.arg(help_behavior_hint="(default: none longer than the node step)"),
+        hint("default: none longer than the node step"),
     ] = None
     """Number of steps of the move in the paper's test."""
 
     def run(self) -> None:
-        """Write the clearances of the pose or of the move.
-
-        Raises:
-            InputError: a design, pose, move or number that cannot be used.
-        """
+        """Write the clearances of the pose or of the move."""
         design = self.with_radii(self.load())
         start = self.pose(design)
-        end = self._end(start)
-        if end is None:
+        here = evaluate(design, start)
+        target = (self.to, self.to_quaternion, self.to_yaw_pitch_roll)
+        if target == (None, None, None):
             if self.steps is not None:
                 raise InputError(
                     "--steps divides a move; say where it goes with --to, --to-quaternion or "
                     "--to-yaw-pitch-roll"
                 )
-            self._write_pose(evaluate(design, start))
+            self.write(lambda: pose_json(here), lambda: pose_lines(here))
             return
         from explorer.legs.moves import move_clearance
 
+        end = make_pose("--to-", start, *target)
         steps = _steps_of(design, start, end) if self.steps is None else self.steps
-        self._write_move(design, move_clearance(design, start, end, steps=steps))
-
-    def _end(self, start: Pose) -> Pose | None:
-        """Return the end of the move; None without a move."""
-        if self.to_quaternion is not None and self.to_yaw_pitch_roll is not None:
-            raise InputError("give one of --to-quaternion and --to-yaw-pitch-roll, not both")
-        position = start.position if self.to is None else self.to
-        if self.to_yaw_pitch_roll is not None:
-            return Pose.of(position, rotation_from_yaw_pitch_roll(self.to_yaw_pitch_roll))
-        if self.to_quaternion is not None:
-            return Pose(position, self.to_quaternion)
-        return None if self.to is None else Pose(position, start.quaternion)
-
-    def _write_pose(self, snapshot: Snapshot) -> None:
-        if self.json:
-            write_json(pose_json(snapshot))
-        else:
-            write_lines(*pose_lines(snapshot))
-
-    def _write_move(self, design: Design, move: MoveClearance) -> None:
-        start, end = evaluate(design, move.start), evaluate(design, move.end)
-        if self.json:
-            write_json(move_json(move, start, end))
-        else:
-            write_lines(*move_lines(move, start, end))
+        move = move_clearance(design, start, end, steps=steps)
+        there = evaluate(design, end)
+        self.write(lambda: move_json(move, here, there), lambda: move_lines(move, here, there))
 
 
 def _steps_of(design: Design, start: Pose, end: Pose) -> int:
     """Return the number of steps in which no leg's end moves farther than a node step.
 
     Raises:
-        InputError: the number exceeds `MOST_STEPS`.
+        InputError: The number exceeds `MOST_STEPS`.
     """
     from explorer.workspace.slices.volume import STEPS_IN_REACH
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from explorer.cli.options import DesignOptions, JsonOptions, PoseOptions
-from explorer.cli.output import figure, heading, pose_table, table, write_json, write_lines
+from explorer.cli.output import heading, lengths, limits_json, pose_table, table
 from explorer.measures.snapshot import Snapshot, evaluate
 from explorer.mechanism.design import JOINTS, LENGTHS
 
@@ -18,44 +19,21 @@ class Inverse(JsonOptions, PoseOptions, DesignOptions):
     """
 
     def run(self) -> None:
-        """Write the joints of the pose.
-
-        Raises:
-            InputError: a design or pose that cannot be used.
-        """
+        """Write the joints of the pose."""
         design = self.load()
         snapshot = evaluate(design, self.pose(design))
-        if self.json:
-            write_json(
-                {
-                    "joints": snapshot.joints.tolist(),
-                    "within_limits": not snapshot.violations,
-                    "violations": [str(violation) for violation in snapshot.violations],
-                }
-            )
-        else:
-            write_lines(
-                heading(design),
-                pose_table(design, snapshot.pose),
-                "",
-                _joint_table(snapshot),
-                "",
-                *_verdict(snapshot),
-            )
+        self.write(
+            lambda: {"joints": snapshot.joints, **limits_json(snapshot)}, lambda: _lines(snapshot)
+        )
 
 
-def _joint_table(snapshot: Snapshot) -> str:
+def _lines(snapshot: Snapshot) -> Iterator[str]:
     design = snapshot.design
     rows = [("joint", "units", "mm", "limits")]
     for name, value in zip(JOINTS, snapshot.joints.tolist(), strict=True):
         bounds = design.length_range(name) if name in LENGTHS else design.limits.guide
         allowed = f"{bounds[0]:.6g} to {bounds[1]:.6g}" if bounds else "none"
-        unit, reach = design.unit_mm, design.reach
-        rows.append((name, figure(value, reach), figure(value * unit, reach * unit), allowed))
-    return table(rows, "<>><")
-
-
-def _verdict(snapshot: Snapshot) -> list[str]:
-    if not snapshot.violations:
-        return ["within the limits"]
-    return ["outside the limits:", *(f"  {violation}" for violation in snapshot.violations)]
+        rows.append((name, *lengths(design, value, design.reach), allowed))
+    yield from (heading(design), pose_table(design, snapshot.pose), "", table(rows, "<>><"), "")
+    yield "outside the limits:" if snapshot.violations else "within the limits"
+    yield from (f"  {violation}" for violation in snapshot.violations)

@@ -5,10 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
-
-import tyro
-from tyro.constructors import PrimitiveConstructorSpec
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from explorer.cli.answers.optimisation import (
     finding_json,
@@ -19,11 +16,21 @@ from explorer.cli.answers.optimisation import (
     outcome_lines,
 )
 from explorer.cli.options import DesignOptions, JsonOptions
-from explorer.cli.output import heading, write_json, write_lines
+from explorer.cli.output import heading, write_json
 from explorer.cli.progress import SearchMeter
 from explorer.cli.streams import write_error
 from explorer.cli.usage import UsageError
-from explorer.cli.values import numbers, numbers_or_none, positive, whole_number
+from explorer.cli.values import (
+    FILE,
+    OPTIONAL,
+    Flag,
+    hint,
+    numbers,
+    numbers_or_none,
+    positive,
+    texts,
+    whole_number,
+)
 from explorer.errors import InputError, NoAnswerError
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import encode_design
@@ -36,25 +43,7 @@ if TYPE_CHECKING:
 
 Six = tuple[float, float, float, float, float, float]
 
-_OPTIONAL = tyro.conf.arg(help_behavior_hint="(optional)")
-_FILE = tyro.conf.arg(metavar="FILE", help_behavior_hint="(optional)")
-
-
-def _words(option: str, metavar: str) -> PrimitiveConstructorSpec[Any]:
-    """Return the parser of an option with one word or more."""
-
-    def read(words: list[str]) -> tuple[str, ...]:
-        if not words:
-            raise UsageError(f"{option} needs at least one value, such as {metavar}")
-        return tuple(words)
-
-    return PrimitiveConstructorSpec(
-        nargs="*",
-        metavar=metavar,
-        instance_from_str=read,
-        is_instance=lambda value: isinstance(value, tuple),
-        str_from_instance=list,
-    )
+_CORNERS = "x-low y-low z-low x-high y-high z-high"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,54 +61,46 @@ class Optimise(JsonOptions, DesignOptions):
     """Objective: F = |1 − V/V′| of the exact volume, the reach, the volume, or the worst margin
     over a box."""
 
-    target_volume: Annotated[float | None, positive("--target-volume"), _OPTIONAL] = None
+    target_volume: Annotated[float | None, positive("--target-volume"), OPTIONAL] = None
     """Volume to match, or least volume; for the smallest reach by default that of the design."""
 
-    target_reach: Annotated[float | None, positive("--target-reach"), _OPTIONAL] = None
+    target_reach: Annotated[float | None, positive("--target-reach"), OPTIONAL] = None
     """Largest reach; for the largest volume by default that of the design."""
 
     box: Annotated[
         Six | tuple[()] | None,
-        numbers_or_none("--box", "x-low y-low z-low x-high y-high z-high"),
-        tyro.conf.arg(help_behavior_hint="(default: that of the design)"),
+        numbers_or_none("--box", _CORNERS),
+        hint("default: that of the design"),
     ] = None
     """Box that bounds the workspace, in design units; none lifts that of the design."""
 
-    clearance: Annotated[float | None, positive("--clearance"), _OPTIONAL] = None
+    clearance: Annotated[float | None, positive("--clearance"), OPTIONAL] = None
     """Least clearance of every pair of legs over the workspace, in design units."""
 
     clearance_margin: Annotated[
-        float | None,
-        positive("--clearance-margin"),
-        tyro.conf.arg(help_behavior_hint="(default: a 20th of the reach)"),
+        float | None, positive("--clearance-margin"), hint("default: a 20th of the reach")
     ] = None
     """Least margin of the poses at which the clearance is demanded: legs meet at singularities."""
 
-    stroke_ratio: Annotated[float | None, positive("--stroke-ratio"), _OPTIONAL] = None
+    stroke_ratio: Annotated[float | None, positive("--stroke-ratio"), OPTIONAL] = None
     """Largest ratio of longest to shortest length of an actuator."""
 
-    required_box: Annotated[
-        Six | None,
-        numbers("--required-box", "x-low y-low z-low x-high y-high z-high"),
-        _OPTIONAL,
-    ] = None
+    required_box: Annotated[Six | None, numbers("--required-box", _CORNERS), OPTIONAL] = None
     """A box that must lie in the workspace, in design units."""
 
     least: Annotated[
-        float | None,
-        positive("--least"),
-        tyro.conf.arg(help_behavior_hint="(default: a 20th of the largest variable)"),
+        float | None, positive("--least"), hint("default: a 20th of the largest variable")
     ] = None
-    """Smallest |a3y|, |b1y| and |b3 − b2|, which a degenerate design has at zero."""
+    """Smallest |a3y|, |b1y| and |b3 − b2|; a design with one of them zero is degenerate."""
 
-    free: Annotated[tuple[str, ...], _words("--free", "yaw|reach|shift-x|…"), _OPTIONAL] = ()
-    """What else may change: yaw, reach, or the required box by shift-x, shift-y, shift-z."""
+    free: Annotated[tuple[str, ...], texts("--free", "yaw|reach|shift-x|…"), OPTIONAL] = ()
+    """Further free variables: yaw, reach, and shift-x, shift-y, shift-z of the required box."""
 
-    bounds: Annotated[tuple[str, ...], _words("--bounds", "NAME=LOW:HIGH …"), _OPTIONAL] = ()
+    bounds: Annotated[tuple[str, ...], texts("--bounds", "NAME=LOW:HIGH …"), OPTIONAL] = ()
     """Bounds of variables, such as b1x=-10:10 yaw=-90:-45."""
 
     starts: Annotated[int, whole_number("--starts", 1, 10_000)] = 1
-    """From how many designs to start: the given one, and others within the bounds."""
+    """Number of starts: the given design, and others within the bounds."""
 
     seed: Annotated[int, whole_number("--seed", 0, 2**31 - 1)] = 0
     """Seed of the other starts."""
@@ -127,27 +108,23 @@ class Optimise(JsonOptions, DesignOptions):
     iterations: Annotated[int, whole_number("--iterations", 1, 100_000)] = 300
     """Largest number of iterations per start."""
 
-    out: Annotated[Path | None, _FILE] = None
+    out: Annotated[Path | None, FILE] = None
     """File for the optimal design; the record of the search is written beside it."""
 
-    record: Annotated[
-        Path | None,
-        tyro.conf.arg(metavar="FILE", help_behavior_hint="(default: OUT with .record.json)"),
-    ] = None
+    record: Annotated[Path | None, hint("default: OUT with .record.json", "FILE")] = None
     """File for the record: problem, history and versions, written even without convergence."""
 
-    repeat: Annotated[Path | None, _FILE] = None
+    repeat: Annotated[Path | None, FILE] = None
     """Record whose problem to solve again, instead of one given by options."""
 
-    findings: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    findings: Flag = False
     """Compare our optima with the paper's instead."""
 
     def run(self) -> None:
         """Write the outcome of the search.
 
         Raises:
-            InputError: a design, problem or file that cannot be used.
-            NoAnswerError: the search did not converge; the best iterate has been written.
+            NoAnswerError: The search did not converge; the best iterate has been written.
         """
         if self.findings:
             self._write_findings()
@@ -164,10 +141,10 @@ class Optimise(JsonOptions, DesignOptions):
         self._check_possible(problem)
         outcome = _search(problem, settings)
         written = self._write_files(outcome, settings, record)
-        if self.json:
-            write_json(outcome_json(outcome, written))
-        else:
-            write_lines(heading(optimised_design(outcome)), *outcome_lines(outcome, written))
+        self.write(
+            lambda: outcome_json(outcome, written),
+            lambda: (heading(optimised_design(outcome)), *outcome_lines(outcome, written)),
+        )
         if not outcome.converged:
             raise NoAnswerError(outcome.run.message)
 
@@ -209,7 +186,7 @@ class Optimise(JsonOptions, DesignOptions):
         """Refuse a problem that the limits make infeasible, before kernels are compiled.
 
         Raises:
-            NoAnswerError: no design within the bounds meets the demands; the message says what
+            NoAnswerError: No design within the bounds meets the demands; the message says what
                 would help.
         """
         from explorer.optimise.refutation.refutation import (
@@ -219,11 +196,11 @@ class Optimise(JsonOptions, DesignOptions):
             words_of,
         )
 
-        found = refutations(problem)
-        if not found:
+        refuted = refutations(problem)
+        if not refuted:
             return
-        message = words_of(found)
-        if self.repeat is None and any(each.limit == BOX_LIMIT for each in found):
+        message = words_of(refuted)
+        if self.repeat is None and any(reason.limit == BOX_LIMIT for reason in refuted):
             advice = "lift the box with --box none"
             box = paper_box(problem)
             if box is not None:
@@ -231,7 +208,7 @@ class Optimise(JsonOptions, DesignOptions):
                 advice += f", or take the paper's with --box {corners}"
             message += f": {advice}"
         if self.json:
-            write_json(infeasible_json(problem, found[0].limit, message))
+            write_json(infeasible_json(problem, refuted[0].limit, message))
         raise NoAnswerError(message)
 
     def _write_files(self, outcome: Outcome, settings: Settings, record: Path | None) -> list[Path]:
@@ -253,19 +230,19 @@ class Optimise(JsonOptions, DesignOptions):
         from explorer.optimise.findings import findings
 
         warm()
-        found = list(findings(lambda name: write_error(f"computing: {name}")))
-        if self.json:
-            write_json({"findings": [finding_json(each) for each in found]})
-        else:
-            write_lines(findings_table(found))
+        optima = list(findings(lambda name: write_error(f"computing: {name}")))
+        self.write(
+            lambda: {"findings": [finding_json(optimum) for optimum in optima]},
+            lambda: [findings_table(optima)],
+        )
 
 
 def _search(problem: Problem, settings: Settings) -> Outcome:
     """Run a search with a progress bar."""
     from explorer.optimise.solver import optimise_design
 
-    called = CALLED[problem.objective]
-    with SearchMeter(settings.starts, settings.iterations, called) as meter:
+    symbol = CALLED[problem.objective]
+    with SearchMeter(settings.starts, settings.iterations, symbol) as meter:
         return optimise_design(
             problem,
             starts=settings.starts,

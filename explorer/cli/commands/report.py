@@ -7,10 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import tyro
-
 from explorer.cli.options import DesignOptions, JsonOptions, PoseOptions
-from explorer.cli.output import write_json, write_lines
+from explorer.cli.values import FILE
 from explorer.errors import InputError
 
 if TYPE_CHECKING:
@@ -29,17 +27,14 @@ class Report(JsonOptions, PoseOptions, DesignOptions):
     out: Path = Path("report.html")
     """File to write, .html or .pdf; an existing one is replaced."""
 
-    record: Annotated[
-        Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="(optional)")
-    ] = None
+    record: Annotated[Path | None, FILE] = None
     """Record of the search that found the design, written by `explorer optimise`."""
 
     def run(self) -> None:
         """Write the report and its path.
 
         Raises:
-            InputError: a design, pose, record or file that cannot be used.
-            MissingExtraError: PDF without the extra "screenshot" or a Chromium.
+            MissingExtraError: A PDF needs the extra "screenshot" and a Chromium.
         """
         from explorer.files.writing import check_writable, write_whole
 
@@ -57,29 +52,17 @@ class Report(JsonOptions, PoseOptions, DesignOptions):
 
         data = make_report(design, pose, record=record, file_format=file_format)
         write_whole(self.out, data)
-        if self.json:
-            write_json(
-                {
-                    "out": str(self.out),
-                    "format": file_format,
-                    "bytes": len(data),
-                    "seconds": time.monotonic() - start,
-                }
-            )
-        else:
-            write_lines(str(self.out))
+        facts = {"format": file_format, "bytes": len(data), "seconds": time.monotonic() - start}
+        self.write(lambda: {"out": self.out, **facts}, lambda: [str(self.out)])
 
 
 def format_of(path: Path) -> ReportFormat:
     """Return the format that the suffix of a file names.
 
     Raises:
-        InputError: the suffix is not .html, .htm or .pdf.
+        InputError: The suffix is not .html, .htm or .pdf.
     """
-    match path.suffix.lower():
-        case ".html" | ".htm":
-            return "html"
-        case ".pdf":
-            return "pdf"
-        case _:
-            raise InputError(f"--out must end in .html or .pdf; got {str(path)!r}")
+    formats: dict[str, ReportFormat] = {".html": "html", ".htm": "html", ".pdf": "pdf"}
+    if path.suffix.lower() not in formats:
+        raise InputError(f"--out must end in .html or .pdf; got {str(path)!r}")
+    return formats[path.suffix.lower()]

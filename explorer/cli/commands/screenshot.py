@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from explorer.cli.options import DesignOptions, JsonOptions, PoseOptions
-from explorer.cli.output import write_json, write_lines
 from explorer.cli.values import pixels
 from explorer.errors import InputError
 
@@ -38,8 +37,7 @@ class Screenshot(JsonOptions, PoseOptions, DesignOptions):
         """Draw the picture and write its path.
 
         Raises:
-            InputError: a design, pose or file that cannot be used.
-            MissingExtraError: the extra "screenshot" or a Chromium is missing.
+            MissingExtraError: The extra "screenshot" or a Chromium is missing.
         """
         from explorer.files.writing import check_writable
 
@@ -53,7 +51,4 @@ class Screenshot(JsonOptions, PoseOptions, DesignOptions):
         # Standard output belongs to the answer; viser reports there when a server stops.
         with contextlib.redirect_stdout(io.StringIO()):
             take(design, pose, view=self.view, out=self.out, size=self.size, panels=self.panels)
-        if self.json:
-            write_json({"file": str(self.out), "size": list(self.size)})
-        else:
-            write_lines(str(self.out))
+        self.write(lambda: {"file": self.out, "size": self.size}, lambda: [str(self.out)])

@@ -10,14 +10,14 @@ from typing import Annotated
 import tyro
 
 from explorer.cli.options import load
-from explorer.cli.values import whole_number
+from explorer.cli.values import DESIGN_NAME, hint, whole_number
 
 
 @dataclass(frozen=True, kw_only=True)
 class Serve:
     """Serve the explorer's page and open it in the browser (the default)."""
 
-    design: Annotated[str | None, tyro.conf.arg(metavar="PRESET_OR_FILE")] = None
+    design: Annotated[str | None, tyro.conf.arg(metavar=DESIGN_NAME)] = None
     """A preset, a design file (JSON), or the name of a design saved on the page; by default the
     last session."""
 
@@ -31,10 +31,7 @@ class Serve:
     """Access token of 16 to 128 letters, digits, - and _; by default that of the environment
     variable EXPLORER_TOKEN, else a random one if other machines can connect."""
 
-    study: Annotated[
-        tuple[Path, ...],
-        tyro.conf.arg(metavar="FOLDER …", help_behavior_hint="(optional)"),
-    ] = ()
+    study: Annotated[tuple[Path, ...], hint("optional", "FOLDER …")] = ()
     """Results of explorer sweep to list on the page, beside the studies run there."""
 
     open: bool = True
@@ -44,14 +41,12 @@ class Serve:
         """Serve the page until interrupted.
 
         Raises:
-            DesignError: a design that cannot be used.
-            InputError: a folder without the results of a study.
-            ServerError: the server cannot start, for instance because the port is in use, or
+            ServerError: The server cannot start, for instance because the port is in use, or
                 the token cannot be used.
         """
         design = None if self.design is None else load(self.design)
-        from explorer.app.features.studies.folders import check_given
         from explorer.app.server import serve
+        from explorer.app.storage.study_folders import check_given
 
         check_given(self.study)
 

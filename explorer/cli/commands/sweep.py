@@ -17,11 +17,10 @@ from explorer.cli.answers.study import (
     summary_lines,
 )
 from explorer.cli.options import JsonOptions, load
-from explorer.cli.output import write_json, write_lines
 from explorer.cli.progress import Meter
 from explorer.cli.streams import write, write_error
 from explorer.cli.usage import UsageError
-from explorer.cli.values import whole_number
+from explorer.cli.values import DESIGN_NAME, OPTIONAL, Flag, hint, whole_number
 from explorer.mechanism.design_file import encode_design
 
 if TYPE_CHECKING:
@@ -29,8 +28,6 @@ if TYPE_CHECKING:
     from explorer.sweep.workers import Workers
 
 _PROGRAM = "explorer sweep"
-_OPTIONAL = tyro.conf.arg(help_behavior_hint="(optional)")
-_FILE = tyro.conf.arg(metavar="FILE", help_behavior_hint="(optional)")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,66 +43,57 @@ class Sweep(JsonOptions):
     ] = None
     """Study file (JSON), or a built-in study (trade-off)."""
 
-    out: Annotated[
-        Path | None, tyro.conf.arg(metavar="FOLDER", help_behavior_hint="(needed for results)")
-    ] = None
+    out: Annotated[Path | None, hint("needed for results", "FOLDER")] = None
     """Folder of the results, with one file per chunk; created if it does not exist."""
 
-    design: Annotated[
-        str | None,
-        tyro.conf.arg(metavar="PRESET_OR_FILE", help_behavior_hint="(default: the study's)"),
-    ] = None
+    design: Annotated[str | None, hint("default: the study's", DESIGN_NAME)] = None
     """Design to vary instead of the study's own: a preset, a design file, or the name of a design
     saved on the page."""
 
     workers: Annotated[
-        int | None,
-        whole_number("--workers", 1, 1024),
-        tyro.conf.arg(help_behavior_hint="(default: one a core)"),
+        int | None, whole_number("--workers", 1, 1024), hint("default: one a core")
     ] = None
     """Number of processes of this machine that evaluate designs."""
 
-    scheduler: Annotated[
-        str | None, tyro.conf.arg(metavar="tcp://HOST:PORT", help_behavior_hint="(optional)")
-    ] = None
+    scheduler: Annotated[str | None, hint("optional", "tcp://HOST:PORT")] = None
     """Dask scheduler whose workers evaluate designs instead; needs the extra `cluster`."""
 
-    limit: Annotated[int | None, whole_number("--limit", 1, 2**30), _OPTIONAL] = None
+    limit: Annotated[int | None, whole_number("--limit", 1, 2**30), OPTIONAL] = None
     """Stop after about this many further designs; the same command continues."""
 
-    summary: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    summary: Flag = False
     """Summarise the folder with its Pareto front, and compute nothing."""
 
-    row: Annotated[int | None, whole_number("--row", 0, 2**30), _OPTIONAL] = None
+    row: Annotated[int | None, whole_number("--row", 0, 2**30), OPTIONAL] = None
     """Write the design with this index in the results as a design file, and compute nothing."""
 
-    new: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    new: Flag = False
     """Write an example of a study file, and compute nothing."""
 
     def run(self) -> None:
         """Compute the missing designs and summarise the folder.
 
         Raises:
-            InputError: a study, folder, index or scheduler that cannot be used.
-            RunError: the workers were lost or cannot evaluate designs.
-            MissingExtraError: an extra is not installed.
+            RunError: The workers were lost or cannot evaluate designs.
+            MissingExtraError: An extra is not installed.
         """
         if self.new:
             self._write_study()
             return
         if self.out is None:
             raise UsageError("name the folder of the results with --out", _PROGRAM)
-        if self.summary or self.row is not None:
-            if self.row is not None:
-                self._write_design(self.out, self.row)
-            else:
-                self._write_summary(self.out)
-            return
-        if self.study is None:
+        if self.row is not None:
+            from explorer.sweep.results import design_at
+
+            write(encode_design(design_at(self.out, self.row)).decode())
+        elif self.summary:
+            self._write_summary(self.out)
+        elif self.study is not None:
+            self._compute(self._load_study(self.study), self.out)
+        else:
             raise UsageError(
                 "name a study file, or give --summary to summarise the folder", _PROGRAM
             )
-        self._compute(self._load_study(self.study), self.out)
 
     def _load_study(self, name: str) -> Study:
         from explorer.sweep.study import load_study
@@ -126,7 +114,7 @@ class Sweep(JsonOptions):
                     folder,
                     workers,
                     limit=self.limit,
-                    told=lambda progress: meter.show(
+                    watch=lambda progress: meter.show(
                         progress_line(progress), progress.done / progress.total
                     ),
                 )
@@ -137,10 +125,10 @@ class Sweep(JsonOptions):
             finally:
                 # Pending tasks are useless after any kind of end.
                 workers.shutdown(cancel_futures=True)
-        if self.json:
-            write_json(progress_json(progress) | {"study": study.name, "folder": str(folder)})
-        else:
-            write_lines(*progress_lines(study, folder, progress))
+        self.write(
+            lambda: progress_json(progress) | {"study": study.name, "folder": folder},
+            lambda: progress_lines(study, folder, progress),
+        )
 
     def _workers(self) -> Workers:
         if self.scheduler is None:
@@ -161,28 +149,20 @@ class Sweep(JsonOptions):
     def _write_summary(self, folder: Path) -> None:
         from explorer.sweep.results import summarise
 
-        found = summarise(folder)
-        if found.damaged:
-            one = found.damaged == 1
+        summary = summarise(folder)
+        if summary.damaged:
+            one = summary.damaged == 1
             write_error(
-                f"{found.damaged} damaged part{' is' if one else 's are'} left out; a run computes "
-                f"{'it' if one else 'them'} again"
+                f"{summary.damaged} damaged part{' is' if one else 's are'} left out; "
+                f"a run computes {'it' if one else 'them'} again"
             )
-        if found.strays:
-            more = f" and {len(found.strays) - 1} more" if len(found.strays) > 1 else ""
+        if summary.strays:
+            more = f" and {len(summary.strays) - 1} more" if len(summary.strays) > 1 else ""
             write_error(
-                f"left out, since no part of the study has that name: {found.strays[0]!r}{more}; "
+                f"left out, since no part of the study has that name: {summary.strays[0]!r}{more}; "
                 "move such files away, because programs that read the whole folder read them too"
             )
-        if self.json:
-            write_json(summary_json(found, folder))
-        else:
-            write_lines(*summary_lines(found))
-
-    def _write_design(self, folder: Path, index: int) -> None:
-        from explorer.sweep.results import design_at
-
-        write(encode_design(design_at(folder, index)).decode())
+        self.write(lambda: summary_json(summary, folder), lambda: summary_lines(summary))
 
     def _write_study(self) -> None:
         from explorer.sweep.study import STUDIES, encode_study

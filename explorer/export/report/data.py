@@ -7,14 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from hashlib import sha256
 from typing import TypeVar
 
 from explorer.errors import ExplorerError
 from explorer.export.simulation import DENSITY
+from explorer.measures.case import Case
+from explorer.measures.catalogue import measures_in
+from explorer.measures.measurements import Measurements, measure_design
 from explorer.measures.snapshot import Snapshot, evaluate
 from explorer.mechanism.design import Design
-from explorer.mechanism.design_file import encode_design
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import Pose
 from explorer.optimise.record import Record
@@ -29,7 +30,7 @@ from explorer.singularity.ellipsoids import (
 )
 from explorer.workspace.accessible.workspace import ReachableWorkspace, reachable_workspace
 from explorer.workspace.least_clearance import LeastClearances, least_clearances
-from explorer.workspace.slices.volume import NodeCount, Volume, workspace_nodes, workspace_volume
+from explorer.workspace.slices.volume import NodeCount, Volume
 from explorer.workspace.solids.solid import Solid
 from explorer.workspace.solids.solids import convex_hull, workspace_solid
 
@@ -52,9 +53,10 @@ class ReportData:
     """The data of a report: a design in a pose and its workspace at that orientation.
 
     Attributes:
-        snapshot: Measures of the design in the pose.
+        case: Design and pose, as the catalogue measures them.
+        measured: Measures of the catalogue that the report lists.
+        snapshot: Values of the design in the pose.
         is_home: Whether the pose is the home pose.
-        volume: Exact volume of the workspace.
         nodes: Nodes of the workspace, counted as in the paper.
         solid: Mesh of the workspace.
         hull_volume: Volume of the convex hull of the mesh, in cubed design units.
@@ -68,9 +70,10 @@ class ReportData:
         record: Record of the search that found the design; None without one.
     """
 
+    case: Case
+    measured: Measurements
     snapshot: Snapshot
     is_home: bool
-    volume: Volume
     nodes: NodeCount | Missing
     solid: Solid | Missing
     hull_volume: float | Missing
@@ -85,17 +88,22 @@ class ReportData:
     @property
     def design(self) -> Design:
         """The design."""
-        return self.snapshot.design
+        return self.case.design
 
     @property
-    def design_file(self) -> str:
-        """The text of the design file."""
-        return encode_design(self.design).decode()
+    def unit_mm(self) -> float:
+        """Millimetres per design unit."""
+        return self.design.unit_mm
 
     @property
-    def design_hash(self) -> str:
-        """The SHA-256 of the design file, in hexadecimal."""
-        return sha256(encode_design(self.design)).hexdigest()
+    def volume(self) -> Volume:
+        """The exact volume of the workspace."""
+        return self.case.volume
+
+    @property
+    def pose_words(self) -> str:
+        """The words for the pose."""
+        return "its home pose" if self.is_home else "the pose of this report"
 
 
 def gather_report_data(
@@ -109,25 +117,26 @@ def gather_report_data(
             None.
         record: Record of the search that found the design.
     """
-    home = home_pose(design)
-    at = home if pose is None else pose
-    r = at.rotation
-    volume = workspace_volume(design, r)
+    case = Case(design, pose=pose)
+    at, r = case.at, case.rotation
     solid = Missing("the workspace is empty")
-    if volume.volume > 0.0:
-        solid = _compute(lambda: workspace_solid(design, r, volume=volume))
-    thick = any(design.limits.leg_radii)
+    if case.volume.volume > 0.0:
+        solid = _compute(lambda: workspace_solid(design, r, volume=case.volume))
+    if not isinstance(solid, Missing):
+        case.mesh = solid
+    reachable = None
+    if any(design.limits.leg_radii):
+        reachable = _compute(lambda: reachable_workspace(design, r, start=at.position))
     return ReportData(
+        case=case,
+        measured=measure_design(case, measures_in("report")),
         snapshot=evaluate(design, at),
-        is_home=at == home,
-        volume=volume,
-        nodes=_compute(lambda: workspace_nodes(design, r)),
+        is_home=at == home_pose(design),
+        nodes=_compute(lambda: case.paper_nodes),
         solid=solid,
         hull_volume=solid if isinstance(solid, Missing) else _compute(lambda: _hull(solid)),
         least=least_clearances(design, r),
-        reachable=_compute(lambda: reachable_workspace(design, r, start=at.position))
-        if thick
-        else None,
+        reachable=reachable,
         performance=performance(design, at),
         ball=singularity_free_ball(at),
         certified=certified_radius(design, at),
@@ -141,6 +150,7 @@ def _hull(solid: Solid) -> float:
 
 
 def _compute(function: Callable[[], T]) -> T | Missing:
+    """Return the value of a function, or why it cannot be computed."""
     try:
         return function()
     except ExplorerError as error:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import datetime as dt
 import shlex
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
+from hashlib import sha256
 from importlib import resources
 from xml.etree.ElementTree import Element
 
@@ -23,13 +24,14 @@ from explorer.export.report.markup import (
     whole,
 )
 from explorer.export.report.sections.legs import legs_section
-from explorer.export.report.sections.mechanism import mechanism_section, pose_words
+from explorer.export.report.sections.mechanism import mechanism_section
 from explorer.export.report.sections.parts import parts_section
 from explorer.export.report.sections.search import search_section
 from explorer.export.report.sections.singularity import singularity_section
 from explorer.export.report.sections.workspace import workspace_section
 from explorer.files.versions import versions
-from explorer.mechanism.design_file import PRESETS
+from explorer.measures.catalogue import CATALOGUE
+from explorer.mechanism.design_file import PRESETS, encode_design
 from explorer.workspace.accessible.workspace import ReachableWorkspace
 
 # The page may fetch nothing.
@@ -59,12 +61,10 @@ def report_html(data: ReportData, date: dt.date) -> str:
         element("style", style),
     )
     body = element("body", element("header", *_title_block(data, date), class_="cover"))
-    for section in (mechanism_section, workspace_section, singularity_section, legs_section):
-        body.append(element("section", *section(data)))
-    body.append(element("section", *parts_section(data)))
-    if data.record is not None:
-        body.append(element("section", *search_section(data, data.record)))
-    body.append(element("section", *_reproduction(data)))
+    for section in _SECTIONS:
+        pieces = list(section(data))
+        if pieces:
+            body.append(element("section", *pieces))
     return f"<!DOCTYPE html>\n{as_html(element('html', head, body, lang='en-GB'))}\n"
 
 
@@ -73,48 +73,52 @@ def _meta(name: str, content: str) -> Element:
 
 
 def _title_block(data: ReportData, date: dt.date) -> Iterator[Element]:
-    design = data.design
     yield element("p", "Design report", class_="kind")
     yield element("h1", _name(data))
     yield element("p", "Flagged 4-4 parallel manipulator", class_="subtitle")
-    particulars: tuple[tuple[str, Piece], ...] = (
+    code = _hash(data)
+    particulars = (
         ("Date", element("time", date.isoformat(), datetime=date.isoformat())),
         ("Made by", f"Flagged 4-4 explorer {__version__}"),
-        ("Unit", f"1 unit = {format_number(design.unit_mm)} mm"),
-        (
-            "Design file, SHA-256",
-            element("span", f"{data.design_hash[:16]}…", title=data.design_hash),
-        ),
+        ("Unit", f"1 unit = {format_number(data.unit_mm)} mm"),
+        ("Design file, SHA-256", element("span", f"{code[:16]}…", title=code)),
     )
-    yield element("dl", *map(_entry, particulars), class_="particulars")
-    yield illustration(cover_drawing(data.snapshot), f"The mechanism in {pose_words(data)}.")
-    yield element("dl", *map(_entry, _headline(data)), class_="headline")
+    yield element("dl", *(_entry(*each) for each in particulars), class_="particulars")
+    yield illustration(cover_drawing(data.snapshot), f"The mechanism in {data.pose_words}.")
+    yield element("dl", *(_entry(*each) for each in _headline(data)), class_="headline")
 
 
 def _name(data: ReportData) -> str:
     return data.design.name or "untitled"
 
 
-def _entry(entry: tuple[str, Piece | tuple[Piece, ...]]) -> Element:
-    name, value = entry
-    pieces = value if isinstance(value, tuple) else (value,)
+def _hash(data: ReportData) -> str:
+    """Return the SHA-256 of the design file, in hexadecimal."""
+    return sha256(encode_design(data.design)).hexdigest()
+
+
+def _entry(name: Piece, *pieces: Piece) -> Element:
     return element("div", element("dt", name), element("dd", *pieces))
 
 
-def _headline(data: ReportData) -> Iterator[tuple[str, tuple[Piece, ...]]]:
-    unit = data.design.unit_mm
-    yield "Exact volume", (number(data.volume.volume), _unit("units³"))
-    if isinstance(data.nodes, Missing):
-        yield "Node volume", ("–",)
-    else:
-        many = element("span", whole(data.nodes.count), " nodes")
-        yield "Node volume", (number(data.nodes.volume), _unit("units³, "), many)
-    yield "Reach", (number(data.design.reach * unit, 4), _unit("mm"))
-    margin = data.snapshot.proximity * data.design.reach
-    yield "Smallest margin |δ| here", (number(margin * unit, 4), _unit("mm"))
-    yield "Inverse condition here", (number(data.snapshot.inverse_condition, 4), _unit("of 1"))
-    clearance = float(data.snapshot.clearances.clearance.min())
-    yield "Least clearance of legs here", (number(clearance * unit, 4), _unit("mm"))
+def _headline(data: ReportData) -> Iterator[tuple[Piece, ...]]:
+    unit, snapshot = data.unit_mm, data.snapshot
+    for name, value in data.measured.values.items():
+        measure = CATALOGUE[name]
+        title = f"{measure.heading[:1].upper()}{measure.heading[1:]}"
+        if value is None:
+            yield title, "–"
+        elif name == "node_volume" and not isinstance(data.nodes, Missing):
+            count = element("span", whole(data.nodes.count), " nodes")
+            yield title, number(value), _unit("units³, "), count
+        else:
+            yield title, number(value), _unit(measure.unit_in("units"))
+    yield "Reach", number(data.design.reach * unit, 4), _unit("mm")
+    margin = snapshot.proximity * data.design.reach
+    yield "Smallest margin |δ| here", number(margin * unit, 4), _unit("mm")
+    yield "Inverse condition here", number(snapshot.inverse_condition, 4), _unit("of 1")
+    clearance = float(snapshot.clearances.clearance.min())
+    yield "Least clearance of legs here", number(clearance * unit, 4), _unit("mm")
 
 
 def _unit(words: str) -> Element:
@@ -122,64 +126,62 @@ def _unit(words: str) -> Element:
 
 
 def _reproduction(data: ReportData) -> Iterator[Element]:
-    design = data.design
     yield element("h2", "How to reproduce it")
-    is_preset = PRESETS.get(design.name) == design
-    source = design.name if is_preset else "design.json"
-    pose = data.snapshot.pose
-    orientation = f" --quaternion {_words(pose.quaternion)}"
-    position = f" --position {_words(pose.position)}"
-    at = "" if data.is_home else position + orientation
-    turned = "" if data.is_home else orientation
-    radii = " --interference" if isinstance(data.reachable, ReachableWorkspace) else ""
-    record = "" if data.record is None else " --record record.json"
-    commands = [
-        f"explorer report --design {shlex.quote(source)}{at}{record} --out report.html",
-        f"explorer workspace --design {shlex.quote(source)}{turned} --hull{radii}",
-        f"explorer singularity --design {shlex.quote(source)}{at}",
-        f"explorer interference --design {shlex.quote(source)}{at}",
-    ]
-    if not isinstance(data.bill, Missing):
-        commands.append(
-            f"explorer export mechanism --design {shlex.quote(source)} --out mechanism.zip"
-        )
-    if data.record is not None:
-        commands.append("explorer optimise --repeat record.json --out data.json")
+    is_preset = PRESETS.get(data.design.name) == data.design
     where: tuple[Piece, ...] = ("The design is a preset of the explorer. ",)
     if not is_preset:
         where = ("Save the file below as ", element("code", "design.json"), ". ")
     yield paragraph(*where, "These commands give the same figures:")
-    yield element("pre", "\n".join(commands), id="commands")
-    if data.record is not None:
+    source = shlex.quote(data.design.name if is_preset else "design.json")
+    yield element("pre", "\n".join(_commands(data, source)), id="commands")
+    if data.record is None:
+        yield paragraph("Nothing here is random; there is no seed.")
+    else:
         settings = data.record.settings
         yield paragraph(
-            "The search is the same each time: seed ",
-            whole(settings.seed),
-            ", ",
-            whole(settings.starts),
-            " start" if settings.starts == 1 else " starts",
-            " of at most ",
-            whole(settings.iterations),
-            " iterations. Nothing else here is random.",
+            *("The search is the same each time: seed ", whole(settings.seed), ", "),
+            *(whole(settings.starts), " start" if settings.starts == 1 else " starts"),
+            *(" of at most ", whole(settings.iterations), " iterations. "),
+            "Nothing else here is random.",
         )
-    else:
-        yield paragraph("Nothing here is random; there is no seed.")
-    heads, rows = ("", "this report"), [(name, value) for name, value in versions().items()]
+    columns = {"this report": versions()}
+    if data.record is not None:
+        columns["the search"] = data.record.versions
+    names = dict.fromkeys(name for each in columns.values() for name in each)
+    rows = [(name, *(each.get(name, "–") for each in columns.values())) for name in names]
     yield element("h3", "Versions")
-    if data.record is None:
-        yield table(heads, rows, align="<<")
-    else:
-        searched = data.record.versions
-        names = dict.fromkeys((*versions(), *searched))
-        yield table(
-            ("", "this report", "the search"),
-            [(name, versions().get(name, "–"), searched.get(name, "–")) for name in names],
-            align="<<<",
-        )
+    yield table(("", *columns), rows, align="<" * (1 + len(columns)))
     yield element("h3", "Design file")
-    yield paragraph("SHA-256 ", element("code", data.design_hash, id="design-hash"), class_="dim")
-    yield element("pre", data.design_file, id="design")
+    yield paragraph("SHA-256 ", element("code", _hash(data), id="design-hash"), class_="dim")
+    yield element("pre", encode_design(data.design).decode(), id="design")
+
+
+def _commands(data: ReportData, source: str) -> Iterator[str]:
+    pose = data.snapshot.pose
+    turned = "" if data.is_home else f" --quaternion {_words(pose.quaternion)}"
+    at = "" if data.is_home else f" --position {_words(pose.position)}{turned}"
+    legs = " --interference" if isinstance(data.reachable, ReachableWorkspace) else ""
+    record = "" if data.record is None else " --record record.json"
+    yield f"explorer report --design {source}{at}{record} --out report.html"
+    yield f"explorer workspace --design {source}{turned} --hull{legs}"
+    yield f"explorer singularity --design {source}{at}"
+    yield f"explorer interference --design {source}{at}"
+    if not isinstance(data.bill, Missing):
+        yield f"explorer export mechanism --design {source} --out mechanism.zip"
+    if data.record is not None:
+        yield "explorer optimise --repeat record.json --out data.json"
 
 
 def _words(values: tuple[float, ...]) -> str:
     return " ".join(repr(float(value)) for value in values)
+
+
+_SECTIONS: tuple[Callable[[ReportData], Iterable[Element]], ...] = (
+    mechanism_section,
+    workspace_section,
+    singularity_section,
+    legs_section,
+    parts_section,
+    search_section,
+    _reproduction,
+)

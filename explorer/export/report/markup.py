@@ -14,6 +14,7 @@ from xml.etree.ElementTree import Element, tostring
 
 Piece: TypeAlias = "Element | str | float | None"
 Cell: TypeAlias = "Piece | Sequence[Piece]"
+Row: TypeAlias = tuple[Cell, ...]
 
 _SUPERSCRIPTS = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 # A number below the first, or from the second on, is written with a power of ten.
@@ -25,14 +26,14 @@ def element(tag: str, *pieces: Piece, **attributes: str | float | None) -> Eleme
 
     The name of an attribute may end in _, if Python reserves the word; other _ become hyphens.
     """
-    made = Element(tag)
+    result = Element(tag)
     for name, value in attributes.items():
         if value is not None:
             words = value if isinstance(value, str) else coordinate(value)
-            made.set(name.rstrip("_").replace("_", "-"), printable(words))
+            result.set(name.rstrip("_").replace("_", "-"), printable(words))
     for piece in pieces:
-        add(made, piece)
-    return made
+        add(result, piece)
+    return result
 
 
 def add(parent: Element, piece: Piece) -> None:
@@ -101,6 +102,11 @@ def drawing_text(
     return element("text", words, x=x, y=y, class_=class_, text_anchor=anchor)
 
 
+def ends(low: float, high: float) -> Cell:
+    """Return the pieces of a range of numbers."""
+    return number(low), " to ", number(high)
+
+
 def whole(value: int) -> Element:
     """Return an element with a whole number, its digits in groups of three."""
     return element("data", f"{value:,}".replace(",", "\N{NARROW NO-BREAK SPACE}"), value=str(value))
@@ -119,14 +125,14 @@ def table(
     """
 
     def line(tag: str, cells: Sequence[Cell]) -> Element:
-        made = element("tr")
+        row = element("tr")
         for index, (cell, side) in enumerate(zip(cells, align, strict=True)):
             pieces = cell if isinstance(cell, Sequence) and not isinstance(cell, str) else (cell,)
             is_name = tag == "td" and index == 0
             scope = "row" if is_name else "col" if tag == "th" else None
             kind = "figure" if side == ">" else None
-            made.append(element("th" if is_name else tag, *pieces, scope=scope, class_=kind))
-        return made
+            row.append(element("th" if is_name else tag, *pieces, scope=scope, class_=kind))
+        return row
 
     return element(
         "table",

@@ -1,1 +1,1 @@
-"""What limits cannot give, told before a search."""
+"""Demands that limits make impossible, known before a search."""

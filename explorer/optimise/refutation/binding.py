@@ -29,25 +29,25 @@ class BindingLimit(NamedTuple):
 
 
 def find_binding_limit(design: Design, volume: float) -> BindingLimit | None:
-    """Return the limit without which a design has a volume; None if no single one is in the way.
+    """Return the one limit without which a design has a volume; None if no limit alone does it.
 
-    If there are several, it is the one without which the volume is the largest.
+    Of several such limits it is the one without which the volume is the largest.
 
     Args:
         design: The manipulator, of a smaller volume.
         volume: The volume, in cubed design units.
     """
     start = msgspec.structs.replace(design, home=home_pose(design))
-    found: list[BindingLimit] = []
+    lifted: list[BindingLimit] = []
     for name, limits in _without_one(design):
         freed = msgspec.structs.replace(start, limits=limits)
-        found.append(BindingLimit(name, workspace_volume(freed, explain=False).volume))
-    enough = [each for each in found if each.volume >= volume]
-    return max(enough, key=lambda each: each.volume, default=None)
+        lifted.append(BindingLimit(name, workspace_volume(freed, explain=False).volume))
+    enough = [binding for binding in lifted if binding.volume >= volume]
+    return max(enough, key=lambda binding: binding.volume, default=None)
 
 
 def _without_one(design: Design) -> Iterator[tuple[str, Limits]]:
-    """Yield the limits without one of them, and its name, for each that can be lifted."""
+    """Yield the name of each limit that can be lifted, and the limits without it."""
     limits = design.limits
     if limits.box is not None:
         yield BOX_LIMIT, msgspec.structs.replace(limits, box=None)

@@ -1,4 +1,4 @@
-"""The volume of a box that planes cut: an upper bound of what limits within it leave."""
+"""The volume of a box cut by planes: an upper bound of the workspace within it."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ import numpy as np
 from explorer.numerics.arrays import FloatArray
 from explorer.optimise.problem import Box
 
-# A corner on a plane is within it, whatever its last bits say; over the edges of the box.
+# Tolerance of corners that lie on a plane, as a share of the edges of the box.
 SLACK = 1e-9
-# Three planes whose normals span less than this have no corner.
+# Three planes have no corner if the determinant of their normals is less than this.
 FLAT = 1e-12
 
 

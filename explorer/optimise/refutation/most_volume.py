@@ -2,8 +2,8 @@
 
 Each limit is a solid of positions, so that no workspace is larger than that solid is at most
 within the bounds of the variables: a box, a ball, the lens that two balls share, a slab of the
-guide. A least margin δ3 leaves of each only what lies on the home's side of the base plane.
-Nothing here measures a workspace, so that all of it takes milliseconds.
+guide. A least margin δ3 leaves only the part on the home's side of the base plane. No workspace is
+measured here, so all bounds take milliseconds.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class Ceiling(NamedTuple):
         limit: Limit that it comes from: "box", "guide", "reach" or such as "l1 maximum".
         words: Subject and verb of a sentence on it, such as "the box holds".
         volume: Bound, in cubed design units.
-        place: Part of the limit that the bound is the volume of, "" for all of it.
+        place: Part of the limit whose volume is the bound, "" for all of it.
     """
 
     limit: str
@@ -110,7 +110,7 @@ def _volume_of(box: Box) -> float:
 
 
 def _within_guide(ranges: Ranges, box: Box, guide: Pair) -> Box:
-    """Return what of a box leaves both carriages on the guide."""
+    """Return the part of a box that leaves both carriages on the guide."""
     (low, *lows), (high, *highs) = box
     for name in ("b2", "b3"):
         ahead = product(ranges.of(name), ranges.along[0])
@@ -123,10 +123,10 @@ def _of_lengths(ranges: Ranges) -> Iterator[Ceiling]:
     for name in LENGTHS:
         least, most = ranges.length(name)
         if name in ("l1", "l4"):
-            volume = ball_above(most, least, _foot(ranges, name))
+            volume = ball_above(most, least, _least_height(ranges, name))
         else:
-            ends = min(ranges.length(each)[1] for each in ("l1", "l4"))
-            volume = 2.0 * ends * disc_above(most, least, _foot(ranges, name))
+            ends = min(ranges.length(end)[1] for end in ("l1", "l4"))
+            volume = 2.0 * ends * disc_above(most, least, _least_height(ranges, name))
         if ranges.is_tied(name):
             of_reach.append(volume)
         else:
@@ -143,10 +143,10 @@ def _of_lengths(ranges: Ranges) -> Iterator[Ceiling]:
 
 
 def _lens(ranges: Ranges) -> float:
-    """Return the most that the balls of l1 and l4 share; their centres are b4 − b1 and a3 away.
+    """Return the largest volume of the lens that the balls of l1 and l4 share.
 
-    Where the centre of the ball of l4 moves away as it grows, at a reach tied to a3, both the
-    ball and the lens are largest at the largest reach.
+    Where l4 is tied to the reach |a3|, its ball moves away as it grows; ball and lens are still
+    largest at the largest reach.
     """
     one, other = ranges.length("l1")[1], ranges.length("l4")[1]
     is_following = REACH not in ranges.problem.names and ranges.is_tied("l1")
@@ -165,10 +165,10 @@ def _lens(ranges: Ranges) -> float:
     return 0.5 * whole if is_halved else whole
 
 
-def _foot(ranges: Ranges, name: str) -> float:
-    """Return from which height over the centre of a length's limit on positions may lie.
+def _least_height(ranges: Ranges, name: str) -> float:
+    """Return the least height of positions over the centre of a length's limit.
 
-    Upwards is to the home's side of the base plane; the lowest that the bounds allow.
+    It is the least that the bounds allow, and upwards is the home's side of the base plane.
     """
     margin = ranges.problem.start.limits.margin
     if margin is None:
@@ -210,6 +210,8 @@ def _of_guide(ranges: Ranges) -> Iterator[Ceiling]:
         return
     apart = smallest(ranges.span) * smallest(ranges.along[0])
     free = max(0.0, guide[1] - guide[0] - apart)
-    area = min(disc_above(ranges.length(name)[1], 0.0, _foot(ranges, name)) for name in LENGTHS)
+    area = min(
+        disc_above(ranges.length(name)[1], 0.0, _least_height(ranges, name)) for name in LENGTHS
+    )
     words = f"a guide from {guide[0]:.6g} to {guide[1]:.6g} leaves"
     yield Ceiling("guide", words, free * area)

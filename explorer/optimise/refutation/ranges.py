@@ -1,6 +1,6 @@
-"""What the variables of a problem can become within their bounds, as intervals.
+"""Intervals of quantities of a design whose variables lie within their bounds.
 
-Each interval holds every value that a design within the bounds can have, and may be wider.
+Each interval holds every value that such a design can have, and may be wider.
 """
 
 from __future__ import annotations
@@ -50,7 +50,9 @@ class Ranges:
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
-        self._bounds = {each.name: (each.low, each.high) for each in problem.variables}
+        self._bounds = {
+            variable.name: (variable.low, variable.high) for variable in problem.variables
+        }
 
     def of(self, name: str) -> Pair:
         """Return the interval of a design variable, or of a shift of the required box."""
@@ -72,9 +74,9 @@ class Ranges:
         if not self.is_turning:
             return (x, x), (y, y), (z, z)
         low, high = (math.radians(end) for end in self._bounds[YAW])
-        now = math.radians(self.problem.start_values[self.problem.names.index(YAW)])
+        start_yaw = math.radians(self.problem.start_values[self.problem.names.index(YAW)])
         angle, length = math.atan2(y, x), math.hypot(x, y)
-        turned = (angle + low - now, angle + high - now)
+        turned = (angle + low - start_yaw, angle + high - start_yaw)
         return (
             product((length, length), _cosines(*turned)),
             product((length, length), _cosines(*(end - 0.5 * math.pi for end in turned))),

@@ -21,14 +21,14 @@ from explorer.optimise.refutation.most_volume import ceilings, margin_planes, ne
 from explorer.optimise.refutation.ranges import Ranges, largest, smallest
 from explorer.workspace.limits.constraints import GAP
 
-# Excess of an impossible demand over its bound, as a share: searches have tolerances.
+# Excess over its bound that makes a demand impossible, as a share: searches have tolerances.
 SPARE = 1e-6
 
 PAPER_BOX = PRESETS["paper-optimal"].limits.box
-"""The box of the paper's optimum."""
+"""Box of the paper's optimum."""
 
 BOX_LIMIT = "box"
-"""The limit that the commands and the page offer to lift."""
+"""Name of the limit that the commands and the page offer to lift."""
 
 
 class Refutation(NamedTuple):
@@ -44,26 +44,26 @@ class Refutation(NamedTuple):
 
 
 def refutations(problem: Problem) -> tuple[Refutation, ...]:
-    """Return why no design within the bounds meets the demands: one reason for each limit.
+    """Return the reasons why no design within the bounds meets the demands, one for each limit.
 
-    Without such a reason the result is (): the demands may be possible.
+    Without a reason, the demands may be possible.
     """
     ranges = Ranges(problem)
-    found: dict[str, Refutation] = {}
-    for each in (
+    reasons: dict[str, Refutation] = {}
+    for refutation in (
         *_volume(ranges),
         *_required_box(ranges),
         *_reach(ranges),
         *_gap(ranges),
         *_clearance(ranges),
     ):
-        found.setdefault(each.limit, each)
-    return tuple(found.values())
+        reasons.setdefault(refutation.limit, refutation)
+    return tuple(reasons.values())
 
 
-def words_of(found: Iterable[Refutation]) -> str:
+def words_of(reasons: Iterable[Refutation]) -> str:
     """Return all reasons in one line."""
-    return "; ".join(each.message for each in found)
+    return "; ".join(refutation.message for refutation in reasons)
 
 
 def with_box(design: Design, box: Box | None) -> Design:
@@ -73,9 +73,9 @@ def with_box(design: Design, box: Box | None) -> Design:
 
 
 def paper_box(problem: Problem) -> Box | None:
-    """Return the box of the paper's optimum, or None where that would not do either."""
+    """Return the box of the paper's optimum, or None if it is too small for the demands too."""
     boxed = msgspec.structs.replace(problem, start=with_box(problem.start, PAPER_BOX))
-    too_small = any(each.limit == BOX_LIMIT for each in refutations(boxed))
+    too_small = any(refutation.limit == BOX_LIMIT for refutation in refutations(boxed))
     return None if too_small else PAPER_BOX
 
 
@@ -86,15 +86,15 @@ def _volume(ranges: Ranges) -> Iterator[Refutation]:
         wanted = 0.0
     elif wanted == 0.0:
         return
-    for each in ceilings(ranges):
+    for ceiling in ceilings(ranges):
         # A workspace without any volume is of no use.
-        if each.volume <= wanted * (1.0 - SPARE):
-            room = "" if each.limit == BOX_LIMIT else "room for "
-            most, asked = _amounts(each.volume, wanted)
-            words = f"{each.words} {room}at most {most} of the {asked} asked for"
+        if ceiling.volume <= wanted * (1.0 - SPARE):
+            room = "" if ceiling.limit == BOX_LIMIT else "room for "
+            most, demanded = _amounts(ceiling.volume, wanted)
+            words = f"{ceiling.words} {room}at most {most} of the {demanded} asked for"
             if wanted == 0.0:
-                words = f"{each.words} {room}no volume"
-            yield Refutation(each.limit, f"{words}{each.place and f', {each.place}'}")
+                words = f"{ceiling.words} {room}no volume"
+            yield Refutation(ceiling.limit, f"{words}{ceiling.place and f', {ceiling.place}'}")
 
 
 def _required_box(ranges: Ranges) -> Iterator[Refutation]:
@@ -105,9 +105,10 @@ def _required_box(ranges: Ranges) -> Iterator[Refutation]:
     volume = math.prod(high - low for low, high in zip(*required, strict=True))
     wanted = problem.demands.volume
     if problem.objective == "match-volume" and wanted and volume > wanted * (1.0 + SPARE):
-        has, asked = _amounts(volume, wanted)
+        has, demanded = _amounts(volume, wanted)
         yield Refutation(
-            "required box", f"the required box has a volume of {has} and {asked} is to be matched"
+            "required box",
+            f"the required box has a volume of {has} and {demanded} is to be matched",
         )
     yield from _box_within_box(ranges, required)
     yield from _box_beyond_margins(ranges, required)
@@ -231,7 +232,7 @@ def _clearance(ranges: Ranges) -> Iterator[Refutation]:
 
 
 def _ends_apart(ranges: Ranges, first: int, second: int) -> float:
-    """Return the most that the nearer two ends of a pair of legs are apart."""
+    """Return the largest distance of the nearer two ends of a pair of legs."""
     b1x, b1y = ranges.of("b1x"), largest(ranges.of("b1y"))
     match first, second:
         case 1, 4:
@@ -243,12 +244,12 @@ def _ends_apart(ranges: Ranges, first: int, second: int) -> float:
             return ranges.apart
         case _:
             along = ranges.of("b2" if first == 2 else "b3")
-            # Legs that share a joint are let be.
+            # Legs that share a joint have no clearance to keep.
             return math.inf if smallest(along) == 0.0 else largest(along)
 
 
 def _amounts(one: float, other: float) -> tuple[str, str]:
-    """Return two volumes with as few digits as tell them apart, four at the least."""
+    """Return two volumes as text with as many digits as they need to differ, at least four."""
     digits = 4
     while digits < 17 and _amount(one, digits) == _amount(other, digits):
         digits += 1

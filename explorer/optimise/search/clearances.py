@@ -3,8 +3,8 @@
 At each of many fixed positions the pair must keep its clearance, or the position must lie
 outside the workspace or nearer to a singular plane than where clearance is demanded. That
 "or" is a smooth maximum, "at each" a smooth minimum, both by Kreisselmeier and Steinhauser
-(1979) and both from below: where the bound is not negative, every position keeps to it.
-Between the positions `explorer.optimise.search.crossings` looks afterwards.
+(1979) and both from below: where the bound is not negative, every position satisfies it.
+`explorer.optimise.search.crossings` searches between the positions afterwards.
 """
 
 from __future__ import annotations
@@ -19,19 +19,23 @@ from explorer.optimise.search.demands import Measured
 from explorer.optimise.search.state import State
 from explorer.workspace.limits.constraints import YAW, BallOrCylinder, HalfSpace
 
-# Sharpness of the smooth extremes, over the clearance demanded.
+# Sharpness of the smooth extremes, per demanded clearance.
 SHARPNESS = 60.0
 # Positions of less weight than this in a smooth minimum add nothing to its gradient.
 WEIGHT = 1e-12
-# Farther out than this multiple of the size of the start does not matter.
+# Cap on slacks, as a multiple of the size of the start.
 FAR = 1e3
+
+# Parameters that move the ends of legs while p stays, and the legs of each pair from 0.
+PARAMETERS = ("a3x", "a3y", "b1x", "b1y", "b2", "b3", YAW)
+LEGS = np.array(PAIRS) - 1
 
 
 class ClearanceDemand:
     """The least clearance of each pair over some positions.
 
     Args:
-        clearance: To keep.
+        clearance: Least clearance, in design units.
         positions: Shape (k, 3).
     """
 
@@ -45,56 +49,32 @@ class ClearanceDemand:
 
     def measure(self, state: State) -> Measured:
         """Return the bounds of the six pairs over the clearance, and their derivatives."""
-        sharp = SHARPNESS / self.clearance
-        p = self.positions
-        distance, points, axes = self._distances(state)
-        # Infinite where a limit can never be kept, or where two legs share a joint.
+        sharp, p = SHARPNESS / self.clearance, self.positions
+        axes = leg_axes(state.design, p, state.rotation)
+        distance, points = np.empty((len(p), 6)), np.empty((len(p), 6, 2, 3))
+        pair_rows(len(p), axes, distance, points)
+        # Infinite where two legs share a joint.
         most = FAR * state.problem.size
-        outside = np.minimum(self._outside(state), most)
+        # A limit that no position satisfies, such as the gap, has its own demand: as a way out
+        # it would make this bound leap, from far below zero to met, where that is missed by little.
+        limits = [it for it in state.limits if isinstance(it, BallOrCylinder | HalfSpace)]
+        outside = np.minimum([-limit.slack(p) for limit in limits], most)
         spare = distance - radii_of_pairs(state.design) - self.clearance
         spare[:, joined_pairs(state.design)] = most
-        # One for each way out, so that the smooth maximum is no larger than the true one.
-        ways = math.log(outside.shape[1] + 1.0)
-        out = _log_sum(sharp * outside)
+        # Shift that keeps the smooth maximum over all ways out from exceeding the true one.
+        ways = math.log(len(outside) + 1.0)
+        out = _log_sum(sharp * outside.T)
         kept = np.logaddexp(sharp * spare, out[:, None]) - ways
         least = -_log_sum(-kept.T)
         weights = np.exp(least - kept)
         by_distance = weights * np.exp(sharp * spare - ways - kept)
-        gradients = np.zeros((len(PAIRS), len(state.u)))
-        for pair in range(len(PAIRS)):
-            rows = np.flatnonzero(by_distance[:, pair] > WEIGHT)
-            slopes = _distance_slopes(
-                state, pair, axes[rows], points[rows, pair], distance[rows, pair]
-            )
-            gradients[pair] += by_distance[rows, pair] @ slopes
+        gradients = _distance_slopes(state, axes, points, distance, by_distance)
         by_leaving = weights - by_distance
         rows = np.flatnonzero(by_leaving.max(axis=1) > WEIGHT)
-        shares = np.exp(sharp * outside[rows] - out[rows, None])
-        for index, slopes in enumerate(self._outside_slopes(state, p[rows])):
-            gradients += (by_leaving[rows] * shares[:, index, None]).T @ slopes
-        scale = self.clearance
-        return Measured(least / sharp / scale, gradients / scale)
-
-    def _distances(self, state: State) -> tuple[FloatArray, FloatArray, FloatArray]:
-        axes = leg_axes(state.design, self.positions, state.rotation)
-        count = len(axes)
-        distance, points = np.empty((count, 6)), np.empty((count, 6, 2, 3))
-        pair_rows(count, axes, distance, points)
-        return distance, points, axes
-
-    def _outside(self, state: State) -> FloatArray:
-        """Return how far positions are outside each limit, shape (k, w)."""
-        return np.column_stack([-limit.slack(self.positions) for limit in state.limits])
-
-    def _outside_slopes(self, state: State, p: FloatArray) -> list[FloatArray]:
-        """Return the derivatives of `_outside`, w of shape (k, n)."""
-        slopes: list[FloatArray] = []
-        for limit in state.limits:
-            if isinstance(limit, BallOrCylinder | HalfSpace):
-                slopes.append(-state.slack(limit, p)[1])
-            else:
-                slopes.append(np.zeros((len(p), len(state.u))))
-        return slopes
+        for limit, far in zip(limits, outside, strict=True):
+            shares = by_leaving[rows] * np.exp(sharp * far[rows] - out[rows])[:, None]
+            gradients -= shares.T @ state.slack(limit, p[rows])[1]
+        return Measured(least / sharp / self.clearance, gradients / self.clearance)
 
 
 def _log_sum(values: FloatArray) -> FloatArray:
@@ -104,51 +84,53 @@ def _log_sum(values: FloatArray) -> FloatArray:
 
 
 def _distance_slopes(
-    state: State, pair: int, axes: FloatArray, points: FloatArray, distance: FloatArray
+    state: State, axes: FloatArray, points: FloatArray, distance: FloatArray, weights: FloatArray
 ) -> FloatArray:
-    """Return the derivatives of the distance of a pair, shape (k, n).
+    """Return the weighted sums of the derivatives of the distances of each pair, shape (6, n).
 
-    By the envelope theorem the closest points may be held on their legs meanwhile.
+    By the envelope theorem the closest points may be held in their places on the legs.
 
     Args:
-        state: Where.
-        pair: Index into `PAIRS`.
-        axes: Of the four legs, shape (k, 4, 2, 3).
-        points: The closest points, shape (k, 2, 3).
-        distance: Between them, shape (k,).
+        state: The problem at the scaled variables.
+        axes: Axes of the four legs at k positions, shape (k, 4, 2, 3).
+        points: Closest points of each pair, shape (k, 6, 2, 3).
+        distance: Distance of each pair, shape (k, 6).
+        weights: Weight of each position, shape (k, 6).
     """
+    rows, pairs = np.nonzero(weights > WEIGHT)
+    points, distance = points[rows, pairs], distance[rows, pairs, None]
     apart = points[:, 0] - points[:, 1]
-    normal = np.divide(
-        apart, distance[:, None], out=np.zeros_like(apart), where=distance[:, None] > 0.0
-    )
-    slopes = np.zeros((len(points), len(state.u)))
-    for side, leg in enumerate(PAIRS[pair]):
-        base, platform = axes[:, leg - 1, 0], axes[:, leg - 1, 1]
+    normal = np.divide(apart, distance, out=np.zeros_like(apart), where=distance > 0.0)
+    slopes = np.zeros((len(rows), len(PARAMETERS)))
+    ends = _end_motions(state)
+    for side, sign in enumerate((1.0, -1.0)):
+        legs = LEGS[pairs, side]
+        base, platform = axes[rows, legs, 0], axes[rows, legs, 1]
         along = platform - base
         length = np.maximum(np.einsum("ki,ki->k", along, along), 1e-300)
         share = np.einsum("ki,ki->k", points[:, side] - base, along) / length
-        for name, (of_base, of_platform) in _motions(state)[leg - 1].items():
-            moving = (1.0 - share) * (normal @ of_base) + share * (normal @ of_platform)
-            slopes += np.outer(moving if side == 0 else -moving, state.along({name: 1.0}))
-    return slopes
+        at = np.stack([1.0 - share, share], axis=1)
+        slopes += sign * np.einsum("kj,kjqi,ki->kq", at, ends[legs], normal)
+    sums = np.zeros((len(PAIRS), len(PARAMETERS)))
+    np.add.at(sums, pairs, weights[rows, pairs, None] * slopes)
+    return sums @ state.rows(PARAMETERS)
 
 
-def _motions(state: State) -> tuple[dict[str, tuple[FloatArray, FloatArray]], ...]:
-    """Return how the base and platform ends of each leg move with each parameter, p held."""
+def _end_motions(state: State) -> FloatArray:
+    """Return the derivatives of both ends of each leg by `PARAMETERS`, p held, (4, 2, 7, 3)."""
     design, r = state.design, state.rotation
     u, v = r[:, 0], r[:, 1]
-    arm = design.b1[0] * u + design.b1[1] * v
     x, y, still = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]), np.zeros(3)
 
     def turned(vector: FloatArray) -> FloatArray:
         return np.array([-vector[1], vector[0], 0.0])
 
-    def on_guide(vector: FloatArray) -> tuple[FloatArray, FloatArray]:
-        return vector * x, vector
-
-    return (
-        {"b1x": (still, u), "b1y": (still, v), YAW: (still, turned(arm))},
-        {"b2": on_guide(u), YAW: on_guide(design.b2 * turned(u))},
-        {"b3": on_guide(u), YAW: on_guide(design.b3 * turned(u))},
-        {"a3x": (x, still), "a3y": (y, still)},
+    b1, b2, b3 = (turned(b) for b in (r[:, :2] @ design.b1, design.b2 * u, design.b3 * u))
+    return np.array(
+        [
+            [[still] * 7, [still, still, u, v, still, still, b1]],
+            [[still] * 4 + [u * x, still, b2 * x], [still] * 4 + [u, still, b2]],
+            [[still] * 5 + [u * x, b3 * x], [still] * 5 + [u, b3]],
+            [[x, y] + [still] * 5, [still] * 7],
+        ]
     )

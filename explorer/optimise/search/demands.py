@@ -1,4 +1,4 @@
-"""What a problem demands, as smooth functions with their exact gradients.
+"""The demands of a problem as smooth functions with their exact gradients.
 
 Each demand is dimensionless and of about unit size: at least zero where it is met, or
 exactly zero for an equality. All are measured at a `State`.
@@ -19,7 +19,7 @@ from explorer.optimise.search.state import State
 from explorer.singularity.ellipsoids import planes_of_singularity
 from explorer.workspace.limits.constraints import GAP, YAW, BallOrCylinder, Constraint, HalfSpace
 
-# How far a demand that is no limit may be missed and is still met, dimensionless.
+# Tolerance of a demand that is no limit, dimensionless.
 MET = 1e-8
 
 
@@ -40,7 +40,7 @@ class Demand(Protocol):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What people call each of them."""
+        """Name of each condition."""
         ...
 
     @property
@@ -50,7 +50,7 @@ class Demand(Protocol):
 
     @property
     def is_limit(self) -> bool:
-        """Whether the design's own limits demand it: they have the tolerance of all limits."""
+        """Whether it is a limit of the design, with the tolerance of all limits."""
         ...
 
     def measure(self, state: State) -> Measured:
@@ -96,9 +96,9 @@ class ReachDemand:
 
 
 class DegenerateDemand:
-    """Distances from degenerate designs, on the side where a run starts.
+    """The distances from degenerate designs, on the side where a run starts.
 
-    They are linear, so that from a start that keeps them no step of the solver leaves them.
+    They are linear, so no step of the solver breaks them after a start that keeps them.
     """
 
     is_equality = False
@@ -112,12 +112,8 @@ class DegenerateDemand:
     def measure(self, state: State) -> Measured:
         """Return sign · distance − least, over the size of the start."""
         size = state.problem.size
-        rows = np.zeros((3, len(state.u)))
-        for row, terms in enumerate(
-            ((("a3y", 1.0),), (("b1y", 1.0),), (("b3", 1.0), ("b2", -1.0)))
-        ):
-            for name, factor in terms:
-                rows[row] += factor * state.along({name: 1.0})
+        rows = state.rows(("a3y", "b1y", "b3"))
+        rows[2] -= state.rows(("b2",))[0]
         values = self.signs * _distances(state) - self.least
         return Measured(values / size, self.signs[:, None] * rows / size)
 
@@ -156,10 +152,9 @@ def _gap(state: State) -> float:
 class BoxDemand:
     """A required box within the workspace.
 
-    What is within a ball, a cylinder or a half-space with all its corners is within it
-    altogether; of a half-space its worst corner is enough. Outside a ball, where a least
-    length keeps it, counts the point of the box that is nearest to the centre, or if that
-    lies inside, how deep.
+    A box whose corners lie within a ball, a cylinder or a half-space lies within it; for a
+    half-space the worst corner decides. A least length keeps the box outside a ball: there the
+    point of the box nearest to the centre decides, or the depth of a centre inside the box.
     """
 
     is_equality = False
@@ -168,7 +163,7 @@ class BoxDemand:
     def __init__(self, start: State) -> None:
         # The gap is the same in every position, and demanded by `GapDemand`.
         self.counts = {
-            limit.name: _points_that_tell(limit) for limit in start.limits if limit.name != GAP
+            limit.name: _deciding_points(limit) for limit in start.limits if limit.name != GAP
         }
         self.names = tuple(
             f"required box within {name}"
@@ -177,13 +172,13 @@ class BoxDemand:
         )
 
     def measure(self, state: State) -> Measured:
-        """Return the slacks of the points that tell of each limit, over the size."""
+        """Return the slacks of the points that decide on each limit, over the size."""
         size, n = state.problem.size, len(state.u)
-        found = {limit.name: limit for limit in state.limits}
+        limits = {limit.name: limit for limit in state.limits}
         values: list[FloatArray] = []
         gradients: list[FloatArray] = []
         for name, count in self.counts.items():
-            limit = found.get(name)
+            limit = limits.get(name)
             if isinstance(limit, BallOrCylinder | HalfSpace):
                 value, by_u, by_p = _slack_of_box(state, limit)
                 for axis, shift in enumerate(SHIFTS):
@@ -191,14 +186,14 @@ class BoxDemand:
                 values.append(value / size)
                 gradients.append(by_u / size)
             else:
-                # It cannot be kept, in no position.
+                # No position keeps this limit.
                 values.append(np.full(count, -1.0))
                 gradients.append(np.zeros((count, n)))
         return Measured(np.concatenate(values), np.vstack(gradients))
 
 
-def _points_that_tell(limit: Constraint) -> int:
-    """Return how many points of a box tell whether it keeps a limit."""
+def _deciding_points(limit: Constraint) -> int:
+    """Return the number of points of a box that decide whether it keeps a limit."""
     if isinstance(limit, BallOrCylinder) and limit.inside:
         return 8 if limit.is_ball else 4
     return 1
@@ -207,7 +202,7 @@ def _points_that_tell(limit: Constraint) -> int:
 def _slack_of_box(
     state: State, limit: BallOrCylinder | HalfSpace
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return what `State.slack` does, of the points of the required box that tell."""
+    """Return what `State.slack` does, of the deciding points of the required box."""
     corners = corners_of(state.box)
     if isinstance(limit, HalfSpace):
         worst = int((corners @ limit.normal).argmax())
@@ -215,10 +210,10 @@ def _slack_of_box(
     if limit.inside:
         # To a cylinder along x both ends along x are the same.
         return state.slack(limit, corners if limit.is_ball else corners[::2])
-    return _outside(state, limit, state.box)
+    return _slack_outside(state, limit, state.box)
 
 
-def _outside(
+def _slack_outside(
     state: State, limit: BallOrCylinder, box: Box
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return what `State.slack` does, of the point of a box that is nearest to a centre."""
@@ -229,7 +224,7 @@ def _outside(
     nearest = np.clip(centre, lows, highs)
     slack, by_u, by_p = state.slack(limit, nearest[None, :])
     if (nearest == centre).all():
-        # The centre is inside: how far it is from the nearest face, to push it out by.
+        # The centre is inside: its distance from the nearest face is to be made up.
         axes = (0, 1, 2) if limit.is_ball else (1, 2)
         axis, side = min(
             ((a, s) for a in axes for s in (0, 1)),
@@ -237,10 +232,9 @@ def _outside(
         )
         normal = np.zeros(3)
         normal[axis] = 1.0 if side == 1 else -1.0
-        deep = float(normal[axis] * ((lows, highs)[side][axis] - centre[axis]))
-        slack = np.array([-deep - limit.radius])
-        own = np.array([*normal, -1.0])
-        by_u = state.along({name: float(own @ rate) for name, rate in limit.rates.items()})[None, :]
+        depth = float(normal[axis] * ((lows, highs)[side][axis] - centre[axis]))
+        slack = np.array([-depth - limit.radius])
+        by_u = (np.array([*normal, -1.0]) @ state.motion(limit))[None, :]
         by_p = -normal[None, :]
     return slack, by_u, by_p
 

@@ -1,4 +1,4 @@
-"""Other places to start from, for a search that found no answer where it was."""
+"""Other designs to start from, for a search that found no solution."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from explorer.optimise.problem import Problem
 from explorer.optimise.search.model import Model
 from explorer.optimise.search.starts import more_starts
 
-# Designs among which promising ones are looked for.
+# Number of designs compared.
 CANDIDATES = 64
 
 
-def promising(
+def promising_starts(
     problem: Problem, seed: int, before_each: Callable[[], None]
 ) -> Iterator[tuple[float, ...]]:
     """Yield values of the variables that miss the demands by little, the best first.
 
     Args:
         problem: The problem.
-        seed: Of the sequence that they are taken from.
+        seed: Seed of the sequence that the values are taken from.
         before_each: Called before each evaluation; may raise.
     """
     candidates = list(more_starts(problem, CANDIDATES, seed))

@@ -1,9 +1,9 @@
-"""From a place that misses some demands by little to the nearest one that meets all of them.
+"""The step from variables that miss some demands by little to the nearest that meet all.
 
-A solver that lowers an objective ends where rounding keeps it from lowering that and the
-misses together, which is farther off than the tolerance of limits. Here the demands count
-alone: each step is the shortest that meets them to first order, found by least distance
-programming (C. L. Lawson, R. J. Hanson, "Solving Least Squares Problems", 1974, chapter 23).
+A solver that lowers an objective ends where rounding keeps it from lowering both that and the
+misses, which are then larger than the tolerance of limits. Here the demands alone count: each step
+is the shortest that meets them to first order, found by least distance programming (C. L. Lawson,
+R. J. Hanson, "Solving Least Squares Problems", 1974, chapter 23).
 """
 
 from __future__ import annotations
@@ -16,18 +16,20 @@ from explorer.optimise.search.model import Evaluation, Model
 
 # Demands that are missed by more than this, dimensionless, are not missed by little.
 NEARLY = 1e-6
-# The misses get squared by each step.
+# Each step squares the misses.
 MOST_STEPS = 4
 # Below this residual no step meets the demands to first order.
 CONTRADICTION = 1e-9
+# Cap on what a demand has to spare, over the worst miss.
+FAR = 1e3
 
 
 def nearest_feasible(model: Model, at: Evaluation) -> Evaluation | None:
-    """Return the place nearest to one that meets all demands; None if none is known nearby.
+    """Return the nearest evaluation that meets all demands; None if no step leads to one.
 
     Args:
         model: The problem.
-        at: A place that misses demands by little.
+        at: Evaluation that misses demands by little.
     """
     lows, highs = model.bounds.T
     for _ in range(MOST_STEPS):
@@ -59,11 +61,13 @@ def _shortest(model: Model, at: Evaluation) -> FloatArray | None:
     missing = np.concatenate(
         [-at.values, at.values[equal], (lows - at.u)[low], (at.u - highs)[high]]
     )
+    # The step is proportional to the misses, so these may be in units of the worst one.
+    unit = missing.max()
     goal = np.zeros(len(at.u) + 1)
     goal[-1] = 1.0
-    matrix = np.vstack([rows.T, missing])
+    matrix = np.vstack([rows.T, np.maximum(missing / unit, -FAR)])
     factors, norm = nnls(matrix, goal)
     if norm <= CONTRADICTION:
         return None
     residual = matrix @ factors - goal
-    return -residual[:-1] / residual[-1]
+    return -unit * residual[:-1] / residual[-1]

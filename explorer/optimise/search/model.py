@@ -1,4 +1,4 @@
-"""A problem as the functions that an SQP solver wants, over scaled variables.
+"""A problem as the functions that an SQP solver needs, over scaled variables.
 
 One more variable is appended where the worst of several values is raised: it stays below
 all of them, which keeps the functions smooth.
@@ -38,10 +38,10 @@ class Evaluation:
     Attributes:
         u: Scaled variables, shape (n,).
         state: The problem there.
-        objective: What is minimised, about of unit size.
-        slope: Its derivatives, shape (n,).
-        values: Of all demands, shape (m,).
-        gradients: Theirs, shape (m, n).
+        objective: Value to minimise, about of unit size.
+        slope: Derivatives of the objective, shape (n,).
+        values: Values of all demands, shape (m,).
+        gradients: Derivatives of the demands, shape (m, n).
     """
 
     u: FloatArray
@@ -86,25 +86,29 @@ class Model:
     @cached_property
     def names(self) -> tuple[str, ...]:
         """The names of all demands, m of them."""
-        return tuple(name for each in self.demands for name in each.names)
+        return tuple(name for demand in self.demands for name in demand.names)
 
     @cached_property
     def equalities(self) -> BoolArray:
         """Which demands are equalities, shape (m,), boolean."""
-        return np.array([each.is_equality for each in self.demands for _ in each.names], dtype=bool)
+        return np.array(
+            [demand.is_equality for demand in self.demands for _ in demand.names], dtype=bool
+        )
 
     @cached_property
     def limits(self) -> BoolArray:
         """Which demands are limits of the design, shape (m,), boolean."""
-        return np.array([each.is_limit for each in self.demands for _ in each.names], dtype=bool)
+        return np.array(
+            [demand.is_limit for demand in self.demands for _ in demand.names], dtype=bool
+        )
 
     @cached_property
     def bounds(self) -> FloatArray:
         """Lows and highs of the scaled variables, shape (n, 2)."""
         problem = self.problem
         pairs = [
-            (each.low / scale, each.high / scale)
-            for each, scale in zip(problem.variables, self.scales, strict=True)
+            (variable.low / scale, variable.high / scale)
+            for variable, scale in zip(problem.variables, self.scales, strict=True)
         ]
         if self.raises_worst:
             pairs.append((-np.inf, np.inf))
@@ -112,8 +116,8 @@ class Model:
 
     @property
     def positions(self) -> FloatArray:
-        """Where clearance is demanded, shape (k, 3)."""
-        return np.vstack([np.zeros((0, 3)), *(d.positions for d in self._clearances())])
+        """Positions at which clearance is demanded, shape (k, 3)."""
+        return np.vstack([np.zeros((0, 3)), *(demand.positions for demand in self._clearances())])
 
     def add_positions(self, positions: FloatArray) -> None:
         """Demand clearance at more positions, shape (k, 3)."""
@@ -122,10 +126,10 @@ class Model:
         self._last = None
 
     def _clearances(self) -> list[ClearanceDemand]:
-        return [each for each in self.demands if isinstance(each, ClearanceDemand)]
+        return [demand for demand in self.demands if isinstance(demand, ClearanceDemand)]
 
     def at(self, u: FloatArray) -> Evaluation:
-        """Return everything at scaled variables; the last place is remembered.
+        """Return the evaluation at scaled variables; the last one is remembered.
 
         Raises:
             DesignError: a degenerate design.
@@ -144,7 +148,7 @@ class Model:
             self._before_each()
         state = state or State(self.problem, u[: self.count])
         if not np.isfinite(u).all():
-            raise DesignError("the solver asked for a design that is not finite")
+            raise DesignError("the solver tried a design that is not finite")
         # A problem may demand nothing.
         values, gradients = [np.zeros(0)], [np.zeros((0, len(u)))]
         for demand in self.demands:
@@ -162,7 +166,7 @@ class Model:
     def _objective(self, state: State, u: FloatArray) -> tuple[float, FloatArray]:
         match self.problem.objective:
             case "match-volume":
-                # The demand says it all; each step is the smallest that meets it to first order.
+                # Each step is the smallest that meets the volume demand to first order.
                 return 0.0, np.zeros(len(u))
             case "smallest-reach":
                 value, gradient = state.reach
@@ -177,10 +181,10 @@ class Model:
                 return -float(u[-1]), slope
 
     def worst(self, at: Evaluation) -> tuple[float, str]:
-        """Return the value and the name of the inequality that is missed most or comes nearest.
+        """Return value and name of the inequality that is missed most or has the least to spare.
 
-        The value is below zero only where it is missed by more than its tolerance: that of all
-        limits for the limits of the design, `MET` for the other demands.
+        The value is below zero only where the inequality is missed by more than its tolerance:
+        that of all limits for the limits of the design, `MET` for the other demands.
         """
         if self.equalities.all():
             return 0.0, ""
@@ -191,11 +195,11 @@ class Model:
         return value if spare[index] < 0.0 else max(0.0, value), self.names[index]
 
     def reported(self, at: Evaluation) -> float:
-        """Return the objective as people read it, see `reported`."""
-        return reported(self.problem, at.state)
+        """Return the objective in its own unit, see `reported_objective`."""
+        return reported_objective(self.problem, at.state)
 
 
-def reported(problem: Problem, state: State) -> float:
+def reported_objective(problem: Problem, state: State) -> float:
     """Return F, the reach, the volume or the worst margin, whichever a problem is about."""
     match problem.objective:
         case "match-volume":
@@ -210,21 +214,21 @@ def reported(problem: Problem, state: State) -> float:
 
 def _demands(problem: Problem, start: State) -> list[Demand]:
     demands = problem.demands
-    found: list[Demand] = []
+    listed: list[Demand] = []
     if demands.volume is not None and problem.objective != "largest-volume":
         exact = problem.objective == "match-volume"
-        found.append(VolumeDemand(demands.volume, is_equality=exact))
+        listed.append(VolumeDemand(demands.volume, is_equality=exact))
     if demands.reach is not None and problem.objective != "smallest-reach":
-        found.append(ReachDemand(demands.reach))
+        listed.append(ReachDemand(demands.reach))
     if demands.least > 0.0:
-        found.append(DegenerateDemand(demands.least, start))
+        listed.append(DegenerateDemand(demands.least, start))
     if start.design.limits.gap > 0.0:
-        found.append(GapDemand(start))
+        listed.append(GapDemand(start))
     if demands.required_box is not None:
-        found.append(BoxDemand(start))
+        listed.append(BoxDemand(start))
     if problem.objective == "largest-margin":
-        found.append(MarginDemand())
+        listed.append(MarginDemand())
     if demands.clearance is not None:
         positions = first_positions(problem, start.design)
-        found.append(ClearanceDemand(demands.clearance, positions))
-    return found
+        listed.append(ClearanceDemand(demands.clearance, positions))
+    return listed

@@ -1,8 +1,8 @@
-"""From a design with an empty workspace to one nearby that has room in it.
+"""The search for a design nearby whose workspace is not empty.
 
-An empty workspace has no volume to climb. But each limit says by how much a position breaks
-it, so a position and a design are sought together, as near to the start as they come, with
-a ball of some radius around the position within all limits.
+An empty workspace has no volume to increase. But a position breaks each limit by some amount, so
+the search is for a position and a design together, as near to the start as possible, with a ball of
+some radius around the position within all limits.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from explorer.optimise.search.sqp import slsqp
 from explorer.optimise.search.state import State, scales
 from explorer.workspace.limits.constraints import BallOrCylinder, HalfSpace
 
-# Positions an axis among which the least broken one is where to begin.
+# Number of positions on each axis among which the search begins at the least broken one.
 SEARCHED = 13
-# How much moving the position costs beside changing the design.
+# Cost of moving the position, relative to that of changing the design.
 COST_OF_PLACE = 0.01
 MOST_ITERATIONS = 60
-# What each limit is missed by where there is no design.
+# Value of each limit where no design exists.
 NO_DESIGN = -1e3
 
 
@@ -34,10 +34,10 @@ def room(problem: Problem) -> float:
     return 0.1 * (volume ** (1.0 / 3.0) if volume is not None else problem.size)
 
 
-def opened(
+def open_workspace(
     problem: Problem, start: FloatArray, *, see: Callable[[State, str], None]
 ) -> FloatArray | None:
-    """Return scaled variables at which a ball fits into the workspace; None if none is found.
+    """Return scaled variables at which a ball fits into the workspace, or None without success.
 
     Args:
         problem: The problem.
@@ -51,27 +51,27 @@ def opened(
         sides.append(DegenerateDemand(problem.demands.least, here))
     if here.design.limits.gap > 0.0:
         sides.append(GapDemand(here))
-    names = [each.name for each in here.limits if isinstance(each, BallOrCylinder | HalfSpace)]
+    names = [limit.name for limit in here.limits if isinstance(limit, BallOrCylinder | HalfSpace)]
     labels = [*names, *(name for side in sides for name in side.names)]
     count = len(labels)
     place = _least_broken(here) / size
     first = np.concatenate([start, place])
     last: list[tuple[FloatArray, FloatArray, FloatArray]] = []
 
-    def measured(x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def slacks(x: FloatArray) -> tuple[FloatArray, FloatArray]:
         if last and np.array_equal(last[0][0], x):
             return last[0][1:]
         values: list[float] = []
         rows: list[FloatArray] = []
         try:
             state = State(problem, x[:n])
-            found = {each.name: each for each in state.limits}
+            limits = {limit.name: limit for limit in state.limits}
         except DesignError:
             return np.full(count, NO_DESIGN), np.zeros((count, len(x)))
         for name in names:
-            limit = found.get(name)
+            limit = limits.get(name)
             if not isinstance(limit, BallOrCylinder | HalfSpace):
-                # One that can never be kept where it is now.
+                # No position keeps this limit here.
                 values.append(NO_DESIGN)
                 rows.append(np.zeros(len(x)))
                 continue
@@ -89,23 +89,23 @@ def opened(
     costs = np.concatenate([np.ones(n), np.full(3, COST_OF_PLACE)])
 
     def slope(x: FloatArray) -> FloatArray:
-        see(State(problem, x[:n]), labels[int(measured(x)[0].argmin())])
+        see(State(problem, x[:n]), labels[int(slacks(x)[0].argmin())])
         return costs * (x - first)
 
     bounds = [
-        (each.low / unit, each.high / unit)
-        for each, unit in zip(problem.variables, scales(problem), strict=True)
+        (variable.low / unit, variable.high / unit)
+        for variable, unit in zip(problem.variables, scales(problem), strict=True)
     ]
-    found, _ = slsqp(
+    end = slsqp(
         lambda x: 0.5 * float(costs @ (x - first) ** 2),
         slope,
         first,
         np.array([*bounds, *[(-np.inf, np.inf)] * 3]),
-        [("ineq", lambda x: measured(x)[0], lambda x: measured(x)[1])],
+        [("ineq", lambda x: slacks(x)[0], lambda x: slacks(x)[1])],
         most=MOST_ITERATIONS,
         precision=1e-8,
     )
-    u = found[:n]
+    u = end[:n]
     return u if State(problem, u).volume > 0.0 else None
 
 
@@ -118,6 +118,6 @@ def _least_broken(state: State) -> FloatArray:
     axes = [low + (high - low) * shares for low, high in zip(lows, highs, strict=True)]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     slack = [
-        each.slack(grid) for each in state.limits if isinstance(each, BallOrCylinder | HalfSpace)
+        limit.slack(grid) for limit in state.limits if isinstance(limit, BallOrCylinder | HalfSpace)
     ]
     return grid[int(np.min(slack, axis=0).argmax())]

@@ -1,6 +1,6 @@
-"""Whether a place is an optimum, checked from the conditions themselves.
+"""The test of an optimum by its own conditions.
 
-At one the slope of the objective is a sum of the gradients of the demands and bounds that
+At an optimum the slope of the objective is a sum of the gradients of the demands and bounds that
 are just met, those of inequalities with a factor of at least zero (Karush, Kuhn and
 Tucker). SciPy's own verdict only says that its steps became small.
 
@@ -20,11 +20,11 @@ from explorer.errors import DesignError
 from explorer.numerics.arrays import FloatArray
 from explorer.optimise.search.model import Evaluation, Model
 
-# A demand or bound within this of being met exactly takes part.
+# A demand or bound with less than this to spare takes part.
 ACTIVE = 1e-6
 # An optimum's conditions hold if their residual is below this.
 OPTIMAL = 1e-5
-# How far away gradients are looked at where there may be a kink, and how many for each variable.
+# Distance at which gradients about a possible kink are sampled, and how many for each variable.
 AROUND = 1e-5
 SAMPLES = 6
 
@@ -33,7 +33,7 @@ class Optimality(NamedTuple):
     """How nearly the conditions hold.
 
     Attributes:
-        residual: What no sum makes up, over the slope of the objective.
+        residual: Remainder of the slope that no such sum makes up, as a share of the slope.
         holding: The demand or bound with the largest factor, "" if none has one.
     """
 
@@ -46,27 +46,33 @@ class Optimality(NamedTuple):
         return self.residual <= OPTIMAL
 
 
-def optimality(model: Model, at: Evaluation) -> Optimality:
-    """Return how nearly a place that meets all demands is an optimum."""
+def optimality(model: Model, at: Evaluation, *, kinks: bool = True) -> Optimality:
+    """Return how nearly a place that meets all demands is an optimum.
+
+    Args:
+        model: The problem.
+        at: The place.
+        kinks: Whether it may be an optimum in a kink, which takes many evaluations to see.
+    """
     smooth = _conditions(model, at, [at])
-    if smooth.is_optimal or model.problem.objective == "match-volume":
+    if smooth.is_optimal or not kinks or model.problem.objective == "match-volume":
         return smooth
-    return min(smooth, _conditions(model, at, [at, *_around(model, at)]))
+    return min(smooth, _conditions(model, at, [at, *_sample_nearby(model, at)]))
 
 
-def _around(model: Model, at: Evaluation) -> list[Evaluation]:
+def _sample_nearby(model: Model, at: Evaluation) -> list[Evaluation]:
     """Return the problem at places close by, within the bounds."""
     lows, highs = model.bounds.T
     random = np.random.default_rng(0)
-    found: list[Evaluation] = []
+    nearby: list[Evaluation] = []
     for _ in range(SAMPLES * len(at.u)):
         step = random.normal(size=len(at.u))
         step *= AROUND / float(np.linalg.norm(step))
         try:
-            found.append(model.at(np.clip(at.u + step, lows, highs)))
+            nearby.append(model.at(np.clip(at.u + step, lows, highs)))
         except DesignError:
             continue
-    return found
+    return nearby
 
 
 def _conditions(model: Model, at: Evaluation, around: list[Evaluation]) -> Optimality:
@@ -78,12 +84,12 @@ def _conditions(model: Model, at: Evaluation, around: list[Evaluation]) -> Optim
     for index, (value, name) in enumerate(zip(at.values.tolist(), model.names, strict=True)):
         if not (model.equalities[index] or value <= ACTIVE):
             continue
-        for each in around:
-            rows.append(each.gradients[index])
+        for place in around:
+            rows.append(place.gradients[index])
             names.append(name)
             if model.equalities[index]:
                 # An equality may pull either way.
-                rows.append(-each.gradients[index])
+                rows.append(-place.gradients[index])
                 names.append(name)
     lows, highs = model.bounds.T
     for index, variable in enumerate(model.problem.names):
@@ -98,7 +104,7 @@ def _conditions(model: Model, at: Evaluation, around: list[Evaluation]) -> Optim
     steepness = float(np.linalg.norm(at.slope))
     if steepness == 0.0:
         return Optimality(0.0, "")
-    slopes = np.array([each.slope for each in around]).T
+    slopes = np.array([place.slope for place in around]).T
     # Some mean of the slopes less some sum of the gradients is to be nothing; the last row
     # makes it a mean.
     demands = np.array(rows).reshape(-1, len(at.u)).T

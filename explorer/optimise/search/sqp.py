@@ -1,7 +1,7 @@
-"""SciPy's SLSQP: on plain functions, and on a model with every accepted iterate seen.
+"""SciPy's SLSQP: on plain functions, and on a model with a call for every accepted iterate.
 
-SLSQP asks for gradients only at iterates that it accepts, which is how they are told from
-the trial points of its line searches.
+SLSQP evaluates gradients only at iterates that it accepts, which distinguishes them from the trial
+points of its line searches.
 """
 
 from __future__ import annotations
@@ -15,26 +15,23 @@ from explorer.errors import DesignError
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.optimise.search.model import Evaluation, Model
 
-# The objective has to stand still to this before SLSQP gives up by itself.
+# SLSQP stops by itself once the objective changes by less than this.
 PRECISION = 1e-14
-# What a design that cannot exist counts for in a line search.
+# Value of the demands and the objective at a design that cannot exist, in a line search.
 NO_DESIGN = 1e3
-# The exit of SLSQP when its iterations ended.
-OUT_OF_ITERATIONS = 9
 
 Values = Callable[[FloatArray], FloatArray]
 
 
 class Stop(Exception):  # noqa: N818 - a signal, not an error
-    """Raised by whoever watches, to end the solver where it is."""
+    """Raised by a callback to end the solver where it is."""
 
 
 class Ended(NamedTuple):
-    """How a solver ended: the last place, its steps, and whether they were too few."""
+    """End of a solver: the last evaluation and the number of steps."""
 
     last: Evaluation
     steps: int
-    out_of_iterations: bool
 
 
 def slsqp(
@@ -46,17 +43,17 @@ def slsqp(
     *,
     most: int,
     precision: float,
-) -> tuple[FloatArray, int]:
-    """Return where SLSQP ends, within the bounds, and its exit mode.
+) -> FloatArray:
+    """Return the variables at which SLSQP ends, within the bounds, shape (n,).
 
     Args:
-        objective: To minimise, of n variables.
-        slope: Its derivatives, shape (n,).
-        start: Shape (n,).
+        objective: Function of n variables to minimise.
+        slope: Derivatives of the objective, shape (n,).
+        start: Variables to start from, shape (n,).
         bounds: Lows and highs, shape (n, 2); infinite for none.
         demands: ("eq" or "ineq", values (m,), gradients (m, n)): zero, or at least zero.
-        most: The most iterations.
-        precision: Of the objective.
+        most: Most iterations.
+        precision: Precision of the objective.
     """
     from scipy import optimize
 
@@ -71,7 +68,7 @@ def slsqp(
         constraints=[{"type": kind, "fun": f, "jac": jac} for kind, f, jac in demands],
         options={"maxiter": most, "ftol": precision},
     )
-    return np.clip(np.asarray(result.x, dtype=np.float64), lows, highs), int(result.status)
+    return np.clip(np.asarray(result.x, dtype=np.float64), lows, highs)
 
 
 def solve(
@@ -84,10 +81,10 @@ def solve(
     """Run SLSQP on a model, to the end or until `Stop` is raised.
 
     Args:
-        model: What to minimise.
+        model: The problem.
         start: Scaled variables, shape (n,), of a design that can exist.
         see: Called with each accepted iterate, the start among them; may raise `Stop`.
-        most: The most iterations.
+        most: Most iterations.
     """
     seen: list[Evaluation] = []
 
@@ -98,42 +95,40 @@ def solve(
             return None
 
     def objective(u: FloatArray) -> float:
-        found = at(u)
-        return found.objective if found else NO_DESIGN
+        evaluation = at(u)
+        return evaluation.objective if evaluation else NO_DESIGN
 
     def slope(u: FloatArray) -> FloatArray:
-        found = at(u)
-        if found is None:
+        evaluation = at(u)
+        if evaluation is None:
             return np.zeros(len(u))
-        if not (seen and np.array_equal(seen[-1].u, found.u)):
-            seen.append(found)
-            see(found)
-        return found.slope
+        if not (seen and np.array_equal(seen[-1].u, evaluation.u)):
+            seen.append(evaluation)
+            see(evaluation)
+        return evaluation.slope
 
-    def part(kind: str, which: BoolArray) -> tuple[str, Values, Values]:
+    def demands_of(kind: str, which: BoolArray) -> tuple[str, Values, Values]:
         count = int(which.sum())
 
         def values(u: FloatArray) -> FloatArray:
-            found = at(u)
-            return found.values[which] if found else np.full(count, -NO_DESIGN)
+            evaluation = at(u)
+            return evaluation.values[which] if evaluation else np.full(count, -NO_DESIGN)
 
         def gradients(u: FloatArray) -> FloatArray:
-            found = at(u)
-            return found.gradients[which] if found else np.zeros((count, len(u)))
+            evaluation = at(u)
+            return evaluation.gradients[which] if evaluation else np.zeros((count, len(u)))
 
         return kind, values, gradients
 
     equal = model.equalities
-    demands = [part(kind, each) for kind, each in (("eq", equal), ("ineq", ~equal)) if each.any()]
-    exit_mode = 0
+    kinds = (("eq", equal), ("ineq", ~equal))
+    demands = [demands_of(kind, which) for kind, which in kinds if which.any()]
     try:
-        u, exit_mode = slsqp(
-            objective, slope, start, model.bounds, demands, most=most, precision=PRECISION
-        )
+        u = slsqp(objective, slope, start, model.bounds, demands, most=most, precision=PRECISION)
         last = at(u)
         if last is not None and not np.array_equal(seen[-1].u, last.u):
             seen.append(last)
             see(last)
     except Stop:
         pass
-    return Ended(seen[-1], len(seen) - 1, exit_mode == OUT_OF_ITERATIONS)
+    return Ended(seen[-1], len(seen) - 1)

@@ -1,4 +1,4 @@
-"""Where searches begin: designs out of a low-discrepancy sequence, positions on a grid."""
+"""The beginnings of searches: designs out of a low-discrepancy sequence, positions on a grid."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from explorer.mechanism.margins import margins
 from explorer.numerics.arrays import FloatArray
 from explorer.optimise.problem import DISTANCES, Problem, distance_of
 
-# Positions an axis at which clearance is demanded at first; more come where they matter.
+# Number of first positions on each axis at which clearance is demanded; more follow where needed.
 IN_SPACE, IN_SURFACE = 7, 21
-# Margins that rise less than this along z have no height at which they are some value.
+# Margins with a smaller slope along z than this take a given value at no height.
 STEEP = 1e-3
-# Tries for each start, before the bounds are taken to leave no room.
+# Designs tried for each start, before the bounds are taken to allow no more.
 TRIES = 64
 MOST_STARTS = 10_000
 
@@ -36,16 +36,16 @@ def check_starts(starts: int) -> None:
 def more_starts(problem: Problem, count: int, seed: int) -> Iterator[tuple[float, ...]]:
     """Yield values of the variables, spread evenly within their bounds (Sobol, scrambled).
 
-    Those nearer to a degenerate design than is allowed are left out.
+    Designs nearer to a degenerate one than is allowed are left out.
     """
     if count <= 0:
         return
     from scipy.stats import qmc
 
-    lows = np.array([each.low for each in problem.variables])
-    highs = np.array([each.high for each in problem.variables])
+    lows = np.array([variable.low for variable in problem.variables])
+    highs = np.array([variable.high for variable in problem.variables])
     sequence = qmc.Sobol(len(lows), rng=seed)
-    found = 0
+    yielded = 0
     for _ in range(TRIES * count):
         values = tuple((lows + (highs - lows) * sequence.random(1)[0]).tolist())
         try:
@@ -54,17 +54,17 @@ def more_starts(problem: Problem, count: int, seed: int) -> Iterator[tuple[float
             continue
         if all(abs(distance_of(design, name)) >= problem.demands.least for name in DISTANCES):
             yield values
-            found += 1
-            if found == count:
+            yielded += 1
+            if yielded == count:
                 return
 
 
 def first_positions(problem: Problem, design: Design) -> FloatArray:
     """Return the positions at which clearance is demanded at first, shape (k, 3).
 
-    They fill the box, or without one the cube of the design's reach, and lie closer in the
-    surface where the smallest margin is just the one from which on clearance is demanded:
-    with a level platform the legs of a column of positions come nearest at its foot.
+    They fill the box, or without one the cube of the design's reach. They lie closer in the
+    surface on which a margin is the least one at which clearance is demanded: with a level platform
+    the legs of a column of positions come nearest at its foot.
     """
     if problem.demands.clearance is None:
         return np.zeros((0, 3))
@@ -82,12 +82,12 @@ def first_positions(problem: Problem, design: Design) -> FloatArray:
     # Margins are linear in z: δ = δ at the foot + rise · z.
     at_foot = margins(foot, rotation)
     rise = margins(np.array([0.0, 0.0, 1.0]), rotation)
-    found = [grid(IN_SPACE, IN_SPACE, IN_SPACE)]
+    groups = [grid(IN_SPACE, IN_SPACE, IN_SPACE)]
     for index in np.flatnonzero(np.abs(rise) > STEEP):
         for side in (-1.0, 1.0):
             height = (side * least - at_foot[:, index]) / rise[index]
-            found.append(np.column_stack([columns, height]))
-    positions = np.vstack(found)
+            groups.append(np.column_stack([columns, height]))
+    positions = np.vstack(groups)
     within = (positions >= np.array(lows)).all(axis=1) & (positions <= np.array(highs)).all(axis=1)
     clear = (np.abs(margins(positions, rotation)) >= least * (1.0 - 1e-9)).all(axis=1)
     return positions[within & clear]

@@ -1,4 +1,4 @@
-"""A problem at one place of its variables: the design there, and how all parameters move.
+"""A problem at given variables: the design there, and the derivatives of all parameters.
 
 The solver works in scaled variables u of about unit size: lengths over the size of the
 start, the yaw in radians. An objective may append one more, see `explorer.optimise.search.model`.
@@ -7,7 +7,7 @@ start, the yaw in radians. An objective may append one more, see `explorer.optim
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cached_property
 
 import numpy as np
@@ -31,12 +31,12 @@ Chain = Mapping[str, FloatArray]
 
 
 def scales(problem: Problem) -> FloatArray:
-    """Return what one unit of each scaled variable is, shape (n,)."""
+    """Return the size of one unit of each scaled variable, shape (n,)."""
     return np.array([math.degrees(1.0) if name == YAW else problem.size for name in problem.names])
 
 
 class State:
-    """A problem at scaled variables; what is asked for is computed once.
+    """A problem at scaled variables; each property is computed once.
 
     Args:
         problem: The problem.
@@ -66,7 +66,7 @@ class State:
 
     @cached_property
     def box(self) -> Box:
-        """The required box where it lies now."""
+        """The required box with its shift."""
         return self.problem.required_box_at(self.values.tolist())
 
     @cached_property
@@ -76,7 +76,7 @@ class State:
 
     @cached_property
     def measured(self) -> Volume:
-        """The workspace, without what empties it."""
+        """Volume of the workspace and its gradient."""
         return workspace_volume(self.design, self.rotation, explain=False)
 
     @property
@@ -91,7 +91,7 @@ class State:
 
     @cached_property
     def chain(self) -> Chain:
-        """How each parameter of the workspace moves with the scaled variables."""
+        """Derivatives of each parameter of the workspace by the scaled variables."""
         problem, n = self.problem, len(self.u)
         chain: dict[str, FloatArray] = {}
         for index, (name, scale) in enumerate(zip(problem.names, scales(problem), strict=True)):
@@ -110,13 +110,14 @@ class State:
             for length in LENGTHS:
                 low, high = self.design.length_range(length)
                 if low <= high / ratio:
-                    chain[f"{length} minimum"] = self._of_maximum(length, chain) / ratio
+                    chain[f"{length} minimum"] = self._maximum_slope(length, chain) / ratio
         return chain
 
-    def _of_maximum(self, length: str, chain: Chain) -> FloatArray:
+    def _maximum_slope(self, length: str, chain: Chain) -> FloatArray:
+        """Return the derivatives of a maximum length by the scaled variables, shape (n,)."""
         if getattr(self.design.limits, length)[1] is not None:
             return chain.get(f"{length} maximum", np.zeros(len(self.u)))
-        return _of_reach(self.design, chain, len(self.u))
+        return _reach_slope(self.design, chain, len(self.u))
 
     @cached_property
     def reach(self) -> tuple[float, FloatArray]:
@@ -124,10 +125,10 @@ class State:
         if REACH in self.problem.names:
             index = self.problem.names.index(REACH)
             return float(self.values[index]), self.chain[f"{LENGTHS[0]} maximum"]
-        return self.design.reach, _of_reach(self.design, self.chain, len(self.u))
+        return self.design.reach, _reach_slope(self.design, self.chain, len(self.u))
 
     def along(self, gradient: Mapping[str, float]) -> FloatArray:
-        """Return derivatives by the scaled variables of what has these by parameters."""
+        """Return derivatives by the scaled variables, shape (n,), from those by parameters."""
         total = np.zeros(len(self.u))
         for name, derivative in gradient.items():
             if name in self.chain:
@@ -137,39 +138,44 @@ class State:
     def slack(
         self, limit: BallOrCylinder | HalfSpace, p: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return by how much positions keep a limit, in design units, and derivatives.
+        """Return the slacks of a limit at positions, in design units, and their derivatives.
 
         Args:
             limit: One of `limits`.
             p: Shape (k, 3).
 
         Returns:
-            The slacks, shape (k,), their derivatives by the scaled variables with p held,
-            shape (k, n), and by p, shape (k, 3).
+            The slacks, at least zero where the limit is kept, shape (k,), their derivatives by
+            the scaled variables with p held, shape (k, n), and by p, shape (k, 3).
         """
-        own = np.zeros((len(p), 4))
+        by_limit = np.ones((len(p), 4))
         match limit:
             case BallOrCylinder():
-                off = p - limit.centre
+                offsets = p - limit.centre
                 if not limit.is_ball:
-                    off[:, 0] = 0.0
-                distance = np.sqrt(np.einsum("ki,ki->k", off, off))
-                away = off / np.maximum(distance, 1e-300)[:, None]
-                side = 1.0 if limit.inside else -1.0
-                own[:, :3], own[:, 3] = side * away, side
-                slack, by_p = side * (limit.radius - distance), -side * away
+                    offsets[:, 0] = 0.0
+                distance = np.sqrt(np.einsum("ki,ki->k", offsets, offsets))
+                by_limit[:, :3] = offsets / np.maximum(distance, 1e-300)[:, None]
+                by_limit *= 1.0 if limit.inside else -1.0
+                by_p = -by_limit[:, :3]
             case HalfSpace():
-                own[:, :3], own[:, 3] = -p, 1.0
-                slack = limit.offset - p @ limit.normal
+                by_limit[:, :3] = -p
                 by_p = np.broadcast_to(-limit.normal, p.shape)
-        by_u = np.zeros((len(p), len(self.u)))
-        for name, rate in limit.rates.items():
-            if name in self.chain:
-                by_u += np.outer(own @ rate, self.chain[name])
-        return slack, by_u, by_p
+        return limit.slack(p), by_limit @ self.motion(limit), by_p
+
+    def motion(self, limit: BallOrCylinder | HalfSpace) -> FloatArray:
+        """Return the derivatives of a limit's centre and radius, or normal and offset, (4, n)."""
+        if not limit.rates:
+            return np.zeros((4, len(self.u)))
+        return np.column_stack([*limit.rates.values()]) @ self.rows(limit.rates)
+
+    def rows(self, names: Iterable[str]) -> FloatArray:
+        """Return the derivatives of k parameters by the scaled variables, shape (k, n)."""
+        zero = np.zeros(len(self.u))
+        return np.array([self.chain.get(name, zero) for name in names])
 
 
-def _of_reach(design: Design, chain: Chain, n: int) -> FloatArray:
+def _reach_slope(design: Design, chain: Chain, n: int) -> FloatArray:
     """Return the derivatives of |a3| by the scaled variables, shape (n,)."""
     total = np.zeros(n)
     for name, value in zip(("a3x", "a3y"), design.a3, strict=True):

@@ -1,4 +1,4 @@
-"""The iterates of a search as they come: recorded, watched, and the best of them kept."""
+"""The record of the iterates of a search, and the best of them."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Callable
 from explorer.optimise.outcome import Iterate, Phase
 from explorer.optimise.problem import Problem
 from explorer.optimise.search.demands import MET
-from explorer.optimise.search.model import Evaluation, Model, reported
+from explorer.optimise.search.model import Evaluation, Model, reported_objective
 from explorer.optimise.search.sqp import Stop
 from explorer.optimise.search.state import State
 
@@ -18,9 +18,9 @@ class Trail:
     """Every iterate of an optimisation.
 
     Args:
-        problem: What is being solved.
-        watch: Called with every iterate as it is found.
-        stop: Asked before each evaluation whether to end here.
+        problem: The problem.
+        watch: Called with every iterate.
+        stop: Called before each evaluation; True ends the search.
     """
 
     def __init__(
@@ -35,7 +35,7 @@ class Trail:
         self._best: Iterate | None = None
 
     def before_each(self) -> None:
-        """Ask whether to go on, before each evaluation.
+        """Raise `Stop` before an evaluation if the search is to end.
 
         Raises:
             Stop: the search is to end here.
@@ -45,18 +45,18 @@ class Trail:
             raise Stop
 
     def begin(self) -> None:
-        """Begin to look for the best iterate anew."""
+        """Forget the best iterate: only iterates that follow count."""
         self._best = None
 
     @property
     def best(self) -> Iterate:
-        """The best iterate since the beginning; the last one before if there is none."""
+        """Best iterate since `begin`; the last one of all if there is none."""
         return self._best or self.history[-1]
 
     def last_at(self, state: State) -> Iterate:
-        """Return the last iterate at a place, which has been seen."""
+        """Return the last iterate at a place that has been recorded."""
         values = tuple(state.values.tolist())
-        return next(each for each in reversed(self.history) if each.values == values)
+        return next(iterate for iterate in reversed(self.history) if iterate.values == values)
 
     def see(self, model: Model, at: Evaluation, phase: Phase) -> None:
         """Record an iterate of the solver."""
@@ -74,7 +74,7 @@ class Trail:
             phase=phase,
             design=state.design,
             values=tuple(state.values.tolist()),
-            objective=reported(self.problem, state),
+            objective=reported_objective(self.problem, state),
             volume=state.volume,
             worst=worst,
             spare=spare,
@@ -85,8 +85,11 @@ class Trail:
         if self._watch is not None:
             self._watch(iterate)
 
-    def rank(self, iterate: Iterate) -> tuple[float, float]:
-        """Return what orders iterates, the best first: demands missed, then the objective."""
+    def rank(self, iterate: Iterate) -> tuple[bool, float, float]:
+        """Return the key that sorts iterates, the best first.
+
+        Those without a workspace come last; the demand missed most decides, then the objective.
+        """
         problem = self.problem
         missed = max(0.0, -iterate.spare)
         if problem.objective != "match-volume" and problem.demands.volume is not None:
@@ -94,4 +97,4 @@ class Trail:
             missed = max(missed, short) if short > MET else missed
         larger = problem.objective in ("largest-volume", "largest-margin")
         objective = -iterate.objective if larger else iterate.objective
-        return missed, objective
+        return iterate.volume <= 0.0, missed, objective

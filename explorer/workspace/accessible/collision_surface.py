@@ -34,7 +34,7 @@ def project_onto_collisions(
     points: FloatArray,
     beside: FloatArray,
 ) -> FloatArray:
-    """Project points onto the surface at which the nearest pair of legs begins to collide.
+    """Project points (n, 3) onto the surface at which the nearest pair of legs begins to collide.
 
     Args:
         design: The manipulator.
@@ -42,34 +42,32 @@ def project_onto_collisions(
         pairs: Indices of the pairs that count.
         touching: Distance of the surface beyond a crossing of axes, for pairs without radii.
         step: Step of the grid on each axis, shape (3,).
-        points: Points near the surface, shape (n, 3).
+        points: Points near the surface; a point that diverges is returned as it is.
         beside: For each point a free position on the near side of the surface, shape (n, 3).
-
-    Returns:
-        Points on the surface, shape (n, 3); those that diverge are returned unprojected.
     """
     if not len(points):
         return points
-    # Legs may pass through one another on the segment between the two.
-    hit, which, collides = _first_collisions(design, rotation, pairs, step, beside, points)
-    side = np.sign(_signed_distances(design, rotation, which, beside)[3])[:, 0]
-    has_side = _signed_distances(design, rotation, which, points)[2][:, 0]
-    radii = radii_of_pairs(design)[which[:, 0]]
+    # On the way from `beside` to a point the legs may pass through one another.
+    collision, pair, collides = _first_collisions(design, rotation, pairs, step, beside, points)
+    *_, line_distances = _signed_distances(design, rotation, pair, beside)
+    side = np.sign(line_distances)[:, 0]
+    _, _, is_signed, _ = _signed_distances(design, rotation, pair, points)
+    radii = radii_of_pairs(design)[pair[:, 0]]
     target = np.where(radii > 0.0, 0.0, -touching)
-    at = np.where((collides & ~has_side)[:, None], hit, points)
+    projected = np.where((collides & ~is_signed[:, 0])[:, None], collision, points)
     for _ in range(STEPS):
-        values, gradients, sides, _ = _signed_distances(design, rotation, which, at)
+        values, gradients, sides, _ = _signed_distances(design, rotation, pair, projected)
         value, gradient, has_side = values[:, 0], gradients[:, 0], sides[:, 0]
-        turned = np.where(has_side, side, 1.0)
-        value, gradient = value * turned - radii, gradient * turned[:, None]
+        direction = np.where(has_side, side, 1.0)
+        value, gradient = value * direction - radii, gradient * direction[:, None]
         square = dot(gradient, gradient)
         ratio = np.where(square > LEAST_SLOPE**2, (target - value) / np.maximum(square, 1e-300), 0)
         move = ratio[:, None] * gradient
         cells = np.abs(move / step).max(axis=1)
-        at += move * np.minimum(1.0, SHARE / np.maximum(cells, 1e-300))[:, None]
-    astray = np.abs((at - points) / step).max(axis=1) > 1.0
-    at[astray] = np.where(collides[:, None], hit, points)[astray]
-    return at
+        projected += move * np.minimum(1.0, SHARE / np.maximum(cells, 1e-300))[:, None]
+    astray = np.abs((projected - points) / step).max(axis=1) > 1.0
+    projected[astray] = np.where(collides[:, None], collision, points)[astray]
+    return projected
 
 
 def _first_collisions(
@@ -80,13 +78,11 @@ def _first_collisions(
     start: FloatArray,
     end: FloatArray,
 ) -> tuple[FloatArray, IntArray, BoolArray]:
-    """Return the first collisions on segments from free starts to ends.
+    """Return the first collisions on segments from free starts to ends, shape (n, 3) each.
 
     A stride as long as the clearance is free, since clearance changes no faster than position.
-
-    Returns:
-        Positions of the collisions, or the ends where there is none, shape (n, 3); the pairs
-        of legs nearest there, shape (n, 1); whether a collision precedes the end, shape (n,).
+    Returned are positions, the ends where there is no collision; the pairs of legs nearest there,
+    shape (n, 1); and whether a collision precedes the end, shape (n,).
     """
     segment = end - start
     length = np.linalg.norm(segment, axis=1)
@@ -110,28 +106,22 @@ def nearest_pair(
 
 
 def _signed_distances(
-    design: Design, rotation: FloatArray, which: IntArray, at: FloatArray
+    design: Design, rotation: FloatArray, pair: IntArray, at: FloatArray
 ) -> tuple[FloatArray, FloatArray, BoolArray, FloatArray]:
     """Return distances between the axes of pairs of legs at positions, signed where possible.
 
     Where the closest points lie between the ends of the legs, the distance is that of the two
-    lines, whose sign tells on which side of each other they are.
-
-    Args:
-        design: The manipulator.
-        rotation: Rotation from platform to base, shape (3, 3).
-        which: Indices of m pairs, shape (m,), or m for each position, shape (n, m).
-        at: Positions, shape (n, 3).
+    lines, and its sign tells on which side of each other they are. `pair` has the indices of m
+    pairs, shape (m,), or of m pairs for each of n positions, shape (n, m).
 
     Returns:
-        The distances, signed where they can be, shape (n, m); their gradients in position,
-        shape (n, m, 3); whether they are signed, shape (n, m); the signed distances of the
-        lines in any case, shape (n, m).
+        The distances, shape (n, m); their gradients in position, shape (n, m, 3); whether they are
+        signed, shape (n, m); the signed distances of the lines in any case, shape (n, m).
     """
-    found = leg_clearances(design, at, rotation)
+    clearances = leg_clearances(design, at, rotation)
     axes = leg_axes(design, at, rotation)
     rows = np.arange(len(at))[:, None]
-    ends = np.array(PAIRS)[which] - 1
+    ends = np.array(PAIRS)[pair] - 1
     one, two = axes[rows, ends[..., 0]], axes[rows, ends[..., 1]]
     u, v = one[..., 1, :] - one[..., 0, :], two[..., 1, :] - two[..., 0, :]
     normal = np.cross(u, v)
@@ -139,12 +129,12 @@ def _signed_distances(
     scale = np.linalg.norm(u, axis=-1) * np.linalg.norm(v, axis=-1)
     normal = normal / np.where(length > 0.0, length, 1.0)[..., None]
     signed = dot(one[..., 0, :] - two[..., 0, :], normal)
-    distance = found.distance[rows, which]
+    distance = clearances.distance[rows, pair]
     has_side = (length > 1e-6 * scale) & (np.abs(np.abs(signed) - distance) <= 1e-9 * design.reach)
-    points = found.points[rows, which]
+    points = clearances.points[rows, pair]
     off = points[..., 0, :] - points[..., 1, :]
     outward = off / np.where(distance > 0.0, distance, 1.0)[..., None]
-    rates = point_rates(axes, found.points)[rows, which]
+    rates = point_rates(axes, clearances.points)[rows, pair]
     return (
         np.where(has_side, signed, distance),
         np.where(has_side[..., None], normal, outward) * rates,

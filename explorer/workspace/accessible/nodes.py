@@ -1,6 +1,6 @@
 """The nodes of a grid that are accessible from a position without a collision of legs.
 
-They form a connected component of a graph: its nodes keep all limits, and its edges are steps
+They form a connected component of a graph. Its nodes keep all limits, and its edges are steps
 between neighbours that are certified free of collisions (`explorer.legs.moves`). The grid
 extends beyond the limits, so that a surface of collision can be followed up to them.
 """
@@ -52,24 +52,20 @@ class Grid:
         """Return the nodes of the cell that holds a position, and of `wider` cells around it."""
         first = np.floor((position - self.lows) / self.step).astype(np.int64)
         x, y, z = (
-            slice(max(0, int(i) - wider), max(0, min(int(i) + 2 + wider, many)))
-            for i, many in zip(first, self.counts, strict=True)
+            slice(max(0, int(i) - wider), max(0, min(int(i) + 2 + wider, count)))
+            for i, count in zip(first, self.counts, strict=True)
         )
         return x, y, z
 
 
 def make_grid(lows: FloatArray, highs: FloatArray, nodes: int, beyond: int) -> Grid:
-    """Make a grid over a box, with nodes on its faces and some beyond it.
+    """Make a grid over a box, with `nodes` on each axis, the first and last of them on its faces.
 
-    Args:
-        lows: Lowest corner of the box, shape (3,).
-        highs: Highest corner of the box, shape (3,).
-        nodes: Number of nodes within the box on each axis, at least 2.
-        beyond: Number of further nodes on either side.
+    `beyond` is the number of further nodes on either side.
     """
     step = (highs - lows) / (nodes - 1)
-    many = nodes + 2 * beyond
-    return Grid(lows - beyond * step, step, (many, many, many))
+    count = nodes + 2 * beyond
+    return Grid(lows - beyond * step, step, (count, count, count))
 
 
 def make_cell_grid(lows: FloatArray, highs: FloatArray, cells: int) -> Grid:
@@ -108,27 +104,27 @@ class Survey:
             start: Position that keeps all limits and clearances, shape (3,).
             pairs: Indices of the pairs that count.
         """
-        return self._component(self.next_to(start, pairs), self.within, pairs)
+        return self._component(self.nodes_near(start, pairs), self.within, pairs)
 
-    def extended(self, accessible: BoolArray, pairs: Sequence[int] = ALL_PAIRS) -> BoolArray:
-        """Return accessible nodes with those beyond the limits that clear steps lead to.
+    def extend(self, accessible: BoolArray, pairs: Sequence[int] = ALL_PAIRS) -> BoolArray:
+        """Return the accessible nodes, and those beyond the limits that clear steps lead to.
 
-        Of the nodes within the limits only the accessible ones belong to it, so that nothing
-        but collisions separates it from the others, at the limits and beyond.
+        Of the nodes within the limits only the accessible ones count, so that nothing but
+        collisions separates the result from other nodes, at the limits and beyond.
         """
         return self._component(accessible, accessible | ~self.within, pairs)
 
-    def next_to(self, start: FloatArray, pairs: Sequence[int] = ALL_PAIRS) -> BoolArray:
+    def nodes_near(self, start: FloatArray, pairs: Sequence[int] = ALL_PAIRS) -> BoolArray:
         """Return the nodes near a position to which a straight move is clear."""
-        linked = np.zeros(self.within.shape, dtype=np.bool_)
+        reached = np.zeros(self.within.shape, dtype=np.bool_)
         for wider in range(3):
             cell = self.grid.cell_around(start, wider)
             near = self.grid.positions[cell]
             clear = pairs_are_clear(self.design, start, self.rotation, near, self.rotation)
-            linked[cell] = clear[..., list(pairs)].all(axis=-1) & self.within[cell]
-            if linked.any():
+            reached[cell] = clear[..., list(pairs)].all(axis=-1) & self.within[cell]
+            if reached.any():
                 break
-        return linked
+        return reached
 
     def _component(self, seeds: BoolArray, allowed: BoolArray, pairs: Sequence[int]) -> BoolArray:
         """Return the allowed nodes that clear steps connect with seeds."""
@@ -137,27 +133,21 @@ class Survey:
 
         shape, allowed = allowed.shape, allowed.ravel()
         clear = self.clear[:, list(pairs)].all(axis=-1)
-        kept = clear & allowed[self.first] & allowed[self.second]
-        ends = (self.first[kept], self.second[kept])
+        usable = clear & allowed[self.first] & allowed[self.second]
+        ends = (self.first[usable], self.second[usable])
         ones = np.ones(len(ends[0]), dtype=np.int8)
         graph = coo_array((ones, ends), shape=(allowed.size, allowed.size))
         count, labels = connected_components(graph, directed=False)
-        is_home = np.zeros(count, dtype=np.bool_)
-        is_home[labels[seeds.ravel() & allowed]] = True
-        return np.asarray((is_home[labels] & allowed).reshape(shape))
+        has_seed = np.zeros(count, dtype=np.bool_)
+        has_seed[labels[seeds.ravel() & allowed]] = True
+        return np.asarray((has_seed[labels] & allowed).reshape(shape))
 
 
 def survey(design: Design, rotation: FloatArray, grid: Grid) -> Survey:
-    """Check limits and collisions at the nodes and on the steps of a grid of positions.
-
-    Args:
-        design: The manipulator.
-        rotation: Rotation from platform to base, shape (3, 3).
-        grid: The grid.
-    """
+    """Check limits and collisions at the nodes and on the steps of a grid of positions."""
     positions = grid.positions
     slack = SLACK * design.reach
-    kept = satisfies(design, constraints(design, rotation), positions)
+    satisfied = satisfies(design, constraints(design, rotation), positions)
     clearance = leg_clearances(design, positions, rotation).clearance
     index = np.arange(math.prod(grid.counts)).reshape(grid.counts)
     ends = [
@@ -167,22 +157,13 @@ def survey(design: Design, rotation: FloatArray, grid: Grid) -> Survey:
     length = np.repeat(grid.step, [len(one) for one, _ in ends])
     flat = clearance.reshape(-1, len(PAIRS))
     a, b = flat[first], flat[second]
-    # At a fixed orientation a clearance changes by no more than the position does. So most
-    # steps are certainly clear, or not clear because an end is not.
+    # At a fixed orientation a clearance changes by no more than the position does. This decides
+    # most steps: they are certainly clear, or an end is not clear.
     clear = a + b > (1.0 + SLACK) * length[:, None]
-    apart = (a > slack) & (b > slack)
-    doubtful = np.flatnonzero((~clear & apart).any(axis=-1))
+    ends_clear = (a > slack) & (b > slack)
+    doubtful = np.flatnonzero((~clear & ends_clear).any(axis=-1))
     nodes = positions.reshape(-1, 3)
-    clear[doubtful] |= pairs_are_clear(
-        design, nodes[first[doubtful]], rotation, nodes[second[doubtful]], rotation
-    )
-    return Survey(
-        design=design,
-        rotation=rotation,
-        grid=grid,
-        within=np.asarray(kept.all(axis=-1)),
-        clearance=clearance,
-        first=first,
-        second=second,
-        clear=clear & apart,
-    )
+    start, end = nodes[first[doubtful]], nodes[second[doubtful]]
+    clear[doubtful] |= pairs_are_clear(design, start, rotation, end, rotation)
+    within = np.asarray(satisfied.all(axis=-1))
+    return Survey(design, rotation, grid, within, clearance, first, second, clear & ends_clear)

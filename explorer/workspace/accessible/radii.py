@@ -42,8 +42,8 @@ class RadiusCurve:
     """The volume of the accessible workspace against one radius of all four legs.
 
     Attributes:
-        radii: Radii in design units, shape (n,), from 0 to the one beyond which nothing is
-            accessible, which comes twice.
+        radii: Radii in design units, shape (n,), from 0 to the largest at which anything is
+            accessible; that one comes twice, with its volume and with 0.
         volumes: Accessible volumes in cubed design units, shape (n,): shares counted in the
             cells of a grid, times the exact volume within the limits.
         least: Least clearances within the limits of legs without radii.
@@ -117,13 +117,13 @@ def radius_curve(
     least = least_clearances(thin, r)
     stages.begin("grid of positions")
     lows, highs = whole.vertices.min(axis=0), whole.vertices.max(axis=0)
-    found = survey(thin, r, make_cell_grid(lows, highs, cells))
+    surveyed = survey(thin, r, make_cell_grid(lows, highs, cells))
     stages.begin("widest paths")
-    widest = 0.5 * _bottleneck_clearances(found, p)[found.within]
+    widest = 0.5 * _bottleneck_clearances(surveyed, p)[surveyed.within]
     radii = np.linspace(0.0, float(widest.max(initial=0.0)), POINTS)
     # A cell is accessible with radii up to its own, to rounding.
-    left = len(widest) - np.searchsorted(np.sort(widest), (1.0 - SAME) * radii)
-    shares = np.append(left / max(1, len(widest)), 0.0)
+    accessible_counts = len(widest) - np.searchsorted(np.sort(widest), (1.0 - SAME) * radii)
+    shares = np.append(accessible_counts / max(1, len(widest)), 0.0)
     return RadiusCurve(np.append(radii, radii[-1]), shares * exact.volume, least)
 
 
@@ -133,43 +133,43 @@ def with_radius(design: Design, radius: float) -> Design:
     return msgspec.structs.replace(design, limits=limits)
 
 
-def _bottleneck_clearances(found: Survey, start: FloatArray) -> FloatArray:
+def _bottleneck_clearances(surveyed: Survey, start: FloatArray) -> FloatArray:
     """Return the least distance of legs on the widest path to each node, −1 without a path."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
 
-    allowed = found.within.ravel()
-    many = len(allowed)
-    distance = found.clearance.reshape(many, -1).min(axis=1)
-    steps = allowed[found.first] & allowed[found.second] & found.clear.all(axis=1)
-    first, second = found.first[steps], found.second[steps]
-    linked = np.flatnonzero(found.next_to(start))
-    at_start = float(leg_clearances(found.design, start, found.rotation).clearance.min())
+    allowed = surveyed.within.ravel()
+    node_count = len(allowed)
+    distance = surveyed.clearance.reshape(node_count, -1).min(axis=1)
+    steps = allowed[surveyed.first] & allowed[surveyed.second] & surveyed.clear.all(axis=1)
+    first, second = surveyed.first[steps], surveyed.second[steps]
+    near_start = np.flatnonzero(surveyed.nodes_near(start))
+    at_start = float(leg_clearances(surveyed.design, start, surveyed.rotation).clearance.min())
     # The start is one more node.
-    first = np.append(first, np.full(len(linked), many))
-    second = np.append(second, linked)
+    first = np.append(first, np.full(len(near_start), node_count))
+    second = np.append(second, near_start)
     distance = np.append(distance, at_start)
-    positions = np.vstack([found.grid.positions.reshape(-1, 3), start])
-    width = _step_clearances(found, positions, distance, first, second)
+    positions = np.vstack([surveyed.grid.positions.reshape(-1, 3), start])
+    width = _step_clearances(surveyed, positions, distance, first, second)
     # The tree of least weight has the widest paths; a weight of zero would be no edge.
     weight = 1.0 + width.max(initial=0.0) - width
-    graph = coo_array((weight, (first, second)), shape=(many + 1, many + 1)).tocsr()
+    graph = coo_array((weight, (first, second)), shape=(node_count + 1, node_count + 1)).tocsr()
     tree = minimum_spanning_tree(graph)
-    order, before = breadth_first_order(tree, many, directed=False)
-    both = (tree + tree.T).tocsr()
-    after = order[1:]
-    weights: FloatArray = np.asarray(both[after, before[after]], dtype=np.float64).ravel()
+    order, predecessors = breadth_first_order(tree, node_count, directed=False)
+    links = (tree + tree.T).tocsr()
+    others = order[1:]
+    weights: FloatArray = np.asarray(links[others, predecessors[others]], dtype=np.float64).ravel()
     widths = 1.0 + width.max(initial=0.0) - weights
-    best: list[float] = [-1.0] * (many + 1)
-    best[many] = at_start
-    preceding: list[int] = before[after].tolist()
-    for node, one_before, step in zip(after.tolist(), preceding, widths.tolist(), strict=True):
-        best[node] = min(best[one_before], step)
-    return np.array(best[:many]).reshape(found.within.shape)
+    best: list[float] = [-1.0] * (node_count + 1)
+    best[node_count] = at_start
+    previous: list[int] = predecessors[others].tolist()
+    for node, predecessor, step in zip(others.tolist(), previous, widths.tolist(), strict=True):
+        best[node] = min(best[predecessor], step)
+    return np.array(best[:node_count]).reshape(surveyed.within.shape)
 
 
 def _step_clearances(
-    found: Survey, positions: FloatArray, distance: FloatArray, first: IntArray, second: IntArray
+    surveyed: Survey, positions: FloatArray, distance: FloatArray, first: IntArray, second: IntArray
 ) -> FloatArray:
     """Return the least distance of legs over each step.
 
@@ -178,7 +178,7 @@ def _step_clearances(
     width = np.minimum(distance[first], distance[second])
     length = np.linalg.norm(positions[second] - positions[first], axis=1)
     near = np.flatnonzero(width < length)
-    design, r = found.design, found.rotation
+    design, r = surveyed.design, surveyed.rotation
     a, b = positions[first[near]], positions[second[near]]
     exact = move_clearances(design, a, r, b, r, tolerance=TOLERANCE * design.reach)
     width[near] = np.maximum(0.0, np.minimum(width[near], exact.clearance.min(axis=-1)))

@@ -38,12 +38,7 @@ class StartError(InputError):
 
 
 def check_start(design: Design, rotation: FloatArray, position: FloatArray) -> None:
-    """Check that a position keeps the limits and that no legs collide there.
-
-    Args:
-        design: The manipulator.
-        rotation: Rotation from platform to base, shape (3, 3).
-        position: Position of b4 in the base frame, shape (3,).
+    """Check that a position (3,) keeps the limits and that no legs collide there.
 
     Raises:
         StartError: the position is not valid; the message names the limits or the pairs of
@@ -52,14 +47,12 @@ def check_start(design: Design, rotation: FloatArray, position: FloatArray) -> N
     faults = start_faults(design, rotation, position)
     if not faults:
         return
-    text = f"no position is accessible from {_text_of(position)}: {'; '.join(faults)}"
+    refusal = f"no position is accessible from {_text_of(position)}: {'; '.join(faults)}"
     nearest = nearest_clear_position(design, rotation, position)
-    if nearest is None:
-        raise StartError(f"{text}; no valid position is found at this orientation", None)
-    raise StartError(
-        f"{text}; the nearest valid position at this orientation is {_text_of(nearest)}",
-        nearest,
-    )
+    remedy = "no valid position is found at this orientation"
+    if nearest is not None:
+        remedy = f"the nearest valid position at this orientation is {_text_of(nearest)}"
+    raise StartError(f"{refusal}; {remedy}", nearest)
 
 
 def start_faults(design: Design, rotation: FloatArray, position: FloatArray) -> list[str]:
@@ -67,15 +60,12 @@ def start_faults(design: Design, rotation: FloatArray, position: FloatArray) -> 
     joints, delta = inverse(design, position, rotation), margins(position, rotation)
     broken = violations(design, position, rotation, joints, delta, home_signs(design))
     clearance = leg_clearances(design, position, rotation).clearance
-    touching = np.flatnonzero(clearance <= 0.0)
-    pairs = [(PAIRS[pair], -float(clearance[pair])) for pair in touching]
-    return [
-        *map(str, broken),
-        *(
-            f"legs {i} and {j} overlap by {depth:.4g}" if depth > 0.0 else f"legs {i} and {j} cross"
-            for (i, j), depth in pairs
-        ),
-    ]
+    faults = [str(violation) for violation in broken]
+    for (i, j), depth in zip(PAIRS, (-clearance).tolist(), strict=True):
+        if depth >= 0.0:
+            manner = f"overlap by {depth:.4g}" if depth > 0.0 else "cross"
+            faults.append(f"legs {i} and {j} {manner}")
+    return faults
 
 
 def _text_of(position: FloatArray) -> str:
@@ -89,15 +79,10 @@ def nearest_clear_position(
 
     It is the best of the local optima near the nearest free nodes of a grid; None if no node
     of the grid is free.
-
-    Args:
-        design: The manipulator.
-        rotation: Rotation from platform to base, shape (3, 3).
-        position: Position of b4 in the base frame, shape (3,).
     """
     limits = constraints(design, rotation)
     lows, highs = bounds(region_of(limits))
-    if any(isinstance(each, Never) for each in limits) or not (lows < highs).all():
+    if any(isinstance(limit, Never) for limit in limits) or not (lows < highs).all():
         return None
     nodes = make_cell_grid(lows, highs, CELLS).positions.reshape(-1, 3)
     nodes = nodes[(slacks(limits, nodes) >= 0.0).all(axis=-1)]
@@ -107,22 +92,22 @@ def nearest_clear_position(
     reach = design.reach
     nodes = nodes[np.linalg.norm(nodes - position, axis=1).argsort()[:STARTS]]
 
-    def kept(p: FloatArray) -> FloatArray:
+    def slacks_at(p: FloatArray) -> FloatArray:
         clearance = leg_clearances(design, p * reach, rotation).clearance / reach
-        room: FloatArray = np.asarray(np.minimum(clearance, 1.0), dtype=np.float64) - CLEAR
-        return np.concatenate([slacks(limits, p * reach) / reach, room])
+        spare: FloatArray = np.asarray(np.minimum(clearance, 1.0), dtype=np.float64) - CLEAR
+        return np.concatenate([slacks(limits, p * reach) / reach, spare])
 
-    def off(p: FloatArray) -> tuple[float, FloatArray]:
+    def squared_distance(p: FloatArray) -> tuple[float, FloatArray]:
         away = p - position / reach
         return float(away @ away), 2.0 * away
 
     best = nodes[0]
     for node in nodes:
-        found = descend(off, kept, node / reach)
-        if found is None:
+        optimum = descend(squared_distance, slacks_at, node / reach)
+        if optimum is None:
             continue
-        at = found * reach
-        nearer = np.linalg.norm(at - position) < np.linalg.norm(best - position)
-        if nearer and not start_faults(design, rotation, at):
-            best = at
+        candidate = optimum * reach
+        nearer = np.linalg.norm(candidate - position) < np.linalg.norm(best - position)
+        if nearer and not start_faults(design, rotation, candidate):
+            best = candidate
     return best

@@ -2,7 +2,7 @@
 
 A connected component of a grid of nodes and certified steps tells on which side of the
 collisions the home lies. The solid of the limits, exact where they bound it, is cut along the
-collision surface, and the part with the home is kept.
+collision surface; the accessible workspace is the part that holds the home.
 """
 
 from __future__ import annotations
@@ -90,8 +90,8 @@ class ReachableWorkspace:
         solid: The accessible part.
         step: Step of the paper's grid of nodes, as in
             `explorer.workspace.slices.volume.NodeCount`.
-        node_count: Number of its nodes within the limits; None if not counted.
-        reachable_node_count: Number of its nodes that steps of the grid lead to; None if not
+        node_count: Number of nodes of that grid within the limits; None if not counted.
+        reachable_node_count: Number of its nodes that clear steps of the grid lead to; None if not
             counted.
         pairs: The six pairs of legs, in the order of `PAIRS`.
     """
@@ -163,12 +163,12 @@ def reachable_workspace(
     stages.begin("grid of positions")
     carver = _Carver(design, r, p, whole, volume, nodes)
     blocking = [pair for pair in ALL_PAIRS if least.bound[pair] <= 0.0 and carver.blocks(pair)]
-    alone = blocking if len(blocking) > 1 else []
-    stages.count = FIXED_STAGES + len(alone)
+    single_pairs = blocking if len(blocking) > 1 else []
+    stages.count = FIXED_STAGES + len(single_pairs)
     stages.begin("collisions of all legs")
     solid, accessible = carver.carve(blocking)
     blocked = dict.fromkeys(blocking, volume - accessible)
-    for pair in alone:
+    for pair in single_pairs:
         stages.begin(f"collisions of {PAIR_NAMES[pair]}")
         blocked[pair] = max(0.0, volume - carver.carve([pair])[1])
     costs = [_cost(pair, least, blocked.get(pair, 0.0)) for pair in ALL_PAIRS]
@@ -190,24 +190,24 @@ def _paper_nodes(
     step: float,
     most: int | None,
 ) -> tuple[int, int] | tuple[None, None]:
-    """Count the nodes of the paper's grid that are within the limits, and accessible.
+    """Count the nodes of the paper's grid within the limits, and the accessible ones.
 
     Both counts are None if the grid has more nodes than `most`.
     """
-    first, many = node_range(region_of(limits), step)
+    first, counts = node_range(region_of(limits), step)
     with np.errstate(over="ignore"):
-        is_fine = most is not None and not float(np.prod(many)) <= most
-    if is_fine:
+        is_too_fine = most is not None and not float(np.prod(counts)) <= most
+    if is_too_fine:
         return None, None
-    check_node_count(many, step, MOST_PAPER_NODES)
-    if not many.all():
+    check_node_count(counts, step, MOST_PAPER_NODES)
+    if not counts.all():
         return 0, 0
-    x, y, z = many.astype(int).tolist()
-    found = survey(design, rotation, Grid(first * step, np.full(3, step), (x, y, z)))
+    x, y, z = counts.astype(int).tolist()
+    surveyed = survey(design, rotation, Grid(first * step, np.full(3, step), (x, y, z)))
     accessible = (
-        0 if start_faults(design, rotation, start) else int(found.accessible_from(start).sum())
+        0 if start_faults(design, rotation, start) else int(surveyed.accessible_from(start).sum())
     )
-    return int(found.within.sum()), accessible
+    return int(surveyed.within.sum()), accessible
 
 
 class _Carver:
@@ -249,9 +249,11 @@ class _Carver:
         """
         if self.radii[pair] > 0.0:
             return True
-        found = self.survey
-        cut = found.accessible_from(self.start, ()) & ~found.accessible_from(self.start, [pair])
-        return bool((cut & (found.clearance[..., pair] > SLACK * self.design.reach)).any())
+        surveyed = self.survey
+        cut = surveyed.accessible_from(self.start, ()) & ~surveyed.accessible_from(
+            self.start, [pair]
+        )
+        return bool((cut & (surveyed.clearance[..., pair] > SLACK * self.design.reach)).any())
 
     def carve(self, pairs: Sequence[int]) -> tuple[Solid, float]:
         """Cut out collisions of some pairs; return the part with the start, and its volume."""
@@ -263,15 +265,15 @@ class _Carver:
     def _thin_walls(
         self, extended: BoolArray, clearance: FloatArray, pairs: Sequence[int]
     ) -> IntArray:
-        """Return those free nodes, one of each step, between which legs collide.
+        """Return a node of each step whose ends are free although legs collide between them.
 
-        Legs thinner than a step may collide between two nodes at which they do not. With
-        the nearer one cut out, the surface passes on either side of it.
+        This happens with legs thinner than a step. The node is the end nearer to the collision;
+        once it is cut out, the surface passes on either side of it.
         """
-        found = self.survey
+        surveyed = self.survey
         thick = [pair for pair in pairs if self.radii[pair] > 0.0]
-        hit = ~found.clear[:, thick].all(axis=1)
-        first, second = found.first[hit], found.second[hit]
+        collides = ~surveyed.clear[:, thick].all(axis=1)
+        first, second = surveyed.first[collides], surveyed.second[collides]
         free = extended.ravel()
         between = free[first] & free[second]
         first, second = first[between], second[between]
@@ -281,9 +283,9 @@ class _Carver:
     def _surface(self, pairs: Sequence[int]) -> Surface:
         from scipy.ndimage import binary_dilation
 
-        found, (design, rotation) = self.survey, (self.design, self.rotation)
-        extended = found.extended(found.accessible_from(self.start, pairs), pairs)
-        clearance = np.minimum(found.clearance[..., list(pairs)].min(axis=-1), design.reach)
+        surveyed, (design, rotation) = self.survey, (self.design, self.rotation)
+        extended = surveyed.extend(surveyed.accessible_from(self.start, pairs), pairs)
+        clearance = np.minimum(surveyed.clearance[..., list(pairs)].min(axis=-1), design.reach)
         # Beyond a wall without thickness the distance from it counts as negative.
         values = clearance * np.where(extended, 1.0, -np.sign(clearance))
         touching = TOUCHING * design.reach
@@ -291,7 +293,7 @@ class _Carver:
             values = values + touching
         values.ravel()[self._thin_walls(extended, clearance, pairs)] = -touching
         # Far from all nodes within the limits there is nothing to cut.
-        near: Any = binary_dilation(found.within, CUBE)
+        near: Any = binary_dilation(surveyed.within, CUBE)
         values[~near] = np.abs(values[~near])
 
         def name_of(points: FloatArray) -> IntArray:
@@ -299,9 +301,9 @@ class _Carver:
 
         return Surface(
             values,
-            found.grid.lows,
-            found.grid.step,
-            partial(project_onto_collisions, design, rotation, pairs, touching, found.grid.step),
+            surveyed.grid.lows,
+            surveyed.grid.step,
+            partial(project_onto_collisions, design, rotation, pairs, touching, surveyed.grid.step),
             PAIR_NAMES,
             name_of,
         )

@@ -61,7 +61,7 @@ def violations(
         joints: Joint values of the pose, shape (6,).
         margin: Margins (δ1, δ2, δ3) of the pose, shape (3,).
         home_signs: Sign triple of the home pose.
-        order: Sign of d3 − d1 to demand, 0 for either; that which the design demands if None.
+        order: Sign of d3 − d1 to demand, 0 for either; the design's if None.
     """
     limits, tolerance = design.limits, design.tolerance
     broken: list[Violation] = []

@@ -113,11 +113,11 @@ class Cone:
     flat: bool
 
     def slack(self, p: FloatArray) -> FloatArray:
-        """Return the slack of positions (..., 3): the angle left to the cone, in radians."""
+        """Return the slack of positions (..., 3) in radians; negative outside the cone."""
         return self.half_angle - angle_between(self._leg(p), self.axis)
 
     def distance(self, p: FloatArray) -> FloatArray:
-        """Return the distances of positions (..., 3) near the surface from it, to first order."""
+        """Return the distances of positions (..., 3) from the nearby surface, to first order."""
         return np.abs(self.slack(p)) * np.linalg.norm(self._leg(p), axis=-1)
 
     def _leg(self, p: FloatArray) -> FloatArray:
@@ -173,17 +173,23 @@ def slacks(limits: tuple[Constraint, ...], position: ArrayLike) -> FloatArray:
 
 def satisfies(design: Design, limits: tuple[Constraint, ...], position: ArrayLike) -> BoolArray:
     """Return whether positions (..., 3) satisfy each of n limits to its tolerance, (..., n)."""
-    allowed = [TOLERANCE if isinstance(limit, Cone) else design.tolerance for limit in limits]
-    return slacks(limits, position) >= -np.array(allowed)
+    tolerances = [TOLERANCE if isinstance(limit, Cone) else design.tolerance for limit in limits]
+    return slacks(limits, position) >= -np.array(tolerances)
 
 
 def _turning(vector: FloatArray) -> FloatArray:
-    """Return the derivative of a vector that turns about z with the platform, by the yaw."""
+    """Return the derivative by the yaw of a vector that turns about z with the platform."""
     return np.array([-vector[1], vector[0], 0.0])
 
 
-def _four(vector: FloatArray, last: float = 0.0) -> FloatArray:
-    return np.array([*vector, last])
+def _vector_rate(vector: FloatArray) -> FloatArray:
+    """Return the derivative of a primitive whose centre or normal alone changes."""
+    return np.array([*vector, 0.0])
+
+
+def _scalar_rate(rate: float) -> FloatArray:
+    """Return the derivative of a primitive whose radius or offset alone changes."""
+    return np.array([0.0, 0.0, 0.0, rate])
 
 
 def _lengths(design: Design, r: FloatArray) -> Iterator[Constraint]:
@@ -198,21 +204,20 @@ def _lengths(design: Design, r: FloatArray) -> Iterator[Constraint]:
         ("d4", -design.b3 * u * yz, False, {"b3": -u * yz, YAW: -design.b3 * _turning(u) * yz}),
         ("l4", a3, True, {"a3x": X, "a3y": Y}),
     )
-    for name, centre, is_ball, moves in legs:
+    for name, centre, is_ball, centre_rates in legs:
         low, high = design.length_range(name)
-        rates = {key: _four(rate) for key, rate in moves.items()}
+        minimum, maximum = f"{name} minimum", f"{name} maximum"
+        rates = {key: _vector_rate(rate) for key, rate in centre_rates.items()}
         if low > 0.0:
-            least = f"{name} minimum"
-            own = {**rates, least: _four(np.zeros(3), 1.0)}
-            yield BallOrCylinder(least, centre, low, is_ball, inside=False, rates=own)
-        most = f"{name} maximum"
-        own = {**rates, most: _four(np.zeros(3), 1.0)}
+            limit_rates = {**rates, minimum: _scalar_rate(1.0)}
+            yield BallOrCylinder(minimum, centre, low, is_ball, inside=False, rates=limit_rates)
+        limit_rates = {**rates, maximum: _scalar_rate(1.0)}
         if getattr(design.limits, name)[1] is None:
             # A maximum at the reach follows a3 and has no parameter of its own.
-            del own[most]
+            del limit_rates[maximum]
             for key, share in zip(("a3x", "a3y"), a3 / design.reach, strict=False):
-                own[key] = own.get(key, np.zeros(4)) + _four(np.zeros(3), float(share))
-        yield BallOrCylinder(most, centre, high, is_ball, inside=True, rates=own)
+                limit_rates[key] = limit_rates.get(key, np.zeros(4)) + _scalar_rate(float(share))
+        yield BallOrCylinder(maximum, centre, high, is_ball, inside=True, rates=limit_rates)
 
 
 def _guide(design: Design, r: FloatArray) -> Iterator[Constraint]:
@@ -221,31 +226,21 @@ def _guide(design: Design, r: FloatArray) -> Iterator[Constraint]:
         low, high = design.limits.guide
         for joint, variable, b in (("d1", "b2", design.b2), ("d3", "b3", design.b3)):
             shift, turning = b * float(u[0]), b * float(_turning(u)[0])
-            yield HalfSpace(
-                f"{joint} minimum",
-                -X,
-                shift - low,
-                {
-                    variable: _four(np.zeros(3), float(u[0])),
-                    YAW: _four(np.zeros(3), turning),
-                    "guide minimum": _four(np.zeros(3), -1.0),
-                },
-            )
-            yield HalfSpace(
-                f"{joint} maximum",
-                X,
-                high - shift,
-                {
-                    variable: _four(np.zeros(3), -float(u[0])),
-                    YAW: _four(np.zeros(3), -turning),
-                    "guide maximum": _four(np.zeros(3), 1.0),
-                },
-            )
+            for end, side, offset in (
+                ("minimum", -1.0, shift - low),
+                ("maximum", 1.0, high - shift),
+            ):
+                rates = {
+                    variable: _scalar_rate(-side * float(u[0])),
+                    YAW: _scalar_rate(-side * turning),
+                    f"guide {end}": _scalar_rate(side),
+                }
+                yield HalfSpace(f"{joint} {end}", side * X, offset, rates)
     # d3 - d1 is the same at every position.
-    apart = (design.b3 - design.b2) * float(u[0])
-    if abs(apart) < design.limits.gap - design.tolerance:
+    difference = (design.b3 - design.b2) * float(u[0])
+    if abs(difference) < design.limits.gap - design.tolerance:
         yield Never(GAP)
-    if demanded_order(design) * apart < -design.tolerance:
+    if demanded_order(design) * difference < -design.tolerance:
         yield Never(CARRIAGE_ORDER)
 
 
@@ -253,9 +248,9 @@ def _box(design: Design) -> Iterator[Constraint]:
     if design.limits.box is None:
         return
     for axis, name, low, high in zip((X, Y, Z), "xyz", *design.limits.box, strict=True):
-        least, most = f"box {name} minimum", f"box {name} maximum"
-        yield HalfSpace(least, -axis, -low, {least: _four(np.zeros(3), -1.0)})
-        yield HalfSpace(most, axis, high, {most: _four(np.zeros(3), 1.0)})
+        minimum, maximum = f"box {name} minimum", f"box {name} maximum"
+        yield HalfSpace(minimum, -axis, -low, {minimum: _scalar_rate(-1.0)})
+        yield HalfSpace(maximum, axis, high, {maximum: _scalar_rate(1.0)})
 
 
 def _margins(design: Design, r: FloatArray) -> Iterator[Constraint]:
@@ -273,9 +268,9 @@ def _margins(design: Design, r: FloatArray) -> Iterator[Constraint]:
         # The lines are parallel, and the margin is zero at every position.
         if float(np.linalg.norm(k)) <= PARALLEL:
             yield Never(name)
-            continue
-        rates = {YAW: _four(-sign * turning), "margin": _four(np.zeros(3), -1.0)}
-        yield HalfSpace(name, -sign * k, -least, rates)
+        else:
+            rates = {YAW: _vector_rate(-sign * turning), "margin": _scalar_rate(-1.0)}
+            yield HalfSpace(name, -sign * k, -least, rates)
 
 
 def _swings(design: Design, r: FloatArray) -> Iterator[Constraint]:
@@ -310,7 +305,7 @@ def demanded_order(design: Design) -> int:
     """
     if design.limits.carriage_order == "any":
         return 0
-    apart = (design.b3 - design.b2) * float(home_pose(design).rotation[0, 0])
-    if abs(apart) <= design.tolerance:
+    difference = (design.b3 - design.b2) * float(home_pose(design).rotation[0, 0])
+    if abs(difference) <= design.tolerance:
         return 0
-    return 1 if apart > 0.0 else -1
+    return 1 if difference > 0.0 else -1

@@ -24,14 +24,10 @@ WORTH_WHILE = 0.8
 def contract_box(
     limits: Sequence[Constraint], lows: FloatArray, highs: FloatArray
 ) -> tuple[FloatArray, FloatArray] | None:
-    """Return (lows, highs) of a smaller box with all positions of a box that satisfy all limits.
+    """Return (lows, highs) of a smaller box that holds all positions within the limits.
 
-    None if no position in the box satisfies them. Cones are ignored.
-
-    Args:
-        limits: Limits of one workspace.
-        lows: Lower ends of the box, shape (3,), in design units.
-        highs: Upper ends of the box, shape (3,).
+    Ends have the shape (3,), in design units. The result is None if no position of the box is
+    within the limits. Cones are ignored.
     """
     for _ in range(MOST_ROUNDS):
         size, volume = float((highs - lows).max()), float(np.prod(highs - lows))
@@ -45,8 +41,8 @@ def contract_box(
         for limit in limits:
             if not isinstance(limit, Cone):
                 steepest = np.linalg.norm(limit.normal) if isinstance(limit, HalfSpace) else 1.0
-                left = limit.slack(middles) >= -half * float(steepest)
-                cells, middles = cells[left], middles[left]
+                satisfiable = limit.slack(middles) >= -half * float(steepest)
+                cells, middles = cells[satisfiable], middles[satisfiable]
         if not len(cells):
             return None
         highs = lows + (cells.max(axis=0) + 1) * step

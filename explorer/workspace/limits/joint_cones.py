@@ -40,14 +40,14 @@ def joint_cones(design: Design) -> tuple[JointCone, ...]:
     if swing == Swing():
         return ()
     home = home_pose(design)
-    at_home = legs(design, np.array(home.position), home.rotation)
+    home_legs = legs(design, np.array(home.position), home.rotation)
     cones: list[JointCone] = []
     for joint in swing.__struct_fields__:
         degrees = getattr(swing, joint)
         if degrees is None:
             continue
         leg = 4 if joint == "a3" else int(joint[1])
-        direction = at_home[leg - 1]
+        direction = home_legs[leg - 1]
         length = float(np.linalg.norm(direction))
         in_platform = joint.startswith("b")
         axis = direction / length if length > 0.0 else None

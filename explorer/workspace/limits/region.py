@@ -31,8 +31,8 @@ class Region:
         low, high: Range of x; empty if low exceeds high.
         circle_limits, plane_limits: Limits of the rows.
         low_limit, high_limit: Limits at the ends of the range, None where a ball is the end.
-        is_flat: Whether a ball or cylinder is to be satisfied both inside and outside, so that
-            the region has no volume, although positions on the surface satisfy all limits.
+        is_flat: Whether positions must lie both inside and outside one ball or cylinder. The
+            region then has no volume, although positions on the surface satisfy all limits.
     """
 
     circles: FloatArray
@@ -47,6 +47,11 @@ class Region:
     is_flat: bool
 
     @property
+    def rows(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """(circles, planes, cones)."""
+        return self.circles, self.planes, self.cones
+
+    @property
     def is_empty(self) -> bool:
         """Whether the range of x or a single surface already shows that there is no volume."""
         return self.is_flat or not self.low < self.high
@@ -56,8 +61,8 @@ def region_of(limits: Sequence[Constraint]) -> Region:
     """Return the region that satisfies all limits; at least one must be the inside of a ball."""
     balls = [c for c in limits if isinstance(c, BallOrCylinder)]
     size = max(ball.radius + float(np.abs(ball.centre).max()) for ball in balls)
-    same = SAME * max(size, 1e-300)
-    circles, is_flat = _distinct(balls, same)
+    tolerance = SAME * max(size, 1e-300)
+    circles, is_flat = _drop_duplicates(balls, tolerance)
     low, high = -math.inf, math.inf
     low_limit: HalfSpace | None = None
     high_limit: HalfSpace | None = None
@@ -71,7 +76,7 @@ def region_of(limits: Sequence[Constraint]) -> Region:
             continue
         across = math.hypot(limit.normal[1], limit.normal[2])
         if across > SAME * abs(float(limit.normal[0])):
-            planes = _with_plane(planes, limit, same)
+            planes = _add_plane(planes, limit, tolerance)
             continue
         end = limit.offset / float(limit.normal[0])
         if limit.normal[0] > 0.0 and end < high:
@@ -102,29 +107,35 @@ def region_of(limits: Sequence[Constraint]) -> Region:
     )
 
 
-def _distinct(balls: list[BallOrCylinder], same: float) -> tuple[list[BallOrCylinder], bool]:
-    """Return each surface once for each side, and whether one is to be satisfied on both sides."""
+def _drop_duplicates(
+    balls: list[BallOrCylinder], tolerance: float
+) -> tuple[list[BallOrCylinder], bool]:
+    """Return each surface once for each side, and whether limits demand both sides of one."""
     distinct: list[BallOrCylinder] = []
     is_flat = False
     for limit in balls:
-        twins = [other for other in distinct if _is_same(limit, other, same)]
-        is_flat = is_flat or any(twin.inside != limit.inside for twin in twins)
-        if all(twin.inside != limit.inside for twin in twins):
+        same_surface = [other for other in distinct if _is_same(limit, other, tolerance)]
+        is_flat = is_flat or any(twin.inside != limit.inside for twin in same_surface)
+        if all(twin.inside != limit.inside for twin in same_surface):
             distinct.append(limit)
     return distinct, is_flat
 
 
-def _is_same(a: BallOrCylinder, b: BallOrCylinder, same: float) -> bool:
+def _is_same(a: BallOrCylinder, b: BallOrCylinder, tolerance: float) -> bool:
     off = np.abs(a.centre - b.centre)[0 if a.is_ball else 1 :]
-    return a.is_ball == b.is_ball and float(off.max()) <= same and abs(a.radius - b.radius) <= same
+    return (
+        a.is_ball == b.is_ball
+        and float(off.max()) <= tolerance
+        and abs(a.radius - b.radius) <= tolerance
+    )
 
 
-def _with_plane(planes: list[HalfSpace], new: HalfSpace, same: float) -> list[HalfSpace]:
-    """Return the planes with another one; of parallel ones only the tighter remains."""
+def _add_plane(planes: list[HalfSpace], new: HalfSpace, tolerance: float) -> list[HalfSpace]:
+    """Return the planes and a new one; of two parallel planes only the tighter."""
     norm = float(np.linalg.norm(new.normal))
     for index, old in enumerate(planes):
         scale = float(np.linalg.norm(old.normal))
         if float(np.abs(new.normal / norm - old.normal / scale).max()) <= SAME:
-            tighter = new.offset / norm < old.offset / scale - same
+            tighter = new.offset / norm < old.offset / scale - tolerance
             return [*planes[:index], new, *planes[index + 1 :]] if tighter else planes
     return [*planes, new]

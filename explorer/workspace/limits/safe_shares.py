@@ -1,4 +1,4 @@
-"""Safe shares of a move: up to which share of it no limit and no clearance can be violated.
+"""Safe shares: how far along a move no limit and no clearance can be violated.
 
 The slack of each limit and each clearance shrinks no faster than points of the platform move, and
 `write_speeds` bounds their speeds over the whole move.
@@ -36,10 +36,10 @@ from explorer.workspace.limits.valid_poses import (
     vector,
 )
 
-# The share of the tolerance by which signs and clearances must hold on the way, to be certain.
+# The share of the tolerance that signs and clearances must exceed on the way, to be certain.
 LEAST_SHARE = 0.01
-# Columns of the speeds over a move: of the platform ends of the four legs, the angle, the three
-# margins, b4 on each axis, and the distance of the carriages.
+# Entries of the speeds over a move: those of the platform ends of the four legs, the angle, the
+# three margins, b4 on each axis, and the distance of the carriages.
 LEG_SPEEDS, TURN_SPEED, MARGIN_SPEEDS, BOX_SPEEDS, GAP_SPEED, SPEEDS = 0, 4, 5, 8, 11, 12
 
 
@@ -50,12 +50,12 @@ def lasting_share(slack: float, rate: float) -> float:
 
 
 @helper
-def safe_share(left: float, rate: float, tolerance: float) -> float:
+def safe_share(slack: float, rate: float, tolerance: float) -> float:
     """Return the share of a move over which a limit holds to a tolerance; −1 if it fails here."""
     # Half of the tolerance remains for a step.
-    if left < -0.5 * tolerance:
+    if slack < -0.5 * tolerance:
         return -1.0
-    return lasting_share(left + tolerance, rate)
+    return lasting_share(slack + tolerance, rate)
 
 
 @helper
@@ -68,49 +68,39 @@ def safe_share_of_limits(
     speeds: FloatArray,
     tolerance: float,
 ) -> float:
-    """Return the share of a move from here on over which all limits are certain to hold.
+    """Return the share of a move from a pose on over which all limits hold to a tolerance.
 
-    Args:
-        row: Row of the rules.
-        p: Position here, shape (3,).
-        r: Rotation here, shape (3, 3).
-        base: Base ends of the legs here, shape (4, 3).
-        ends: Platform ends of the legs here, shape (4, 3).
-        speeds: Bounds of the speeds, see `write_speeds`.
-        tolerance: Length by which limits may be exceeded.
-
-    Returns:
-        The share; −1 if a limit fails here.
+    It is −1 if a limit fails in that pose. The ends of the legs are those of the pose.
     """
     share = math.inf
     for i in range(3):
-        left = min(p[i] - row[BOX_LOWS + i], row[BOX_HIGHS + i] - p[i])
-        share = min(share, safe_share(left, speeds[BOX_SPEEDS + i], tolerance))
-    least = row[MARGIN]
-    if least > -math.inf:
+        slack = min(p[i] - row[BOX_LOWS + i], row[BOX_HIGHS + i] - p[i])
+        share = min(share, safe_share(slack, speeds[BOX_SPEEDS + i], tolerance))
+    least_margin = row[MARGIN]
+    if least_margin > -math.inf:
         delta1 = -(r[0, 2] * p[0] + r[1, 2] * p[1] + r[2, 2] * p[2])
         delta2 = r[1, 0] * p[2] - r[2, 0] * p[1]
-        left1, left2 = row[SIGNS] * delta1 - least, row[SIGNS + 1] * delta2 - least
-        left3 = row[SIGNS + 2] * p[2] - least
-        if least < 2.0 * tolerance:
+        slack1, slack2 = row[SIGNS] * delta1 - least_margin, row[SIGNS + 1] * delta2 - least_margin
+        slack3 = row[SIGNS + 2] * p[2] - least_margin
+        if least_margin < 2.0 * tolerance:
             # Only the signs are demanded, and they must be certain.
-            if min(left1, left2, left3) < LEAST_SHARE * tolerance:
+            if min(slack1, slack2, slack3) < LEAST_SHARE * tolerance:
                 return -1.0
-            share = min(share, lasting_share(left1, speeds[MARGIN_SPEEDS]))
+            share = min(share, lasting_share(slack1, speeds[MARGIN_SPEEDS]))
             share = min(
                 share,
-                lasting_share(left2, speeds[MARGIN_SPEEDS + 1]),
-                lasting_share(left3, speeds[MARGIN_SPEEDS + 2]),
+                lasting_share(slack2, speeds[MARGIN_SPEEDS + 1]),
+                lasting_share(slack3, speeds[MARGIN_SPEEDS + 2]),
             )
         else:
-            share = min(share, safe_share(left1, speeds[MARGIN_SPEEDS], tolerance))
-            share = min(share, safe_share(left2, speeds[MARGIN_SPEEDS + 1], tolerance))
-            share = min(share, safe_share(left3, speeds[MARGIN_SPEEDS + 2], tolerance))
+            share = min(share, safe_share(slack1, speeds[MARGIN_SPEEDS], tolerance))
+            share = min(share, safe_share(slack2, speeds[MARGIN_SPEEDS + 1], tolerance))
+            share = min(share, safe_share(slack3, speeds[MARGIN_SPEEDS + 2], tolerance))
     d1, d3 = ends[1, 0], ends[2, 0]
-    left = min(d1 - row[GUIDE_LOW], row[GUIDE_HIGH] - d1)
-    share = min(share, safe_share(left, speeds[LEG_SPEEDS + 1], tolerance))
-    left = min(d3 - row[GUIDE_LOW], row[GUIDE_HIGH] - d3)
-    share = min(share, safe_share(left, speeds[LEG_SPEEDS + 2], tolerance))
+    slack = min(d1 - row[GUIDE_LOW], row[GUIDE_HIGH] - d1)
+    share = min(share, safe_share(slack, speeds[LEG_SPEEDS + 1], tolerance))
+    slack = min(d3 - row[GUIDE_LOW], row[GUIDE_HIGH] - d3)
+    share = min(share, safe_share(slack, speeds[LEG_SPEEDS + 2], tolerance))
     share = min(
         share, safe_share(carriages_apart(row, d1, d3) - row[GAP], speeds[GAP_SPEED], tolerance)
     )
@@ -119,8 +109,8 @@ def safe_share_of_limits(
         for i in range(3):
             square += (ends[leg, i] - base[leg, i]) ** 2
         length = math.sqrt(square)
-        left = min(length - row[LENGTH_LOWS + leg], row[LENGTH_HIGHS + leg] - length)
-        share = min(share, safe_share(left, speeds[LEG_SPEEDS + leg], tolerance))
+        slack = min(length - row[LENGTH_LOWS + leg], row[LENGTH_HIGHS + leg] - length)
+        share = min(share, safe_share(slack, speeds[LEG_SPEEDS + leg], tolerance))
     return share
 
 
@@ -131,9 +121,12 @@ def safe_share_of_cones(
     base: FloatArray,
     ends: FloatArray,
     speeds: FloatArray,
-    slack: float,
+    tolerance: float,
 ) -> float:
-    """Return the share of a move over which all cones hold to a slack in radians; −1 if none."""
+    """Return the share of a move over which all cones hold to a tolerance in radians.
+
+    It is −1 if a cone fails in the pose given.
+    """
     share = math.inf
     for index in range(cones.shape[0]):
         leg = int(cones[index, LEG]) - 1
@@ -153,13 +146,13 @@ def safe_share_of_cones(
         length = math.sqrt(a * a + b * b + c * c)
         across = math.sqrt((b * z - c * y) ** 2 + (c * x - a * z) ** 2 + (a * y - b * x) ** 2)
         angle = math.atan2(across, a * x + b * y + c * z)
-        left = math.atan2(cones[index, SINE], cones[index, COSINE]) - angle
-        # Until its length has halved, the leg turns at most twice as fast.
+        slack = math.atan2(cones[index, SINE], cones[index, COSINE]) - angle
         if length == 0.0:
             return -1.0
+        # Until its length has halved, the leg turns at most twice as fast.
         share = min(share, lasting_share(0.5 * length, speeds[LEG_SPEEDS + leg]))
         share = min(
-            share, safe_share(left, turning + 2.0 * speeds[LEG_SPEEDS + leg] / length, slack)
+            share, safe_share(slack, turning + 2.0 * speeds[LEG_SPEEDS + leg] / length, tolerance)
         )
     return share
 
@@ -177,14 +170,16 @@ def safe_share_of_clearances(
             pair += 1
             if radius < 0.0:
                 continue
-            start, other = vector(base, i), vector(base, j)
-            u, v = minus(vector(ends, i), start), minus(vector(ends, j), other)
-            w = minus(start, other)
+            first, second = vector(base, i), vector(base, j)
+            u, v = minus(vector(ends, i), first), minus(vector(ends, j), second)
+            w = minus(first, second)
             s, t = closest_shares(u, v, w)
-            left = math.sqrt(square_at(s, t, u, v, w)) - radius
-            if left < least:
+            clearance = math.sqrt(square_at(s, t, u, v, w)) - radius
+            if clearance < least:
                 return -1.0
-            share = min(share, lasting_share(left, speeds[LEG_SPEEDS + i] + speeds[LEG_SPEEDS + j]))
+            share = min(
+                share, lasting_share(clearance, speeds[LEG_SPEEDS + i] + speeds[LEG_SPEEDS + j])
+            )
     return share
 
 
@@ -211,13 +206,13 @@ def write_speeds(
         speeds[LEG_SPEEDS + leg] = forward + angle * math.sqrt(a * a + b * b + c * c)
     speeds[TURN_SPEED] = angle
     # On its line b4 is farthest from a1 at one of the ends.
-    far = 0.0
+    farthest = 0.0
     for end in range(2):
         square = 0.0
         for i in range(3):
             square += (p[i] + end * step[i]) ** 2
-        far = max(far, math.sqrt(square))
-    speeds[MARGIN_SPEEDS] = speeds[MARGIN_SPEEDS + 1] = forward + angle * far
+        farthest = max(farthest, math.sqrt(square))
+    speeds[MARGIN_SPEEDS] = speeds[MARGIN_SPEEDS + 1] = forward + angle * farthest
     for i in range(3):
         speeds[BOX_SPEEDS + i] = abs(step[i])
     speeds[MARGIN_SPEEDS + 2] = speeds[BOX_SPEEDS + 2]

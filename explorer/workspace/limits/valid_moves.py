@@ -1,9 +1,10 @@
 """Validity of straight moves: whether all demands of a design hold all along, with a proof.
 
 No demand can fail within the safe share of a move (`explorer.workspace.limits.safe_shares`), so
-the next pose to check is at its end (conservative advancement; Mirtich 2000). Along a limit the
-safe shares would be tiny. Therefore a limit may be exceeded by a small tolerance between two
-poses that satisfy it; a clearance may not, nor a margin of which only the sign is demanded.
+the next pose to check is at the end of that share (conservative advancement; Mirtich 2000).
+Along a limit the safe shares would be tiny, so a limit may be exceeded by a small tolerance
+between two poses that satisfy it. A clearance, or a margin of which only the sign is demanded,
+must hold everywhere.
 """
 
 from __future__ import annotations
@@ -46,8 +47,8 @@ def moves_are_valid(
     """Return whether straight moves satisfy all limits, margins and clearances, shape (...).
 
     The position moves on a straight line and the platform turns about one axis the shorter way,
-    as in `explorer.legs.moves`. True is a proof, but for the tolerance. A move whose clearances
-    or signs hold by less than a 100th of the tolerance may be refused.
+    as in `explorer.legs.moves`. True is a proof, but for the tolerance. A move whose
+    clearances or signs hold by less than a 100th of the tolerance may be refused.
 
     Args:
         design: The manipulator.
@@ -73,17 +74,17 @@ def moves_are_valid(
         for value, shape in ((p, (3,)), (r, (3, 3)), (q, (3,)), (s, (3, 3)))
     ]
     valid = np.empty(len(rows[0]), dtype=np.bool_)
-    demanded = rules or Rules.of(design)
-    allowed = DEFAULT_TOLERANCE * design.reach if tolerance is None else tolerance
+    design_rules = rules or Rules.of(design)
+    limit_tolerance = DEFAULT_TOLERANCE * design.reach if tolerance is None else tolerance
     valid_move_rows(
         20 * len(rows[0]),
-        demanded.row,
-        demanded.cones,
+        design_rules.row,
+        design_rules.cones,
         rows[0],
         rows[1],
         rows[2],
         rows[3],
-        allowed,
+        limit_tolerance,
         valid,
     )
     return valid.reshape(batch)
@@ -161,18 +162,7 @@ def valid_move_rows(
     tolerance: float,
     valid: BoolArray,
 ) -> None:
-    """Write whether each move satisfies all rules.
-
-    Args:
-        row: Row of the rules.
-        cones: Cones of the rules.
-        start: Positions at the starts, shape (n, 3).
-        start_rotation: Rotations at the starts, shape (n, 3, 3).
-        end: Positions at the ends, shape (n, 3).
-        end_rotation: Rotations at the ends, shape (n, 3, 3).
-        tolerance: Length by which limits may be exceeded, in design units.
-        valid: Written, shape (n,).
-    """
+    """Write whether n moves satisfy all rules, limits to a tolerance in design units."""
     base, ends, p, r = np.zeros((4, 3)), np.zeros((4, 3)), np.zeros(3), np.zeros((3, 3))
     step, axis, speeds = np.zeros(3), np.zeros(3), np.zeros(SPEEDS)
     reach, least = math.hypot(row[0], row[1]), LEAST_SHARE * tolerance

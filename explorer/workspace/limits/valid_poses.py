@@ -1,8 +1,8 @@
 """Validity of poses: whether they satisfy all demands of a design, in compiled loops.
 
-The demands are the limits, the home's sign triple and the clearances of all pairs of legs. For
-which of them a pose violates, see `explorer.workspace.limits.broken` and
-`explorer.legs.clearance`, with which this module agrees.
+The demands are the limits, the home's sign triple and the clearances of all pairs of legs.
+`explorer.workspace.limits.broken` and `explorer.legs.clearance`, with which this module agrees,
+name the demands that a pose violates.
 """
 
 from __future__ import annotations
@@ -59,42 +59,43 @@ class Rules:
         Args:
             design: The manipulator.
             signs: Sign triple to demand instead of the home's, even if no margin is demanded.
-            order: Sign of d3 − d1 to demand, 0 for either; that which the design demands if
-                None.
+            order: Sign of d3 − d1 to demand, 0 for either; the design's if None.
         """
-        limits, slack = design.limits, design.tolerance
+        limits, tolerance = design.limits, design.tolerance
         row = np.empty(RULE_COLUMNS)
         row[:LENGTH_LOWS] = design.variables
         for index, name in enumerate(LENGTHS):
             low, high = design.length_range(name)
-            row[LENGTH_LOWS + index], row[LENGTH_HIGHS + index] = low - slack, high + slack
+            row[LENGTH_LOWS + index], row[LENGTH_HIGHS + index] = low - tolerance, high + tolerance
         low, high = limits.guide or (-math.inf, math.inf)
-        row[GUIDE_LOW], row[GUIDE_HIGH] = low - slack, high + slack
-        row[GAP] = limits.gap - slack
+        row[GUIDE_LOW], row[GUIDE_HIGH] = low - tolerance, high + tolerance
+        row[GAP] = limits.gap - tolerance
         lows, highs = limits.box or ((-math.inf,) * 3, (math.inf,) * 3)
-        row[BOX_LOWS:BOX_HIGHS] = np.array(lows) - slack
-        row[BOX_HIGHS:MARGIN] = np.array(highs) + slack
-        row[MARGIN] = -math.inf if limits.margin is None else limits.margin - slack
+        row[BOX_LOWS:BOX_HIGHS] = np.array(lows) - tolerance
+        row[BOX_HIGHS:MARGIN] = np.array(highs) + tolerance
+        row[MARGIN] = -math.inf if limits.margin is None else limits.margin - tolerance
         if signs is not None:
-            row[MARGIN] = (limits.margin or 0.0) - slack
+            row[MARGIN] = (limits.margin or 0.0) - tolerance
         row[SIGNS:ORDER] = signs or home_signs(design)
         row[ORDER] = demanded_order(design) if order is None else order
         # No clearance is demanded of a pair that shares a joint.
         row[RADII:] = np.where(joined_pairs(design), -1.0, radii_of_pairs(design))
-        cones = [
-            (0.0,) * CONE_COLUMNS
-            if cone.axis is None
-            else (
-                float(cone.leg),
-                *cone.axis.tolist(),
-                # The tolerance is that of the limits; half a turn is no bound.
-                math.cos(min(math.pi, cone.half_angle + TOLERANCE)),
-                math.sin(min(math.pi, cone.half_angle + TOLERANCE)),
-                float(cone.in_platform),
-            )
-            for cone in joint_cones(design)
-        ]
-        return Rules(row, np.array(cones, dtype=np.float64).reshape(-1, CONE_COLUMNS))
+        cones = np.zeros((len(joint_cones(design)), CONE_COLUMNS))
+        for cone, cone_row in zip(joint_cones(design), cones, strict=True):
+            if cone.axis is not None:
+                angle = cone.half_angle + TOLERANCE
+                # Half a turn is no bound, so its sine must be exact.
+                cosine, sine = (
+                    (math.cos(angle), math.sin(angle)) if angle < math.pi else (-1.0, 0.0)
+                )
+                cone_row[:] = (cone.leg, *cone.axis, cosine, sine, cone.in_platform)
+        return Rules(row, cones)
+
+    def without_clearances(self) -> Rules:
+        """Return rules that demand no clearance."""
+        row = self.row.copy()
+        row[RADII:] = -1.0
+        return Rules(row, self.cones)
 
     def tighten(self, margin: float, clearance: float) -> Rules:
         """Return rules that demand at least a margin and a clearance.
@@ -131,11 +132,11 @@ def poses_are_valid(
     p_rows = np.broadcast_to(p, (*batch, 3)).reshape(-1, 3)
     r_rows = np.broadcast_to(r, (*batch, 3, 3)).reshape(-1, 3, 3)
     valid = np.empty(len(p_rows), dtype=np.bool_)
-    demanded = rules or Rules.of(design)
+    design_rules = rules or Rules.of(design)
     valid_rows(
         len(p_rows),
-        demanded.row,
-        demanded.cones,
+        design_rules.row,
+        design_rules.cones,
         for_kernel(p_rows),
         for_kernel(r_rows),
         valid,
@@ -144,8 +145,8 @@ def poses_are_valid(
 
 
 @helper
-def within(square: float, low: float, high: float) -> bool:
-    """Return whether the root of a square lies within bounds, of which `low` may be negative."""
+def is_root_within(square: float, low: float, high: float) -> bool:
+    """Return whether the root of a square lies within bounds; `low` may be negative."""
     return square <= high * high and (low <= 0.0 or square >= low * low)
 
 
@@ -197,7 +198,7 @@ def satisfies_limits(
         square = 0.0
         for i in range(3):
             square += (ends[leg, i] - base[leg, i]) ** 2
-        if not within(square, row[LENGTH_LOWS + leg], row[LENGTH_HIGHS + leg]):
+        if not is_root_within(square, row[LENGTH_LOWS + leg], row[LENGTH_HIGHS + leg]):
             return False
     return True
 
@@ -244,9 +245,9 @@ def is_clear(i: int, j: int, radius: float, base: FloatArray, ends: FloatArray) 
         c, d = base[j, axis], ends[j, axis]
         if max(min(a, b) - max(c, d), min(c, d) - max(a, b)) > radius:
             return True
-    start, other = vector(base, i), vector(base, j)
-    u, v = minus(vector(ends, i), start), minus(vector(ends, j), other)
-    w = minus(start, other)
+    first, second = vector(base, i), vector(base, j)
+    u, v = minus(vector(ends, i), first), minus(vector(ends, j), second)
+    w = minus(first, second)
     s, t = closest_shares(u, v, w)
     return square_at(s, t, u, v, w) > radius * radius
 
@@ -260,7 +261,7 @@ def is_valid(
     base: FloatArray,
     ends: FloatArray,
 ) -> bool:
-    """Return whether a pose satisfies all rules; the ends of the legs are written."""
+    """Return whether a pose satisfies all rules; write the ends of the legs."""
     write_ends(row, p, r, base, ends)
     if not satisfies_limits(row, p, r, base, ends):
         return False
@@ -283,15 +284,7 @@ def valid_rows(
     rotation: FloatArray,
     valid: BoolArray,
 ) -> None:
-    """Write whether each pose satisfies all rules.
-
-    Args:
-        row: Row of the rules.
-        cones: Cones of the rules.
-        position: Positions of b4, shape (n, 3).
-        rotation: Rotations, platform to base, shape (n, 3, 3).
-        valid: Written, shape (n,).
-    """
+    """Write whether n poses satisfy all rules, given as the row and the cones of `Rules`."""
     base, ends = np.zeros((4, 3)), np.zeros((4, 3))
     for index in range(position.shape[0]):
         valid[index] = is_valid(row, cones, position[index], rotation[index], base, ends)

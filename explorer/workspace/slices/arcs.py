@@ -11,6 +11,7 @@ same surface.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import helper
@@ -28,12 +29,36 @@ LOW, HIGH, POINT_Y, POINT_Z, ALONG_Y, ALONG_Z = range(6)
 PARALLEL = 1e-12
 
 
+class Slicer(NamedTuple):
+    """The surfaces of a region, with the arrays that slices of it are computed in.
+
+    Attributes:
+        circles: Rows, shape (n, 6).
+        planes: Rows, shape (m, 4).
+        bearings: Directions to each centre from those of the others, then of the planes'
+            normals, in radians, shape (n, n + m).
+        radii: Radii of the circles in the slice, shape (n,).
+        arcs: Forbidden arcs of one boundary.
+        span: Span of one line; see `LOW`.
+        moments: Moments of the boundaries, circles first; see `LENGTH`, shape (n + m, 3).
+    """
+
+    circles: FloatArray
+    planes: FloatArray
+    bearings: FloatArray
+    radii: FloatArray
+    arcs: FloatArray
+    span: FloatArray
+    moments: FloatArray
+
+
 @helper
 def write_radii(circles: FloatArray, x: float, radii: FloatArray) -> bool:
     """Write the radii of the circles in the slice at x, 0 where a surface does not reach it.
 
     Returns:
-        Whether the slice may hold anything: False where a surface to lie inside is not reached.
+        Whether the slice can have an area: False if it misses a ball or cylinder that holds the
+        region.
     """
     for k in range(circles.shape[0]):
         off = x - circles[k, X]
@@ -70,76 +95,62 @@ def sort_arcs(arcs: FloatArray, count: int) -> None:
 
 
 @helper
-def collect_forbidden_on_circle(
-    k: int,
-    x: float,
-    circles: FloatArray,
-    planes: FloatArray,
-    radii: FloatArray,
-    bearings: FloatArray,
-    arcs: FloatArray,
-) -> int:
+def collect_forbidden_on_circle(k: int, x: float, slicer: Slicer) -> int:
     """Collect the arcs of circle k that other surfaces forbid, sorted by their starts.
 
     Returns:
         The count of arcs; -1 if all of the circle is forbidden.
     """
-    count = 0
+    circles, planes, radii, arcs = slicer.circles, slicer.planes, slicer.radii, slicer.arcs
+    bearings, count = slicer.bearings, 0
     r, y, z = radii[k], circles[k, Y], circles[k, Z]
     circle_count = circles.shape[0]
     for j in range(circle_count):
         if j == k:
             continue
-        other, side = radii[j], circles[j, SIDE]
-        if other == 0.0:
+        other_radius, side = radii[j], circles[j, SIDE]
+        if other_radius == 0.0:
             continue
         dy, dz = y - circles[j, Y], z - circles[j, Z]
         distance = math.sqrt(dy * dy + dz * dz)
         # A point at the angle phi is inside j where cos(phi - bearing) <= q.
-        rest = other * other - r * r - distance * distance
-        reach = 2.0 * r * distance
-        if rest >= reach:
+        rest = other_radius * other_radius - r * r - distance * distance
+        amplitude = 2.0 * r * distance
+        if rest >= amplitude:
             if side < 0.0:
                 return -1
             continue
-        if rest < -reach:
+        if rest < -amplitude:
             if side > 0.0:
                 return -1
             continue
-        half = math.acos(rest / reach)
+        half = math.acos(rest / amplitude)
         if side > 0.0:
             count = add_arc(arcs, count, bearings[k, j] - half, 2.0 * half)
         else:
             count = add_arc(arcs, count, bearings[k, j] + half, TWO_PI - 2.0 * half)
     for j in range(planes.shape[0]):
         ay, az = planes[j, Y], planes[j, Z]
-        reach = r * math.sqrt(ay * ay + az * az)
+        amplitude = r * math.sqrt(ay * ay + az * az)
         rest = planes[j, OFFSET] - planes[j, X] * x - ay * y - az * z
-        if rest >= reach:
+        if rest >= amplitude:
             continue
-        if rest < -reach:
+        if rest < -amplitude:
             return -1
-        half = math.acos(rest / reach)
+        half = math.acos(rest / amplitude)
         count = add_arc(arcs, count, bearings[k, circle_count + j] - half, 2.0 * half)
     sort_arcs(arcs, count)
     return count
 
 
 @helper
-def collect_forbidden_on_line(
-    k: int,
-    x: float,
-    circles: FloatArray,
-    planes: FloatArray,
-    radii: FloatArray,
-    arcs: FloatArray,
-    span: FloatArray,
-) -> int:
-    """Write the span of line k within the other half-planes and discs; collect what holes forbid.
+def collect_forbidden_on_line(k: int, x: float, slicer: Slicer) -> int:
+    """Write the span of line k within the other half-planes and discs; collect its forbidden parts.
 
     Returns:
-        The count of parts that holes forbid, collected in `arcs`; -1 if all of it is forbidden.
+        The count of parts that holes forbid, collected in `arcs`; -1 if all of the line is.
     """
+    circles, planes, radii, arcs = slicer.circles, slicer.planes, slicer.radii, slicer.arcs
     ay, az = planes[k, Y], planes[k, Z]
     norm = math.sqrt(ay * ay + az * az)
     level = (planes[k, OFFSET] - planes[k, X] * x) / norm
@@ -153,8 +164,8 @@ def collect_forbidden_on_line(
             continue
         slope = planes[j, Y] * ty + planes[j, Z] * tz
         rest = planes[j, OFFSET] - planes[j, X] * x - planes[j, Y] * qy - planes[j, Z] * qz
-        steep = math.sqrt(planes[j, Y] * planes[j, Y] + planes[j, Z] * planes[j, Z])
-        if abs(slope) <= PARALLEL * steep:
+        other_norm = math.sqrt(planes[j, Y] * planes[j, Y] + planes[j, Z] * planes[j, Z])
+        if abs(slope) <= PARALLEL * other_norm:
             if rest < 0.0:
                 return -1
         elif slope > 0.0:
@@ -180,6 +191,7 @@ def collect_forbidden_on_line(
             count += 1
     if low >= high:
         return -1
+    span = slicer.span
     span[LOW], span[HIGH] = low, high
     span[POINT_Y], span[POINT_Z], span[ALONG_Y], span[ALONG_Z] = qy, qz, ty, tz
     sort_arcs(arcs, count)
@@ -187,21 +199,13 @@ def collect_forbidden_on_line(
 
 
 @helper
-def slice_area(
-    x: float,
-    circles: FloatArray,
-    planes: FloatArray,
-    bearings: FloatArray,
-    radii: FloatArray,
-    arcs: FloatArray,
-    span: FloatArray,
-    moments: FloatArray,
-) -> tuple[float, float]:
+def slice_area(x: float, slicer: Slicer) -> tuple[float, float]:
     """Return the area of the slice at x, and the sum of the absolute values of its terms.
 
-    The moments of each boundary are written, circles first; see `LENGTH`.
+    The moments of each boundary are written to the slicer.
     """
-    area, terms = 0.0, 0.0
+    circles, radii, arcs, moments = slicer.circles, slicer.radii, slicer.arcs, slicer.moments
+    area, magnitude, span = 0.0, 0.0, slicer.span
     moments[:, :] = 0.0
     if not write_radii(circles, x, radii):
         return 0.0, 0.0
@@ -210,48 +214,48 @@ def slice_area(
         r = radii[k]
         if r == 0.0:
             continue
-        count = collect_forbidden_on_circle(k, x, circles, planes, radii, bearings, arcs)
+        count = collect_forbidden_on_circle(k, x, slicer)
         if count < 0:
             continue
         y, z, side = circles[k, Y], circles[k, Z], circles[k, SIDE]
         angle, along_y, along_z = 0.0, 0.0, 0.0
         # The boundary runs from the end of one forbidden arc to the start of the next.
-        reached = 0.0
+        covered = 0.0
         for i in range(count + 1):
             start = arcs[i, START] if i < count else TWO_PI
-            if start > reached:
+            if start > covered:
                 # Ends at 0 and 2 pi are not corners, so their sine and cosine must be exact.
-                first = 0.0 if reached == 0.0 else math.sin(reached)
-                first_cos = 1.0 if reached == 0.0 else math.cos(reached)
+                first = 0.0 if covered == 0.0 else math.sin(covered)
+                first_cos = 1.0 if covered == 0.0 else math.cos(covered)
                 last = 0.0 if start == TWO_PI else math.sin(start)
                 last_cos = 1.0 if start == TWO_PI else math.cos(start)
-                angle += start - reached
+                angle += start - covered
                 along_y += last - first
                 along_z += first_cos - last_cos
-            if i < count and arcs[i, END] > reached:
-                reached = arcs[i, END]
+            if i < count and arcs[i, END] > covered:
+                covered = arcs[i, END]
         moments[k, LENGTH], moments[k, MOMENT_Y], moments[k, MOMENT_Z] = angle, along_y, along_z
         area += side * 0.5 * r * (r * angle + y * along_y + z * along_z)
-        terms += 0.5 * r * (r * angle + abs(y * along_y) + abs(z * along_z))
-    for k in range(planes.shape[0]):
-        count = collect_forbidden_on_line(k, x, circles, planes, radii, arcs, span)
+        magnitude += 0.5 * r * (r * angle + abs(y * along_y) + abs(z * along_z))
+    for k in range(slicer.planes.shape[0]):
+        count = collect_forbidden_on_line(k, x, slicer)
         if count < 0:
             continue
-        reached = span[LOW]
+        covered = span[LOW]
         qy, qz, ty, tz = span[POINT_Y], span[POINT_Z], span[ALONG_Y], span[ALONG_Z]
         row = circle_count + k
         for i in range(count + 1):
             start = min(arcs[i, START], span[HIGH]) if i < count else span[HIGH]
-            if start > reached:
-                length, middle = start - reached, 0.5 * (start + reached)
+            if start > covered:
+                length, middle = start - covered, 0.5 * (start + covered)
                 part = 0.5 * length * (qy * tz - qz * ty)
                 area += part
-                terms += abs(part)
+                magnitude += abs(part)
                 moments[row, LENGTH] += length
                 moments[row, MOMENT_Y] += length * (qy + middle * ty)
                 moments[row, MOMENT_Z] += length * (qz + middle * tz)
-            if i < count and arcs[i, END] > reached:
-                reached = arcs[i, END]
-            if reached >= span[HIGH]:
+            if i < count and arcs[i, END] > covered:
+                covered = arcs[i, END]
+            if covered >= span[HIGH]:
                 break
-    return area, terms
+    return area, magnitude

@@ -10,14 +10,11 @@ AXES = "xyz"
 def axes_of_slice(axis: str) -> tuple[int, int, int]:
     """Return the indices of the axis across which a slice is cut and of the slice's own axes.
 
-    Args:
-        axis: "x", "y" or "z".
-
     Raises:
-        InputError: `axis` is not one of them.
+        InputError: the axis is not "x", "y" or "z".
     """
     if axis not in AXES or len(axis) != 1:
         raise InputError(f"a slice is cut across x, y or z; got {axis!r}")
     cut = AXES.index(axis)
-    first, second = (each for each in range(3) if each != cut)
+    first, second = (other for other in range(3) if other != cut)
     return cut, first, second

@@ -9,8 +9,9 @@ wrong. Circles and planes are rows of `explorer.workspace.limits.columns`.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
-from explorer.numerics.arrays import FloatArray
+from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.numerics.compiled import helper
 from explorer.workspace.limits.columns import IS_BALL, OFFSET, RADIUS, SIDE, X, Y, Z
 
@@ -18,6 +19,24 @@ from explorer.workspace.limits.columns import IS_BALL, OFFSET, RADIUS, SIDE, X, 
 NEAR = 1e-7
 # The slack grows where surfaces meet at an angle whose sine is smaller than this.
 BLURRED = 1e-6
+
+
+class Boundary(NamedTuple):
+    """The surfaces of a region and the breaks found on them.
+
+    Attributes:
+        circles: Rows, shape (n, 6).
+        planes: Rows, shape (m, 4).
+        size: Bound of the region's size, see `region_size`.
+        breaks: Breaks; the first two are the ends of the x-range.
+        number: Number of breaks, shape (1,).
+    """
+
+    circles: FloatArray
+    planes: FloatArray
+    size: float
+    breaks: FloatArray
+    number: IntArray
 
 
 @helper
@@ -31,40 +50,30 @@ def region_size(circles: FloatArray) -> float:
 
 
 @helper
-def slack_at(size: float, sine: float) -> float:
+def slack_at(boundary: Boundary, sine: float) -> float:
     """Return the slack of a point where surfaces meet at an angle with the given sine."""
-    return NEAR * size * (1.0 + BLURRED / sine) if sine > 0.0 else math.inf
+    return NEAR * boundary.size * (1.0 + BLURRED / sine) if sine > 0.0 else math.inf
 
 
 @helper
-def add_break(
-    circles: FloatArray,
-    planes: FloatArray,
-    x: float,
-    y: float,
-    z: float,
-    slack: float,
-    breaks: FloatArray,
-    count: int,
-) -> int:
-    """Add a break at x if (x, y, z) satisfies all limits to within a slack; return the count.
-
-    The first two breaks are the ends of the x-range.
-    """
+def add_break(boundary: Boundary, x: float, y: float, z: float, slack: float) -> None:
+    """Add a break at x if (x, y, z) satisfies all limits to within a slack."""
+    circles, planes, breaks = boundary.circles, boundary.planes, boundary.breaks
+    count = boundary.number[0]
     if count + 1 == breaks.shape[0] or not breaks[0] < x < breaks[1]:
-        return count
+        return
     for k in range(circles.shape[0]):
         dx, dy, dz = circles[k, IS_BALL] * (x - circles[k, X]), y - circles[k, Y], z - circles[k, Z]
-        beyond = math.sqrt(dx * dx + dy * dy + dz * dz) - circles[k, RADIUS]
-        if circles[k, SIDE] * beyond > slack:
-            return count
+        excess = math.sqrt(dx * dx + dy * dy + dz * dz) - circles[k, RADIUS]
+        if circles[k, SIDE] * excess > slack:
+            return
     for k in range(planes.shape[0]):
         ax, ay, az = planes[k, X], planes[k, Y], planes[k, Z]
-        beyond = ax * x + ay * y + az * z - planes[k, OFFSET]
-        if beyond > slack * math.sqrt(ax * ax + ay * ay + az * az):
-            return count
+        excess = ax * x + ay * y + az * z - planes[k, OFFSET]
+        if excess > slack * math.sqrt(ax * ax + ay * ay + az * az):
+            return
     breaks[count] = x
-    return count + 1
+    boundary.number[0] = count + 1
 
 
 @helper
@@ -81,22 +90,13 @@ def real_roots(a: float, b: float, c: float) -> tuple[float, float]:
 
 
 @helper
-def add_breaks_at_height(
-    circles: FloatArray,
-    planes: FloatArray,
-    ball: int,
-    y: float,
-    z: float,
-    slack: float,
-    breaks: FloatArray,
-    count: int,
-) -> int:
+def add_breaks_at_height(boundary: Boundary, ball: int, y: float, z: float, slack: float) -> None:
     """Add breaks where the line along x through (y, z) meets a sphere."""
+    circles = boundary.circles
     dy, dz = y - circles[ball, Y], z - circles[ball, Z]
     square = circles[ball, RADIUS] * circles[ball, RADIUS] - dy * dy - dz * dz
     if square >= 0.0:
         half = math.sqrt(square)
         x = circles[ball, X]
-        count = add_break(circles, planes, x - half, y, z, slack, breaks, count)
-        count = add_break(circles, planes, x + half, y, z, slack, breaks, count)
-    return count
+        add_break(boundary, x - half, y, z, slack)
+        add_break(boundary, x + half, y, z, slack)

@@ -9,10 +9,13 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import helper
 from explorer.workspace.limits.columns import IS_BALL, OFFSET, RADIUS, X, Y, Z
 from explorer.workspace.slices.break_points import (
+    Boundary,
     add_break,
     add_breaks_at_height,
     real_roots,
@@ -26,36 +29,30 @@ SAME_BREAK = 1e-13
 
 
 @helper
-def add_breaks_of_pair(
-    circles: FloatArray,
-    planes: FloatArray,
-    j: int,
-    k: int,
-    size: float,
-    breaks: FloatArray,
-    count: int,
-) -> int:
+def add_breaks_of_pair(boundary: Boundary, j: int, k: int) -> None:
     """Add breaks where the circles j and k touch."""
+    circles = boundary.circles
     if circles[j, IS_BALL] == 0.0 and circles[k, IS_BALL] == 0.0:
-        return count
+        return
     dy, dz = circles[k, Y] - circles[j, Y], circles[k, Z] - circles[j, Z]
     distance = math.sqrt(dy * dy + dz * dz)
-    slack = slack_at(size, distance / size)
-    # Concentric circles touch all around, so any direction will do.
+    slack = slack_at(boundary, distance / boundary.size)
+    # Concentric circles touch at every point, so any direction serves.
     ty, tz = (dy / distance, dz / distance) if distance > 0.0 else (1.0, 0.0)
     if circles[j, IS_BALL] == 0.0 or circles[k, IS_BALL] == 0.0:
-        ball, tube = (j, k) if circles[j, IS_BALL] > 0.0 else (k, j)
-        for radius in (-circles[tube, RADIUS], circles[tube, RADIUS]):
-            y, z = circles[tube, Y] + radius * ty, circles[tube, Z] + radius * tz
-            count = add_breaks_at_height(circles, planes, ball, y, z, slack, breaks, count)
-        return count
+        ball, cylinder = (j, k) if circles[j, IS_BALL] > 0.0 else (k, j)
+        for radius in (-circles[cylinder, RADIUS], circles[cylinder, RADIUS]):
+            y, z = circles[cylinder, Y] + radius * ty, circles[cylinder, Z] + radius * tz
+            add_breaks_at_height(boundary, ball, y, z, slack)
+        return
     xj, rj, xk, rk = circles[j, X], circles[j, RADIUS], circles[k, X], circles[k, RADIUS]
     # The squared radii of the two circles differ by alpha + beta x.
     beta = 2.0 * (xj - xk)
     alpha = (rj - rk) * (rj + rk) - (xj - xk) * (xj + xk)
     if distance == 0.0:
         x, _ = real_roots(0.0, beta, alpha)
-        return add_break(circles, planes, x, circles[j, Y], circles[j, Z], slack, breaks, count)
+        add_break(boundary, x, circles[j, Y], circles[j, Z], slack)
+        return
     # They touch where r_j = |d² + alpha + beta x| / 2d, the distance of the point from centre j.
     per = 1.0 / (4.0 * distance * distance)
     shifted = distance * distance + alpha
@@ -66,21 +63,19 @@ def add_breaks_of_pair(
     ):
         along = 0.5 * (shifted + beta * x) / distance
         y, z = circles[j, Y] + along * ty, circles[j, Z] + along * tz
-        count = add_break(circles, planes, x, y, z, slack, breaks, count)
-    return count
+        add_break(boundary, x, y, z, slack)
 
 
 @helper
-def add_breaks_of_line(
-    circles: FloatArray, planes: FloatArray, k: int, size: float, breaks: FloatArray, count: int
-) -> int:
+def add_breaks_of_line(boundary: Boundary, k: int) -> None:
     """Add breaks where line k touches circles."""
-    slack = slack_at(size, 1.0)
+    circles, planes = boundary.circles, boundary.planes
+    slack = slack_at(boundary, 1.0)
     ax, ay, az = planes[k, X], planes[k, Y], planes[k, Z]
     norm = math.sqrt(ay * ay + az * az)
     ax, ay, az = ax / norm, ay / norm, az / norm
     for j in range(circles.shape[0]):
-        # The distance of the line from the centre is the radius: (rest - ax x)² = r².
+        # The line touches where its distance from the centre is the radius: (rest - ax x)² = r².
         rest = planes[k, OFFSET] / norm - ay * circles[j, Y] - az * circles[j, Z]
         x, r, ball = circles[j, X], circles[j, RADIUS], circles[j, IS_BALL]
         for root in real_roots(
@@ -90,25 +85,21 @@ def add_breaks_of_line(
         ):
             along = rest - ax * root
             y, z = circles[j, Y] + along * ay, circles[j, Z] + along * az
-            count = add_break(circles, planes, root, y, z, slack, breaks, count)
-    return count
+            add_break(boundary, root, y, z, slack)
 
 
 @helper
-def add_breaks_at_tangencies(
-    circles: FloatArray, planes: FloatArray, size: float, breaks: FloatArray, count: int
-) -> int:
+def add_breaks_at_tangencies(boundary: Boundary) -> None:
     """Add breaks at the poles of spheres, and where circles and lines touch circles."""
-    n = circles.shape[0]
+    circles, n = boundary.circles, boundary.circles.shape[0]
     for j in range(n):
         if circles[j, IS_BALL] > 0.0:
-            y, z, slack = circles[j, Y], circles[j, Z], slack_at(size, 1.0)
-            count = add_breaks_at_height(circles, planes, j, y, z, slack, breaks, count)
+            y, z, slack = circles[j, Y], circles[j, Z], slack_at(boundary, 1.0)
+            add_breaks_at_height(boundary, j, y, z, slack)
         for k in range(j + 1, n):
-            count = add_breaks_of_pair(circles, planes, j, k, size, breaks, count)
-    for k in range(planes.shape[0]):
-        count = add_breaks_of_line(circles, planes, k, size, breaks, count)
-    return count
+            add_breaks_of_pair(boundary, j, k)
+    for k in range(boundary.planes.shape[0]):
+        add_breaks_of_line(boundary, k)
 
 
 @helper
@@ -116,20 +107,22 @@ def find_breaks(
     circles: FloatArray, planes: FloatArray, low: float, high: float, breaks: FloatArray
 ) -> int:
     """Write low, the breaks in between and high, in ascending order; return the count."""
-    size = region_size(circles)
     breaks[0], breaks[1] = low, high
-    count = add_breaks_at_tangencies(circles, planes, size, breaks, 2)
-    count = add_breaks_at_vertices(circles, planes, size, breaks, count)
+    number = np.full(1, 2)
+    boundary = Boundary(circles, planes, region_size(circles), breaks, number)
+    add_breaks_at_tangencies(boundary)
+    add_breaks_at_vertices(boundary)
+    count = number[0]
     for i in range(2, count):
         x, j = breaks[i], i - 1
         while breaks[j] > x:
             breaks[j + 1] = breaks[j]
             j -= 1
         breaks[j + 1] = x
-    room = SAME_BREAK * (high - low)
+    tolerance = SAME_BREAK * (high - low)
     distinct = 1
     for i in range(1, count - 1):
-        if breaks[distinct - 1] + room < breaks[i] < high - room:
+        if breaks[distinct - 1] + tolerance < breaks[i] < high - tolerance:
             breaks[distinct] = breaks[i]
             distinct += 1
     breaks[distinct] = high

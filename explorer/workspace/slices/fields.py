@@ -101,15 +101,9 @@ def slice_field(
     points = np.empty((len(rows), len(columns), 3))
     points[..., cut] = level
     points[..., first], points[..., second] = columns, rows[:, None]
-    return SliceField(
-        field=field,
-        axis=axis,
-        level=level,
-        columns=columns,
-        rows=rows,
-        values=field_at(design, points, r, field),
-        inside=np.asarray((slacks(limits, points) >= 0.0).all(axis=-1)),
-    )
+    values = field_at(design, points, r, field)
+    inside = np.asarray((slacks(limits, points) >= 0.0).all(axis=-1))
+    return SliceField(field, axis, level, columns, rows, values, inside)
 
 
 def field_at(design: Design, position: ArrayLike, rotation: ArrayLike, field: Field) -> FloatArray:

@@ -16,7 +16,7 @@ import numpy as np
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import helper, kernel
 from explorer.workspace.limits.columns import IS_BALL, OFFSET, RADIUS, SIDE, X, Y, Z
-from explorer.workspace.slices.arcs import LENGTH, MOMENT_Y, MOMENT_Z, slice_area
+from explorer.workspace.slices.arcs import LENGTH, MOMENT_Y, MOMENT_Z, Slicer, slice_area
 from explorer.workspace.slices.break_points import region_size
 from explorer.workspace.slices.breaks import find_breaks
 
@@ -34,16 +34,18 @@ STALLED, MOST_STALLS = 0.8, 3
 FASTEST = 0.3
 # Rounding error, as a share of the summed terms and of the size of the region's coordinates.
 ROUNDING = 2.0**-48
+# Rows of the quadrature: nodes, weights, and from the third on factors that give coefficients.
+NODE, WEIGHT, COEFFICIENTS = 0, 1, 2
 # Columns of a piece: its ends, how often halving did not help, its volume and weighted surface,
-# the errors of both, and the summed absolute terms of its areas. From HEAD on, derivatives follow.
-START, END, STALLS, VOLUME, SURFACE, VOLUME_ERROR, SURFACE_ERROR, TERMS, HEAD = range(9)
+# the errors of both, and the summed absolute terms of its areas. From RATES on, derivatives follow.
+START, END, STALLS, VOLUME, SURFACE, VOLUME_ERROR, SURFACE_ERROR, TERMS, RATES = range(9)
 # Entries of the result of `integrate_slices`.
 TOTAL, AREA_AT_LOW, AREA_AT_HIGH, SLICES, PIECES, TOTAL_ERROR, RESULTS = range(7)
 
 
 @helper
 def largest(values: FloatArray, start: int) -> float:
-    """Return the largest absolute value among four."""
+    """Return the largest absolute value among four from an index on."""
     size = 0.0
     for k in range(start, start + 4):
         size = max(size, abs(values[k]))
@@ -57,35 +59,26 @@ def quadrature_error(last: FloatArray, nodes: int) -> float:
     The Legendre coefficients of an analytic integrand decay geometrically. The decay is taken
     from the last eight of them, and the error from the degree of twice the number of nodes.
     """
-    before, after = largest(last, 0), largest(last, 4)
-    decay = min(1.0, max(FASTEST, after / before)) if before > 0.0 else 1.0
-    return after * decay ** (0.25 * nodes)
+    earlier, later = largest(last, 0), largest(last, 4)
+    decay = min(1.0, max(FASTEST, later / earlier)) if earlier > 0.0 else 1.0
+    return later * decay ** (0.25 * nodes)
 
 
 @helper
-def integrate_piece(
-    piece: FloatArray,
-    circles: FloatArray,
-    planes: FloatArray,
-    bearings: FloatArray,
-    quadrature: FloatArray,
-    radii: FloatArray,
-    arcs: FloatArray,
-    span: FloatArray,
-    moments: FloatArray,
-) -> int:
+def integrate_piece(piece: FloatArray, slicer: Slicer, quadrature: FloatArray) -> int:
     """Integrate over one piece, from its start to its end; return the count of slices computed."""
+    circles, planes, moments = slicer.circles, slicer.planes, slicer.moments
     n, m, g = circles.shape[0], planes.shape[0], quadrature.shape[1]
     a, b = piece[START], piece[END]
     for k in range(VOLUME, piece.shape[0]):
         piece[k] = 0.0
-    of_area, of_surface = np.zeros(8), np.zeros(8)
+    area_coefficients, surface_coefficients = np.zeros(8), np.zeros(8)
     for i in range(g):
-        t = quadrature[0, i]
+        t = quadrature[NODE, i]
         # This substitution makes powers of 3/2, as which areas begin at both ends, smooth.
         x = a + (b - a) * t * t * (3.0 - 2.0 * t)
-        rate = quadrature[1, i] * (b - a) * 6.0 * t * (1.0 - t)
-        area, terms = slice_area(x, circles, planes, bearings, radii, arcs, span, moments)
+        rate = quadrature[WEIGHT, i] * (b - a) * 6.0 * t * (1.0 - t)
+        area, terms = slice_area(x, slicer)
         if i == 0 and terms == 0.0:
             # A piece whose middle slice is empty is empty.
             return 1
@@ -93,32 +86,32 @@ def integrate_piece(
         # one to two, keep such a change visible.
         surface = 0.0
         for k in range(n):
-            at = HEAD + 4 * k
-            angle, r = rate * circles[k, SIDE] * moments[k, LENGTH], radii[k]
-            piece[at + X] += angle * circles[k, IS_BALL] * (x - circles[k, X])
-            piece[at + Y] += rate * circles[k, SIDE] * r * moments[k, MOMENT_Y]
-            piece[at + Z] += rate * circles[k, SIDE] * r * moments[k, MOMENT_Z]
-            piece[at + RADIUS] += angle * circles[k, RADIUS]
+            column = RATES + 4 * k
+            angle, r = rate * circles[k, SIDE] * moments[k, LENGTH], slicer.radii[k]
+            piece[column + X] += angle * circles[k, IS_BALL] * (x - circles[k, X])
+            piece[column + Y] += rate * circles[k, SIDE] * r * moments[k, MOMENT_Y]
+            piece[column + Z] += rate * circles[k, SIDE] * r * moments[k, MOMENT_Z]
+            piece[column + RADIUS] += angle * circles[k, RADIUS]
             surface += (1.0 + k / (n + m)) * moments[k, LENGTH] * circles[k, RADIUS]
         for k in range(m):
-            at = HEAD + 4 * (n + k)
+            column = RATES + 4 * (n + k)
             square = planes[k, Y] * planes[k, Y] + planes[k, Z] * planes[k, Z]
             per = rate / math.sqrt(square)
-            piece[at + X] -= per * moments[n + k, LENGTH] * x
-            piece[at + Y] -= per * moments[n + k, MOMENT_Y]
-            piece[at + Z] -= per * moments[n + k, MOMENT_Z]
-            piece[at + OFFSET] += per * moments[n + k, LENGTH]
+            piece[column + X] -= per * moments[n + k, LENGTH] * x
+            piece[column + Y] -= per * moments[n + k, MOMENT_Y]
+            piece[column + Z] -= per * moments[n + k, MOMENT_Z]
+            piece[column + OFFSET] += per * moments[n + k, LENGTH]
             tilt = math.sqrt(1.0 + planes[k, X] * planes[k, X] / square)
             surface += (1.0 + (n + k) / (n + m)) * moments[n + k, LENGTH] * tilt
         piece[VOLUME] += rate * area
         piece[SURFACE] += rate * surface
         piece[TERMS] += rate * terms
         for k in range(8):
-            of_area[k] += rate * quadrature[2 + k, i] * area
-            of_surface[k] += rate * quadrature[2 + k, i] * surface
-    piece[VOLUME_ERROR] = quadrature_error(of_area, g)
+            area_coefficients[k] += rate * quadrature[COEFFICIENTS + k, i] * area
+            surface_coefficients[k] += rate * quadrature[COEFFICIENTS + k, i] * surface
+    piece[VOLUME_ERROR] = quadrature_error(area_coefficients, g)
     # Faces begin as square roots, whose coefficients need not decay geometrically.
-    piece[SURFACE_ERROR] = largest(of_surface, 4)
+    piece[SURFACE_ERROR] = largest(surface_coefficients, 4)
     return g
 
 
@@ -131,20 +124,20 @@ def excess(piece: FloatArray, volume_error: float, surface_error: float) -> floa
 @helper
 def worst_piece(pieces: FloatArray, count: int, volume_error: float, surface_error: float) -> int:
     """Return the piece to halve next, or -1 if the errors that halving can reduce are allowed."""
-    worst, most, of_volume, of_surface = -1, 0.0, 0.0, 0.0
+    worst, largest_excess, volume_sum, surface_sum = -1, 0.0, 0.0, 0.0
     for i in range(count):
         start, end = pieces[i, START], pieces[i, END]
         if pieces[i, STALLS] >= MOST_STALLS or not start < 0.5 * (start + end) < end:
             continue
-        of_volume += pieces[i, VOLUME_ERROR]
-        of_surface += pieces[i, SURFACE_ERROR]
-        beyond = excess(pieces[i], volume_error, surface_error)
-        if beyond > most:
-            worst, most = i, beyond
-    return worst if of_volume > volume_error or of_surface > surface_error else -1
+        volume_sum += pieces[i, VOLUME_ERROR]
+        surface_sum += pieces[i, SURFACE_ERROR]
+        piece_excess = excess(pieces[i], volume_error, surface_error)
+        if piece_excess > largest_excess:
+            worst, largest_excess = i, piece_excess
+    return worst if volume_sum > volume_error or surface_sum > surface_error else -1
 
 
-@kernel("void(f8[:,::1], f8[:,::1], f8, f8, f8[:,::1], f8[::1], f8[:,::1], f8[:,::1])")
+@kernel("void(f8[:,::1], f8[:,::1], f8, f8, f8[:,::1], f8[::1], f8[:,::1])")
 def integrate_slices(
     circles: FloatArray,
     planes: FloatArray,
@@ -152,8 +145,7 @@ def integrate_slices(
     high: float,
     quadrature: FloatArray,
     result: FloatArray,
-    by_circle: FloatArray,
-    by_plane: FloatArray,
+    rates: FloatArray,
 ) -> None:
     """Integrate the area of the slices from low to high, and its derivatives.
 
@@ -166,13 +158,11 @@ def integrate_slices(
             give the last eight Legendre coefficients of an integrand, shape (10, g).
         result: Written: the volume, the areas at low and high, the counts of slices and pieces,
             and the estimated error of the volume, rounding included; shape (6,).
-        by_circle: Written: derivatives by (x, y, z, radius), shape (n, 4).
-        by_plane: Written: derivatives by (x, y, z, offset), shape (m, 4).
+        rates: Written: derivatives by (x, y, z, radius) of each circle, then by (x, y, z, offset)
+            of each plane, shape (n + m, 4).
     """
     n, m = circles.shape[0], planes.shape[0]
-    radii, span = np.zeros(n), np.zeros(6)
-    arcs = np.zeros((MOST_ARCS, 2))
-    moments, bearings = np.zeros((n + m, 3)), np.zeros((n, n + m))
+    bearings = np.zeros((n, n + m))
     for k in range(n):
         for j in range(n):
             bearings[k, j] = math.atan2(
@@ -180,19 +170,19 @@ def integrate_slices(
             )
         for j in range(m):
             bearings[k, n + j] = math.atan2(planes[j, Z], planes[j, Y])
+    arcs, span, moments = np.zeros((MOST_ARCS, 2)), np.zeros(6), np.zeros((n + m, 3))
+    slicer = Slicer(circles, planes, bearings, np.zeros(n), arcs, span, moments)
     breaks = np.zeros(MOST_BREAKS)
     count = find_breaks(circles, planes, low, high, breaks) - 1
-    pieces = np.zeros((MOST_PIECES, HEAD + 4 * (n + m)))
+    pieces = np.zeros((MOST_PIECES, RATES + 4 * (n + m)))
     slices = 0
     for i in range(count):
         pieces[i, START], pieces[i, END] = breaks[i], breaks[i + 1]
-        slices += integrate_piece(
-            pieces[i], circles, planes, bearings, quadrature, radii, arcs, span, moments
-        )
+        slices += integrate_piece(pieces[i], slicer, quadrature)
     size = region_size(circles)
-    total = np.zeros(HEAD + 4 * (n + m))
+    total = np.zeros(RATES)
     while True:
-        for k in range(VOLUME, HEAD):
+        for k in range(VOLUME, RATES):
             total[k] = 0.0
             for i in range(count):
                 total[k] += pieces[i, k]
@@ -210,24 +200,18 @@ def integrate_slices(
         pieces[count, END] = end
         after = 0.0
         for i in (worst, count):
-            slices += integrate_piece(
-                pieces[i], circles, planes, bearings, quadrature, radii, arcs, span, moments
-            )
+            slices += integrate_piece(pieces[i], slicer, quadrature)
             after += excess(pieces[i], allowed, SURFACE_TOLERANCE * total[SURFACE])
         if after > STALLED * before:
             stalls += 1.0
         pieces[worst, STALLS] = pieces[count, STALLS] = stalls
         count += 1
     for k in range(4 * (n + m)):
+        rate = 0.0
         for i in range(count):
-            total[HEAD + k] += pieces[i, HEAD + k]
-        if k < 4 * n:
-            by_circle[k // 4, k % 4] = total[HEAD + k]
-        else:
-            by_plane[k // 4 - n, k % 4] = total[HEAD + k]
+            rate += pieces[i, RATES + k]
+        rates[k // 4, k % 4] = rate
     result[TOTAL], result[SLICES], result[PIECES] = total[VOLUME], slices, count
-    result[AREA_AT_LOW], _ = slice_area(low, circles, planes, bearings, radii, arcs, span, moments)
-    result[AREA_AT_HIGH], _ = slice_area(
-        high, circles, planes, bearings, radii, arcs, span, moments
-    )
+    result[AREA_AT_LOW], _ = slice_area(low, slicer)
+    result[AREA_AT_HIGH], _ = slice_area(high, slicer)
     result[TOTAL_ERROR] = total[VOLUME_ERROR] + rounding

@@ -28,6 +28,8 @@ from explorer.workspace.limits.columns import (
 
 # The most ends of z-intervals in one column: two for each surface and two of the column.
 ENDS = 64
+# Entries of the result of `count_nodes`: the number of nodes, their lowest and highest indices.
+COUNT, LOWS, HIGHS, RESULTS = 0, 1, 4, 7
 # A discriminant that is negative by less than this share of b² counts as zero.
 DOUBLE_ROOT = 1e-12
 
@@ -78,20 +80,13 @@ def count_nodes(
     step: float,
     result: IntArray,
 ) -> None:
-    """Count the nodes of a grid that satisfy all limits.
+    """Count the nodes of a grid that satisfy all limits, to within a slack in design units.
 
-    Args:
-        circles: Rows, shape (n, 6).
-        planes: Rows, shape (m, 4).
-        cones: Rows, shape (k, 8).
-        ends: Ends of the x-range, shape (2,).
-        slack: Excess by which a limit may be violated.
-        first: Index of the first node on each axis, shape (3,); a node is index times step.
-        counts: Number of nodes on each axis, shape (3,).
-        step: Spacing of the grid.
-        result: Written: the number of nodes, then their lowest and highest indices, shape (7,).
+    A node is an index times the step; `first` has the indices of the first node, `counts` the
+    number of nodes on each axis, and `ends` the ends of the x-range. The results are written,
+    see `COUNT`, shape (RESULTS,).
     """
-    result[0] = 0
+    result[COUNT] = 0
     for i in range(counts[0]):
         x = (first[0] + i) * step
         if x < ends[0] or x > ends[1]:
@@ -102,13 +97,13 @@ def count_nodes(
                 z = (first[2] + k) * step
                 if not is_within(x, y, z, circles, planes, cones, slack):
                     continue
-                at = (int(first[0]) + i, int(first[1]) + j, int(first[2]) + k)
+                node = (int(first[0]) + i, int(first[1]) + j, int(first[2]) + k)
                 for axis in range(3):
-                    if result[0] == 0 or at[axis] < result[1 + axis]:
-                        result[1 + axis] = at[axis]
-                    if result[0] == 0 or at[axis] > result[4 + axis]:
-                        result[4 + axis] = at[axis]
-                result[0] += 1
+                    if result[COUNT] == 0 or node[axis] < result[LOWS + axis]:
+                        result[LOWS + axis] = node[axis]
+                    if result[COUNT] == 0 or node[axis] > result[HIGHS + axis]:
+                        result[HIGHS + axis] = node[axis]
+                result[COUNT] += 1
 
 
 @helper
@@ -138,16 +133,10 @@ def column_lengths(
     per_axis: int,
     total: FloatArray,
 ) -> None:
-    """Add up the exact z-lengths of the region in columns at the centres of per_axis² cells.
+    """Add up the exact z-lengths of a region in columns at the centres of per_axis² cells.
 
-    Args:
-        circles: Rows, shape (n, 6).
-        planes: Rows, shape (m, 4).
-        cones: Rows, shape (k, 8).
-        lows: Lower ends of a box that holds the region, shape (3,).
-        highs: Upper ends of that box, shape (3,).
-        per_axis: Number of cells on each of x and y.
-        total: Written: the sum of the lengths, shape (1,).
+    The cells are those of a box with the ends `lows` and `highs`, which holds the region.
+    Written to `total`: the sum of the lengths, shape (1,).
     """
     ends = np.zeros(ENDS)
     total[0] = 0.0
@@ -169,11 +158,11 @@ def column_lengths(
                 dx = 0.0 if cones[k, IS_FLAT] > 0.0 else x - cones[k, X]
                 dy, zc = y - cones[k, Y], cones[k, Z]
                 # (off·axis)² = cos² |off|², as a polynomial in z - zc.
-                flat = dx * cones[k, AXIS_X] + dy * cones[k, AXIS_Y]
+                xy_along = dx * cones[k, AXIS_X] + dy * cones[k, AXIS_Y]
                 square = cones[k, COSINE] * cones[k, COSINE]
                 a = cones[k, AXIS_Z] * cones[k, AXIS_Z] - square
-                b = flat * cones[k, AXIS_Z]
-                c = flat * flat - square * (dx * dx + dy * dy)
+                b = xy_along * cones[k, AXIS_Z]
+                c = xy_along * xy_along - square * (dx * dx + dy * dy)
                 count = add_crossings(a, b - a * zc, a * zc * zc - 2.0 * b * zc + c, ends, count)
             stops = np.sort(ends[:count])
             for k in range(count - 1):

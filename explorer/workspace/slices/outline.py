@@ -94,21 +94,21 @@ class _Curve:
     offset: float
     side: float
     limit: str
-    # The index of its limit; a cylinder has two lines.
-    owner: int
+    # A cylinder has two lines with the same index.
+    limit_index: int
 
     @property
     def is_circle(self) -> bool:
         return self.radius > 0.0
 
-    def is_same(self, other: _Curve, same: float) -> bool:
+    def is_same(self, other: _Curve, tolerance: float) -> bool:
         if self.is_circle != other.is_circle or self.side != other.side:
             return False
         if self.is_circle:
             off = max(math.dist(self.centre, other.centre), abs(self.radius - other.radius))
-            return off <= same
+            return off <= tolerance
         turned = math.dist(self.normal, other.normal)
-        return turned <= SAME and abs(self.offset - other.offset) <= same
+        return turned <= SAME and abs(self.offset - other.offset) <= tolerance
 
 
 def slice_outline(design: Design, rotation: ArrayLike, axis: str, level: float) -> Outline | None:
@@ -137,10 +137,10 @@ def slice_outline(design: Design, rotation: ArrayLike, axis: str, level: float) 
         return empty
     size = float(max(np.abs(lows).max(), np.abs(highs).max()))
     curves: list[_Curve] = []
-    for owner, limit in enumerate(limits):
+    for limit_index, limit in enumerate(limits):
         if not isinstance(limit, BallOrCylinder | HalfSpace):
             continue
-        limit_curves = _curves_of(limit, axes, level, owner)
+        limit_curves = _curves_of(limit, axes, level, limit_index)
         if limit_curves is None:
             return empty
         for curve in limit_curves:
@@ -152,9 +152,9 @@ def slice_outline(design: Design, rotation: ArrayLike, axis: str, level: float) 
 
 
 def _curves_of(
-    limit: BallOrCylinder | HalfSpace, axes: tuple[int, int, int], level: float, owner: int
+    limit: BallOrCylinder | HalfSpace, axes: tuple[int, int, int], level: float, limit_index: int
 ) -> list[_Curve] | None:
-    """Return the curves in which a plane cuts a limit surface; None if no point satisfies it."""
+    """Return the curves in which a plane cuts a limit surface; None if the limit holds nowhere."""
     cut, first, second = axes
     if isinstance(limit, HalfSpace):
         n = limit.normal[[first, second]]
@@ -163,36 +163,40 @@ def _curves_of(
         if length <= SAME * float(np.linalg.norm(limit.normal)):
             return [] if offset >= 0.0 else None
         u, v = (n / length).tolist()
-        return [_Curve((0.0, 0.0), 0.0, (u, v), offset / length, 1.0, limit.name, owner)]
+        return [_Curve((0.0, 0.0), 0.0, (u, v), offset / length, 1.0, limit.name, limit_index)]
     side = 1.0 if limit.inside else -1.0
     centre = (float(limit.centre[first]), float(limit.centre[second]))
     if not limit.is_ball and cut == 0:
-        return [_Curve(centre, limit.radius, (0.0, 0.0), 0.0, side, limit.name, owner)]
+        return [_Curve(centre, limit.radius, (0.0, 0.0), 0.0, side, limit.name, limit_index)]
     off = level - float(limit.centre[cut])
     square = (limit.radius - off) * (limit.radius + off)
     if square <= 0.0:
         return None if limit.inside else []
     half = math.sqrt(square)
     if limit.is_ball:
-        return [_Curve(centre, half, (0.0, 0.0), 0.0, side, limit.name, owner)]
+        return [_Curve(centre, half, (0.0, 0.0), 0.0, side, limit.name, limit_index)]
     # A cylinder along x is cut in two lines, on either side of its axis.
-    high = _Curve((0.0, 0.0), 0.0, (0.0, side), side * (centre[1] + half), side, limit.name, owner)
+    high = _Curve(
+        (0.0, 0.0), 0.0, (0.0, side), side * (centre[1] + half), side, limit.name, limit_index
+    )
     low = replace(high, normal=(0.0, -side), offset=side * (half - centre[1]))
     return [high, low]
 
 
 def _edges_of(curve: _Curve, curves: list[_Curve], size: float) -> list[Edge]:
     """Return the parts of a curve that satisfy all limits but its own."""
-    others = [other for other in curves if other.owner != curve.owner]
+    others = [other for other in curves if other.limit_index != curve.limit_index]
     # The two lines of a cylinder are parallel, so curves of one limit never meet.
-    stops = sorted(stop for other in others for stop in _find_meetings(curve, other))
+    ends_of_parts = sorted(
+        parameter for other in others for parameter in _find_meetings(curve, other)
+    )
     if curve.is_circle:
-        if not stops:
-            stops = [0.0, math.pi]
-        stops.append(stops[0] + 2.0 * math.pi)
+        if not ends_of_parts:
+            ends_of_parts = [0.0, math.pi]
+        ends_of_parts.append(ends_of_parts[0] + 2.0 * math.pi)
     else:
-        stops = [-4.0 * size, *stops, 4.0 * size]
-    low, high = np.array(stops[:-1]), np.array(stops[1:])
+        ends_of_parts = [-4.0 * size, *ends_of_parts, 4.0 * size]
+    low, high = np.array(ends_of_parts[:-1]), np.array(ends_of_parts[1:])
     long = (high - low) * (curve.radius or 1.0) > SHORT * size
     low, high = low[long], high[long]
     inside = _are_inside(_points_at(curve, 0.5 * (low + high)), others)
@@ -222,11 +226,11 @@ def _points_at(curve: _Curve, parameter: FloatArray) -> FloatArray:
 def _are_inside(points: FloatArray, others: list[_Curve]) -> BoolArray:
     """Return whether points (n, 2) satisfy the limits of curves, shape (n,)."""
     inside = np.ones(len(points), dtype=np.bool_)
-    for owner in {other.owner for other in others}:
-        own = [other for other in others if other.owner == owner]
-        within = np.stack([_slack(other, points) > 0.0 for other in own])
+    for limit_index in {other.limit_index for other in others}:
+        curves_of_limit = [other for other in others if other.limit_index == limit_index]
+        within = np.stack([_slack(other, points) > 0.0 for other in curves_of_limit])
         # A point outside a cylinder is above one of its lines or below the other.
-        inside &= within.any(axis=0) if own[0].side < 0.0 else within.all(axis=0)
+        inside &= within.any(axis=0) if curves_of_limit[0].side < 0.0 else within.all(axis=0)
     return inside
 
 
@@ -244,15 +248,15 @@ def _find_meetings(curve: _Curve, other: _Curve) -> list[float]:
     if other.is_circle:
         du, dv = other.centre[0] - curve.centre[0], other.centre[1] - curve.centre[1]
         distance = math.hypot(du, dv)
-        over = curve.radius**2 + distance**2 - other.radius**2
-        under = 2.0 * curve.radius * distance
+        numerator = curve.radius**2 + distance**2 - other.radius**2
+        denominator = 2.0 * curve.radius * distance
     else:
         du, dv = other.normal
-        over = other.offset - du * curve.centre[0] - dv * curve.centre[1]
-        under = curve.radius
-    if abs(over) >= under:
+        numerator = other.offset - du * curve.centre[0] - dv * curve.centre[1]
+        denominator = curve.radius
+    if abs(numerator) >= denominator:
         return []
-    bearing, half = math.atan2(dv, du), math.acos(over / under)
+    bearing, half = math.atan2(dv, du), math.acos(numerator / denominator)
     return [(bearing + sign * half) % (2.0 * math.pi) for sign in (-1.0, 1.0)]
 
 
@@ -275,20 +279,20 @@ def _find_meetings_on_line(line: _Curve, other: _Curve) -> list[float]:
 
 def _join(edges: list[Edge], corner: float) -> tuple[tuple[Edge, ...], ...] | None:
     """Return edges joined to closed loops; None if an end has no start nearby."""
-    left, loops = list(edges), list[tuple[Edge, ...]]()
-    while left:
-        loop = [left.pop()]
+    unjoined, loops = list(edges), list[tuple[Edge, ...]]()
+    while unjoined:
+        loop = [unjoined.pop()]
         while True:
             end = loop[-1].end
-            closing = math.dist(end, loop[0].start)
+            gap = math.dist(end, loop[0].start)
             nearest = min(
-                range(len(left)), key=lambda k: math.dist(end, left[k].start), default=None
+                range(len(unjoined)), key=lambda k: math.dist(end, unjoined[k].start), default=None
             )
-            if nearest is not None and math.dist(end, left[nearest].start) < closing:
-                if math.dist(end, left[nearest].start) > corner:
+            if nearest is not None and math.dist(end, unjoined[nearest].start) < gap:
+                if math.dist(end, unjoined[nearest].start) > corner:
                     return None
-                loop.append(left.pop(nearest))
-            elif closing <= corner:
+                loop.append(unjoined.pop(nearest))
+            elif gap <= corner:
                 break
             else:
                 return None

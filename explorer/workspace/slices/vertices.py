@@ -17,6 +17,7 @@ from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import helper
 from explorer.workspace.limits.columns import IS_BALL, OFFSET, RADIUS, X, Y, Z
 from explorer.workspace.slices.break_points import (
+    Boundary,
     add_break,
     add_breaks_at_height,
     real_roots,
@@ -32,27 +33,17 @@ DX, DY, DZ = 3, 4, 5
 
 
 @helper
-def add_breaks_of_fixed_line(
-    circles: FloatArray,
-    planes: FloatArray,
-    y: float,
-    z: float,
-    slack: float,
-    breaks: FloatArray,
-    count: int,
-) -> int:
+def add_breaks_of_fixed_line(boundary: Boundary, y: float, z: float, slack: float) -> None:
     """Add vertices where the line along x through (y, z) meets spheres."""
-    for k in range(circles.shape[0]):
-        if circles[k, IS_BALL] > 0.0:
-            count = add_breaks_at_height(circles, planes, k, y, z, slack, breaks, count)
-    return count
+    for k in range(boundary.circles.shape[0]):
+        if boundary.circles[k, IS_BALL] > 0.0:
+            add_breaks_at_height(boundary, k, y, z, slack)
 
 
 @helper
-def add_breaks_on_cylinders(
-    circles: FloatArray, planes: FloatArray, size: float, breaks: FloatArray, count: int
-) -> int:
+def add_breaks_on_cylinders(boundary: Boundary) -> None:
     """Add vertices on the lines along x in which a cylinder meets another, or a plane."""
+    circles, planes = boundary.circles, boundary.planes
     n, m = circles.shape[0], planes.shape[0]
     for j in range(n):
         if circles[j, IS_BALL] > 0.0:
@@ -65,20 +56,20 @@ def add_breaks_on_cylinders(
             square = dy * dy + dz * dz
             if square == 0.0:
                 continue
-            slack = slack_at(size, math.sqrt(square) / size)
+            slack = slack_at(boundary, math.sqrt(square) / boundary.size)
             rk = circles[k, RADIUS]
             along = 0.5 * (square + (rj - rk) * (rj + rk)) / square
             rest = rj * rj / square - along * along
             if rest < 0.0:
                 continue
-            up = math.sqrt(rest)
-            for sign in (-up, up):
+            half_chord = math.sqrt(rest)
+            for sign in (-half_chord, half_chord):
                 y, z = yj + along * dy - sign * dz, zj + along * dz + sign * dy
-                count = add_breaks_of_fixed_line(circles, planes, y, z, slack, breaks, count)
+                add_breaks_of_fixed_line(boundary, y, z, slack)
                 for i in range(m):
                     if planes[i, X] != 0.0:
                         x = (planes[i, OFFSET] - planes[i, Y] * y - planes[i, Z] * z) / planes[i, X]
-                        count = add_break(circles, planes, x, y, z, slack, breaks, count)
+                        add_break(boundary, x, y, z, slack)
         for k in range(m):
             if planes[k, X] != 0.0:
                 continue
@@ -88,11 +79,10 @@ def add_breaks_on_cylinders(
             rest = rj * rj / square - level * level
             if rest < 0.0:
                 continue
-            up, slack = math.sqrt(rest), slack_at(size, 1.0)
-            for sign in (-up, up):
+            half_chord, slack = math.sqrt(rest), slack_at(boundary, 1.0)
+            for sign in (-half_chord, half_chord):
                 y, z = yj + level * ay - sign * az, zj + level * az + sign * ay
-                count = add_breaks_of_fixed_line(circles, planes, y, z, slack, breaks, count)
-    return count
+                add_breaks_of_fixed_line(boundary, y, z, slack)
 
 
 @helper
@@ -124,17 +114,9 @@ def write_line_of_planes(
 
 
 @helper
-def add_breaks_on_line(
-    circles: FloatArray,
-    planes: FloatArray,
-    line: FloatArray,
-    k: int,
-    slack: float,
-    breaks: FloatArray,
-    count: int,
-) -> int:
+def add_breaks_on_line(boundary: Boundary, line: FloatArray, k: int, slack: float) -> None:
     """Add vertices where a line meets sphere or cylinder k."""
-    ball = circles[k, IS_BALL]
+    circles, ball = boundary.circles, boundary.circles[k, IS_BALL]
     ox, oy, oz = ball * (line[X] - circles[k, X]), line[Y] - circles[k, Y], line[Z] - circles[k, Z]
     dx, dy, dz = ball * line[DX], line[DY], line[DZ]
     for t in real_roots(
@@ -143,21 +125,14 @@ def add_breaks_on_line(
         ox * ox + oy * oy + oz * oz - circles[k, RADIUS] * circles[k, RADIUS],
     ):
         x, y, z = line[X] + t * line[DX], line[Y] + t * line[DY], line[Z] + t * line[DZ]
-        count = add_break(circles, planes, x, y, z, slack, breaks, count)
-    return count
+        add_break(boundary, x, y, z, slack)
 
 
 @helper
-def add_breaks_of_planes(
-    circles: FloatArray,
-    planes: FloatArray,
-    cuts: FloatArray,
-    size: float,
-    breaks: FloatArray,
-    count: int,
-) -> int:
+def add_breaks_of_planes(boundary: Boundary, cuts: FloatArray) -> None:
     """Add vertices on the lines in which two planes meet."""
-    n, m = circles.shape[0], planes.shape[0]
+    circles = boundary.circles
+    n, m = circles.shape[0], boundary.planes.shape[0]
     line = np.zeros(6)
     for p in range(m):
         for q in range(p + 1, m):
@@ -165,27 +140,22 @@ def add_breaks_of_planes(
             sine = write_line_of_planes(cuts[p], cuts[q], x, y, z, line)
             if sine == 0.0:
                 continue
-            slack = slack_at(size, sine)
+            slack = slack_at(boundary, sine)
             if abs(line[DX]) <= PARALLEL:
                 # The whole line lies in one slice.
                 x, y, z = line[X], line[Y], line[Z]
-                count = add_break(circles, planes, x, y, z, math.inf, breaks, count)
+                add_break(boundary, x, y, z, math.inf)
             for k in range(n):
-                count = add_breaks_on_line(circles, planes, line, k, slack, breaks, count)
+                add_breaks_on_line(boundary, line, k, slack)
             for k in range(q + 1, m):
-                steep = cuts[k, X] * line[DX] + cuts[k, Y] * line[DY] + cuts[k, Z] * line[DZ]
-                if abs(steep) > PARALLEL:
+                slope = cuts[k, X] * line[DX] + cuts[k, Y] * line[DY] + cuts[k, Z] * line[DZ]
+                if abs(slope) > PARALLEL:
                     rest = cuts[k, OFFSET] - (
                         cuts[k, X] * line[X] + cuts[k, Y] * line[Y] + cuts[k, Z] * line[Z]
                     )
-                    t, near = rest / steep, slack_at(size, sine * abs(steep))
-                    x, y, z = (
-                        line[X] + t * line[DX],
-                        line[Y] + t * line[DY],
-                        line[Z] + t * line[DZ],
-                    )
-                    count = add_break(circles, planes, x, y, z, near, breaks, count)
-    return count
+                    t, vertex_slack = rest / slope, slack_at(boundary, sine * abs(slope))
+                    x, y, z = line[X] + t * line[DX], line[Y] + t * line[DY], line[Z] + t * line[DZ]
+                    add_break(boundary, x, y, z, vertex_slack)
 
 
 @helper
@@ -243,28 +213,18 @@ def write_quartic_roots(a: FloatArray, roots: FloatArray) -> int:
 
 
 @helper
-def add_breaks_of_circle(
-    circles: FloatArray,
-    planes: FloatArray,
-    ball: int,
-    cut: FloatArray,
-    slack: float,
-    breaks: FloatArray,
-    count: int,
-) -> int:
+def add_breaks_of_circle(boundary: Boundary, ball: int, cut: FloatArray, slack: float) -> None:
     """Add vertices where the circle in which a plane cuts a sphere meets cylinders."""
+    circles = boundary.circles
     nx, ny, nz = cut[X], cut[Y], cut[Z]
     across = math.sqrt(ny * ny + nz * nz)
     level = cut[OFFSET] - nx * circles[ball, X] - ny * circles[ball, Y] - nz * circles[ball, Z]
     square = (circles[ball, RADIUS] - level) * (circles[ball, RADIUS] + level)
     if across <= PARALLEL or square <= 0.0:
-        return count
+        return
     r = math.sqrt(square)
-    cx, cy, cz = (
-        circles[ball, X] + level * nx,
-        circles[ball, Y] + level * ny,
-        circles[ball, Z] + level * nz,
-    )
+    cx, cy = circles[ball, X] + level * nx, circles[ball, Y] + level * ny
+    cz = circles[ball, Z] + level * nz
     # Seen along x it is an ellipse: r along e, and r |nx| along f.
     fy, fz = ny / across, nz / across
     ey, ez = fz, -fy
@@ -279,10 +239,10 @@ def add_breaks_of_circle(
         rest = u * u + v * v - radius * radius
         # Each half of the circle is (2t, 1 - t²) / (1 + t²), so that t stays within [-1, 1].
         for half in (-1.0, 1.0):
-            tall = -half * nx * r
-            a[0] = tall * tall - 2.0 * tall * v + rest
-            a[4] = tall * tall + 2.0 * tall * v + rest
-            a[2] = 4.0 * r * r - 2.0 * tall * tall + 2.0 * rest
+            semi_f = -half * nx * r
+            a[0] = semi_f * semi_f - 2.0 * semi_f * v + rest
+            a[4] = semi_f * semi_f + 2.0 * semi_f * v + rest
+            a[2] = 4.0 * r * r - 2.0 * semi_f * semi_f + 2.0 * rest
             a[1] = a[3] = -4.0 * r * u
             for i in range(write_quartic_roots(a, roots)):
                 t = roots[i]
@@ -290,20 +250,13 @@ def add_breaks_of_circle(
                 x = cx + r * across * cosine
                 y = cy + r * (ey * sine - nx * fy * cosine)
                 z = cz + r * (ez * sine - nx * fz * cosine)
-                count = add_break(circles, planes, x, y, z, slack, breaks, count)
-    return count
+                add_break(boundary, x, y, z, slack)
 
 
 @helper
-def add_breaks_on_spheres(
-    circles: FloatArray,
-    planes: FloatArray,
-    cuts: FloatArray,
-    size: float,
-    breaks: FloatArray,
-    count: int,
-) -> int:
+def add_breaks_on_spheres(boundary: Boundary, cuts: FloatArray) -> None:
     """Add vertices on the circles in which two spheres, or a sphere and a plane, meet."""
+    circles, planes = boundary.circles, boundary.planes
     n, m = circles.shape[0], planes.shape[0]
     line = np.zeros(6)
     sines = np.ones(m + n)
@@ -315,20 +268,17 @@ def add_breaks_on_spheres(
             # The plane of the circle in which two spheres meet.
             dx, dy, dz = circles[j, X] - x, circles[j, Y] - y, circles[j, Z] - z
             distance = math.sqrt(dx * dx + dy * dy + dz * dz)
-            sines[m + j] = distance / size if circles[j, IS_BALL] > 0.0 else 0.0
+            sines[m + j] = distance / boundary.size if circles[j, IS_BALL] > 0.0 else 0.0
             if sines[m + j] > 0.0:
-                powers = (circles[i, RADIUS] - circles[j, RADIUS]) * (
-                    circles[i, RADIUS] + circles[j, RADIUS]
-                )
-                cut = cuts[m + j]
+                ri, rj, cut = circles[i, RADIUS], circles[j, RADIUS], cuts[m + j]
                 cut[X], cut[Y], cut[Z] = dx / distance, dy / distance, dz / distance
-                cut[OFFSET] = 0.5 * (distance + powers / distance)
+                cut[OFFSET] = 0.5 * (distance + (ri - rj) * (ri + rj) / distance)
                 cut[OFFSET] += cut[X] * x + cut[Y] * y + cut[Z] * z
         for p in range(m + n):
             if (p < m and planes[p, X] == 0.0) or m <= p <= m + i or sines[p] == 0.0:
                 continue
-            slack = slack_at(size, sines[p])
-            count = add_breaks_of_circle(circles, planes, i, cuts[p], slack, breaks, count)
+            slack = slack_at(boundary, sines[p])
+            add_breaks_of_circle(boundary, i, cuts[p], slack)
             if p < m:
                 continue
             # The plane of the circle meets other planes, and those of circles with other spheres.
@@ -337,17 +287,14 @@ def add_breaks_on_spheres(
                     continue
                 sine = write_line_of_planes(cuts[p], cuts[q], x, y, z, line)
                 if sine > 0.0:
-                    near = slack_at(size, sine * sines[p] * sines[q])
-                    count = add_breaks_on_line(circles, planes, line, i, near, breaks, count)
-    return count
+                    vertex_slack = slack_at(boundary, sine * sines[p] * sines[q])
+                    add_breaks_on_line(boundary, line, i, vertex_slack)
 
 
 @helper
-def add_breaks_at_vertices(
-    circles: FloatArray, planes: FloatArray, size: float, breaks: FloatArray, count: int
-) -> int:
-    """Add breaks at the vertices of a region and return the count of breaks."""
-    n, m = circles.shape[0], planes.shape[0]
+def add_breaks_at_vertices(boundary: Boundary) -> None:
+    """Add breaks at the vertices of a region."""
+    planes, n, m = boundary.planes, boundary.circles.shape[0], boundary.planes.shape[0]
     # Planes with unit normals, then the planes of the circles in which one sphere meets others.
     cuts = np.zeros((m + n, 4))
     for k in range(m):
@@ -355,6 +302,6 @@ def add_breaks_at_vertices(
         norm = math.sqrt(ax * ax + ay * ay + az * az)
         cuts[k, X], cuts[k, Y], cuts[k, Z] = ax / norm, ay / norm, az / norm
         cuts[k, OFFSET] = planes[k, OFFSET] / norm
-    count = add_breaks_on_cylinders(circles, planes, size, breaks, count)
-    count = add_breaks_of_planes(circles, planes, cuts, size, breaks, count)
-    return add_breaks_on_spheres(circles, planes, cuts, size, breaks, count)
+    add_breaks_on_cylinders(boundary)
+    add_breaks_of_planes(boundary, cuts)
+    add_breaks_on_spheres(boundary, cuts)

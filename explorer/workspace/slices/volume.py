@@ -31,6 +31,7 @@ from explorer.workspace.limits.constraints import (
     constraints,
 )
 from explorer.workspace.limits.region import Region, region_of
+from explorer.workspace.slices import nodes
 from explorer.workspace.slices.integration import (
     AREA_AT_HIGH,
     AREA_AT_LOW,
@@ -39,7 +40,6 @@ from explorer.workspace.slices.integration import (
     TOTAL_ERROR,
     integrate_slices,
 )
-from explorer.workspace.slices.nodes import column_lengths, count_nodes
 
 # Gauss-Legendre nodes per piece; with fewer nodes more pieces have to be halved.
 NODES = 20
@@ -47,7 +47,7 @@ NODES = 20
 COLUMNS = 400
 # Columns per axis that are enough to decide whether there is a volume.
 COARSE_COLUMNS = 80
-# The radius of a ball around all limits, as a multiple of the largest distance of one.
+# The radius of a ball around all limits, over the largest distance of a limit from the origin.
 SURROUNDINGS = 4.0
 # The most nodes that are counted.
 MOST_NODES = 50_000_000
@@ -124,9 +124,7 @@ def workspace_volume(
 def volume_within(region: Region, columns: int = COLUMNS) -> tuple[float, float]:
     """Return the volume of a region and its error, as in `Volume`.
 
-    Args:
-        region: The intersection of limits.
-        columns: Columns per axis, for regions with cones.
+    Regions with cones are divided in a number of columns per axis.
     """
     if len(region.cones):
         return _volume_of_columns(region, columns)
@@ -156,30 +154,17 @@ def workspace_nodes(
     counts = number.astype(np.int64)
     if not counts.all():
         return empty
-    result = np.zeros(7, dtype=np.int64)
+    result = np.zeros(nodes.RESULTS, dtype=np.int64)
     slack = design.tolerance
     ends = np.array([region.low - slack, region.high + slack])
-    count_nodes(
-        int(counts.prod()),
-        region.circles,
-        region.planes,
-        region.cones,
-        ends,
-        slack,
-        first,
-        counts,
-        width,
-        result,
-    )
-    if result[0] == 0:
+    node_count = int(counts.prod())
+    nodes.count_nodes(node_count, *region.rows, ends, slack, first, counts, width, result)
+    count = int(result[nodes.COUNT])
+    if not count:
         return empty
-    low_x, low_y, low_z, high_x, high_y, high_z = (result[1:] * width).tolist()
-    return NodeCount(
-        width,
-        int(result[0]),
-        int(result[0]) * width**3,
-        ((low_x, low_y, low_z), (high_x, high_y, high_z)),
-    )
+    low_x, low_y, low_z, high_x, high_y, high_z = (result[nodes.LOWS :] * width).tolist()
+    extent = (low_x, low_y, low_z), (high_x, high_y, high_z)
+    return NodeCount(width, count, count * width**3, extent)
 
 
 def node_step_of(design: Design, step: float | None = None) -> float:
@@ -196,8 +181,8 @@ def node_step_of(design: Design, step: float | None = None) -> float:
 
 def node_range(region: Region, step: float) -> tuple[FloatArray, FloatArray]:
     """Return the index of the first node and the number of nodes around a region, each (3,)."""
-    lows, highs = _around(region)
-    # Nodes on a boundary count, so the grid may not lose one to rounding.
+    lows, highs = _bounding_box(region)
+    # Nodes on a boundary count, so the grid must not lose one to rounding.
     # A tiny step overflows; `check_node_count` refuses such a count.
     with np.errstate(over="ignore", invalid="ignore"):
         first = np.ceil(lows / step - 1e-9)
@@ -205,7 +190,11 @@ def node_range(region: Region, step: float) -> tuple[FloatArray, FloatArray]:
 
 
 def check_node_count(counts: FloatArray, step: float, most: int) -> None:
-    """Raise an `InputError` if a grid with `counts` nodes per axis, (3,), has more than `most`."""
+    """Refuse a grid with `counts` nodes per axis, (3,), that has more than `most` nodes.
+
+    Raises:
+        InputError: the grid has too many nodes.
+    """
     with np.errstate(over="ignore"):
         count = float(np.prod(counts))
     if not math.isfinite(count):
@@ -223,11 +212,11 @@ def bounds(region: Region) -> tuple[FloatArray, FloatArray]:
 
     The box need not be the tightest. If the region has no volume, a low may exceed its high.
     """
-    lows, highs = _around(region)
+    lows, highs = _bounding_box(region)
     return (lows, np.full(3, -math.inf)) if region.is_flat else (lows, highs)
 
 
-def _around(region: Region) -> tuple[FloatArray, FloatArray]:
+def _bounding_box(region: Region) -> tuple[FloatArray, FloatArray]:
     """Return (lows, highs) of a box that holds a region, even if the region is a surface."""
     lows = np.array([region.low, -math.inf, -math.inf])
     highs = np.array([region.high, math.inf, math.inf])
@@ -250,36 +239,26 @@ def _around(region: Region) -> tuple[FloatArray, FloatArray]:
 @cache
 def quadrature() -> FloatArray:
     """Return the quadrature as `integrate_slices` takes it, shape (10, NODES)."""
-    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    abscissae, weights = np.polynomial.legendre.leggauss(NODES)
     # The middle node comes first: a piece that is empty there is empty everywhere.
-    order = np.argsort(np.abs(nodes), kind="stable")
-    nodes, weights = nodes[order], weights[order]
+    order = np.argsort(np.abs(abscissae), kind="stable")
+    abscissae, weights = abscissae[order], weights[order]
     degrees = np.arange(NODES - 8, NODES)
-    values = (2.0 * degrees + 1.0) * np.polynomial.legendre.legvander(nodes, NODES - 1)[:, -8:]
-    return np.stack([0.5 * (nodes + 1.0), 0.5 * weights, *values.T])
+    values = (2.0 * degrees + 1.0) * np.polynomial.legendre.legvander(abscissae, NODES - 1)[:, -8:]
+    return np.stack([0.5 * (abscissae + 1.0), 0.5 * weights, *values.T])
 
 
 def _volume_of_slices(region: Region) -> tuple[float, float, dict[str, float]]:
     lows, highs = bounds(region)
     if region.is_empty or not (lows < highs).all():
         return 0.0, 0.0, {}
-    result = np.zeros(RESULTS)
-    by_circle, by_plane = np.zeros((len(region.circles), 4)), np.zeros((len(region.planes), 4))
-    integrate_slices(
-        1,
-        region.circles,
-        region.planes,
-        region.low,
-        region.high,
-        quadrature(),
-        result,
-        by_circle,
-        by_plane,
-    )
+    surfaces = (*region.circle_limits, *region.plane_limits)
+    result, rates = np.zeros(RESULTS), np.zeros((len(surfaces), 4))
+    ends = region.low, region.high
+    integrate_slices(1, region.circles, region.planes, *ends, quadrature(), result, rates)
     gradient: dict[str, float] = {}
-    moving: list[tuple[BallOrCylinder | HalfSpace, FloatArray]] = [
-        *zip(region.circle_limits, by_circle, strict=True),
-        *zip(region.plane_limits, by_plane, strict=True),
+    surface_rates: list[tuple[BallOrCylinder | HalfSpace, FloatArray]] = [
+        *zip(surfaces, rates, strict=True)
     ]
     # An end that moves by dx sweeps the area of its slice; its normal is along x.
     for end, area in (
@@ -287,32 +266,21 @@ def _volume_of_slices(region: Region) -> tuple[float, float, dict[str, float]]:
         (region.high_limit, result[AREA_AT_HIGH]),
     ):
         if end is not None:
-            moving.append((end, np.array([0.0, 0.0, 0.0, area / abs(float(end.normal[0]))])))
-    for limit, derivative in moving:
+            surface_rates.append((end, np.array([0.0, 0.0, 0.0, area / abs(float(end.normal[0]))])))
+    for limit, volume_rate in surface_rates:
         for name, rate in limit.rates.items():
-            gradient[name] = gradient.get(name, 0.0) + float(derivative @ rate)
+            gradient[name] = gradient.get(name, 0.0) + float(volume_rate @ rate)
     return float(result[TOTAL]), float(result[TOTAL_ERROR]), gradient
 
 
 def _volume_of_columns(region: Region, columns: int = COLUMNS) -> tuple[float, float]:
-    if region.is_empty:
-        return 0.0, 0.0
     lows, highs = bounds(region)
-    if not (lows < highs).all():
+    if region.is_empty or not (lows < highs).all():
         return 0.0, 0.0
     volumes: list[float] = []
     for per_axis in (columns // 2, columns):
         total = np.zeros(1)
-        column_lengths(
-            per_axis * per_axis,
-            region.circles,
-            region.planes,
-            region.cones,
-            lows,
-            highs,
-            per_axis,
-            total,
-        )
+        nodes.column_lengths(per_axis * per_axis, *region.rows, lows, highs, per_axis, total)
         cell = (highs[0] - lows[0]) * (highs[1] - lows[1]) / (per_axis * per_axis)
         volumes.append(float(total[0]) * float(cell))
     return volumes[1], abs(volumes[1] - volumes[0])
@@ -325,14 +293,16 @@ def find_emptying_limits(limits: Sequence[Constraint]) -> tuple[str, ...]:
     limit, they are a set that empties the workspace together, of which none can be left out.
     """
     names = tuple(dict.fromkeys(limit.name for limit in limits))
-    around = _surroundings(limits)
+    surrounding_ball = _surroundings(limits)
 
     def is_empty(chosen: Collection[str]) -> bool:
-        return not _has_volume([*(limit for limit in limits if limit.name in chosen), around])
+        return not _has_volume(
+            [*(limit for limit in limits if limit.name in chosen), surrounding_ball]
+        )
 
-    alone = tuple(name for name in names if not is_empty({*names} - {name}))
-    if alone:
-        return alone
+    sufficient = tuple(name for name in names if not is_empty({*names} - {name}))
+    if sufficient:
+        return sufficient
     needed = {*names}
     for name in names:
         if is_empty(needed - {name}):

@@ -1,7 +1,7 @@
 """Agreement of the volume of a mesh with the exact volume of its workspace.
 
 If all faces are within the tolerance of the true surface, the volume is wrong by at most the
-tolerance times their area. For a workspace about as thin as the tolerance that is no bound of use,
+tolerance times their area. For a workspace about as thin as the tolerance that bound is useless,
 so the difference must not exceed a share of the exact volume either.
 """
 
@@ -38,14 +38,15 @@ class ExactVolume:
     error: float
 
     def excess(self, solid: Solid) -> float:
-        """Return the volume by which a mesh differs more than allowed; it agrees if not positive.
+        """Return the volume by which the difference of a mesh exceeds the allowed one.
 
-        The excess is infinite if some face comes from no limit, since its facet protrudes.
+        The mesh agrees if the excess is not positive. It is infinite if some face comes from no
+        limit, since its facet protrudes.
         """
         if (solid.limit_of_face < 0).any():
             return math.inf
-        most = min(solid.tolerance * solid.area, LARGEST_SHARE * self.volume)
-        return abs(solid.volume - self.volume) - most - self.error
+        allowed = min(solid.tolerance * solid.area, LARGEST_SHARE * self.volume)
+        return abs(solid.volume - self.volume) - allowed - self.error
 
     def is_settled_by(self, solid: Solid) -> bool:
         """Return whether a mesh agrees, and is not empty although the exact volume is not zero."""
@@ -53,17 +54,12 @@ class ExactVolume:
 
     def is_artefact(self, solid: Solid) -> bool:
         """Return whether the exact volume is zero and that of the mesh is due to its tolerance."""
-        is_none = self.volume <= 0.0 and self.excess(solid) > 0.0
-        return is_none and abs(solid.volume) <= solid.tolerance * solid.area
+        disagrees = self.volume <= 0.0 and self.excess(solid) > 0.0
+        return disagrees and abs(solid.volume) <= solid.tolerance * solid.area
 
 
 def exact_volume(limits: Sequence[Constraint], known: Volume | None = None) -> ExactVolume:
-    """Return the exact volume of a workspace.
-
-    Args:
-        limits: Limits of the workspace.
-        known: Volume of the workspace if it has been computed before.
-    """
+    """Return the exact volume of a workspace, which may have been computed before."""
     region = region_of(limits)
     volume, error = volume_within(region, COLUMNS) if known is None else (known.volume, known.error)
     return ExactVolume(volume, 2.0 * error)
@@ -72,17 +68,12 @@ def exact_volume(limits: Sequence[Constraint], known: Volume | None = None) -> E
 def exact_volume_within(
     limits: Sequence[Constraint], lows: FloatArray, highs: FloatArray
 ) -> ExactVolume:
-    """Return the exact volume of a workspace that is known to lie in a box.
+    """Return the exact volume of a workspace that is known to lie in a box, ends (3,) each.
 
     The box makes columns closer and rounding smaller than they are without it.
-
-    Args:
-        limits: Limits of the workspace.
-        lows: Lower ends of the box, shape (3,), in design units.
-        highs: Upper ends of the box, shape (3,).
     """
-    walls = [HalfSpace("", -axis, -float(low)) for axis, low in zip(np.eye(3), lows, strict=True)]
-    walls += [HalfSpace("", axis, float(high)) for axis, high in zip(np.eye(3), highs, strict=True)]
-    region = region_of([*limits, *walls])
-    volume, error = volume_within(region)
+    sides = np.concatenate([-np.eye(3), np.eye(3)])
+    ends = [*(-lows).tolist(), *highs.tolist()]
+    walls = [HalfSpace("", side, end) for side, end in zip(sides, ends, strict=True)]
+    volume, error = volume_within(region_of([*limits, *walls]))
     return ExactVolume(volume, 2.0 * error)

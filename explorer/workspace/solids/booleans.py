@@ -54,22 +54,22 @@ def mesh_of(body: Manifold) -> tuple[FloatArray, NDArray[np.int32], NDArray[np.u
     mesh: Any = body.to_mesh64()
     faces = np.asarray(mesh.tri_verts, dtype=np.int32)
     if len(mesh.merge_from_vert):
-        same = np.arange(len(mesh.vert_properties), dtype=np.int32)
-        same[mesh.merge_from_vert] = mesh.merge_to_vert
-        faces = same[faces]
+        merged = np.arange(len(mesh.vert_properties), dtype=np.int32)
+        merged[mesh.merge_from_vert] = mesh.merge_to_vert
+        faces = merged[faces]
     runs = np.diff(np.asarray(mesh.run_index, dtype=np.int64)) // 3
     ids = np.repeat(np.asarray(mesh.run_original_id), runs)
     return np.array(mesh.vert_properties[:, :3]), faces, ids
 
 
 def union(bodies: Sequence[Manifold]) -> Manifold:
-    """Return the union of bodies, formed in pairs and pairs of pairs.
+    """Return the union of bodies: of pairs first, then of pairs of pairs.
 
     Each boolean cuts surfaces that bodies share along their other surfaces. After `as_original`
     the cuts can be simplified away; otherwise the union of 64 bodies has millions of faces.
     """
     while len(bodies) > 1:
         pairs = zip(bodies[::2], bodies[1::2], strict=False)
-        left = bodies[len(bodies) // 2 * 2 :]
-        bodies = [*((one + other).as_original().simplify(0.0) for one, other in pairs), *left]
+        unpaired = bodies[len(bodies) // 2 * 2 :]
+        bodies = [*((one + other).as_original().simplify(0.0) for one, other in pairs), *unpaired]
     return bodies[0]

@@ -75,18 +75,13 @@ def step_of(radius: float, tolerance: float) -> float:
     return min(WIDEST, 4.0 * math.asin(math.sqrt(min(0.25, 0.5 * tolerance / radius))))
 
 
-def facing(
+def facing_part(
     centre: FloatArray, radius: float, box: Box, tolerance: float
 ) -> tuple[FloatArray, float]:
     """Return the unit direction from a centre to a box, and the angle about it to tessellate.
 
-    Beyond this angle, in radians, the sphere is outside the box; it is π if all may be inside.
-
-    Args:
-        centre: Centre of a sphere, shape (3,), or of a circle in y and z, shape (2,).
-        radius: Radius of the sphere or circle.
-        box: Box near which facets are needed.
-        tolerance: Distance by which facets may lie outside the sphere.
+    Beyond this angle, in radians, a sphere is outside the box by more than a tolerance; it is π
+    if all of the sphere may be inside. A centre in y and z, shape (2,), is that of a circle.
     """
     corners = box.corners[:, 3 - len(centre) :]
     axes = np.eye(len(centre))
@@ -102,14 +97,9 @@ def facing(
 def ball(
     centre: FloatArray, radius: float, towards: FloatArray, angle: float, step: float
 ) -> Facets:
-    """Return the part of a ball within an angle of a direction, closed by a flat base.
+    """Return the part of a ball within an angle of a unit direction, closed by a flat base.
 
-    Args:
-        centre: Centre of the ball, shape (3,).
-        radius: Radius of the ball.
-        towards: Unit direction, shape (3,).
-        angle: Least angle in radians; π for the whole ball.
-        step: Angle between neighbouring corners, see `step_of`.
+    The angle in radians is π for the whole ball; for the step see `step_of`.
     """
     points, faces, outward = _unit_cap(*_cap_of(angle, step))
     frame = _frame(towards)
@@ -127,15 +117,10 @@ def ball_faces(angle: float, step: float) -> int:
 def cylinder(
     centre: FloatArray, radius: float, towards: FloatArray, angle: float, step: float, box: Box
 ) -> Facets:
-    """Return the part of a cylinder along x within an angle of a direction in y and z.
+    """Return the part of a cylinder along x within an angle of a direction, longer than a box.
 
-    Args:
-        centre: (y, z) of the axis, shape (2,).
-        radius: Radius of the cylinder.
-        towards: Unit direction in y and z, shape (2,).
-        angle: Least angle in radians; π for the whole cylinder.
-        step: Angle between neighbouring corners, see `step_of`.
-        box: Box whose length along x the cylinder exceeds.
+    The centre and the unit direction are in y and z, shape (2,); the angle in radians is π for
+    the whole cylinder; for the step see `step_of`.
     """
     whole = angle >= math.pi
     count = max(3, math.ceil(2.0 * angle / step))
@@ -158,13 +143,13 @@ def prism(outline: FloatArray, box: Box) -> Facets:
             box.highs[0] + BEYOND * box.size,
         )
     ]
-    here = np.arange(count)
-    after = (here + 1) % count
+    indices = np.arange(count)
+    following = (indices + 1) % count
     inner = np.arange(1, count - 1)
     faces = np.concatenate(
         [
-            np.column_stack([here, after, after + count]),
-            np.column_stack([here, after + count, here + count]),
+            np.column_stack([indices, following, following + count]),
+            np.column_stack([indices, following + count, indices + count]),
             np.column_stack([np.zeros_like(inner), inner + 1, inner]),
             np.column_stack([np.zeros_like(inner), inner, inner + 1]) + [count, count, count],
         ]
@@ -185,11 +170,8 @@ def half_space(normal: FloatArray, offset: float, box: Box) -> Facets:
 def wedge(apex: FloatArray, axis: FloatArray, half_angle: float, box: Box) -> Facets:
     """Return the part of a wedge along x in and around a box.
 
-    Args:
-        apex: (y, z) of the edge, shape (2,).
-        axis: Unit direction of the middle plane in y and z, shape (2,).
-        half_angle: Half-angle in radians, below a right angle.
-        box: Box near which facets are needed.
+    The apex and the unit direction of the middle plane are in y and z, shape (2,); the half-angle
+    in radians is below a right angle.
     """
     width, height, wall = _far_rim(apex, half_angle, box)
     along, across = height * axis, width * np.array([-axis[1], axis[0]])
@@ -201,12 +183,8 @@ def wedge(apex: FloatArray, axis: FloatArray, half_angle: float, box: Box) -> Fa
 def cone(apex: FloatArray, axis: FloatArray, half_angle: float, step: float, box: Box) -> Facets:
     """Return the part of a cone in and around a box.
 
-    Args:
-        apex: Apex, shape (3,).
-        axis: Unit axis, shape (3,).
-        half_angle: Half-angle in radians, below a right angle.
-        step: Angle between neighbouring corners of the rim, see `step_of`.
-        box: Box near which facets are needed.
+    The axis is a unit vector, the half-angle in radians below a right angle, and the step that
+    between neighbouring corners of the rim, see `step_of`.
     """
     count = max(8, math.ceil(2.0 * math.pi / step))
     width, height, wall = _far_rim(apex, half_angle, box)
@@ -214,14 +192,14 @@ def cone(apex: FloatArray, axis: FloatArray, half_angle: float, step: float, box
     turns = 2.0 * math.pi / count * np.arange(count)
     rim = np.column_stack([width * np.cos(turns), width * np.sin(turns), np.full(count, height)])
     points = np.concatenate([[[0.0, 0.0, 0.0]], rim, rim + [0.0, 0.0, wall]])
-    here = 1 + np.arange(count)
-    after = 1 + (np.arange(count) + 1) % count
+    indices = 1 + np.arange(count)
+    following = 1 + (np.arange(count) + 1) % count
     inner = np.arange(1, count - 1)
     faces = np.concatenate(
         [
-            np.column_stack([np.zeros_like(here), after, here]),
-            np.column_stack([here, after, after + count]),
-            np.column_stack([here, after + count, here + count]),
+            np.column_stack([np.zeros_like(indices), following, indices]),
+            np.column_stack([indices, following, following + count]),
+            np.column_stack([indices, following + count, indices + count]),
             np.column_stack([np.zeros_like(inner), inner, inner + 1]) + 1 + count,
         ]
     )
@@ -315,19 +293,19 @@ def _stitch_rings(counts: IntArray, first: IntArray) -> IntArray:
     order = np.lexsort((side, middle, pair))
     pair, side = pair[order], side[order]
     starts = np.searchsorted(pair, pairs)
-    reached: list[IntArray] = []
-    for which in (0, 1):
-        before = np.cumsum(side == which) - (side == which)
-        reached.append(before - before[starts][pair])
+    passed: list[IntArray] = []
+    for ring in (0, 1):
+        edges_before = np.cumsum(side == ring) - (side == ring)
+        passed.append(edges_before - edges_before[starts][pair])
     inner, outer = counts[pair], counts[pair + 1]
-    at_inner, at_outer = first[pair] + reached[0] % inner, first[pair + 1] + reached[1] % outer
-    beyond = np.where(
+    inner_point, outer_point = first[pair] + passed[0] % inner, first[pair + 1] + passed[1] % outer
+    third_point = np.where(
         side == 0,
-        first[pair] + (reached[0] + 1) % inner,
-        first[pair + 1] + (reached[1] + 1) % outer,
+        first[pair] + (passed[0] + 1) % inner,
+        first[pair + 1] + (passed[1] + 1) % outer,
     )
     # Rings go from the pole outwards, each counter-clockwise about z.
-    return np.column_stack([at_inner, at_outer, beyond])
+    return np.column_stack([inner_point, outer_point, third_point])
 
 
 def _positions_in_groups(counts: IntArray) -> IntArray:

@@ -27,7 +27,7 @@ from explorer.workspace.solids.facets import (
     ball_faces,
     cone,
     cylinder,
-    facing,
+    facing_part,
     half_space,
     step_of,
     wedge,
@@ -114,13 +114,10 @@ class Frame:
 def frame_of(
     families: Sequence[Sequence[Constraint]], reach: float, tolerance: float | None
 ) -> Frame:
-    """Return the frame for workspaces.
+    """Return the frame for workspaces, given by the limits of each.
 
-    Args:
-        families: Limits of each workspace.
-        reach: Reach of the design, in design units.
-        tolerance: Tolerance in design units, at most a quarter of the largest extent; a 500th of
-            the reach or of the largest extent, whichever is smaller, if None.
+    The tolerance in design units is at most a quarter of the largest extent; if None, it is a 500th
+    of the reach or of the largest extent, whichever is smaller.
 
     Raises:
         InputError: the tolerance is not positive.
@@ -147,13 +144,8 @@ def primitives_of(
 ) -> list[Primitive]:
     """Return the primitives of a workspace: their intersection, less those that are cut.
 
-    The list is empty if the boxes around the primitives already show that the workspace is.
-
-    Args:
-        limits: Limits of the workspace.
-        frame: Frame of the primitives.
-        contracted: Whether the frame's box holds this workspace more tightly than the box of its
-            region.
+    The list is empty if the boxes around the primitives already show that the workspace is. If the
+    frame is contracted, its box holds this workspace more tightly than the box of its region.
     """
     ends = _box_of(limits)
     if ends is None:
@@ -220,7 +212,7 @@ def _balls_and_cylinders(
                 bounding.append((limit, radius))
         if not bounding:
             continue
-        parts = [facing(centre, radius, frame.box, frame.chord) for _, radius in bounding]
+        parts = [facing_part(centre, radius, frame.box, frame.chord) for _, radius in bounding]
         angle = max(part[1] for part in parts)
         step = step_of(max(radius for _, radius in bounding), frame.chord)
         for limit, radius in bounding:

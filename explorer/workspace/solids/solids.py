@@ -37,9 +37,9 @@ if TYPE_CHECKING:
 
 CORNERS = np.array(list(itertools.product((0, 1), repeat=3)))
 
-# A mesh that does not agree is refined: its tolerance is divided by this,
+# Divisor of the tolerance in each round of refining a mesh that does not agree, the most rounds,
+# and the most faces of all primitives together.
 FINER = 4.0
-# in at most so many rounds, as long as its primitives have at most so many faces together.
 MOST_ROUNDS = 10
 MOST_REFINED = 60_000
 
@@ -101,12 +101,7 @@ class Surface:
 
 
 def carved_solid(whole: Solid, surface: Surface | None, seed: FloatArray) -> Solid:
-    """Return the connected part of a workspace that holds a position, cut by a surface.
-
-    Args:
-        whole: The workspace, as returned by `workspace_solid`.
-        surface: Surface that removes a part of the workspace, if any.
-        seed: Position in the part to return, shape (3,).
+    """Return the part of a workspace that holds a position (3,), less what a surface removes.
 
     Raises:
         ExplorerError: a boolean fails.
@@ -127,47 +122,44 @@ def carved_solid(whole: Solid, surface: Surface | None, seed: FloatArray) -> Sol
     ]
 
     def nearness(part: Solid) -> tuple[float, float]:
-        # Rounding may put a seed on the surface, or outside; the nearest vertex then decides.
-        off = float(np.linalg.norm(part.vertices - seed, axis=1).min())
-        return round(part.winding(seed), 1), -off
+        # Rounding may put the seed on the surface or outside; the nearest vertex then decides.
+        distance = float(np.linalg.norm(part.vertices - seed, axis=1).min())
+        return round(part.winding(seed), 1), -distance
 
     solid = max(parts, key=nearness)
     if surface is None:
         return solid
-    of_face = solid.limit_of_face.copy()
-    cut = np.flatnonzero(of_face == len(names))
-    centres = solid.vertices[solid.faces[cut]].mean(axis=1)
-    of_face[cut] = len(names) + surface.name_of(centres)
-    return replace(solid, limit_of_face=of_face, limits=(*names, *surface.names))
+    limit_of_face = solid.limit_of_face.copy()
+    carved = np.flatnonzero(limit_of_face == len(names))
+    centres = solid.vertices[solid.faces[carved]].mean(axis=1)
+    limit_of_face[carved] = len(names) + surface.name_of(centres)
+    return replace(solid, limit_of_face=limit_of_face, limits=(*names, *surface.names))
 
 
 def _below_zero(surface: Surface, frame: Frame, face_id: int) -> Manifold:
     """Return the set below zero of a surface as a body in a frame, with one id for its faces."""
     from manifold3d import Manifold
 
-    below = np.argwhere(surface.values < 0.0)
-    if not len(below):
+    negative = np.argwhere(surface.values < 0.0)
+    if not len(negative):
         return Manifold()
-    first = np.maximum(below.min(axis=0) - 1, 0)
-    beyond = np.minimum(below.max(axis=0) + 2, surface.values.shape)
-    x, y, z = (slice(int(a), int(b)) for a, b in zip(first, beyond, strict=True))
+    first = np.maximum(negative.min(axis=0) - 1, 0)
+    end = np.minimum(negative.max(axis=0) + 2, surface.values.shape)
+    x, y, z = (slice(int(a), int(b)) for a, b in zip(first, end, strict=True))
     values, lows = surface.values[x, y, z], surface.lows + first * surface.step
-    where, faces = surface_below_zero(values)
-    most = np.array(values.shape) - 2
-    corners = np.clip(np.floor(where), 0, most).astype(np.int64)[:, None, :] + CORNERS
+    grid_points, faces = surface_below_zero(values)
+    last_cell = np.array(values.shape) - 2
+    corners = np.clip(np.floor(grid_points), 0, last_cell).astype(np.int64)[:, None, :] + CORNERS
     highest = values[corners[..., 0], corners[..., 1], corners[..., 2]].argmax(axis=1)
-    beside = corners[np.arange(len(where)), highest]
-    points = surface.settle(lows + where * surface.step, lows + beside * surface.step)
+    beside = corners[np.arange(len(grid_points)), highest]
+    points = surface.settle(lows + grid_points * surface.step, lows + beside * surface.step)
     return manifold_of((frame.to_frame(points), faces), (face_id,), (len(faces),))
 
 
 def reachable_solid(design: Design, rotations: ArrayLike, tolerance: float | None = None) -> Solid:
-    """Return the reachable workspace of some orientations, their union, as a mesh.
+    """Return the reachable workspace of n orientations (n, 3, 3), their union, as a mesh.
 
-    Args:
-        design: The manipulator.
-        rotations: Platform to base, shape (n, 3, 3).
-        tolerance: As of `workspace_solid`.
+    For the tolerance see `workspace_solid`.
 
     Raises:
         InputError: not rotations, or a tolerance that is not positive or too small.
@@ -190,28 +182,26 @@ def reachable_solid(design: Design, rotations: ArrayLike, tolerance: float | Non
 
 
 def dexterous_solid(design: Design, rotations: ArrayLike, tolerance: float | None = None) -> Solid:
-    """Return the dexterous workspace of some orientations, their intersection, as a mesh.
+    """Return the dexterous workspace of n orientations (n, 3, 3), their intersection, as a mesh.
 
-    Args:
-        design: The manipulator.
-        rotations: Platform to base, shape (n, 3, 3).
-        tolerance: As of `workspace_solid`.
+    For the tolerance see `workspace_solid`.
 
     Raises:
         InputError: not rotations, or a tolerance that is not positive or too small.
         ExplorerError: a boolean fails.
     """
     limits = [limit for family in _families(design, rotations) for limit in family]
-    solid = _make_common_solid(design, limits, tolerance)
+
+    def make_without(name: str) -> Solid:
+        others = [limit for limit in limits if limit.name != name]
+        return _make_solid(others, frame_of([others], design.reach, tolerance))
+
+    solid = make_without("")
     if not solid.is_empty:
         return solid
     names = _names([limits])
-    alone = tuple(
-        name
-        for name in names
-        if not _make_common_solid(design, [x for x in limits if x.name != name], tolerance).is_empty
-    )
-    return replace(solid, empty_because=alone or names)
+    sufficient = tuple(name for name in names if not make_without(name).is_empty)
+    return replace(solid, empty_because=sufficient or names)
 
 
 def convex_hull(solid: Solid) -> Solid:
@@ -224,14 +214,11 @@ def convex_hull(solid: Solid) -> Solid:
 
     if solid.is_empty:
         return solid
-    lows, highs = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
-    middle, scale = 0.5 * (lows + highs), float((highs - lows).max())
-    points = (solid.vertices - middle) / scale
-    shapes: Any = Manifold
-    vertices, faces, _ = mesh_of(shapes.hull_points(points))
-    origin = np.zeros(len(faces), dtype=np.int64)
-    points = vertices * scale + middle
-    return Solid(points, faces, origin, (HULL,), solid.tolerance, agrees=solid.agrees)
+    frame = _frame_of(solid)
+    untyped: Any = Manifold
+    vertices, faces, _ = mesh_of(untyped.hull_points(frame.to_frame(solid.vertices)))
+    limit_of_face, points = np.zeros(len(faces), dtype=np.int64), frame.to_design(vertices)
+    return Solid(points, faces, limit_of_face, (HULL,), solid.tolerance, agrees=solid.agrees)
 
 
 def cut_solid(solid: Solid, half_space: HalfSpace) -> Solid:
@@ -248,16 +235,20 @@ def cut_solid(solid: Solid, half_space: HalfSpace) -> Solid:
     offset = (half_space.offset - float(half_space.normal @ frame.middle)) / (length * frame.scale)
     names = (*solid.limits, half_space.name)
     part = _solid_of(body.trim_by_plane((x, y, z), -offset), origins, frame, names)
-    of_face = np.where(part.limit_of_face < 0, len(solid.limits), part.limit_of_face)
-    return replace(part, limit_of_face=of_face, agrees=solid.agrees)
+    limit_of_face = np.where(part.limit_of_face < 0, len(solid.limits), part.limit_of_face)
+    return replace(part, limit_of_face=limit_of_face, agrees=solid.agrees)
+
+
+def _frame_of(solid: Solid) -> Frame:
+    lows, highs = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
+    return frame_around(lows, highs, solid.tolerance)
 
 
 def _body_of(solid: Solid) -> tuple[Manifold, Frame, dict[int, int]]:
     """Return a mesh as a body, its frame, and the indices of limits by the ids of faces."""
     from manifold3d import Manifold
 
-    lows, highs = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
-    frame = frame_around(lows, highs, solid.tolerance)
+    frame = _frame_of(solid)
     order = np.argsort(solid.limit_of_face, kind="stable")
     used, counts = np.unique(solid.limit_of_face, return_counts=True)
     first = Manifold.reserve_ids(len(used))
@@ -278,14 +269,8 @@ def _names(families: Sequence[Sequence[Constraint]]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(limit.name for limits in families for limit in limits))
 
 
-def _make_common_solid(
-    design: Design, limits: Sequence[Constraint], tolerance: float | None
-) -> Solid:
-    """Return the positions that satisfy all limits as a mesh."""
-    return _make_solid(limits, frame_of([limits], design.reach, tolerance))
-
-
 def _make_solid(limits: Sequence[Constraint], frame: Frame, *, contracted: bool = False) -> Solid:
+    """Return the positions that satisfy all limits as a mesh."""
     names = _names([limits])
     bodies, origins = _make_bodies([limits], frame, names, contracted=contracted)
     return _solid_of(bodies[0], origins, frame, names)
@@ -302,11 +287,8 @@ def _make_agreeing_solid(limits: Sequence[Constraint], frame: Frame, exact: Exac
         return _empty_solid(limits, frame)
     exact = exact_volume_within(limits, *finer.ends)
     for _ in range(MOST_ROUNDS):
-        primitives = primitives_of(limits, finer, contracted=True)
-        if (
-            exact.is_settled_by(best)
-            or sum(primitive.faces for primitive in primitives) > MOST_REFINED
-        ):
+        faces = sum(primitive.faces for primitive in primitives_of(limits, finer, contracted=True))
+        if exact.is_settled_by(best) or faces > MOST_REFINED:
             break
         solid = _make_solid(limits, finer, contracted=True)
         if best.is_empty or exact.excess(solid) < exact.excess(best):
@@ -319,9 +301,9 @@ def _make_agreeing_solid(limits: Sequence[Constraint], frame: Frame, exact: Exac
 
 def _empty_solid(limits: Sequence[Constraint], frame: Frame) -> Solid:
     """Return an empty solid that agrees with the exact volume."""
-    faces, of_face = np.zeros((0, 3), dtype=np.int32), np.zeros(0, dtype=np.int64)
+    faces, limit_of_face = np.zeros((0, 3), dtype=np.int32), np.zeros(0, dtype=np.int64)
     names = _names([limits])
-    return Solid(np.zeros((0, 3)), faces, of_face, names, frame.tolerance, agrees=True)
+    return Solid(np.zeros((0, 3)), faces, limit_of_face, names, frame.tolerance, agrees=True)
 
 
 def _make_bodies(
@@ -332,8 +314,12 @@ def _make_bodies(
     contracted: bool = False,
 ) -> tuple[list[Manifold], dict[int, int]]:
     """Return each family's workspace as a body, and the indices of names by the ids of faces."""
-    everything = [primitives_of(limits, frame, contracted=contracted) for limits in families]
-    faces = sum(primitive.faces for primitives in everything for primitive in primitives)
+    primitives_of_families = [
+        primitives_of(limits, frame, contracted=contracted) for limits in families
+    ]
+    faces = sum(
+        primitive.faces for primitives in primitives_of_families for primitive in primitives
+    )
     if faces > MOST_FACES:
         # The number of faces of a ball is inverse to the tolerance; other solids have fewer.
         least = frame.tolerance * faces / MOST_FACES
@@ -343,7 +329,9 @@ def _make_bodies(
             f"{MOST_FACES:,} are made, so it must be at least about {least:.2g}{fewer}"
         )
     origins: dict[int, int] = {}
-    return [_make_body(primitives, origins, names) for primitives in everything], origins
+    return [
+        _make_body(primitives, origins, names) for primitives in primitives_of_families
+    ], origins
 
 
 def _make_body(
@@ -386,6 +374,6 @@ def _solid_of(
     body: Manifold, origins: dict[int, int], frame: Frame, names: tuple[str, ...]
 ) -> Solid:
     vertices, faces, ids = mesh_of(body)
-    which, inverse = np.unique(ids, return_inverse=True)
-    of_id = np.array([origins.get(int(face_id), -1) for face_id in which], dtype=np.int64)
-    return Solid(frame.to_design(vertices), faces, of_id[inverse], names, frame.tolerance)
+    distinct, inverse = np.unique(ids, return_inverse=True)
+    limit_of_id = np.array([origins.get(int(face_id), -1) for face_id in distinct], dtype=np.int64)
+    return Solid(frame.to_design(vertices), faces, limit_of_id[inverse], names, frame.tolerance)

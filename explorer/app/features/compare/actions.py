@@ -1,12 +1,12 @@
-"""The actions of comparing designs: pin copies of them, let go of them, look at them."""
+"""The actions of comparing designs: pin a copy of a design, and unpin it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
-from explorer.app.state.action import Action, changes
-from explorer.app.state.compared import SLOTS, Look, Pinned
+from explorer.app.state.action import Action
+from explorer.app.state.compared import SLOTS, Pinned
 from explorer.app.state.state import State
 from explorer.errors import InputError
 from explorer.mechanism.design import Design
@@ -14,7 +14,7 @@ from explorer.mechanism.design import Design
 
 @dataclass(frozen=True)
 class Pin(Action):
-    """Keep a copy of a design beside the live one, in the first place that is free."""
+    """Pin a copy of a design beside the live one, in the first free place."""
 
     template: ClassVar[str] = "Pin {action.design.name}"
 
@@ -34,14 +34,14 @@ class Pin(Action):
             )
         if None not in pinned:
             raise InputError(
-                f"{name} finds no place: {', '.join(SLOTS)} are taken; unpin one of them first"
+                f"{name} cannot be pinned: {', '.join(SLOTS)} are taken; unpin one of them first"
             )
         return _with_pinned(state, pinned.index(None), self.design)
 
 
 @dataclass(frozen=True)
 class Unpin(Action):
-    """Let go of the design in a place, 0 to 2; where there is none, nothing happens."""
+    """Remove the pinned design from a place, 0 to 2; do nothing if the place is free."""
 
     template: ClassVar[str] = "Unpin {action.place}"
 
@@ -49,7 +49,7 @@ class Unpin(Action):
 
     @property
     def place(self) -> str:
-        """What people call the place."""
+        """The letter of the place."""
         return SLOTS[self.slot]
 
     def apply(self, state: State) -> State:
@@ -57,24 +57,9 @@ class Unpin(Action):
         return _with_pinned(state, self.slot, None)
 
 
-@dataclass(frozen=True)
-class SetLook(Action):
-    """Change how designs are compared."""
-
-    look: Look
-
-    def apply(self, state: State) -> State:
-        """Return the next state."""
-        return replace(state, compared=replace(state.compared, look=self.look))
-
-    def describe(self, before: State, after: State) -> str:
-        """Return what the step did."""
-        return changes("Compare", before.compared.look, after.compared.look)
-
-
 def _with_pinned(state: State, slot: int, design: Design | None) -> State:
-    found = list(state.compared.pinned)
-    found[slot] = design
-    a, b, c = found
+    places = list(state.compared.pinned)
+    places[slot] = design
+    a, b, c = places
     pinned: Pinned = (a, b, c)
     return replace(state, compared=replace(state.compared, pinned=pinned))

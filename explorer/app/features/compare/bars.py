@@ -1,4 +1,4 @@
-"""Designs side by side: small bars from zero, a drawing for each of some measures."""
+"""Designs side by side as bars from zero, in a drawing for each of some measures."""
 
 from __future__ import annotations
 
@@ -26,8 +26,10 @@ DRAWN = (
 )
 """The measures that are drawn, row by row."""
 
+# Number of drawings in a row.
 ACROSS = 4
-# Of one drawing, its title, a bar, its letter and the room of its number, in pixels.
+# Sizes in pixels: a drawing's width, heights of its title, a bar and the gap below it; widths of a
+# letter and a number; the space below a drawing.
 WIDTH, TITLE, BAR, GAP = 148.0, 17.0, 11.0, 3.0
 LETTER, NUMBER, SPACE = 24.0, 52.0, 9.0
 
@@ -36,7 +38,7 @@ def bars(columns: Sequence[Column], *, millimetres: bool) -> str:
     """Return the bars as an SVG.
 
     Args:
-        columns: The live design first.
+        columns: Columns of the comparison, the live design first.
         millimetres: Whether lengths are in millimetres, rather than in design units.
     """
     height = TITLE + len(columns) * (BAR + GAP) + SPACE
@@ -48,7 +50,7 @@ def bars(columns: Sequence[Column], *, millimetres: bool) -> str:
     rows = -(-len(DRAWN) // ACROSS)
     return (
         f'<svg viewBox="0 0 {ACROSS * WIDTH:g} {rows * height:g}" width="100%" '
-        'style="display:block;font-size:10.5px;fill:currentColor" role="img" '
+        'class="ex-bars" role="img" '
         f'aria-label="Measures of the designs as bars">{drawings}</svg>'
     )
 
@@ -57,8 +59,8 @@ def _drawing(measure: Measure, columns: Sequence[Column], *, millimetres: bool) 
     values = [column.value(measure) for column in columns]
     known = [value for value in values if value is not None]
     low, high = min([0.0, *known]), max([0.0, *known])
-    room = WIDTH - LETTER - NUMBER - 8.0
-    scale = room / (high - low) if high > low else 0.0
+    longest = WIDTH - LETTER - NUMBER - 8.0
+    scale = longest / (high - low) if high > low else 0.0
     zero = LETTER - low * scale
     best = best_of(measure, values)
     unit = unit_of(measure, millimetres=millimetres)
@@ -71,17 +73,17 @@ def _drawing(measure: Measure, columns: Sequence[Column], *, millimetres: bool) 
     parts = [title]
     for index, (column, value) in enumerate(zip(columns, values, strict=True)):
         y = TITLE + index * (BAR + GAP)
-        line = y + BAR - 2.0
-        parts.append(f'<text x="0" y="{line:g}" fill-opacity="0.6">{column.letter}</text>')
+        baseline = y + BAR - 2.0
+        parts.append(f'<text x="0" y="{baseline:g}" fill-opacity="0.6">{column.letter}</text>')
         if value is None:
-            parts.append(f'<text x="{zero + 4.0:.1f}" y="{line:g}" fill-opacity="0.6">–</text>')
+            parts.append(f'<text x="{zero + 4.0:.1f}" y="{baseline:g}" fill-opacity="0.6">–</text>')
             continue
         start, end = sorted((zero, zero + value * scale))
         weight = 700 if index in best else 400
         parts.append(
             f'<rect x="{start:.2f}" y="{y:g}" width="{max(end - start, 0.8):.2f}" '
             f'height="{BAR:g}" rx="1.5" fill="{css(column.colour)}"/>'
-            f'<text x="{end + 4.0:.1f}" y="{line:g}" font-weight="{weight}">'
+            f'<text x="{end + 4.0:.1f}" y="{baseline:g}" font-weight="{weight}">'
             f"{format_number(value)}</text>"
         )
     return "".join(parts)

@@ -23,13 +23,13 @@ PERCENT = 100.0
 
 @dataclass(frozen=True)
 class Column:
-    """A design that is compared.
+    """A design in the comparison.
 
     Attributes:
-        number: 0 for the live one, from 1 for those that are pinned.
+        number: Number of the column: 0 for the live design, from 1 for the pinned ones.
         design: The design.
         measured: Values of its measures; None until they are computed.
-        factor: Unit of its lengths in units of the comparison.
+        factor: One unit of its lengths in units of the comparison.
         is_current: Whether no newer values are being computed.
         problem: Why something is missing; None if nothing is.
     """
@@ -43,51 +43,48 @@ class Column:
 
     @property
     def letter(self) -> str:
-        """Its short name: "live", or the letter of its place."""
+        """The short name: "live", or the letter of the place."""
         return "live" if self.number == LIVE else SLOTS[self.number - 1]
 
     @property
     def colour(self) -> Rgb:
-        """The colour of its place."""
+        """The colour of the design in tables, bars and the scene."""
         return COMPARED[self.number]
 
     def own_value(self, measure: Measure) -> float | None:
-        """Return a value in the design's own units, None if it has none; shares in per cent."""
+        """Return a value in the design's own units, shares in per cent; None if it is unknown."""
         value = None if self.measured is None else self.measured[measure.name]
         return PERCENT * value if value is not None and measure.unit == "share" else value
 
     def value(self, measure: Measure) -> float | None:
-        """Return a value in the unit of the comparison, None if it has none."""
+        """Return a value in the unit of the comparison; None if it is unknown."""
         value = self.own_value(measure)
         return None if value is None else value * self.factor**measure.power
 
     def swatch(self) -> str:
-        """Return a square of its colour, as HTML."""
-        return (
-            '<span style="display:inline-block;width:10px;height:10px;border-radius:2px;'
-            f'background:{css(self.colour)};margin-right:5px;vertical-align:-1px"></span>'
-        )
+        """Return a square in the colour of the design, as HTML."""
+        return f'<span class="ex-swatch" style="--colour:{css(self.colour)}"></span>'
 
 
 def columns_of(state: State, feed: CompareFeed) -> tuple[Column, ...]:
-    """Return the live design and those that are pinned, with what is known of them."""
-    found: list[Column] = []
+    """Return the columns of the live design and of the pinned ones."""
+    columns: list[Column] = []
     for number, design in enumerate((state.design, *state.compared.pinned)):
         if design is None:
             continue
         drawing = feed.drawing(number)
         unit = 1.0 if state.compared.look.millimetres else state.design.unit_mm
-        found.append(
+        columns.append(
             Column(
                 number=number,
                 design=design,
-                measured=None if drawing is None else drawing.figures,
+                measured=None if drawing is None else drawing.measurements,
                 factor=design.unit_mm / unit,
                 is_current=feed.is_current(number),
                 problem=feed.problem(number) or (None if drawing is None else drawing.problem),
             )
         )
-    return tuple(found)
+    return tuple(columns)
 
 
 def unit_of(measure: Measure, *, millimetres: bool) -> str:
@@ -101,18 +98,18 @@ def hint_of(measure: Measure) -> str:
 
 
 def best_of(measure: Measure, values: list[float | None]) -> set[int]:
-    """Return the indices of the best values: none if all are equal, or the measure has no sense."""
+    """Return the indices of the best values; none if all are equal or no value is better."""
     known = [value for value in values if value is not None]
     if measure.sense is None or len(known) < 2:
         return set()
     best = max(known) if measure.sense == "more" else min(known)
-    near = SAME * max(map(abs, known))
-    found = {k for k, value in enumerate(values) if value is not None and abs(value - best) <= near}
-    return found if len(found) < len(known) else set()
+    same = SAME * max(map(abs, known))
+    equal = {k for k, value in enumerate(values) if value is not None and abs(value - best) <= same}
+    return equal if len(equal) < len(known) else set()
 
 
 def value_text(measure: Measure, value: float, size: float, *, signed: bool = False) -> str:
-    """Return a value with as many decimals as the largest one of its row has room for."""
+    """Return a value with the decimals that suit a size, the largest value of its row."""
     if measure.is_whole:
         text = f"{value:+,.0f}" if signed else f"{value:,.0f}"
         return text.replace(",", "\N{NARROW NO-BREAK SPACE}").replace("-", "−")
@@ -121,36 +118,36 @@ def value_text(measure: Measure, value: float, size: float, *, signed: bool = Fa
     digits = decimals_of(size)
     text = f"{value:+.{digits}f}" if signed else f"{value:.{digits}f}"
     if float(text) == 0.0:
-        # A difference by rounding is none.
+        # A difference within rounding counts as none.
         least = SAME * size if signed else 0.0
         return "0" if abs(value) <= least else format_number(value, 3)
     return text.replace("-", "−")
 
 
 def size_of(values: list[float | None]) -> float:
-    """Return the size of the largest of some values."""
+    """Return the largest absolute value; 0 if all are unknown."""
     return max((abs(value) for value in values if value is not None), default=0.0)
 
 
 def notes(state: State, columns: tuple[Column, ...]) -> list[str]:
     """Return remarks on a comparison: problems, empty workspaces, other units, as HTML."""
-    found: list[str] = []
+    remarks: list[str] = []
     live = state.design
     for column in columns:
         who = escape(f"{column.letter} ({column.design.name})")
         if column.problem is not None:
-            found.append(f"{who}: {escape(column.problem)}.")
+            remarks.append(f"{who}: {escape(column.problem)}.")
         if column.measured is not None and column.measured.empty_because:
             causes = ", ".join(map(escape, column.measured.empty_because))
-            found.append(f"{who} has an empty workspace; emptied by: {causes}.")
-    others = [each for each in columns if not math.isclose(each.design.unit_mm, live.unit_mm)]
+            remarks.append(f"{who} has an empty workspace; emptied by: {causes}.")
+    others = [other for other in columns if not math.isclose(other.design.unit_mm, live.unit_mm)]
     if others:
         others_units = ", ".join(
-            f"{each.letter} has {each.design.unit_mm:.6g} mm" for each in others
+            f"{other.letter} has {other.design.unit_mm:.6g} mm" for other in others
         )
         unit = "millimetres" if state.compared.look.millimetres else "units of the live design"
-        found.append(
+        remarks.append(
             f"One unit of the live design is {live.unit_mm:.6g} mm; {others_units}. Lengths are in "
             f"{unit}, and workspaces are drawn to true size."
         )
-    return found
+    return remarks

@@ -1,13 +1,13 @@
-"""A design that is compared: its figures, its workspace and its outline, for the worker to find."""
+"""The worker's task for comparing: measure a design, and draw its workspace and outline."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import TypeAlias
 
 import numpy as np
 
+from explorer.app.features.workspace.reached import Rows
 from explorer.app.scene.bands import Shell
 from explorer.errors import ExplorerError
 from explorer.measures.case import MESH_TOLERANCE, Case
@@ -21,22 +21,20 @@ from explorer.singularity.colours import Rgb
 from explorer.workspace.solids.solid import Solid
 from explorer.workspace.solids.solids import workspace_solid
 
-Rows: TypeAlias = tuple[tuple[float, ...], ...]
-
-# Designs whose figures and solids are kept: those compared, and what the last steps had.
-KEPT = 8
+# Number of cached measurements and solids: of the compared designs, and of the last changes.
+CACHED = 8
 NO_COLOUR: Rgb = (0, 0, 0)
 
 
 @dataclass(frozen=True)
 class ComparedRequest:
-    """What to find of a design; lengths in design units.
+    """Request to measure and draw a design; lengths in design units.
 
     Attributes:
         design: The manipulator.
         drawn: Whether the workspace is drawn.
-        rotation: Of the workspace that is drawn, rows of the matrix; None for that of home.
-        tolerance: Of its mesh; None for a share of the reach.
+        rotation: Rotation of the drawn workspace, rows of the matrix; None for the home pose.
+        tolerance: Chord tolerance of its mesh; None for a share of the reach.
     """
 
     design: Design
@@ -47,45 +45,45 @@ class ComparedRequest:
 
 @dataclass(frozen=True)
 class ComparedDrawing:
-    """What was found of a design.
+    """A design measured and drawn; lengths in design units.
 
     Attributes:
-        request: What was asked for.
-        figures: None if there is a problem.
-        shell: The surface of its workspace, if that was asked for and is not empty.
+        request: The request.
+        measurements: Values of the measures; None if they could not be computed.
+        shell: Surface of the workspace; None if it was not requested or is empty.
         outline: Lines along base, legs and platform in the home pose, shape (n, 2, 3).
-        problem: Why something is missing, for people; None if nothing is.
+        problem: Why something is missing; None if nothing is.
     """
 
     request: ComparedRequest
-    figures: Measurements | None
+    measurements: Measurements | None
     shell: Shell | None
     outline: FloatArray
     problem: str | None = None
 
     @cached_property
     def extent(self) -> FloatArray | None:
-        """Lows and highs of the workspace that is drawn, shape (2, 3); None without one."""
+        """The lows and highs of the drawn workspace, shape (2, 3); None without one."""
         if self.shell is None:
             return None
         return np.array([self.shell.vertices.min(axis=0), self.shell.vertices.max(axis=0)])
 
 
 def compared_drawing(request: ComparedRequest) -> ComparedDrawing:
-    """Return the figures of a design, and its workspace if that is asked for."""
+    """Return the measurements of a design, and its workspace if requested."""
     design = request.design
-    figures: Measurements | None = None
+    measurements: Measurements | None = None
     shell: Shell | None = None
     problem: str | None = None
     try:
-        figures = _figures(design)
+        measurements = _measure(design)
         if request.drawn:
             solid = _solid(design, request.rotation, request.tolerance)
             if not solid.is_empty:
                 shell = Shell(NO_COLOUR, solid.vertices, solid.faces)
     except ExplorerError as error:
         problem = str(error)
-    return ComparedDrawing(request, figures, shell, outline_of(design), problem)
+    return ComparedDrawing(request, measurements, shell, outline_of(design), problem)
 
 
 def outline_of(design: Design) -> FloatArray:
@@ -94,7 +92,7 @@ def outline_of(design: Design) -> FloatArray:
     points = snapshot.points
     d1, d3 = float(snapshot.joints[1]), float(snapshot.joints[3])
     first, second = np.array([d1, 0.0, 0.0]), np.array([d3, 0.0, 0.0])
-    # The guide as far as it is used.
+    # The part of the guide between a1 and the carriages.
     low, high = np.array([[min(0.0, d1, d3), 0.0, 0.0], [max(0.0, d1, d3), 0.0, 0.0]])
     base = ((low, high), (points.a1, points.a3), (high, points.a3))
     legs = (
@@ -108,13 +106,13 @@ def outline_of(design: Design) -> FloatArray:
     return np.array([*base, *legs, *platform])
 
 
-@lru_cache(maxsize=KEPT)
-def _figures(design: Design) -> Measurements:
+@lru_cache(maxsize=CACHED)
+def _measure(design: Design) -> Measurements:
     case = Case(design, mesh=_solid(design, None, None))
     return measure_design(case, measures_in("compare"))
 
 
-@lru_cache(maxsize=KEPT)
+@lru_cache(maxsize=CACHED)
 def _solid(design: Design, rotation: Rows | None, tolerance: float | None) -> Solid:
     r = home_pose(design).rotation if rotation is None else np.array(rotation)
     return workspace_solid(design, r, tolerance or MESH_TOLERANCE * design.reach)

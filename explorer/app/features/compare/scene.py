@@ -9,9 +9,12 @@ import viser
 from numpy.typing import NDArray
 
 from explorer.app.features.compare.drawing import ComparedDrawing
-from explorer.app.features.compare.feed import COLUMNS, LIVE, CompareFeed, true_size
-from explorer.app.features.workspace.scene import EMPTY, ArrayPair
+from explorer.app.features.compare.feed import COLUMNS, LIVE, CompareFeed, unit_ratio
+from explorer.app.features.feature import Services
+from explorer.app.features.workspace.scene import ArrayPair
+from explorer.app.scene.part import NO_POINTS, ScenePart, box_corners
 from explorer.app.scene.placing import Placed
+from explorer.app.scene.shapes import NO_MESH, add_translucent
 from explorer.app.state.compared import SLOTS
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.colours import COMPARED
@@ -25,17 +28,24 @@ APART = 3e-4
 NAMES = ("live", *SLOTS)
 
 
-class ComparedScene:
-    """Draws what the feed has of each column."""
+class ComparedScene(ScenePart):
+    """The workspaces and outlines of all columns."""
 
-    def __init__(self, scene: viser.SceneApi, feed: CompareFeed) -> None:
-        self._feed = feed
+    def __init__(self, services: Services) -> None:
+        scene = services.scene
+        self._feed = services.get(CompareFeed)
         self._columns = [_Column(scene, column) for column in range(COLUMNS)]
 
     def updates(self, placed: Placed) -> Iterator[Update]:
-        """Yield what draws the workspaces of this frame."""
+        """Yield the updates that draw the workspaces of this frame."""
         for index, column in enumerate(self._columns):
             yield from column.updates(placed, self._feed.drawing(index))
+
+    def corners(self, placed: Placed) -> FloatArray:
+        """Return the corners of the boxes about the workspaces that are drawn."""
+        extents = self._feed.extents(placed.frame.state)
+        boxes = [box_corners(placed.scale * extent) for extent in extents]
+        return np.concatenate(boxes) if boxes else NO_POINTS
 
 
 class _Column:
@@ -44,16 +54,8 @@ class _Column:
     def __init__(self, scene: viser.SceneApi, column: int) -> None:
         self._column = column
         name, colour = f"/compared/{NAMES[column]}", COMPARED[column]
-        self._mesh = scene.add_mesh_simple(
-            f"{name}/workspace",
-            *EMPTY,
-            color=colour,
-            opacity=OPACITY,
-            side="double",
-            flat_shading=True,
-            cast_shadow=False,
-            receive_shadow=False,
-            visible=False,
+        self._mesh = add_translucent(
+            scene, f"{name}/workspace", NO_MESH, OPACITY, colour=colour, is_flat=True
         )
         self._lines = scene.add_line_segments(
             f"{name}/outline",
@@ -70,13 +72,13 @@ class _Column:
         self._top: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def updates(self, placed: Placed, drawing: ComparedDrawing | None) -> Iterator[Update]:
-        """Yield what draws it in this frame."""
+        """Yield the updates that draw the design in this frame."""
         state = placed.frame.state
         compared, column = state.compared, self._column
         design = state.design if column == LIVE else compared.pinned[column - 1]
         look = compared.look
         if drawing is not None and design is not None:
-            self._place(drawing, placed.scale * true_size(design, state.design))
+            self._scale(drawing, placed.scale * unit_ratio(design, state.design))
         # Nothing is overlaid where there is nothing to compare.
         shown = look.overlay and drawing is not None and self._workspace is not None
         yield self._mesh, "visible", shown
@@ -84,38 +86,42 @@ class _Column:
         if shown and self._workspace is not None:
             yield self._mesh, "vertices", self._workspace[0]
             yield self._mesh, "faces", self._workspace[1]
-            yield self._label, "text", NAMES[column] if column == LIVE else _named(column, design)
+            yield (
+                self._label,
+                "text",
+                NAMES[column] if column == LIVE else _title(column, design),
+            )
             yield self._label, "position", self._top
-        # The live mechanism itself is there.
+        # The live design has no outline, since its mechanism is drawn.
         outlined = look.outlines and column != LIVE and drawing is not None
         yield self._lines, "visible", outlined
         if outlined:
             yield self._lines, "points", self._outline
 
-    def _place(self, drawing: ComparedDrawing, scale: float) -> None:
-        """Bring a new drawing into scene units, once, so that it is compared by identity."""
+    def _scale(self, drawing: ComparedDrawing, scale: float) -> None:
+        """Scale a new drawing to scene units, once, so that updates compare it by identity."""
         if self._drawn is not None and self._drawn[0] is drawing and self._drawn[1] == scale:
             return
         self._drawn = drawing, scale
-        self._outline = _single(drawing.outline, scale)
+        self._outline = _scaled(drawing.outline, scale)
         self._workspace = None
         if drawing.shell is not None:
-            vertices = _single(_grown(drawing.shell.vertices, self._column * APART), scale)
+            vertices = _scaled(_enlarged(drawing.shell.vertices, self._column * APART), scale)
             self._workspace = vertices, np.asarray(drawing.shell.faces, dtype=np.uint32)
             x, y, z = vertices[int(vertices[:, 2].argmax())].tolist()
             self._top = (x, y, z)
 
 
-def _named(column: int, design: Design | None) -> str:
+def _title(column: int, design: Design | None) -> str:
     name = "" if design is None else f" {design.name}"
     return f"{NAMES[column]}{name}"
 
 
-def _grown(points: FloatArray, share: float) -> FloatArray:
-    """Return points (n, 3) that lie further from the middle of their box by a share."""
+def _enlarged(points: FloatArray, share: float) -> FloatArray:
+    """Return points (n, 3) enlarged by a share about the middle of their box."""
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
     return middle + (1.0 + share) * (points - middle)
 
 
-def _single(points: FloatArray, scale: float) -> NDArray[np.float32]:
+def _scaled(points: FloatArray, scale: float) -> NDArray[np.float32]:
     return np.asarray(points * scale, dtype=np.float32)

@@ -2,39 +2,44 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from html import escape
 
 import viser
 
-from explorer.app.browser.viser_gaps import element_id
-from explorer.app.features.designs.shelf import Shelf
-from explorer.app.session.session import Session
+from explorer.app.features.designs.files import DesignFile
+from explorer.app.features.designs.saved_designs import SavedDesigns
+from explorer.app.features.feature import Services
+from explorer.app.session.session import Who
 from explorer.app.state.actions import Open, SetName
 from explorer.app.state.frame import Frame
 from explorer.app.storage.library import Entry
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.controls import Controls
-from explorer.app.widgets.labels import labelled, out_of_sight
-from explorer.app.widgets.markup import BEYOND, DIM, format_number
+from explorer.app.widgets.buttons import Does, press_button
+from explorer.app.widgets.controls import Bound, Controls
+from explorer.app.widgets.markup import format_number
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import LARGEST_FILE, PRESETS
 
-# Rows of a page of the list.
+# Number of rows on a page of the list.
 ROWS = 24
-Who = int | None
+TURNS = {
+    "newer": ("Newer designs", "Show the previous page of the list."),
+    "older": ("Older designs", "Show the next page of the list."),
+}
+"""Ways to turn the pages of the list, with the words and the hint of their buttons."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """A line of the list.
+    """A row of the list.
 
     Attributes:
-        name: Of the design.
-        design: None where the file is of no use.
-        problem: Why it is not.
-        is_preset: Whether it came along, and stays as it is.
+        name: Name of the design.
+        design: The design; None if its file cannot be used.
+        problem: Why the file cannot be used; None if it can.
+        is_preset: Whether the design is a preset, which nobody can change.
     """
 
     name: str
@@ -44,41 +49,32 @@ class Row:
 
 
 class DesignsPanel:
-    """The live design's name, what can be done with it, and the list of all others.
+    """The live design's name, buttons that save it, and the list of all designs."""
 
-    Args:
-        gui: Where it is added.
-        session: Whose design it is.
-        shelf: The saved designs.
-        download: Sends the live design to a browser.
-    """
-
-    def __init__(
-        self, gui: viser.GuiApi, session: Session, shelf: Shelf, download: Callable[[Who], None]
-    ) -> None:
+    def __init__(self, services: Services) -> None:
+        gui, session, buttons = services.gui, services.session, services.buttons
         self._session = session
-        self._shelf = shelf
+        self._saved = saved = services.get(SavedDesigns)
         self._controls = Controls(gui, session)
         self._controls.text(
             "Name",
-            "What the live design is called, and saved as.",
-            lambda frame: frame.state.design.name,
-            lambda _, name: SetName(name),
+            "Name of the live design, under which it is saved.",
+            Bound(lambda frame: frame.state.design.name, lambda _, name: SetName(name)),
             disabled=lambda state: state.optimisation.is_on,
         )
-        does: dict[str, Callable[[Who], None]] = {
-            "Save": lambda who: shelf.save(session.state.design, who),
-            "Save a copy": lambda who: shelf.save_copy(session.state.design, who),
+        actions: dict[str, Callable[[Who], None]] = {
+            "Save": lambda who: saved.save(session.state.design, who),
+            "Save a copy": lambda who: saved.save_copy(session.state.design, who),
             "Rename": self._rename,
-            "Download": download,
+            "Download": services.get(DesignFile).send,
         }
-        self._does = gui.add_button_group(
+        self._buttons = gui.add_button_group(
             "Design",
-            tuple(does),
-            hint="Save under its name, or as a copy; give the saved one the name above; take it "
-            "away as a file. What is replaced goes to the trash.",
+            tuple(actions),
+            hint="Save the design under its name or as a copy, give the saved one the name above, "
+            "or download it as a file. A design that is replaced goes to the trash.",
         )
-        self._does.on_click(lambda event: does[self._does.value](event.client_id))
+        self._buttons.on_click(lambda event: actions[self._buttons.value](event.client_id))
         self.status = gui.add_html("")
         upload = gui.add_upload_button(
             "Open a file …",
@@ -88,113 +84,90 @@ class DesignsPanel:
             hint=f"A design file (JSON) of at most {LARGEST_FILE // 1000} kB from this computer.",
         )
         upload.on_upload(
-            lambda event: shelf.take(upload.value.content, upload.value.name, event.client_id)
+            lambda event: saved.take(upload.value.content, upload.value.name, event.client_id)
         )
         self.list = gui.add_html("")
         self.restore = gui.add_button(
             "Bring back",
             color="gray",
             icon=viser.Icon.ARROW_BACK_UP,
-            hint="Bring back the design that was deleted or replaced last.",
+            hint="Restore the design that was deleted or replaced last.",
             visible=False,
         )
-        self.restore.on_click(lambda event: shelf.restore(event.client_id))
-        # The list is made of labels of these.
-        self.open = self._buttons(gui, "Open design", self._open)
-        self.duplicate = self._buttons(gui, "Duplicate design", self._duplicate)
-        self.delete = self._buttons(gui, "Delete design", self._delete)
-        self.newer = self._turner(gui, "Newer designs", -ROWS, "Turn the list to those before.")
-        self.older = self._turner(gui, "Older designs", ROWS, "Turn the list to those after.")
-        hidden = (*self.open, *self.duplicate, *self.delete, self.newer, self.older)
-        gui.add_html(out_of_sight([element_id(button) for button in hidden]))
-        # Those of the page to which the list is turned, and which of all is the first.
+        self.restore.on_click(lambda event: saved.restore(event.client_id))
+        buttons.on("designs.open", self._for_row(self._open))
+        buttons.on("designs.duplicate", self._for_row(self._duplicate))
+        buttons.on("designs.delete", self._for_row(self._delete))
+        buttons.on("designs.turn", self._turn, values=TURNS)
+        for way, (label, hint) in TURNS.items():
+            buttons.offer(
+                f"Designs › {label}",
+                hint,
+                "designs.turn",
+                way,
+                lambda way=way: self._can_turn(way),
+            )
+        # Rows of the present page, index of its first row, and number of all rows.
         self.rows: tuple[Row, ...] = ()
-        self._first = 0
+        self.first = self._total = 0
 
     def updates(self, frame: Frame) -> Iterator[Update]:
-        """Yield what makes the panel show the frame and the saved designs."""
-        self._shelf.look()
+        """Yield the updates that make the panel show the frame and the saved designs."""
+        self._saved.look()
         yield from self._controls.updates(frame)
         live, base = frame.state.design, frame.state.base
-        saved = {entry.name: entry.design for entry in self._shelf.entries}
+        saved = {entry.name: entry.design for entry in self._saved.entries}
         yield self.status, "content", status(live, saved.get(live.name))
-        rows = rows_of(self._shelf.entries)
-        first = min(self._first, (len(rows) - 1) // ROWS * ROWS)
-        self._first, self.rows = first, rows[first : first + ROWS]
-        ids = [
-            tuple(element_id(buttons[row]) for buttons in (self.open, self.duplicate, self.delete))
-            for row in range(len(self.rows))
-        ]
-        turns = (
-            element_id(self.newer) if first > 0 else None,
-            element_id(self.older) if first + ROWS < len(rows) else None,
-        )
-        foot = _foot(first, len(self.rows), len(rows), turns) if len(rows) > ROWS else ""
-        yield self.list, "content", listed(self.rows, base.name, ids, foot)
-        for button, identity in zip((self.newer, self.older), turns, strict=True):
-            yield button, "visible", identity is not None
-        for index in range(ROWS):
-            row = self.rows[index] if index < len(self.rows) else None
-            yield self.open[index], "visible", row is not None and row.design is not None
-            yield self.duplicate[index], "visible", row is not None and row.design is not None
-            yield self.delete[index], "visible", row is not None and not row.is_preset
-        deleted = self._shelf.deleted
+        rows = rows_of(self._saved.entries)
+        first = min(self.first, (len(rows) - 1) // ROWS * ROWS)
+        self.first, self._total, self.rows = first, len(rows), rows[first : first + ROWS]
+        ways = [way for way in TURNS if self._can_turn(way)]
+        foot = _foot(first, len(self.rows), len(rows), ways) if len(rows) > ROWS else ""
+        yield self.list, "content", list_designs(self.rows, base.name, foot)
+        deleted = self._saved.deleted
         yield self.restore, "visible", bool(deleted)
         if deleted:
             yield self.restore, "label", f"Bring back {deleted[0].name}"
 
     def _rename(self, who: Who) -> None:
         state = self._session.state
-        self._shelf.rename(state.base.name, state.design.name, who)
+        self._saved.rename(state.base.name, state.design.name, who)
 
     def _open(self, row: Row, who: Who) -> None:
         if row.is_preset and row.design is not None:
             self._session.do(Open(row.design), who=who)
         else:
-            self._shelf.open(row.name, who)
+            self._saved.open(row.name, who)
 
     def _duplicate(self, row: Row, who: Who) -> None:
         if row.is_preset and row.design is not None:
-            self._shelf.copy(row.design, who)
+            self._saved.copy(row.design, who)
         else:
-            self._shelf.duplicate(row.name, who)
+            self._saved.duplicate(row.name, who)
 
     def _delete(self, row: Row, who: Who) -> None:
         if not row.is_preset:
-            self._shelf.delete(row.name, who)
+            self._saved.delete(row.name, who)
 
-    def _turner(self, gui: viser.GuiApi, label: str, by: int, hint: str) -> viser.GuiButtonHandle:
-        button = gui.add_button(label, visible=False, hint=hint)
+    def _can_turn(self, way: str) -> bool:
+        return self.first > 0 if way == "newer" else self.first + ROWS < self._total
 
-        @button.on_click
-        def _(_: object) -> None:
-            self._first = max(0, self._first + by)
+    def _turn(self, way: str, _: viser.ClientHandle) -> None:
+        if self._can_turn(way):
+            self.first += -ROWS if way == "newer" else ROWS
             self._session.redraw()
 
-        return button
+    def _for_row(self, action: Callable[[Row, Who], None]) -> Does:
+        def press(name: str, client: viser.ClientHandle) -> None:
+            row = next((row for row in self.rows if row.name == name), None)
+            if row is not None:
+                action(row, client.client_id)
 
-    def _buttons(
-        self, gui: viser.GuiApi, label: str, does: Callable[[Row, Who], None]
-    ) -> list[viser.GuiButtonHandle]:
-        def pushed(row: int, who: Who) -> None:
-            if row < len(self.rows):
-                does(self.rows[row], who)
-
-        buttons = [
-            gui.add_button(
-                f"{label} {row + 1}",
-                visible=False,
-                hint=f"{label.split(maxsplit=1)[0]} the design in row {row + 1} of the list.",
-            )
-            for row in range(ROWS)
-        ]
-        for row, button in enumerate(buttons):
-            button.on_click(lambda event, row=row: pushed(row, event.client_id))
-        return buttons
+        return press
 
 
 def rows_of(entries: Sequence[Entry]) -> tuple[Row, ...]:
-    """Return the lines of the list: the designs of the user, then those that came along."""
+    """Return the rows of the list: the designs of the user, then the presets."""
     presets = [Row(design.name, design, is_preset=True) for design in PRESETS.values()]
     own = [Row(entry.name, entry.design, entry.problem) for entry in entries]
     return (*own, *presets)
@@ -205,80 +178,68 @@ def status(live: Design, saved: Design | None) -> str:
     if saved == live:
         words = "Saved."
     elif live.name in PRESETS and live == PRESETS[live.name]:
-        words = "A preset, as it came."
+        words = "An unchanged preset."
     elif saved is None:
         words = "Not saved under a name yet; it comes back with the session."
     else:
         words = "Changed since it was saved."
-    return f'<div style="padding:0 12px 2px;font-size:12px;{DIM}">{escape(words)}</div>'
+    return f'<div class="ex-note ex-dim">{escape(words)}</div>'
 
 
-def listed(
-    rows: Sequence[Row], current: str, ids: Sequence[tuple[str, ...]], foot: str = ""
-) -> str:
-    """Return the list in HTML, each row made of labels of its three buttons."""
+def list_designs(rows: Sequence[Row], current: str, foot: str = "") -> str:
+    """Return the list in HTML, with the buttons of each row."""
     head = (
-        f'<div style="display:flex;gap:8px;padding:2px 8px;{DIM};font-size:11.5px">'
-        '<span style="flex:1">Designs, the last saved on top</span>'
-        '<span style="width:170px;text-align:right">reach |a3|</span>'
-        '<span style="width:132px"></span></div>'
+        '<div class="ex-row ex-dim ex-small"><span class="ex-fill">Designs, the last saved on top'
+        '</span><span class="ex-reach">reach |a3|</span><span class="ex-acts"></span></div>'
     )
-    lines = "".join(
-        _line(row, each, row.name == current) for row, each in zip(rows, ids, strict=True)
+    lines = "".join(_line(row, row.name == current) for row in rows)
+    return f'<div class="ex-box">{head}{lines}{foot}</div>'
+
+
+def _foot(first: int, count: int, total: int, ways: Iterable[str]) -> str:
+    """Return the line below the list: the rows that are shown, and links to other pages."""
+    turns = "".join(
+        press_button("designs.turn", way, TURNS[way][0], hint=TURNS[way][1], class_name="ex-link")
+        for way in ways
     )
     return (
-        '<div style="padding:2px 6px 8px;font-size:12.5px;line-height:1.3;'
-        f'font-variant-numeric:tabular-nums">{head}{lines}{foot}</div>'
+        f'<div class="ex-row"><span class="ex-fill ex-dim">{first + 1} to {first + count} '
+        f"of {total}</span>{turns}</div>"
     )
 
 
-def _foot(first: int, count: int, total: int, turns: tuple[str | None, str | None]) -> str:
-    """Return the line that tells which part of the list is shown, and turns to the others."""
-    newer, older = (
-        "" if identity is None else _deed(identity, name, name)
-        for identity, name in zip(turns, ("Newer designs", "Older designs"), strict=True)
-    )
-    return (
-        '<div style="display:flex;gap:12px;padding:6px 8px 0">'
-        f'<span style="flex:1;{DIM}">{first + 1} to {first + count} of {total}</span>'
-        f"{newer}{older}</div>"
-    )
-
-
-def _line(row: Row, ids: tuple[str, ...], is_current: bool) -> str:
-    look = "display:flex;gap:8px;align-items:center;padding:3px 8px;border-radius:4px;"
-    if is_current:
-        look += "background:rgba(34,104,212,0.14);"
+def _line(row: Row, is_current: bool) -> str:
     if row.design is None:
+        problem = escape(row.problem or "")
         name = (
-            f'<span style="flex:1;color:{BEYOND}" title="{escape(row.problem or "", quote=True)}">'
+            f'<span class="ex-fill ex-beyond" title="{problem}">'
             f"{escape(row.name)}: cannot be used</span>"
         )
-        reach = doubled = ""
+        reach = copy = ""
     else:
-        tag = f' <span style="{DIM}">preset</span>' if row.is_preset else ""
-        name = labelled(
-            ids[0],
-            f"Open {row.name}",
+        tag = ' <span class="ex-dim">preset</span>' if row.is_preset else ""
+        name = press_button(
+            "designs.open",
+            row.name,
             f"{escape(row.name)}{tag}",
-            style="flex:1;cursor:pointer;overflow:hidden;text-overflow:ellipsis;white-space:nowrap;"
-            + ("font-weight:600;" if is_current else ""),
+            hint=f"Open {row.name}",
+            class_name="ex-fill ex-cut",
         )
         length = row.design.reach
         reach = (
-            f'{format_number(length)} units <span style="{DIM}">= '
+            f'{format_number(length)} units <span class="ex-dim">= '
             f"{format_number(length * row.design.unit_mm)} mm</span>"
         )
-        doubled = _deed(ids[1], f"Duplicate {row.name}", "Duplicate")
-    gone = "" if row.is_preset else _deed(ids[2], f"Delete {row.name}", "Delete")
+        copy = _link("duplicate", row.name)
+    delete = "" if row.is_preset else _link("delete", row.name)
+    here = " is-here" if is_current else ""
     return (
-        f'<div style="{look}">{name}'
-        f'<span style="width:170px;text-align:right">{reach}</span>'
-        f'<span style="width:132px;display:flex;gap:12px;justify-content:flex-end">'
-        f"{doubled}{gone}</span></div>"
+        f'<div class="ex-row{here}">{name}<span class="ex-reach">{reach}</span>'
+        f'<span class="ex-acts">{copy}{delete}</span></div>'
     )
 
 
-def _deed(identity: str, name: str, content: str) -> str:
-    style = "cursor:pointer;color:var(--mantine-primary-color-filled)"
-    return labelled(identity, name, content, style=style)
+def _link(act: str, name: str) -> str:
+    words = act.capitalize()
+    hint = f"{words} {name}"
+    return press_button(f"designs.{act}", name, words, hint=hint, label=hint, class_name="ex-link")

@@ -1,1 +1,1 @@
-"""The tour and the list of keys."""
+"""The toolbar, the list of keys, the manual and the tour."""

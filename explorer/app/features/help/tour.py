@@ -1,4 +1,4 @@
-"""The tour of first-time users: five steps, each done by the user or shown, or passed over."""
+"""The tour for first-time users: five steps, each done by the user, shown or skipped."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 
 from explorer.app.features.optimise.actions import StartRun
 from explorer.app.state.action import Action
-from explorer.app.state.actions import GoHome, SetPosition, SetVariable, SetView
+from explorer.app.state.actions import GoHome, Set, SetPosition, SetVariable
 from explorer.app.state.frame import Frame
 
-# What the tour does by itself: how far it moves the platform, in reaches, how near a
-# singularity it goes, in warning lengths, and how much larger it makes a variable.
+# What "Show me" does: the stride of the platform in reaches, the height over the base plane in
+# warning lengths, and the factor on a variable.
 STRIDE, NEAR, GROWTH = 0.1, 0.5, 1.1
 
 
@@ -20,12 +20,12 @@ class Step:
     """A step of the tour.
 
     Attributes:
-        title: What to do.
-        text: How, and what to look at; plain text.
-        tab: To turn to.
-        is_done: Whether it was done, from the frame in which it began and the present one.
-        show: What does it for the user.
-        after: What is done when the user goes on.
+        title: Task of the user.
+        text: Instructions, and what to look at; plain text.
+        tab: Tab of the controls.
+        is_done: Whether the user did it, from the frame in which it began and the present one.
+        show: Action that does it for the user.
+        after: Action when the user goes on; None for none.
     """
 
     title: str
@@ -66,9 +66,8 @@ def _is_solid(_: Frame, now: Frame) -> bool:
     return now.state.view.workspace.solid
 
 
-def _show_solid(frame: Frame) -> Action:
-    view = frame.state.view
-    return SetView(replace(view, workspace=replace(view.workspace, solid=True)))
+def _show_solid(_: Frame) -> Action:
+    return Set("view.workspace.solid", True, "Solid")
 
 
 def _is_optimised(before: Frame, now: Frame) -> bool:
@@ -120,12 +119,12 @@ STEPS = (
 
 @dataclass(frozen=True)
 class Tour:
-    """How far the tour of one user has got.
+    """The progress of one user's tour.
 
     Attributes:
-        at: The index of the step.
-        began: The frame in which it began.
-        is_done: Whether the user has done what it asks for.
+        at: Index of the step.
+        began: Frame in which the step began.
+        is_done: Whether the user has done the step.
     """
 
     at: int
@@ -134,7 +133,7 @@ class Tour:
 
     @property
     def step(self) -> Step:
-        """The step at hand."""
+        """The present step."""
         return STEPS[self.at]
 
     @property
@@ -142,18 +141,18 @@ class Tour:
         """Whether no step follows."""
         return self.at == len(STEPS) - 1
 
-    def seen(self, frame: Frame) -> Tour:
-        """Return the tour after a frame: the step may be done by it."""
+    def after_frame(self, frame: Frame) -> Tour:
+        """Return the tour after a frame, in which the step may be done."""
         if self.is_done or not self.step.is_done(self.began, frame):
             return self
         return replace(self, is_done=True)
 
-    def moved(self, steps: int, frame: Frame) -> Tour:
-        """Return the tour so many steps on, at the first or the last at most."""
+    def step_by(self, steps: int, frame: Frame) -> Tour:
+        """Return the tour some steps on or back, within its first and last."""
         at = min(max(self.at + steps, 0), len(STEPS) - 1)
         return Tour(at, frame)
 
 
-def begun(frame: Frame) -> Tour:
+def start_tour(frame: Frame) -> Tour:
     """Return the tour at its first step."""
     return Tour(0, frame)

@@ -1,4 +1,4 @@
-"""The card of the tour: over the scene of one browser, and nobody else's."""
+"""The card of the tour, over the scene of one browser."""
 
 from __future__ import annotations
 
@@ -8,15 +8,14 @@ from html import escape
 
 import viser
 
-from explorer.app.browser.viser_gaps import element_id
-from explorer.app.features.help.tour import STEPS, Tour, begun
-from explorer.app.session.session import Session
+from explorer.app.features.feature import Runner, Services
+from explorer.app.features.help.tour import STEPS, Tour, start_tour
 from explorer.app.state.frame import Frame
-from explorer.app.widgets.labels import labelled, out_of_sight
-from explorer.app.widgets.markup import DIM, WITHIN
+from explorer.app.widgets.buttons import press_button
 
-# In pixels, from the upper left corner of the scene.
+# Place from the upper left corner of the scene, and width, in pixels.
 PLACE, WIDTH = (14, 14), 330
+PRESS = "tour"
 BUTTONS = {
     "Skip": "End the tour; the command Tour begins it again.",
     "Back": "Go back to the step before.",
@@ -25,49 +24,52 @@ BUTTONS = {
 }
 
 
-class TourGuide:
-    """Leads users through the tour, each in a browser of their own.
+class TourGuide(Runner):
+    """Leads users through the tour, each in a browser of their own."""
 
-    Args:
-        session: In which they do what the steps ask for.
-        ended: Called when a user has come to the end, or skipped the rest.
-    """
-
-    def __init__(self, session: Session, ended: Callable[[], None]) -> None:
-        self._session = session
-        self._ended = ended
+    def __init__(self, services: Services) -> None:
+        self._session = services.session
+        self._services = services
+        preferences = services.preferences
+        self._is_seen = preferences is None or preferences.chosen.tour_seen
         self._lock = threading.RLock()
         self._cards: dict[int, _Card] = {}
+        services.buttons.on(PRESS, self._press, values=BUTTONS)
+        services.server.on_client_connect(self._connected)
+        services.server.on_client_disconnect(self._disconnected)
 
     def begin(self, client: viser.ClientHandle) -> None:
-        """Begin the tour, from its first step if it is on already."""
+        """Begin the tour, or begin it again."""
         with self._lock:
             self.end(client)
-            self._cards[client.client_id] = _Card(client, begun(self._frame()), self._press)
+            self._cards[client.client_id] = _Card(client, start_tour(self._frame()))
 
     def end(self, client: viser.ClientHandle) -> None:
-        """Put a browser's card away."""
+        """Close a browser's card."""
         with self._lock:
             card = self._cards.pop(client.client_id, None)
         if card is not None:
             card.remove()
 
-    def disconnected(self, client: viser.ClientHandle) -> None:
-        """Forget a browser."""
-        with self._lock:
-            self._cards.pop(client.client_id, None)
-
     def follow(self, frame: Frame) -> None:
-        """See whether users have done what their step asks for."""
+        """Mark the steps that a frame shows as done."""
         with self._lock:
             cards = tuple(self._cards.values())
         for card in cards:
-            card.change(lambda tour: tour.seen(frame))
+            card.change(lambda tour: tour.after_frame(frame))
+
+    def _connected(self, client: viser.ClientHandle) -> None:
+        if not self._is_seen:
+            self.begin(client)
+
+    def _disconnected(self, client: viser.ClientHandle) -> None:
+        with self._lock:
+            self._cards.pop(client.client_id, None)
 
     def _frame(self) -> Frame:
         return Frame(self._session.state)
 
-    def _press(self, client: viser.ClientHandle, name: str) -> None:
+    def _press(self, name: str, client: viser.ClientHandle) -> None:
         card = self._cards.get(client.client_id)
         if card is None:
             return
@@ -77,25 +79,21 @@ class TourGuide:
             self._session.post(object(), lambda s: change(Frame(s)), who=client.client_id)
         elif name == "Skip" or (name == "Next" and tour.is_last):
             self.end(client)
-            self._ended()
+            self._is_seen = True
+            self._services.remember(None, tour_seen=True)
         else:
             if name == "Next" and tour.step.after is not None:
                 self._session.do(tour.step.after, who=client.client_id)
             frame = self._frame()
-            card.change(lambda tour: tour.moved(1 if name == "Next" else -1, frame))
+            card.change(lambda tour: tour.step_by(1 if name == "Next" else -1, frame))
 
 
 class _Card:
     """The card of one browser."""
 
-    def __init__(
-        self,
-        client: viser.ClientHandle,
-        tour: Tour,
-        press: Callable[[viser.ClientHandle, str], None],
-    ) -> None:
+    def __init__(self, client: viser.ClientHandle, tour: Tour) -> None:
         self.tour = tour
-        # Hands, frames and other browsers' hands come on threads of their own.
+        # Presses, frames and other browsers' presses come on threads of their own.
         self._lock = threading.Lock()
         self._is_removed = False
         gui = client.gui
@@ -103,70 +101,52 @@ class _Card:
         self._panel.float(x=PLACE[0], y=PLACE[1], width=WIDTH)
         with self._panel.add_tab("Tour"):
             self._html = gui.add_html("")
-            self._buttons = {name: gui.add_button(name, hint=BUTTONS[name]) for name in BUTTONS}
-            ids = {name: element_id(button) for name, button in self._buttons.items()}
-            gui.add_html(out_of_sight(tuple(ids.values())))
-        self._ids = ids
-        for name, button in self._buttons.items():
-            button.on_click(lambda _, name=name: press(client, name))
         self._show()
 
-    def change(self, moved: Callable[[Tour], Tour]) -> None:
-        """Go where the tour is moved to, and show it; nothing once the card is gone."""
+    def change(self, advance: Callable[[Tour], Tour]) -> None:
+        """Change the tour and show it, unless the card is closed."""
         with self._lock:
-            tour = moved(self.tour)
+            tour = advance(self.tour)
             if tour != self.tour and not self._is_removed:
                 self.tour = tour
                 self._show()
 
     def remove(self) -> None:
-        """Take the card away."""
+        """Close the card."""
         with self._lock:
             self._is_removed = True
             self._panel.remove()
 
     def _show(self) -> None:
-        self._html.content = card_words(self.tour, self._ids)
+        self._html.content = card_words(self.tour)
 
 
-def card_words(tour: Tour, ids: dict[str, str]) -> str:
-    """Return the card as HTML.
-
-    Args:
-        tour: How far it has got.
-        ids: Of the buttons, by their names.
-    """
+def card_words(tour: Tour) -> str:
+    """Return the card as HTML: the progress of the tour, its step, and the buttons."""
     step = tour.step
     dots = "".join(
-        '<span style="display:inline-block;width:7px;height:7px;border-radius:4px;'
-        f'margin-right:5px;background:currentColor;opacity:{1 if i <= tour.at else 0.25}"></span>'
+        f'<span class="ex-dot{"" if i <= tour.at else " is-ahead"}"></span>'
         for i in range(len(STEPS))
     )
-    done = f'<span style="color:{WITHIN};font-weight:600">Done</span>' if tour.is_done else ""
-    first = "" if tour.at == 0 else _button(ids["Back"], "Back")
-    show = "" if tour.is_done else _button(ids["Show me"], "Show me")
-    last = _button(ids["Next"], "Finish" if tour.is_last else "Next", is_main=True)
+    done = '<span class="ex-within ex-strong">Done</span>' if tour.is_done else ""
+    first = "" if tour.at == 0 else _button("Back")
+    show = "" if tour.is_done else _button("Show me")
+    last = _button("Next", "Finish" if tour.is_last else "Next", look="is-main")
     return (
-        '<div style="padding:6px 14px 12px;font-size:13px;line-height:1.5">'
-        f'<div style="display:flex;justify-content:space-between;{DIM};font-size:12px">'
+        '<div class="ex-card"><div class="ex-line ex-dim">'
         f"<span>{dots}</span><span>step {tour.at + 1} of {len(STEPS)}</span></div>"
-        f'<div style="font-size:15px;font-weight:600;margin:6px 0 2px">{escape(step.title)}</div>'
-        f"<div>{escape(step.text)}</div>"
-        f'<div style="{DIM};margin-top:4px">Tab {escape(step.tab)}, on the right. {done}</div>'
-        '<div style="display:flex;gap:6px;justify-content:flex-end;margin-top:10px">'
-        f"{_button(ids['Skip'], 'Skip the tour', is_quiet=True)}{first}{show}{last}</div></div>"
+        f"<h4>{escape(step.title)}</h4><div>{escape(step.text)}</div>"
+        f'<div class="ex-dim">Tab {escape(step.tab)}, on the right. {done}</div>'
+        f'<div class="ex-ends">{_button("Skip", "Skip the tour", look="is-quiet")}'
+        f"{first}{show}{last}</div></div>"
     )
 
 
-def _button(identity: str, words: str, *, is_main: bool = False, is_quiet: bool = False) -> str:
-    if is_main:
-        look = (
-            "background:var(--mantine-primary-color-filled);"
-            "color:var(--mantine-primary-color-contrast);"
-        )
-    elif is_quiet:
-        look = f"{DIM};margin-right:auto;padding-left:0;"
-    else:
-        look = "border:1px solid color-mix(in srgb,currentColor 35%,transparent);"
-    style = f"cursor:pointer;padding:3px 10px;border-radius:4px;white-space:nowrap;{look}"
-    return labelled(identity, words, escape(words), style=style)
+def _button(name: str, words: str | None = None, *, look: str = "") -> str:
+    return press_button(
+        PRESS,
+        name,
+        escape(words or name),
+        hint=BUTTONS[name],
+        class_name=f"ex-button {look}".rstrip(),
+    )

@@ -1,14 +1,15 @@
-"""How close the legs come: the closest pair, and the legs as thick as they are."""
+"""The closest pair of legs, and the legs as capsules of their radii."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
 import numpy as np
-import viser
 
+from explorer.app.features.feature import Services
+from explorer.app.scene.part import ScenePart
 from explorer.app.scene.placing import Placed
-from explorer.app.scene.shapes import Balls, Rods
+from explorer.app.scene.shapes import Balls, Rods, add_lines
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.colours import OUTLINE, TUBE
 from explorer.legs.clearance import PAIRS, leg_axes
@@ -17,30 +18,24 @@ from explorer.numerics.number_text import format_number
 CAPSULE_OPACITY = 0.22
 
 
-class ClearanceScene:
-    """The line between the closest two axes, and capsules of the radii of the legs."""
+class ClearanceScene(ScenePart):
+    """The shortest line between the axes of the closest legs, and a capsule for each leg."""
 
-    def __init__(self, scene: viser.SceneApi) -> None:
-        self._line = scene.add_line_segments(
-            "/clearance/line",
-            np.zeros((1, 2, 3)),
-            OUTLINE,
-            thickness=4.0,
-            thickness_units="screen",
-            visible=False,
-        )
+    def __init__(self, services: Services) -> None:
+        scene = services.scene
+        self._line = add_lines(scene, "/clearance/line", 1, OUTLINE, 4.0)
         self._label = scene.add_label("/clearance/label", "0", visible=False)
         self._rods = Rods(scene, "/clearance/rods", [TUBE] * 4, opacity=CAPSULE_OPACITY)
         self._ends = Balls(scene, "/clearance/ends", [TUBE] * 8, opacity=CAPSULE_OPACITY)
 
     def updates(self, placed: Placed) -> Iterator[Update]:
-        """Yield what draws the clearance of this frame."""
+        """Yield the updates that draw the closest pair and the capsules of this frame."""
         state, snapshot = placed.frame.state, placed.frame.snapshot
         radii = placed.scale * np.array(state.design.limits.leg_radii)
-        thick = state.view.legs and not state.view.twin and bool(radii.any())
+        has_radii = state.view.legs and not state.view.twin and bool(radii.any())
         for part in (self._rods, self._ends):
-            yield from part.shown(thick)
-        if thick:
+            yield from part.show(has_radii)
+        if has_radii:
             axes = placed.scale * leg_axes(
                 state.design, np.array(state.pose.position), snapshot.rotation
             )
@@ -50,11 +45,11 @@ class ClearanceScene:
         yield self._line, "visible", shown
         yield self._label, "visible", shown
         if shown:
-            found = snapshot.clearances
-            pair = int(found.closest)
-            ends = placed.scale * found.points[pair]
+            clearances = snapshot.clearances
+            pair = int(clearances.closest)
+            ends = placed.scale * clearances.points[pair]
             first, second = PAIRS[pair]
             yield self._line, "points", ends[None].astype(np.float32)
             yield self._label, "position", tuple(ends.mean(axis=0).tolist())
-            clearance = format_number(float(found.clearance[pair]), 3)
+            clearance = format_number(float(clearances.clearance[pair]), 3)
             yield self._label, "text", f"legs {first}–{second}: {clearance}"

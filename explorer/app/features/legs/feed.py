@@ -1,13 +1,11 @@
-"""Keeps the radius curve in step with the state."""
+"""The radius curve, requested from the worker while it is shown."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
+from explorer.app.features.feature import Services
 from explorer.app.features.legs.tasks import RadiusDrawing, RadiusRequest, draw_radius_curve
 from explorer.app.features.workspace.feed import workspace_rows, workspace_start
 from explorer.app.session.feed import Feed
-from explorer.app.session.jobs import Worker
 from explorer.app.state.frame import Frame
 from explorer.workspace.accessible.radii import with_radius
 
@@ -15,11 +13,17 @@ from explorer.workspace.accessible.radii import with_radius
 class RadiusFeed(Feed[RadiusRequest, RadiusDrawing]):
     """Drawings of the reachable volume against the radius of the legs."""
 
-    def __init__(self, worker: Worker, redraw: Callable[[], None]) -> None:
-        super().__init__(worker, draw_radius_curve, _radius_curve, redraw, has_stages=True)
+    def __init__(self, services: Services) -> None:
+        super().__init__(
+            services.worker,
+            draw_radius_curve,
+            _request_for,
+            services.session.redraw,
+            has_stages=True,
+        )
 
 
-def _radius_curve(frame: Frame) -> RadiusRequest | None:
+def _request_for(frame: Frame) -> RadiusRequest | None:
     if not frame.state.view.radius_curve:
         return None
     thin = with_radius(frame.state.design, 0.0)

@@ -1,82 +1,72 @@
-"""How close the legs come to each other: in the pose, in the last move, and as they grow."""
+"""The clearances of the legs in the pose and in the last move, and the effect of their radii."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import replace
 
-import viser
-
+from explorer.app.features.feature import Services
 from explorer.app.features.legs.feed import RadiusFeed
 from explorer.app.features.legs.radius_plot import RadiusPlot
-from explorer.app.session.session import Session
-from explorer.app.state.actions import SetView
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.controls import Controls
-from explorer.app.widgets.markup import BEYOND, DIM, WITHIN, format_number
+from explorer.app.widgets.markup import box, caption, dim, format_number, row, status, table
 from explorer.legs.clearance import PAIRS
-
-BOX = (
-    '<div style="padding:4px 12px 8px;font-size:12.5px;line-height:1.45;'
-    'font-variant-numeric:tabular-nums">'
-)
-TABLE = '<table style="width:100%;border-collapse:collapse">'
-RIGHT = '<td style="text-align:right">'
 
 
 class LegsPanel:
-    """The table of clearances, and on request that of the last move and the radius curve."""
+    """The table of clearances, that of the last move, and the radius curve."""
 
-    def __init__(self, gui: viser.GuiApi, session: Session) -> None:
+    def __init__(self, services: Services) -> None:
+        gui, self._feed = services.gui, services.get(RadiusFeed)
         self._pose = gui.add_html("")
-        self._controls = Controls(gui, session)
+        self._controls = Controls(gui, services.session)
         with gui.add_folder("Last move"):
             self._controls.checkbox(
                 "Swept tetrahedra",
-                "Draw what the legs swept from where the last move began, and compare the "
-                "paper's test for interference with the exact one.",
-                lambda frame: frame.state.view.swept,
-                lambda state, on: SetView(replace(state.view, swept=on)),
+                "Draw the tetrahedra that the legs swept in the last move, and compare the paper's "
+                "test for interference with the exact one.",
+                "view.swept",
             )
             self._move = gui.add_html("", visible=False)
-        with gui.add_folder("Thicker legs"):
+        with gui.add_folder("Leg radius"):
             self._controls.checkbox(
                 "Volume against radius",
-                "Draw how much of the workspace can be reached if all four legs have one "
-                "radius; the orientation and the start are those of the tab Workspace.",
-                lambda frame: frame.state.view.radius_curve,
-                lambda state, on: SetView(replace(state.view, radius_curve=on)),
+                "Draw the reachable volume over one radius of all four legs, for the orientation "
+                "and the start of the tab Workspace.",
+                "view.radius_curve",
             )
             self._plot = RadiusPlot(gui)
 
-    def updates(self, frame: Frame, feed: RadiusFeed) -> Iterator[Update]:
-        """Yield what makes the panel show the frame."""
+    def updates(self, frame: Frame) -> Iterator[Update]:
+        """Yield the updates that make the panel show the frame."""
         yield self._pose, "content", clearance_table(frame)
         yield from self._controls.updates(frame)
         yield self._move, "visible", frame.state.view.swept
         if frame.state.view.swept:
             yield self._move, "content", move_table(frame)
-        yield from self._plot.updates(frame, feed)
+        yield from self._plot.updates(frame, self._feed)
 
 
 def clearance_table(frame: Frame) -> str:
     """Return the clearances of the six pairs as HTML."""
-    found = frame.snapshot.clearances
-    clearances = found.clearance.tolist()
-    collides = min(clearances) < 0.0
-    word, colour = ("Legs collide", BEYOND) if collides else ("Legs are clear", WITHIN)
-    unit = frame.state.design.unit_mm
-    closest = int(found.closest)
-    rows = "".join(
-        _row(index, clearance, unit, closest == index) for index, clearance in enumerate(clearances)
+    clearances = frame.snapshot.clearances
+    collides = bool(clearances.clearance.min() < 0.0)
+    unit_mm = frame.state.design.unit_mm
+    rows = (
+        _row(
+            index,
+            clearance,
+            *_lengths(clearance, unit_mm),
+            is_closest=index == int(clearances.closest),
+        )
+        for index, clearance in enumerate(clearances.clearance.tolist())
     )
-    return (
-        f"{BOX}{_status(word, colour)}"
-        f'<div style="{DIM};margin-bottom:4px">Clearance: distance of the axes less the radii</div>'
-        f'{TABLE}<tr style="{DIM}"><td>legs</td>{RIGHT}units</td>{RIGHT}mm</td></tr>'
-        f"{rows}</table></div>"
+    return box(
+        status("Legs collide", "beyond") if collides else status("Legs are clear", "within"),
+        caption("Clearance: distance of the axes less the radii"),
+        table(rows, ("legs", "units", "mm")),
     )
 
 
@@ -84,72 +74,40 @@ def move_table(frame: Frame) -> str:
     """Return the last move by both tests, the paper's and the exact one, as HTML."""
     move = frame.last_move
     if move is None:
-        return (
-            f'{BOX}<div style="{DIM}">Nothing is swept. Move the platform: a whole drag, up to '
-            "its first pause, is one move.</div></div>"
-        )
-    clearances = move.clearance.tolist()
+        return box(dim("No move yet. Move the platform: a drag without a pause is one move."))
     if move.is_clear:
-        exact, colour = "Clear all the way", WITHIN
+        result = status("Clear all the way", "within")
     else:
-        word = "collide" if min(clearances) < 0.0 else "touch"
-        exact, colour = f"Legs {word} on the way", BEYOND
-    rows = "".join(
-        _move_row(
-            PAIRS[index],
-            clearance,
-            float(move.share[index]),
-            overlaps=bool(move.overlaps[index]),
-            is_closest=move.closest == index,
-        )
-        for index, clearance in enumerate(clearances)
-    )
-    overlapping = [
-        f"{i} – {j}" for (i, j), is_so in zip(PAIRS, move.overlaps, strict=True) if is_so
-    ]
-    paper = f"overlap of {', '.join(overlapping)}" if overlapping else "no overlap"
-    return (
-        f"{BOX}{_status(exact, colour)}"
-        f'<div style="margin-bottom:4px">By the paper\'s test, in one step: {paper}</div>'
-        f'<div style="{DIM};margin-bottom:4px">Least clearance on the straight way, and how far '
-        "along it</div>"
-        f'{TABLE}<tr style="{DIM}"><td>legs</td><td>swept</td>{RIGHT}units</td>{RIGHT}at</td></tr>'
-        f"{rows}</table></div>"
+        verb = "collide" if move.clearance.min() < 0.0 else "touch"
+        result = status(f"Legs {verb} on the way", "beyond")
+    pairs = ", ".join(_name(index) for index, overlaps in enumerate(move.overlaps) if overlaps)
+    paper = f"overlap of {pairs}" if pairs else "no overlap"
+    rows: list[str] = []
+    for index, clearance in enumerate(move.clearance.tolist()):
+        cells = ("", "joined", "")
+        if not math.isinf(clearance):
+            swept = '<span class="ex-beyond">overlap</span>' if move.overlaps[index] else "free"
+            cells = swept, format_number(clearance), f"{100.0 * float(move.share[index]):.0f} %"
+        rows.append(_row(index, clearance, *cells, is_closest=move.closest == index))
+    return box(
+        result,
+        f"<div>Paper's one-step test: {paper}</div>",
+        caption("Minimum clearance on the straight path, and where on the path"),
+        table(rows, ("legs", "swept", "units", "at")),
     )
 
 
-def _status(word: str, colour: str) -> str:
-    return (
-        f'<div style="font-size:15px;font-weight:600;color:{colour};margin-bottom:6px">{word}</div>'
-    )
-
-
-def _row(index: int, clearance: float, unit_mm: float, is_closest: bool) -> str:
+def _name(index: int) -> str:
     first, second = PAIRS[index]
-    if math.isinf(clearance):
-        units, millimetres = "joined", ""
-    else:
-        units, millimetres = format_number(clearance), format_number(clearance * unit_mm)
-    weight = "font-weight:600;" if is_closest else ""
-    colour = f"color:{BEYOND};" if clearance < 0.0 else ""
-    return (
-        f'<tr style="{weight}{colour}"><td style="padding:1px 0">{first} – {second}</td>'
-        f"{RIGHT}{units}</td>{RIGHT}{millimetres}</td></tr>"
-    )
+    return f"{first} – {second}"
 
 
-def _move_row(
-    legs: tuple[int, int], clearance: float, share: float, *, overlaps: bool, is_closest: bool
-) -> str:
-    first, second = legs
+def _lengths(clearance: float, unit_mm: float) -> tuple[str, str]:
     if math.isinf(clearance):
-        swept, least, at = "", "joined", ""
-    else:
-        swept = f'<span style="color:{BEYOND}">overlap</span>' if overlaps else "free"
-        least, at = format_number(clearance), f"{100.0 * share:.0f} %"
-    weight = "font-weight:600;" if is_closest else ""
-    colour = f"color:{BEYOND};" if clearance < 0.0 else ""
-    return (
-        f'<tr style="{weight}{colour}"><td style="padding:1px 0">{first} – {second}</td>'
-        f"<td>{swept}</td>{RIGHT}{least}</td>{RIGHT}{at}</td></tr>"
-    )
+        return "joined", ""
+    return format_number(clearance), format_number(clearance * unit_mm)
+
+
+def _row(index: int, clearance: float, *cells: str, is_closest: bool) -> str:
+    look = "ex-beyond " * (clearance < 0.0) + "ex-strong" * is_closest
+    return row(_name(index), *cells, look=look.strip())

@@ -13,35 +13,40 @@ from viser import uplot
 from explorer.app.features.legs.feed import RadiusFeed
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.charts import BLUE, ORANGE, TEAL, VIOLET, axis
-from explorer.app.widgets.colours import Rgb, css
-from explorer.app.widgets.markup import DIM, alert, format_number
+from explorer.app.widgets.charts import (
+    BLANK,
+    BLUE,
+    ORANGE,
+    TEAL,
+    VIOLET,
+    add_chart,
+    axis,
+    dots,
+    line,
+)
+from explorer.app.widgets.colours import Rgb
+from explorer.app.widgets.markup import alert, box, dim, format_number, row, swatch, table
 from explorer.app.widgets.under_way import UnderWay, problem, progress
 from explorer.legs.clearance import PAIRS
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import FloatArray
 from explorer.workspace.accessible.radii import RadiusCurve
 
-# Of the volume without radii: what is left of it is told too.
+# Share of the volume without radii; the largest radius that keeps it is marked.
 SHARE = 0.99
-# How far the chart goes beyond the radius at which nothing is left, or beyond the present one.
+# End of the chart, as a multiple of the last radius of the curve and of the largest marked one.
 BEYOND_LAST, BEYOND_PRESENT = 1.15, 1.05
 HEIGHT = 190
-BLANK = np.zeros(2)
-BOX = (
-    '<div style="padding:2px 12px 8px;font-size:12.5px;line-height:1.45;'
-    'font-variant-numeric:tabular-nums">'
-)
 
 
-class Mark(NamedTuple):
+class RadiusMark(NamedTuple):
     """A radius that is marked on the curve.
 
     Attributes:
-        label: What it is.
-        colour: Of its point.
-        size: Of its point, in pixels.
-        radius: None if it is not marked.
+        label: Its meaning.
+        colour: Colour of its point.
+        size: Size of its point, in pixels.
+        radius: The radius in design units; None if it is not marked.
     """
 
     label: str
@@ -51,22 +56,19 @@ class Mark(NamedTuple):
 
 
 class RadiusPlot:
-    """Chart and words; both are hidden and nothing is computed until they are asked for."""
+    """The chart and its numbers, hidden until they are requested."""
 
     def __init__(self, gui: viser.GuiApi) -> None:
-        self._chart = gui.add_uplot(
-            (BLANK,) * 5,
-            _series(marks_of(None, None)),
-            scales=_scales(1.0, 1.0),
-            axes=(
+        marks = (dots(mark.label, mark.colour, mark.size) for mark in marks_of(None, None))
+        self._chart = add_chart(
+            gui,
+            (line("volume", BLUE), *marks),
+            (
                 axis("radius of all four legs (units)", label_size=20, size=28),
                 axis("reachable volume (units³)", label_size=18, size=46),
             ),
-            legend={"show": False},
-            cursor={"drag": {"x": False, "y": False}},
             height=HEIGHT,
             padding=(8, 14, 0, 0),
-            visible=False,
         )
         self._words = gui.add_html("", visible=False)
         self._under_way = UnderWay(gui, "curve")
@@ -74,7 +76,7 @@ class RadiusPlot:
         self._data: tuple[NDArray[Any], ...] = (BLANK,) * 5
 
     def updates(self, frame: Frame, feed: RadiusFeed) -> Iterator[Update]:
-        """Yield what makes them show the frame."""
+        """Yield the updates that make the chart and its numbers show the frame."""
         shown = frame.state.view.radius_curve
         drawing = feed.drawing if shown else None
         yield from self._under_way.updates(feed)
@@ -89,7 +91,7 @@ class RadiusPlot:
         radius = common_radius(frame.state.design)
         if self._plotted is None or self._plotted[0] is not curve or self._plotted[1] != radius:
             self._plotted = curve, radius
-            self._data = chart_of(curve, radius)
+            self._data = chart_columns(curve, radius)
         yield self._chart, "scales", _scales(float(self._data[0][-1]), float(curve.volumes[0]))
         yield self._chart, "data", self._data
 
@@ -100,38 +102,42 @@ def common_radius(design: Design) -> float | None:
     return radii.pop() if len(radii) == 1 else None
 
 
-def marks_of(curve: RadiusCurve | None, radius: float | None) -> tuple[Mark, Mark, Mark]:
-    """Return the marks of a curve, in the order in which they are told."""
+def marks_of(
+    curve: RadiusCurve | None, radius: float | None
+) -> tuple[RadiusMark, RadiusMark, RadiusMark]:
+    """Return the three marks of a curve, in the order of the chart's columns."""
     return (
-        Mark("present radius", ORANGE, 10, radius),
-        Mark("99 % left up to", TEAL, 8, None if curve is None else curve.radius_at(SHARE)),
-        Mark("harmless up to", VIOLET, 8, None if curve is None else curve.harmless),
+        RadiusMark("present radius", ORANGE, 10, radius),
+        RadiusMark(
+            "99 % reachable up to", TEAL, 8, None if curve is None else curve.radius_at(SHARE)
+        ),
+        RadiusMark("no loss up to", VIOLET, 8, None if curve is None else curve.harmless),
     )
 
 
 def volume_at(curve: RadiusCurve, radius: float) -> float:
-    """Return the reachable volume at a radius, 0 beyond that at which nothing is left."""
-    return float(np.interp(radius, *_before_the_fall(curve), right=0.0))
+    """Return the reachable volume at a radius; 0 beyond the last radius of the curve."""
+    return float(np.interp(radius, *_without_drop(curve), right=0.0))
 
 
-def _before_the_fall(curve: RadiusCurve) -> tuple[FloatArray, FloatArray]:
-    """Return radii, each once, and volumes: at the last radius what it leaves, not nothing."""
+def _without_drop(curve: RadiusCurve) -> tuple[FloatArray, FloatArray]:
+    """Return distinct radii and their volumes, without the drop to 0 at the last radius."""
     first = np.append(True, np.diff(curve.radii) > 0.0)
     return curve.radii[first], curve.volumes[first]
 
 
-def chart_of(curve: RadiusCurve, radius: float | None) -> tuple[FloatArray, ...]:
+def chart_columns(curve: RadiusCurve, radius: float | None) -> tuple[FloatArray, ...]:
     """Return the columns of the chart: radii, volumes, and the three marks.
 
-    Beyond the last radius the curve falls to nothing at once.
+    Beyond the last radius the volume is 0.
     """
     marks = marks_of(curve, radius)
     marked = [mark.radius for mark in marks if mark.radius is not None]
     last = float(curve.radii[-1])
     end = max(BEYOND_LAST * last, BEYOND_PRESENT * max(marked))
-    radii, volumes = _before_the_fall(curve)
-    inner = np.unique([*radii, *(each for each in marked if each <= last)])
-    outer = np.unique([last, *(each for each in marked if each > last), end])
+    radii, volumes = _without_drop(curve)
+    inner = np.unique([*radii, *(radius for radius in marked if radius <= last)])
+    outer = np.unique([last, *(radius for radius in marked if radius > last), end])
     x = np.concatenate([inner, outer])
     y = np.concatenate([np.interp(inner, radii, volumes), np.zeros(len(outer))])
     columns = [x, y]
@@ -144,94 +150,60 @@ def chart_of(curve: RadiusCurve, radius: float | None) -> tuple[FloatArray, ...]
 
 
 def radius_words(frame: Frame, feed: RadiusFeed) -> str:
-    """Return what the chart tells as HTML, or why there is none."""
+    """Return the numbers below the chart, or why there is no chart, as HTML."""
     if feed.problem is not None:
         return problem(feed, "The curve could not be drawn", "Compute the curve")
     drawing = feed.drawing
     if drawing is None:
-        return f'{BOX}<div style="{DIM}">{progress(feed).capitalize()}</div></div>'
-    waits = f' <span style="{DIM};font-size:11.5px">{progress(feed)}</span>'
-    note = "" if feed.is_current else waits
+        return box(dim(progress(feed).capitalize()))
+    note = "" if feed.is_current else f' <span class="ex-dim ex-small">{progress(feed)}</span>'
     if drawing.curve is None:
         reason = "" if drawing.trouble is None else drawing.trouble.reason
         text = f"{reason[:1].upper()}{reason[1:]}."
         return alert("Nothing can be reached, even without radii", text) + note
     curve = drawing.curve
     if float(curve.volumes[0]) <= 0.0:
-        return f'{BOX}<div style="{DIM}">The workspace is empty.{note}</div></div>'
+        return box(dim(f"The workspace is empty.{note}"))
     design = frame.state.design
     marks = marks_of(curve, common_radius(design))
-    rows = "".join(_row(mark, curve, design.unit_mm) for mark in marks)
-    return (
-        f'{BOX}<div style="display:flex;justify-content:space-between;margin-bottom:2px">'
-        f"<b>Reachable volume</b>{note}</div>"
-        f'<table style="width:100%;border-collapse:collapse">{rows}</table>'
-        f'<div style="{DIM};margin-top:4px">{where_legs_meet(curve, design.reach)}</div></div>'
+    return box(
+        f'<div class="ex-line"><b>Reachable volume</b>{note}</div>',
+        table(_row(mark, curve, design.unit_mm) for mark in marks),
+        f'<div class="ex-dim ex-after">{where_legs_meet(curve, design.reach)}</div>',
     )
 
 
 def where_legs_meet(curve: RadiusCurve, reach: float) -> str:
-    """Return in words which legs are the first to meet as they grow, and where."""
+    """Return a sentence on the legs that collide first as their radii grow, and where."""
     least = curve.least
     closest = float(least.clearance.min())
     if not np.isfinite(closest):
         return "No two legs can meet."
     first = np.flatnonzero(least.clearance <= closest)
     meetings = [
-        f"legs {i} and {j} at {_shown(least.position[pair])}"
-        for pair, (i, j) in ((int(each), PAIRS[each]) for each in first)
+        f"legs {i} and {j} at {_position(least.position[pair])}"
+        for pair, (i, j) in ((int(pair), PAIRS[pair]) for pair in first)
     ]
     if closest > 0.0:
-        return f"The first to collide within the limits: {'; '.join(meetings)}."
+        return f"First collision within the limits: {'; '.join(meetings)}."
     on_base = np.abs(least.position[first, 2]).max() <= 1e-6 * reach
     where = ", where z = 0" if on_base else ""
-    return f"Even without radii these touch within the limits{where}: {'; '.join(meetings)}."
+    return f"Even without radii legs touch within the limits{where}: {'; '.join(meetings)}."
 
 
-def _row(mark: Mark, curve: RadiusCurve, unit_mm: float) -> str:
-    swatch = (
-        f'<span style="display:inline-block;width:9px;height:9px;border-radius:5px;'
-        f'background:{css(mark.colour)};margin-right:6px"></span>'
-    )
+def _row(mark: RadiusMark, curve: RadiusCurve, unit_mm: float) -> str:
     if mark.radius is None:
-        value, left = "they differ", ""
+        value, note = "they differ", ""
     else:
-        share = 100.0 * volume_at(curve, mark.radius) / float(curve.volumes[0])
-        value = format_number(mark.radius, 3)
-        left = f"{share:.3g} %" if mark.label == "present radius" else _length(mark, unit_mm)
-    return (
-        f'<tr><td style="padding:1px 0">{swatch}{mark.label}</td>'
-        f'<td style="text-align:right">{value}</td>'
-        f'<td style="text-align:right;{DIM}">{left}</td></tr>'
-    )
+        value, note = format_number(mark.radius, 3), f"{format_number(mark.radius * unit_mm, 3)} mm"
+        if mark.label == "present radius":
+            note = f"{100.0 * volume_at(curve, mark.radius) / float(curve.volumes[0]):.3g} %"
+    return row(f"{swatch(mark.colour, 'ex-dot')}{mark.label}", value, dim(note))
 
 
-def _length(mark: Mark, unit_mm: float) -> str:
-    return f"{format_number((mark.radius or 0.0) * unit_mm, 3)} mm"
-
-
-def _shown(position: FloatArray) -> str:
+def _position(position: FloatArray) -> str:
     rounded = np.round(position, 6) + 0.0
     return "(" + ", ".join(format_number(float(x), 3) for x in rounded) + ")"
-
-
-def _series(marks: tuple[Mark, ...]) -> tuple[uplot.Series, ...]:
-    line: uplot.Series = {
-        "label": "volume",
-        "stroke": css(BLUE),
-        "width": 2.0,
-        "points": {"show": False},
-    }
-    points: list[uplot.Series] = [
-        {
-            "label": mark.label,
-            "stroke": css(mark.colour),
-            "width": 0.0,
-            "points": {"show": True, "size": mark.size, "fill": css(mark.colour)},
-        }
-        for mark in marks
-    ]
-    return ({"label": "radius"}, line, *points)
 
 
 def _scales(last: float, volume: float) -> dict[str, uplot.Scale]:

@@ -1,4 +1,4 @@
-"""What the legs swept in the last move: the paper's four tetrahedra of one step."""
+"""The tetrahedra that the legs swept in the last move, taken as one step as in the paper."""
 
 from __future__ import annotations
 
@@ -8,7 +8,10 @@ from collections.abc import Iterator
 import numpy as np
 import viser
 
+from explorer.app.features.feature import Services
+from explorer.app.scene.part import ScenePart
 from explorer.app.scene.placing import Placed
+from explorer.app.scene.shapes import add_lines, add_translucent
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.colours import OUTLINE, SWEPT, Rgb
 from explorer.legs.clearance import PAIRS
@@ -18,38 +21,35 @@ from explorer.numerics.arrays import FloatArray
 
 # Vertices 0 and 1 are the base ends at the start and at the end, 2 and 3 the platform ends.
 SOLID = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
-# The base ends of legs 1 and 4 do not move: one face twice would be twice as opaque.
+# Legs 1 and 4 sweep triangles, since their base ends do not move; a face drawn twice would be twice
+# as opaque.
 TRIANGLE = np.array([[0, 2, 3]])
-# The leg where it was is drawn by itself, so that the eye sees which way it went.
+# The leg before the move has thicker lines of its own, which show the direction of the move.
 START = (0, 2)
 EDGES = tuple(edge for edge in itertools.combinations(range(4), 2) if edge != START)
 OPACITY = 0.22
 
 
-class SweptTetrahedra:
-    """Each translucent, and those that overlap another in the colour of a collision."""
+class SweptTetrahedra(ScenePart):
+    """Four translucent tetrahedra; those that overlap another have the colour of a collision."""
 
-    def __init__(self, scene: viser.SceneApi) -> None:
+    def __init__(self, services: Services) -> None:
+        scene = services.scene
         self._meshes = [
-            scene.add_mesh_simple(
+            add_translucent(
+                scene,
                 f"/swept/{leg}",
-                np.zeros((4, 3)),
-                TRIANGLE if leg in (1, 4) else SOLID,
-                color=SWEPT,
-                opacity=OPACITY,
-                side="double",
-                flat_shading=True,
-                cast_shadow=False,
-                receive_shadow=False,
-                visible=False,
+                (np.zeros((4, 3)), TRIANGLE if leg in (1, 4) else SOLID),
+                OPACITY,
+                is_flat=True,
             )
             for leg in (1, 2, 3, 4)
         ]
-        self._edges = _Lines(scene, "/swept/edges", EDGES, thickness=1.5)
-        self._starts = _Lines(scene, "/swept/starts", (START,), thickness=4.0)
+        self._edges = _Lines(scene, "/swept/edges", EDGES, 1.5)
+        self._starts = _Lines(scene, "/swept/starts", (START,), 4.0)
 
     def updates(self, placed: Placed) -> Iterator[Update]:
-        """Yield what draws the tetrahedra of this frame's last move."""
+        """Yield the updates that draw the tetrahedra of this frame's last move."""
         view = placed.frame.state.view
         move = placed.frame.last_move if view.swept and not view.twin else None
         for handle in (*self._meshes, self._edges.handle, self._starts.handle):
@@ -57,7 +57,7 @@ class SweptTetrahedra:
         if move is None:
             return
         start, end = move.start, move.end
-        bodies = placed.scale * swept_tetrahedra(
+        tetrahedra = placed.scale * swept_tetrahedra(
             placed.frame.state.design,
             np.array(start.position),
             start.rotation,
@@ -65,11 +65,11 @@ class SweptTetrahedra:
             end.rotation,
         )
         colours = [OUTLINE if overlaps else SWEPT for overlaps in overlapping_legs(move)]
-        for mesh, body, colour in zip(self._meshes, bodies, colours, strict=True):
-            yield mesh, "vertices", body.astype(np.float32)
+        for mesh, corners, colour in zip(self._meshes, tetrahedra, colours, strict=True):
+            yield mesh, "vertices", corners.astype(np.float32)
             yield mesh, "color", colour
-        yield from self._edges.along(bodies, colours)
-        yield from self._starts.along(bodies, colours)
+        yield from self._edges.along(tetrahedra, colours)
+        yield from self._starts.along(tetrahedra, colours)
 
 
 class _Lines:
@@ -80,26 +80,17 @@ class _Lines:
         scene: viser.SceneApi,
         name: str,
         edges: tuple[tuple[int, int], ...],
-        *,
         thickness: float,
     ) -> None:
         self._edges = np.array(edges)
-        self.handle = scene.add_line_segments(
-            name,
-            np.zeros((4 * len(edges), 2, 3)),
-            # One colour for all could not become many: the browser would draw white.
-            np.zeros((4 * len(edges), 2, 3), dtype=np.uint8),
-            thickness=thickness,
-            thickness_units="screen",
-            visible=False,
-        )
+        self.handle = add_lines(scene, name, 4 * len(edges), None, thickness)
 
-    def along(self, bodies: FloatArray, colours: list[Rgb]) -> Iterator[Update]:
-        """Yield what draws the edges of bodies (4, 4, 3)."""
-        points = bodies[:, self._edges].reshape(-1, 2, 3)
+    def along(self, tetrahedra: FloatArray, colours: list[Rgb]) -> Iterator[Update]:
+        """Yield the updates that draw the edges of tetrahedra (4, 4, 3)."""
+        points = tetrahedra[:, self._edges].reshape(-1, 2, 3)
         yield self.handle, "points", points.astype(np.float32)
-        many = np.repeat(np.array(colours, dtype=np.uint8), 2 * len(self._edges), axis=0)
-        yield self.handle, "colors", many.reshape(-1, 2, 3)
+        end_colours = np.repeat(np.array(colours, dtype=np.uint8), 2 * len(self._edges), axis=0)
+        yield self.handle, "colors", end_colours.reshape(-1, 2, 3)
 
 
 def overlapping_legs(move: MoveClearance) -> list[bool]:

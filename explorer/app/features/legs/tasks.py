@@ -1,4 +1,4 @@
-"""The worker's task for the legs: the accessible volume against their radius."""
+"""The worker's task for the legs: the reachable volume over their radius."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from explorer.app.features.workspace.reached import (
     trouble_of,
     watch_of,
 )
-from explorer.app.session.worker import Line
+from explorer.app.session.worker import Channel
 from explorer.errors import ExplorerError
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Triple
@@ -21,12 +21,12 @@ from explorer.workspace.accessible.radii import RadiusCurve, radius_curve
 
 @dataclass(frozen=True)
 class RadiusRequest:
-    """Of what to draw the reachable volume against the radius of the legs.
+    """A request for the reachable volume over the radius of the legs.
 
     Attributes:
-        design: The manipulator; its legs without radii, since these do not count.
-        rotation: Platform to base, rows of the matrix.
-        start: From where it is to be reached; None for the home position.
+        design: The manipulator, its legs without radii.
+        rotation: Rotation from platform to base, rows of the matrix.
+        start: Position of b4 from which others are reached; None for the home position.
     """
 
     design: Design
@@ -36,12 +36,12 @@ class RadiusRequest:
 
 @dataclass(frozen=True)
 class RadiusDrawing:
-    """The reachable volume against the radius.
+    """The reachable volume over the radius of the legs.
 
     Attributes:
-        request: What was asked for.
-        curve: None if there is trouble.
-        trouble: Why there is no curve.
+        request: The request.
+        curve: The curve; None if it could not be computed.
+        trouble: Reason why there is no curve; None if there is one.
     """
 
     request: RadiusRequest
@@ -49,11 +49,11 @@ class RadiusDrawing:
     trouble: Trouble | None
 
 
-def draw_radius_curve(request: RadiusRequest, line: Line | None = None) -> RadiusDrawing:
-    """Return the reachable volume against the radius of all legs; `line` as above."""
+def draw_radius_curve(request: RadiusRequest, channel: Channel | None = None) -> RadiusDrawing:
+    """Return the reachable volume over the radius of all legs; `channel` sends progress."""
     design, rotation = request.design, np.array(request.rotation)
     try:
-        curve = radius_curve(design, rotation, start=request.start, watch=watch_of(line))
+        curve = radius_curve(design, rotation, start=request.start, watch=watch_of(channel))
     except ExplorerError as error:
         return RadiusDrawing(request, None, trouble_of(error))
     return RadiusDrawing(request, curve, None)

@@ -1,7 +1,7 @@
-"""Both flags, coloured by the incidences: a point, a line and a plane that hangs from it.
+"""The flags of base and platform, each a point, a line through it and a plane through the line.
 
-Each element takes the colour of the incidence that it is part of: a1 and the platform
-plane that of δ1, the two lines that of δ2, b4 and the base plane that of δ3.
+Each element has the colour of its incidence: a1 and the platform plane that of δ1, the two lines
+that of δ2, b4 and the base plane that of δ3.
 """
 
 from __future__ import annotations
@@ -11,7 +11,9 @@ from collections.abc import Iterator
 import numpy as np
 import viser
 
+from explorer.app.features.feature import Services
 from explorer.app.features.mechanism.legs import guide_span
+from explorer.app.scene.part import NO_POINTS, ScenePart
 from explorer.app.scene.placing import Placed
 from explorer.app.scene.shapes import Patch, cylinder, sphere, turned_to
 from explorer.app.widgets.assigning import Update
@@ -28,7 +30,7 @@ class Flag:
     """One flag in its own frame: the point at the origin, the line along x."""
 
     def __init__(self, scene: viser.SceneApi, root: str, deltas: tuple[int, int, int]) -> None:
-        # Which margin colours the point, the line and the plane.
+        # Indices of the margins that colour the point, the line and the plane.
         self._deltas = deltas
         self._point = scene.add_mesh_simple(
             f"{root}/flag/point", *sphere(), scale=POINT_RADIUS, cast_shadow=False
@@ -39,47 +41,51 @@ class Flag:
         self._patch = Patch(scene, f"{root}/flag", opacity=PLANE_OPACITY)
 
     def updates(self, placed: Placed, corners: FloatArray, size: float) -> Iterator[Update]:
-        """Yield what draws it with a plane of four corners, the first two on its line."""
+        """Yield the updates that draw the flag; the first two corners (4, 3) are on its line."""
         state = placed.frame.state
         levels = placed.frame.verdict.levels
-        point, along, plane = (proximity_colour(levels[k], 1.0) for k in self._deltas)
+        point_colour, line_colour, plane_colour = (
+            proximity_colour(levels[index], 1.0) for index in self._deltas
+        )
         low, high = corners[:2, 0].tolist()
         for handle in (self._point, self._line):
             yield handle, "visible", state.view.flags
-        yield from self._patch.shown(state.view.flags)
-        yield self._point, "color", point
+        yield from self._patch.show(state.view.flags)
+        yield self._point, "color", point_colour
         yield self._point, "scale", POINT_RADIUS * size
-        yield self._line, "color", along
+        yield self._line, "color", line_colour
         yield self._line, "position", (low, 0.0, 0.0)
         yield self._line, "scale", (LINE_RADIUS * size, LINE_RADIUS * size, high - low)
-        yield from self._patch.spanned(corners, plane)
+        yield from self._patch.span(corners, plane_colour)
 
 
-class Flags:
+class Flags(ScenePart):
     """The base's flag and the platform's."""
 
-    def __init__(self, scene: viser.SceneApi) -> None:
+    def __init__(self, services: Services) -> None:
+        scene = services.scene
         self._base = Flag(scene, "/base", deltas=(0, 1, 2))
         self._platform = Flag(scene, "/platform", deltas=(2, 1, 0))
 
     def updates(self, placed: Placed) -> Iterator[Update]:
-        """Yield what draws the flags of this frame."""
+        """Yield the updates that draw the flags of this frame."""
         yield from self._base.updates(placed, _base_corners(placed), 1.0)
         yield from self._platform.updates(
             placed, _platform_corners(placed), max(0.6, placed.thickness)
         )
 
-
-def flag_corners(placed: Placed) -> FloatArray:
-    """Return the corners of both planes in the scene, shape (8, 3)."""
-    rotation = placed.frame.snapshot.rotation
-    platform = placed.points["b4"] + _platform_corners(placed) @ rotation.T
-    return np.concatenate([_base_corners(placed), platform])
+    def corners(self, placed: Placed) -> FloatArray:
+        """Return the corners of both planes."""
+        if not placed.frame.state.view.flags:
+            return NO_POINTS
+        rotation = placed.frame.snapshot.rotation
+        platform = placed.points["b4"] + _platform_corners(placed) @ rotation.T
+        return np.concatenate([_base_corners(placed), platform])
 
 
 def _base_corners(placed: Placed) -> FloatArray:
     low, high = guide_span(placed)
-    return _hanging(low - 1.0, high + 1.0, 1.2 * float(placed.points["a3"][1]))
+    return _rectangle(low - 1.0, high + 1.0, 1.2 * float(placed.points["a3"][1]))
 
 
 def _platform_corners(placed: Placed) -> FloatArray:
@@ -87,10 +93,10 @@ def _platform_corners(placed: Placed) -> FloatArray:
     stations = [float(local[name][0]) for name in ("b1", "b2", "b3", "b4")]
     beyond = 0.16 * placed.reach
     side = float(local["b1"][1])
-    hang = side + float(np.copysign(0.5 * beyond, side))
-    return _hanging(min(stations) - beyond, max(stations) + beyond, hang)
+    edge = side + float(np.copysign(0.5 * beyond, side))
+    return _rectangle(min(stations) - beyond, max(stations) + beyond, edge)
 
 
-def _hanging(low: float, high: float, hang: float) -> FloatArray:
-    """Return the corners of a plane that hangs from a line along x to y, shape (4, 3)."""
-    return np.array([[low, 0, 0], [high, 0, 0], [high, hang, 0], [low, hang, 0]], float)
+def _rectangle(low: float, high: float, y: float) -> FloatArray:
+    """Return the corners of a rectangle between the x-axis and a line at y, shape (4, 3)."""
+    return np.array([[low, 0, 0], [high, 0, 0], [high, y, 0], [low, y, 0]], float)

@@ -1,4 +1,4 @@
-"""The legs: four as they are built, or the 6-4 twin's six (the paper's Figure 1).
+"""The four legs of the mechanism, or the six of its 6-4 twin (the paper's Figure 1).
 
 Legs 1 and 4: U joint, telescoping actuator, ball joint. Legs 2 and 3: a carriage on the
 guide, a revolute about it, an actuator perpendicular to it, ball joint.
@@ -11,6 +11,8 @@ from collections.abc import Iterator
 import numpy as np
 import viser
 
+from explorer.app.features.feature import Services
+from explorer.app.scene.part import ScenePart
 from explorer.app.scene.placing import Placed
 from explorer.app.scene.shapes import Balls, Boxes, Rods
 from explorer.app.widgets.assigning import Update
@@ -22,25 +24,25 @@ from explorer.numerics.arrays import FloatArray
 TWIN = (("a1", "b1"), ("a1", "b2"), ("a1", "b3"), ("a2", "b2"), ("a2", "b3"), ("a3", "b4"))
 """The six legs of the 6-4 twin, base point and platform point."""
 
-# All in scene units at thickness one.
+# Sizes in scene units, at thickness one.
 PLATE_TOP = -0.6
 RAIL_HALF_WIDTH, RAIL_TOP = 0.3, -0.42
 TUBE_RADIUS, ROD_RADIUS, COLLAR_RADIUS = 0.17, 0.095, 0.215
 BALL_RADIUS, SOCKET_RADIUS = 0.24, 0.19
 PIN_RADIUS, PIN_HALF_LENGTH = 0.085, 0.34
-# Of the reach: the cylinder of an actuator has one length however far the rod is out.
+# Length of an actuator's cylinder, which does not depend on its stroke, as a share of the reach.
 TUBE_SHARE = 0.34
 
 
 class Telescopes:
-    """Actuators: a cylinder at the base end, a rod at the platform end."""
+    """Actuators, each with a cylinder at the base end and a rod at the platform end."""
 
     def __init__(self, scene: viser.SceneApi, name: str, count: int) -> None:
         colours = [TUBE] * count + [ROD] * count + [JOINT] * count + [JOINT] * count
         self._rods = Rods(scene, name, colours)
 
     def along(self, placed: Placed, bases: FloatArray, tips: FloatArray) -> Iterator[Update]:
-        """Yield what draws them from bases (n, 3) to tips (n, 3)."""
+        """Yield the updates that draw the actuators from bases (n, 3) to tips (n, 3)."""
         size, count = placed.thickness, len(bases)
         spans = tips - bases
         lengths = np.linalg.norm(spans, axis=1, keepdims=True)
@@ -54,33 +56,34 @@ class Telescopes:
             size * np.repeat([TUBE_RADIUS, ROD_RADIUS, COLLAR_RADIUS, SOCKET_RADIUS], count),
         )
 
-    def alarmed(self, alarms: list[bool]) -> Iterator[Update]:
-        """Yield what colours those that raise an alarm."""
+    def colour_alarms(self, alarms: list[bool]) -> Iterator[Update]:
+        """Yield the updates that give some actuators the colour of an alarm."""
         tubes = [OUTLINE if alarm else TUBE for alarm in alarms]
         rods = [OUTLINE if alarm else ROD for alarm in alarms]
-        yield from self._rods.coloured([*tubes, *rods, *[JOINT] * (2 * len(alarms))])
+        yield from self._rods.colour([*tubes, *rods, *[JOINT] * (2 * len(alarms))])
 
-    def shown(self, visible: bool) -> Iterator[Update]:
-        """Yield what shows or hides them."""
-        yield from self._rods.shown(visible)
+    def show(self, visible: bool) -> Iterator[Update]:
+        """Yield the updates that show or hide the actuators."""
+        yield from self._rods.show(visible)
 
 
-class Legs:
+class Legs(ScenePart):
     """The four legs with their joints, carriages and guide."""
 
-    def __init__(self, scene: viser.SceneApi) -> None:
+    def __init__(self, services: Services) -> None:
+        scene = services.scene
         self._actuators = Telescopes(scene, "/legs/actuators", 4)
-        # Per U joint a post and two pins; per carriage a sleeve about the guide.
+        # A post and two pins for each U joint, and a sleeve about the guide for each carriage.
         self._joints = Rods(scene, "/legs/joints", [JOINT, ROD, ROD] * 2 + [JOINT] * 2)
         self._balls = Balls(scene, "/legs/balls", [BALL] * 4 + [JOINT] * 2)
         self._guide = Boxes(scene, "/legs/guide", [RAIL, CARRIAGE, CARRIAGE])
 
     def updates(self, placed: Placed) -> Iterator[Update]:
-        """Yield what draws the legs of this frame."""
+        """Yield the updates that draw the legs of this frame."""
         view = placed.frame.state.view
-        visible = view.legs and not view.twin and placed.parts is None
+        visible = view.legs and not view.twin and placed.is_schematic
         for part in (self._actuators, self._joints, self._balls, self._guide):
-            yield from part.shown(visible)
+            yield from part.show(visible)
         if not visible:
             return
         p, size = placed.points, placed.thickness
@@ -88,7 +91,7 @@ class Legs:
         bases = np.array([p["a1"], d1, d3, p["a3"]])
         tips = np.array([p["b1"], p["b2"], p["b3"], p["b4"]])
         yield from self._actuators.along(placed, bases, tips)
-        yield from self._actuators.alarmed(colliding_legs(placed.frame.snapshot))
+        yield from self._actuators.colour_alarms(colliding_legs(placed.frame.snapshot))
         yield from self._balls.at(
             np.concatenate([tips, bases[[0, 3]]]),
             size * np.array([BALL_RADIUS] * 4 + [1.2 * TUBE_RADIUS] * 2),
@@ -101,13 +104,13 @@ class Legs:
         ends: list[FloatArray] = []
         for base, tip in ((bases[0], tips[0]), (bases[3], tips[3])):
             first = np.array([1.0, 0.0, 0.0])
-            # The other axis of the cross, perpendicular to the first and to the leg.
+            # The second axis of the U joint is perpendicular to the first and to the leg.
             second = np.array([0.0, base[2] - tip[2], tip[1] - base[1]])
             norm = float(np.linalg.norm(second))
             second = second / norm if norm > 1e-9 else np.array([0.0, 1.0, 0.0])
-            reach = PIN_HALF_LENGTH * size
-            starts += [base + [0.0, 0.0, PLATE_TOP], base - reach * first, base - reach * second]
-            ends += [base, base + reach * first, base + reach * second]
+            half = PIN_HALF_LENGTH * size
+            starts += [base + [0.0, 0.0, PLATE_TOP], base - half * first, base - half * second]
+            ends += [base, base + half * first, base + half * second]
         sleeve = np.array([0.4 * size, 0.0, 0.0])
         starts += [bases[1] - sleeve, bases[2] - sleeve]
         ends += [bases[1] + sleeve, bases[2] + sleeve]
@@ -131,23 +134,24 @@ class Legs:
                 *([d[0] + half, 0.4, -0.2 * size] for d in (d1, d3)),
             ]
         )
-        yield from self._guide.spanning(lows, highs)
+        yield from self._guide.span(lows, highs)
 
 
-class TwinLegs:
-    """The six legs of the 6-4 twin: from a1 or a2 instead of from the carriages."""
+class TwinLegs(ScenePart):
+    """The six legs of the 6-4 twin, which start at a1 and a2 instead of the carriages."""
 
-    def __init__(self, scene: viser.SceneApi) -> None:
+    def __init__(self, services: Services) -> None:
+        scene = services.scene
         self._actuators = Telescopes(scene, "/twin/actuators", len(TWIN))
         self._balls = Balls(scene, "/twin/balls", [JOINT] * 3 + [BALL] * 4)
         self._posts = Rods(scene, "/twin/posts", [JOINT] * 3)
 
     def updates(self, placed: Placed) -> Iterator[Update]:
-        """Yield what draws the twin's legs of this frame."""
+        """Yield the updates that draw the twin's legs of this frame."""
         view = placed.frame.state.view
         visible = view.legs and view.twin
         for part in (self._actuators, self._balls, self._posts):
-            yield from part.shown(visible)
+            yield from part.show(visible)
         if not visible:
             return
         p, size = placed.points, placed.thickness
@@ -158,6 +162,11 @@ class TwinLegs:
         heads = np.array([p["b1"], p["b2"], p["b3"], p["b4"]])
         yield from self._balls.at(np.concatenate([feet, heads]), np.full(7, BALL_RADIUS * size))
         yield from self._posts.between(feet + [0.0, 0.0, PLATE_TOP], feet, np.full(3, 0.2 * size))
+
+    def corners(self, placed: Placed) -> FloatArray:
+        """Return the ends of the guide."""
+        low, high = guide_span(placed)
+        return np.array([[low, 0.0, 0.0], [high, 0.0, 0.0]])
 
 
 def colliding_legs(snapshot: Snapshot) -> list[bool]:
@@ -171,7 +180,7 @@ def colliding_legs(snapshot: Snapshot) -> list[bool]:
 
 
 def guide_span(placed: Placed) -> tuple[float, float]:
-    """Return where the guide is drawn from and to: past a1, a2 and both carriages."""
+    """Return the x in the scene of both drawn ends of the guide, beyond a1, a2 and carriages."""
     p = placed.points
     stations = [float(p[name][0]) for name in ("a1", "a2", "b2", "b3")]
     return min(stations) - 0.7, max(stations) + 0.7

@@ -1,4 +1,4 @@
-"""Labels a1 … b4, ghosts of the other assembly modes, and the handle to drag."""
+"""Labels a1 … b4, ghosts of the other assembly modes, and the drag handle."""
 
 from __future__ import annotations
 
@@ -8,8 +8,12 @@ from collections.abc import Iterator
 import numpy as np
 import viser
 
-from explorer.app.scene.bodies import platform_plate
+from explorer.app.features.feature import Services
+from explorer.app.features.mechanism.bodies import platform_plate
+from explorer.app.scene.part import NO_POINTS, ScenePart, around
 from explorer.app.scene.placing import Placed, scene_scale
+from explorer.app.scene.shapes import NO_MESH, add_lines, add_translucent
+from explorer.app.state.actions import SetPose
 from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.colours import GHOST
@@ -23,14 +27,15 @@ PLATFORM_LABELS = ("b1", "b2", "b3", "b4")
 
 HANDLE_NAME = "/handle"
 HANDLE_SCALE = 1.9
-# From the gizmo's origin to the tip of an arrow, as viser draws it.
-HANDLE_REACH = 1.25 * HANDLE_SCALE
+# Length from the gizmo's origin to the tip of an arrow, as viser draws it.
+ARROW_LENGTH = 1.25 * HANDLE_SCALE
 
 
-class Labels:
+class Labels(ScenePart):
     """The names of the attachment points."""
 
-    def __init__(self, scene: viser.SceneApi) -> None:
+    def __init__(self, services: Services) -> None:
+        scene = services.scene
         self._handles = {
             name: scene.add_label(
                 f"{'/base' if name in BASE_LABELS else '/platform'}/label/{name}",
@@ -42,53 +47,39 @@ class Labels:
         }
 
     def updates(self, placed: Placed) -> Iterator[Update]:
-        """Yield what draws the labels of this frame."""
+        """Yield the updates that draw the labels of this frame."""
         for name, handle in self._handles.items():
-            own = placed.points if name in BASE_LABELS else placed.platform_points
+            points = placed.points if name in BASE_LABELS else placed.platform_points
             lift = 0.3 if name in BASE_LABELS else 0.3 * placed.facing
             yield handle, "visible", placed.frame.state.view.labels
-            yield handle, "position", tuple((own[name] + [0.0, 0.0, lift]).tolist())
+            yield handle, "position", tuple((points[name] + [0.0, 0.0, lift]).tolist())
 
 
-class Ghosts:
+class Ghosts(ScenePart):
     """The seven other assembly modes of the same joints, each with its sign triple."""
 
-    def __init__(self, scene: viser.SceneApi) -> None:
+    def __init__(self, services: Services) -> None:
+        scene = services.scene
         # Instanced meshes cannot change their shape, and these follow the design.
         self._plates = [
-            scene.add_mesh_simple(
-                f"/ghosts/platform/{i}",
-                np.zeros((3, 3)),
-                np.array([[0, 1, 2]]),
-                color=GHOST,
-                opacity=0.35,
-                side="double",
-                cast_shadow=False,
-                receive_shadow=False,
-            )
+            add_translucent(scene, f"/ghosts/platform/{i}", NO_MESH, 0.35, colour=GHOST)
             for i in range(7)
         ]
-        self._legs = scene.add_line_segments(
-            "/ghosts/legs",
-            np.zeros((28, 2, 3)),
-            GHOST,
-            thickness=1.2,
-            thickness_units="screen",
-        )
+        self._legs = add_lines(scene, "/ghosts/legs", 28, GHOST, 1.2)
         self._names = [
             scene.add_label(f"/ghosts/name/{i}", mode_name(i), font_screen_scale=0.75)
             for i in range(7)
         ]
 
     def updates(self, placed: Placed) -> Iterator[Update]:
-        """Yield what draws the ghosts of this frame."""
+        """Yield the updates that draw the ghosts of this frame."""
         state = placed.frame.state
         visible = state.view.ghosts
         for handle in (*self._plates, self._legs, *self._names):
             yield handle, "visible", visible
         if not visible:
             return
-        others = _others(placed)
+        others = _other_modes(placed)
         solution = placed.frame.snapshot.modes
         positions = placed.scale * solution.position[others]
         rotations = solution.rotation[others]
@@ -105,6 +96,12 @@ class Ghosts:
             yield label, "text", mode_name(mode)
             yield label, "position", tuple(tip.tolist())
 
+    def corners(self, placed: Placed) -> FloatArray:
+        """Return the corners of cubes about the joints of the ghosts."""
+        if not placed.frame.state.view.ghosts:
+            return NO_POINTS
+        return around(ghost_points(placed).reshape(-1, 3))
+
     @staticmethod
     def _leg_lines(placed: Placed, tips: FloatArray) -> FloatArray:
         bases = np.zeros_like(tips)
@@ -115,47 +112,60 @@ class Ghosts:
 
 def ghost_points(placed: Placed) -> FloatArray:
     """Return b1 … b4 of the seven other assembly modes in the scene, shape (7, 4, 3)."""
-    others = _others(placed)
+    others = _other_modes(placed)
     solution = placed.frame.snapshot.modes
     local = np.array(list(placed.platform_points.values()))
     turned = np.einsum("mij,nj->mni", solution.rotation[others], local)
     return placed.scale * solution.position[others][:, None] + turned
 
 
-def handle_tips(placed: Placed) -> FloatArray:
-    """Return the tips of the gizmo's three arrows in the scene, shape (3, 3)."""
-    return placed.points["b4"] + HANDLE_REACH * placed.frame.snapshot.rotation.T
-
-
-def _others(placed: Placed) -> list[int]:
+def _other_modes(placed: Placed) -> list[int]:
     return [mode for mode in range(8) if mode != placed.frame.state.mode]
 
 
-class DragHandle:
+class DragHandle(ScenePart):
     """The gizmo at b4: arrows move the platform, arcs turn it."""
 
-    def __init__(self, scene: viser.SceneApi) -> None:
+    def __init__(self, services: Services) -> None:
+        scene = services.scene
         self.handle = scene.add_transform_controls(
             HANDLE_NAME, scale=HANDLE_SCALE, line_width=2.0, depth_test=False, opacity=0.85
         )
+        self._session = services.session
+        self.handle.on_update(self._move_platform)
 
     def pose(self, state: State) -> Pose:
         """Return the pose of the platform where the gizmo is.
 
         Raises:
-            InputError: it is where no platform can be.
+            InputError: the gizmo is where no platform can be.
         """
         x, y, z = (np.asarray(self.handle.position) / scene_scale(state)).tolist()
         w, i, j, k = np.asarray(self.handle.wxyz, dtype=np.float64).tolist()
         return Pose((x, y, z), (w, i, j, k))
 
     def updates(self, placed: Placed) -> Iterator[Update]:
-        """Yield what keeps the gizmo on the platform."""
+        """Yield the updates that keep the gizmo on the platform."""
         state = placed.frame.state
         yield self.handle, "visible", state.view.handle
         with contextlib.suppress(InputError):
-            # Writing back what the hand has just set would fight with it.
+            # A pose that was written back during a drag would move the gizmo under the pointer.
             if self.pose(state) == state.pose:
                 return
         yield self.handle, "position", tuple(placed.points["b4"].tolist())
         yield self.handle, "wxyz", state.pose.quaternion
+
+    def corners(self, placed: Placed) -> FloatArray:
+        """Return the tips of the three arrows."""
+        if not placed.frame.state.view.handle:
+            return NO_POINTS
+        return placed.points["b4"] + ARROW_LENGTH * placed.frame.snapshot.rotation.T
+
+    def _move_platform(self, event: viser.TransformControlsEvent) -> None:
+        if event.client_id is not None:
+            self._session.post(
+                "drag",
+                lambda state: SetPose(self.pose(state)),
+                stamp=self.handle.update_timestamp,
+                who=event.client_id,
+            )

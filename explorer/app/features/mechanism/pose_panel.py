@@ -1,27 +1,25 @@
-"""Moving the mechanism: by its legs, by its pose, or from one assembly mode to another."""
+"""The panel that moves the mechanism, by its joints, its pose or its assembly mode."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 import viser
 
 from explorer.app.browser.viser_gaps import Mark
-from explorer.app.session.session import Session
+from explorer.app.features.feature import Services
 from explorer.app.state.actions import (
     GoHome,
     SetAngle,
     SetJoint,
     SetMode,
+    SetPose,
     SetPosition,
-    SetView,
     UseNearest,
 )
 from explorer.app.state.frame import Frame
-from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.controls import Controls, Span
+from explorer.app.widgets.controls import Bound, Controls, Span
 from explorer.app.widgets.markup import alert, format_number, remark
 from explorer.app.widgets.ranges import coordinate_span, length_span
 from explorer.mechanism.design import JOINTS, LENGTHS
@@ -30,9 +28,9 @@ from explorer.mechanism.margins import describe_modes, mode_name
 
 JOINT_HINTS = {
     "l1": "Leg 1: length of the actuator from a1 to b1 (U joint, actuator, ball joint).",
-    "d1": "Leg 2: where its carriage stands on the guide, from a1.",
+    "d1": "Leg 2: position of its carriage on the guide, from a1.",
     "d2": "Leg 2: length of the actuator from the guide, perpendicular to it, to b2.",
-    "d3": "Leg 3: where its carriage stands on the guide, from a1.",
+    "d3": "Leg 3: position of its carriage on the guide, from a1.",
     "d4": "Leg 3: length of the actuator from the guide, perpendicular to it, to b3.",
     "l4": "Leg 4: length of the actuator from a3 to b4 (U joint, actuator, ball joint).",
 }
@@ -45,20 +43,21 @@ JOINT_LABELS = {
     "l4": "l4  leg 4",
 }
 ANGLES = (
-    ("yaw", "about the base's z, first", 180.0),
-    ("pitch", "about the turned y, second", 90.0),
-    ("roll", "about the twice turned x, third", 180.0),
+    ("yaw", "about the base's z, the first of three", 180.0),
+    ("pitch", "about the y that yaw turned, the second of three", 90.0),
+    ("roll", "about the platform's x, the third of three", 180.0),
 )
-# Share of a slider that a label takes.
+# Room for a label, as a share of the slider.
 LABEL_ROOM = 0.24
 MODES = tuple(f"{mode}:  {mode_name(mode)}" for mode in range(8))
 
 
 class MovePanel:
-    """Sliders for legs and pose, the list of modes, and word of lengths that cannot close."""
+    """Sliders for joints and pose, the list of modes, and messages on lengths."""
 
-    def __init__(self, gui: viser.GuiApi, session: Session) -> None:
-        self._controls = controls = Controls(gui, session)
+    def __init__(self, services: Services) -> None:
+        gui = services.gui
+        self._controls = controls = Controls(gui, services.session)
         with gui.add_folder("Legs (design units)"):
             for joint, name in enumerate(JOINTS):
                 self._add_joint(joint, name)
@@ -67,7 +66,7 @@ class MovePanel:
             self._nearest = controls.button(
                 "Use the nearest length",
                 "Move this leg to the nearest length that closes and stays clear of "
-                "singularities, the others as they are.",
+                "singularities; the other legs stay as they are.",
                 UseNearest,
                 icon=viser.Icon.MAGNET,
             )
@@ -87,17 +86,21 @@ class MovePanel:
                 "δ1 δ2 δ3",
                 "The eight ways to assemble these leg lengths, by the signs of the margins.",
                 MODES,
-                lambda frame: mode_options(frame)[-1 if is_between(frame) else frame.state.mode],
-                lambda state, chosen: (
-                    SetMode(MODES.index(chosen)) if chosen in MODES else SetView(state.view)
+                Bound(
+                    lambda frame: mode_options(frame)[
+                        -1 if is_singular(frame) else frame.state.mode
+                    ],
+                    # The last option is the present singular pose, which lies in no mode.
+                    lambda state, chosen: (
+                        SetMode(MODES.index(chosen)) if chosen in MODES else SetPose(state.pose)
+                    ),
                 ),
-                more=mode_options,
+                options_of=mode_options,
             )
             controls.checkbox(
                 "Other modes as ghosts",
                 "Draw the seven other ways to assemble the same leg lengths.",
-                lambda frame: frame.state.view.ghosts,
-                lambda state, on: SetView(replace(state.view, ghosts=on)),
+                "view.ghosts",
             )
 
     def _add_joint(self, joint: int, name: str) -> None:
@@ -108,9 +111,9 @@ class MovePanel:
 
         self._controls.slider(
             JOINT_LABELS[name],
-            f"{JOINT_HINTS[name]} The marks bound the values that close, the others held.",
-            lambda frame: frame.state.joints[joint],
-            lambda _, value: SetJoint(joint, value),
+            f"{JOINT_HINTS[name]} The marks bound the values that close with the other joints as "
+            "they are.",
+            Bound(lambda frame: frame.state.joints[joint], lambda _, value: SetJoint(joint, value)),
             span,
             marks=marks,
         )
@@ -119,25 +122,26 @@ class MovePanel:
         self._controls.slider(
             name,
             f"The {name} coordinate of b4 in the base frame.",
-            lambda frame: frame.state.pose.position[axis],
-            lambda _, value: SetPosition(axis, value),
+            Bound(
+                lambda frame: frame.state.pose.position[axis],
+                lambda _, value: SetPosition(axis, value),
+            ),
             coordinate_span,
         )
 
     def _add_angle(self, axis: int, name: str, order: str, edge: float) -> None:
-        def span(_: State) -> Span:
-            return Span(-edge, edge, 0.1)
-
         self._controls.slider(
             f"{name} (°)",
             f"Rotation of the platform {order}, in degrees.",
-            lambda frame: frame.state.yaw_pitch_roll[axis],
-            lambda _, value: SetAngle(axis, value),
-            span,
+            Bound(
+                lambda frame: frame.state.yaw_pitch_roll[axis],
+                lambda _, value: SetAngle(axis, value),
+            ),
+            Span(-edge, edge, 0.1),
         )
 
     def updates(self, frame: Frame) -> Iterator[Update]:
-        """Yield what makes the panel show the frame."""
+        """Yield the updates that make the panel show the frame."""
         unclosed = frame.state.unclosed
         yield self._alert, "visible", unclosed is not None
         yield self._nearest, "visible", unclosed is not None and unclosed.nearest is not None
@@ -146,18 +150,18 @@ class MovePanel:
         words = None if unclosed is not None else frame.state.remark
         yield self._remark, "visible", words is not None
         if words is not None:
-            yield self._remark, "content", remark("Not quite the length asked for", words)
+            yield self._remark, "content", remark("The length was adjusted", words)
         yield from self._controls.updates(frame)
 
 
-def is_between(frame: Frame) -> bool:
-    """Whether the pose is singular, so that it lies in no mode but between some."""
+def is_singular(frame: Frame) -> bool:
+    """Whether the pose is singular, and so on the boundary of several modes."""
     return len(frame.snapshot.bordering_modes) > 1
 
 
 def mode_options(frame: Frame) -> tuple[str, ...]:
-    """Return the modes to choose from; at a singular pose its boundary comes last."""
-    if not is_between(frame):
+    """Return the options of the list of modes; the last one is the present pose if singular."""
+    if not is_singular(frame):
         return MODES
     snapshot = frame.snapshot
     return (*MODES, f"{snapshot.sign_words}:  {describe_modes(snapshot.bordering_modes)}")
@@ -167,23 +171,23 @@ def interval_marks(intervals: tuple[Interval, ...], span: Span) -> tuple[Mark, .
     """Return marks at the ends of the intervals, with labels that do not overlap.
 
     Args:
-        intervals: In which the lengths close.
-        span: Of the slider that is marked.
+        intervals: Intervals in which the lengths close.
+        span: Range of the slider.
     """
     marks: list[Mark] = []
-    labelled = -1.0
+    label_end = -1.0
     for low, high in intervals:
         start, end = (min(max(v, span.low), span.high) for v in (low, high))
         first, last = ((v - span.low) / (span.high - span.low) for v in (start, end))
         size = max(abs(span.low), abs(span.high))
         texts = (format_number(low, 3, size=size), format_number(high, 3, size=size))
-        if first - labelled < LABEL_ROOM:
+        if first - label_end < LABEL_ROOM:
             texts = ("", "")
         elif last - first < LABEL_ROOM:
-            # Too close for two labels: the end with more room beside it carries both.
+            # There is no room for two labels: the end with more room beside it has both.
             both = f"{texts[0]} … {texts[1]}"
             texts = ("", both) if first < 0.5 else (both, "")
         if any(texts):
-            labelled = last
+            label_end = last
         marks += [(start, texts[0]), (end, texts[1])]
     return tuple(marks)

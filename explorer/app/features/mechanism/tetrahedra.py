@@ -1,4 +1,4 @@
-"""The three trilateration tetrahedra: singular is where one of them is flat."""
+"""The three tetrahedra of the trilaterations: a pose is singular where one of them is flat."""
 
 from __future__ import annotations
 
@@ -6,10 +6,11 @@ import itertools
 from collections.abc import Iterator
 
 import numpy as np
-import viser
 
+from explorer.app.features.feature import Services
+from explorer.app.scene.part import ScenePart
 from explorer.app.scene.placing import Placed
-from explorer.app.scene.shapes import of_one_colour
+from explorer.app.scene.shapes import add_lines, add_translucent, of_one_colour
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.colours import OUTLINE, proximity_colour
 from explorer.mechanism.margins import TETRAHEDRA
@@ -19,37 +20,25 @@ EDGES = np.array(list(itertools.combinations(range(4), 2)))
 OPACITY = 0.1
 
 
-class Tetrahedra:
-    """Each translucent in the colour of its incidence; one that cannot close is outlined."""
+class Tetrahedra(ScenePart):
+    """Three translucent tetrahedra in the colours of their incidences.
 
-    def __init__(self, scene: viser.SceneApi) -> None:
+    One that the present lengths cannot close has thick edges in the colour of an alarm.
+    """
+
+    def __init__(self, services: Services) -> None:
+        scene, flat = services.scene, (np.zeros((4, 3)), FACES)
         self._meshes = [
-            scene.add_mesh_simple(
-                f"/tetrahedra/{index}/faces",
-                np.zeros((4, 3)),
-                FACES,
-                opacity=OPACITY,
-                side="double",
-                flat_shading=True,
-                cast_shadow=False,
-                receive_shadow=False,
-            )
+            add_translucent(scene, f"/tetrahedra/{index}/faces", flat, OPACITY, is_flat=True)
             for index in (1, 2, 3)
         ]
         self._edges = [
-            scene.add_line_segments(
-                f"/tetrahedra/{index}/edges",
-                np.zeros((6, 2, 3)),
-                # One colour for all could not become many: the browser would draw white.
-                np.zeros((6, 2, 3), dtype=np.uint8),
-                thickness=1.5,
-                thickness_units="screen",
-            )
+            add_lines(scene, f"/tetrahedra/{index}/edges", len(EDGES), None, 1.5)
             for index in (1, 2, 3)
         ]
 
     def updates(self, placed: Placed) -> Iterator[Update]:
-        """Yield what draws the tetrahedra of this frame."""
+        """Yield the updates that draw the tetrahedra of this frame."""
         state = placed.frame.state
         failing = state.unclosed.failing if state.unclosed else ()
         for index, names in enumerate(TETRAHEDRA):

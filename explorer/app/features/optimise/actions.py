@@ -1,8 +1,7 @@
-"""The actions of an optimisation, from the wish to accepting what was found.
+"""The actions of an optimisation, from its problem to accepting the result.
 
-While a run goes on, the design belongs to it: the actions of `explorer.app.state.actions` that
-would change it are refused. A run is long or it is short; in either case a slider touched
-in passing must not throw it away, and cancelling takes one press of the same button.
+During a run the actions of `explorer.app.state.actions` that would change the design are refused,
+so that a slider touched by accident does not end the run.
 """
 
 from __future__ import annotations
@@ -14,10 +13,12 @@ from typing import ClassVar
 import msgspec
 
 from explorer.app.features.optimise.problem import problem_of, refuted
-from explorer.app.state.action import Action, changes
-from explorer.app.state.actions import check_free, moved
-from explorer.app.state.optimisation import PLACE, Comparison, SearchResult, Wish
+from explorer.app.state.action import Action
+from explorer.app.state.actions import Set, check_free, moved
+from explorer.app.state.optimisation import PLACE, Comparison, SearchResult
+from explorer.app.state.parts import kept_on_open
 from explorer.app.state.state import Optimisation, Run, State
+from explorer.app.state.values import with_value
 from explorer.errors import ExplorerError, NoAnswerError
 from explorer.mechanism.design import Design
 from explorer.mechanism.home import home_pose
@@ -31,63 +32,63 @@ LONGEST_NAME = 100
 
 
 @dataclass(frozen=True)
-class SetWish(Action):
-    """Change what is asked for."""
-
-    wish: Wish
+class SetRequest(Set):
+    """Change one value of the problem."""
 
     def apply(self, state: State) -> State:
-        """Return the next state.
+        """Return the next state."""
+        request = super().apply(state).optimisation.request
+        if request.objective == "largest-margin" and not {YAW, PLACE} & {*request.free}:
+            # Only these influence the margins over a box.
+            request = replace(request, free=(*request.free, YAW, PLACE))
+        return replace(
+            state, optimisation=replace(state.optimisation, request=request, refusal=None)
+        )
 
-        Raises:
-            InputError: a number that nothing can be asked with, see `Wish.check`.
-        """
-        wish = self.wish
-        wish.check()
-        if wish.objective == "largest-margin" and not {YAW, PLACE} & {*wish.free}:
-            # Nothing else has an influence on margins over a box.
-            wish = replace(wish, free=(*wish.free, YAW, PLACE))
-        return replace(state, optimisation=replace(state.optimisation, wish=wish, refusal=None))
 
-    def describe(self, before: State, after: State) -> str:
-        """Return what the step did."""
-        return changes("Wanted", before.optimisation.wish, after.optimisation.wish)
+@dataclass(frozen=True)
+class SetObjective(SetRequest):
+    """Change the objective, and reset the volume."""
+
+    def apply(self, state: State) -> State:
+        """Return the next state."""
+        return super().apply(with_value(state, "optimisation.request.volume", None))
 
 
 @dataclass(frozen=True)
 class StartRun(Action):
-    """Begin to look for the best design."""
+    """Start the search for the best design."""
 
     def apply(self, state: State) -> State:
-        """Return the next state; with the reason if it cannot begin.
+        """Return the next state, with the reason if there is no problem to search.
 
         Raises:
-            NoAnswerError: the limits cannot give what is asked for.
+            NoAnswerError: the limits rule out the demands.
         """
-        found = state.optimisation
-        if found.is_on:
+        optimisation = state.optimisation
+        if optimisation.is_on:
             return state
         try:
             problem = problem_of(state)
         except ExplorerError as error:
-            return replace(state, optimisation=replace(found, refusal=str(error)))
+            return replace(state, optimisation=replace(optimisation, refusal=str(error)))
         impossible = refuted(state)
         if impossible:
             raise NoAnswerError(words_of(impossible))
-        last = found.run
-        # What was found and not accepted is no design of the user's yet.
+        last = optimisation.run
+        # A result that is not accepted is not yet a design of the user.
         own = last.own if last is not None and last.is_undecided else state
         run = Run(
-            number=found.count + 1,
+            number=optimisation.count + 1,
             problem=problem,
-            starts=found.wish.starts,
+            starts=optimisation.request.starts,
             own=replace(own, optimisation=Optimisation()),
         )
         workspace = replace(state.view.workspace, solid=True)
         return replace(
             state,
-            optimisation=Optimisation(found.wish, run, run.number),
-            # The workspace is what it is all about.
+            optimisation=Optimisation(optimisation.request, run, run.number),
+            # The run shows its workspace.
             view=replace(state.view, workspace=workspace),
         )
 
@@ -126,7 +127,7 @@ class TakePaperBox(Action):
 
 @dataclass(frozen=True)
 class CancelRun(Action):
-    """Ask the run to end."""
+    """Cancel the run."""
 
     def apply(self, state: State) -> State:
         """Return the next state."""
@@ -135,7 +136,7 @@ class CancelRun(Action):
 
 @dataclass(frozen=True)
 class Advance(Action):
-    """Show iterates of a run, the last of which is drawn."""
+    """Add iterates to a run, and draw the last one."""
 
     continues: ClassVar[bool] = True
 
@@ -148,12 +149,12 @@ class Advance(Action):
         if run is None or run.number != self.number or not self.iterates:
             return state
         after = _with_run(state, lambda run: replace(run, iterates=run.iterates + self.iterates))
-        return _showing(after, self.iterates[-1].design)
+        return _with_design(after, self.iterates[-1].design)
 
 
 @dataclass(frozen=True)
 class EndRun(Action):
-    """End a run: what it found is shown, or if that is nothing, the user's own design."""
+    """End a run and show its result, or without one the user's own design."""
 
     template: ClassVar[str] = "Optimise: {design}"
 
@@ -169,13 +170,13 @@ class EndRun(Action):
             return state
         after = _with_run(state, lambda run: replace(run, phase="ended", verdict=self.verdict))
         if self.verdict.best is None:
-            return _back(after, run.own)
-        return _showing(after, _named(self.verdict.best.design))
+            return _restore_own(after, run.own)
+        return _with_design(after, _renamed(self.verdict.best.design))
 
 
 @dataclass(frozen=True)
 class Compare(Action):
-    """Put the measures of own and found design side by side."""
+    """Add the comparison of the user's own design and the new one."""
 
     continues: ClassVar[bool] = True
 
@@ -193,7 +194,7 @@ class Compare(Action):
 
 @dataclass(frozen=True)
 class Accept(Action):
-    """Make what was found the design of the user."""
+    """Make the result the design of the user."""
 
     template: ClassVar[str] = "Accept {design}"
 
@@ -214,40 +215,33 @@ class Revert(Action):
 
     def apply(self, state: State) -> State:
         """Return the next state."""
-        found = state.optimisation
-        if found.run is None or not found.run.is_undecided:
+        run = state.optimisation.run
+        if run is None or not run.is_undecided:
             return state
-        forgotten = replace(state, optimisation=replace(found, run=None))
-        return _back(forgotten, found.run.own)
+        without_run = replace(state, optimisation=replace(state.optimisation, run=None))
+        return _restore_own(without_run, run.own)
 
 
 def _with_run(state: State, change: Callable[[Run], Run]) -> State:
-    found = state.optimisation
-    if found.run is None or not found.is_on:
+    optimisation = state.optimisation
+    if optimisation.run is None or not optimisation.is_on:
         return state
-    return replace(state, optimisation=replace(found, run=change(found.run)))
+    return replace(state, optimisation=replace(optimisation, run=change(optimisation.run)))
 
 
-def _back(state: State, own: State) -> State:
-    """Return the user's own state, with what is looked at as it is now."""
-    return replace(
-        own,
-        view=state.view,
-        hold=state.hold,
-        optimisation=state.optimisation,
-        compared=state.compared,
-        studies=state.studies,
-    )
+def _restore_own(state: State, own: State) -> State:
+    """Return the user's own state with the present view."""
+    return replace(own, **kept_on_open(state) | {"optimisation": state.optimisation})
 
 
-def _showing(state: State, design: Design) -> State:
-    """Return the state with a design of a run, in the orientation that its workspace has."""
+def _with_design(state: State, design: Design) -> State:
+    """Return the state with a design of a run, in the orientation of its home pose."""
     pose = Pose(state.pose.position, home_pose(design).quaternion)
     return moved(replace(state, design=design), pose)
 
 
-def _named(design: Design) -> Design:
-    """Return a design by a name of its own: it is not the one that it came from."""
+def _renamed(design: Design) -> Design:
+    """Return a design with a name that differs from the user's own design."""
     if design.name.endswith(SUFFIX):
         return design
     name = design.name[: LONGEST_NAME - len(SUFFIX)] + SUFFIX

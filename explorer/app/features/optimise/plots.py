@@ -1,4 +1,4 @@
-"""Three charts of a run: the objective, the volume and the worst constraint by iterates."""
+"""Three charts of a run over its iterates: the objective, the volume, the worst constraint."""
 
 from __future__ import annotations
 
@@ -14,27 +14,26 @@ from viser import uplot
 
 from explorer.app.state.state import Run
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.charts import BLUE, FONT, ORANGE
+from explorer.app.widgets.charts import BLUE, FONT, ORANGE, add_chart, line
 from explorer.app.widgets.colours import css
-from explorer.app.widgets.markup import DIM, format_number
+from explorer.app.widgets.markup import format_number
 from explorer.optimise import curves
 from explorer.optimise.outcome import Iterate
 from explorer.optimise.problem import Problem
 
 HEIGHT = 96
-BLANK = np.zeros(2)
-# Of the span of the values: how far an axis goes beyond them.
-BEYOND = 0.12
+# Padding of an axis beyond the values, as a share of their span.
+PADDING = 0.12
 
 
 class Curve(NamedTuple):
-    """What a chart shows.
+    """The content of a chart.
 
     Attributes:
-        caption: What it is, with the last value.
-        values: One for each iterate.
-        level: What they are compared with, or None.
-        powers: Whether values are powers of ten, each told by its exponent.
+        caption: Name of the values, with the last one.
+        values: One value for each iterate.
+        level: Value to compare the others with, or None.
+        powers: Whether the values are exponents of ten.
     """
 
     caption: str
@@ -51,21 +50,10 @@ class OptimisePlots:
 
     def _add(self, gui: viser.GuiApi) -> tuple[viser.GuiHtmlHandle, viser.GuiUplotHandle]:
         caption = gui.add_html("", visible=False)
-        chart = gui.add_uplot(
-            (BLANK,) * 3,
-            _series(),
-            scales=_scales(Curve("", BLANK, None)),
-            axes=_axes(),
-            legend={"show": False},
-            cursor={"drag": {"x": False, "y": False}},
-            height=HEIGHT,
-            padding=(6, 14, 0, 0),
-            visible=False,
-        )
-        return caption, chart
+        return caption, add_chart(gui, _series(), _axes(), height=HEIGHT, padding=(6, 14, 0, 0))
 
     def updates(self, run: Run | None) -> Iterator[Update]:
-        """Yield what makes them show a run."""
+        """Yield the updates that show a run."""
         shown = [] if run is None else curves_of(run)
         for index, (caption, chart) in enumerate(self._charts):
             curve = shown[index] if index < len(shown) else None
@@ -78,25 +66,25 @@ class OptimisePlots:
 
 
 def curves_of(run: Run) -> list[Curve]:
-    """Return the curves of the start that is looked at: the present one, in the end the best."""
+    """Return the curves of the present start; once the run has ended, of the best one."""
     if not run.iterates:
         return []
     which = (run.best or run.iterates[-1]).run
-    iterates = [each for each in run.iterates if each.run == which]
+    iterates = [iterate for iterate in run.iterates if iterate.run == which]
     if not iterates:
         return []
     return [
-        Curve(_words(run.problem, iterates[-1], curve), curve.values, curve.level, curve.powers)
+        Curve(_name(run.problem, iterates[-1], curve), curve.values, curve.level, curve.powers)
         for curve in curves.curves_of(run.problem, iterates)
     ]
 
 
-def _words(problem: Problem, last: Iterate, curve: curves.Curve) -> str:
-    """Return what a curve is, with its last value."""
+def _name(problem: Problem, last: Iterate, curve: curves.Curve) -> str:
+    """Return the name of the values of a curve, with the last one."""
     if curve.kind == "spare":
-        return f"Worst constraint, missed below 0: {last.worst or 'none'}"
+        return f"Worst constraint, broken below 0: {last.worst or 'none'}"
     if curve.kind == "volume":
-        target = "" if curve.level is None else f", wanted {curve.level:.6g}"
+        target = "" if curve.level is None else f", required {curve.level:.6g}"
         return f"Volume (units³): {last.volume:.6g}{target}"
     if curve.powers:
         return f"log10 of F = |1 − V / V′|; F = {last.objective:.2g}".replace("e-", "e−")
@@ -112,11 +100,7 @@ def data_of(curve: Curve) -> tuple[NDArray[np.float64], ...]:
 
 
 def _caption(text: str) -> str:
-    return (
-        f'<div style="{DIM};font-size:11.5px;padding:4px 12px 0;overflow:hidden;'
-        f'text-overflow:ellipsis;white-space:nowrap;font-variant-numeric:tabular-nums">'
-        f"{escape(text)}</div>"
-    )
+    return f'<div class="ex-note ex-dim ex-cut">{escape(text)}</div>'
 
 
 def _series() -> tuple[uplot.Series, ...]:
@@ -124,28 +108,21 @@ def _series() -> tuple[uplot.Series, ...]:
         "label": "value",
         "stroke": css(BLUE),
         "width": 2.0,
-        # Shown where they are apart.
+        # uPlot shows points only where they do not touch.
         "points": {"size": 5, "fill": css(BLUE)},
     }
-    level: uplot.Series = {
-        "label": "level",
-        "stroke": css(ORANGE),
-        "width": 1.0,
-        "dash": (4, 4),
-        "points": {"show": False},
-    }
-    return ({"label": "iteration"}, values, level)
+    return values, line("level", ORANGE, width=1.0, dash=(4, 4))
 
 
 def _scales(curve: Curve) -> dict[str, uplot.Scale]:
     last = max(1.0, len(curve.values) - 1.0)
-    every = [*curve.values.tolist(), *([] if curve.level is None else [curve.level])]
-    low, high = min(every), max(every)
+    heights = [*curve.values.tolist(), *([] if curve.level is None else [curve.level])]
+    low, high = min(heights), max(heights)
     if curve.powers:
         low = math.floor(low)
         edges = float(low), float(max(math.ceil(high), low + 1))
     else:
-        room = BEYOND * (high - low) or 0.05 * abs(high) or 1.0
+        room = PADDING * (high - low) or 0.05 * abs(high) or 1.0
         edges = low - room, high + room
     return {"x": {"time": False, "range": (0.0, last)}, "y": {"range": edges}}
 

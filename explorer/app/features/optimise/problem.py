@@ -1,4 +1,4 @@
-"""The problem that a wish makes of a design, and what suits the design where nothing is said."""
+"""The problem of the optimiser for a design, with values that suit the design by default."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from functools import lru_cache
 import msgspec
 import numpy as np
 
-from explorer.app.state.optimisation import PLACE, Wish
+from explorer.app.state.optimisation import PLACE, OptimisationRequest
 from explorer.app.state.state import State
 from explorer.errors import ExplorerError
 from explorer.measures.size import longest_length
@@ -25,109 +25,104 @@ from explorer.optimise.refutation.refutation import Refutation, paper_box, refut
 from explorer.workspace.limits.constraints import Never, constraints
 from explorer.workspace.slices.volume import workspace_volume
 
-# The volume to match, unless one is given: more than the design has, by this factor or so.
+# Default volume to match, as a multiple of the present volume.
 MORE = 1.1
-
-
-# Of the largest box about home in the workspace: the edge of the one that is suggested.
+# Edge of the default box, as a share of that of the largest box about home in the workspace.
 SHARE_OF_BOX = 0.5
-
-
-# Positions on each edge of a box at which it is tried, and halvings of its edge.
+# Number of positions checked on each edge of a box, and of halvings of the edge.
 TRIED, HALVINGS = 5, 30
 
 
-def wished_volume(state: State) -> float:
-    """Return the volume that is asked for."""
-    return _wished_volume(state.base, state.optimisation.wish)
+def requested_volume(state: State) -> float:
+    """Return the required volume."""
+    return _requested_volume(state.base, state.optimisation.request)
 
 
-def wished_reach(state: State) -> float:
-    """Return the largest reach that is asked for."""
-    return _wished_reach(state.base, state.optimisation.wish)
+def requested_reach(state: State) -> float:
+    """Return the largest reach allowed."""
+    return _requested_reach(state.base, state.optimisation.request)
 
 
-def wished_box(state: State) -> Box:
-    """Return the box that is required."""
-    return _wished_box(state.base, state.optimisation.wish)
+def requested_box(state: State) -> Box:
+    """Return the required box."""
+    return _requested_box(state.base, state.optimisation.request)
 
 
-def _wished_volume(base: Design, wish: Wish) -> float:
-    if wish.volume is not None:
-        return wish.volume
-    return _volume(base, same=wish.objective == "smallest-reach")
+def _requested_volume(base: Design, request: OptimisationRequest) -> float:
+    if request.volume is not None:
+        return request.volume
+    return _default_volume(base, same=request.objective == "smallest-reach")
 
 
-def _wished_reach(base: Design, wish: Wish) -> float:
-    return longest_length(base) if wish.reach is None else wish.reach
+def _requested_reach(base: Design, request: OptimisationRequest) -> float:
+    return longest_length(base) if request.reach is None else request.reach
 
 
-def _wished_box(base: Design, wish: Wish) -> Box:
-    return wish.box or box_within(base)
+def _requested_box(base: Design, request: OptimisationRequest) -> Box:
+    return request.box or box_within(base)
 
 
 def problem_of(state: State) -> Problem:
-    """Return the problem that is asked for, from the present design.
+    """Return the problem of the present design.
 
     Raises:
-        ExplorerError: it cannot be asked like that.
+        ExplorerError: the values make no problem.
     """
-    return _problem(state.design, state.base, state.optimisation.wish)
+    return _problem(state.design, state.base, state.optimisation.request)
 
 
-def _problem(design: Design, base: Design, wish: Wish) -> Problem:
-    free = [name for name in wish.free if name in (*VARIABLES, YAW)]
-    if wish.needs_box and PLACE in wish.free:
+def _problem(design: Design, base: Design, request: OptimisationRequest) -> Problem:
+    free = [name for name in request.free if name in (*VARIABLES, YAW)]
+    if request.needs_box and PLACE in request.free:
         free += SHIFTS
     problem = make_problem(
         design,
-        wish.objective,
-        volume=_wished_volume(base, wish) if wish.needs_volume else None,
-        reach=_wished_reach(base, wish) if wish.needs_reach else None,
-        clearance=None if wish.clearance == 0.0 else wish.clearance,
-        required_box=_wished_box(base, wish) if wish.needs_box else None,
+        request.objective,
+        volume=_requested_volume(base, request) if request.needs_volume else None,
+        reach=_requested_reach(base, request) if request.needs_reach else None,
+        clearance=None if request.clearance == 0.0 else request.clearance,
+        required_box=_requested_box(base, request) if request.needs_box else None,
         free=[name for name in free if name not in VARIABLES],
     )
-    variables = tuple(each for each in problem.variables if each.name in free)
+    variables = tuple(variable for variable in problem.variables if variable.name in free)
     return msgspec.structs.replace(problem, variables=variables)
 
 
 def refuted(state: State) -> tuple[Refutation, ...]:
-    """Return what the limits cannot give of what is asked for.
+    """Return the demands that the limits rule out.
 
-    Empty if a search may give it, and where no problem can be made of it: that is told when
-    the search is asked for.
+    Empty if a search may keep all, and if the values make no problem, which `StartRun` reports.
     """
-    return _refuted(state.design, state.base, state.optimisation.wish)
+    return _refuted(state.design, state.base, state.optimisation.request)
 
 
 @lru_cache(maxsize=8)
-def _refuted(design: Design, base: Design, wish: Wish) -> tuple[Refutation, ...]:
-    problem = _problem_or_none(design, base, wish)
+def _refuted(design: Design, base: Design, request: OptimisationRequest) -> tuple[Refutation, ...]:
+    problem = _problem_or_none(design, base, request)
     return () if problem is None else refutations(problem)
 
 
 def box_on_offer(state: State) -> Box | None:
-    """Return the box of the paper's optimum where that holds what is asked for."""
-    return _box_on_offer(state.design, state.base, state.optimisation.wish)
+    """Return the box of the paper's optimum if it can hold what is required; else None."""
+    return _box_on_offer(state.design, state.base, state.optimisation.request)
 
 
 @lru_cache(maxsize=8)
-def _box_on_offer(design: Design, base: Design, wish: Wish) -> Box | None:
-    problem = _problem_or_none(design, base, wish)
+def _box_on_offer(design: Design, base: Design, request: OptimisationRequest) -> Box | None:
+    problem = _problem_or_none(design, base, request)
     return None if problem is None else paper_box(problem)
 
 
-def _problem_or_none(design: Design, base: Design, wish: Wish) -> Problem | None:
+def _problem_or_none(design: Design, base: Design, request: OptimisationRequest) -> Problem | None:
     try:
-        return _problem(design, base, wish)
+        return _problem(design, base, request)
     except ExplorerError:
         return None
 
 
 @lru_cache(maxsize=8)
 def box_within(design: Design) -> Box:
-    """Return a box in the workspace about the home position, or where that is not, a small one."""
+    """Return a box in the workspace about the home position; a small one if home is outside."""
     home = home_pose(design)
     limits = constraints(design, home.rotation)
     middle = np.array(home.position)
@@ -145,7 +140,7 @@ def box_within(design: Design) -> Box:
         half = 0.5 * (low + high)
         low, high = (half, high) if is_within(half) else (low, half)
     edge = SHARE_OF_BOX * low or 0.1 * design.reach
-    # Round numbers read better, and the box need not be just this one.
+    # Round numbers read better, and the box need not be exact.
     unit = 10.0 ** math.floor(math.log10(edge) - 1.0)
     digits = max(0, -round(math.log10(unit)))
     lows, highs = (
@@ -156,8 +151,8 @@ def box_within(design: Design) -> Box:
 
 
 @lru_cache(maxsize=8)
-def _volume(design: Design, *, same: bool) -> float:
-    """Return the volume of a design to six digits, or the next round one that is larger."""
+def _default_volume(design: Design, *, same: bool) -> float:
+    """Return the volume of a design to six digits if `same`, else the next larger round one."""
     volume = workspace_volume(design).volume or design.reach**3
     if same:
         return float(f"{volume:.6g}")

@@ -1,7 +1,7 @@
-"""Runs the optimiser in a process of its own and lets the page follow its iterates.
+"""The optimiser in a process of its own, and its iterates on the page.
 
-The search may be done in a blink, which nobody would see: its iterates are shown one after
-the other, no faster than they are drawn, and many of them in few steps.
+The iterates of a quick search are shown one after the other, no faster than they are drawn, and
+many of them in few steps.
 """
 
 from __future__ import annotations
@@ -9,55 +9,48 @@ from __future__ import annotations
 import math
 import threading
 import time
-from collections.abc import Callable
 
+from explorer.app.features.feature import Runner, Services
 from explorer.app.features.optimise import tasks
 from explorer.app.features.optimise.actions import Advance, Compare, EndRun
-from explorer.app.session.faults import Faults
+from explorer.app.features.workspace.feed import WorkspaceFeed
 from explorer.app.session.jobs import Worker
-from explorer.app.session.session import Session
 from explorer.app.state.action import Action
 from explorer.app.state.frame import Frame
-from explorer.app.state.optimisation import SearchResult, cut_short, verdict_of
+from explorer.app.state.optimisation import SearchResult, killed_result, result_of
 from explorer.app.state.state import Run, State
 from explorer.optimise.outcome import Iterate, Outcome
 
-# Seconds between two iterates that are shown, and that one waits to be drawn at the most.
+# Least seconds between two iterates on the page, and most to wait for the drawing of one.
 PACE, LONGEST = 0.07, 0.25
-# However many iterates wait, about so many steps show them.
+# Number of advances of the page that show all waiting iterates.
 STEPS = 25
-# Seconds after which a search that was cancelled ends with its process.
+# Seconds after which the process of a cancelled search is ended.
 PATIENCE = 0.1
+
+# Seconds between two checks for the end of a search.
+WAIT_SECONDS = 0.02
 
 DIED = "the optimiser's process died; the design is as it was, and Optimise starts it again"
 
 
-class Optimiser:
-    """Does what the state asks for: begins the search, cancels it, tells how it goes.
+class Optimiser(Runner):
+    """Runner that starts and cancels searches as the state requests, and shows their iterates."""
 
-    Args:
-        session: Which is told.
-        report: Called with a message when the process died or failed unexpectedly.
-        is_drawn: Whether the page shows all of the last iterate.
-        faults: Where requests are kept that failed unexpectedly; None to keep none.
-    """
-
-    def __init__(
-        self,
-        session: Session,
-        report: Callable[[str], None],
-        is_drawn: Callable[[], bool],
-        faults: Faults | None = None,
-    ) -> None:
-        self.worker = Worker(report, preload=[tasks.__name__], died=DIED, faults=faults)
-        self._session = session
-        self._is_drawn = is_drawn
+    def __init__(self, services: Services) -> None:
+        self.worker = Worker(
+            services.tell, preload=[tasks.__name__], died=DIED, faults=services.faults
+        )
+        self._session = services.session
+        # The drawings tell whether the page shows all of the last iterate.
+        self._drawings = services.get(WorkspaceFeed)
+        services.at_end(self.stop)
         self._stopped = threading.Event()
-        # What has come and was not shown yet; written by the worker's thread too.
+        # Iterates and end that are not shown yet; the worker's thread writes them too.
         self._lock = threading.Lock()
         self._waiting: list[Iterate] = []
         self._ending: Outcome | str | None = None
-        # Of the run that was begun last: its number, its order, when it was last advanced.
+        # Number and order of the last run, and the time of its last advance.
         self._number = 0
         self._order = 0
         self._advanced = 0.0
@@ -65,7 +58,7 @@ class Optimiser:
         self._compared = 0
 
     def follow(self, frame: Frame) -> None:
-        """Do what a frame asks for, unless it is done already."""
+        """Start, cancel or compare as a frame requests, once."""
         run = frame.state.optimisation.run
         if run is None:
             return
@@ -78,8 +71,19 @@ class Optimiser:
             self._compared = run.number
             self._compare(run)
 
+    def prepare(self) -> None:
+        """Start the process of the searches."""
+        self.worker.start()
+
+    def wait_until_idle(self, timeout: float) -> bool:
+        """Wait until a search and its comparison have ended; return whether they have."""
+        deadline = time.monotonic() + timeout
+        while self._session.state.optimisation.is_on and time.monotonic() < deadline:
+            time.sleep(WAIT_SECONDS)
+        return self.worker.wait_until_idle(deadline - time.monotonic())
+
     def stop(self) -> None:
-        """End the process and whatever waits for it."""
+        """End the process and the thread that waits for it."""
         self._stopped.set()
         self.worker.stop()
 
@@ -94,11 +98,11 @@ class Optimiser:
             (run.problem, run.starts),
             self._ended,
             self._ended,
-            told=self._told,
+            receive=self._receive,
         )
         threading.Thread(target=self._play, args=(number,), name="iterates", daemon=True).start()
 
-    def _told(self, iterate: Iterate) -> None:
+    def _receive(self, iterate: Iterate) -> None:
         with self._lock:
             self._waiting.append(iterate)
 
@@ -117,14 +121,14 @@ class Optimiser:
                 is_idle = not self._waiting and self._ending is None
             if is_idle or self._session.is_waiting(self):
                 continue
-            if self._is_drawn() or time.monotonic() - self._advanced > LONGEST:
+            if self._drawings.is_settled or time.monotonic() - self._advanced > LONGEST:
                 self._post()
 
     def _post(self) -> None:
         self._session.post(self, self._advance)
 
     def _advance(self, state: State) -> Action:
-        """Return what shows the next iterates, or the end once all are shown."""
+        """Return the action that shows the next iterates, or the end once all are shown."""
         run = state.optimisation.run
         with self._lock:
             if run is None or run.number != self._number or run.phase == "ended":
@@ -138,7 +142,7 @@ class Optimiser:
             if not is_over or self._ending is None:
                 return Advance(run.number, shown)
             self._number = 0
-            verdict = _verdict(run, run.iterates + shown, self._ending, self._is_cancelled)
+            verdict = _verdict_of(run, run.iterates + shown, self._ending, self._is_cancelled)
             return EndRun(run.number, verdict, shown)
 
     def _compare(self, run: Run) -> None:
@@ -153,16 +157,16 @@ class Optimiser:
             "compare",
             tasks.compare,
             (run.own.design, best.design, margin, boxes),
-            lambda found: self._session.do(Compare(run.number, found)),
+            lambda comparison: self._session.do(Compare(run.number, comparison)),
             lambda _: None,
         )
 
 
-def _verdict(
+def _verdict_of(
     run: Run, iterates: tuple[Iterate, ...], ending: Outcome | str, is_cancelled: bool
 ) -> SearchResult:
     if isinstance(ending, Outcome):
-        return verdict_of(ending, run.starts)
+        return result_of(ending, run.starts)
     if is_cancelled:
-        return cut_short(run.problem, iterates)
+        return killed_result(run.problem, iterates)
     return SearchResult("failed", ending)

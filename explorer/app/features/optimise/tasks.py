@@ -1,8 +1,8 @@
-"""The tasks of the optimiser's process: to look for a design, and to compare two."""
+"""The tasks of the optimiser's process: search for a design, compare two."""
 
 from __future__ import annotations
 
-from explorer.app.session.worker import Line
+from explorer.app.session.worker import Channel
 from explorer.app.state.optimisation import Comparison
 from explorer.measures.case import Case
 from explorer.measures.catalogue import measures_in
@@ -13,18 +13,18 @@ from explorer.optimise.problem import Box, Problem
 from explorer.optimise.solver import optimise_design
 
 
-def optimise(problem: Problem, starts: int, line: Line) -> Outcome:
-    """Look for the best design, telling each iterate as it is found.
+def optimise(problem: Problem, starts: int, channel: Channel) -> Outcome:
+    """Search for the best design, and send each iterate to the parent.
 
     Args:
-        problem: What to look for.
-        starts: From how many designs.
-        line: To the parent.
+        problem: Problem to solve.
+        starts: Number of designs to start from.
+        channel: Channel to the parent.
 
     Raises:
         InputError: see `optimise_design`.
     """
-    return optimise_design(problem, starts=starts, watch=line.tell, stop=line.is_cut)
+    return optimise_design(problem, starts=starts, watch=channel.send, stop=channel.is_cancelled)
 
 
 def compare(
@@ -36,10 +36,10 @@ def compare(
     """Return the measures of two designs.
 
     Args:
-        before: The one to compare with.
-        after: The other.
-        demanded_margin: From which margin on a clearance was demanded; None if it was not.
-        boxes: Over which the least margin of each is looked for, or None.
+        before: Design to compare with.
+        after: Other design.
+        demanded_margin: Margin from which on a clearance is demanded; None without a demand.
+        boxes: Box of each for its least margin, or None.
     """
     first, second = (
         measure_design(

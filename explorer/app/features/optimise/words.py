@@ -1,4 +1,4 @@
-"""An optimisation in words: how far it has got, how it ended, and old beside new."""
+"""The progress, the verdict and the comparison of an optimisation as HTML."""
 
 from __future__ import annotations
 
@@ -8,7 +8,18 @@ from html import escape
 
 from explorer.app.state.optimisation import SearchResult
 from explorer.app.state.state import Run, State
-from explorer.app.widgets.markup import BEYOND, DIM, WITHIN, alert, decimals_for, format_number
+from explorer.app.widgets.markup import (
+    Look,
+    alert,
+    box,
+    decimals_for,
+    dim,
+    format_number,
+    meter,
+    row,
+    status,
+    table,
+)
 from explorer.measures.catalogue import CATALOGUE
 from explorer.measures.clearance import CERTAIN
 from explorer.measures.measurements import Measurements
@@ -17,18 +28,14 @@ from explorer.optimise.curves import CALLED
 from explorer.optimise.problem import YAW, ObjectiveName, Problem
 from explorer.optimise.refutation.refutation import BOX_LIMIT, Refutation
 
-BOX = (
-    '<div style="padding:6px 12px 4px;font-size:12.5px;line-height:1.45;'
-    'font-variant-numeric:tabular-nums">'
-)
 TITLES = {
-    "converged": ("Found", WITHIN),
-    "not converged": ("Not converged", BEYOND),
-    "infeasible": ("No design keeps all demands", BEYOND),
-    "stalled": ("Stalled", BEYOND),
-    "cancelled": ("Cancelled: the best so far", BEYOND),
+    "converged": "Converged",
+    "not converged": "Not converged",
+    "infeasible": "No design keeps all demands",
+    "stalled": "Stalled",
+    "cancelled": "Cancelled: the best so far",
 }
-# Significant digits of the larger of two numbers that are compared.
+# Significant digits of the larger of two compared numbers.
 DIGITS = 6
 # The measure that each objective improves.
 GOALS: dict[ObjectiveName, str] = {
@@ -40,95 +47,88 @@ GOALS: dict[ObjectiveName, str] = {
 
 
 def refused_words(refusals: Sequence[Refutation]) -> str:
-    """Return what the limits cannot give of what is asked for, as HTML."""
+    """Return the demands that the limits rule out, as HTML."""
     title = "No design can keep these demands"
-    body = " ".join(_sentence(each.message) for each in refusals)
-    if any(each.limit != BOX_LIMIT for each in refusals):
-        body += " Ask for less, or change the limits in the tab Design."
+    body = " ".join(_sentence(refusal.message) for refusal in refusals)
+    if any(refusal.limit != BOX_LIMIT for refusal in refusals):
+        body += " Lower the demands, or change the limits in the tab Design."
     return alert(title, body)
 
 
 def progress_line(run: Run) -> str:
-    """Return how far a run has got, as HTML."""
+    """Return the progress of a run, as HTML."""
     if run.phase == "cancelling":
         return _running("Cancelling …", "", 0.0)
     if not run.iterates:
-        return _running("Starting …", "the first time, kernels are compiled", 0.0)
+        return _running("Starting …", "the first start compiles kernels", 0.0)
     last = run.iterates[-1]
-    inside = sum(each.run == last.run for each in run.iterates) - 1
+    step = sum(iterate.run == last.run for iterate in run.iterates) - 1
     start = f"start {last.run + 1} of {run.starts}, " if run.starts > 1 else ""
-    missed = f", missed: {last.worst}" if last.spare < 0.0 else ""
+    broken = f", broken: {last.worst}" if last.spare < 0.0 else ""
     name = CALLED[run.problem.objective]
     return _running(
-        f"{start}{last.phase} {inside}".capitalize(),
-        f"{name} {format_number(last.objective, 5)}{missed}",
+        f"{start}{last.phase} {step}".capitalize(),
+        f"{name} {format_number(last.objective, 5)}{broken}",
         last.run / run.starts,
     )
 
 
 def verdict_words(state: State, run: Run, verdict: SearchResult) -> str:
-    """Return how a run ended, as HTML."""
+    """Return the verdict on a run, as HTML."""
     if verdict.status == "failed":
-        return alert("Nothing was found", f"{_sentence(verdict.message)} Your design is as it was.")
-    title, colour = TITLES[verdict.status]
-    if verdict.best is None:
-        title = "Cancelled"
+        return alert("No result", f"{_sentence(verdict.message)} Your design is as it was.")
+    title = "Cancelled" if verdict.best is None else TITLES[verdict.status]
     message = _sentence(verdict.message.removeprefix(f"{verdict.status}: "))
-    facts: list[str] = []
+    remarks: list[str] = []
     if verdict.starts > 1:
-        facts.append(f"{verdict.starts} starts, {verdict.converged} converged")
+        remarks.append(f"{verdict.starts} starts, {verdict.converged} converged")
     if verdict.seconds is not None:
-        facts.append(f"{verdict.seconds:.2g} s")
+        remarks.append(f"{verdict.seconds:.2g} s")
     if run.accepted:
-        facts.append("accepted")
+        remarks.append("accepted")
     if verdict.best is not None and state.design.variables != verdict.best.design.variables:
-        facts.append("changed by hand since")
-    return (
-        f'{BOX}<div style="font-size:15px;font-weight:600;color:{colour};margin-bottom:2px">'
-        f"{title}</div><div>{escape(message)}</div>"
-        f'<div style="{DIM};font-size:11.5px;margin-bottom:6px">{" · ".join(facts)}</div></div>'
+        remarks.append("changed by hand since")
+    return box(
+        status(title, "within" if verdict.status == "converged" else "beyond"),
+        f"<div>{escape(message)}</div>",
+        f'<div class="ex-dim ex-small">{" · ".join(remarks)}</div>',
     )
 
 
 @dataclass(frozen=True)
 class Row:
-    """A measure of two designs.
+    """A measure or a variable of two designs.
 
     Attributes:
-        name: What it is, with its unit.
-        hint: What it means.
-        before, after: None if there is none.
-        whole: Whether it is a count.
-        colour: Of the change, where that means something.
-        is_goal: Whether it is what was wanted.
+        name: Name, with the unit after a comma.
+        hint: Meaning.
+        before, after: Values; None where there is none.
+        is_whole: Whether it is a count.
+        look: Whether the change keeps or breaks the demands, where that is defined.
+        is_goal: Whether it is the objective.
     """
 
     name: str
     hint: str
     before: float | None
     after: float | None
-    whole: bool = False
-    colour: str | None = None
+    is_whole: bool = False
+    look: Look | None = None
     is_goal: bool = False
 
 
 def comparison_table(run: Run) -> str:
-    """Return own and found design side by side, as HTML."""
+    """Return the user's own design and the best one side by side, as HTML."""
     if run.comparison is None:
-        return f'{BOX}<span style="{DIM}">Comparing …</span></div>'
+        return box(dim("Comparing …"))
     before, after = run.comparison.before, run.comparison.after
-    right = f'<td style="text-align:right;{DIM}">'
-    head = f"<tr><td></td>{right}old</td>{right}new</td>{right}change</td></tr>"
-    measures = "".join(map(_row, measure_rows(run.problem, before, after)))
-    own = zip(VARIABLES, before.design.variables, after.design.variables, strict=True)
-    variables = "".join(
-        _row(Row(name, "Design variable, in design units", first, second), is_first=index == 0)
-        for index, (name, first, second) in enumerate(own)
+    measures = map(_row, measure_rows(run.problem, before, after))
+    both = zip(VARIABLES, before.design.variables, after.design.variables, strict=True)
+    variables = (
+        _row(Row(name, "Design variable, in design units", old, new), is_first=index == 0)
+        for index, (name, old, new) in enumerate(both)
     )
-    return (
-        f'{BOX}<table style="width:100%;border-collapse:collapse">{head}{measures}{variables}'
-        "</table></div>"
-    )
+    return box(table((*measures, *variables), ("", "old", "new", "change")))
 
 
 def measure_rows(problem: Problem, before: Measurements, after: Measurements) -> Iterator[Row]:
@@ -160,21 +160,21 @@ def measure_rows(problem: Problem, before: Measurements, after: Measurements) ->
             before[name],
             after[name],
             measure.is_whole,
-            _colour(problem, name, before, after),
+            _look(problem, name, before, after),
             is_goal=name == goal,
         )
 
 
-def _colour(problem: Problem, name: str, before: Measurements, after: Measurements) -> str | None:
-    """Return the colour of a change: better or worse for the problem, None if neither."""
+def _look(problem: Problem, name: str, before: Measurements, after: Measurements) -> Look | None:
+    """Return whether a change is good or bad for the problem; None if neither."""
     old, new = before[name] or 0.0, after[name] or 0.0
-    # Clearances are known to this length.
-    known = CERTAIN * (after["reach"] or 0.0)
+    # Clearances are exact to this length.
+    accuracy = CERTAIN * (after["reach"] or 0.0)
     if name == "least_clearance":
-        return BEYOND if after[name] is not None and new <= known else None
+        return "beyond" if after[name] is not None and new <= accuracy else None
     if name == "demanded_clearance":
         demand = problem.demands.clearance or 0.0
-        return BEYOND if after[name] is not None and new < demand - known else WITHIN
+        return "beyond" if after[name] is not None and new < demand - accuracy else "within"
     if name != GOALS[problem.objective]:
         return None
     if problem.objective == "match-volume":
@@ -182,31 +182,33 @@ def _colour(problem: Problem, name: str, before: Measurements, after: Measuremen
         is_better = abs(new - target) < abs(old - target)
     else:
         is_better = new > old if CATALOGUE[name].sense == "more" else new < old
-    return WITHIN if is_better else None
+    return "within" if is_better else None
 
 
-def _row(row: Row, *, is_first: bool = False) -> str:
-    larger = max((abs(each) for each in (row.before, row.after) if each is not None), default=0.0)
-    digits = 0 if row.whole else decimals_of(larger)
-    cells = [_number(each, digits) for each in (row.before, row.after)]
+def _row(line: Row, *, is_first: bool = False) -> str:
+    """Return a row of the table; the first of a group has a line above."""
+    largest = max(
+        (abs(value) for value in (line.before, line.after) if value is not None), default=0.0
+    )
+    digits = 0 if line.is_whole else decimals_of(largest)
     change = ""
-    if row.before is not None and row.after is not None:
-        change = _change(row.after - row.before, digits)
-    colour = f"color:{row.colour};" if row.colour is not None else ""
-    weight = "font-weight:600;" if row.is_goal else ""
-    top = "border-top:1px solid var(--mantine-color-default-border);" if is_first else ""
-    name, _, unit = row.name.partition(",")
-    unit = f'<span style="{DIM};font-weight:400">{unit}</span>' if unit else ""
-    right = f'<td style="text-align:right;{top}">'
-    return (
-        f'<tr title="{escape(row.hint)}" style="{weight}">'
-        f'<td style="padding:1px 0;{top}">{name}{unit}</td>{right}{cells[0]}</td>'
-        f'{right}{cells[1]}</td><td style="text-align:right;{top}{colour}">{change}</td></tr>'
+    if line.before is not None and line.after is not None:
+        change = _change(line.after - line.before, digits)
+    if line.look is not None:
+        change = f'<span class="ex-{line.look}">{change}</span>'
+    name, _, unit = line.name.partition(", ")
+    return row(
+        f"{name} {dim(unit)}" if unit else name,
+        _number(line.before, digits),
+        _number(line.after, digits),
+        change,
+        look=" ".join(["ex-strong"] * line.is_goal + ["ex-first"] * is_first),
+        hint=line.hint,
     )
 
 
 def decimals_of(size: float) -> int:
-    """Return how many decimals give a number of this size `DIGITS` digits, 4 at the most."""
+    """Return the decimals with which a number of a size has `DIGITS` digits, 4 at most."""
     return min(4, decimals_for(size, DIGITS)) if size > 0.0 else 1
 
 
@@ -220,19 +222,15 @@ def _change(value: float, digits: int) -> str:
 
 
 def _running(title: str, text: str, share: float) -> str:
-    return (
-        f'{BOX}<div style="font-weight:600">{escape(title)}</div>'
-        f'<div style="{DIM};overflow:hidden;text-overflow:ellipsis;white-space:nowrap">'
-        f"{escape(text) or '&nbsp;'}</div>"
-        '<div style="height:3px;border-radius:2px;margin:4px 0 2px;'
-        'background:color-mix(in srgb,currentColor 12%,transparent)">'
-        f'<div style="height:3px;border-radius:2px;width:{100.0 * share:.1f}%;'
-        'background:var(--mantine-primary-color-filled)"></div></div></div>'
+    return box(
+        f'<div class="ex-strong">{escape(title)}</div>',
+        f'<div class="ex-dim ex-cut">{escape(text) or "&nbsp;"}</div>',
+        meter(100.0 * share),
     )
 
 
 def _sentence(text: str) -> str:
-    """Return a message as a sentence."""
+    """Return a message with a capital and a full stop."""
     return f"{text[:1].upper()}{text[1:]}{'' if text.endswith('.') else '.'}"
 
 

@@ -1,4 +1,4 @@
-"""What can be done with paths: make, play, plan, and store the ends to plan between."""
+"""Actions on paths: to make, play and plan one, and to store its ends."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from explorer.mechanism.pose import Pose
 
 @dataclass(frozen=True)
 class ChooseModes(Action):
-    """Choose from which assembly mode to which to go."""
+    """Choose the assembly modes in which a path begins and ends."""
 
     template: ClassVar[str] = "Path from mode {action.first} to {action.last}"
 
@@ -32,7 +32,7 @@ class ChooseModes(Action):
 
 @dataclass(frozen=True)
 class WatchModes(Action):
-    """Go the straight way from one assembly mode of the present joints to another."""
+    """Play the straight path between the chosen assembly modes of the present joints."""
 
     template: ClassVar[str] = "Watch the path between modes"
 
@@ -40,7 +40,7 @@ class WatchModes(Action):
         """Return the next state, at the start of the path, playing.
 
         Raises:
-            InputError: the same mode twice.
+            InputError: the path begins and ends in the same mode.
         """
         first, last = chosen_modes(state)
         if first == last:
@@ -48,22 +48,22 @@ class WatchModes(Action):
                 f"a path between modes needs two of them; both are mode {last} ({mode_name(last)})"
             )
         journey = state.journey
-        at = state.pose
+        pose = state.pose
         if journey is not None and journey.kind == "modes" and journey.pose == state.pose:
-            # The joints on the way are others; those of its ends are meant.
-            at = journey.poses[0]
-        solution = forward(state.design, joints_of(state.design, at))
+            # The pose is on such a path: the joints are those of its ends.
+            pose = journey.poses[0]
+        solution = forward(state.design, joints_of(state.design, pose))
         start, end = (
             Pose.of(solution.position[mode], solution.rotation[mode]) for mode in (first, last)
         )
         title = f"Mode {first} ({mode_name(first)}) to mode {last} ({mode_name(last)})"
-        made = Journey("modes", title, state.design, (start, end), is_playing=True)
-        after = _with(state, journey=made, modes=(first, last))
+        path = Journey("modes", title, state.design, (start, end), is_playing=True)
+        after = _with(state, journey=path, modes=(first, last))
         return replace(moved(after, start), mode=first)
 
 
 def chosen_modes(state: State) -> tuple[int, int]:
-    """Return between which assembly modes to go."""
+    """Return the assembly modes in which a path begins and ends."""
     first, last = state.paths.modes
     begin = state.mode if first is None else first
     return begin, begin ^ 4 if last is None else last
@@ -81,7 +81,7 @@ class SetPathTime(Action):
         """Return the next state.
 
         Raises:
-            InputError: there is no path, or a time that is not finite.
+            InputError: there is no path, or the time is not finite.
         """
         journey = _journey(state)
         if not math.isfinite(self.seconds):
@@ -93,7 +93,7 @@ class SetPathTime(Action):
 
 @dataclass(frozen=True)
 class Play(Action):
-    """Let time go on along the path, from its start if it is at its end; or stop it."""
+    """Play the path, from its start if it is at its end; or pause it."""
 
     continues: ClassVar[bool] = True
 
@@ -115,7 +115,7 @@ class Play(Action):
 
 @dataclass(frozen=True)
 class Advance(Action):
-    """Let so many seconds pass on the path, if it is playing; at its end it stops."""
+    """Advance a path that is playing by some seconds, until its end."""
 
     continues: ClassVar[bool] = True
 
@@ -133,7 +133,7 @@ class Advance(Action):
 
 @dataclass(frozen=True)
 class StoreEnd(Action):
-    """Keep the present pose as the start or the goal of a path to plan."""
+    """Store the present pose as the start or the goal of a path to plan."""
 
     template: ClassVar[str] = "Store the {action.end} of a path"
 
@@ -147,27 +147,8 @@ class StoreEnd(Action):
 
 
 @dataclass(frozen=True)
-class SetPlanSeconds(Action):
-    """Set how long to look for a path, in seconds."""
-
-    template: ClassVar[str] = "Plan for {action.seconds:.3g} s"
-
-    seconds: float
-
-    def apply(self, state: State) -> State:
-        """Return the next state.
-
-        Raises:
-            InputError: not above zero.
-        """
-        if not (math.isfinite(self.seconds) and self.seconds > 0.0):
-            raise InputError(f"planning needs a time above zero; got {self.seconds:g} seconds")
-        return _with(state, seconds=self.seconds)
-
-
-@dataclass(frozen=True)
 class Plan(Action):
-    """Ask for a path from the stored start to the stored goal."""
+    """Request a path from the stored start to the stored goal."""
 
     template: ClassVar[str] = "Plan a path"
 
@@ -180,7 +161,7 @@ class Plan(Action):
         missing = [name for name in ("start", "goal") if getattr(state.paths, name) is None]
         if missing:
             raise InputError(
-                f"store a {' and a '.join(missing)} first: move the platform there and push its "
+                f"store a {' and a '.join(missing)} first: move the platform there and press its "
                 "button"
             )
         return _with(
@@ -190,7 +171,7 @@ class Plan(Action):
 
 @dataclass(frozen=True)
 class CancelPlan(Action):
-    """Do not go on planning."""
+    """Stop planning."""
 
     template: ClassVar[str] = "Stop planning"
 
@@ -201,12 +182,12 @@ class CancelPlan(Action):
 
 @dataclass(frozen=True)
 class TakePlan(Action):
-    """Take the path that a request has led to, or why there is none; late answers are dropped.
+    """Accept the result of planning, unless a newer request has replaced its own.
 
     Attributes:
-        request: The number of the request.
-        journey: The path, None without one.
-        problem: Why there is none.
+        request: Number of the request.
+        journey: The path; None if none was found.
+        problem: Reason why there is no path; None if there is one.
     """
 
     continues: ClassVar[bool] = True

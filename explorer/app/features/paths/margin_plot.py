@@ -1,4 +1,4 @@
-"""The three margins over a path as a chart, its crossings marked, and where the platform is."""
+"""The three margins along a path as a chart, with its crossings and the present time."""
 
 from __future__ import annotations
 
@@ -13,45 +13,59 @@ from viser import uplot
 from explorer.app.state.frame import Frame
 from explorer.app.state.paths import Journey
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.charts import BLUE, NEUTRAL, ORANGE, TEAL, VIOLET, axis
-from explorer.app.widgets.colours import Rgb, css
-from explorer.app.widgets.markup import DIM, format_number, signed
+from explorer.app.widgets.charts import (
+    BLUE,
+    NEUTRAL,
+    ORANGE,
+    TEAL,
+    VIOLET,
+    add_chart,
+    axis,
+    dots,
+    line,
+)
+from explorer.app.widgets.colours import Rgb
+from explorer.app.widgets.markup import box, dim, format_number, row, signed, swatch, table
 from explorer.mechanism.margins import INCIDENCES, margins
 from explorer.numerics.arrays import FloatArray
 
-# Told apart by every common deficiency of colour vision, and in grey; none is one that warns.
+# Lines of the margins: colours that are distinct in every common colour-vision deficiency and
+# differ from those of warnings, dashes, and the marks of the legend.
 COLOURS: tuple[Rgb, Rgb, Rgb] = (BLUE, TEAL, VIOLET)
 DASHES: tuple[tuple[float, ...], ...] = ((), (7.0, 3.0), (2.0, 3.0))
+STROKES = ("ex-stroke", "ex-stroke is-dashed", "ex-stroke is-dotted")
 HEIGHT = 200
-# Time, the three margins, zero, crossings, and now.
-COLUMNS = 7
-BLANK = np.zeros(2)
-# In the words below: crossings beyond these are counted only.
-MOST_TOLD = 6
+# Number of crossings that are listed; the others are counted.
+MOST_LISTED = 6
 
 
 class MarginPlot:
-    """The chart and its legend with the crossings; hidden while there is no path."""
+    """The chart and its legend, hidden while there is no path."""
 
     def __init__(self, gui: viser.GuiApi) -> None:
-        self._chart = gui.add_uplot(
-            (BLANK,) * COLUMNS,
-            _series(),
-            scales=_scales(1.0, 1.0),
-            axes=(
+        deltas = (
+            line(f"δ{index}", colour, dash=dash)
+            for index, (colour, dash) in enumerate(zip(COLOURS, DASHES, strict=True), start=1)
+        )
+        self._chart = add_chart(
+            gui,
+            (
+                *deltas,
+                line("zero", NEUTRAL, width=1.0),
+                dots("singular", ORANGE, 9),
+                line("now", NEUTRAL, width=1.5),
+            ),
+            (
                 axis("time (s)", label_size=20, size=28),
                 axis("δ (units)", label_size=18, size=40, space=26),
             ),
-            legend={"show": False},
-            cursor={"drag": {"x": False, "y": False}},
             height=HEIGHT,
             padding=(8, 12, 0, 0),
-            visible=False,
         )
         self._words = gui.add_html("", visible=False)
 
     def updates(self, frame: Frame) -> Iterator[Update]:
-        """Yield what makes them show the frame."""
+        """Yield the updates that make the chart and its legend show the frame."""
         journey = frame.state.journey
         for handle in (self._chart, self._words):
             yield handle, "visible", journey is not None
@@ -65,17 +79,17 @@ class MarginPlot:
 
 
 def columns_of(journey: Journey) -> tuple[NDArray[Any], ...]:
-    """Return the columns of the chart: time, δ1 to δ3, zero, crossings, and now."""
-    timed, found = journey.trajectory, journey.margins
-    crossings = [crossing_time(journey, i) for i in range(len(found.crossings))]
+    """Return the columns of the chart: time, δ1 to δ3, zero, crossings, and the present time."""
+    trajectory = journey.trajectory
+    crossings = [crossing_time(journey, i) for i in range(len(journey.margins.crossings))]
     now = journey.at
-    # Now stands twice, for a line from bottom to top.
-    times = np.concatenate([timed.time, crossings, [now, now]])
+    # The present time has two rows, for a line from bottom to top.
+    times = np.concatenate([trajectory.time, crossings, [now, now]])
     order = np.argsort(times, kind="stable")
     x = times[order]
-    deltas = _margins_at(journey, np.interp(x, timed.time, timed.at))
+    deltas = _margins_at(journey, np.interp(x, trajectory.time, trajectory.at))
     zero, crossed, cursor = np.zeros(len(x)), np.full(len(x), np.nan), np.full(len(x), np.nan)
-    first = len(timed.time)
+    first = len(trajectory.time)
     crossed[np.isin(order, np.arange(first, first + len(crossings)))] = 0.0
     top = 1.08 * float(np.abs(deltas).max())
     cursor[order == len(times) - 2] = -top
@@ -84,98 +98,60 @@ def columns_of(journey: Journey) -> tuple[NDArray[Any], ...]:
 
 
 def crossing_time(journey: Journey, index: int) -> float:
-    """Return when the path is at one of its crossings, in seconds."""
-    crossing, timed = journey.margins.crossings[index], journey.trajectory
-    return float(np.interp(crossing.move + crossing.share, timed.at, timed.time))
+    """Return the time of a crossing of the path, in seconds."""
+    crossing, trajectory = journey.margins.crossings[index], journey.trajectory
+    return float(np.interp(crossing.move + crossing.share, trajectory.at, trajectory.time))
 
 
 def _margins_at(journey: Journey, at: FloatArray) -> FloatArray:
-    """Return the margins (n, 3) at places of the path, by interpolation between its samples."""
-    known = journey.margins
-    return np.stack([np.interp(at, known.at, known.margins[:, i]) for i in range(3)], axis=1)
+    """Return the margins (n, 3) at n parameters of the path, interpolated between its samples."""
+    samples = journey.margins
+    return np.stack([np.interp(at, samples.at, samples.margins[:, i]) for i in range(3)], axis=1)
 
 
 def path_words(journey: Journey) -> str:
-    """Return the legend with the margins here, and the crossings, as HTML."""
+    """Return the legend with the present margins, and the crossings, as HTML."""
     pose = journey.pose
-    here = margins(pose.position, pose.rotation).tolist()
-    legend = "".join(
-        f'<tr><td style="padding:1px 0">{_swatch(index)}δ{index + 1}</td>'
-        f'<td style="{DIM}">{INCIDENCES[index]}</td>'
-        f'<td style="text-align:right">{signed(value)}</td></tr>'
-        for index, value in enumerate(here)
+    legend = (
+        row(
+            f'{swatch(colour, look)}δ{index} <span class="ex-dim ex-small">{incidence}</span>',
+            signed(value),
+        )
+        for index, (colour, look, incidence, value) in enumerate(
+            zip(
+                COLOURS,
+                STROKES,
+                INCIDENCES,
+                margins(pose.position, pose.rotation).tolist(),
+                strict=True,
+            ),
+            start=1,
+        )
     )
-    return (
-        '<div style="padding:0 12px 6px;font-size:12px;line-height:1.45;'
-        'font-variant-numeric:tabular-nums"><table style="width:100%;border-collapse:collapse">'
-        f'{legend}</table><div style="margin-top:5px">{_crossings(journey)}</div></div>'
-    )
+    return box(table(legend), f'<div class="ex-after">{_crossings(journey)}</div>')
 
 
 def _crossings(journey: Journey) -> str:
-    found = journey.margins
+    along_path = journey.margins
     lines = [
         f"{crossing_time(journey, i):.2f} s: δ{c.incidence} = 0"
         f"{'' if c.changes_sign else ', only touched'}"
-        for i, c in enumerate(found.crossings)
+        for i, c in enumerate(along_path.crossings)
     ]
-    lines += [f"all along a move: δ{each} = 0" for each in found.lies_in]
+    lines += [f"along a whole move: δ{index} = 0" for index in along_path.lies_in]
     if not lines:
-        least = np.abs(found.margins).min(axis=0)
+        least = np.abs(along_path.margins).min(axis=0)
         index = int(least.argmin())
-        return (
-            f'<span style="{DIM}">No singularity on the way; the closest is δ{index + 1} = 0, '
-            f"with |δ{index + 1}| = {format_number(float(least[index]), 3)}.</span>"
+        return dim(
+            f"No singularity on the path; the closest is δ{index + 1} = 0, with "
+            f"|δ{index + 1}| = {format_number(float(least[index]), 3)}."
         )
-    dot = (
-        '<span style="display:inline-block;width:9px;height:9px;border-radius:5px;'
-        f'background:{css(ORANGE)};margin-right:6px"></span>'
-    )
-    told = "".join(f"<div>{dot}{line}</div>" for line in lines[:MOST_TOLD])
-    more = len(lines) - MOST_TOLD
-    rest = f'<div style="{DIM}">and {more} more</div>' if more > 0 else ""
-    word = "Singular once" if len(lines) == 1 else f"Singular {len(lines)} times"
-    return f"<b>{word} on the way</b>{told}{rest}"
-
-
-def _swatch(index: int) -> str:
-    style = ("solid", "dashed", "dotted")[index]
-    return (
-        '<span style="display:inline-block;width:20px;height:0;vertical-align:middle;'
-        f'border-top:2.5px {style} {css(COLOURS[index])};margin-right:6px"></span>'
-    )
-
-
-def _series() -> tuple[uplot.Series, ...]:
-    lines: list[uplot.Series] = [
-        {
-            "label": f"δ{index + 1}",
-            "stroke": css(colour),
-            "width": 2.0,
-            "dash": dash,
-            "points": {"show": False},
-        }
-        for index, (colour, dash) in enumerate(zip(COLOURS, DASHES, strict=True))
-    ]
-    zero: uplot.Series = {
-        "label": "zero",
-        "stroke": css(NEUTRAL),
-        "width": 1.0,
-        "points": {"show": False},
-    }
-    crossings: uplot.Series = {
-        "label": "singular",
-        "stroke": css(ORANGE),
-        "width": 0.0,
-        "points": {"show": True, "size": 9, "fill": css(ORANGE)},
-    }
-    now: uplot.Series = {
-        "label": "now",
-        "stroke": css(NEUTRAL),
-        "width": 1.5,
-        "points": {"show": False},
-    }
-    return ({"label": "time"}, *lines, zero, crossings, now)
+    dot = swatch(ORANGE, "ex-dot")
+    listed = "".join(f"<div>{dot}{line}</div>" for line in lines[:MOST_LISTED])
+    more = len(lines) - MOST_LISTED
+    rest = f'<div class="ex-dim">and {more} more</div>' if more > 0 else ""
+    headline = "Singular once" if len(lines) == 1 else f"Singular {len(lines)} times"
+    return f"<b>{headline} on the path</b>{listed}{rest}"
 
 
 def _scales(duration: float, top: float) -> dict[str, uplot.Scale]:

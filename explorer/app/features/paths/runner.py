@@ -1,53 +1,46 @@
-"""Plays paths, and has them planned in a process of its own, as the state asks for it."""
+"""The runner that plays paths, and plans them in a process of its own."""
 
 from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
 
+from explorer.app.features.feature import Runner, Services
 from explorer.app.features.paths import tasks
 from explorer.app.features.paths.actions import Advance, TakePlan
-from explorer.app.session.faults import Faults
 from explorer.app.session.jobs import Worker
-from explorer.app.session.session import Session
 from explorer.app.state.action import Action
 from explorer.app.state.frame import Frame
 from explorer.app.state.paths import Journey
 from explorer.app.state.state import State
 from explorer.paths.planning import PlannedPath
 
-# Seconds between two frames that are played.
-PACE = 0.04
-# The longest way on in one frame, however long it took to draw.
-LONGEST = 0.25
+# Time between two frames of a path, in seconds.
+FRAME_SECONDS = 0.04
+# Longest step of a path between two frames, in seconds, even if a frame takes longer.
+LONGEST_STEP = 0.25
 DIED = "the planner's process ended; Plan starts it again"
 
 
-class PathRunner:
-    """Follows the frames: plays while one is playing, plans while one is planning.
+class PathRunner(Runner):
+    """Plays and plans paths as the frames request."""
 
-    Args:
-        session: Which is told.
-        report: Called with a message when the process died or failed unexpectedly.
-        faults: Where requests are kept that failed unexpectedly; None to keep none.
-    """
-
-    def __init__(
-        self, session: Session, report: Callable[[str], None], faults: Faults | None = None
-    ) -> None:
-        self.worker = Worker(report, preload=[tasks.__name__], died=DIED, faults=faults)
-        self._session = session
+    def __init__(self, services: Services) -> None:
+        self.worker = Worker(
+            services.tell, preload=[tasks.__name__], died=DIED, faults=services.faults
+        )
+        self._session = services.session
+        services.at_end(self.stop)
         self._stopped = threading.Event()
         self._playing = threading.Event()
-        self._played = 0.0
+        self._advanced_at = 0.0
         self._thread: threading.Thread | None = None
-        # Of the last request: its number and its order, None once it is over.
+        # The last request to plan: its number, and its order at the worker, None once it is done.
         self._request = 0
         self._order: int | None = None
 
     def follow(self, frame: Frame) -> None:
-        """Do what a frame asks for, unless it is done already."""
+        """Start or stop playing and planning as a frame requests."""
         journey, paths = frame.state.journey, frame.state.paths
         if journey is not None and journey.is_playing:
             self._play()
@@ -61,7 +54,7 @@ class PathRunner:
             self._order = None
 
     def stop(self) -> None:
-        """End the process and the playing."""
+        """End the planner's process and the thread that plays."""
         self._stopped.set()
         self._playing.set()
         self.worker.stop()
@@ -71,20 +64,20 @@ class PathRunner:
     def _plan(self, state: State) -> None:
         request, design, paths = self._request, state.design, state.paths
 
-        def found(path: PlannedPath) -> None:
+        def take_path(path: PlannedPath) -> None:
             moves = len(path.poses) - 1
             title = f"Planned path of {moves} {'move' if moves == 1 else 'moves'}"
-            self._end(request, Journey("plan", title, design, path.poses), None)
+            self._finish(request, Journey("plan", title, design, path.poses), None)
 
         self._order = self.worker.submit(
             "plan",
             tasks.plan,
             (design, paths.start, paths.goal, paths.seconds),
-            found,
-            lambda problem: self._end(request, None, problem),
+            take_path,
+            lambda problem: self._finish(request, None, problem),
         )
 
-    def _end(self, request: int, journey: Journey | None, problem: str | None) -> None:
+    def _finish(self, request: int, journey: Journey | None, problem: str | None) -> None:
         if request == self._request:
             self._order = None
         self._session.do(TakePlan(request, journey, problem))
@@ -92,19 +85,19 @@ class PathRunner:
     def _play(self) -> None:
         if self._playing.is_set():
             return
-        self._played = time.monotonic()
+        self._advanced_at = time.monotonic()
         self._playing.set()
         if self._thread is None:
             self._thread = threading.Thread(target=self._run, name="player", daemon=True)
             self._thread.start()
 
     def _run(self) -> None:
-        while self._playing.wait() and not self._stopped.wait(PACE):
-            # One that waits covers the time until it is its turn.
+        while self._playing.wait() and not self._stopped.wait(FRAME_SECONDS):
+            # A step that still waits will cover the time until the session handles it.
             if self._playing.is_set() and not self._session.is_waiting(self):
                 self._session.post(self, self._advance)
 
     def _advance(self, _: State) -> Action:
         now = time.monotonic()
-        passed, self._played = min(now - self._played, LONGEST), now
+        passed, self._advanced_at = min(now - self._advanced_at, LONGEST_STEP), now
         return Advance(passed)

@@ -1,4 +1,4 @@
-"""What the planner's own process does."""
+"""The task of the planner's own process."""
 
 from __future__ import annotations
 

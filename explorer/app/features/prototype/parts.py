@@ -1,4 +1,4 @@
-"""The parts of the prototype as they are drawn, made in the worker."""
+"""The parts of the prototype and their meshes, made in the worker."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from explorer.prototype.assembly import Prototype, make_prototype
 
 @dataclass(frozen=True)
 class PartsRequest:
-    """Of which design to make the parts; its name does not count."""
+    """Request to make the parts of a design; its name does not count."""
 
     design: Design
 
 
 @dataclass(frozen=True)
 class Parts:
-    """What was made of a design.
+    """The parts of a design.
 
     Attributes:
-        prototype: The parts, which know their places in a pose.
-        meshes: To draw them, in their order and frames, in design units.
-        listed: The same for the workshop.
+        prototype: Parts with their places in a pose.
+        meshes: Meshes of the parts, in their order and frames, in design units.
+        listed: List of the parts for the workshop.
     """
 
     prototype: Prototype
@@ -39,10 +39,10 @@ class PartsDrawing:
     """The parts of a design, or why there are none.
 
     Attributes:
-        request: What was asked for.
-        parts: None if the design is too tight for them.
-        refusal: Why, and what would fit.
-        seconds: How long it took.
+        request: Request that it answers.
+        parts: Parts; None if the design is too tight for them.
+        refusal: Why there are none, and what would fit.
+        seconds: Computing time.
     """
 
     request: PartsRequest

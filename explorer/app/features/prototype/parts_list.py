@@ -1,4 +1,4 @@
-"""The list of parts as a workshop reads it: what is alike in one line, and the stock to cut.
+"""The list of parts for a workshop: one line for parts that are alike, with the stock to cut.
 
 Stock is the bar or the block that a part is cut from.
 """
@@ -15,11 +15,11 @@ from explorer.prototype.assembly import Prototype
 from explorer.prototype.bill import Actuator, bill_of_materials
 from explorer.prototype.part import Part
 
-# What is cut from a round bar, and the bar's axis in the frame of the part.
+# Axis of the round bar in the frame of the part, for the kinds cut from one.
 _ROUND = {"cylinder": 2, "rod": 2, "ball": 2, "carriage": 0}
-# As they are put together.
+# Kinds in the order of assembly.
 _ORDER = ("base", "carriage", "cross", "cylinder", "rod", "ball", "platform")
-# Parts are alike whose measures agree to so many digits.
+# Significant digits in which volume and stock of parts that are alike agree.
 _DIGITS = 6
 
 
@@ -54,10 +54,10 @@ class Line:
     """Parts that are alike.
 
     Attributes:
-        kind: Of part, such as "rod".
-        legs: To which they belong, () for base and platform.
-        stock: From which each is cut.
-        volume: Of each, in mm³.
+        kind: Kind of part, such as "rod".
+        legs: Legs that have one; () for base and platform.
+        stock: Stock that each is cut from.
+        volume: Volume of each, in mm³.
     """
 
     kind: str
@@ -67,7 +67,7 @@ class Line:
 
     @property
     def count(self) -> int:
-        """How many there are."""
+        """The number of these parts."""
         return max(len(self.legs), 1)
 
     @property
@@ -76,23 +76,19 @@ class Line:
         return " ".join([self.kind, ", ".join(map(str, self.legs))]).strip()
 
     def mass(self, density: float) -> float:
-        """Return the mass of all of them in grams.
-
-        Args:
-            density: In kg/m³.
-        """
+        """Return the mass of all of them in grams, at a density in kg/m³."""
         return self.count * density * self.volume * 1e-6
 
 
 @dataclass(frozen=True)
 class PartsList:
-    """All that a prototype consists of."""
+    """Parts and actuators of a prototype."""
 
     lines: tuple[Line, ...]
     actuators: tuple[Actuator, ...]
 
     def mass(self, density: float) -> float:
-        """Return the mass of everything in grams, at a density in kg/m³."""
+        """Return the mass of all parts in grams, at a density in kg/m³."""
         return sum(line.mass(density) for line in self.lines)
 
     def moving_mass(self, density: float) -> float:
@@ -103,25 +99,20 @@ class PartsList:
 def parts_list(prototype: Prototype) -> PartsList:
     """Return the list of a prototype's parts."""
     bill = bill_of_materials(prototype, 1.0)
-    found: dict[object, Line] = {}
+    lines: dict[object, Line] = {}
     for part, item in zip(prototype.parts, bill.items, strict=True):
         stock = stock_of(part, prototype.design.unit_mm)
         key = (part.kind, _rounded((item.volume, *vars(stock).values())))
-        known = found.get(key)
+        same = lines.get(key)
         _, _, leg = part.name.partition(" ")
-        legs = (*(() if known is None else known.legs), *((int(leg),) if leg else ()))
-        found[key] = Line(part.kind, legs, stock, item.volume)
-    lines = sorted(found.values(), key=lambda line: _ORDER.index(line.kind))
-    return PartsList(tuple(lines), bill.actuators)
+        legs = (*(() if same is None else same.legs), *((int(leg),) if leg else ()))
+        lines[key] = Line(part.kind, legs, stock, item.volume)
+    in_order = sorted(lines.values(), key=lambda line: _ORDER.index(line.kind))
+    return PartsList(tuple(in_order), bill.actuators)
 
 
 def stock_of(part: Part, unit_mm: float) -> Stock:
-    """Return what a part is cut from.
-
-    Args:
-        part: Any.
-        unit_mm: Millimetres in a design unit.
-    """
+    """Return the stock of a part; `unit_mm` is the millimetres in a design unit."""
     points = part.vertices * unit_mm
     lows, highs = points.min(axis=0), points.max(axis=0)
     x, y, z = (highs - lows).tolist()

@@ -1,7 +1,7 @@
 """The prototype: parts in place of the schematic legs and bodies, moved as rigid bodies.
 
-A node for each part is there from the start. It gets a mesh when the design has changed, and
-in each frame no more than its place.
+Each part has a node from the start. The node gets a mesh when the design changes, and only its
+place in each frame.
 """
 
 from __future__ import annotations
@@ -11,9 +11,12 @@ from collections.abc import Iterator
 import numpy as np
 import viser
 
+from explorer.app.features.feature import Services
 from explorer.app.features.mechanism.legs import colliding_legs
+from explorer.app.features.prototype.feed import PartsFeed
 from explorer.app.features.prototype.parts import Parts
 from explorer.app.scene.creases import Drawn
+from explorer.app.scene.part import NO_POINTS, ScenePart, box_corners
 from explorer.app.scene.placing import Placed
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.colours import (
@@ -40,22 +43,23 @@ COLOURS: dict[str, Rgb] = {
     "platform": PLATFORM_BODY,
     "ball": BALL,
 }
-"""Greys, as of the schematic parts: orange and blue belong to the singularities."""
+"""Greys, as for the schematic parts: orange and blue belong to the singularities."""
 
 BALLS = tuple(f"ball {leg}" for leg in LEGS)
 NAMES = (*BODIES, *BALLS)
 ON_BODIES = ("base", "platform")
-"""What the switch of the bodies shows; balls go with the platform, the rest with the legs."""
+"""Parts that the switch of the bodies shows, with the balls; that of the legs shows the rest."""
 
 
-class PrototypeScene:
-    """Draws the parts, together or drawn apart."""
+class PrototypeScene(ScenePart):
+    """The parts, assembled or exploded."""
 
-    def __init__(self, scene: viser.SceneApi) -> None:
+    def __init__(self, services: Services) -> None:
+        scene, self._feed = services.scene, services.get(PartsFeed)
         empty = np.zeros((3, 3)), np.array([[0, 1, 2]])
         self._nodes: dict[str, viser.MeshHandle] = {}
         for name in NAMES:
-            # A ball hangs on the platform, so that it moves with it without a word.
+            # The platform is the parent of the balls, so that they move with it.
             path = f"platform/{name}" if name in BALLS else name
             kind = name.partition(" ")[0]
             self._nodes[name] = scene.add_mesh_simple(
@@ -65,8 +69,8 @@ class PrototypeScene:
         self._meshes: dict[str, Drawn] = {}
 
     def updates(self, placed: Placed) -> Iterator[Update]:
-        """Yield what draws the parts of this frame."""
-        view, parts = placed.frame.state.view, placed.parts
+        """Yield the updates that draw the parts of a frame."""
+        view, parts = placed.frame.state.view, self._feed.parts
         for name, node in self._nodes.items():
             switch = view.bodies if name in ON_BODIES or name in BALLS else view.legs
             yield node, "visible", switch and parts is not None
@@ -79,6 +83,19 @@ class PrototypeScene:
             for kind in ("cylinder", "rod"):
                 colour = OUTLINE if alarm else COLOURS[kind]
                 yield self._nodes[f"{kind} {leg}"], "color", colour
+
+    def corners(self, placed: Placed) -> FloatArray:
+        """Return the corners of boxes about the parts."""
+        parts = self._feed.parts
+        if parts is None:
+            return NO_POINTS
+        places, seen = shown_places(placed, parts), list[FloatArray]()
+        for (vertices, _), origin, rotation in zip(
+            parts.meshes, places.origin, places.rotation, strict=True
+        ):
+            corners = box_corners(np.stack([vertices.min(axis=0), vertices.max(axis=0)]))
+            seen.append(placed.scale * (corners @ rotation.T + origin))
+        return np.concatenate(seen)
 
     def _shapes(self, parts: Parts, scale: float) -> Iterator[Update]:
         if self._drawn is None or self._drawn[0] is not parts or self._drawn[1] != scale:
@@ -97,10 +114,10 @@ class PrototypeScene:
         names = [part.name for part in parts.prototype.parts]
         positions = (placed.scale * places.origin).tolist()
         turns = quaternion_from_rotation(places.rotation).tolist()
-        plate = names.index("platform")
+        platform = names.index("platform")
         for index, name in enumerate(names):
             if name in BALLS:
-                off = (places.origin[index] - places.origin[plate]) @ places.rotation[plate]
+                off = (places.origin[index] - places.origin[platform]) @ places.rotation[platform]
                 yield self._nodes[name], "position", tuple((placed.scale * off).tolist())
             else:
                 yield self._nodes[name], "position", tuple(positions[index])
@@ -116,15 +133,3 @@ def shown_places(placed: Placed, parts: Parts) -> Places:
         return places
     away = share * exploded_offsets(parts.prototype, places)
     return Places(places.origin + away, places.rotation)
-
-
-def part_corners(placed: Placed, parts: Parts) -> FloatArray:
-    """Return the corners of boxes about the parts in the scene, shape (n, 3)."""
-    places, seen = shown_places(placed, parts), list[FloatArray]()
-    for (vertices, _), origin, turn in zip(
-        parts.meshes, places.origin, places.rotation, strict=True
-    ):
-        ends = np.stack([vertices.min(axis=0), vertices.max(axis=0)])
-        corners = np.array(np.meshgrid(*ends.T)).reshape(3, -1).T
-        seen.append(placed.scale * (corners @ turn.T + origin))
-    return np.concatenate(seen)

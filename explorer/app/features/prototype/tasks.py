@@ -10,10 +10,10 @@ def export_assembly(design: Design, file_format: str) -> bytes:
 
     Args:
         design: The manipulator.
-        file_format: As of `explorer.export.assembly`, or "step".
+        file_format: A format of `explorer.export.assembly`, or "step".
 
     Raises:
-        ExplorerError: a design too tight for the parts, or a library that is missing.
+        ExplorerError: a design too tight for the parts, or a missing library.
     """
     from explorer.export.assembly import assembly_bytes
     from explorer.prototype.assembly import make_prototype

@@ -1,4 +1,4 @@
-"""What can be taken away: the view as a picture, the scene as a page, the session as a table."""
+"""Downloads: the view as a picture, the scene as a page, the session as a table, the report."""
 
 from __future__ import annotations
 
@@ -6,47 +6,46 @@ from collections.abc import Iterator
 
 import viser
 
-from explorer.app.features.sharing.downloads import Downloads
+from explorer.app.features.designs.files import DesignFile
+from explorer.app.features.feature import Services
+from explorer.app.features.sharing.files import SessionRecorder, SharedFiles
 from explorer.app.features.sharing.reporting import ReportFormat
 from explorer.app.features.sharing.view_picture import LEAST, MOST
+from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.markup import DIM
+from explorer.app.widgets.markup import note
 
 TWICE = "twice as shown"
 OTHER = "other"
-SIZES: dict[str, tuple[int, int] | None] = {
+SIZES: dict[str, tuple[int, int] | float] = {
     "1920 × 1080": (1920, 1080),
     "3840 × 2160": (3840, 2160),
-    TWICE: None,
-    OTHER: None,
+    TWICE: 2.0,
 }
+"""Width and height, or a factor on the size in the browser."""
 
 
 class SharePanel:
-    """Buttons for the files that everything on the page can be taken away in.
+    """Buttons that download pictures, files and reports."""
 
-    Args:
-        gui: Where they are added.
-        downloads: Sends the files.
-    """
-
-    def __init__(self, gui: viser.GuiApi, downloads: Downloads) -> None:
-        self._log = downloads.log
+    def __init__(self, services: Services) -> None:
+        gui, files = services.gui, services.get(SharedFiles)
+        self._log = services.get(SessionRecorder).log
         with gui.add_folder("Picture of the view"):
-            self._add_picture(gui, downloads)
+            self._add_picture(gui, files)
         with gui.add_folder("Files"):
             sends = {
-                "Scene (HTML)": downloads.scene,
-                "Session (CSV)": downloads.session,
-                "Design (JSON)": downloads.design,
+                "Scene (HTML)": files.scene,
+                "Session (CSV)": files.session,
+                "Design (JSON)": services.get(DesignFile).send,
             }
-            files = gui.add_button_group(
+            kinds = gui.add_button_group(
                 "Download",
                 tuple(sends),
-                hint="The scene as it stands, to turn in any browser; a table of all poses so "
-                "far; what explorer --design opens.",
+                hint="The present scene, to turn in any browser; a table of all poses so "
+                "far; a file that explorer --design opens.",
             )
-            files.on_click(lambda event: sends[files.value](event.client_id))
+            kinds.on_click(lambda event: sends[kinds.value](event.client_id))
             reports: dict[str, ReportFormat] = {"HTML": "html", "PDF": "pdf"}
             report = gui.add_button_group(
                 "Report",
@@ -54,16 +53,16 @@ class SharePanel:
                 hint="The design in its present pose on a few pages: drawings, slices, tables, "
                 "limits. PDF needs the extra screenshot and a Chromium.",
             )
-            report.on_click(lambda event: downloads.report(reports[report.value], event.client_id))
+            report.on_click(lambda event: files.report(reports[report.value], event.client_id))
             self._words = gui.add_html("")
 
-    def updates(self) -> Iterator[Update]:
-        """Yield what makes the panel show how much of the session is kept."""
+    def updates(self, _: Frame) -> Iterator[Update]:
+        """Yield the updates that show the number of poses of the session."""
         yield self._words, "content", words(len(self._log))
 
-    def _add_picture(self, gui: viser.GuiApi, downloads: Downloads) -> None:
+    def _add_picture(self, gui: viser.GuiApi, files: SharedFiles) -> None:
         size = gui.add_dropdown(
-            "Size (px)", tuple(SIZES), hint="Width and height; lines and labels grow with it."
+            "Size (px)", (*SIZES, OTHER), hint="Width and height; lines and labels grow with it."
         )
         width = gui.add_number(
             "Width (px)", 1600, min=LEAST, max=MOST, step=1, visible=False, hint=_bounds("Width")
@@ -79,7 +78,7 @@ class SharePanel:
         button = gui.add_button(
             "Download picture",
             icon=viser.Icon.PHOTO,
-            hint="PNG of the scene with its labels, as View has it and from where you look.",
+            hint="PNG of the scene with its labels, as in the tab View, from your camera.",
         )
 
         @size.on_update
@@ -88,14 +87,8 @@ class SharePanel:
 
         @button.on_click
         def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
-            wanted = SIZES[size.value]
-            if size.value == OTHER:
-                wanted = (width.value, height.value)
-            downloads.picture(
-                2.0 if wanted is None else wanted,
-                transparent=transparent.value,
-                client_id=event.client_id,
-            )
+            sides = SIZES.get(size.value, (width.value, height.value))
+            files.picture(sides, transparent=transparent.value, client_id=event.client_id)
 
 
 def _bounds(name: str) -> str:
@@ -103,10 +96,9 @@ def _bounds(name: str) -> str:
 
 
 def words(poses: int) -> str:
-    """Return as HTML what the files are, given how many poses of the session are kept."""
-    kept = "1 pose" if poses == 1 else f"{poses:,} poses"
-    return (
-        f'<div style="padding:2px 12px 6px;font-size:12.5px;line-height:1.45;{DIM}">'
+    """Return a note on the files as HTML, for a session of so many poses."""
+    count = "1 pose" if poses == 1 else f"{poses:,} poses"
+    return note(
         "The scene is one file to turn and zoom in any browser, without network. "
-        f"The session has {kept} so far.</div>"
+        f"The session has {count} so far."
     )

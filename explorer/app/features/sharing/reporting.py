@@ -1,7 +1,6 @@
-"""The report of a design as a file's contents; PDF is the same page, printed by a browser.
+"""The report of a design as bytes: HTML, or the same page printed as PDF by a browser.
 
-Plain values in and bytes out, so that it can be made in a process of its own. It imports no
-viser, and HTML needs no browser.
+A worker process makes it, so it takes plain values. It imports no viser, and HTML needs no browser.
 """
 
 from __future__ import annotations
@@ -31,10 +30,10 @@ def make_report(
 
     Args:
         design: The manipulator.
-        pose: Of its platform, whose orientation the workspace has; its home pose if None.
-        record: Of the search that found the design; its history is told then.
+        pose: Pose of its platform, whose orientation the workspace has; home if None.
+        record: Record of the search that gave the design, which adds its history.
         file_format: HTML, or PDF by a headless browser.
-        date: Of the report; today if None.
+        date: Date of the report; today if None.
 
     Raises:
         MissingExtraError: PDF without Playwright or a Chromium.
@@ -46,17 +45,16 @@ def make_report(
     html = report_html(gather_report_data(design, pose, record), date or dt.date.today())
     if file_format == "html":
         return html.encode()
-    # In a thread of its own: where an event loop runs, as in a notebook, the browser's calls
-    # would be refused.
+    # Playwright refuses calls on a thread with an event loop, such as a notebook's.
     with ThreadPoolExecutor(1) as pool:
-        return pool.submit(_printed, html).result()
+        return pool.submit(_print, html).result()
 
 
-def _printed(html: str) -> bytes:
+def _print(html: str) -> bytes:
     from explorer.app.browser.headless import headless_browser
 
     with headless_browser() as browser:
-        # A report has no scripts and fetches nothing; the browser is told so too.
+        # A report has no scripts and fetches nothing; the browser ensures that.
         context = browser.new_context(java_script_enabled=False, offline=True)
         page = context.new_page()
         page.set_content(html, wait_until="load")

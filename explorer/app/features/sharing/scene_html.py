@@ -1,8 +1,7 @@
-"""The scene as one HTML file that anyone can open, turn and zoom, without the explorer.
+"""The scene as one HTML file, to open, turn and zoom without the explorer.
 
-The file holds viser's page and the scene as it is drawn, and nothing else: what is hidden, the
-panels and the drag handle are left out, and a policy of its own keeps it from fetching
-anything.
+The file holds viser's page and the visible scene, without the panels and the drag handle. Its
+content security policy keeps it from fetching anything.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ from explorer.app.state.state import State
 from explorer.app.widgets.markup import signed
 from explorer.numerics.arrays import FloatArray
 
-# Of what has no place in the tree of the scene, only this goes into the file.
+# Messages outside the tree of the scene that go into the file.
 KEPT = (
     "BackgroundImageMessage",
     "EnableLightsMessage",
@@ -28,7 +27,7 @@ KEPT = (
     "FogMessage",
     "ThemeConfigurationMessage",
 )
-# It would move nothing.
+# Message of the drag handle, which would move nothing.
 HANDLE = "TransformControlsMessage"
 VISIBILITY = "SetSceneNodeVisibilityMessage"
 POLICY = (
@@ -43,12 +42,12 @@ CAPTION_STYLE = (
 
 
 @dataclass(frozen=True)
-class Eye:
-    """Where the camera stands when the file is opened, in scene units.
+class FileCamera:
+    """The camera of the opened file, in scene units.
 
     Attributes:
-        position: Of the eye, shape (3,).
-        look_at: What it looks at, shape (3,).
+        position: Position, shape (3,).
+        look_at: Point that it looks at, shape (3,).
         fov: Vertical angle of view, in radians.
     """
 
@@ -57,16 +56,16 @@ class Eye:
     fov: float
 
     @staticmethod
-    def of(client: viser.ClientHandle) -> Eye:
-        """Return that of a browser."""
+    def of(client: viser.ClientHandle) -> FileCamera:
+        """Return the camera of a browser."""
         camera = client.camera
-        return Eye(camera.position, camera.look_at, float(camera.fov))
+        return FileCamera(camera.position, camera.look_at, float(camera.fov))
 
     def messages(self) -> list[SceneMessage]:
-        """Return what puts a camera there, now and when its view is reset."""
+        """Return the messages that set the camera, also when its view is reset."""
         return [
-            {"type": f"SetCamera{what}Message", field: value, "initial": True}
-            for what, field, value in (
+            {"type": f"SetCamera{part}Message", field: value, "initial": True}
+            for part, field, value in (
                 ("Position", "position", _triple(self.position)),
                 ("LookAt", "look_at", _triple(self.look_at)),
                 ("UpDirection", "position", (0.0, 0.0, 1.0)),
@@ -75,16 +74,18 @@ class Eye:
         ]
 
 
-def scene_html(server: viser.ViserServer, state: State, eye: Eye, *, date: dt.date) -> bytes:
+def scene_html(
+    server: viser.ViserServer, state: State, camera: FileCamera, *, date: dt.date
+) -> bytes:
     """Return the scene of a server as one HTML file, in the theme of its page.
 
     Args:
-        server: Whose scene it is.
-        state: That is drawn.
-        eye: Where the camera stands when it is opened.
-        date: For the caption.
+        server: Server of the scene.
+        state: State of the scene.
+        camera: Camera of the opened file.
+        date: Date in the caption.
     """
-    page = scene_as_html(server, lambda all_: [*shown(all_), *eye.messages()])
+    page = scene_as_html(server, lambda all_: [*shown(all_), *camera.messages()])
     title = f"{state.design.name} – flagged 4-4 manipulator"
     head, title_of_viser, rest = page.partition("<title>Viser</title>")
     body, end, after = rest.rpartition("</body>")
@@ -97,7 +98,7 @@ def scene_html(server: viser.ViserServer, state: State, eye: Eye, *, date: dt.da
 
 
 def shown(messages: Iterable[SceneMessage]) -> list[SceneMessage]:
-    """Return of all that makes a scene what is seen, without the handle."""
+    """Return the messages of the visible nodes of a scene, without the drag handle."""
     all_ = list(messages)
     hidden = {m["name"] for m in all_ if m["type"] == VISIBILITY and not m["visible"]}
     hidden |= {m["name"] for m in all_ if m["type"] == HANDLE}
@@ -115,7 +116,7 @@ def shown(messages: Iterable[SceneMessage]) -> list[SceneMessage]:
 
 
 def caption_of(state: State, date: dt.date) -> str:
-    """Return as HTML what the scene shows: design, unit, pose, date."""
+    """Return design, unit, pose and date of a scene as HTML."""
     x, y, z = (signed(value) for value in state.pose.position)
     angles = " · ".join(
         f"{name} {signed(value, 2)}°"
@@ -129,12 +130,12 @@ def caption_of(state: State, date: dt.date) -> str:
 
 
 def _is_scaffold(message: SceneMessage) -> bool:
-    """Whether this makes a part that is not seen itself, but has others in it."""
+    """Whether a message makes an invisible frame, there only for its children."""
     return message["type"] == "FrameMessage" and not message["props"]["show_axes"]
 
 
 def _lineage(name: str) -> list[str]:
-    """Return the names of a part of the scene and of all that it belongs to."""
+    """Return the names of a node of the scene and of its ancestors."""
     parts = name.split("/")
     return ["/".join(parts[: count + 1]) for count in range(len(parts))]
 

@@ -1,8 +1,8 @@
-"""Where the platform was since the explorer started, to be taken away as a table.
+"""The poses of the platform since the explorer started, for a table to download.
 
-Kept is what it takes to compute the rest later: pose, mode and design. Memory is bounded: of
-one drag at most fifty poses a second are kept, its first and its last among them, and beyond
-so many rows the oldest are forgotten.
+Each row has the pose, the mode and the design, from which all other values follow. Memory is
+bounded: a drag leaves at most fifty poses a second, its first and its last among them, and the
+newest rows replace the oldest.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose
 
 MOST_ROWS = 100_000
-# Of what one hand does with one control, this many seconds lie between two rows.
+# Least time between two rows of one drag, in seconds.
 LEAST_SECONDS = 0.02
-# Time, position, quaternion, mode, unit, design variables.
+# Number of columns: time, position, quaternion, mode, unit, design variables.
 WIDTH = 1 + 3 + 4 + 1 + 1 + 6
 
 
@@ -28,41 +28,40 @@ class SessionLog:
     """The poses of a session.
 
     Args:
-        most: So many are kept.
+        most: Largest number of poses.
     """
 
     def __init__(self, most: int = MOST_ROWS) -> None:
         self._lock = threading.Lock()
-        self._begun = time.monotonic()
-        # Pages of it that were never written take no memory.
+        self._start_time = time.monotonic()
+        # Rows that were never written take no memory.
         self._rows = np.empty((most, WIDTH))
         self._moved_by: list[str] = []
         self._count = 0
         self._last: tuple[Pose, Design] | None = None
-        # Of the last row: whose it is, and whether it goes if the same hand goes on.
-        self._hand: object = None
+        # Drag of the last row, and whether the next row of the same drag replaces it.
+        self._drag: object = None
         self._is_passing = False
-        # When the last row was written that stays.
+        # Time of the last row that stays.
         self._kept_at = -np.inf
 
     @property
-    def begun(self) -> float:
-        """When the session began, by `time.monotonic`."""
-        return self._begun
+    def start_time(self) -> float:
+        """The time of the start of the session, by `time.monotonic`."""
+        return self._start_time
 
     def __len__(self) -> int:
-        """Return how many poses are kept."""
+        """Return the number of poses."""
         return len(self._moved_by)
 
-    def record(self, state: State, hand: object, moved_by: str, at: float | None = None) -> None:
-        """Keep the pose of a state, if it or the design is another than before.
+    def record(self, state: State, drag: object, moved_by: str, at: float | None = None) -> None:
+        """Record the pose of a state, if it or the design has changed.
 
         Args:
-            state: That is shown.
-            hand: The same for all that one hand does with one control without a pause; None
-                for what is no drag.
-            moved_by: What brought the platform there, in words.
-            at: When, by `time.monotonic`; now if None.
+            state: State of the page.
+            drag: Value shared by all poses of one drag of one control; None without a drag.
+            moved_by: Words of the action that moved the platform.
+            at: Time, by `time.monotonic`; now if None.
         """
         pose, design = state.pose, state.design
         last = self._last
@@ -71,17 +70,17 @@ class SessionLog:
         now = time.monotonic() if at is None else at
         with self._lock:
             self._last = (pose, design)
-            goes_on = hand is not None and hand == self._hand
-            replaces = goes_on and self._is_passing
-            self._hand = hand
-            self._is_passing = goes_on and now - self._kept_at < LEAST_SECONDS
+            continues = drag is not None and drag == self._drag
+            replaces = continues and self._is_passing
+            self._drag = drag
+            self._is_passing = continues and now - self._kept_at < LEAST_SECONDS
             if not self._is_passing:
                 self._kept_at = now
             if not replaces:
                 self._count += 1
             index = (self._count - 1) % len(self._rows)
             self._rows[index] = (
-                now - self._begun,
+                now - self._start_time,
                 *pose.position,
                 *pose.quaternion,
                 state.mode,
@@ -94,11 +93,11 @@ class SessionLog:
                 self._moved_by.append(moved_by)
 
     def table(self) -> SessionTable:
-        """Return all that is kept, in its order."""
+        """Return all rows, oldest first."""
         with self._lock:
-            kept = len(self._moved_by)
-            oldest = self._count % kept if kept == len(self._rows) else 0
-            rows = np.roll(self._rows[:kept], -oldest, axis=0)
+            count = len(self._moved_by)
+            oldest = self._count % count if count == len(self._rows) else 0
+            rows = np.roll(self._rows[:count], -oldest, axis=0)
             moved_by = (*self._moved_by[oldest:], *self._moved_by[:oldest])
         return SessionTable(
             time=rows[:, 0],
@@ -112,5 +111,5 @@ class SessionLog:
 
 
 def _alike(one: Design, other: Design) -> bool:
-    """Whether two designs have the same points; that their limits differ moves nothing."""
+    """Whether two designs have the same points, whatever their limits."""
     return one is other or (one.variables == other.variables and one.unit_mm == other.unit_mm)

@@ -17,9 +17,9 @@ def export_session(table: SessionTable) -> bytes:
 def export_report(
     design: Design, pose: Pose, record: Record | None, file_format: ReportFormat
 ) -> bytes:
-    """Return the report of a design in a pose, with the search that found it, if one did.
+    """Return the report of a design in a pose, with the record of its search if there is one.
 
     Raises:
-        ExplorerError: PDF without what prints it.
+        ExplorerError: PDF without a browser to print it.
     """
     return make_report(design, pose, record=record, file_format=file_format)

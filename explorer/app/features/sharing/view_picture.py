@@ -1,9 +1,8 @@
-"""Pictures of the scene at any size, drawn by the browser that asks for one.
+"""Pictures of the scene at any size, drawn by the browser that downloads one.
 
-The browser draws the scene alone, with its labels, from where its camera stands and as the
-View tab has it; lines and labels grow with the picture. What its graphics cannot draw at
-once, some browsers fill with a part of the picture and tell nobody: so a large picture is
-held against a small one.
+The browser draws the scene alone, with its labels, its camera and the settings of the tab View;
+lines and labels grow with the picture. Some browsers fill a picture too large for their graphics
+with a part of it, without an error; so a large picture is compared with a small one.
 """
 
 from __future__ import annotations
@@ -24,16 +23,15 @@ from explorer.numerics.arrays import FloatArray
 LEAST, MOST = 16, 8192
 """The bounds of width and height, in pixels."""
 
-# A software renderer takes half a minute for the largest.
+# A software renderer takes half a minute for the largest picture.
 PATIENCE_SECONDS = 90.0
-# What every browser that has WebGL draws at once, in pixels.
+# Side that every browser with WebGL draws at once, in pixels.
 CERTAIN = 2048
-# Of the small picture that a large one is held against, in pixels, and the squares that are
-# compared, along each side.
+# Side of the small picture in pixels, and number of compared squares along each side.
 SMALL, SQUARES = 512, 16
-# Mean difference of two pictures of one scene, of 255; different parts of it differ by 30.
+# Largest mean difference of two pictures of one scene, of 255; different parts differ by 30.
 ALIKE = 8.0
-# The widest angle of view, of what is much higher than wide, in radians.
+# Widest angle of view, for pictures much higher than wide, in radians.
 WIDEST = math.radians(150.0)
 
 Pixels = NDArray[np.uint8]
@@ -41,12 +39,12 @@ Colour = tuple[int, int, int]
 
 
 @dataclass(frozen=True)
-class Eye:
-    """From where to look, as of viser's camera.
+class ViewCamera:
+    """A camera of viser.
 
     Attributes:
         wxyz: Orientation.
-        position: In the scene.
+        position: Position in the scene.
         fov: Vertical angle of view, in radians.
     """
 
@@ -73,44 +71,43 @@ def view_picture(
     background: Colour | None = (255, 255, 255),
     without: Sequence[str] = (),
 ) -> bytes:
-    """Return the view of a browser as PNG; blocks until that has drawn it.
+    """Return the view of a browser as PNG; blocks until the browser has drawn it.
 
-    What is seen in the browser is in the picture: where that is narrower than the view, more
-    is seen above and below.
+    A picture narrower than the view shows more above and below, so that nothing is lost.
 
     Args:
         client: The browser.
         size: Width and height in pixels.
-        background: Behind the scene; None to leave it transparent.
-        without: The names of parts of the scene to leave out.
+        background: Colour of the background; None for a transparent one.
+        without: Names of nodes of the scene to leave out.
 
     Raises:
         InputError: a size that is out of bounds.
-        NoAnswerError: the browser is gone, is out of sight, or cannot draw that much.
+        NoAnswerError: the browser is gone, hidden, or cannot draw that much.
     """
     width, height = check_size(*size)
-    # A browser shows a part of its own in place of everybody's of the same name.
+    # A node of one browser covers the shared one of the same name.
     covers = [client.scene.add_frame(name, show_axes=False) for name in without]
     try:
-        pixels = _checked(client, width, height)
+        pixels = _draw_and_check(client, width, height)
     finally:
         for cover in covers:
             cover.remove()
     return encoded(pixels if background is None else on_background(pixels, background))
 
 
-def _checked(client: viser.ClientHandle, width: int, height: int) -> Pixels:
-    """Return what a browser sees, (height, width, 4), and all of it.
+def _draw_and_check(client: viser.ClientHandle, width: int, height: int) -> Pixels:
+    """Return the whole view of a browser, shape (height, width, 4).
 
     Raises:
         NoAnswerError: it cannot draw that much.
     """
-    eye = _eye(client, width / height)
-    pixels = _drawn(client, eye, width, height)
+    camera = _camera(client, width / height)
+    pixels = _draw(client, camera, width, height)
     if max(width, height) > CERTAIN:
         scale = SMALL / max(width, height)
         sides = [max(round(scale * side), SQUARES) for side in (width, height)]
-        small = _drawn(client, eye, *sides)
+        small = _draw(client, camera, *sides)
         if difference(pixels, small) > ALIKE:
             half = math.sqrt(0.5)
             raise NoAnswerError(
@@ -141,7 +138,7 @@ def on_background(pixels: Pixels, colour: Colour) -> Pixels:
 
 
 def difference(one: Pixels, other: Pixels) -> float:
-    """Return how much two pictures (height, width, 4) differ, of 255, whatever their sizes."""
+    """Return the mean difference of two pictures (height, width, 4) of any sizes, of 255."""
     return float(np.abs(_squares(one) - _squares(other)).mean())
 
 
@@ -152,27 +149,27 @@ def encoded(pixels: Pixels) -> bytes:
     return cast("bytes", imageio.imwrite("<bytes>", pixels, extension=".png"))
 
 
-def _eye(client: viser.ClientHandle, aspect: float) -> Eye:
+def _camera(client: viser.ClientHandle, aspect: float) -> ViewCamera:
     camera = client.camera
     fov = float(camera.fov)
     if aspect < camera.aspect:
         fov = 2.0 * math.atan(math.tan(0.5 * fov) * camera.aspect / aspect)
-    return Eye(np.array(camera.wxyz), np.array(camera.position), min(fov, WIDEST))
+    return ViewCamera(np.array(camera.wxyz), np.array(camera.position), min(fov, WIDEST))
 
 
-def _drawn(client: viser.ClientHandle, eye: Eye, width: int, height: int) -> Pixels:
-    """Return what a browser draws, (height, width, 4), transparent where nothing is.
+def _draw(client: viser.ClientHandle, camera: ViewCamera, width: int, height: int) -> Pixels:
+    """Return a picture drawn by a browser, shape (height, width, 4), transparent where empty.
 
     Raises:
-        NoAnswerError: it is gone, is out of sight, or cannot draw that much.
+        NoAnswerError: it is gone, hidden, or cannot draw that much.
     """
     try:
         pixels = client.get_render(
             height,
             width,
-            wxyz=eye.wxyz,
-            position=eye.position,
-            fov=eye.fov,
+            wxyz=camera.wxyz,
+            position=camera.position,
+            fov=camera.fov,
             transport_format="png",
             timeout=PATIENCE_SECONDS,
         )

@@ -1,14 +1,13 @@
-"""What can be done about singularities: go to one, and move one margin alone."""
+"""Actions on singularities: to go to one, and to change one margin alone."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from explorer.app.state.action import Action, changes
+from explorer.app.state.action import Action
 from explorer.app.state.actions import moved
-from explorer.app.state.jog import jogged
+from explorer.app.state.jog import make_jog
 from explorer.app.state.state import State
-from explorer.app.state.view import SingularView
 from explorer.errors import InputError
 from explorer.mechanism.margins import INCIDENCES
 from explorer.mechanism.pose import Pose
@@ -20,27 +19,12 @@ from explorer.singularity.uncoupled import UNCOUPLED
 
 
 @dataclass(frozen=True)
-class SetSingularView(Action):
-    """Change how singularities are shown."""
-
-    view: SingularView
-
-    def apply(self, state: State) -> State:
-        """Return the next state."""
-        return replace(state, view=replace(state.view, singular=self.view))
-
-    def describe(self, before: State, after: State) -> str:
-        """Return what the step did."""
-        return changes("View", before.view.singular, after.view.singular)
-
-
-@dataclass(frozen=True)
 class Jog(Action):
-    """Take one of the six uncoupled motions to an amount from where it began.
+    """Set the amount of one of the six uncoupled motions.
 
     Attributes:
-        motion: Its index in `UNCOUPLED`.
-        amount: In design units of a translation, in degrees of a rotation.
+        motion: Index of the motion in `UNCOUPLED`.
+        amount: Amount from the start of the motion, in design units or degrees.
     """
 
     motion: int
@@ -50,9 +34,9 @@ class Jog(Action):
         """Return the next state.
 
         Raises:
-            InputError: no such motion, or an amount that is not finite.
+            InputError: there is no such motion, or the amount is not finite.
         """
-        jog = jogged(self.motion, jog_start(state, self.motion), self.amount)
+        jog = make_jog(self.motion, jog_start(state, self.motion), self.amount)
         return replace(moved(state, jog.pose), jog=jog)
 
     def words(self) -> str:
@@ -63,7 +47,7 @@ class Jog(Action):
 
 
 def jog_start(state: State, motion: int) -> Pose:
-    """Return where a motion begins: where it began if it is in use, else here."""
+    """Return the pose at the start of a motion: the present pose if it is not in use."""
     jog = state.jog_in_use
     return jog.start if jog is not None and jog.motion == motion else state.pose
 
@@ -78,36 +62,40 @@ class GoToStratum(Action):
         """Return the next state.
 
         Raises:
-            InputError: no such stratum, the generic one, or one that is left only by an
-                arbitrarily small way: the pose is in it, or between it and deeper ones.
+            InputError: there is no such stratum, or none of its poses is the nearest: it is the
+                generic one, or the pose lies in it or in its boundary.
         """
-        asked = tuple(self.stratum)
-        found = nearest_in_stratum(state.design, state.pose, asked)
-        if codimension(asked) == 0:
+        goal = tuple(self.stratum)
+        nearest = nearest_in_stratum(state.design, state.pose, goal)
+        if codimension(goal) == 0:
             raise InputError(
-                "generic poses are as near as one likes to any pose; choose a singular stratum, "
-                "or move any margin off zero"
+                "generic poses lie arbitrarily close to every pose; choose a singular stratum, or "
+                "move any margin off zero"
             )
         here = seen_stratum(state.design, state.pose)
-        if here == asked:
+        if here == goal:
             raise InputError(
-                f"the pose lies in {name_of(asked)} already: {describe_stratum(asked)}"
+                f"the pose lies in {stratum_name(goal)} already: {describe_stratum(goal)}"
             )
-        if found.distance == 0.0:
+        if nearest.distance == 0.0:
             raise InputError(
-                f"the pose lies in {name_of(here)}, which {name_of(asked)} borders on: its poses "
-                "are as near as one likes, and none is the nearest; move a margin off zero"
+                f"the pose lies in {stratum_name(here)}, which {stratum_name(goal)} borders on, "
+                "so none of its poses is the nearest; move a margin off zero"
             )
-        return moved(state, found.pose)
+        return moved(state, nearest.pose)
 
     def words(self) -> str:
         """Return what the action does."""
-        return f"Go to stratum {name_of(self.stratum)}"
+        return f"Go to stratum {stratum_name(self.stratum)}"
 
 
 @dataclass(frozen=True)
 class GoToSingularity(Action):
-    """Move to the nearest pose with one of the three incidences, 1 to 3; None: the nearest."""
+    """Move to the nearest pose with an incidence.
+
+    Attributes:
+        incidence: Number of the incidence, 1 to 3; None for the nearest of the three.
+    """
 
     incidence: int | None
 
@@ -117,11 +105,11 @@ class GoToSingularity(Action):
         Raises:
             InputError: the pose has that incidence already.
         """
-        found = nearest_singularities(state.design, state.pose)
+        poses = nearest_singularities(state.design, state.pose)
         nearest = (
-            min(found, key=lambda each: each.distance)
+            min(poses, key=lambda pose: pose.distance)
             if self.incidence is None
-            else found[self.incidence - 1]
+            else poses[self.incidence - 1]
         )
         if nearest.distance == 0.0:
             index = nearest.incidence
@@ -135,6 +123,6 @@ class GoToSingularity(Action):
         return f"Go to the nearest pose with δ{self.incidence} = 0"
 
 
-def name_of(stratum: Stratum) -> str:
-    """Return how a stratum is written, such as "(3, 4, 2, 1)"."""
+def stratum_name(stratum: Stratum) -> str:
+    """Return the name of a stratum, such as "(3, 4, 2, 1)"."""
     return f"({', '.join(map(str, stratum))})"

@@ -1,19 +1,15 @@
-"""How near a singularity is, and why: the numbers, and folders for what there is beyond them."""
+"""The proximity to singularities: verdict, margins and conditioning of the present pose."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from html import escape
 
-import viser
-
+from explorer.app.features.feature import Services
+from explorer.app.features.singularity.actions import stratum_name
 from explorer.app.features.singularity.distance import DistancePanel
-from explorer.app.features.singularity.feed import StrataFeed
 from explorer.app.features.singularity.performance import PerformancePanel
 from explorer.app.features.singularity.strata import StrataPanel
-from explorer.app.session.session import Session
-from explorer.app.state.actions import SetView
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.colours import (
@@ -25,171 +21,166 @@ from explorer.app.widgets.colours import (
     css,
     proximity_colour,
 )
-from explorer.app.widgets.controls import Controls
-from explorer.app.widgets.markup import BEYOND, CLOSE, DIM, WITHIN, fitted, format_number, share
+from explorer.app.widgets.controls import At, Controls
+from explorer.app.widgets.markup import (
+    Look,
+    box,
+    caption,
+    dim,
+    fitted,
+    format_number,
+    meter,
+    row,
+    share,
+    status,
+    swatch,
+    table,
+    ticks,
+)
 from explorer.app.widgets.ranges import length_span
 from explorer.measures.snapshot import Snapshot
-from explorer.measures.verdict import DISTANCE_SHARE
+from explorer.measures.verdict import DISTANCE_SHARE, Kind
 from explorer.mechanism.margins import INCIDENCES, describe_modes, mode_name
 from explorer.singularity.strata import GENERIC
 
 VERDICT_HINT = (
-    "How far b1 to b4 go to the nearest singular pose, as a root mean square, position and "
-    "orientation being free"
+    "Root-mean-square displacement of b1 to b4 to the nearest singular pose, of any position and "
+    "orientation"
 )
+LEGEND_HINT = (
+    "Colour of an incidence: by its margin |δ| or by the distance to its nearest singular pose, "
+    "whichever is further left on its scale"
+)
+LOOKS: dict[Kind, Look] = {"clear": "within", "near": "close", "singular": "beyond"}
 
 
 class SingularityPanel:
-    """Legend, margins, conditioning, mode; then distances, strata and performance."""
+    """The verdict with its numbers; then folders for distances, strata and performance."""
 
-    def __init__(self, gui: viser.GuiApi, session: Session) -> None:
-        self._controls = Controls(gui, session)
+    def __init__(self, services: Services) -> None:
+        gui = services.gui
+        self._controls = Controls(gui, services.session)
         self._numbers = gui.add_html("")
         self._controls.number(
             "Warn below",
-            "Margins below this length are drawn orange, and singular poses nearer than a third "
-            "of it; in design units.",
-            lambda frame: frame.state.warn_below,
-            lambda state, value: SetView(replace(state.view, warn_below=value)),
+            "Warning length in design units: an incidence is orange if its margin is below this "
+            "length, or if its nearest singular pose is closer than a third of it.",
+            At("view.warn_below", default=lambda state: state.warn_below),
             least=0.0,
             step=lambda state: length_span(state).step,
         )
         with gui.add_folder("Nearest singular poses"):
-            self._distances = DistancePanel(gui, session)
+            self._distances = DistancePanel(services)
         with gui.add_folder("Stratum of the two flags"):
-            self._strata = StrataPanel(gui, session)
+            self._strata = StrataPanel(services)
         with gui.add_folder("Performance"):
-            self._performance = PerformancePanel(gui, session)
+            self._performance = PerformancePanel(services)
 
-    def updates(self, frame: Frame, feed: StrataFeed) -> Iterator[Update]:
-        """Yield what makes the panel show the frame."""
+    def updates(self, frame: Frame) -> Iterator[Update]:
+        """Yield the updates that make the panel show the frame."""
         yield self._numbers, "content", summary(frame)
         yield from self._controls.updates(frame)
         yield from self._distances.updates(frame)
-        yield from self._strata.updates(frame, feed)
+        yield from self._strata.updates(frame)
         yield from self._performance.updates(frame)
 
 
 def summary(frame: Frame) -> str:
-    """Return the panel's contents as HTML."""
-    return (
-        '<div style="padding:4px 12px 2px;font-size:12.5px;line-height:1.45;'
-        'font-variant-numeric:tabular-nums">'
-        f"{_status(frame)}{_legend(frame.state.warn_below)}"
-        f"{''.join(_margin(frame, index) for index in range(3))}"
-        f"{_table(frame)}{_limits(frame.snapshot)}</div>"
+    """Return the panel's numbers as HTML."""
+    return box(
+        _verdict(frame),
+        _legend(frame.state.warn_below),
+        *(_margin(frame, index) for index in range(3)),
+        f'<div class="ex-after ex-before">{table(_rows(frame))}</div>',
+        _limits(frame.snapshot),
     )
 
 
-def _status(frame: Frame) -> str:
-    found, design = frame.verdict, frame.state.design
-    colour = {"clear": WITHIN, "near": CLOSE, "singular": BEYOND}[found.kind]
-    millimetres = f"{format_number(found.distance * design.unit_mm, 3)} mm"
-    note = DIM if found.kind == "clear" else f"color:{colour}"
-    return (
-        f'<div style="font-size:15px;font-weight:600;color:{colour};margin-bottom:2px">'
-        f'{found.title}</div><div style="{note};min-height:36px;margin-bottom:6px" '
-        f'title="{escape(VERDICT_HINT)}">'
-        f"{escape(found.reason(millimetres))}</div>"
+def _verdict(frame: Frame) -> str:
+    verdict = frame.verdict
+    look = LOOKS[verdict.kind]
+    millimetres = f"{format_number(verdict.distance * frame.state.design.unit_mm, 3)} mm"
+    return status(verdict.title, look) + (
+        f'<div class="{"ex-dim" if look == "within" else f"ex-{look}"} ex-two-lines" '
+        f'title="{VERDICT_HINT}">{escape(verdict.reason(millimetres))}</div>'
     )
 
 
 def _legend(warn: float) -> str:
-    share = 100.0 / FAR_WARNINGS
-    stops = f"{css(SINGULAR)} 0%,{css(WARNED)} {share:g}%,{css(CLEAR)} {share:g}%,{css(FAR)} 100%"
-    return (
-        f'<div style="{DIM};margin-bottom:3px">Margin |δ| or distance, the worse (units)</div>'
-        f'<div style="height:11px;border-radius:2px;background:linear-gradient(90deg,{stops})">'
-        f"</div>{_ticks('|δ|', warn)}{_ticks('distance', DISTANCE_SHARE * warn)}"
-    )
-
-
-def _ticks(name: str, warn: float) -> str:
-    """Return what stands below the legend for one of the two measures."""
-    ticks = "".join(
-        f'<span style="position:absolute;left:{left:g}%;transform:translateX({shift});'
-        f'white-space:nowrap">{text}</span>'
-        for left, shift, text in (
-            (0.0, "0", "0"),
-            (100.0 / FAR_WARNINGS, "-50%", f"{warn:.3g}"),
-            (60.0, "-50%", name),
-            (100.0, "-100%", f"≥ {FAR_WARNINGS * warn:.3g}"),
+    edge = 100.0 / FAR_WARNINGS
+    stops = f"{css(SINGULAR)} 0%,{css(WARNED)} {edge:g}%,{css(CLEAR)} {edge:g}%,{css(FAR)} 100%"
+    scales = "".join(
+        ticks(
+            (0.0, "0"),
+            (edge, f"{length:.3g}"),
+            (60.0, name),
+            (100.0, f"≥ {FAR_WARNINGS * length:.3g}"),
         )
+        for name, length in (("margin |δ|", warn), ("distance", DISTANCE_SHARE * warn))
     )
-    return f'<div style="position:relative;height:16px;font-size:11px;{DIM}">{ticks}</div>'
+    return (
+        caption("Proximity to singularities (design units)", LEGEND_HINT)
+        + f'<div class="ex-legend" style="--colours:{stops}"></div>{scales}'
+    )
 
 
 def _margin(frame: Frame, index: int) -> str:
     snapshot, level = frame.snapshot, frame.verdict.levels[index]
-    value, reach, unit_mm = (
-        float(snapshot.margins[index]),
-        snapshot.design.reach,
-        snapshot.design.unit_mm,
-    )
-    colour = css(proximity_colour(level, 1.0))
+    value, volume = float(snapshot.margins[index]), float(snapshot.volumes[index])
+    reach, unit_mm = snapshot.design.reach, snapshot.design.unit_mm
+    colour = proximity_colour(level, 1.0)
     filled = min(100.0, 100.0 * level / FAR_WARNINGS)
-    volume, size = float(snapshot.volumes[index]), float(snapshot.volume_sizes[index])
     return (
-        '<div style="margin:7px 0 0"><div style="display:flex;align-items:baseline;gap:7px">'
-        f'<span style="width:11px;height:11px;border-radius:2px;background:{colour};'
-        'flex:none;align-self:center"></span>'
-        f"<b>δ{index + 1}</b><span>{fitted(value, reach, 5)}</span>"
-        f'<span style="{DIM};font-size:11.5px">{fitted(value * unit_mm, reach * unit_mm, 4)} mm'
-        f'</span><span style="{DIM};margin-left:auto;font-size:11.5px" '
-        'title="Volume of its tetrahedron, signed">'
-        f"V {format_number(volume, size=size)} units³</span></div>"
-        '<div style="height:3px;border-radius:2px;margin:3px 0 2px;'
-        'background:color-mix(in srgb,currentColor 12%,transparent)">'
-        f'<div style="height:3px;border-radius:2px;width:{filled:.1f}%;background:{colour}">'
-        f'</div></div><div style="{DIM};font-size:11.5px">{escape(INCIDENCES[index])}</div></div>'
+        f'<div class="ex-after"><div class="ex-line"><span>{swatch(colour)}'
+        f"<b>δ{index + 1}</b>&ensp;"
+        f'{fitted(value, reach, 5)}&ensp;<span class="ex-dim ex-small">'
+        f"{fitted(value * unit_mm, reach * unit_mm, 4)} mm</span></span>"
+        '<span class="ex-dim ex-small" title="Volume of its tetrahedron, signed">'
+        f"V {format_number(volume, size=float(snapshot.volume_sizes[index]))} units³</span></div>"
+        f"{meter(filled, colour, look='ex-meter is-thin')}"
+        f'<div class="ex-dim ex-small">{INCIDENCES[index]}</div></div>'
     )
 
 
-def _table(frame: Frame) -> str:
-    snapshot = frame.snapshot
-    generic = "generic" if snapshot.stratum == GENERIC else "singular"
-    rows = (
-        (
-            "det J",
-            f"{format_number(snapshot.determinant, size=snapshot.determinant_size)} units³",
-            "Determinant of the actuator Jacobian",
-        ),
-        (
-            "1/cond J",
-            share(snapshot.inverse_condition),
-            "Inverse condition number of J made homogeneous with the reach; 0 is singular",
-        ),
-        ("min |δ| / reach", share(snapshot.proximity), "Smallest margin over the reach |a3|"),
-        *_mode_rows(frame),
-        (
-            "Stratum",
-            f"({', '.join(map(str, snapshot.stratum))})",
-            "Relative position of the two flags, one of 24",
-        ),
-        ("", f"dimension {snapshot.stratum_dimension}, {generic}", "Dimension of the stratum"),
-    )
-    cells = "".join(
-        f'<tr title="{escape(hint)}"><td style="{DIM};padding:1px 8px 1px 0">{name}</td>'
-        f'<td style="text-align:right">{value}</td></tr>'
-        for name, value, hint in rows
-    )
-    return f'<table style="width:100%;border-collapse:collapse;margin:12px 0 8px">{cells}</table>'
-
-
-def _mode_rows(frame: Frame) -> tuple[tuple[str, str, str], ...]:
+def _rows(frame: Frame) -> Iterator[str]:
     snapshot, mode = frame.snapshot, frame.state.mode
-    hint = "Assembly mode: the signs of δ1, δ2, δ3"
-    if snapshot.stratum == GENERIC:
-        return (("Mode", f"{mode_name(mode)} &nbsp;({mode})", hint),)
-    between = "At a singular pose the modes meet whose signs differ where a margin is 0"
-    return (
-        ("Mode", snapshot.sign_words, hint),
-        ("", describe_modes(snapshot.bordering_modes), between),
+    is_generic = snapshot.stratum == GENERIC
+    determinant = format_number(snapshot.determinant, size=snapshot.determinant_size)
+    yield row(dim("det J"), f"{determinant} units³", hint="Determinant of the actuator Jacobian")
+    yield row(
+        dim("1/cond J"),
+        share(snapshot.inverse_condition),
+        hint="Inverse condition number of J, with lengths divided by the reach; 0 is singular",
+    )
+    yield row(
+        dim("min |δ| / reach"),
+        share(snapshot.proximity),
+        hint="Smallest margin over the reach |a3|",
+    )
+    yield row(
+        dim("Mode"),
+        f"{mode_name(mode)} &nbsp;({mode})" if is_generic else snapshot.sign_words,
+        hint="Assembly mode: the signs of δ1, δ2, δ3",
+    )
+    if not is_generic:
+        yield row(
+            "",
+            describe_modes(snapshot.bordering_modes),
+            hint="Modes that meet at this singular pose: their signs differ where a margin is 0",
+        )
+    yield row(
+        dim("Stratum"),
+        stratum_name(snapshot.stratum),
+        hint="Relative position of the two flags, one of 24",
+    )
+    kind = "generic" if is_generic else "singular"
+    yield row(
+        "", f"dimension {snapshot.stratum_dimension}, {kind}", hint="Dimension of the stratum"
     )
 
 
 def _limits(snapshot: Snapshot) -> str:
     if not snapshot.violations:
-        return f'<div style="color:{WITHIN};font-weight:600">Within all limits</div>'
-    items = "".join(f"<div>{escape(str(v))}</div>" for v in snapshot.violations)
-    return f'<div style="color:{BEYOND}"><b>Outside the limits</b>{items}</div>'
+        return '<div class="ex-within ex-strong">Within all limits</div>'
+    items = "".join(f"<div>{escape(str(limit))}</div>" for limit in snapshot.violations)
+    return f'<div class="ex-beyond"><b>Outside the limits</b>{items}</div>'

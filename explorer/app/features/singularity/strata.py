@@ -1,24 +1,22 @@
-"""The order of the 24 strata as a diagram to click on, today's lit, each with its distance."""
+"""The closure order of the 24 strata as a diagram of buttons, with the distance of each."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 from functools import cache
 from html import escape
 
 import viser
 
-from explorer.app.browser.viser_gaps import element_id
-from explorer.app.features.singularity.actions import GoToStratum, SetSingularView, name_of
+from explorer.app.features.feature import Services
+from explorer.app.features.singularity.actions import GoToStratum, stratum_name
 from explorer.app.features.singularity.feed import StrataFeed
-from explorer.app.session.session import Session
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.buttons import press_button
 from explorer.app.widgets.colours import css, proximity_colour
 from explorer.app.widgets.controls import Controls
-from explorer.app.widgets.labels import out_of_sight
-from explorer.app.widgets.markup import DIM, format_number
+from explorer.app.widgets.markup import box, dim, format_number
 from explorer.measures.verdict import DISTANCE_SHARE
 from explorer.singularity.bruhat import (
     COVERED,
@@ -30,116 +28,110 @@ from explorer.singularity.bruhat import (
 )
 from explorer.singularity.strata import GENERIC, STRATA, inversions
 
-# In pixels: from row to row, and the size of a node.
-ROW, NODE_WIDTH, NODE_HEIGHT = 50, 36, 30
-# On the left, for the dimensions.
-LEFT = 14
+# In pixels, as in the stylesheet: from row to row, and the height of a node.
+ROW, NODE_HEIGHT = 50, 30
 
 
 class StrataPanel:
-    """The diagram, and in words where one more incidence leads."""
+    """The present stratum, those that one more incidence leads to, and the diagram."""
 
-    def __init__(self, gui: viser.GuiApi, session: Session) -> None:
+    def __init__(self, services: Services) -> None:
+        gui, self._session, buttons = services.gui, services.session, services.buttons
+        self._feed = services.get(StrataFeed)
         self._words = gui.add_html("")
-        self._controls = Controls(gui, session)
+        self._controls = Controls(gui, services.session)
         self._controls.checkbox(
             "Diagram",
-            "Draw which of the 24 relative positions of the two flags borders on which; a click "
-            "moves the mechanism to the nearest pose in one.",
-            lambda frame: frame.state.view.singular.strata,
-            lambda state, on: SetSingularView(replace(state.view.singular, strata=on)),
+            "Draw which of the 24 relative positions of the two flags border on each other; a "
+            "click on one moves the mechanism to the nearest pose in it.",
+            "view.singular.strata",
         )
         self._diagram = gui.add_html("", visible=False)
-        self.buttons: dict[Stratum, viser.GuiButtonHandle] = {}
-        for stratum in STRATA:
-            if stratum != GENERIC:
-                label = f"Go to {name_of(stratum)}: {describe_stratum(stratum)}"
-                self.buttons[stratum] = self._controls.button(
-                    label, f"{label}.", lambda w=stratum: GoToStratum(w)
-                )
-        self._ids = {w: element_id(button) for w, button in self.buttons.items()}
-        gui.add_html(out_of_sight(tuple(self._ids.values())))
+        buttons.on(PRESS, self._go, values=GOALS)
+        for digits, stratum in GOALS.items():
+            label = f"Go to {stratum_name(stratum)}: {describe_stratum(stratum)}"
+            buttons.offer(f"Singularity › {label}", f"{label}.", PRESS, digits)
 
-    def updates(self, frame: Frame, feed: StrataFeed) -> Iterator[Update]:
-        """Yield what makes the panel show the frame."""
+    def updates(self, frame: Frame) -> Iterator[Update]:
+        """Yield the updates that make the panel show the frame."""
         yield from self._controls.updates(frame)
         shown = frame.state.view.singular.strata
         yield self._diagram, "visible", shown
-        for button in self.buttons.values():
-            yield button, "visible", shown
-        distances = distances_of(frame, feed)
+        distances = distances_of(frame, self._feed)
         if shown:
-            yield self._diagram, "content", diagram(frame, distances, self._ids)
+            yield self._diagram, "content", diagram(frame, distances)
         yield self._words, "content", neighbours(frame, distances)
+
+    def _go(self, digits: str, client: viser.ClientHandle) -> None:
+        self._session.do(GoToStratum(GOALS[digits]), who=client.client_id)
+
+
+def _digits(stratum: Stratum) -> str:
+    return "".join(map(str, stratum))
+
+
+PRESS = "strata.go"
+GOALS = {_digits(w): w for w in STRATA if w != GENERIC}
+"""The strata that the diagram leads to, by the values of their buttons."""
 
 
 def distances_of(frame: Frame, feed: StrataFeed) -> Mapping[Stratum, float]:
-    """Return what is known of the distances at this moment.
+    """Return the distances that are known, by stratum, in design units.
 
-    Those of codimension one are, and those whose closure the pose lies in; the others come
-    from the worker.
+    The distances of the present stratum and of those with one incidence are known at once; the
+    worker computes the others.
     """
     here = frame.snapshot.stratum
     drawing = feed.drawing if feed.is_current else None
-    found = {} if drawing is None else dict(drawing.distances)
+    distances = {} if drawing is None else dict(drawing.distances)
     for stratum, nearest in zip(OF_INCIDENCES, frame.snapshot.nearest, strict=True):
-        found[stratum] = nearest.distance
-    found[here] = 0.0
-    return found
+        distances[stratum] = nearest.distance
+    distances[here] = 0.0
+    return distances
 
 
-def diagram(frame: Frame, distances: Mapping[Stratum, float], ids: Mapping[Stratum, str]) -> str:
+def diagram(frame: Frame, distances: Mapping[Stratum, float]) -> str:
     """Return the diagram as HTML.
 
     Args:
-        frame: What is shown.
-        distances: As far as they are known, by stratum, in design units.
-        ids: Of the buttons that the nodes push.
+        frame: The frame that is shown.
+        distances: Distances that are known, by stratum, in design units.
     """
     here = frame.snapshot.stratum
     warn = DISTANCE_SHARE * frame.state.warn_below
     levels = {w: distance / warn for w, distance in distances.items()}
 
-    def below(stratum: Stratum) -> str:
+    def distance_text(stratum: Stratum) -> str:
         return _distance(distances.get(stratum), 3, frame)
 
     # One incidence has one colour all over the page.
     levels.update(zip(OF_INCIDENCES, frame.verdict.levels, strict=True))
-    nodes = "".join(
-        _node(w, below(w), levels.get(w), ids.get(w), is_here=w == here) for w in STRATA
-    )
+    nodes = "".join(_node(w, distance_text(w), levels.get(w), is_here=w == here) for w in STRATA)
     ranks = "".join(
-        f'<span style="position:absolute;left:0;top:{_top(d) + 8}px;font-size:10.5px;{DIM}" '
-        f'title="Dimension {d}">{d}</span>'
-        for d in range(7)
+        f'<span style="--top:{_top(d) + 8}px" title="Dimension {d}">{d}</span>' for d in range(7)
     )
-    return (
-        '<div style="padding:2px 12px 0;font-variant-numeric:tabular-nums">'
-        f'<div style="{DIM};font-size:11.5px;line-height:1.35">Dimension on the left; below each '
-        "its distance in design units. Click to go to the nearest pose in it.</div>"
-        f'<div style="position:relative;height:{6 * ROW + NODE_HEIGHT + 4}px;margin-top:6px">'
-        f'{_edges(here)}{ranks}<div style="position:absolute;left:{LEFT}px;right:0;top:0">'
-        f"{nodes}</div></div></div>"
+    return box(
+        '<div class="ex-dim ex-small">Dimensions on the left; distances in design units. '
+        "Click on a stratum to go to its nearest pose.</div>"
+        f'<div class="ex-strata" style="--height:{6 * ROW + NODE_HEIGHT + 4}px">'
+        f'{_edges(here)}<div class="ex-ranks">{ranks}</div><div class="ex-nodes">{nodes}</div>'
+        "</div>"
     )
 
 
 def neighbours(frame: Frame, distances: Mapping[Stratum, float]) -> str:
-    """Return where the pose lies and where one more incidence leads, in words, as HTML."""
+    """Return the present stratum and those that one more incidence leads to, as HTML."""
     here = frame.snapshot.stratum
     rows = "".join(_neighbour(w, _distance(distances.get(w), 4, frame)) for w in COVERED[here])
     rest = (
-        f'<div style="{DIM};margin:7px 0 3px;display:flex;'
-        f'justify-content:space-between"><span>One incidence from here</span><span>units</span>'
-        f"</div>{rows}"
+        '<div class="ex-line ex-dim ex-after"><span>With one more incidence</span>'
+        f"<span>units</span></div>{rows}"
         if rows
-        else f'<div style="{DIM};margin-top:7px">Both flags coincide: nothing is more singular.'
-        "</div>"
+        else '<div class="ex-dim ex-after">Both flags coincide: nothing is more singular.</div>'
     )
-    return (
-        '<div style="padding:4px 12px 8px;font-size:12.5px;line-height:1.4;'
-        f'font-variant-numeric:tabular-nums"><div><b>{name_of(here)}</b> '
-        f'<span style="{DIM}">dimension {inversions(here)}</span></div>'
-        f"<div>{escape(_sentence(here))}</div>{rest}</div>"
+    return box(
+        f"<div><b>{stratum_name(here)}</b> {dim(f'dimension {inversions(here)}')}</div>",
+        f"<div>{escape(_sentence(here))}</div>{rest}",
     )
 
 
@@ -159,53 +151,37 @@ def _distance(distance: float | None, digits: int, frame: Frame) -> str:
 
 def _neighbour(stratum: Stratum, value: str) -> str:
     return (
-        '<div style="display:flex;justify-content:space-between;gap:8px;padding:2px 0">'
-        f"<span>{escape(_sentence(stratum))}</span><span>{value}</span></div>"
+        f'<div class="ex-line"><span>{escape(_sentence(stratum))}</span><span>{value}</span></div>'
     )
 
 
-def _node(
-    stratum: Stratum,
-    below: str,
-    level: float | None,
-    button: str | None,
-    *,
-    is_here: bool,
-) -> str:
+def _node(stratum: Stratum, below: str, level: float | None, *, is_here: bool) -> str:
     column, count = _place(stratum)
     left = 100.0 * (column + 0.5) / count
     colour = "currentColor" if level is None else css(proximity_colour(level, 1.0))
-    look = "background:var(--mantine-color-body);"
-    edge = f"border:1.5px solid color-mix(in srgb,{colour} 75%,transparent);"
     if is_here:
         below = "here"
-        edge, look = f"border:1.5px solid {colour};", f"background:{colour};color:#fff;"
         if stratum == GENERIC:
             colour = css(proximity_colour(float("inf"), 1.0))
-            edge, look = f"border:1.5px solid {colour};", f"background:{colour};color:#fff;"
     elif stratum == GENERIC:
         below = "any"
-    hint = escape(f"{name_of(stratum)}  {_sentence(stratum)}")
-    tag, does = ("span", "") if button is None else ("label", f' for="{button}"')
-    # The button takes its name from its label.
-    named = "" if button is None else f' aria-label="Go to {hint}"'
-    pointer = "" if button is None else "cursor:pointer;"
-    return (
-        f'<{tag}{does} title="{hint}"{named} style="position:absolute;left:calc({left:.4g}% - '
-        f"{NODE_WIDTH // 2}px);top:{_top(inversions(stratum))}px;width:{NODE_WIDTH}px;"
-        f"height:{NODE_HEIGHT}px;box-sizing:border-box;border-radius:5px;text-align:center;"
-        f'user-select:none;{pointer}{edge}{look}"><span style="display:block;font-size:11px;'
-        f'line-height:15px;font-weight:600">{"".join(map(str, stratum))}</span>'
-        f'<span style="display:block;font-size:9.5px;line-height:10px;opacity:0.85">{below}'
-        f"</span></{tag}>"
+    place = f"--left:{left:.4g}%;--top:{_top(inversions(stratum))}px;--colour:{colour}"
+    content = f"<b>{_digits(stratum)}</b><span>{below}</span>"
+    look = "ex-node is-here" if is_here else "ex-node"
+    hint = f"{stratum_name(stratum)}  {_sentence(stratum)}"
+    if stratum == GENERIC:
+        return f'<span class="{look}" style="{place}" title="{escape(hint)}">{content}</span>'
+    button = press_button(
+        PRESS, _digits(stratum), content, hint=hint, label=f"Go to {hint}", class_name=look
     )
+    return f'<div style="{place}">{button}</div>'
 
 
 @cache
 def _place(stratum: Stratum) -> tuple[int, int]:
     """Return the column of a stratum and how many its row has."""
     row = [w for w in STRATA if codimension(w) == codimension(stratum)]
-    # From the left as δ1, δ2 and δ3 are counted.
+    # In the order of `STRATA`, so that δ1, δ2 and δ3 stand from left to right.
     return row.index(stratum), len(row)
 
 
@@ -215,9 +191,9 @@ def _top(dimension: int) -> int:
 
 @cache
 def _edges(here: Stratum) -> str:
-    """Return the edges of the diagram; those that lead on from a stratum stand out."""
+    """Return the edges of the diagram as SVG; those down from a stratum are darker."""
     plain: list[str] = []
-    lit: list[str] = []
+    darker: list[str] = []
     for upper, lowers in COVERED.items():
         for lower in lowers:
             ends = [(100.0 * (c + 0.5) / n) for c, n in (_place(upper), _place(lower))]
@@ -226,10 +202,9 @@ def _edges(here: Stratum) -> str:
                 f'<line x1="{ends[0]:.4g}%" y1="{first}" x2="{ends[1]:.4g}%" '
                 f'y2="{_top(inversions(lower))}"/>'
             )
-            (lit if upper == here else plain).append(line)
+            (darker if upper == here else plain).append(line)
     return (
-        f'<svg style="position:absolute;left:{LEFT}px;top:0;width:calc(100% - {LEFT}px);'
-        'height:100%;overflow:visible" stroke="currentColor">'
+        '<svg class="ex-edges" stroke="currentColor">'
         f'<g stroke-opacity="0.16">{"".join(plain)}</g>'
-        f'<g stroke-opacity="0.75" stroke-width="1.5">{"".join(lit)}</g></svg>'
+        f'<g stroke-opacity="0.75" stroke-width="1.5">{"".join(darker)}</g></svg>'
     )

@@ -12,7 +12,7 @@ from explorer.singularity.nearest_stratum import nearest_in_strata
 
 @dataclass(frozen=True)
 class StrataRequest:
-    """From which pose to measure the way to each stratum."""
+    """A request for the distances of a pose to all strata."""
 
     design: Design
     pose: Pose
@@ -20,11 +20,12 @@ class StrataRequest:
 
 @dataclass(frozen=True)
 class StrataDistances:
-    """The root-mean-square way of b1 to b4 to the nearest pose in each of the 24 strata.
+    """The distances of a pose to the 24 strata.
 
     Attributes:
-        request: What was asked for.
-        distances: In design units, by stratum.
+        request: The request.
+        distances: Root-mean-square displacements of b1 to b4 to the nearest pose in each stratum,
+            in design units.
     """
 
     request: StrataRequest
@@ -32,6 +33,6 @@ class StrataDistances:
 
 
 def strata_distances(request: StrataRequest) -> StrataDistances:
-    """Return how far the pose is from each stratum."""
-    found = nearest_in_strata(request.design, request.pose)
-    return StrataDistances(request, {w: nearest.distance for w, nearest in found.items()})
+    """Return the distances of a pose to all strata."""
+    poses = nearest_in_strata(request.design, request.pose)
+    return StrataDistances(request, {w: pose.distance for w, pose in poses.items()})

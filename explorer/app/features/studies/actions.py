@@ -1,4 +1,4 @@
-"""The actions of looking at studies: open one, brush, choose axes, pick a design, wish for one."""
+"""The actions of studies: open one, brush axes, pick a design."""
 
 from __future__ import annotations
 
@@ -6,27 +6,27 @@ import math
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
-from explorer.app.state.action import Action, changes
+from explorer.app.state.action import Action
 from explorer.app.state.actions import Open
 from explorer.app.state.state import State
-from explorer.app.state.studies import Range, Studies, StudyWish, spoken
+from explorer.app.state.studies import Range, Studies, label_of
 from explorer.errors import InputError
 
-# Of one axis; hands make a few.
+# Ranges of one axis.
 MOST_RANGES = 16
 
 
 @dataclass(frozen=True)
 class OpenStudy(Action):
-    """Look at a study by its name, or at none."""
+    """Open a study by its name; None closes it."""
 
     name: str | None
 
     def apply(self, state: State) -> State:
-        """Return the next state; what was brushed and picked in another study is forgotten."""
+        """Return the next state, without the brushes and the pick of another study."""
         if self.name == state.studies.name:
             return state
-        return replace(state, studies=Studies(name=self.name, wish=state.studies.wish))
+        return replace(state, studies=Studies(name=self.name, plan=state.studies.plan))
 
     def words(self) -> str:
         """Return what the action does."""
@@ -35,7 +35,7 @@ class OpenStudy(Action):
 
 @dataclass(frozen=True)
 class BrushAxis(Action):
-    """Ask for designs that lie within ranges of an axis; with none the axis is free."""
+    """Select designs within ranges of an axis; no ranges free it."""
 
     axis: str
     ranges: tuple[Range, ...]
@@ -46,16 +46,16 @@ class BrushAxis(Action):
         Raises:
             InputError: too many ranges, or one without numbers.
         """
-        return _with(state, state.studies.brushed(self.axis, _checked(self.axis, self.ranges)))
+        return _with(state, state.studies.with_ranges(self.axis, _checked(self.axis, self.ranges)))
 
     def words(self) -> str:
         """Return what the action does."""
-        return f"{'Brush' if self.ranges else 'Free'} {spoken(self.axis)}"
+        return f"{'Brush' if self.ranges else 'Free'} {label_of(self.axis)}"
 
 
 @dataclass(frozen=True)
 class BrushBox(Action):
-    """Ask for designs within a box of the scatter plot; without ranges both axes are free."""
+    """Select designs within a box of the scatter plot; None frees both axes."""
 
     template: ClassVar[str] = "Brush {action.spoken}"
 
@@ -65,8 +65,8 @@ class BrushBox(Action):
 
     @property
     def spoken(self) -> str:
-        """What people call both axes."""
-        return f"{spoken(self.across)} and {spoken(self.up)}"
+        """The names of both axes on the page."""
+        return f"{label_of(self.across)} and {label_of(self.up)}"
 
     def apply(self, state: State) -> State:
         """Return the next state.
@@ -77,7 +77,7 @@ class BrushBox(Action):
         studies = state.studies
         for index, axis in enumerate((self.across, self.up)):
             ranges = () if self.box is None else (self.box[index],)
-            studies = studies.brushed(axis, _checked(axis, ranges))
+            studies = studies.with_ranges(axis, _checked(axis, ranges))
         return _with(state, studies)
 
 
@@ -93,30 +93,12 @@ class ClearBrushes(Action):
 
 
 @dataclass(frozen=True)
-class SetAxes(Action):
-    """Choose what the scatter plot shows and what colours the plots; None for an objective."""
-
-    across: str | None
-    up: str | None
-    colour: str | None
-
-    def apply(self, state: State) -> State:
-        """Return the next state."""
-        studies = replace(state.studies, across=self.across, up=self.up, colour=self.colour)
-        return _with(state, studies)
-
-    def describe(self, before: State, after: State) -> str:
-        """Return what the step did."""
-        return changes("Plot", before.studies, after.studies)
-
-
-@dataclass(frozen=True)
 class PickDesign(Open):
     """Open the design of a row of the open study.
 
     Attributes:
-        index: Of the design in its study.
-        study: Its name.
+        index: Index of the design in its study.
+        study: Name of the study.
     """
 
     template: ClassVar[str] = "Pick {design}"
@@ -134,21 +116,6 @@ class PickDesign(Open):
             raise InputError(f"the study {self.study!r} is not open any more")
         after = super().apply(state)
         return _with(after, replace(after.studies, picked=self.index))
-
-
-@dataclass(frozen=True)
-class SetStudyWish(Action):
-    """Change the small study that can be started."""
-
-    wish: StudyWish
-
-    def apply(self, state: State) -> State:
-        """Return the next state."""
-        return _with(state, replace(state.studies, wish=self.wish))
-
-    def describe(self, before: State, after: State) -> str:
-        """Return what the step did."""
-        return changes("New study", before.studies.wish, after.studies.wish)
 
 
 def _with(state: State, studies: Studies) -> State:

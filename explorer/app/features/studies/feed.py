@@ -1,7 +1,6 @@
-"""Keeps the plots of the open study in step with what is brushed, picked and computed.
+"""The plots of the open study, in step with its brushes, its pick and its new results.
 
-It reads and draws on a thread of its own, only what is new, so that nothing of it is in the
-way of a hand on a slider.
+A thread of its own reads and draws them, so that the controls of the page stay quick.
 """
 
 from __future__ import annotations
@@ -17,11 +16,11 @@ from pathlib import Path
 import numpy as np
 
 from explorer.app.features.studies.figures import encoded, parallel, scatter
-from explorer.app.features.studies.folders import StudyFolders, study_in
 from explorer.app.features.studies.shown import Shown, ordered_front, shown
-from explorer.app.session.jobs import LatestWins
+from explorer.app.session.latest import LatestWins
 from explorer.app.state.frame import Frame
-from explorer.app.state.studies import Studies, StudyWish
+from explorer.app.state.studies import Studies, StudyPlan
+from explorer.app.storage.study_folders import StudyFolders, study_in
 from explorer.errors import ExplorerError, InputError
 from explorer.numerics.arrays import BoolArray, IntArray
 from explorer.sweep.parts import pyarrow
@@ -30,17 +29,13 @@ from explorer.sweep.rows import columns_of
 from explorer.sweep.study import Study
 
 MOST_ON_PAGE = 100_000
-"""Designs of the largest study that the page shows."""
+"""Number of designs of the largest study that the page shows."""
 
-NO_WISH = StudyWish()
+NO_PLAN = StudyPlan()
 
 
 class PlotJson:
-    """A figure as viser takes one, made already.
-
-    Args:
-        text: The figure as JSON.
-    """
+    """A figure that is JSON already, in the form that viser takes."""
 
     def __init__(self, text: str) -> None:
         self.text = text
@@ -52,11 +47,11 @@ class PlotJson:
 
 @dataclass(frozen=True)
 class Request:
-    """What is to be drawn.
+    """Request to draw a study.
 
     Attributes:
-        studies: What is looked at, and how; without the wish, which changes nothing.
-        version: Of what has been computed.
+        studies: Open study, brushes, axes and pick; without the plan, which changes nothing.
+        version: Version of the results.
         dark: Whether the page is dark.
     """
 
@@ -67,16 +62,16 @@ class Request:
 
 @dataclass(frozen=True)
 class StudyDrawing:
-    """A study as it is drawn.
+    """A study that has been drawn.
 
     Attributes:
-        request: What was asked for.
+        request: Request that it answers.
         results: All rows so far.
         front: Rows on the Pareto front, the best in the first objective first.
-        inside: Which rows lie within all brushes, shape (n,).
-        shown: What the plots show; None while there is nothing to show.
-        plots: The parallel lines, and the scatter plot.
-        reasons: How many rows are not done, by status and reason, most frequent first.
+        inside: Whether each row lies within all brushes, shape (n,).
+        shown: Rows and axes of the plots; None while there is nothing to show.
+        plots: Parallel lines and scatter plot.
+        reasons: Counts of the rows that are not done, by status and reason, most frequent first.
     """
 
     request: Request
@@ -106,20 +101,19 @@ class StudyDrawing:
         """Return the row of a design.
 
         Raises:
-            InputError: it has none.
+            InputError: it has not been computed yet.
         """
-        found = np.flatnonzero(self.results.columns["index"] == index)
-        if not len(found):
+        rows = np.flatnonzero(self.results.columns["index"] == index)
+        if not len(rows):
             raise InputError(f"design {index} has not been computed yet")
-        return int(found[0])
+        return int(rows[0])
 
     def beside(self, picked: int | None, step: int) -> int | None:
         """Return the index of the design a step along the front; None where there is none.
 
         Args:
-            picked: The index of the design to go from; the first of the front if it is not
-                on it.
-            step: 1 for the next one, −1 for the one before.
+            picked: Index of the present design; without one on the front, the first is returned.
+            step: 1 for the next design, −1 for the previous one.
         """
         indices: list[int] = self.results.columns["index"][self.front_inside].tolist()
         if not indices:
@@ -131,51 +125,47 @@ class StudyDrawing:
 
 
 class StudyFeed:
-    """Reads and draws the open study.
+    """Thread that reads and draws the open study.
 
     Args:
-        folders: Where studies lie.
-        redraw: Called when something new is there.
-        inbox: The id of the control that events of the plots go to.
+        folders: Folders of the studies.
+        redraw: Called after each drawing.
     """
 
-    def __init__(
-        self, folders: StudyFolders, redraw: Callable[[], None], inbox: Callable[[], str]
-    ) -> None:
+    def __init__(self, folders: StudyFolders, redraw: Callable[[], None]) -> None:
         self.folders = folders
-        # Here and not on the thread, which would draw while the page is being made.
-        self.names = tuple(folders.found())
+        # The thread would redraw a page that is not complete yet.
+        self.names = tuple(folders.by_name())
         self.problem: str | None = None
         self._redraw = redraw
-        self._inbox = inbox
         self._version = itertools.count(1)
         self._revision = itertools.count(1)
         self._lock = threading.Lock()
         self._computed = 0
         self._seen: tuple[Studies, int, bool] | None = None
-        self._asked: Request | None = None
+        self._request: Request | None = None
         self._drawing: StudyDrawing | None = None
-        # Of the thread alone: what was read last.
+        # Results that were read last; only the thread uses them.
         self._read: tuple[tuple[str, int], Results, BoolArray] | None = None
         self._jobs: LatestWins[Request | None] = LatestWins(self._do, "studies")
 
     @property
     def drawing(self) -> StudyDrawing | None:
         """The newest drawing of the open study."""
-        found, asked = self._drawing, self._asked
-        if found is None or asked is None or found.request.studies.name != asked.studies.name:
+        drawing, request = self._drawing, self._request
+        if drawing is None or request is None:
             return None
-        return found
+        return drawing if drawing.request.studies.name == request.studies.name else None
 
     @property
     def is_current(self) -> bool:
-        """Whether the drawing is what was last asked for."""
-        return self._asked is None or (
-            self._drawing is not None and self._drawing.request == self._asked
+        """Whether the drawing answers the last request."""
+        return self._request is None or (
+            self._drawing is not None and self._drawing.request == self._request
         )
 
     def follow(self, frame: Frame, *, dark: bool = False) -> None:
-        """Have the study drawn that a frame shows, unless it is drawn already."""
+        """Draw the study of a frame, unless it is drawn already."""
         studies = frame.state.studies
         seen = (studies, self._computed, dark)
         if self._seen is not None and all(
@@ -184,25 +174,25 @@ class StudyFeed:
             return
         self._seen = seen
         if studies.name is None:
-            self._asked = self._drawing = self.problem = None
+            self._request = self._drawing = self.problem = None
             return
-        request = Request(replace(studies, wish=NO_WISH), self._computed, dark)
-        if request != self._asked:
-            self._asked = request
+        request = Request(replace(studies, plan=NO_PLAN), self._computed, dark)
+        if request != self._request:
+            self._request = request
             self._jobs.post("draw", time.monotonic(), request)
 
     def look(self) -> None:
-        """Look again which studies there are; this returns at once."""
+        """List the studies again; this returns at once."""
         self._jobs.post("look", time.monotonic(), None)
 
     def refresh(self) -> None:
-        """Say that more has been computed."""
+        """Draw again, since there are new results."""
         with self._lock:
             self._computed = next(self._version)
         self._redraw()
 
     def wait_until_idle(self, timeout: float = 10.0) -> bool:
-        """Wait until all that was asked for is drawn; say whether it is."""
+        """Wait until all requests are done; return whether they are."""
         return self._jobs.wait_until_idle(timeout)
 
     def stop(self) -> None:
@@ -212,10 +202,10 @@ class StudyFeed:
     def _do(self, requests: Sequence[Request | None]) -> None:
         for request in requests:
             if request is None:
-                self.names = tuple(self.folders.found())
+                self.names = tuple(self.folders.by_name())
                 continue
             try:
-                self._drawing, self.problem = self._drawn(request), None
+                self._drawing, self.problem = self._draw(request), None
             except ExplorerError as error:
                 self._drawing, self.problem = None, str(error)
             except Exception as error:  # noqa: BLE001 - a bad file must not end the thread
@@ -223,17 +213,17 @@ class StudyFeed:
                 self._drawing, self.problem = None, message
         self._redraw()
 
-    def _drawn(self, request: Request) -> StudyDrawing:
+    def _draw(self, request: Request) -> StudyDrawing:
         results, front = self._results(str(request.studies.name), request.version)
         seen = shown(results, front, request.studies)
         if seen is None:
             plots, inside = None, np.ones(results.count, dtype=np.bool_)
         else:
-            revision, inbox = next(self._revision), self._inbox()
+            revision = next(self._revision)
             plots, inside = (
                 (
-                    PlotJson(encoded(parallel(seen, inbox, revision, dark=request.dark))),
-                    PlotJson(encoded(scatter(seen, inbox, revision, dark=request.dark))),
+                    PlotJson(encoded(parallel(seen, revision, dark=request.dark))),
+                    PlotJson(encoded(scatter(seen, revision, dark=request.dark))),
                 ),
                 seen.inside,
             )
@@ -249,7 +239,7 @@ class StudyFeed:
 
 
 def results_in(folder: Path) -> Results:
-    """Return the rows of a study as far as they have been computed, though there be none.
+    """Return the rows of a study that have been computed, if any.
 
     Raises:
         InputError: the folder holds no study, or one of too many designs for the page.
@@ -273,9 +263,11 @@ def results_in(folder: Path) -> Results:
 
 
 def reasons(results: Results) -> tuple[tuple[str, str, int], ...]:
-    """Return how many rows are not done, by status and reason, most frequent first."""
+    """Return counts of the rows that are not done, by status and reason, most frequent first."""
     columns = results.columns
-    odd = columns["status"] != "done"
-    pairs = zip(columns["status"][odd].tolist(), columns["reason"][odd].tolist(), strict=True)
+    not_done = columns["status"] != "done"
+    pairs = zip(
+        columns["status"][not_done].tolist(), columns["reason"][not_done].tolist(), strict=True
+    )
     counted = Counter((str(status), str(reason or "")) for status, reason in pairs)
     return tuple((*pair, count) for pair, count in counted.most_common())

@@ -1,4 +1,4 @@
-"""The two plots of a study as Plotly reads them: plain data, made without Plotly itself.
+"""The two plots of a study as plain data for Plotly, made without Plotly itself.
 
 Numbers go as packed arrays (`bdata`), which is a tenth of the work of text.
 """
@@ -6,6 +6,7 @@ Numbers go as packed arrays (`bdata`), which is a tenth of the work of text.
 from __future__ import annotations
 
 import base64
+import math
 from collections.abc import Mapping
 from typing import Any, TypeAlias
 
@@ -14,17 +15,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from explorer.app.features.studies.shown import Shown
-from explorer.app.state.studies import Range, briefly, spoken, titled, unit_of
+from explorer.app.state.studies import Range, label_of, short_title_of, title_of, unit_of
 from explorer.numerics.arrays import BoolArray, FloatArray
 
 Figure: TypeAlias = dict[str, Any]
 
-# Above so many points the graphics processor draws the scatter plot.
+# With more points than this the graphics processor draws the scatter plot.
 MOST_AS_SVG = 1500
 
 FRONT, PICKED = "#c2185b", "#0a9d6c"
-# Of the others, from the least to the greatest value, as points and as the denser lines, by
-# whether the page is dark, where greater is brighter; and where brushes leave them out.
+# Colours of the other designs from the least to the greatest value, by whether the page is dark:
+# as points, and as lines, which are denser.
 SCALE = {
     False: ("#c9d6e6", "#8fb0d2", "#4a7fb5", "#1f4f86"),
     True: ("#34506f", "#4477a6", "#7aabd6", "#cbe2f6"),
@@ -33,24 +34,27 @@ LINE_SCALE = {
     False: ("#dbe4ee", "#b9cfe4", "#8fb3d6", "#5f8fc0"),
     True: ("#2d4259", "#3b5d81", "#4f81b0", "#86b4df"),
 }
-# Of points that lack what colours the others.
+# Colours of points without the value that colours the others, and of those outside the brushes.
 PLAIN = "rgba(128,136,148,0.6)"
 LEFT_OUT = "rgba(128,136,148,0.22)"
 TEXT = "#7d8794"
 GRID = "rgba(128,136,148,0.22)"
-# Behind the plots, by theme: digits have a rim of this colour.
+# Background of the plots, by theme; digits have a rim of this colour.
 PAPER = {False: "#ffffff", True: "#242424"}
-# Levels of the scale of the parallel lines: the others, the front, the picked one.
+# Ends of the scale of the parallel lines: the other designs, the front, the picked one.
 OTHERS, ON_FRONT, ON_PICKED = 0.8, 0.9, 1.0
+# Largest number of axes with level titles, and the tilt of titles with more axes, in degrees.
+MOST_LEVEL, TILT = 7, 24
+# Widths of a character of a title and of a scroll bar, in pixels.
+CHARACTER, SCROLL_BAR = 6.2, 14
 
 
-def parallel(shown: Shown, inbox: str, revision: int, *, dark: bool) -> Figure:
+def parallel(shown: Shown, revision: int, *, dark: bool) -> Figure:
     """Return the plot with an axis for each variable and measure, and a line for each design.
 
     Args:
-        shown: What is drawn.
-        inbox: The id of the control that events go to.
-        revision: Another one than that of the plot before, so that nothing of it is kept.
+        shown: Rows and axes to draw.
+        revision: Number that differs from the last plot's, so that Plotly resets its brushes.
         dark: Whether the page is dark.
     """
     level = OTHERS * _shares(shown.column(shown.colour)[shown.lines])
@@ -74,7 +78,7 @@ def parallel(shown: Shown, inbox: str, revision: int, *, dark: bool) -> Figure:
         column = shown.column(name)[shown.lines]
         dimension: dict[str, Any] = {
             "name": name,
-            "label": briefly(name),
+            "label": short_title_of(name),
             "values": packed(column),
             "range": _padded(column),
             "tickformat": "~g",
@@ -82,29 +86,31 @@ def parallel(shown: Shown, inbox: str, revision: int, *, dark: bool) -> Figure:
         }
         ranges = shown.studies.ranges_of(name)
         if ranges:
-            dimension["constraintrange"] = [[*each] for each in ranges]
+            dimension["constraintrange"] = [[*ends] for ends in ranges]
         dimensions.append(dimension)
+    is_tilted = len(shown.axes) > MOST_LEVEL
     trace = {
         "type": "parcoords",
         "dimensions": dimensions,
         "line": line,
         "unselected": {"line": {"color": LEFT_OUT, "opacity": 0.25}},
-        "labelangle": -24 if len(shown.axes) > 7 else 0,
+        "labelangle": -TILT if is_tilted else 0,
         "labelfont": {"size": 11.5},
         "tickfont": {"size": 9.5},
         # The ends are ticks like others; their own digits would run into one another.
         "rangefont": {"size": 1, "color": "rgba(0,0,0,0)"},
         "uirevision": revision,
     }
-    top = 64 if len(shown.axes) > 7 else 34
-    margin = {"l": 34, "r": 44, "t": top, "b": 12}
-    layout = _layout(shown, inbox, "parallel", margin, dark=dark)
-    # Lines have no data of their own by which their designs could be known.
+    # Titles have their middle above their axes; a scroll bar may cover the edge of the plot.
+    right = SCROLL_BAR + math.ceil(0.5 * CHARACTER * len(short_title_of(shown.axes[-1])))
+    margin = {"l": 34, "r": max(44, right), "t": 64 if is_tilted else 34, "b": 12}
+    layout = _layout(shown, "parallel", margin, dark=dark)
+    # Lines carry no data that could name their designs.
     layout["meta"]["designs"] = shown.results.columns["index"][shown.lines].tolist()
     return _figure([trace], layout)
 
 
-def scatter(shown: Shown, inbox: str, revision: int, *, dark: bool) -> Figure:
+def scatter(shown: Shown, revision: int, *, dark: bool) -> Figure:
     """Return the plot of two measures with a point for each design; see `parallel`."""
     front, inside = shown.front[shown.rows], shown.inside[shown.rows]
     is_picked = np.isin(shown.rows, shown.picked)
@@ -116,7 +122,7 @@ def scatter(shown: Shown, inbox: str, revision: int, *, dark: bool) -> Figure:
         "cmin": low,
         "cmax": high,
         "colorbar": {
-            "title": {"text": titled(shown.colour), "side": "right", "font": {"size": 11}},
+            "title": {"text": title_of(shown.colour), "side": "right", "font": {"size": 11}},
             "thickness": 9,
             "outlinewidth": 0,
             "tickfont": {"size": 10},
@@ -153,7 +159,7 @@ def scatter(shown: Shown, inbox: str, revision: int, *, dark: bool) -> Figure:
             },
         ),
     ]
-    layout = _layout(shown, inbox, "scatter", {"l": 62, "r": 10, "t": 12, "b": 42}, dark=dark)
+    layout = _layout(shown, "scatter", {"l": 62, "r": 10, "t": 12, "b": 42}, dark=dark)
     layout |= {
         "xaxis": _axis(shown.across),
         "yaxis": _axis(shown.up),
@@ -180,8 +186,8 @@ def packed(values: NDArray[Any], kind: str = "f4") -> dict[str, str]:
 
 def _points(shown: Shown, which: BoolArray, marker: Mapping[str, Any]) -> Figure:
     indices = shown.results.columns["index"][shown.rows[which]]
-    lines = [f"<b>design %{{customdata}}</b><br>{_told(shown.across, 'x')}"]
-    lines.append(_told(shown.up, "y"))
+    lines = [f"<b>design %{{customdata}}</b><br>{_hover_line(shown.across, 'x')}"]
+    lines.append(_hover_line(shown.up, "y"))
     return {
         "type": "scatter" if len(shown.rows) <= MOST_AS_SVG else "scattergl",
         "mode": "markers",
@@ -190,14 +196,14 @@ def _points(shown: Shown, which: BoolArray, marker: Mapping[str, Any]) -> Figure
         "customdata": packed(indices, "i4"),
         "hovertemplate": "<br>".join(lines) + "<extra></extra>",
         "marker": dict(marker),
-        # What is left out is told by the server.
+        # The server draws the points outside the brushes.
         "unselected": {"marker": {"opacity": marker.get("opacity", 1.0)}},
     }
 
 
 def _front_line(shown: Shown) -> Figure | None:
-    """Return the line through the front, where it is one: of the two objectives shown."""
-    names = [each.measure for each in shown.results.study.objectives]
+    """Return the line through the front; None unless the plot shows the two objectives."""
+    names = [objective.measure for objective in shown.results.study.objectives]
     if sorted(names) != sorted((shown.across, shown.up)):
         return None
     on = shown.rows[shown.front[shown.rows]]
@@ -220,8 +226,8 @@ def _boxes(shown: Shown) -> list[dict[str, Any]]:
     if not across and not up:
         return []
     free: tuple[tuple[Range, str], ...] = (((0.0, 1.0), " domain"),)
-    columns = tuple((each, "") for each in across) or free
-    rows = tuple((each, "") for each in up) or free
+    columns = tuple((ends, "") for ends in across) or free
+    rows = tuple((ends, "") for ends in up) or free
     return [
         {
             "type": "rect",
@@ -242,20 +248,18 @@ def _boxes(shown: Shown) -> list[dict[str, Any]]:
 
 def _axis(name: str) -> dict[str, Any]:
     return {
-        "title": {"text": titled(name), "standoff": 6, "font": {"size": 12}},
+        "title": {"text": title_of(name), "standoff": 6, "font": {"size": 12}},
         "gridcolor": GRID,
         "zeroline": False,
         "nticks": 7,
         "tickfont": {"size": 11},
         "separatethousands": True,
-        # A zoom is kept as long as the axis is the same.
+        # A zoom stays as long as the axis is the same.
         "uirevision": name,
     }
 
 
-def _layout(
-    shown: Shown, inbox: str, plot: str, margin: Mapping[str, int], *, dark: bool
-) -> dict[str, Any]:
+def _layout(shown: Shown, plot: str, margin: Mapping[str, int], *, dark: bool) -> dict[str, Any]:
     return {
         "paper_bgcolor": PAPER[dark],
         "plot_bgcolor": "rgba(0,0,0,0)",
@@ -266,7 +270,6 @@ def _layout(
         "meta": {
             "explorer": plot,
             "study": shown.studies.name,
-            "inbox": inbox,
             "axes": [shown.across, shown.up],
         },
     }
@@ -277,10 +280,10 @@ def _figure(data: list[Figure], layout: Figure) -> Figure:
     return {"data": data, "layout": layout, "config": config}
 
 
-def _told(name: str, axis: str) -> str:
+def _hover_line(name: str, axis: str) -> str:
     unit = unit_of(name)
     gap = "" if unit == "°" else " "
-    return f"{spoken(name)} %{{{axis}:.5~g}}{gap}{unit}".rstrip()
+    return f"{label_of(name)} %{{{axis}:.5~g}}{gap}{unit}".rstrip()
 
 
 def _ends(values: FloatArray) -> Range:
@@ -297,5 +300,5 @@ def _padded(values: FloatArray) -> list[float]:
 
 def _shares(values: FloatArray) -> FloatArray:
     low, high = _ends(values)
-    # Of few lines all may have the same.
+    # All of a few lines may have the same value.
     return (values - low) / (high - low) if high > low else np.zeros(len(values))

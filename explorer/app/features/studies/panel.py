@@ -3,34 +3,37 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from typing import Any, Literal
 
 import viser
 
-from explorer.app.browser.viser_gaps import element_id
+from explorer.app.features.feature import Services
 from explorer.app.features.studies.actions import (
     ClearBrushes,
     OpenStudy,
     PickDesign,
-    SetAxes,
-    SetStudyWish,
 )
 from explorer.app.features.studies.feed import StudyDrawing, StudyFeed
-from explorer.app.features.studies.folders import StudyFolders
 from explorer.app.features.studies.plots import HINT, StudyPlots
 from explorer.app.features.studies.runner import Run, StudyRunner
-from explorer.app.features.studies.words import ROWS, chips, legend, run_line, status, table, window
-from explorer.app.session.faults import Faults
-from explorer.app.session.session import Session, Who
+from explorer.app.features.studies.words import chips, legend, run_line, status, table
+from explorer.app.session.session import Who
 from explorer.app.state.action import Action
+from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
-from explorer.app.state.studies import FEWEST, LEAST_PERCENT, MOST, MOST_PERCENT, StudyWish, spoken
+from explorer.app.state.studies import (
+    FEWEST,
+    LEAST_PERCENT,
+    MOST,
+    MOST_PERCENT,
+    StudyPlan,
+    label_of,
+)
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.controls import Control
-from explorer.app.widgets.labels import labelled, out_of_sight
-from explorer.app.widgets.markup import DIM, alert
+from explorer.app.widgets.buttons import Buttons, Does
+from explorer.app.widgets.controls import At, Bound, Control
+from explorer.app.widgets.markup import alert, note
 from explorer.errors import ExplorerError
 from explorer.measures.catalogue import measures_in
 from explorer.sweep.study import NAMES
@@ -38,94 +41,77 @@ from explorer.sweep.study import NAMES
 NONE = "—"
 Axis = Literal["across", "up", "colour"]
 AXES: dict[Axis, tuple[str, str]] = {
-    "across": ("Across", "What the scatter plot shows from left to right."),
-    "up": ("Up", "What it shows from bottom to top."),
-    "colour": ("Coloured by", "What colours the designs in both plots."),
+    "across": ("Across", "Measure or variable from left to right in the scatter plot."),
+    "up": ("Up", "Measure or variable from bottom to top in the scatter plot."),
+    "colour": ("Coloured by", "Measure or variable that colours the designs in both plots."),
 }
 ALONG = {"Previous": -1, "Next": 1}
-Resize = Callable[[viser.ClientHandle, bool], None]
 
 
 class StudiesPanel:
-    """A study in plots and words, and the wish for a small one.
+    """The plots, legend and table of the open study, and the controls of a new one."""
 
-    Args:
-        server: Of the page.
-        tab: In which it is.
-        session: To which it posts.
-        folders: Where studies lie.
-        complain: Called with a message for people and the client it is for.
-        resize: Makes the drawer taller in a browser, or as low as it was.
-        faults: Where requests are kept that failed unexpectedly; None to keep none.
-    """
-
-    def __init__(
-        self,
-        server: viser.ViserServer,
-        tab: viser.GuiTabHandle,
-        session: Session,
-        folders: StudyFolders,
-        complain: Callable[[str, Who], None],
-        resize: Resize,
-        faults: Faults | None = None,
-    ) -> None:
+    def __init__(self, services: Services) -> None:
+        if services.studies is None:
+            raise RuntimeError("a page without folders of studies has no panel for them")
+        gui, session, none = services.gui, services.session, (NONE,)
+        self._services = services
         self._session = session
-        self._complain = complain
-        self._resize = resize
-        # Browsers in which the drawer is tall; the others are not.
+        self._complain = services.complain
+        # Browsers with a tall drawer.
         self._tall: set[int] = set()
-        gui = server.gui
         self.choice = gui.add_dropdown(
             "Study",
-            _only_none(),
+            none,
             hint="A study of the data folder, or one named on the command line.",
         )
         self._control = Control[str](
             session,
             self.choice,
-            lambda frame: frame.state.studies.name or NONE,
-            lambda _, name: OpenStudy(None if name == NONE else name),
+            Bound(
+                lambda frame: frame.state.studies.name or NONE,
+                lambda _, name: OpenStudy(None if name == NONE else name),
+            ),
         )
         self.running = gui.add_html("", visible=False)
         self.cancel = gui.add_button(
-            "Cancel study", color="red", visible=False, hint="End it; what is finished is kept."
+            "Cancel study",
+            color="red",
+            visible=False,
+            hint="End the study; finished designs are kept.",
         )
         self.go_on = gui.add_button(
-            "Go on with the study", visible=False, hint="Compute the designs that are missing."
+            "Continue the study", visible=False, hint="Compute the designs that are missing."
         )
         self.status = gui.add_html("")
-        self.plots = StudyPlots(server, tab, session, self.pick)
-        self.feed = StudyFeed(folders, session.redraw, lambda: self.plots.inbox_id)
-        self.runner = StudyRunner(session, self.feed, complain, faults)
+        self.plots = StudyPlots(services, self.pick, self.status)
+        self.feed = StudyFeed(services.studies, session.redraw)
+        self.runner = StudyRunner(session, self.feed, services.complain, services.faults)
+        services.at_end(self.feed.stop)
+        services.at_end(self.runner.stop)
         self.legend = gui.add_html("")
         self.along = gui.add_button_group(
-            "Along the front", tuple(ALONG), hint="Open a design of the front, beside the live one."
+            "Along the front",
+            tuple(ALONG),
+            hint="Open the previous or the next design of the front.",
         )
         self.table = gui.add_html("")
         self._places: dict[Axis, viser.GuiDropdownHandle[str]] = {
-            axis: gui.add_dropdown(label, _only_none(), hint=hint)
-            for axis, (label, hint) in AXES.items()
+            axis: gui.add_dropdown(label, none, hint=hint) for axis, (label, hint) in AXES.items()
         }
         self._axes = [
-            Control[str](session, handle, self._shown(axis), self._chooses(axis))
+            Control[str](session, handle, Bound(self._read_axis(axis), self._write_axis(axis)))
             for axis, handle in self._places.items()
         ]
         with gui.add_folder("New study", expand_by_default=False) as self._new:
-            self._add_wish(gui)
-        self.rows = [gui.add_button(f"Front row {row + 1}", visible=False) for row in range(ROWS)]
-        self.clear = gui.add_button("Clear brushes", hint="Let all designs in again.")
-        self.taller = gui.add_button("Taller drawer", hint="Or as low as it was.")
-        chips = (*self.vary.values(), *self.measure.values())
-        hidden = (*self.rows, *chips, self.clear, self.taller)
-        self._hides = gui.add_html(
-            out_of_sight([element_id(button) for button in hidden]) + self.plots.hides
-        )
+            self._add_new_study(gui)
         self._listen()
+        self._add_buttons(services.buttons)
         self._key: tuple[object, ...] = ()
 
-    def updates(self, frame: Frame, *, dark: bool = False) -> Iterator[Update]:
-        """Yield what makes the tab show a frame."""
-        self.feed.follow(frame, dark=dark)
+    def updates(self, frame: Frame) -> Iterator[Update]:
+        """Yield the updates that show a frame."""
+        self.feed.follow(frame, dark=self._services.theme.is_dark)
         studies, drawing, run = frame.state.studies, self.feed.drawing, self.runner.run
         names = (NONE, *dict.fromkeys((*self.feed.names, *filter(None, (studies.name,)))))
         yield self.choice, "options", names
@@ -136,14 +122,14 @@ class StudiesPanel:
             yield handle, "visible", axes != (NONE,)
         for control in self._axes:
             yield from control.updates(frame)
-        for control in self._wishes:
+        for control in self._plan_controls:
             yield from control.updates(frame)
-        # All that follows is text, made anew only if something has changed.
+        # The texts are made again only after a change.
         key = (drawing, studies, run, self.feed.problem)
         if len(key) == len(self._key) and all(a is b for a, b in zip(key, self._key, strict=True)):
             return
         self._key = key
-        yield from self._texts(studies.wish, drawing, run)
+        yield from self._texts(studies.plan, drawing, run)
 
     def pick(self, index: int, who: Who) -> None:
         """Open the design with an index in the open study."""
@@ -158,13 +144,8 @@ class StudiesPanel:
         name = str(drawing.request.studies.name)
         self._session.do(PickDesign(design, index=index, study=name), who=who)
 
-    def stop(self) -> None:
-        """End the threads and processes."""
-        self.runner.stop()
-        self.feed.stop()
-
     def _texts(
-        self, wish: StudyWish, drawing: StudyDrawing | None, run: Run | None
+        self, plan: StudyPlan, drawing: StudyDrawing | None, run: Run | None
     ) -> Iterator[Update]:
         yield self.running, "visible", run is not None
         yield self.running, "content", "" if run is None else run_line(run)
@@ -178,22 +159,8 @@ class StudiesPanel:
         yield self.legend, "content", "" if drawing is None else legend(drawing)
         has_front = drawing is not None and len(drawing.front_inside) > 0
         yield self.along, "visible", has_front
-        is_brushed = drawing is not None and bool(drawing.request.studies.brushes)
-        yield self.clear, "disabled", not is_brushed
-        ids = [element_id(button) for button in self.rows]
-        yield self.table, "content", "" if drawing is None else table(drawing, ids)
-        count = 0 if drawing is None else min(len(drawing.front_inside), ROWS)
-        for row, button in enumerate(self.rows):
-            yield button, "visible", row < count
-        yield (
-            self.chips,
-            "content",
-            chips(
-                wish,
-                {name: element_id(button) for name, button in self.vary.items()},
-                {name: element_id(button) for name, button in self.measure.items()},
-            ),
-        )
+        yield self.table, "content", "" if drawing is None else table(drawing)
+        yield self.chips, "content", chips(plan)
 
     def _status(self, drawing: StudyDrawing | None) -> str:
         if self.feed.problem is not None:
@@ -201,21 +168,13 @@ class StudiesPanel:
         if not self.plots.is_possible:
             return alert("No plots", HINT)
         if drawing is None:
-            return (
-                f'<div style="padding:2px 12px;font-size:12.5px;{DIM}">Open a study, or start a '
-                "small one around the live design below; explorer sweep runs large ones.</div>"
+            return note(
+                "Open a study, or start a small one around the live design below; "
+                "explorer sweep runs large ones."
             )
-        look = "cursor:pointer;color:var(--mantine-primary-color-filled)"
-        clear = labelled(element_id(self.clear), "Clear all brushes", "clear", style=look)
-        taller = labelled(
-            element_id(self.taller),
-            "Make the drawer taller, or lower again",
-            "Taller ⇕",
-            style=look,
-        )
-        return status(drawing, clear, taller)
+        return status(drawing)
 
-    def _shown(self, axis: Axis) -> Callable[[Frame], str]:
+    def _read_axis(self, axis: Axis) -> Callable[[Frame], str]:
         def read(_: Frame) -> str:
             drawing = self.feed.drawing
             if drawing is None or drawing.shown is None:
@@ -224,28 +183,20 @@ class StudiesPanel:
 
         return read
 
-    def _chooses(self, axis: Axis) -> Callable[[State, str], Action]:
-        def write(state: State, name: str) -> Action:
-            studies = state.studies
-            chosen: dict[str, Any] = {each: getattr(studies, each) for each in AXES}
-            return SetAxes(**{**chosen, axis: None if name == NONE else name})
+    def _write_axis(self, axis: Axis) -> Callable[[State, str], Action]:
+        label, _ = AXES[axis]
+        return lambda _, name: Set(
+            f"studies.{axis}", None if name == NONE else name, label, label_of(name)
+        )
 
-        return write
-
-    def _add_wish(self, gui: viser.GuiApi) -> None:
-        def counted(state: State, value: float) -> Action:
-            return SetStudyWish(replace(state.studies.wish, count=round(value)))
-
-        def ranged(state: State, value: float) -> Action:
-            return SetStudyWish(replace(state.studies.wish, percent=float(value)))
-
+    def _add_new_study(self, gui: viser.GuiApi) -> None:
         count = gui.add_slider(
             "Designs",
             min=float(FEWEST),
             max=float(MOST),
             step=1.0,
             initial_value=float(FEWEST),
-            hint="How many designs, spread evenly by a Sobol sequence; powers of two spread best.",
+            hint="Number of designs, spread evenly by a Sobol sequence; powers of two spread best.",
         )
         percent = gui.add_slider(
             "Around by ± %",
@@ -253,56 +204,49 @@ class StudiesPanel:
             max=MOST_PERCENT,
             step=1.0,
             initial_value=LEAST_PERCENT,
-            hint="How far variables go around the live design: by so much of their value, or of a "
-            "20th of the reach where that is more; the yaw by so much of 90°.",
+            hint="Range of the variables around the live design: a share of their value, or of a "
+            "20th of the reach where that is more; for the yaw a share of 90°.",
         )
-        self._wishes: list[Control[Any]] = [
+        self._plan_controls: list[Control[Any]] = [
             Control[float](
-                self._session,
-                count,
-                lambda frame: float(frame.state.studies.wish.count),
-                counted,
+                self._session, count, At("studies.plan.count", convert=round).bound("Designs")
             ),
             Control[float](
-                self._session,
-                percent,
-                lambda frame: frame.state.studies.wish.percent,
-                ranged,
+                self._session, percent, At("studies.plan.percent").bound("Around by ± %")
             ),
         ]
         self.chips = gui.add_html("")
         self.start = gui.add_button(
             "Start study",
             icon=viser.Icon.PLAYER_PLAY,
-            hint="Run it in processes of their own; its results go to the data folder.",
+            hint="Compute the study in the background; its results go to the data folder.",
         )
-        self.vary = {name: gui.add_button(f"Vary {spoken(name)}") for name in NAMES}
-        self.measure = {
-            name: gui.add_button(f"Measure {spoken(name)}") for name in measures_in("studies")
-        }
 
     def _listen(self) -> None:
         self.start.on_click(
             lambda event: self.runner.start(
-                self._session.state.design, self._session.state.studies.wish, event.client_id
+                self._session.state.design, self._session.state.studies.plan, event.client_id
             )
         )
         self.cancel.on_click(lambda _: self.runner.cancel())
         self.go_on.on_click(lambda event: self._go_on(event.client_id))
         self.along.on_click(lambda event: self._step(ALONG[self.along.value], event.client_id))
-        self.clear.on_click(lambda event: self._session.do(ClearBrushes(), who=event.client_id))
-        for row, button in enumerate(self.rows):
-            button.on_click(lambda event, row=row: self._pick_row(row, event.client_id))
-        for name, button in self.vary.items():
-            button.on_click(lambda event, name=name: self._turn("variable", name, event.client_id))
-        for name, button in self.measure.items():
-            button.on_click(lambda event, name=name: self._turn("measure", name, event.client_id))
 
-        @self.taller.on_click
-        def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
-            if event.client is not None:
-                self._tall ^= {event.client.client_id}
-                self._resize(event.client, event.client.client_id in self._tall)
+    def _add_buttons(self, buttons: Buttons) -> None:
+        buttons.on("studies.pick", self._pick_row)
+        buttons.on("studies.vary", self._switch("variable"), values=NAMES)
+        buttons.on("studies.measure", self._switch("measure"), values=measures_in("studies"))
+        buttons.on("studies.clear", self._clear)
+        buttons.on("studies.taller", self._toggle_height)
+        buttons.offer(
+            "Studies › Clear brushes",
+            "Free all axes.",
+            "studies.clear",
+            is_ready=lambda: bool(self._session.state.studies.brushes),
+        )
+        buttons.offer(
+            "Studies › Taller drawer", "Make the drawer taller, or lower again.", "studies.taller"
+        )
 
     def _go_on(self, who: Who) -> None:
         name = self._session.state.studies.name
@@ -317,28 +261,25 @@ class StudiesPanel:
         if index is not None:
             self.pick(index, who)
 
-    def _pick_row(self, row: int, who: Who) -> None:
-        drawing = self.feed.drawing
-        if drawing is None:
-            return
-        indices = drawing.results.columns["index"]
-        rows = window(drawing.front_inside, drawing.request.studies.picked, indices)
-        if row < len(rows):
-            self.pick(int(indices[rows[row]]), who)
+    def _pick_row(self, index: str, client: viser.ClientHandle) -> None:
+        if index.isascii() and index.isdecimal():
+            self.pick(int(index), client.client_id)
 
-    def _turn(self, what: Literal["variable", "measure"], name: str, who: Who) -> None:
-        def change(state: State) -> Action:
-            wish = state.studies.wish
-            turned = (
-                wish.with_variable_turned(name)
-                if what == "variable"
-                else wish.with_measure_turned(name)
-            )
-            return SetStudyWish(turned)
+    def _clear(self, _: str, client: viser.ClientHandle) -> None:
+        self._session.do(ClearBrushes(), who=client.client_id)
 
-        self._session.post(object(), change, who=who)
+    def _toggle_height(self, _: str, client: viser.ClientHandle) -> None:
+        self._tall ^= {client.client_id}
+        self._services.resize_drawer(client, tall=client.client_id in self._tall)
 
+    def _switch(self, what: Literal["variable", "measure"]) -> Does:
+        def press(name: str, client: viser.ClientHandle) -> None:
+            def change(state: State) -> Action:
+                plan = state.studies.plan
+                is_variable = what == "variable"
+                turn = plan.with_variable_toggled if is_variable else plan.with_measure_advanced
+                return Set("studies.plan", turn(name), "New study", label_of(name))
 
-def _only_none() -> tuple[str, ...]:
-    """Return the options of a list that has none yet; more come."""
-    return (NONE,)
+            self._session.post(object(), change, who=client.client_id)
+
+        return press

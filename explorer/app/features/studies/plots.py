@@ -1,18 +1,21 @@
-"""The two plots of the open study, and what hands do in them."""
+"""The two plots of the open study, and the brushes and picks made in them."""
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Iterator
 from importlib.util import find_spec
 from typing import Any, cast
 
 import viser
 
-from explorer.app.browser.viser_gaps import element_id, run_script
+from explorer.app.browser.viser_gaps import run_script
+from explorer.app.features.feature import Services
 from explorer.app.features.studies.actions import BrushAxis, BrushBox
 from explorer.app.features.studies.feed import PlotJson, StudyDrawing
-from explorer.app.features.studies.plot_events import SCRIPT, Boxed, Brushed, Picked, event_of
-from explorer.app.session.session import Session, Who
+from explorer.app.features.studies.plot_events import Boxed, Brushed, Picked, event_of
+from explorer.app.look import read_script
+from explorer.app.session.session import Who
 from explorer.app.widgets.assigning import Update
 
 # Height over width.
@@ -24,35 +27,26 @@ EMPTY = '{"data":[],"layout":{}}'
 class StudyPlots:
     """Parallel lines above, a scatter plot below.
 
-    They are made when they are first needed: each browser is then sent Plotly, some 5 MB.
+    They are added when first needed, since each browser then loads Plotly, some 5 MB.
 
     Args:
-        server: Whose browsers show them.
-        tab: In which they are.
-        session: That brushes are posted to.
-        pick: Opens the design with an index in the open study.
+        services: Services of the page.
+        pick: Function that opens the design with an index in the open study.
+        above: Element of the tab above the plots.
     """
 
     def __init__(
         self,
-        server: viser.ViserServer,
-        tab: viser.GuiTabHandle,
-        session: Session,
+        services: Services,
         pick: Callable[[int, Who], None],
+        above: viser.GuiHtmlHandle,
     ) -> None:
-        self._server = server
-        self._tab = tab
-        self._session = session
+        self._server = services.server
+        self._tab = services.tab
+        self._session = services.session
         self._pick = pick
-        self.inbox = server.gui.add_text("What is done in plots", "")
-        self.inbox.on_update(self._heard)
-        identity = element_id(self.inbox)
-        # Wherever viser puts it: all that holds nothing else is out of sight.
-        self.hides = (
-            f'<style>div:has(> div label[for="{identity}"]):not(:has(button, .js-plotly-plot))'
-            "{position:absolute;width:1px;height:1px;overflow:hidden;clip-path:inset(50%);"
-            "visibility:hidden}</style>"
-        )
+        self._above = above
+        services.buttons.on("studies.plot", self._receive)
         self.handles: tuple[viser.GuiPlotlyHandle, viser.GuiPlotlyHandle] | None = None
 
     @property
@@ -60,16 +54,11 @@ class StudyPlots:
         """Whether Plotly is installed."""
         return find_spec("plotly") is not None
 
-    @property
-    def inbox_id(self) -> str:
-        """The id of the input that events go to."""
-        return element_id(self.inbox)
-
     def updates(self, drawing: StudyDrawing | None) -> Iterator[Update]:
-        """Yield what makes the plots show a drawing."""
+        """Yield the updates that show a drawing."""
         plots = None if drawing is None else drawing.plots
         if plots is not None and self.handles is None and self.is_possible:
-            self.handles = self._made()
+            self.handles = self._add()
         if self.handles is None:
             return
         for handle in self.handles:
@@ -78,29 +67,27 @@ class StudyPlots:
             for handle, plot in zip(self.handles, plots, strict=True):
                 yield handle, "figure", plot
 
-    def _made(self) -> tuple[viser.GuiPlotlyHandle, viser.GuiPlotlyHandle]:
+    def _add(self) -> tuple[viser.GuiPlotlyHandle, viser.GuiPlotlyHandle]:
         gui = self._server.gui
-        # viser asks a figure for nothing but its JSON.
+        # viser only calls `to_json` of a figure.
         empty = cast("Any", PlotJson(EMPTY))
-        # Below what was there before them, above what came after.
-        order = self.inbox.order
-        with self._tab:
+        # The plots come between the elements before and after them.
+        order = self._above.order
+        with self._tab or contextlib.nullcontext():
             above = gui.add_plotly(empty, aspect=PARALLEL_ASPECT, order=order + 0.1)
             below = gui.add_plotly(empty, aspect=SCATTER_ASPECT, order=order + 0.2)
-        run_script(self._server, SCRIPT)
+        run_script(self._server, read_script("plots"))
         return above, below
 
-    def _heard(self, event: viser.GuiEvent[viser.GuiTextHandle]) -> None:
-        told = event_of(self.inbox.value)
-        if event.client_id is None or told is None:
+    def _receive(self, line: str, client: viser.ClientHandle) -> None:
+        event = event_of(line)
+        # An event in the plot of another study is out of date.
+        if event is None or event.study != self._session.state.studies.name:
             return
-        # What was done in the plot of another study is over.
-        if told.study != self._session.state.studies.name:
-            return
-        match told:
+        match event:
             case Picked(index=index):
-                self._pick(index, event.client_id)
+                self._pick(index, client.client_id)
             case Brushed(axis=axis, ranges=ranges):
-                self._session.do(BrushAxis(axis, ranges), who=event.client_id)
+                self._session.do(BrushAxis(axis, ranges), who=client.client_id)
             case Boxed(axes=(across, up), box=box):
-                self._session.do(BrushBox(across, up, box), who=event.client_id)
+                self._session.do(BrushBox(across, up, box), who=client.client_id)

@@ -1,4 +1,4 @@
-"""Runs small studies from the page in a process of their own, one at a time."""
+"""Small studies started on the page, computed in a process of their own, one at a time."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from pathlib import Path
 from explorer.app.features.studies import tasks
 from explorer.app.features.studies.actions import OpenStudy
 from explorer.app.features.studies.feed import StudyFeed
-from explorer.app.features.studies.folders import keep_study, study_in
 from explorer.app.session.faults import Faults
 from explorer.app.session.jobs import Worker
 from explorer.app.session.session import Session, Who
-from explorer.app.state.studies import StudyWish, study_around
+from explorer.app.state.studies import StudyPlan, study_around
+from explorer.app.storage.study_folders import keep_study, study_in
 from explorer.errors import ExplorerError, InputError
 from explorer.mechanism.design import Design
 from explorer.sweep.run import Progress
 from explorer.sweep.study import Study
 
-# Seconds between two times that what is there is drawn anew.
+# Seconds between two drawings of the results so far.
 PACE = 1.0
-# Seconds after which a study that was cancelled ends with its process; one that is about to
-# begin hears of it late.
+# Seconds after which the process of a cancelled study is ended; workers that are about to begin
+# notice late.
 PATIENCE = 5.0
-DIED = "the study's process died; what is finished is kept, and Go on starts it again"
+DIED = "the study's process died; finished designs are kept, and Continue starts it again"
 
 
 @dataclass(frozen=True)
@@ -34,10 +34,10 @@ class Run:
     """A study that is being computed.
 
     Attributes:
-        name: Of its folder.
+        name: Name of its folder.
         study: The study.
-        progress: How far it is; None before the first word of it.
-        is_cancelled: Whether it is asked to end.
+        progress: Progress; None before the first report.
+        is_cancelled: Whether it is to end.
     """
 
     name: str
@@ -47,13 +47,13 @@ class Run:
 
 
 class StudyRunner:
-    """Starts, cancels and goes on with studies of the page.
+    """Starts, cancels and continues studies of the page.
 
     Args:
-        session: In which they are opened.
-        feed: That draws them; it is told when there is more to draw.
-        complain: Called with a message for people and the client it is for.
-        faults: Where requests are kept that failed unexpectedly; None to keep none.
+        session: Session in which studies are opened.
+        feed: Drawings of the studies, renewed with new results.
+        complain: Called with a message and the client that it is for.
+        faults: Store of requests that failed unexpectedly; None to keep none.
     """
 
     def __init__(
@@ -82,27 +82,27 @@ class StudyRunner:
         """The study that is being computed, if one is."""
         return self._run
 
-    def start(self, design: Design, wish: StudyWish, who: Who = None) -> None:
+    def start(self, design: Design, plan: StudyPlan, who: Who = None) -> None:
         """Start a small study around a design, and open it.
 
         Args:
             design: The design.
-            wish: What varies and what is measured.
-            who: The client to tell should it not be possible.
+            plan: Variables and measures of the study.
+            who: Client that gets the message if it cannot be started.
         """
-        self._begin(lambda: self._new(design, wish), who)
+        self._begin(lambda: self._new(design, plan), who)
 
     def go_on(self, name: str, who: Who = None) -> None:
-        """Go on with a study that is not complete."""
+        """Continue a study that is not complete."""
 
-        def known() -> tuple[Study, Path]:
+        def load() -> tuple[Study, Path]:
             folder = self._feed.folders.folder(name)
             return study_in(folder), folder
 
-        self._begin(known, who)
+        self._begin(load, who)
 
     def cancel(self) -> None:
-        """End the study under way; what is finished is kept."""
+        """End the present study; finished designs are kept."""
         with self._lock:
             if self._run is None or self._run.is_cancelled:
                 return
@@ -112,30 +112,30 @@ class StudyRunner:
         self._session.redraw()
 
     def wait_until_idle(self, timeout: float = 60.0) -> bool:
-        """Wait until no study is under way; say whether none is."""
+        """Wait until no study is being computed; return whether none is."""
         return self.worker.wait_until_idle(timeout) and self._run is None
 
     def stop(self) -> None:
         """End the process."""
         self.worker.stop()
 
-    def _new(self, design: Design, wish: StudyWish) -> tuple[Study, Path]:
+    def _new(self, design: Design, plan: StudyPlan) -> tuple[Study, Path]:
         folder = self._feed.folders.new(design.name)
-        study = study_around(design, wish, folder.name)
-        # So that it can be opened, and gone on with, before its first part is there.
+        study = study_around(design, plan, folder.name)
+        # The study can be opened and continued before its first part is there.
         keep_study(folder, study)
         return study, folder
 
-    def _begin(self, made: Callable[[], tuple[Study, Path]], who: Who) -> None:
+    def _begin(self, make_study: Callable[[], tuple[Study, Path]], who: Who) -> None:
         with self._lock:
             if self._run is not None:
                 message = f"the study {self._run.name!r} is being computed: wait, or cancel it"
                 self._complain(message, who)
                 return
             try:
-                study, folder = made()
-                found = self._feed.folders.found()
-                name = next((name for name, path in found.items() if path == folder), None)
+                study, folder = make_study()
+                folders = self._feed.folders.by_name()
+                name = next((name for name, path in folders.items() if path == folder), None)
                 if name is None:
                     raise InputError(f"{str(folder)!r} holds no study")
             except ExplorerError as error:
@@ -143,12 +143,17 @@ class StudyRunner:
                 return
             self._run = Run(name, study)
             self._order = self.worker.submit(
-                "study", tasks.run, (study, folder), self._ended, self._failed, told=self._told
+                "study",
+                tasks.run,
+                (study, folder),
+                self._ended,
+                self._failed,
+                receive=self._receive,
             )
         self._feed.look()
         self._session.do(OpenStudy(name), who=who)
 
-    def _told(self, progress: Progress) -> None:
+    def _receive(self, progress: Progress) -> None:
         with self._lock:
             if self._run is not None:
                 self._run = replace(self._run, progress=progress)
@@ -160,16 +165,16 @@ class StudyRunner:
             self._session.redraw()
 
     def _ended(self, _: Progress) -> None:
-        self._over()
+        self._finish()
 
     def _failed(self, problem: str) -> None:
         run = self._run
-        self._over()
-        # One that was cancelled may have had to be ended with its process.
+        self._finish()
+        # The process of a cancelled study may have been ended.
         if run is not None and not run.is_cancelled:
             self._complain(problem, None)
 
-    def _over(self) -> None:
+    def _finish(self) -> None:
         with self._lock:
             self._run = None
         self._feed.refresh()

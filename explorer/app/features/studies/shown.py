@@ -1,4 +1,4 @@
-"""What of a study is drawn: its rows, not more of them than a browser can, and its axes."""
+"""Rows and axes of a study that its plots show, limited to what a browser can draw."""
 
 from __future__ import annotations
 
@@ -16,29 +16,29 @@ from explorer.sweep.results import Results
 from explorer.sweep.study import Study
 
 MOST_ROWS = 5000
-"""Of more rows the front and some of the others are drawn."""
+"""Largest number of rows drawn; of more rows, the front and some of the others."""
 
-# What became of designs that were measured; of others there is little or nothing to draw.
+# Statuses of designs that have measures.
 MEASURED = ("done", "not converged")
 
-# Between two ends that are closer an axis has nothing to tell, as a share of their size.
+# Least spread of an axis as a share of the size of its values; one with less is left out.
 NO_SPREAD = 1e-9
 
 
 @dataclass(frozen=True)
 class Shown:
-    """What of a study is drawn.
+    """Rows and axes of the plots of a study.
 
     Attributes:
         results: All rows.
-        front: Which are on the Pareto front, shape (n,).
-        inside: Which lie within all brushes, shape (n,).
-        studies: How it is looked at.
+        front: Whether each row is on the Pareto front, shape (n,).
+        inside: Whether each row lies within all brushes, shape (n,).
+        studies: Open study, brushes, axes and pick.
         axes: Variables and measures that differ between rows.
-        rows: Those that are points of the scatter plot, ascending: they have both its axes.
-        lines: Those that are lines of the parallel axes, ascending: they have all of these.
-        count: How many could be points.
-        lacking: How many rows that were measured have no line, and which axes they lack.
+        rows: Rows with values on both axes of the scatter plot, ascending.
+        lines: Rows with values on all axes of the parallel lines, ascending.
+        count: Number of rows with values on both axes of the scatter plot, drawn or not.
+        lacking: Number of measured rows without a line, and the axes that they lack.
     """
 
     results: Results
@@ -53,17 +53,17 @@ class Shown:
 
     @property
     def across(self) -> str:
-        """What the scatter plot shows from left to right."""
+        """The axis of the scatter plot from left to right."""
         return _chosen(self.results.study, self.axes, self.studies.across, 0)
 
     @property
     def up(self) -> str:
-        """What it shows from bottom to top."""
+        """The axis of the scatter plot from bottom to top."""
         return _chosen(self.results.study, self.axes, self.studies.up, 1)
 
     @property
     def colour(self) -> str:
-        """What colours the plots."""
+        """The axis that colours the plots."""
         return _chosen(self.results.study, self.axes, self.studies.colour, 0)
 
     def column(self, name: str) -> FloatArray:
@@ -72,31 +72,31 @@ class Shown:
 
     @property
     def picked(self) -> IntArray:
-        """The row that was picked last, none or one."""
+        """The row of the picked design, none or one, shape (0 or 1,)."""
         return np.flatnonzero(self.results.columns["index"] == _index(self.studies.picked))
 
 
 def shown(results: Results, front: BoolArray, studies: Studies) -> Shown | None:
-    """Return what of a study is drawn; None while there is nothing to draw.
+    """Return the rows and axes to draw; None while there is nothing to draw.
 
     Args:
         results: All rows.
-        front: Which are on the Pareto front, shape (n,).
-        studies: How it is looked at.
+        front: Whether each row is on the Pareto front, shape (n,).
+        studies: Open study, brushes, axes and pick.
     """
     columns, study = results.columns, results.study
     is_measured = np.isin(columns["status"].astype(str), MEASURED)
-    known = {
+    has_value = {
         name: is_measured & np.isfinite(np.asarray(columns[name], dtype=np.float64))
         for name in (*study.varied, *study.measures)
     }
-    axes = tuple(name for name, rows in known.items() if _has_spread(columns[name][rows]))
+    axes = tuple(name for name, rows in has_value.items() if _has_spread(columns[name][rows]))
     if len(axes) < 2:
         return None
     across = _chosen(study, axes, studies.across, 0)
     up = _chosen(study, axes, studies.up, 1)
-    on_lines = np.all([known[name] for name in axes], axis=0)
-    points, lines = np.flatnonzero(known[across] & known[up]), np.flatnonzero(on_lines)
+    on_lines = np.all([has_value[name] for name in axes], axis=0)
+    points, lines = np.flatnonzero(has_value[across] & has_value[up]), np.flatnonzero(on_lines)
     keep = front | (columns["index"] == _index(studies.picked))
     return Shown(
         results,
@@ -109,18 +109,18 @@ def shown(results: Results, front: BoolArray, studies: Studies) -> Shown | None:
         len(points),
         (
             int((is_measured & ~on_lines).sum()),
-            tuple(name for name in axes if (is_measured & ~known[name]).any()),
+            tuple(name for name in axes if (is_measured & ~has_value[name]).any()),
         ),
     )
 
 
 def thinned(rows: IntArray, keep: BoolArray, most: int) -> IntArray:
-    """Return at most so many of some rows, ascending, those to keep first.
+    """Return at most `most` rows, ascending, preferring those to keep.
 
     Args:
-        rows: Ascending, shape (n,).
-        keep: Which of them must stay, shape (n,); of more than `most` some are left out too.
-        most: How many.
+        rows: Rows, ascending, shape (n,).
+        keep: Whether each is to stay, shape (n,); more than `most` are thinned too.
+        most: Largest number of rows returned.
     """
     if len(rows) <= most:
         return rows
@@ -131,8 +131,8 @@ def thinned(rows: IntArray, keep: BoolArray, most: int) -> IntArray:
 
 def default_axes(study: Study, axes: Sequence[str]) -> tuple[str, str]:
     """Return two different axes: the first objectives, then measures, then variables."""
-    wanted = [each.measure for each in study.objectives]
-    order = dict.fromkeys((*wanted, *study.measures, *study.varied))
+    objectives = [objective.measure for objective in study.objectives]
+    order = dict.fromkeys((*objectives, *study.measures, *study.varied))
     first, second = [name for name in order if name in axes][:2]
     return first, second
 
@@ -148,7 +148,7 @@ def ordered_front(results: Results, front: BoolArray) -> IntArray:
 
     Args:
         results: All rows.
-        front: Which are on the front, shape (n,).
+        front: Whether each row is on the front, shape (n,).
     """
     rows = np.flatnonzero(front)
     if not len(rows):

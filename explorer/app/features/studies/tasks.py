@@ -1,24 +1,24 @@
-"""What the process of small studies does: it runs one and tells how far it is."""
+"""The task of the process of small studies."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from explorer.app.session.worker import Line
+from explorer.app.session.worker import Channel
 from explorer.sweep.run import Progress, run_study
 from explorer.sweep.study import Study
 from explorer.sweep.workers import LocalWorkers, cores
 
 
-def run(study: Study, folder: Path, line: Line) -> Progress:
-    """Compute what is missing of a study, telling the progress after each part.
+def run(study: Study, folder: Path, channel: Channel) -> Progress:
+    """Compute the missing designs of a study, and send the progress after each part.
 
-    One core is left to the page.
+    One core remains for the page.
 
     Args:
         study: The study.
-        folder: For its results.
-        line: To the parent.
+        folder: Folder of its results.
+        channel: Channel to the parent.
 
     Raises:
         InputError: the study cannot be run, or the folder is another's or in use.
@@ -28,7 +28,7 @@ def run(study: Study, folder: Path, line: Line) -> Progress:
     """
     workers = LocalWorkers(max(1, cores() - 1))
     try:
-        return run_study(study, folder, workers, told=line.tell, is_cut=line.is_cut)
+        return run_study(study, folder, workers, watch=channel.send, stop=channel.is_cancelled)
     finally:
-        # Of a study that was cancelled nothing under way is of use any more.
+        # Designs of a cancelled study that are being computed are not needed.
         workers.shutdown(cancel_futures=True)

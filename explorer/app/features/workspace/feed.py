@@ -1,17 +1,14 @@
-"""Keeps what the worker draws in step with the state: the workspace, and the radius curve.
+"""The workspace that the worker draws, in step with the state.
 
-Of a burst of changes only the newest waits while one is computed, and a drawing is shown
-only until a newer one is there, so the page never freezes and never shows what is over.
+While one drawing is computed, only the newest request waits.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
-from explorer.app.features.workspace.reached import Rows
+from explorer.app.features.feature import Services
+from explorer.app.features.workspace.reached import Rows, rows_of
 from explorer.app.features.workspace.tasks import WorkspaceDrawing, WorkspaceRequest, draw_workspace
 from explorer.app.session.feed import Feed
-from explorer.app.session.jobs import Worker
 from explorer.app.state.frame import Frame
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import Triple
@@ -21,12 +18,14 @@ from explorer.numerics.arrays import FloatArray
 class WorkspaceFeed(Feed[WorkspaceRequest, WorkspaceDrawing]):
     """Drawings of the workspace."""
 
-    def __init__(self, worker: Worker, redraw: Callable[[], None]) -> None:
-        super().__init__(worker, draw_workspace, _workspace, redraw, has_stages=True)
+    def __init__(self, services: Services) -> None:
+        super().__init__(
+            services.worker, draw_workspace, _request_for, services.session.redraw, has_stages=True
+        )
 
 
 def workspace_rotation(frame: Frame) -> FloatArray:
-    """Return the orientation whose workspace is shown, shape (3, 3)."""
+    """Return the orientation of the workspace that is shown, shape (3, 3)."""
     state = frame.state
     if state.view.workspace.orientation == "home":
         return home_pose(state.design).rotation
@@ -34,17 +33,17 @@ def workspace_rotation(frame: Frame) -> FloatArray:
 
 
 def workspace_rows(frame: Frame) -> Rows:
-    """Return the same as plain numbers."""
-    return tuple(tuple(row) for row in workspace_rotation(frame).tolist())
+    """Return the rows of `workspace_rotation` as plain numbers."""
+    return rows_of(workspace_rotation(frame))
 
 
 def workspace_start(frame: Frame) -> Triple | None:
-    """Return from where things are to be reached, None for the home position."""
+    """Return the position where paths start; None for home."""
     state = frame.state
     return state.pose.position if state.view.workspace.start == "pose" else None
 
 
-def _workspace(frame: Frame) -> WorkspaceRequest | None:
+def _request_for(frame: Frame) -> WorkspaceRequest | None:
     view = frame.state.view.workspace
     if not (view.solid or view.hull):
         return None
@@ -59,6 +58,6 @@ def _workspace(frame: Frame) -> WorkspaceRequest | None:
         level=view.level if view.cut is not None else None,
         tolerance=view.tolerance,
         hull=view.hull,
-        # What nothing is coloured by must not make it all anew.
+        # The length changes no drawing that is not coloured by it.
         warn_below=frame.state.warn_below if coloured else 1.0,
     )

@@ -1,4 +1,4 @@
-"""What of a workspace can be reached, for the worker: computed in stages, and kept."""
+"""The reachable part of a workspace, computed in stages in the worker, and a cache of it."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from typing import TypeAlias
 import numpy as np
 
 from explorer.app.session.feed import Stage
-from explorer.app.session.worker import Line
+from explorer.app.session.worker import Channel
 from explorer.errors import ExplorerError
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Triple
+from explorer.numerics.arrays import FloatArray
 from explorer.numerics.stages import Watch, unwatched
 from explorer.workspace.accessible.start import StartError
 from explorer.workspace.accessible.workspace import (
@@ -21,17 +22,27 @@ from explorer.workspace.accessible.workspace import (
 )
 
 Rows: TypeAlias = tuple[tuple[float, ...], ...]
-"""Of a matrix."""
+"""Rows of a matrix."""
 
-# Workspaces that are kept, so that to cut or colour one takes no time.
-KEPT = 4
-# The most nodes of the paper's grid whose steps are looked at for a drawing.
+# Number of cached workspaces, so that a cut or another colour takes no time.
+CACHED = 4
+# Most nodes of the paper's grid whose steps are checked for a drawing.
 MOST_LIVE_NODES = 200_000
+
+
+def rows_of(matrix: FloatArray) -> Rows:
+    """Return the rows of a matrix (n, m) as plain numbers, which can be compared and hashed."""
+    return tuple(tuple(row) for row in matrix.tolist())
 
 
 @dataclass(frozen=True)
 class Trouble:
-    """Why nothing can be reached, and from which position something can, if from any."""
+    """Why nothing can be reached.
+
+    Attributes:
+        reason: Words for the page.
+        nearest: Nearest position to start from; None if there is none.
+    """
 
     reason: str
     nearest: Triple | None
@@ -39,13 +50,13 @@ class Trouble:
 
 @dataclass(frozen=True)
 class Reached:
-    """What of a workspace can be reached.
+    """The numbers of the reachable part of a workspace.
 
     Attributes:
-        volume: In cubed design units.
-        node_count: Of the paper's grid; None if the grid is too fine to be counted.
-        pairs: What each pair of legs means for it, in the order of `PAIRS`.
-        harmless_radius: By how much all radii may grow before any two legs collide.
+        volume: Volume in cubed design units.
+        node_count: Number of nodes of the paper's grid; None if the grid is too fine.
+        pairs: Clearance and blocked volume of each pair of legs, in the order of `PAIRS`.
+        harmless_radius: Length by which all radii may grow before any two legs collide.
     """
 
     volume: float
@@ -54,18 +65,18 @@ class Reached:
     harmless_radius: float
 
 
-_kept: dict[tuple[Design, Rows, Triple | None, float], ReachableWorkspace | Trouble] = {}
+_cache: dict[tuple[Design, Rows, Triple | None, float], ReachableWorkspace | Trouble] = {}
 
 
 def reach_workspace(
     design: Design, rotation: Rows, start: Triple | None, tolerance: float, watch: Watch
 ) -> ReachableWorkspace | Trouble:
-    """Return what can be reached; the newest few results are kept."""
+    """Return the reachable workspace, or why there is none; cache the newest few."""
     key = (design, rotation, start, tolerance)
-    found = _kept.pop(key, None)
-    if found is None:
+    result = _cache.pop(key, None)
+    if result is None:
         try:
-            found = reachable_workspace(
+            result = reachable_workspace(
                 design,
                 np.array(rotation),
                 start=start,
@@ -74,27 +85,27 @@ def reach_workspace(
                 watch=watch,
             )
         except ExplorerError as error:
-            found = trouble_of(error)
-    _kept[key] = found
-    if len(_kept) > KEPT:
-        del _kept[next(iter(_kept))]
-    return found
+            result = trouble_of(error)
+    _cache[key] = result
+    if len(_cache) > CACHED:
+        del _cache[next(iter(_cache))]
+    return result
 
 
-def watch_of(line: Line | None) -> Watch:
-    """Return what tells the parent each stage, and ends the task once the parent cancels it."""
-    if line is None:
+def watch_of(channel: Channel | None) -> Watch:
+    """Return a watch that sends each stage to the parent and ends the task when it cancels."""
+    if channel is None:
         return unwatched
 
     def watch(words: str, share: float) -> None:
-        line.end_if_cancelled()
-        line.tell(Stage(words, share))
+        channel.raise_if_cancelled()
+        channel.send(Stage(words, share))
 
     return watch
 
 
 def trouble_of(error: ExplorerError) -> Trouble:
-    """Return why nothing can be reached, from the error that says so."""
+    """Return an error of the library as a trouble."""
     nearest = error.nearest if isinstance(error, StartError) else None
     if nearest is None:
         return Trouble(str(error), None)
@@ -102,8 +113,11 @@ def trouble_of(error: ExplorerError) -> Trouble:
     return Trouble(str(error), (x, y, z))
 
 
-def reached_of(found: ReachableWorkspace) -> Reached:
+def reached_of(workspace: ReachableWorkspace) -> Reached:
     """Return the numbers of a reachable workspace."""
     return Reached(
-        found.reachable_volume, found.reachable_node_count, found.pairs, found.harmless_radius
+        workspace.reachable_volume,
+        workspace.reachable_node_count,
+        workspace.pairs,
+        workspace.harmless_radius,
     )

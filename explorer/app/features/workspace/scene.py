@@ -1,4 +1,4 @@
-"""The workspace around the mechanism: solid, hull, slice, and the three singular planes."""
+"""The solid and the hull of the workspace, the singular planes, and the broken limit."""
 
 from __future__ import annotations
 
@@ -9,11 +9,13 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
+from explorer.app.features.feature import Services
 from explorer.app.features.workspace.feed import WorkspaceFeed, workspace_rotation
 from explorer.app.features.workspace.tasks import WorkspaceDrawing
 from explorer.app.scene.bands import COLLIDING, PLAIN, Shell
+from explorer.app.scene.part import NO_POINTS, ScenePart, box_corners
 from explorer.app.scene.placing import Placed
-from explorer.app.scene.shapes import Patch
+from explorer.app.scene.shapes import NO_MESH, Patch, add_lines, add_translucent
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.colours import OUTLINE, Rgb, proximity_colour
 from explorer.numerics.arrays import FloatArray
@@ -29,9 +31,8 @@ from explorer.workspace.limits.constraints import (
 
 ArrayPair: TypeAlias = tuple[NDArray[np.float32], NDArray[np.uint32]]
 
-EMPTY: ArrayPair = np.zeros((3, 3), dtype=np.float32), np.array([[0, 1, 2]], dtype=np.uint32)
 SOLID_OPACITY = 0.42
-# Of where legs collide, which is to be seen through the rest.
+# Opacity where legs collide, so that this is visible through the rest.
 COLLIDING_OPACITY = 0.8
 CUT_OPACITY = 0.96
 PLANE_OPACITY = 0.12
@@ -39,52 +40,44 @@ HULL_COLOUR: Rgb = (90, 100, 116)
 HULL_OPACITY = 0.3
 
 
-class WorkspaceScene:
-    """Draws what the feed has, and where p leaves it the limit that is broken."""
+class WorkspaceScene(ScenePart):
+    """The newest drawing, the singular planes, and the limit that the position p breaks most."""
 
-    def __init__(self, scene: viser.SceneApi, feed: WorkspaceFeed) -> None:
-        self._feed = feed
-        # Collisions are made first, and so drawn first: what is in front of them shows them.
+    def __init__(self, services: Services) -> None:
+        scene = services.scene
+        self._feed = services.get(WorkspaceFeed)
+        # Collisions are added first and so drawn first: surfaces before them let them through.
         self._colours: tuple[Rgb, ...] = (COLLIDING, PLAIN, *band_colours())
         self._shells = [
-            scene.add_mesh_simple(
+            add_translucent(
+                scene,
                 f"/workspace/shell/{index}",
-                *EMPTY,
-                color=colour,
-                side="double",
-                flat_shading=True,
-                cast_shadow=False,
-                receive_shadow=False,
-                visible=False,
+                NO_MESH,
+                SOLID_OPACITY,
+                colour=colour,
+                is_flat=True,
             )
             for index, colour in enumerate(self._colours)
         ]
         self._hull = scene.add_mesh_simple(
             "/workspace/hull",
-            *EMPTY,
+            *NO_MESH,
             color=HULL_COLOUR,
             wireframe=True,
             opacity=HULL_OPACITY,
             visible=False,
         )
         self._planes = [_SingularPlane(scene, index) for index in range(3)]
-        self._broken = scene.add_line_segments(
-            "/workspace/broken/lines",
-            np.zeros((1, 2, 3)),
-            OUTLINE,
-            thickness=4.0,
-            thickness_units="screen",
-            visible=False,
-        )
+        self._broken = add_lines(scene, "/workspace/broken/lines", 1, OUTLINE, 4.0)
         self._broken_label = scene.add_label(
             "/workspace/broken/label", "limit", font_screen_scale=0.9, visible=False
         )
-        self._placed_for: tuple[WorkspaceDrawing, float] | None = None
+        self._scaled_from: tuple[WorkspaceDrawing, float] | None = None
         self._scaled: dict[Rgb, ArrayPair] = {}
-        self._scaled_hull = EMPTY
+        self._scaled_hull: ArrayPair | None = None
 
     def updates(self, placed: Placed) -> Iterator[Update]:
-        """Yield what draws the workspace of this frame."""
+        """Yield the updates that draw the workspace of a frame."""
         view = placed.frame.state.view.workspace
         drawing = self._feed.drawing
         self._scale(drawing, placed.scale)
@@ -96,29 +89,35 @@ class WorkspaceScene:
                 yield handle, "opacity", _opacity(colour, is_cut=is_cut)
                 yield handle, "vertices", shell[0]
                 yield handle, "faces", shell[1]
-        has_hull = view.hull and drawing is not None and drawing.hull is not None
-        yield self._hull, "visible", has_hull
-        if has_hull:
-            yield self._hull, "vertices", self._scaled_hull[0]
-            yield self._hull, "faces", self._scaled_hull[1]
+        hull = self._scaled_hull if view.hull else None
+        yield self._hull, "visible", hull is not None
+        if hull is not None:
+            yield self._hull, "vertices", hull[0]
+            yield self._hull, "faces", hull[1]
         for plane in self._planes:
             yield from plane.updates(placed)
         yield from self._broken_limit(placed)
 
+    def corners(self, placed: Placed) -> FloatArray:
+        """Return the corners of the box about the drawn workspace."""
+        drawing = self._feed.drawing
+        if drawing is None or drawing.extent is None:
+            return NO_POINTS
+        return box_corners(placed.scale * np.array(drawing.extent))
+
     def _scale(self, drawing: WorkspaceDrawing | None, scale: float) -> None:
-        """Bring a new drawing into scene units, once, so that it is compared by identity."""
+        """Scale a new drawing to scene units, once, so that updates compare it by identity."""
         if drawing is None:
-            self._placed_for, self._scaled = None, {}
-        elif self._placed_for is None or (
-            self._placed_for[0] is not drawing or self._placed_for[1] != scale
+            self._scaled_from, self._scaled, self._scaled_hull = None, {}, None
+        elif self._scaled_from is None or (
+            self._scaled_from[0] is not drawing or self._scaled_from[1] != scale
         ):
-            self._placed_for = drawing, scale
+            self._scaled_from = drawing, scale
             self._scaled = {shell.colour: _scaled(shell, scale) for shell in drawing.shells}
-            if drawing.hull is not None:
-                self._scaled_hull = _scaled(drawing.hull, scale)
+            self._scaled_hull = None if drawing.hull is None else _scaled(drawing.hull, scale)
 
     def _broken_limit(self, placed: Placed) -> Iterator[Update]:
-        """Show the limit that p breaks the most: from p to the nearest place that keeps it."""
+        """Yield the updates that draw a line from p to the surface of the limit it breaks most."""
         frame = placed.frame
         shown = frame.state.view.workspace.solid and frame.state.unclosed is None
         worst: tuple[float, str, FloatArray] | None = None
@@ -140,7 +139,7 @@ class WorkspaceScene:
 
 
 class _SingularPlane:
-    """One of the three planes of singular positions, all through a1."""
+    """One of the three planes of singular positions, which all pass through a1."""
 
     def __init__(self, scene: viser.SceneApi, index: int) -> None:
         self._index = index
@@ -150,10 +149,10 @@ class _SingularPlane:
         )
 
     def updates(self, placed: Placed) -> Iterator[Update]:
-        """Yield what draws it in this frame."""
+        """Yield the updates that draw the plane of a frame."""
         state, snapshot = placed.frame.state, placed.frame.snapshot
         normal = self._normal(snapshot.rotation) if state.view.workspace.planes else None
-        yield from self._patch.shown(normal is not None)
+        yield from self._patch.show(normal is not None)
         yield self._label, "visible", normal is not None
         if normal is None:
             return
@@ -165,11 +164,11 @@ class _SingularPlane:
         across = np.cross(normal, along)
         half = 1.1 * placed.reach
         corners = half * np.array([a * along + b * across for a, b in CORNERS])
-        yield from self._patch.spanned(corners, colour)
+        yield from self._patch.span(corners, colour)
         yield self._label, "position", tuple(corners[2].tolist())
 
     def _normal(self, rotation: FloatArray) -> FloatArray | None:
-        """Return its unit normal; None with parallel lines, where every position is singular."""
+        """Return the unit normal; None if the lines are parallel and every position is singular."""
         x = rotation[:, 0]
         normal = (-rotation[:, 2], np.array([0.0, -x[2], x[1]]), np.array([0.0, 0.0, 1.0]))[
             self._index
@@ -193,7 +192,7 @@ def _scaled(shell: Shell, scale: float) -> ArrayPair:
 
 
 def _nearest(limit: BallOrCylinder | HalfSpace, p: FloatArray) -> FloatArray:
-    """Return the place nearest to p on the surface of a limit."""
+    """Return the position nearest to p on the surface of a limit."""
     if isinstance(limit, HalfSpace):
         excess = float(limit.normal @ p) - limit.offset
         return p - limit.normal * excess / float(limit.normal @ limit.normal)

@@ -1,4 +1,4 @@
-"""The map of a slice: what of a plane of positions is kept, in the colours of a measure."""
+"""The map of a slice of the workspace, a picture in the colours of a measure."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ Axis = Literal["x", "y", "z"]
 
 AXES: tuple[Axis, ...] = ("x", "y", "z")
 CUT = "cut"
-"""What the faces in the plane of a cut come from."""
+"""Name of the limit whose faces lie in the plane of a cut."""
 
 # Pixels on the longer side of the map of a slice.
 MAP_PIXELS = 110
-# Within the limits and out of reach: the colour of collisions, and how much of it.
+# Colour and opacity of positions within the limits that are not reachable.
 BLOCKED = (*OUTLINE, 96)
 
 
@@ -40,7 +40,7 @@ class SliceMap:
 
 
 def level_within(low: float, high: float, level: float | None) -> float:
-    """Return where an extent is cut: at a level within it, else in the middle."""
+    """Return the level of a cut: the one given if it is within the extent, else the middle."""
     return level if level is not None and low <= level <= high else 0.5 * (low + high)
 
 
@@ -50,18 +50,18 @@ def slice_map(
     """Return the map of a slice through a workspace, None if it has no extent.
 
     Args:
-        colouring: Of what, and by what.
-        axis: Across which it is cut.
-        level: Where.
-        whole: What is within the limits, cut there; None if that is all that counts.
-        reached: The part of it that can be reached, cut there; None likewise.
+        colouring: Colouring of the workspace by a measure.
+        axis: Axis across which the workspace is cut.
+        level: Coordinate of the cut on that axis.
+        whole: Cut solid of the workspace within the limits; None if collisions do not count.
+        reached: Cut solid of its reachable part; None likewise.
     """
     limits = constraints(colouring.design, colouring.rotation)
     lows, highs = bounds(region_of(limits))
     if not np.isfinite([lows, highs]).all() or not (lows < highs).all():
         return None
     cut = AXES.index(axis)
-    first, second = (each for each in range(3) if each != cut)
+    first, second = (index for index in range(3) if index != cut)
     width, height = float(highs[first] - lows[first]), float(highs[second] - lows[second])
     pixel = max(width, height) / MAP_PIXELS
     columns = lows[first] + pixel * (np.arange(max(1, round(width / pixel))) + 0.5)
@@ -75,10 +75,10 @@ def slice_map(
     pixels = np.zeros((*inside.shape, 4), dtype=np.uint8)
     if whole is not None and reached is not None:
         flat = points[..., [first, second]]
-        held = inside & section(whole, (first, second), flat)
-        blocked = held & ~section(reached, (first, second), flat)
-        # Facets lack a rim at the limits: of that it is known only whether legs collide.
-        rim = inside & ~held
+        in_section = inside & section(whole, (first, second), flat)
+        blocked = in_section & ~section(reached, (first, second), flat)
+        # Facets leave out a rim at the limits, where only collisions of legs are checked.
+        rim = inside & ~in_section
         clearance = leg_clearances(colouring.design, points[rim], colouring.rotation).clearance
         blocked[rim] = (clearance <= 0.0).any(axis=-1)
         inside &= ~blocked
@@ -98,12 +98,12 @@ def slice_map(
 
 
 def section(solid: Solid, axes: tuple[int, int], points: FloatArray) -> BoolArray:
-    """Return which points of the plane of a cut lie in the faces that it made.
+    """Return which points of the plane of a cut lie in the faces of the cut.
 
     Args:
-        solid: With faces that come from `CUT`.
-        axes: The two of the plane.
-        points: Their coordinates on a grid, rows and columns, shape (h, w, 2).
+        solid: Solid that was cut; its cut faces have the limit `CUT`.
+        axes: Two axes of the plane.
+        points: Coordinates on these axes of a grid of points, shape (h, w, 2).
     """
     inside = np.zeros(points.shape[:2], dtype=np.bool_)
     if CUT not in solid.limits:
@@ -118,6 +118,6 @@ def section(solid: Solid, axes: tuple[int, int], points: FloatArray) -> BoolArra
 
 
 def _side(start: FloatArray, end: FloatArray, points: FloatArray) -> FloatArray:
-    """Return on which side of a line points (n, 2) lie, by the sign."""
-    (x, y), off = end - start, points - start
-    return x * off[:, 1] - y * off[:, 0]
+    """Return numbers (n,) whose signs say on which side of a line points (n, 2) lie."""
+    (x, y), offsets = end - start, points - start
+    return x * offsets[:, 1] - y * offsets[:, 0]

@@ -1,4 +1,4 @@
-"""The worker's tasks for the workspace: to draw and measure it, and to write files of it."""
+"""The worker's tasks for the workspace: draw it, measure it, write files of it."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from explorer.app.features.workspace.slice_map import (
     slice_map,
 )
 from explorer.app.scene.bands import PLAIN, Colouring, Measure, Shell
-from explorer.app.session.worker import Line
+from explorer.app.session.worker import Channel
 from explorer.errors import InputError
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Triple
@@ -38,30 +38,27 @@ from explorer.workspace.solids.solids import convex_hull, cut_solid, workspace_s
 
 Region = Literal["limits", "reachable"]
 
-
-# Of the reach: the chord tolerance of a live solid.
+# Chord tolerance of a live solid, as a share of the reach.
 LIVE_TOLERANCE = 0.004
-
-
 # The format with exact faces rather than facets.
 STEP = "step"
 
 
 @dataclass(frozen=True)
 class WorkspaceRequest:
-    """What to draw and measure of a workspace; lengths in design units.
+    """Request to draw and measure a workspace; lengths in design units.
 
     Attributes:
         design: The manipulator.
-        rotation: Platform to base, rows of the matrix.
-        region: All that is within the limits, or what of it can be reached.
-        start: From where it is to be reached; None for the home position.
-        colour: By what the surface is coloured.
-        cut: The axis along which it is cut open, or None.
-        level: The coordinate of the cut; None, or one beyond the extent, for the middle of it.
+        rotation: Rows of the matrix, platform to base.
+        region: All that is within the limits, or its reachable part.
+        start: Position where paths start; None for home.
+        colour: Measure that colours the surface.
+        cut: Axis across which the solid is cut open, or None.
+        level: Coordinate of the cut; None, or one beyond the extent, for the middle.
         tolerance: Chord tolerance; None for a share of the reach.
-        hull: Whether the convex hull is wanted.
-        warn_below: The length below which margins are warned of.
+        hull: Whether to make the convex hull.
+        warn_below: Length below which margins raise a warning.
     """
 
     design: Design
@@ -81,24 +78,24 @@ class WorkspaceDrawing:
     """A workspace drawn and measured; lengths in design units.
 
     Attributes:
-        request: What was asked for.
-        shells: The surface.
-        coarse_edge: The longest edge of a coloured facet, if that is longer than usual; see
+        request: The request.
+        shells: Surface, by colour.
+        coarse_edge: Longest edge of a coloured facet, if longer than usual; see
             `explorer.app.scene.bands.Colouring.shells`.
-        hull: The convex hull, if asked for.
-        slice_map: The map of the slice, if it is cut.
-        level: The coordinate at which it is cut, if it is.
-        volume: Within the limits; exact, see `explorer.workspace.slices.volume`.
-        error: Of the exact volume.
-        reached: What can be reached, if that was asked for and there is no trouble.
-        trouble: Why all that is within the limits is drawn instead.
-        mesh_volume: Of the uncut solid.
+        hull: Convex hull, if requested.
+        slice_map: Map of the slice, if the solid is cut.
+        level: Coordinate of the cut, if the solid is cut.
+        volume: Exact volume within the limits, see `explorer.workspace.slices.volume`.
+        error: Bound of the error of that volume.
+        reached: Numbers of the reachable part, if requested and there is no trouble.
+        trouble: Why nothing is reachable, if all within the limits is drawn instead.
+        mesh_volume: Volume of the uncut solid.
         mesh_agrees: Whether the volume of the solid within the limits agrees with the exact one.
-        hull_volume: Of the hull, if asked for.
-        extent: (lows, highs) of the solid, None if it is empty.
-        nodes: The paper's node count within the limits, None if the grid is too fine.
-        empty_because: The limits that empty it.
-        seconds: How long it took.
+        hull_volume: Volume of the hull, if requested.
+        extent: (lows, highs) of the solid; None if it is empty.
+        nodes: The paper's node count within the limits; None if the grid is too fine.
+        empty_because: Names of the limits that empty the workspace.
+        seconds: Computing time.
     """
 
     request: WorkspaceRequest
@@ -120,24 +117,24 @@ class WorkspaceDrawing:
     seconds: float
 
 
-def draw_workspace(request: WorkspaceRequest, line: Line | None = None) -> WorkspaceDrawing:
+def draw_workspace(request: WorkspaceRequest, channel: Channel | None = None) -> WorkspaceDrawing:
     """Return the workspace, drawn and measured.
 
     Args:
-        request: What to draw.
-        line: To the parent, which is told each `Stage` and may cancel; None for neither.
+        request: Workspace to draw.
+        channel: Channel to the parent, which gets each `Stage` and may cancel; None for neither.
     """
     begin = time.perf_counter()
     design, rotation = request.design, np.array(request.rotation)
     tolerance = request.tolerance or LIVE_TOLERANCE * design.reach
-    watch = watch_of(line)
+    watch = watch_of(channel)
     measured = workspace_volume(design, rotation)
     whole = workspace_solid(design, rotation, tolerance, volume=measured)
-    found = None
+    reached = trouble = None
     if request.region == "reachable":
-        found = reach_workspace(design, request.rotation, request.start, tolerance, watch)
-    found, trouble = (None, found) if isinstance(found, Trouble) else (found, None)
-    solid = whole if found is None else found.solid
+        result = reach_workspace(design, request.rotation, request.start, tolerance, watch)
+        reached, trouble = (None, result) if isinstance(result, Trouble) else (result, None)
+    solid = whole if reached is None else reached.solid
     hull = convex_hull(solid) if request.hull and not solid.is_empty else None
     colouring = Colouring(design, rotation, request.colour, request.warn_below)
     shown, mapped, level = solid, None, None
@@ -145,12 +142,12 @@ def draw_workspace(request: WorkspaceRequest, line: Line | None = None) -> Works
     if request.cut is not None and extent is not None:
         axis = AXES.index(request.cut)
         level = level_within(float(extent[0][axis]), float(extent[1][axis]), request.level)
-        # The half that looks at the isometric camera is taken away.
+        # The half that faces the isometric camera is cut away.
         side = -1.0 if request.cut == "y" else 1.0
-        knife = HalfSpace(CUT, side * np.eye(3)[axis], side * level)
-        shown = cut_solid(solid, knife)
-        both = (None, None) if found is None else (cut_solid(whole, knife), shown)
-        mapped = slice_map(colouring, request.cut, level, *both)
+        half_space = HalfSpace(CUT, side * np.eye(3)[axis], side * level)
+        shown = cut_solid(solid, half_space)
+        cut_solids = (None, None) if reached is None else (cut_solid(whole, half_space), shown)
+        mapped = slice_map(colouring, request.cut, level, *cut_solids)
     try:
         nodes = workspace_nodes(design, rotation)
     except InputError:
@@ -165,7 +162,7 @@ def draw_workspace(request: WorkspaceRequest, line: Line | None = None) -> Works
         level=level,
         volume=measured.volume,
         error=measured.error,
-        reached=None if found is None else reached_of(found),
+        reached=None if reached is None else reached_of(reached),
         trouble=trouble,
         mesh_volume=solid.volume,
         mesh_agrees=solid.agrees,
@@ -190,16 +187,16 @@ def export_mesh(
 
     Args:
         design: The manipulator.
-        rotation: Platform to base, rows of the matrix.
+        rotation: Rows of the matrix, platform to base.
         tolerance: Chord tolerance, in design units.
-        region: All that is within the limits, or what of it can be reached.
-        start: From where it is to be reached; None for the home position.
+        region: All that is within the limits, or its reachable part.
+        start: Position where paths start; None for home.
         what: "workspace" or "hull".
-        file_format: As of `explorer.export.mesh`, or `STEP`.
+        file_format: A format of `explorer.export.mesh`, or `STEP`.
 
     Raises:
-        ExplorerError: an empty workspace, nothing to be reached, a library that is missing, or
-            STEP of what has no exact faces.
+        ExplorerError: an empty workspace, nothing reachable, a missing library, or STEP of a solid
+            without exact faces.
     """
     if file_format == STEP:
         return _exact_file(design, rotation, region, what)
@@ -208,10 +205,10 @@ def export_mesh(
     if region == "limits":
         solid = workspace_solid(design, np.array(rotation), tolerance)
     else:
-        found = reach_workspace(design, rotation, start, tolerance, unwatched)
-        if isinstance(found, Trouble):
-            raise InputError(found.reason)
-        solid = found.solid
+        reached = reach_workspace(design, rotation, start, tolerance, unwatched)
+        if isinstance(reached, Trouble):
+            raise InputError(reached.reason)
+        solid = reached.solid
     name = f"{design.name} {exported_name(region, what)}"
     return mesh_bytes(convex_hull(solid) if what == "hull" else solid, file_format, design, name)
 
@@ -220,10 +217,10 @@ def _exact_file(design: Design, rotation: Rows, region: Region, what: str) -> by
     """Return a STEP file of the workspace within the limits.
 
     Raises:
-        InputError: a hull, or what of the workspace can be reached: neither has exact faces.
+        InputError: a hull or the reachable part; neither has exact faces.
         ExplorerError: as of `explorer.export.step.workspace_step`.
     """
-    meshes = "as 3mf, stl, glb, obj or ply it can be exported"
+    meshes = "export it as 3mf, stl, glb, obj or ply"
     if what == "hull":
         raise InputError(f"STEP takes exact faces, and a convex hull consists of facets; {meshes}")
     if region != "limits":
@@ -237,7 +234,7 @@ def _exact_file(design: Design, rotation: Rows, region: Region, what: str) -> by
 
 
 def exported_name(region: Region, what: str) -> str:
-    """Return what a file is called that holds a "workspace" or a "hull"."""
+    """Return the name of a file with a "workspace" or a "hull"."""
     return what if region == "limits" else f"reachable {what}"
 
 

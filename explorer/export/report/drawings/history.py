@@ -35,15 +35,15 @@ def charts(record: Record) -> Element | None:
         return None
     curves = curves_of(record.problem, steps)
     width = WIDTH / len(curves)
-    made: list[Element] = []
+    drawn: list[Element] = []
     for index, curve in enumerate(curves):
-        made.append(
+        drawn.append(
             element(
                 "text", _title(record, curve), x=index * width + LEFT - 30.0, y=13.0, class_="title"
             )
         )
-        made.extend(_chart(curve, index * width + LEFT, width - LEFT - RIGHT))
-    return svg_drawing(HEIGHT, "The search, by iterations", *made)
+        drawn.extend(_chart(curve, index * width + LEFT, width - LEFT - RIGHT))
+    return svg_drawing(HEIGHT, "The search, by iterations", *drawn)
 
 
 def _title(record: Record, curve: Curve) -> str:
@@ -65,21 +65,21 @@ def _chart(curve: Curve, left: float, width: float) -> list[Element]:
     def place(index: float, value: float) -> tuple[float, float]:
         return left + width * index / last, TOP + tall * (high - value) / (high - low)
 
-    made = element("g", class_="ruler")
-    made.append(
+    axes = element("g", class_="ruler")
+    axes.append(
         element("path", d=f"M{coordinate(left)},{TOP}v{tall}h{coordinate(width)}", class_="frame")
     )
     for tick in _ticks(low, high, whole=curve.powers):
         _, y = place(0.0, tick)
-        made.append(element("line", x1=left, y1=y, x2=left + width, y2=y, class_="grid"))
+        axes.append(element("line", x1=left, y1=y, x2=left + width, y2=y, class_="grid"))
         words = power_of_ten(round(tick)) if curve.powers else format_number(tick, 5)
-        made.append(drawing_text(words, left - 5.0, y + 3.5, anchor="end"))
+        axes.append(drawing_text(words, left - 5.0, y + 3.5, anchor="end"))
     for tick in _ticks(0.0, float(last), whole=True):
         x, _ = place(tick, low)
-        made.append(element("line", x1=x, y1=TOP + tall, x2=x, y2=TOP + tall + 4.0))
-        made.append(drawing_text(format_number(tick), x, TOP + tall + 15.0))
-    made.append(drawing_text("iteration", left + 0.5 * width, HEIGHT - 6.0, class_="axis"))
-    pieces = [made]
+        axes.append(element("line", x1=x, y1=TOP + tall, x2=x, y2=TOP + tall + 4.0))
+        axes.append(drawing_text(format_number(tick), x, TOP + tall + 15.0))
+    axes.append(drawing_text("iteration", left + 0.5 * width, HEIGHT - 6.0, class_="axis"))
+    pieces = [axes]
     if curve.level is not None:
         _, y = place(0.0, curve.level)
         pieces.append(element("line", x1=left, y1=y, x2=left + width, y2=y, class_="level"))

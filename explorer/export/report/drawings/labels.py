@@ -38,18 +38,13 @@ def labels(
     """
     taken = [_box(point, 9.0, 9.0) for _, point in names]
     covered = np.concatenate([np.zeros((0, 2)), *(a + _ALONG * (b - a) for a, b in lines)])
-    made: list[Element] = []
+    texts: list[Element] = []
     for name, point in names:
         width = LETTER * len(name) + 4.0
 
         def cost(offset: Offset, point: FloatArray = point, width: float = width) -> float:
             x0, y0, x1, y1 = box = _placed(point, offset, width)
-            inside = (
-                (covered[:, 0] > x0)
-                & (covered[:, 0] < x1)
-                & (covered[:, 1] > y0)
-                & (covered[:, 1] < y1)
-            )
+            inside = ((covered > (x0, y0)) & (covered < (x1, y1))).all(axis=1)
             outside = max(0.0, within[0] - x0, x1 - within[2], within[1] - y0, y1 - within[3])
             overlap = sum(_overlap(box, other) for other in taken)
             return overlap + 4.0 * float(inside.sum()) + 50.0 * outside + 0.4 * offset[0]
@@ -57,8 +52,8 @@ def labels(
         best = min(itertools.product(_DISTANCES, _DIRECTIONS), key=cost)
         box = _placed(point, best, width)
         taken.append(box)
-        made.append(drawing_text(name, 0.5 * (box[0] + box[2]), box[3] - 2.5, class_="label"))
-    return made
+        texts.append(drawing_text(name, 0.5 * (box[0] + box[2]), box[3] - 2.5, class_="label"))
+    return texts
 
 
 def _placed(point: FloatArray, offset: Offset, width: float) -> Box:

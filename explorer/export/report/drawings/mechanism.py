@@ -54,7 +54,7 @@ def cover_drawing(snapshot: Snapshot) -> Element:
 def three_views(snapshot: Snapshot) -> Element:
     """Return the mechanism from above, from the front and from the side, at one scale."""
     points = points_to_show(snapshot)
-    wide, deep = (float(each) for each in np.ptp(points[:, :2], axis=0))
+    wide, deep = (float(extent) for extent in np.ptp(points[:, :2], axis=0))
     high = float(np.ptp(points[:, 2]))
     least = 1e-9 * max(wide, deep, high)
     room = 2.0 * ROOM
@@ -63,20 +63,20 @@ def three_views(snapshot: Snapshot) -> Element:
         (SHEET_HEIGHT - 2.0 * room - 16.0) / max(deep + high, least),
     )
     left = min(max(scale * wide + room, LEAST_CELL), WIDTH - LEAST_CELL)
-    upper, lower = (max(scale * each + room + 16.0, LEAST_CELL) for each in (deep, high))
+    upper, lower = (max(scale * extent + room + 16.0, LEAST_CELL) for extent in (deep, high))
     height = upper + lower
     cells: tuple[tuple[ViewName, str, float, float, float, float], ...] = (
         ("top", "From above", 0.0, 0.0, left, upper),
         ("front", "From the front", 0.0, upper, left, lower),
         ("side", "From the right", left, upper, WIDTH - left, lower),
     )
-    made: list[Element] = []
+    views: list[Element] = []
     for name, title, x, y, width, tall in cells:
         view = fit_view(name, points, (x, y + 16.0, width, tall - 16.0), scale)
         box = (x, y + 16.0, x + width, y + tall)
-        made.append(element("text", title, x=x + 8.0, y=y + 18.0, class_="title"))
-        made.extend(mechanism(snapshot, view, box))
-        made.append(axes_cross(view, x + 14.0, y + 62.0, flat=True))
+        views.append(element("text", title, x=x + 8.0, y=y + 18.0, class_="title"))
+        views.extend(mechanism(snapshot, view, box))
+        views.append(axes_cross(view, x + 14.0, y + 62.0, flat=True))
     lines = element(
         "path",
         d=f"M0,{coordinate(upper)}H{coordinate(WIDTH)}M{coordinate(left)},0V{coordinate(height)}",
@@ -87,7 +87,7 @@ def three_views(snapshot: Snapshot) -> Element:
         height,
         "The mechanism from above, from the front and from the right, at one scale",
         lines,
-        *made,
+        *views,
         *_key(left + 24.0, 18.0),
         scale_bar(view, snapshot.design.unit_mm, left + 24.0, upper - 18.0),
     )
@@ -111,8 +111,8 @@ def mechanism(
     """Yield the elements of a mechanism, with labels within a box, or without labels if None."""
     points = snapshot.points
     legs = leg_axes(snapshot.design, snapshot.pose.position, snapshot.rotation)
-    found = verdict(snapshot, WARN_SHARE * snapshot.design.reach)
-    tints = [css(proximity_colour(level, 1.0)) for level in found.levels]
+    here = verdict(snapshot, WARN_SHARE * snapshot.design.reach)
+    tints = [css(proximity_colour(level, 1.0)) for level in here.levels]
     low, high = _guide(snapshot)
     yield _area(view, [low, high, points.a3], tints[2])
     yield _line(view, low, high, "rail")
@@ -128,8 +128,8 @@ def mechanism(
         _line(view, *ends, "flag", stroke=tints[1]),
     ]
     pieces.append((float(view.depth(np.array([*ends, points.b1])).mean()), plate))
-    for _, each in sorted(pieces, key=lambda piece: piece[0]):
-        yield from each
+    for _, elements in sorted(pieces, key=lambda piece: piece[0]):
+        yield from elements
     for station in _carriages(snapshot):
         x, y = view.to(station).tolist()
         yield element("rect", x=x - 5.0, y=y - 5.0, width=10.0, height=10.0, class_="carriage")
@@ -172,15 +172,15 @@ def round_length(length: float) -> float:
 
 def axes_cross(view: Projection, x: float, y: float, *, flat: bool = False) -> Element:
     """Return the axes of the base; of a flat view only those in its plane."""
-    made = element("g", class_="axes")
+    axes = element("g", class_="axes")
     for name, axis in zip("xyz", np.eye(3), strict=True):
         dx, dy = ((view.to(axis) - view.to(np.zeros(3))) / view.scale).tolist()
         if flat and np.hypot(dx, dy) < 0.5:
             continue
         end_x, end_y = x + 22.0 * dx, y + 22.0 * dy
-        made.append(element("line", x1=x, y1=y, x2=end_x, y2=end_y))
-        made.append(drawing_text(name, x + 30.0 * dx, y + 30.0 * dy + 3.5))
-    return made
+        axes.append(element("line", x1=x, y1=y, x2=end_x, y2=end_y))
+        axes.append(drawing_text(name, x + 30.0 * dx, y + 30.0 * dy + 3.5))
+    return axes
 
 
 def path_of(points: FloatArray) -> str:
@@ -236,27 +236,19 @@ def _dot(
 def _key(x: float, y: float) -> Iterator[Element]:
     """Yield the key to the signs of the drawings."""
     yield element("text", "Key", x=x, y=y, class_="title")
-    entries: tuple[tuple[Element, str], ...] = (
-        (
-            element("circle", cx=x + 9.0, cy=0.0, r=4.2, class_="joint"),
-            "universal joint, on the base",
-        ),
-        (
-            element("rect", x=x + 4.0, y=-5.0, width=10.0, height=10.0, class_="carriage"),
-            "carriage on the guide: d1, d3",
-        ),
-        (
-            element("circle", cx=x + 9.0, cy=0.0, r=4.2, class_="ball"),
-            "ball joint, on the platform",
-        ),
-        (
-            element(
-                "g",
-                element("line", x1=x, y1=0.0, x2=x + 18.0, y2=0.0, class_="rod"),
-                element("line", x1=x, y1=0.0, x2=x + 10.0, y2=0.0, class_="cylinder"),
-            ),
-            "leg: cylinder and rod",
-        ),
+    leg = [
+        element("line", x1=x, y1=0.0, x2=x + length, y2=0.0, class_=name)
+        for name, length in (("rod", 18.0), ("cylinder", 10.0))
+    ]
+    carriage = element("rect", x=x + 4.0, y=-5.0, width=10.0, height=10.0, class_="carriage")
+    joint, ball = (
+        element("circle", cx=x + 9.0, cy=0.0, r=4.2, class_=name) for name in ("joint", "ball")
+    )
+    entries = (
+        (joint, "universal joint, on the base"),
+        (carriage, "carriage on the guide: d1, d3"),
+        (ball, "ball joint, on the platform"),
+        (element("g", *leg), "leg: cylinder and rod"),
     )
     for index, (sign, words) in enumerate(entries):
         line = y + 22.0 + 20.0 * index

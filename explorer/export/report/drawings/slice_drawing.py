@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from xml.etree.ElementTree import Element
 
 from explorer.export.report.drawings.mechanism import WIDTH, round_length, svg_drawing
-from explorer.export.report.drawings.slices import Slices
+from explorer.export.report.drawings.slices import Slices, in_plane
 from explorer.export.report.markup import coordinate, drawing_text, element, format_number
 from explorer.singularity.colours import BAND_EDGES, OUTLINE, band_colours, css
 from explorer.workspace.slices.axes import AXES
@@ -25,24 +25,24 @@ def slices_through(slices: Slices, position: Sequence[float]) -> Element:
     high = float(max(spans[1], spans[2]))
     scale = min((WIDTH - 3.0 * (LEFT + RIGHT)) / wide, MOST_HEIGHT / high)
     height = TOP + BOTTOM + scale * high
-    made: list[Element] = []
+    maps: list[Element] = []
     left = 0.5 * (WIDTH - 3.0 * (LEFT + RIGHT) - scale * wide)
     for axis in ("z", "y", "x"):
-        first, second = (k for k, name in enumerate(AXES) if name != axis)
+        first, second = in_plane(axis)
         level = float(position[AXES.index(axis)])
         width, tall = (float(scale * spans[k]) for k in (first, second))
         x, y = left + LEFT, TOP + tall
-        made.append(_placed(slices, axis, level, x, y, scale, f"slice-{axis}"))
+        maps.append(_placed(slices, axis, level, x, y, scale, f"slice-{axis}"))
         for index, (k, low) in enumerate(((first, x), (second, y))):
-            made.append(_ruler(slices, k, low, scale, across=x if index else y, up=bool(index)))
+            maps.append(_ruler(slices, k, low, scale, across=x if index else y, up=bool(index)))
         home_u, home_v = (float(position[k] - slices.lows[k]) * scale for k in (first, second))
         cross = f"M{coordinate(x + home_u - 5)},{coordinate(y - home_v)}h10m-5,-5v10"
-        made.append(element("path", d=cross, class_="cross casing"))
-        made.append(element("path", d=cross, class_="cross"))
+        maps.append(element("path", d=cross, class_="cross casing"))
+        maps.append(element("path", d=cross, class_="cross"))
         title = f"{axis} = {format_number(level, 4)}"
-        made.append(element("text", title, x=x, y=y - tall - 10.0, class_="title"))
+        maps.append(element("text", title, x=x, y=y - tall - 10.0, class_="title"))
         left += LEFT + width + RIGHT
-    return svg_drawing(height, "Three slices of the workspace", *made)
+    return svg_drawing(height, "Three slices of the workspace", *maps)
 
 
 def slice_strip(
@@ -50,42 +50,42 @@ def slice_strip(
 ) -> tuple[Element, list[tuple[float, float | None]]]:
     """Return maps of slices at even steps along an axis, and the level and area of each."""
     cut = AXES.index(axis)
-    first, second = (each for each in range(3) if each != cut)
+    first, second = in_plane(axis)
     spans = slices.highs - slices.lows
     room = 10.0
     scale = min((WIDTH / many - room) / float(spans[first]), 200.0 / float(spans[second]))
     tall = scale * float(spans[second])
-    made: list[Element] = []
-    found: list[tuple[float, float | None]] = []
+    maps: list[Element] = []
+    areas: list[tuple[float, float | None]] = []
     for index in range(many):
         level = float(slices.lows[cut] + spans[cut] * (index + 0.5) / many)
         left = (index + 0.5) * WIDTH / many - 0.5 * scale * float(spans[first])
-        made.append(_placed(slices, axis, level, left, TOP + tall, scale, f"strip-{index}"))
+        maps.append(_placed(slices, axis, level, left, TOP + tall, scale, f"strip-{index}"))
         middle = (index + 0.5) * WIDTH / many
         title = f"{axis} = {format_number(level, 4)}"
-        made.append(drawing_text(title, middle, 16.0, class_="title"))
-        found.append((level, slices.area(axis, level)))
-    return svg_drawing(TOP + tall + 6.0, f"Slices along {axis}", *made), found
+        maps.append(drawing_text(title, middle, 16.0, class_="title"))
+        areas.append((level, slices.area(axis, level)))
+    return svg_drawing(TOP + tall + 6.0, f"Slices along {axis}", *maps), areas
 
 
 def legend(slices: Slices, unit_mm: float) -> Element:
     """Return the legend of the maps' colours."""
     colours, warn = band_colours(), slices.warn_below
-    step, left, made = 46.0, 130.0, list[Element]()
-    made.append(drawing_text("smallest margin", left - 12.0, 15.0, anchor="end"))
-    made.append(drawing_text("units", left - 12.0, 33.0, anchor="end"))
-    made.append(drawing_text("mm", left - 12.0, 47.0, anchor="end"))
+    step, left, pieces = 46.0, 130.0, list[Element]()
+    pieces.append(drawing_text("smallest margin", left - 12.0, 15.0, anchor="end"))
+    pieces.append(drawing_text("units", left - 12.0, 33.0, anchor="end"))
+    pieces.append(drawing_text("mm", left - 12.0, 47.0, anchor="end"))
     for index, (edge, colour) in enumerate(zip(BAND_EDGES, colours, strict=True)):
         x = left + step * index
-        made.append(element("rect", x=x, y=4.0, width=step, height=14.0, fill=css(colour)))
+        pieces.append(element("rect", x=x, y=4.0, width=step, height=14.0, fill=css(colour)))
         for factor, y in ((1.0, 33.0), (unit_mm, 47.0)):
             words = format_number(edge * warn * factor, 3)
-            made.append(drawing_text(words, x, y))
+            pieces.append(drawing_text(words, x, y))
     if any(slices.design.limits.leg_radii):
         x = left + step * len(colours) + 18.0
-        made.append(element("rect", x=x, y=4.0, width=14.0, height=14.0, fill=css(OUTLINE)))
-        made.append(element("text", "legs collide", x=x + 19.0, y=15.0, class_="small"))
-    return svg_drawing(52.0, "The colours of the maps", *made)
+        pieces.append(element("rect", x=x, y=4.0, width=14.0, height=14.0, fill=css(OUTLINE)))
+        pieces.append(element("text", "legs collide", x=x + 19.0, y=15.0, class_="small"))
+    return svg_drawing(52.0, "The colours of the maps", *pieces)
 
 
 def _placed(
@@ -104,23 +104,22 @@ def _ruler(
     """Return an axis with ticks at round numbers, below a map or to its left."""
     low, high = float(slices.lows[k]), float(slices.highs[k])
     step = round_length((high - low) / _TICKS * 1.6)
-    made = element("g", class_="ruler")
+    ruler = element("g", class_="ruler")
     way = -1.0 if up else 1.0
     end = start + way * scale * (high - low)
     ticks = range(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1)
     line = (across, start, across, end) if up else (start, across, end, across)
-    made.append(element("line", **dict(zip(("x1", "y1", "x2", "y2"), line, strict=True))))
+    ruler.append(element("line", **dict(zip(("x1", "y1", "x2", "y2"), line, strict=True))))
     for tick in ticks:
         at = start + way * scale * (tick * step - low)
+        x1, y1, x2, y2 = (across, at, across - 4.0, at) if up else (at, across, at, across + 4.0)
+        ruler.append(element("line", x1=x1, y1=y1, x2=x2, y2=y2))
         words = format_number(tick * step, 4)
         if up:
-            made.append(element("line", x1=across, y1=at, x2=across - 4.0, y2=at))
-            made.append(drawing_text(words, across - 7.0, at + 3.5, anchor="end"))
+            ruler.append(drawing_text(words, across - 7.0, at + 3.5, anchor="end"))
         else:
-            made.append(element("line", x1=at, y1=across, x2=at, y2=across + 4.0))
-            made.append(drawing_text(words, at, across + 15.0))
-    if up:
-        made.append(drawing_text(AXES[k], across - 30.0, 0.5 * (start + end) + 3.5, class_="axis"))
-    else:
-        made.append(drawing_text(AXES[k], 0.5 * (start + end), across + 30.0, class_="axis"))
-    return made
+            ruler.append(drawing_text(words, at, across + 15.0))
+    middle = 0.5 * (start + end)
+    x, y = (across - 30.0, middle + 3.5) if up else (middle, across + 30.0)
+    ruler.append(drawing_text(AXES[k], x, y, class_="axis"))
+    return ruler

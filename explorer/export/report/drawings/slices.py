@@ -10,10 +10,11 @@ import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from typing import Any
 from xml.etree.ElementTree import Element
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from explorer.export.report.drawings.mechanism import path_of, round_length
 from explorer.export.report.markup import coordinate, element
@@ -79,10 +80,6 @@ class Slices:
         """Whether outlines are arcs and lines, rather than those of a grid."""
         return self.design.limits.swing == Swing()
 
-    @cached_property
-    def _thick(self) -> bool:
-        return any(self.design.limits.leg_radii)
-
     def area(self, axis: str, level: float) -> float | None:
         """Return the exact area of a slice, in squared design units; None with cones."""
         outline = self.outline(axis, level)
@@ -101,90 +98,77 @@ class Slices:
             name: Identifier of the outline, unique in the document.
         """
         outline = self.outline(axis, level)
-        own = self._own(axis)
+        to_map = _ToMap(self.lows[in_plane(axis)], self.own_scale)
         if outline is None:
-            field = slice_field(
-                self.design,
-                self.rotation,
-                "margin",
-                axis=axis,
-                level=level,
-                steps=CELLS,
-                extent=(self.lows, self.highs),
-            )
-            data, edge = _runs(field.inside, own(_ends(field.columns, field.rows))), None
+            extent = (self.lows, self.highs)
+            places: dict[str, Any] = {"axis": axis, "level": level, "extent": extent}
+            field = slice_field(self.design, self.rotation, "margin", steps=CELLS, **places)
+            data, edge = _runs(field.inside, to_map(_ends(field.columns, field.rows))), None
         else:
-            data = "".join(_loop(loop, own, self.own_scale) for loop in outline.loops)
+            data = "".join(_loop(loop, to_map) for loop in outline.loops)
             edge = element("path", d=data, class_="edge") if data else None
         if not data:
             return element("g")
-        corners = own(self._corners(axis))
         filled = element("g", clip_path=f"url(#{name})")
-        colours = band_colours()
-        filled.append(element("path", d=path_of(corners), fill=css(colours[0])))
-        for share, colour in zip(BAND_EDGES[1:], colours[1:], strict=True):
-            polygons = [path_of(own(each)) for each in self._beyond(axis, level, share)]
+
+        def add(share: float, **look: str) -> None:
+            polygons = [path_of(to_map(polygon)) for polygon in self._beyond(axis, level, share)]
             if polygons:
-                filled.append(element("path", d="".join(polygons), fill=css(colour)))
+                filled.append(element("path", d="".join(polygons), **look))
+
+        first, *others = band_colours()
+        filled.append(element("path", d=path_of(to_map(self._corners(axis))), fill=css(first)))
+        for share, colour in zip(BAND_EDGES[1:], others, strict=True):
+            add(share, fill=css(colour))
         for number in range(1, CONTOURS):
             share = number * self.contour_step / self.warn_below
-            polygons = [path_of(own(each)) for each in self._beyond(axis, level, share)]
-            if polygons and share > BAND_EDGES[-1]:
-                filled.append(element("path", d="".join(polygons), class_="contour"))
-        if self._thick:
-            filled.append(self._collisions(axis, level))
+            if share > BAND_EDGES[-1]:
+                add(share, class_="contour")
+        if any(self.design.limits.leg_radii):
+            filled.append(self._collisions(axis, level, to_map))
         clip = element("clipPath", element("path", d=data, clip_rule="evenodd"), id=name)
         return element("g", clip, filled, edge)
 
-    def _own(self, axis: str) -> _Own:
-        cut = AXES.index(axis)
-        first, second = (each for each in range(3) if each != cut)
-        return _Own(self.lows[[first, second]], self.own_scale)
-
     def _corners(self, axis: str) -> FloatArray:
-        first, second = (k for k, name in enumerate(AXES) if name != axis)
-        (u0, v0), (u1, v1) = self.lows[[first, second]], self.highs[[first, second]]
+        (u0, v0), (u1, v1) = self.lows[in_plane(axis)], self.highs[in_plane(axis)]
         return np.array([[u0, v0], [u1, v0], [u1, v1], [u0, v1]])
 
     def _beyond(self, axis: str, level: float, share: float) -> Iterator[FloatArray]:
         """Yield the polygons in which every margin is at least a share of the warning length."""
-        cut = AXES.index(axis)
-        first, second = (each for each in range(3) if each != cut)
         gradients = planes_of_singularity(self.rotation)
         for signs in itertools.product((-1.0, 1.0), repeat=3):
             polygon = self._corners(axis)
             for sign, gradient in zip(signs, gradients, strict=True):
-                least = share * self.warn_below - sign * float(gradient[cut]) * level
-                values = sign * (polygon @ gradient[[first, second]]) - least
-                polygon = _clipped(polygon, values)
+                beyond = float(gradient[AXES.index(axis)]) * level
+                least = share * self.warn_below - sign * beyond
+                polygon = _clipped(polygon, sign * (polygon @ gradient[in_plane(axis)]) - least)
                 if not len(polygon):
                     break
             else:
                 yield polygon
 
-    def _collisions(self, axis: str, level: float) -> Element:
-        cut = AXES.index(axis)
-        first, second = (each for each in range(3) if each != cut)
-        sides = (self.highs - self.lows)[[first, second]]
-        many = np.maximum(1.0, np.rint(COLLISION_CELLS * sides / sides.max()))
+    def _collisions(self, axis: str, level: float, to_map: _ToMap) -> Element:
+        lows, sides = self.lows[in_plane(axis)], (self.highs - self.lows)[in_plane(axis)]
+        many = np.maximum(1.0, np.rint(COLLISION_CELLS * sides / sides.max())).astype(int)
         columns, rows = (
             low + side / n * (np.arange(n, dtype=np.float64) + 0.5)
-            for low, side, n in (
-                (float(self.lows[first]), float(sides[0]), int(many[0])),
-                (float(self.lows[second]), float(sides[1]), int(many[1])),
-            )
+            for low, side, n in zip(lows.tolist(), sides.tolist(), many.tolist(), strict=True)
         )
-        points = np.empty((len(rows), len(columns), 3))
-        points[..., cut] = level
+        points = np.full((len(rows), len(columns), 3), level)
+        first, second = in_plane(axis)
         points[..., first], points[..., second] = columns, rows[:, None]
         collide = leg_clearances(self.design, points, self.rotation).clearance.min(axis=-1) <= 0.0
-        data = _runs(collide, self._own(axis)(_ends(columns, rows)))
-        return element("path", d=data, fill=css(OUTLINE))
+        return element("path", d=_runs(collide, to_map(_ends(columns, rows))), fill=css(OUTLINE))
+
+
+def in_plane(axis: str) -> list[int]:
+    """Return the indices of the two axes of a slice that is normal to a third."""
+    return [index for index, name in enumerate(AXES) if name != axis]
 
 
 @dataclass(frozen=True)
-class _Own:
-    """From design units to a drawing's own coordinates."""
+class _ToMap:
+    """The conversion from design units to the own coordinates of a map."""
 
     lows: FloatArray
     scale: float
@@ -192,45 +176,45 @@ class _Own:
     def __call__(self, points: FloatArray) -> FloatArray:
         return (points - self.lows) * self.scale
 
+    def text(self, point: ArrayLike) -> str:
+        """Return a point as coordinates of a path."""
+        x, y = self(np.asarray(point)).tolist()
+        return f"{coordinate(x)},{coordinate(y)}"
 
-def _loop(loop: tuple[Edge, ...], own: _Own, scale: float) -> str:
+
+def _loop(loop: tuple[Edge, ...], to_map: _ToMap) -> str:
     """Return a closed loop of edges as the data of a path."""
-    x, y = own(np.array(loop[0].start)).tolist()
-    data = [f"M{coordinate(x)},{coordinate(y)}"]
+    data = [f"M{to_map.text(loop[0].start)}"]
     for edge in loop:
-        x, y = own(np.array(edge.end)).tolist()
-        end = f"{coordinate(x)},{coordinate(y)}"
         if edge.centre is None:
-            data.append(f"L{end}")
+            data.append(f"L{to_map.text(edge.end)}")
             continue
-        radius = coordinate(edge.radius * scale)
-        sweep = int(edge.turn > 0.0)
+        radius = coordinate(edge.radius * to_map.scale)
+        arc = f"A{radius},{radius} 0 0 {int(edge.turn > 0.0)}"
         if abs(edge.turn) > math.pi - 1e-6:
             # An arc of a path must be less than a whole circle: two halves are plain.
-            half = _middle(edge)
-            mx, my = own(half).tolist()
-            data.append(f"A{radius},{radius} 0 0 {sweep} {coordinate(mx)},{coordinate(my)}")
-        data.append(f"A{radius},{radius} 0 0 {sweep} {end}")
+            data.append(f"{arc} {to_map.text(_middle(edge))}")
+        data.append(f"{arc} {to_map.text(edge.end)}")
     return "".join((*data, "Z"))
 
 
 def _middle(edge: Edge) -> FloatArray:
     centre = np.array(edge.centre)
-    off = np.array(edge.start) - centre
+    x, y = np.array(edge.start) - centre
     c, s = math.cos(0.5 * edge.turn), math.sin(0.5 * edge.turn)
-    return centre + np.array([c * off[0] - s * off[1], s * off[0] + c * off[1]])
+    return centre + np.array([c * x - s * y, s * x + c * y])
 
 
 def _clipped(polygon: FloatArray, values: FloatArray) -> FloatArray:
     """Return the part of a convex polygon (n, 2) where a linear value is not negative."""
-    kept: list[FloatArray] = []
+    corners: list[FloatArray] = []
     for k in range(len(polygon)):
         a, b = values[k - 1], values[k]
         if (a >= 0.0) != (b >= 0.0):
-            kept.append(polygon[k - 1] + a / (a - b) * (polygon[k] - polygon[k - 1]))
+            corners.append(polygon[k - 1] + a / (a - b) * (polygon[k] - polygon[k - 1]))
         if b >= 0.0:
-            kept.append(polygon[k])
-    return np.array(kept) if len(kept) > 2 else np.zeros((0, 2))
+            corners.append(polygon[k])
+    return np.array(corners) if len(corners) > 2 else np.zeros((0, 2))
 
 
 def _ends(columns: FloatArray, rows: FloatArray) -> FloatArray:

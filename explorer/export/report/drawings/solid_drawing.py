@@ -1,7 +1,7 @@
 """A solid as a drawing: shaded faces from the back to the front, and the edges of its limits.
 
 The workspace is an intersection of balls, cylinders and half-spaces, convex where no length
-has a minimum: then its visible faces cover nothing of each other, and the drawing is exact.
+has a minimum: then no visible face covers another, and the drawing is exact.
 """
 
 from __future__ import annotations
@@ -34,17 +34,17 @@ def shaded_faces(solid: Solid, view: Projection) -> Element:
     facing = 0.5 + 0.5 * (normals[order] @ view.axes.T @ light)
     shades = np.rint(facing * (_SHADES - 1)).astype(int).tolist()
     flat = view.to(corners[order])
-    made = element("g", class_="faces")
+    group = element("g", class_="faces")
     last, data = -1, list[str]()
     for shade, triangle in zip(shades, flat, strict=True):
         if shade != last and data:
-            made.append(_faces(last, data))
+            group.append(_faces(last, data))
             data = []
         last = shade
         data.append(path_of(triangle))
     if data:
-        made.append(_faces(last, data))
-    return made
+        group.append(_faces(last, data))
+    return group
 
 
 def visible_edges(solid: Solid, view: Projection) -> Element:

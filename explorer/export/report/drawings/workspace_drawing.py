@@ -44,7 +44,7 @@ def workspace_views(snapshot: Snapshot, solid: Solid, slices: Slices) -> Element
     whole = fit_view("isometric", points, (0.0, 0.0, half, height), scale)
     opened = fit_view("isometric", points, (half, 0.0, half, height), scale)
     level = snapshot.pose.position[1]
-    kept = cut_solid(solid, HalfSpace("cut", np.array([0.0, -1.0, 0.0]), -level))
+    cut = cut_solid(solid, HalfSpace("cut", np.array([0.0, -1.0, 0.0]), -level))
     pieces = [
         element("g", *mechanism(snapshot, whole, None)),
         element("g", shaded_faces(solid, whole), opacity="0.66"),
@@ -52,8 +52,8 @@ def workspace_views(snapshot: Snapshot, solid: Solid, slices: Slices) -> Element
         scale_bar(whole, snapshot.design.unit_mm, 4.0, height - 6.0),
         axes_cross(whole, half - 40.0, height - 30.0),
     ]
-    if not kept.is_empty:
-        pieces += [shaded_faces(kept, opened), visible_edges(kept, opened)]
+    if not cut.is_empty:
+        pieces += [shaded_faces(cut, opened), visible_edges(cut, opened)]
     pieces.append(_on_cut(slices, level, opened))
     pieces.append(element("g", *mechanism(snapshot, opened, None), opacity="0.9"))
     return svg_drawing(height, "The workspace, whole and cut open", *pieces)

@@ -21,18 +21,16 @@ def legs_section(data: ReportData) -> Iterator[Element]:
         "they collide. The least clearance over the workspace at this orientation is computed by "
         "branch and bound. A pair that shares a joint has no clearance."
     )
-    blocked = reachable is not None and not isinstance(reachable, Missing)
     heads = ["legs", "here, units", "here, mm", "least, units", "least, mm"]
-    rows: list[tuple[Cell, ...]] = []
+    rows: list[list[Cell]] = []
     for index, (first, second) in enumerate(PAIRS):
-        cells: list[Cell] = [element("b", f"{first}–{second}")]
+        rows.append([element("b", f"{first}–{second}")])
         for clearance in (float(at.clearance[index]), float(least.clearance[index])):
-            cells += [_known(clearance), _known(clearance * unit)]
-        if reachable is not None and not isinstance(reachable, Missing):
-            cells.append(reachable.pairs[index].blocked_volume)
-        rows.append(tuple(cells))
-    if blocked:
+            rows[-1] += [_known(clearance), _known(clearance * unit)]
+    if reachable is not None and not isinstance(reachable, Missing):
         heads.append("blocks, units³")
+        for row, pair in zip(rows, reachable.pairs, strict=True):
+            row.append(pair.blocked_volume)
     yield table(heads, rows, align="<" + ">" * (len(heads) - 1))
 
 

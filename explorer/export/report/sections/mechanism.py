@@ -5,18 +5,22 @@ from __future__ import annotations
 from collections.abc import Iterator
 from xml.etree.ElementTree import Element
 
+import msgspec
+
 from explorer.export.report.data import ReportData
 from explorer.export.report.drawings.mechanism import three_views
 from explorer.export.report.markup import (
     Cell,
+    Row,
     element,
+    ends,
     format_number,
     illustration,
     number,
     paragraph,
     table,
 )
-from explorer.mechanism.design import JOINTS, LENGTHS, VARIABLES
+from explorer.mechanism.design import JOINTS, LENGTHS
 from explorer.mechanism.pose import yaw_pitch_roll_from_rotation
 from explorer.singularity.colours import WARN_SHARE
 
@@ -48,7 +52,7 @@ def mechanism_section(data: ReportData) -> Iterator[Element]:
     )
     yield illustration(
         three_views(data.snapshot),
-        f"The mechanism in {pose_words(data)}, in three views at one scale (third angle). "
+        f"The mechanism in {data.pose_words}, in three views at one scale (third angle). "
         "Colours show how near each element of the two flags is to its incidence: "
         f"orange where its margin is below the warning length of {100.0 * WARN_SHARE:g} % of the "
         "reach, or the nearest singular pose is nearer than a third of it; blue beyond.",
@@ -61,87 +65,70 @@ def mechanism_section(data: ReportData) -> Iterator[Element]:
         yield paragraph(f"This pose breaks limits: {'; '.join(map(str, broken))}.", class_="note")
 
 
-def pose_words(data: ReportData) -> str:
-    """Return the words for the pose of a report."""
-    return "its home pose" if data.is_home else "the pose of this report"
+def _lengths(data: ReportData, name: Cell, value: float) -> Row:
+    """Return a row with a length in design units and in millimetres."""
+    return name, value, value * data.unit_mm
 
 
 def _variables(data: ReportData) -> Element:
-    unit = data.design.unit_mm
-    rows: list[tuple[Cell, ...]] = [
-        ((element("b", name), f" {_MEANINGS[name]}"), value, number(value * unit))
-        for name, value in zip(VARIABLES, data.design.variables, strict=True)
+    meanings = {**_MEANINGS, "|a3|": "reach"}
+    values = (*data.design.variables, data.design.reach)
+    rows = [
+        _lengths(data, (element("b", name), f" {meaning}"), value)
+        for (name, meaning), value in zip(meanings.items(), values, strict=True)
     ]
-    rows.append(((element("b", "|a3|"), " reach"), data.design.reach, data.design.reach * unit))
-    return table(
-        ("design variable", "units", "mm"), rows, align="<>>", caption="Design variables X"
-    )
+    heads = ("design variable", "units", "mm")
+    return table(heads, rows, align="<>>", caption="Design variables X")
 
 
 def _pose(data: ReportData) -> Element:
-    unit, pose = data.design.unit_mm, data.snapshot.pose
-    rows: list[tuple[Cell, ...]] = [
-        (f"{axis} of b4", value, value * unit)
+    pose = data.snapshot.pose
+    rows = [
+        _lengths(data, f"{axis} of b4", value)
         for axis, value in zip("xyz", pose.position, strict=True)
     ]
     angles = yaw_pitch_roll_from_rotation(data.snapshot.rotation).tolist()
-    rows += [
-        (name, (number(angle), "°"), "")
-        for name, angle in zip(("yaw", "pitch", "roll"), angles, strict=True)
-    ]
-    rows += [
-        (f"quaternion {name}", value, "")
-        for name, value in zip("wxyz", pose.quaternion, strict=True)
-    ]
+    for name, angle in zip(("yaw", "pitch", "roll"), angles, strict=True):
+        rows.append((name, (number(angle), "°"), ""))
+    for name, value in zip("wxyz", pose.quaternion, strict=True):
+        rows.append((f"quaternion {name}", value, ""))
     name = "Home pose" if data.is_home else "Pose"
     return table(("", "units", "mm"), rows, align="<>>", caption=name)
 
 
 def _joints(data: ReportData) -> Element:
-    design, unit = data.design, data.design.unit_mm
-    rows: list[tuple[Cell, ...]] = []
+    design, unit = data.design, data.unit_mm
+    rows: list[Row] = []
     for name, value in zip(JOINTS, data.snapshot.joints.tolist(), strict=True):
-        if name in LENGTHS:
-            low, high = design.length_range(name)
-            ends = (number(low * unit), number(high * unit))
-        elif design.limits.guide is not None:
-            low, high = design.limits.guide
-            ends = (number(low * unit), number(high * unit))
-        else:
-            ends = ("none", "none")
-        rows.append(((element("b", name), f" {_JOINTS[name]}"), value, value * unit, *ends))
+        limits = design.length_range(name) if name in LENGTHS else design.limits.guide
+        bounds = ("none", "none") if limits is None else (number(end * unit) for end in limits)
+        rows.append((*_lengths(data, (element("b", name), f" {_JOINTS[name]}"), value), *bounds))
     return table(
         ("joint", "units", "mm", "minimum, mm", "maximum, mm"),
         rows,
         align="<>>>>",
-        caption=f"Joints in {pose_words(data)}, and their limits",
+        caption=f"Joints in {data.pose_words}, and their limits",
     )
 
 
 def _limits(data: ReportData) -> Element:
-    limits, unit = data.design.limits, data.design.unit_mm
-    rows: list[tuple[Cell, ...]] = []
-    if limits.box is not None:
-        for axis, low, high in zip("xyz", *limits.box, strict=True):
-            words = (number(low), " to ", number(high))
-            rows.append(
-                (f"box of b4, {axis}", words, (number(low * unit), " to ", number(high * unit)))
-            )
-    else:
+    limits, unit = data.design.limits, data.unit_mm
+    rows: list[Row] = []
+    if limits.box is None:
         rows.append(("box of b4", "none", "none"))
-    rows.append(("gap |d1 − d3|, at least", limits.gap, limits.gap * unit))
+    else:
+        for axis, low, high in zip("xyz", *limits.box, strict=True):
+            rows.append((f"box of b4, {axis}", ends(low, high), ends(low * unit, high * unit)))
+    rows.append(_lengths(data, "gap |d1 − d3|, at least", limits.gap))
     order = {"home": "as at home", "any": "no demand"}[limits.carriage_order]
     rows.append(("order of the carriages", order, ""))
-    if limits.margin is None:
-        rows.append(("margins", "no demand", ""))
-    elif limits.margin == 0.0:
-        rows.append(("margins", "signs as at home", ""))
+    if limits.margin:
+        rows.append(_lengths(data, "|δ|, at least, signs as at home", limits.margin))
     else:
-        rows.append(("|δ|, at least, signs as at home", limits.margin, limits.margin * unit))
+        rows.append(("margins", "no demand" if limits.margin is None else "signs as at home", ""))
     for leg, radius in enumerate(limits.leg_radii, 1):
-        rows.append((f"radius of leg {leg}", radius, radius * unit))
-    for name in limits.swing.__struct_fields__:
-        angle = getattr(limits.swing, name)
+        rows.append(_lengths(data, f"radius of leg {leg}", radius))
+    for name, angle in msgspec.structs.asdict(limits.swing).items():
         if angle is not None:
             rows.append((f"swing at {name}, at most", f"{format_number(angle)}°", ""))
     return table(("limit", "units", "mm"), rows, align="<>>", caption="Further limits")

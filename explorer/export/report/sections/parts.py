@@ -22,31 +22,23 @@ def parts_section(data: ReportData) -> Iterator[Element]:
         number(bill.mass * 1000.0, 4),
         " g in all.",
     )
+    actuators = [
+        (str(leg.leg), *_rounded(*leg.stroke, *leg.required, leg.diameter, leg.mass * 1000.0))
+        for leg in bill.actuators
+    ]
+    parts = [
+        (item.name, *_rounded(*item.size, item.volume / 1000.0, item.mass * 1000.0))
+        for item in bill.items
+    ]
     yield table(
         ("leg", "from, mm", "to, mm", "limits from, mm", "to, mm", "Ø, mm", "mass, g"),
-        [
-            (
-                str(each.leg),
-                *(number(value, 4) for value in (*each.stroke, *each.asked)),
-                number(each.diameter, 4),
-                number(each.mass * 1000.0, 4),
-            )
-            for each in bill.actuators
-        ],
+        actuators,
         align="<>>>>>>",
         caption="Actuators: strokes, and the strokes that the limits require",
     )
-    yield table(
-        ("part", "x, mm", "y, mm", "z, mm", "volume, cm³", "mass, g"),
-        [
-            (
-                item.name,
-                *(number(value, 4) for value in item.size),
-                number(item.volume / 1000.0, 4),
-                number(item.mass * 1000.0, 4),
-            )
-            for item in bill.items
-        ],
-        align="<>>>>>",
-        caption="Bill of parts",
-    )
+    heads = ("part", "x, mm", "y, mm", "z, mm", "volume, cm³", "mass, g")
+    yield table(heads, parts, align="<>>>>>", caption="Bill of parts")
+
+
+def _rounded(*values: float) -> list[Element]:
+    return [number(value, 4) for value in values]

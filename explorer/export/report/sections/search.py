@@ -7,14 +7,16 @@ from xml.etree.ElementTree import Element
 
 from explorer.export.report.data import ReportData
 from explorer.export.report.drawings.history import charts, steps_of
-from explorer.export.report.markup import Cell, element, illustration, paragraph, table, whole
+from explorer.export.report.markup import Row, element, illustration, paragraph, table, whole
 from explorer.mechanism.design import VARIABLES
 from explorer.optimise.curves import CALLED
-from explorer.optimise.record import Record
 
 
-def search_section(data: ReportData, record: Record) -> Iterator[Element]:
-    """Yield the section on the search that found the design."""
+def search_section(data: ReportData) -> Iterator[Element]:
+    """Yield the section on the search that found the design; nothing without a record."""
+    record = data.record
+    if record is None:
+        return
     yield element("h2", "Optimisation")
     run, problem = record.runs[record.chosen], record.problem
     if record.design.variables != data.design.variables:
@@ -29,30 +31,28 @@ def search_section(data: ReportData, record: Record) -> Iterator[Element]:
             "The search from the chosen start, by iterations; dashed lines are the demands.",
         )
     best = next((step for step in record.history if step.number == run.best), None)
-    rows: list[tuple[Cell, ...]] = [
+    rows: list[Row] = [
         ("objective", problem.objective.replace("-", " ")),
         ("status", run.status),
+    ]
+    if problem.demands.volume is not None:
+        rows.append(("demanded volume, units³", problem.demands.volume))
+    if best is not None:
+        rows.append((CALLED[problem.objective], best.objective))
+        rows.append(("volume, units³", best.volume))
+    rows += [
         ("iterations", whole(run.iterations)),
         ("evaluations", whole(run.evaluations)),
         ("starts", whole(record.settings.starts)),
         ("seed", whole(record.settings.seed)),
         ("time, s", record.seconds),
     ]
-    if best is not None:
-        rows.insert(2, (CALLED[problem.objective], best.objective))
-        rows.insert(3, ("volume, units³", best.volume))
-    if problem.demands.volume is not None:
-        rows.insert(2, ("demanded volume, units³", problem.demands.volume))
     if run.holding:
         rows.append(("held by", run.holding))
     start, end = problem.start, record.design
-    changes: list[tuple[Cell, ...]] = [
-        (element("b", name), before, after, after - before)
-        for name, before, after in zip(VARIABLES, start.variables, end.variables, strict=True)
-    ]
-    changes.append(
-        ((element("b", "|a3|"), " reach"), start.reach, end.reach, end.reach - start.reach)
-    )
+    names = [*((element("b", name),) for name in VARIABLES), (element("b", "|a3|"), " reach")]
+    before, after = ((*design.variables, design.reach) for design in (start, end))
+    changes = [(*row, row[2] - row[1]) for row in zip(names, before, after, strict=True)]
     yield element(
         "div",
         table((), rows, align="<>", caption="The search"),

@@ -16,7 +16,6 @@ from explorer.export.report.markup import (
     table,
     whole,
 )
-from explorer.export.report.sections.mechanism import pose_words
 from explorer.measures.verdict import verdict
 from explorer.mechanism.margins import INCIDENCES, TETRAHEDRA, describe_modes
 from explorer.mechanism.pose import yaw_pitch_roll_from_rotation
@@ -38,8 +37,8 @@ def singularity_section(data: ReportData) -> Iterator[Element]:
         note = None if here.kind == "clear" else "note"
         yield paragraph(f"{here.title}: {here.reason(away)}.", class_=note)
     yield paragraph(
-        "The mechanism is singular exactly where one of three margins is zero; each is the height "
-        "of a tetrahedron. The signs of the three name the assembly mode."
+        "The mechanism is singular exactly where one of three margins is zero: there a "
+        "tetrahedron is flat. The signs of the three name the assembly mode."
     )
     yield table(
         ("margin", "zero when", "units", "mm", "tetrahedron", "volume, units³"),
@@ -55,7 +54,7 @@ def singularity_section(data: ReportData) -> Iterator[Element]:
             for k in range(3)
         ],
         align="<<>><>",
-        caption=f"Margins in {pose_words(data)}",
+        caption=f"Margins in {data.pose_words}",
     )
     yield table(
         (),
@@ -108,14 +107,14 @@ def _mode_figure(modes: tuple[int, ...]) -> Piece:
 def _nearest(data: ReportData) -> Element:
     unit = data.design.unit_mm
     rows: list[tuple[Cell, ...]] = []
-    for each in data.snapshot.nearest:
-        angles = yaw_pitch_roll_from_rotation(each.pose.rotation).tolist()
+    for nearest in data.snapshot.nearest:
+        angles = yaw_pitch_roll_from_rotation(nearest.pose.rotation).tolist()
         rows.append(
             (
-                element("b", f"δ{each.incidence} = 0"),
-                each.distance,
-                each.distance * unit,
-                *(number(value, 5) for value in each.pose.position),
+                element("b", f"δ{nearest.incidence} = 0"),
+                nearest.distance,
+                nearest.distance * unit,
+                *(number(value, 5) for value in nearest.pose.position),
                 *((number(value, 5), "°") for value in angles),
             )
         )

@@ -13,7 +13,10 @@ from explorer.export.report.drawings.slices import Slices
 from explorer.export.report.drawings.workspace_drawing import workspace_views
 from explorer.export.report.markup import (
     Cell,
+    Piece,
+    Row,
     element,
+    ends,
     format_number,
     illustration,
     number,
@@ -21,7 +24,7 @@ from explorer.export.report.markup import (
     table,
     whole,
 )
-from explorer.export.report.sections.mechanism import pose_words
+from explorer.measures.catalogue import CATALOGUE
 from explorer.workspace.solids.solid import Solid
 
 
@@ -38,7 +41,7 @@ def workspace_section(data: ReportData) -> Iterator[Element]:
         return
     yield paragraph(
         "All positions of b4 within the limits, at the orientation of ",
-        f"{pose_words(data)}. The volume is integrated from exact slices and exact to rounding; ",
+        f"{data.pose_words}. The volume is integrated from exact slices and exact to rounding; ",
         "the node volume is counted as in the paper: grid nodes, boundary included, times step³.",
     )
     solid = data.solid
@@ -49,17 +52,12 @@ def workspace_section(data: ReportData) -> Iterator[Element]:
     else:
         yield from _pictures(data, solid)
     yield _volumes(data)
-    yield from _accessible(data)
-    tables = [
-        _extent(data),
-        _bounding(solid) if isinstance(solid, Solid) and not solid.is_empty else None,
-    ]
-    yield element(
-        "div",
-        element("div", *tables),
-        _gradient(data) if data.volume.gradient else None,
-        class_="pair",
-    )
+    if isinstance(data.reachable, Missing):
+        reason = data.reachable.reason
+        yield paragraph(f"The accessible workspace cannot be computed: {reason}.", class_="note")
+    bounding = _bounding(solid) if isinstance(solid, Solid) and not solid.is_empty else None
+    gradient = _gradient(data) if data.volume.gradient else None
+    yield element("div", element("div", _extent(data), bounding), gradient, class_="pair")
 
 
 def _pictures(data: ReportData, solid: Solid) -> Iterator[Element]:
@@ -90,70 +88,58 @@ def _pictures(data: ReportData, solid: Solid) -> Iterator[Element]:
     )
     drawn, areas = slice_strip(slices, "x")
     yield illustration(drawn, "Slices along the guide, at one scale, in the same colours.")
-    if all(area is not None for _, area in areas):
-        unit = snapshot.design.unit_mm
-        yield table(
-            ("slice at", *(f"x = {format_number(x, 4)}" for x, _ in areas)),
-            [
-                ("area, units²", *(number(area or 0.0, 5) for _, area in areas)),
-                ("area, cm²", *(number((area or 0.0) * (0.1 * unit) ** 2, 5) for _, area in areas)),
-            ],
-            align="<" + ">" * len(areas),
-        )
+    known = [area for _, area in areas if area is not None]
+    if len(known) == len(areas):
+        square = (0.1 * data.unit_mm) ** 2
+        heads = ("slice at", *(f"x = {format_number(x, 4)}" for x, _ in areas))
+        rows = [
+            ("area, units²", *(number(area, 5) for area in known)),
+            ("area, cm²", *(number(area * square, 5) for area in known)),
+        ]
+        yield table(heads, rows, align="<" + ">" * len(areas))
 
 
 def _volumes(data: ReportData) -> Element:
-    centimetres = (0.1 * data.design.unit_mm) ** 3
-    rows: list[tuple[Cell, ...]] = []
+    nodes, hull, reachable = data.nodes, data.hull_volume, data.reachable
+    remarks: dict[str, Cell] = {}
+    is_exact = data.volume.error <= 1e-6 * data.volume.volume
+    remarks["volume"] = "exact" if is_exact else "to four digits"
+    if not isinstance(nodes, Missing):
+        steps = (" nodes at multiples of ", number(nodes.step), " units")
+        remarks["node_volume"] = (whole(nodes.count), *steps)
+    rows: list[Row] = []
 
-    def add(name: str, volume: float, *remark: Cell) -> None:
-        rows.append((name, volume, volume * centimetres, *(remark or ("",))))
+    def add(name: str, volume: float | None, remark: Cell) -> None:
+        cells = ("–", "–") if volume is None else (volume, volume * (0.1 * data.unit_mm) ** 3)
+        rows.append((name, *cells, remark))
 
-    exact = "exact" if data.volume.error <= 1e-6 * data.volume.volume else "to four digits"
-    add("exact volume", data.volume.volume, exact)
-    if isinstance(data.nodes, Missing):
-        rows.append(("node volume", "–", "–", data.nodes.reason))
+    for name, value in data.measured.values.items():
+        measure = CATALOGUE[name]
+        if measure.power == CATALOGUE["volume"].power:
+            remark = remarks.get(name) or measure.reason(data.case)
+            add(measure.heading, value, remark)
+    if isinstance(hull, Missing):
+        add("convex hull", None, hull.reason)
     else:
-        nodes = data.nodes
-        remark = (whole(nodes.count), " nodes at multiples of ", number(nodes.step), " units")
-        add("node volume", nodes.volume, remark)
-    if isinstance(data.hull_volume, Missing):
-        rows.append(("convex hull", "–", "–", data.hull_volume.reason))
-    else:
-        add("convex hull", data.hull_volume, "of the mesh")
-    reachable = data.reachable
+        add("convex hull", hull, "of the mesh")
     if reachable is not None and not isinstance(reachable, Missing):
-        remark = ("without a collision of legs",)
-        of, within = reachable.reachable_node_count, reachable.node_count
-        if of is not None and within is not None:
-            remark = (*remark, "; ", whole(of), " of ", whole(within), " nodes")
-        add("accessible", reachable.reachable_volume, remark)
+        count, within = reachable.reachable_node_count, reachable.node_count
+        share: tuple[Piece, ...] = ()
+        if count is not None and within is not None:
+            share = ("; ", whole(count), " of ", whole(within), " nodes")
+        name = CATALOGUE["reachable_volume"].heading
+        add(name, reachable.reachable_volume, ("without a collision of legs", *share))
     return table(("volume", "units³", "cm³", ""), rows, align="<>><", caption="Volumes")
 
 
 def _extent(data: ReportData) -> Element | None:
     if isinstance(data.nodes, Missing) or data.nodes.extent is None:
         return None
-    unit, (lows, highs) = data.design.unit_mm, data.nodes.extent
-    extents: list[tuple[Cell, ...]] = [
-        (
-            axis,
-            (number(low), " to ", number(high)),
-            (number(low * unit), " to ", number(high * unit)),
-        )
-        for axis, low, high in zip("xyz", lows, highs, strict=True)
+    rows = [
+        (axis, ends(low, high), ends(low * data.unit_mm, high * data.unit_mm))
+        for axis, low, high in zip("xyz", *data.nodes.extent, strict=True)
     ]
-    return table(
-        ("axis", "units", "mm"), extents, align="<>>", caption="Extent of the counted nodes"
-    )
-
-
-def _accessible(data: ReportData) -> Iterator[Element]:
-    if isinstance(data.reachable, Missing):
-        yield paragraph(
-            f"The accessible workspace cannot be computed: {data.reachable.reason}.",
-            class_="note",
-        )
+    return table(("axis", "units", "mm"), rows, align="<>>", caption="Extent of the counted nodes")
 
 
 def _bounding(solid: Solid) -> Element:
@@ -162,21 +148,16 @@ def _bounding(solid: Solid) -> Element:
     sides = (corners[:, 1:] - corners[:, :1]) / size
     areas = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
     shares = np.bincount(solid.limit_of_face, areas, len(solid.limits)) / areas.sum()
-    rows: list[tuple[Cell, ...]] = [
+    rows = [
         (name, (number(100.0 * share, 3), " %"))
         for share, name in sorted(zip(shares.tolist(), solid.limits, strict=True), reverse=True)
         if share > 0.0
     ]
-    return table(
-        ("bounded by", "share of the surface"), rows, align="<>", caption="Limits that bound it"
-    )
+    heads = ("bounded by", "share of the surface")
+    return table(heads, rows, align="<>", caption="Limits that bound it")
 
 
 def _gradient(data: ReportData) -> Element:
-    rows: list[tuple[Cell, ...]] = [(name, rate) for name, rate in data.volume.gradient.items()]
-    return table(
-        ("with", "units³ per unit; yaw per radian"),
-        rows,
-        align="<>",
-        caption="Gradient of the volume",
-    )
+    heads = ("with", "units³ per unit; yaw per radian")
+    rows = [*data.volume.gradient.items()]
+    return table(heads, rows, align="<>", caption="Gradient of the volume")

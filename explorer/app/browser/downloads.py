@@ -1,0 +1,128 @@
+"""Files sent to browsers, each to the one that asked and to no other.
+
+The worker makes files that need computing; a thread here waits for those that a browser draws.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import viser
+
+from explorer.app.session.jobs import Worker
+from explorer.app.session.session import Who
+from explorer.errors import ExplorerError
+
+# Number of browsers that are waited for at the same time.
+MOST_WAITED_FOR = 4
+
+File = tuple[str, bytes]
+"""The name of a file and its content."""
+
+
+class Downloads:
+    """Sends files, each to one browser.
+
+    Args:
+        server: Server of the browsers.
+        worker: Worker that makes files.
+        complain: Called with a message for people and the client it is for.
+    """
+
+    def __init__(
+        self, server: viser.ViserServer, worker: Worker, complain: Callable[[str, Who], None]
+    ) -> None:
+        self._server = server
+        self._worker = worker
+        self._complain = complain
+        self._threads = ThreadPoolExecutor(MOST_WAITED_FOR, thread_name_prefix="downloads")
+        self._lock = threading.Lock()
+        self._busy: set[int] = set()
+
+    def stop(self) -> None:
+        """Start no further file."""
+        self._threads.shutdown(wait=False, cancel_futures=True)
+
+    def send(self, who: Who, name: str, data: bytes) -> None:
+        """Send a file that is made already."""
+        client = self._client(who)
+        if client is not None:
+            client.send_file_download(name, data, save_immediately=True)
+
+    def compute(
+        self,
+        who: Who,
+        name: str,
+        task: Callable[..., bytes],
+        arguments: tuple[Any, ...],
+        notice: tuple[str, str] | None = None,
+    ) -> None:
+        """Send a file that the worker makes.
+
+        It replaces one of the same name that waits for the same browser.
+
+        Args:
+            who: The browser.
+            name: Name of the file.
+            task: A function of the worker.
+            arguments: Arguments of the task.
+            notice: Title and text that the browser shows meanwhile.
+        """
+        client = self._client(who)
+        if client is None:
+            return
+        notification = None
+        if notice is not None:
+            notification = client.add_notification(*notice, loading=True, with_close_button=False)
+
+        def done(data: bytes) -> None:
+            if notification is not None:
+                notification.remove()
+            client.send_file_download(name, data, save_immediately=True)
+
+        def failed(problem: str) -> None:
+            if notification is not None:
+                notification.remove()
+            self._complain(problem, who)
+
+        # A file that a notice announces is never replaced.
+        key = object() if notice is not None else ("download", who, name)
+        self._worker.submit(key, task, arguments, done, failed)
+
+    def make(self, who: Who, doing: str, make: Callable[[viser.ClientHandle], File]) -> None:
+        """Send a file made on a thread with the browser; each browser has one made at a time.
+
+        Args:
+            who: The browser.
+            doing: Title of the notice that the browser shows meanwhile.
+            make: Makes the file.
+        """
+        client = self._client(who)
+        if client is None:
+            return
+        with self._lock:
+            is_busy = client.client_id in self._busy
+            self._busy.add(client.client_id)
+        if is_busy:
+            self._complain("the last file is still being made; wait for it", who)
+            return
+
+        def work() -> None:
+            notice = client.add_notification(doing, "", loading=True, with_close_button=False)
+            try:
+                name, data = make(client)
+                client.send_file_download(name, data, save_immediately=True)
+            except ExplorerError as error:
+                self._complain(str(error), who)
+            finally:
+                notice.remove()
+                with self._lock:
+                    self._busy.discard(client.client_id)
+
+        self._threads.submit(work)
+
+    def _client(self, who: Who) -> viser.ClientHandle | None:
+        return self._server.get_clients().get(-1 if who is None else who)

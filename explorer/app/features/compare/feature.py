@@ -1,0 +1,17 @@
+"""Up to three pinned designs beside the live one."""
+
+from __future__ import annotations
+
+from explorer.app.features.compare.drawing import compared_drawing
+from explorer.app.features.compare.feed import CompareFeed
+from explorer.app.features.compare.panel import ComparePanel
+from explorer.app.features.compare.scene import ComparedScene
+from explorer.app.features.feature import Feature, Tab
+
+COMPARE = Feature(
+    "compare",
+    tabs=(Tab("drawer", "Compare", ComparePanel),),
+    scene=(ComparedScene,),
+    feeds=(CompareFeed,),
+    tasks=(compared_drawing,),
+)

@@ -1,0 +1,183 @@
+"""The user's saved designs, read and changed on a thread of their own.
+
+A slow or full disk thus does not hold up the mechanism. Other explorers may change the same
+folder, so it is checked again and again.
+"""
+
+from __future__ import annotations
+
+import itertools
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import viser
+
+from explorer.app.features.feature import Services
+from explorer.app.session.latest import LatestWins
+from explorer.app.session.session import Who
+from explorer.app.state.actions import MarkSaved, Open
+from explorer.app.storage.library import Deleted, Entry, copy_name
+from explorer.app.widgets.palette import Command
+from explorer.errors import ExplorerError, InputError
+from explorer.mechanism.design import Design
+from explorer.mechanism.design_file import PRESETS, decode_design
+
+# Seconds between two checks of the folder.
+CHECK_SECONDS = 1.0
+# Most saved designs that the palette offers, the last saved first; the panel lists all.
+MOST_COMMANDS = 200
+
+
+@dataclass(frozen=True)
+class _Request:
+    work: Callable[[], object]
+    who: Who
+
+
+class SavedDesigns:
+    """Carries out the page's requests to the library, one after the other.
+
+    Attributes:
+        entries: The saved designs, the last saved first.
+        commands: Those that open them.
+        deleted: What is in the trash, the last deleted first.
+    """
+
+    def __init__(self, services: Services) -> None:
+        if services.user_data is None:
+            raise RuntimeError("a page that keeps nothing has no library")
+        self._library = services.user_data.library
+        self._session = services.session
+        self._complain = services.complain
+        self._checked_at = 0.0
+        self._stamp: int | None = None
+        self.entries: tuple[Entry, ...] = ()
+        self.commands: tuple[Command, ...] = ()
+        self.deleted: tuple[Deleted, ...] = ()
+        self._requests: LatestWins[_Request] = LatestWins(self._do_all, "designs")
+        services.at_end(self.stop)
+        self.look()
+
+    def look(self) -> None:
+        """Request to read the folder again if it has changed; return at once."""
+        now = time.monotonic()
+        if now - self._checked_at < CHECK_SECONDS:
+            return
+        self._checked_at = now
+        stamp = self._folder_stamp()
+        if stamp != self._stamp:
+            self._stamp = stamp
+            self.refresh()
+
+    def refresh(self) -> None:
+        """Request to read the folder again."""
+        self._post("look", lambda: None, None)
+
+    def save(self, design: Design, who: Who = None) -> None:
+        """Save a design under its name; another one of that name goes to the trash."""
+
+        def work() -> None:
+            if design.name in PRESETS:
+                raise InputError(
+                    f"{design.name!r} is a preset and stays as it is; give yours another name"
+                )
+            self._mark_saved(self._library.save(design.name, design, replace=True))
+
+        self._post(object(), work, who)
+
+    def save_copy(self, design: Design, who: Who = None) -> None:
+        """Save the live design under a new name, which it takes itself."""
+        self._post(object(), lambda: self._mark_saved(self._copy(design)), who)
+
+    def rename(self, old: str, new: str, who: Who = None) -> None:
+        """Give a saved design another name."""
+
+        def work() -> None:
+            if old not in {entry.name for entry in self._library.list()}:
+                raise InputError("the design is not saved yet; save it before you rename it")
+            self._mark_saved(self._library.rename(old, new))
+
+        self._post(object(), work, who)
+
+    def open(self, name: str, who: Who = None) -> None:
+        """Open a saved design."""
+        self._post(object(), lambda: self._session.do(Open(self._library.open(name))), who)
+
+    def copy(self, design: Design, who: Who = None) -> None:
+        """Save a copy of a design under a new name; the live one stays as it is."""
+        self._post(object(), lambda: self._copy(design), who)
+
+    def duplicate(self, name: str, who: Who = None) -> None:
+        """Save a saved design again under a new name."""
+        self._post(object(), lambda: self._library.duplicate(name), who)
+
+    def delete(self, name: str, who: Who = None) -> None:
+        """Move a saved design to the trash."""
+        self._post(object(), lambda: self._library.delete(name), who)
+
+    def restore(self, who: Who = None) -> None:
+        """Restore the design that was deleted or replaced last."""
+
+        def work() -> None:
+            deleted = self._library.deleted()
+            if not deleted:
+                raise InputError("nothing has been deleted")
+            taken = {entry.name for entry in self._library.list()}
+            name = deleted[0].name
+            self._library.restore(
+                deleted[0].file, copy_name(name, taken) if name in taken else None
+            )
+
+        self._post(object(), work, who)
+
+    def take(self, data: bytes, name: str, who: Who = None) -> None:
+        """Open an uploaded design file."""
+        self._post(object(), lambda: self._session.do(Open(decode_design(data, name))), who)
+
+    def wait_until_idle(self, timeout: float = 10.0) -> bool:
+        """Wait until all requests are done; return whether they are."""
+        return self._requests.wait_until_idle(timeout)
+
+    def stop(self) -> None:
+        """End the thread."""
+        self._requests.stop()
+
+    def _copy(self, design: Design) -> Design:
+        taken = {entry.name for entry in self._library.list()} | set(PRESETS)
+        return self._library.save(copy_name(design.name, taken), design)
+
+    def _mark_saved(self, design: Design) -> None:
+        self._session.do(MarkSaved(design))
+
+    def _post(self, key: object, work: Callable[[], object], who: Who) -> None:
+        self._requests.post(key, time.monotonic(), _Request(work, who))
+
+    def _do_all(self, requests: Sequence[_Request]) -> None:
+        for request in requests:
+            try:
+                request.work()
+            except ExplorerError as error:
+                self._complain(str(error), request.who)
+        self._stamp = self._folder_stamp()
+        self.entries = self._library.list()
+        self.commands = tuple(itertools.islice(self._commands(), MOST_COMMANDS))
+        self.deleted = self._library.deleted()
+        self._session.redraw()
+
+    def _commands(self) -> Iterator[Command]:
+        """Yield the commands that open the saved designs, in their order."""
+        for entry in self.entries:
+            if entry.design is not None:
+                label = f"Designs › Open {entry.name}"
+                yield Command(label, "Open this saved design.", self._opens(entry.name))
+
+    def _opens(self, name: str) -> Callable[[viser.ClientHandle], None]:
+        return lambda client: self.open(name, client.client_id)
+
+    def _folder_stamp(self) -> int | None:
+        """Return the folder's time of change in ns; None if the folder cannot be read."""
+        try:
+            return self._library.folder.stat().st_mtime_ns
+        except OSError:
+            return None

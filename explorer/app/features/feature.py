@@ -1,0 +1,238 @@
+"""The declaration of a feature, and the services that the page offers to features.
+
+A feature is a folder beside this module. It declares all that it adds to the page in one
+`Feature`, which stands in the list of `explorer.app.features.listed`.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal, Protocol, TypeVar
+
+import viser
+
+from explorer.app.browser.downloads import Downloads
+from explorer.app.browser.viser_gaps import panel_in
+from explorer.app.scene.part import ScenePart
+from explorer.app.session.faults import Faults
+from explorer.app.session.jobs import Worker
+from explorer.app.session.session import Session, Who
+from explorer.app.state.action import Action
+from explorer.app.state.frame import Frame
+from explorer.app.state.state import State
+from explorer.app.storage.preferences import PreferenceFile
+from explorer.app.storage.study_folders import StudyFolders
+from explorer.app.storage.user_data import UserData
+from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.buttons import Buttons
+from explorer.app.widgets.commands import Key
+from explorer.app.widgets.palette import Command
+from explorer.app.widgets.theme import Theme
+from explorer.errors import StorageError
+
+Place = Literal["top", "main", "side", "drawer"]
+Shared = TypeVar("Shared")
+
+# Heights of the open drawer, in pixels.
+DRAWER_HEIGHT, TALL_DRAWER = 300, 540
+
+
+@dataclass
+class Services:
+    """The services that the page offers to its features.
+
+    Attributes:
+        server: Server of the scene and the controls.
+        session: Session to which changes are posted.
+        worker: Process for long computations.
+        buttons: Buttons in the markup of the page.
+        downloads: Sender of files to browsers.
+        complain: Function that shows a problem to one client, or to all for None.
+        tell: Function that shows a message to all clients.
+        theme: Theme of the page, light or dark.
+        drawer: Panel over the foot of the scene.
+        user_data: The user's designs and session; None to save nothing.
+        studies: Folders of design studies; None to offer none.
+        preferences: File that remembers theme and tour; None to remember nothing.
+        commands: Function that returns the commands of the palette.
+        tab: Tab whose panels are being made.
+    """
+
+    server: viser.ViserServer
+    session: Session
+    worker: Worker
+    buttons: Buttons
+    downloads: Downloads
+    complain: Callable[[str, Who], None]
+    tell: Callable[[str], None]
+    theme: Theme
+    drawer: viser.PanelHandle
+    user_data: UserData | None
+    studies: StudyFolders | None
+    preferences: PreferenceFile | None
+    commands: Callable[[], tuple[Command, ...]] = tuple
+    tab: viser.GuiTabHandle | None = None
+    _shared: dict[object, Any] = field(default_factory=dict[object, Any])
+    _ends: list[Callable[[], None]] = field(default_factory=list[Callable[[], None]])
+
+    @property
+    def gui(self) -> viser.GuiApi:
+        """The API that adds controls."""
+        return self.server.gui
+
+    @property
+    def scene(self) -> viser.SceneApi:
+        """The API that adds parts of the scene."""
+        return self.server.scene
+
+    @property
+    def faults(self) -> Faults | None:
+        """The record of requests that failed unexpectedly; None to keep none."""
+        return None if self.user_data is None else self.user_data.faults
+
+    def get(self, kind: Callable[[Services], Shared]) -> Shared:
+        """Return the one object of a class that the features share, made at the first call."""
+        if kind not in self._shared:
+            self._shared[kind] = kind(self)
+        return self._shared[kind]
+
+    def at_end(self, stop: Callable[[], None]) -> None:
+        """Register a function that is called when the page ends."""
+        self._ends.append(stop)
+
+    def stop(self) -> None:
+        """Call the functions registered with `at_end`, the last one first."""
+        while self._ends:
+            self._ends.pop()()
+
+    def remember(
+        self, who: Who, *, dark: bool | None = None, tour_seen: bool | None = None
+    ) -> None:
+        """Remember a preference of the user, if preferences are kept."""
+        if self.preferences is None:
+            return
+        try:
+            self.preferences.choose(dark=dark, tour_seen=tour_seen)
+        except StorageError as error:
+            self.complain(str(error), who)
+
+    def resize_drawer(self, client: viser.ClientHandle, *, tall: bool) -> None:
+        """Make the drawer tall in a browser, or as low as it is at first."""
+        panel_in(client, self.drawer).set_height(TALL_DRAWER if tall else DRAWER_HEIGHT)
+
+
+class Panel(Protocol):
+    """The content of a tab, or a part of it."""
+
+    def updates(self, frame: Frame, /) -> Iterator[Update]:
+        """Yield the updates that make the panel show the frame."""
+        ...
+
+
+class Feed(Protocol):
+    """Requests drawings from the worker, before the frame is drawn."""
+
+    def follow(self, frame: Frame) -> None:
+        """Request what a frame needs, unless it is requested already."""
+        ...
+
+
+class Runner(ABC):
+    """Does long work that the state requests, after the frame is drawn."""
+
+    @abstractmethod
+    def follow(self, frame: Frame) -> None:
+        """Begin or end the work that a frame requests."""
+
+    def prepare(self) -> None:
+        """Start the process that the work will need, in the background."""
+        return
+
+    def wait_until_idle(self, timeout: float) -> bool:  # noqa: ARG002 - some begin no work
+        """Wait until the work that leads to a new frame is done; say whether it is."""
+        return True
+
+
+@dataclass(frozen=True)
+class Tab:
+    """A panel in a tab of the page.
+
+    Attributes:
+        place: Place of the tab: "main" is the panel on the right, "side" that on the left, "drawer"
+            that over the foot of the scene; "top" is the part above all tabs on the right.
+        title: Title of the tab; several panels may share one, in their order.
+        panel: Function that makes the panel.
+    """
+
+    place: Place
+    title: str
+    panel: Callable[[Services], Panel]
+
+
+@dataclass(frozen=True)
+class StateCommand:
+    """A command that changes the state and has no control.
+
+    Attributes:
+        label: Name in the palette.
+        does: Sentence on what it does.
+        change: Function from the state to the action.
+        is_ready: Function that tells whether a state allows it.
+    """
+
+    label: str
+    does: str
+    change: Callable[[State], Action]
+    is_ready: Callable[[State], bool] = lambda _: True
+
+    def of(self, session: Session) -> Command:
+        """Return the command for a session."""
+
+        def run(client: viser.ClientHandle) -> None:
+            session.post(object(), self.change, who=client.client_id)
+
+        return Command(self.label, self.does, run, lambda: self.is_ready(session.state))
+
+
+def _always(_: Services) -> bool:
+    return True
+
+
+@dataclass(frozen=True)
+class Feature:
+    """All that a feature adds to the page.
+
+    Its actions and its part of the state need no entry: actions bring their own words, and its part
+    of the state is saved, undone and compared with the rest.
+
+    Attributes:
+        name: Name of its folder.
+        tabs: Its panels, in their order.
+        scene: Classes of its parts of the scene.
+        feeds: Classes that request drawings from the worker.
+        runners: Classes that do long work.
+        tasks: Functions that the worker calls; it imports them when it starts.
+        commands: Commands that have no control.
+        passing: Function that returns the commands that come and go, such as those that open a
+            saved design; the same object while they stay.
+        keys: Keys by the names of commands.
+        lists: Labels of the lists whose every option is a command.
+        floor: Function that returns the lowest height, in design units, of what is drawn in place
+            of the schematic mechanism; None while that is drawn itself.
+        is_offered: Function that tells whether the page has the feature.
+    """
+
+    name: str
+    tabs: tuple[Tab, ...] = ()
+    scene: tuple[Callable[[Services], ScenePart], ...] = ()
+    feeds: tuple[Callable[[Services], Feed], ...] = ()
+    runners: tuple[Callable[[Services], Runner], ...] = ()
+    tasks: tuple[Callable[..., object], ...] = ()
+    commands: tuple[StateCommand, ...] = ()
+    passing: Callable[[Services], tuple[Command, ...]] | None = None
+    keys: Mapping[str, tuple[Key, ...]] = field(default_factory=dict[str, tuple[Key, ...]])
+    lists: tuple[str, ...] = ()
+    floor: Callable[[Services], float | None] | None = None
+    is_offered: Callable[[Services], bool] = _always

@@ -1,0 +1,44 @@
+"""The mechanism: its pose, its design, and how it is drawn."""
+
+from __future__ import annotations
+
+from explorer.app.features.feature import Feature, StateCommand, Tab
+from explorer.app.features.mechanism.bodies import Bodies
+from explorer.app.features.mechanism.design_panel import DesignPanel
+from explorer.app.features.mechanism.flags import Flags
+from explorer.app.features.mechanism.legs import Legs, TwinLegs
+from explorer.app.features.mechanism.marks import DragHandle, Ghosts, Labels
+from explorer.app.features.mechanism.pose_panel import MovePanel
+from explorer.app.features.mechanism.tetrahedra import Tetrahedra
+from explorer.app.state.actions import SetMode
+from explorer.app.widgets.commands import Key, shift
+
+# Number of sign triples of the three margins.
+MODE_COUNT = 8
+
+MECHANISM = Feature(
+    "mechanism",
+    tabs=(Tab("main", "Move", MovePanel), Tab("main", "Design", DesignPanel)),
+    # Bodies come first: they make the platform's frame, to which others attach.
+    scene=(Bodies, Flags, Legs, TwinLegs, Tetrahedra, Labels, Ghosts, DragHandle),
+    commands=(
+        StateCommand(
+            "Move › Next assembly mode",
+            "Assemble the same leg lengths in the next of the eight ways.",
+            lambda state: SetMode((state.mode + 1) % MODE_COUNT),
+        ),
+        StateCommand(
+            "Move › Previous assembly mode",
+            "Assemble the same leg lengths in the previous of the eight ways.",
+            lambda state: SetMode((state.mode - 1) % MODE_COUNT),
+        ),
+    ),
+    keys={
+        "Move › Home pose": (Key("H"),),
+        "Move › Next assembly mode": (Key("N"),),
+        "Move › Previous assembly mode": (shift("N"),),
+        "Move › Use the nearest length": (Key("U"),),
+        "Move › Other modes as ghosts": (Key("M"),),
+    },
+    lists=("δ1 δ2 δ3", "Preset", "On a change"),
+)

@@ -1,0 +1,18 @@
+"""The optimiser: its problem, the search and the result."""
+
+from __future__ import annotations
+
+from explorer.app.features.feature import Feature, Tab
+from explorer.app.features.optimise.panel import OptimisePanel
+from explorer.app.features.optimise.runner import Optimiser
+from explorer.app.features.optimise.scene import RequiredBox
+from explorer.app.widgets.commands import Key, shift
+
+OPTIMISE = Feature(
+    "optimise",
+    tabs=(Tab("main", "Optimise", OptimisePanel),),
+    scene=(RequiredBox,),
+    runners=(Optimiser,),
+    keys={"Optimise › Optimise": (Key("O"),), "Optimise › Cancel": (shift("O"),)},
+    lists=("Objective",),
+)

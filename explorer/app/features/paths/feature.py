@@ -1,0 +1,30 @@
+"""Paths: between assembly modes, and planned without a singularity."""
+
+from __future__ import annotations
+
+from explorer.app.features.feature import Feature, StateCommand, Tab
+from explorer.app.features.paths.actions import Play
+from explorer.app.features.paths.panel import PathsPanel
+from explorer.app.features.paths.runner import PathRunner
+from explorer.app.features.paths.scene import PathScene
+from explorer.app.widgets.commands import Key, shift
+
+PATHS = Feature(
+    "paths",
+    tabs=(Tab("side", "Paths", PathsPanel),),
+    scene=(PathScene,),
+    runners=(PathRunner,),
+    commands=(
+        StateCommand(
+            "Paths › Play or pause",
+            "Play the present path, or pause it.",
+            lambda state: Play(state.journey is None or not state.journey.is_playing),
+            lambda state: state.journey is not None,
+        ),
+    ),
+    keys={
+        "Paths › Watch": (shift("M"),),
+        "Paths › Plan": (Key("J"),),
+        "Paths › Play or pause": (Key("P"),),
+    },
+)

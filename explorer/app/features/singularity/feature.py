@@ -1,0 +1,28 @@
+"""The proximity to singularities, and the motions that change one margin alone."""
+
+from __future__ import annotations
+
+from explorer.app.features.feature import Feature, StateCommand, Tab
+from explorer.app.features.singularity.actions import GoToSingularity
+from explorer.app.features.singularity.feed import StrataFeed
+from explorer.app.features.singularity.jog_panel import JogPanel
+from explorer.app.features.singularity.jog_scene import JogScene
+from explorer.app.features.singularity.panel import SingularityPanel
+from explorer.app.features.singularity.scene import BallScene, EllipsoidScene, NearestGhost
+from explorer.app.widgets.commands import shift
+
+SINGULARITY = Feature(
+    "singularity",
+    tabs=(Tab("main", "Move", JogPanel), Tab("side", "Singularity", SingularityPanel)),
+    scene=(NearestGhost, EllipsoidScene, BallScene, JogScene),
+    feeds=(StrataFeed,),
+    commands=(
+        StateCommand(
+            "Singularity › Go to the nearest one",
+            "Move the mechanism to the closest of the nearest poses of δ1, δ2 and δ3.",
+            lambda _: GoToSingularity(None),
+        ),
+    ),
+    keys={"Singularity › Go to the nearest one": (shift("G"),)},
+    lists=("Arrows", "Ghost", "Ellipsoid"),
+)

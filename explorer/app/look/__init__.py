@@ -1,0 +1,32 @@
+"""The look of the page and its behaviour in a browser: one stylesheet, and scripts.
+
+A script sets `window.explorer.NAME` once, even if the page connects again. Where that is a
+function, its arguments are values from the server.
+"""
+
+from __future__ import annotations
+
+import msgspec
+
+from explorer.files.packaged import packaged_file
+
+FOLDER = "app/look"
+
+
+def read_script(name: str, *arguments: object) -> str:
+    """Return a script of this folder, with a call of its function if there are arguments.
+
+    Args:
+        name: The script's name without the suffix.
+        arguments: Values of JSON for the function that the script sets.
+    """
+    source = packaged_file(FOLDER, f"{name}.js").read_text("utf-8")
+    if not arguments:
+        return source
+    values = ", ".join(msgspec.json.encode(each).decode() for each in arguments)
+    return f"{source}window.explorer.{name}({values});\n"
+
+
+def read_stylesheet() -> str:
+    """Return the script that puts the stylesheet into a page, in place of an older one."""
+    return read_script("style", packaged_file(FOLDER, "page.css").read_text("utf-8"))

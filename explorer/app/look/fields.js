@@ -1,0 +1,274 @@
+window.explorer ??= {};
+
+// Lets number fields take a value only when it is complete, lets lines of text be emptied and typed
+// again, and sends keys where a user expects them.
+window.explorer.fields ??= (() => {
+  const PAUSE = 700;
+  const write = Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value").set;
+  const isField = (it) => it instanceof HTMLInputElement && it.inputMode === "decimal";
+  // The field that is typed into, what it held at first, and what the page last knew of.
+  let typing = null;
+  const numberIn = (text) => {
+    // Full-width characters, as from an input method of East Asia, count too.
+    const plain = text
+      .normalize("NFKC")
+      .trim()
+      .replace(/^\u2212/, "-")
+      .replace(/^([^.,]*),([^.,]*)$/, "$1.$2");
+    const value = /^[-+]?(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$/i.test(plain) ? Number(plain) : NaN;
+    return Math.abs(value) <= Number.MAX_SAFE_INTEGER ? value : null;
+  };
+  // The page's number fields take no exponents.
+  const written = (value) =>
+    value.toLocaleString("en", { useGrouping: false, maximumFractionDigits: 20 });
+  // The page's fields infer the typed text from the caret: here, all of it was replaced.
+  const tell = (field, from, to) => {
+    write.call(field, from);
+    field.setSelectionRange(0, from.length);
+    field.dispatchEvent(new KeyboardEvent("keydown", { key: "Unidentified", bubbles: true }));
+    write.call(field, to);
+    field.setSelectionRange(to.length, to.length);
+    field.dispatchEvent(new Event("input", { bubbles: true }));
+  };
+  const enter = () => {
+    const { field, before } = typing,
+      value = numberIn(field.value);
+    if (value === null) {
+      giveUp();
+      return;
+    }
+    clearTimeout(typing.pause);
+    typing.isPending = false;
+    typing.before = written(value);
+    typing.isTelling = true;
+    tell(field, before, typing.before);
+    typing.isTelling = false;
+  };
+  // The page writes its own number whenever it redraws the field, even while a user types.
+  const hold = () => {
+    const { field, text, chosen } = typing;
+    if (field.value === text) return;
+    if (typing.first === typing.before) typing.first = field.value;
+    typing.before = field.value;
+    write.call(field, text);
+    field.setSelectionRange(...chosen);
+  };
+  const choose = () => {
+    typing.chosen = [typing.field.selectionStart, typing.field.selectionEnd];
+  };
+  const watch = () => {
+    if (!typing || !typing.isPending) return;
+    hold();
+    requestAnimationFrame(watch);
+  };
+  const finish = () => {
+    hold();
+    enter();
+  };
+  const rest = () => {
+    hold();
+    // A number that may be unfinished, such as 0.0 on the way to 0.05, is not entered.
+    const value = numberIn(typing.field.value);
+    if (value !== null && written(value) === typing.field.value) enter();
+  };
+  const wait = () => {
+    clearTimeout(typing.pause);
+    typing.pause = setTimeout(rest, PAUSE);
+  };
+  const giveUp = () => {
+    clearTimeout(typing.pause);
+    typing.isPending = false;
+    write.call(typing.field, typing.before);
+  };
+  // viser ignores keys pressed in fields.
+  const tellAll = ({ key, code, ctrlKey, metaKey, shiftKey }) => {
+    const init = { key, code, ctrlKey, metaKey, shiftKey, bubbles: true };
+    document.documentElement.dispatchEvent(new KeyboardEvent("keydown", init));
+  };
+  // A field takes the focus back with its next number if its page is not told of the focusout.
+  const leave = (field) => {
+    field.focus = field.setSelectionRange = () => {};
+  };
+  const comeBack = (field) => {
+    delete field.focus;
+    delete field.setSelectionRange;
+  };
+  const begun = (field) => ({ field, first: field.value, before: field.value });
+  addEventListener(
+    "focusin",
+    ({ target }) => {
+      if (isField(target)) comeBack(target);
+      typing = isField(target) ? begun(target) : null;
+    },
+    true,
+  );
+  addEventListener(
+    "input",
+    (event) => {
+      if (!isField(event.target)) return;
+      if (!typing || typing.field !== event.target) {
+        typing = begun(event.target);
+      }
+      if (typing.isTelling) return;
+      event.stopPropagation();
+      wait();
+      // Nothing may be written into the field while an input method composes text.
+      if (event.isComposing) clearTimeout(typing.pause);
+      typing.text = typing.field.value;
+      choose();
+      if (!typing.isPending) requestAnimationFrame(watch);
+      typing.isPending = typing.isEdited = true;
+    },
+    true,
+  );
+  // The page would turn every comma into a point and report the number itself.
+  addEventListener(
+    "paste",
+    (event) => {
+      if (isField(event.target)) event.stopPropagation();
+    },
+    true,
+  );
+  addEventListener(
+    "beforeinput",
+    (event) => {
+      const { target, inputType } = event;
+      if (!isField(target)) return;
+      // The browser does not know what scripts wrote into its fields, and would undo wrongly.
+      if (inputType.startsWith("history")) event.preventDefault();
+      // The explorer may have written another number since.
+      if (typing && typing.field === target && !typing.isPending) typing.before = target.value;
+    },
+    true,
+  );
+  addEventListener(
+    "compositionend",
+    ({ target }) => {
+      if (typing && typing.field === target && typing.isPending) wait();
+    },
+    true,
+  );
+  document.addEventListener("selectionchange", () => {
+    if (typing && typing.isPending && typing.field.value === typing.text) choose();
+  });
+  addEventListener(
+    "keydown",
+    (event) => {
+      const { target, key } = event;
+      if (!typing || typing.field !== target || typing.isTelling || event.isComposing) return;
+      if (typing.isPending) hold();
+      if ((event.ctrlKey || event.metaKey) && /^[zy]$/i.test(key)) {
+        event.preventDefault();
+        event.stopPropagation();
+        if (typing.isPending) giveUp();
+        else tellAll(event);
+        return;
+      }
+      if (typing.isEdited && key === "Escape") {
+        write.call(target, typing.first);
+        enter();
+      }
+      if (typing.isPending && ["Enter", "Tab", "ArrowUp", "ArrowDown"].includes(key)) enter();
+      if (key === "Enter") {
+        event.stopPropagation();
+        target.blur();
+        return;
+      }
+      // The page's field would act on a text that it does not know.
+      const isTyped = key.length === 1 && !event.ctrlKey && !event.metaKey;
+      if (isTyped || ["Backspace", "Delete", "ArrowLeft", "ArrowRight"].includes(key)) {
+        event.stopPropagation();
+      }
+    },
+    true,
+  );
+  // This runs before the field loses the focus, since a field that gets a number takes it back.
+  addEventListener(
+    "pointerdown",
+    ({ target }) => {
+      if (typing && typing.isPending && typing.field !== target) finish();
+      // The arrows of a field need its focus.
+      const field = target.closest?.(".mantine-NumberInput-root")?.querySelector("input");
+      if (field) comeBack(field);
+    },
+    true,
+  );
+  addEventListener(
+    "change",
+    (event) => {
+      if (!typing || typing.field !== event.target || !typing.isPending) return;
+      event.stopPropagation();
+      finish();
+    },
+    true,
+  );
+  addEventListener(
+    "focusout",
+    (event) => {
+      if (!typing || typing.field !== event.target) return;
+      if (typing.isPending) finish();
+      // The page would clamp the number to the range, although the range is about to follow it.
+      if (typing.isEdited) {
+        event.stopPropagation();
+        leave(typing.field);
+      }
+      typing = null;
+    },
+    true,
+  );
+
+  // A line of text reports no change while it is empty or ends with a blank: more is being typed.
+  let line = null;
+  const isLine = (it) => it instanceof HTMLInputElement && !!it.closest(".mantine-TextInput-root");
+  addEventListener(
+    "focusin",
+    ({ target }) => {
+      line = isLine(target) ? { field: target, before: target.value } : null;
+    },
+    true,
+  );
+  addEventListener(
+    "input",
+    (event) => {
+      if (line && line.field === event.target && !/\S$/.test(line.field.value)) {
+        event.stopPropagation();
+      }
+    },
+    true,
+  );
+  addEventListener(
+    "keydown",
+    (event) => {
+      if (event.key !== "Enter" || event.isComposing || !isLine(event.target)) return;
+      event.stopPropagation();
+      event.target.blur();
+    },
+    true,
+  );
+  addEventListener(
+    "focusout",
+    ({ target }) => {
+      if (!line || line.field !== target) return;
+      const text = target.value.trim() || line.before;
+      line = null;
+      if (text === target.value) return;
+      write.call(target, text);
+      target.dispatchEvent(new Event("input", { bubbles: true }));
+    },
+    true,
+  );
+
+  // A checkbox or option that was clicked would keep all keys to itself, so it loses the focus; one
+  // that was chosen with the keyboard keeps it.
+  document.addEventListener("click", ({ detail, target }) => {
+    if (!detail || !target.closest("input[type=checkbox], [role=option]")) return;
+    setTimeout(() => document.activeElement?.blur());
+  });
+
+  // This listener runs after the page's own and before viser's, which turns the camera.
+  document.body.addEventListener("keydown", (event) => {
+    const isOnSlider = event.target.closest?.(".mantine-Slider-root");
+    if (isOnSlider && event.key.startsWith("Arrow")) event.stopPropagation();
+  });
+  return true;
+})();

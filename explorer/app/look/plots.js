@@ -1,0 +1,87 @@
+window.explorer ??= {};
+
+// Reports brushes and picks in the plots of studies as presses of "studies.plot".
+window.explorer.plots ??= (() => {
+  const tell = (plot, event) => {
+    const line = JSON.stringify({ study: plot.layout.meta.study, ...event });
+    window.explorer.press("studies.plot", line);
+  };
+  const ordered = ([a, b]) => (a <= b ? [a, b] : [b, a]);
+  const rangesOf = ({ constraintrange: given }) =>
+    !given || !given.length ? [] : Array.isArray(given[0]) ? given : [given];
+  // Row of the line within all brushes that passes nearest to a point of the window; null if none.
+  const lineAt = (plot, x, y) => {
+    const brushes = plot.querySelectorAll(".axis-brush .background");
+    const axes = plot._fullData[0].dimensions.map((dimension, k) => {
+      const {
+          values,
+          range: [low, high],
+        } = dimension,
+        ranges = rangesOf(dimension);
+      const box = brushes[k].getBoundingClientRect();
+      const at = (row) => box.bottom - (box.height * (values[row] - low)) / (high - low);
+      const isIn = (row) =>
+        !ranges.length || ranges.some(([a, b]) => values[row] >= a && values[row] <= b);
+      return { at, isIn, x: box.x + box.width / 2 };
+    });
+    const inOrder = axes.toSorted((a, b) => a.x - b.x);
+    const next = inOrder.findIndex((axis) => axis.x >= x);
+    if (next < 1) return null;
+    const [from, to] = [inOrder[next - 1], inOrder[next]];
+    let nearest = null,
+      least = 6;
+    plot.layout.meta.designs.forEach((_, row) => {
+      const start = from.at(row),
+        rise = to.at(row) - start,
+        run = to.x - from.x;
+      const above = start + (rise * (x - from.x)) / run - y;
+      const away = Math.abs(above) * (run / Math.hypot(run, rise));
+      if (away < least && axes.every((axis) => axis.isIn(row))) [nearest, least] = [row, away];
+    });
+    return nearest;
+  };
+  const listen = {
+    scatter(plot) {
+      plot.on("plotly_click", ({ points }) => {
+        const index = Number(points[points.length - 1].customdata);
+        if (Number.isInteger(index)) tell(plot, { do: "pick", index });
+      });
+      plot.on("plotly_selected", (event) => {
+        if (!event || !event.range) return;
+        const box = [ordered(event.range.x), ordered(event.range.y)];
+        tell(plot, { do: "box", axes: plot.layout.meta.axes, box });
+      });
+      plot.on("plotly_deselect", () =>
+        tell(plot, { do: "box", axes: plot.layout.meta.axes, box: null }),
+      );
+    },
+    parallel(plot) {
+      let pressed = null;
+      plot.addEventListener("mousedown", (e) => (pressed = [e.clientX, e.clientY]), true);
+      plot.addEventListener("click", (e) => {
+        if (!e.target.classList.contains("gl-canvas") || !pressed) return;
+        if (Math.hypot(e.clientX - pressed[0], e.clientY - pressed[1]) > 4) return;
+        const row = lineAt(plot, e.clientX, e.clientY);
+        if (row !== null) tell(plot, { do: "pick", index: plot.layout.meta.designs[row] });
+      });
+      plot.on("plotly_restyle", ([changes]) => {
+        for (const key of Object.keys(changes)) {
+          const found = key.match(/^dimensions\[(\d+)\]\.constraintrange$/);
+          if (!found) continue;
+          const dimension = plot.data[0].dimensions[Number(found[1])];
+          const ranges = rangesOf(dimension).map((each) => ordered(Array.from(each)));
+          tell(plot, { do: "brush", axis: dimension.name, ranges });
+        }
+      });
+    },
+  };
+  // Plots come and go with their tab, and searching the page for them is cheap.
+  return setInterval(() => {
+    for (const plot of document.querySelectorAll(".js-plotly-plot")) {
+      const meta = plot.layout && plot.layout.meta;
+      if (plot.explorerListens || !meta || !listen[meta.explorer] || !plot.on) continue;
+      plot.explorerListens = true;
+      listen[meta.explorer](plot);
+    }
+  }, 150);
+})();

@@ -1,0 +1,86 @@
+"""A thread that handles what is posted to it, the newest item of each key only.
+
+viser runs callbacks at the same time and in no order, so none of them computes. They post to one
+thread, which handles all that waits in one go.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Sequence
+from typing import Generic, TypeVar
+
+Item = TypeVar("Item")
+
+
+class LatestWins(Generic[Item]):
+    """A thread that handles what is posted, the newest item of each key only.
+
+    Args:
+        handle: Called with all items that wait, in the order of their stamps. An exception
+            from it ends the thread, so it must not raise any.
+        name: Name of the thread.
+    """
+
+    def __init__(self, handle: Callable[[Sequence[Item]], None], name: str) -> None:
+        self._handle = handle
+        self._waiting: dict[object, tuple[float, Item]] = {}
+        self._condition = threading.Condition()
+        self._busy = False
+        self._stopped = False
+        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+        self._thread.start()
+
+    def post(self, key: object, stamp: float, item: Item) -> None:
+        """Queue an item, in place of one with the same key that waits.
+
+        Args:
+            key: Key of the item; events of one slider share it.
+            stamp: Time of its event. An item older than the waiting one is dropped.
+            item: The item.
+        """
+        with self._condition:
+            waiting = self._waiting.get(key)
+            if waiting is None or waiting[0] <= stamp:
+                self._waiting[key] = (stamp, item)
+                self._condition.notify_all()
+
+    def is_waiting(self, key: object) -> bool:
+        """Whether an item with this key waits."""
+        with self._condition:
+            return key in self._waiting
+
+    @property
+    def waiting(self) -> int:
+        """Number of items that wait."""
+        with self._condition:
+            return len(self._waiting)
+
+    def wait_until_idle(self, timeout: float) -> bool:
+        """Wait until no item waits and none is handled; return whether that is so."""
+        with self._condition:
+            return self._condition.wait_for(
+                lambda: not self._waiting and not self._busy, timeout=timeout
+            )
+
+    def stop(self) -> None:
+        """Drop the items that wait and end the thread."""
+        with self._condition:
+            self._stopped = True
+            self._waiting.clear()
+            self._condition.notify_all()
+        if threading.current_thread() is not self._thread:
+            self._thread.join(timeout=5.0)
+
+    def _run(self) -> None:
+        while True:
+            with self._condition:
+                self._busy = False
+                self._condition.notify_all()
+                self._condition.wait_for(lambda: self._waiting or self._stopped)
+                if self._stopped:
+                    return
+                items = [item for _, item in sorted(self._waiting.values(), key=lambda w: w[0])]
+                self._waiting.clear()
+                self._busy = True
+            self._handle(items)

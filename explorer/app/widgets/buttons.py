@@ -1,0 +1,176 @@
+"""Buttons in the page's own markup: HTML, and functions that handle presses, by name.
+
+viser's HTML reports no clicks. A script of the page sends each press on an element with
+`data-press` to one hidden text control, through the guard for all messages of clients. It is
+decoded strictly here; presses on names that are not registered are dropped.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Container
+from concurrent.futures import Future, ThreadPoolExecutor
+from html import escape
+from typing import Annotated
+
+import msgspec
+import viser
+
+from explorer.app.browser.viser_gaps import element_id, run_script
+from explorer.app.look import read_script
+from explorer.app.security.client_messages import decode_text
+from explorer.app.widgets.palette import Command
+
+LONGEST_VALUE = 4000
+# JSON escapes make a value longer.
+LONGEST_TEXT = 4 * LONGEST_VALUE
+
+Does = Callable[[str, viser.ClientHandle], None]
+"""Handles a press with the value of its button, for the client that pressed."""
+
+
+class _Press(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A press as the script sends it.
+
+    Attributes:
+        name: Name of the button.
+        value: Value of the button; "" without one.
+        count: Another number for each press, so that the text differs.
+    """
+
+    name: Annotated[str, msgspec.Meta(max_length=100)]
+    value: Annotated[str, msgspec.Meta(max_length=LONGEST_VALUE)]
+    count: Annotated[int, msgspec.Meta(ge=0, le=2**53)]
+
+
+_DECODER = msgspec.json.Decoder(_Press)
+
+
+class Buttons:
+    """The buttons in the markup of one page.
+
+    Args:
+        server: The server whose browsers show the page.
+    """
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        self._registered: dict[str, tuple[Does, Container[str] | None]] = {}
+        self._commands: list[Command] = []
+        # Handles presses one after the other, in their order.
+        self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="buttons")
+        self.inbox = server.gui.add_text("Presses on markup", "", visible=False)
+
+        # A coroutine runs on the thread that reads messages, while the text is that of this event.
+        @self.inbox.on_update
+        async def _(event: viser.GuiEvent[viser.GuiTextHandle]) -> None:
+            if event.client is not None:
+                self.receive(event.target.value, event.client)
+
+        run_script(server, read_script("buttons", element_id(self.inbox)))
+
+    @property
+    def commands(self) -> tuple[Command, ...]:
+        """The commands that press a button, for the palette."""
+        return tuple(self._commands)
+
+    def on(self, name: str, does: Does, *, values: Container[str] | None = None) -> None:
+        """Register the function that handles presses on the buttons with a name.
+
+        Args:
+            name: The name, unique in the page, such as "compare.open".
+            does: The function that handles a press.
+            values: The values that a press may have; any if None.
+
+        Raises:
+            ValueError: the name is registered.
+        """
+        if name in self._registered:
+            raise ValueError(f"two buttons are called {name!r}")
+        self._registered[name] = does, values
+
+    def offer(
+        self,
+        label: str,
+        hint: str,
+        name: str,
+        value: str = "",
+        is_ready: Callable[[], bool] = lambda: True,
+    ) -> None:
+        """Offer a press in the palette.
+
+        Args:
+            label: The name of the command, from the tab to the option.
+            hint: Sentence on what it does.
+            name: The name of the button.
+            value: The value of the button.
+            is_ready: Function that tells whether it can be pressed now.
+        """
+        self._commands.append(
+            Command(label, hint, lambda client: self.press(name, value, client), is_ready)
+        )
+
+    def receive(self, text: str, client: viser.ClientHandle) -> None:
+        """Queue a press that a page sent; drop a text that describes none."""
+        press = _decode_press(text)
+        if press is not None:
+            # A page that is being closed takes no more presses.
+            with contextlib.suppress(RuntimeError):
+                handled = self._thread.submit(self.press, press.name, press.value, client)
+                handled.add_done_callback(_raise_failure)
+
+    def press(self, name: str, value: str, client: viser.ClientHandle) -> None:
+        """Handle a press on the button with a name and a value; do nothing if there is none."""
+        does, values = self._registered.get(name, (None, None))
+        if does is not None and (values is None or value in values):
+            does(value, client)
+
+    def stop(self) -> None:
+        """End the thread on which presses are handled."""
+        self._thread.shutdown(wait=False, cancel_futures=True)
+
+
+def _raise_failure(handled: Future[None]) -> None:
+    """Raise the exception of handling a press, so that it is logged with its trace."""
+    if not handled.cancelled():
+        handled.result()
+
+
+def _decode_press(text: str) -> _Press | None:
+    """Return the press that a text describes; None if the script did not write the text."""
+    return decode_text(text, _DECODER) if len(text) <= LONGEST_TEXT else None
+
+
+def press_button(
+    name: str,
+    value: str | int,
+    content: str,
+    *,
+    hint: str = "",
+    label: str = "",
+    class_name: str = "",
+    is_on: bool | None = None,
+    is_disabled: bool = False,
+) -> str:
+    """Return a button as HTML, whose presses go to the function registered under a name.
+
+    Args:
+        name: The name that was given to `Buttons.on`.
+        value: The value that its function receives.
+        content: The visible content, HTML.
+        hint: Words on what a press does, shown when a pointer rests on the button.
+        label: The name for screen readers; the content if "".
+        class_name: The classes of the stylesheet.
+        is_on: Whether a switch is on; None if the button is no switch.
+        is_disabled: Whether the button cannot be pressed.
+    """
+    values = {
+        "class": class_name,
+        "data-press": name,
+        "data-value": str(value),
+        "title": hint,
+        "aria-label": label,
+        "aria-pressed": "" if is_on is None else str(is_on).lower(),
+    }
+    attributes = "".join(f' {key}="{escape(text)}"' for key, text in values.items() if text)
+    disabled = " disabled" if is_disabled else ""
+    return f'<button type="button"{attributes}{disabled}>{content}</button>'

@@ -1,0 +1,291 @@
+"""States of every kind to save: after random actions, and one that no value is new in."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable
+from dataclasses import dataclass, is_dataclass, replace
+from typing import Any, TypeVar, cast, get_args, get_type_hints
+
+import msgspec
+from hypothesis import strategies as st
+
+from explorer.app.features.compare.actions import Pin, Unpin
+from explorer.app.features.optimise.actions import (
+    Accept,
+    Advance,
+    CancelRun,
+    Compare,
+    EndRun,
+    StartRun,
+)
+from explorer.app.features.paths.actions import Plan, Play, SetPathTime, StoreEnd, WatchModes
+from explorer.app.features.singularity.actions import Jog
+from explorer.app.features.studies.actions import BrushAxis
+from explorer.app.session.gestures import UserAction
+from explorer.app.state.action import Action
+from explorer.app.state.actions import (
+    GoHome,
+    Open,
+    SetAngle,
+    SetJoint,
+    SetMode,
+    SetPosition,
+    SetVariable,
+    UseNearest,
+    check_free,
+)
+from explorer.app.state.compared import Look
+from explorer.app.state.optimisation import PLACE, Comparison, OptimisationRequest, SearchResult
+from explorer.app.state.state import Run, State, opened
+from explorer.app.state.studies import Studies
+from explorer.app.state.view import PrototypeView, SingularView, View, WorkspaceView
+from explorer.errors import ExplorerError
+from explorer.measures.case import Case
+from explorer.measures.catalogue import measures_in
+from explorer.measures.measurements import measure_design
+from explorer.mechanism.design import VARIABLES, Limits
+from explorer.mechanism.design_file import PRESETS
+from explorer.optimise.outcome import Iterate
+from explorer.optimise.problem import YAW
+from explorer.optimise.record import Record, RunRecord, Settings, step_of
+
+OPTIMAL = PRESETS["paper-optimal"]
+MEASURED = measure_design(Case(OPTIMAL), measures_in("optimise"))
+
+Make = Callable[[State, int, float], Action]
+Sample = tuple[Make, int, float]
+
+
+@dataclass(frozen=True)
+class Change(Action):
+    """Replace values of a part of the state, named by a dotted path; "" is the state itself."""
+
+    part: str
+    values: dict[str, Any]
+
+    def apply(self, state: State) -> State:
+        return _changed(state, [*filter(None, self.part.split("."))], self.values)
+
+
+def _changed(value: Any, path: list[str], values: dict[str, Any]) -> Any:
+    if not path:
+        return replace(value, **values)
+    first, *rest = path
+    return replace(value, **{first: _changed(getattr(value, first), rest, values)})
+
+
+def _length(share: float) -> float:
+    return 45.0 * share - 10.0
+
+
+def _view(_: State, i: int, share: float) -> Action:
+    return Change(
+        "view",
+        {
+            "workspace": WorkspaceView(solid=i > 2, cut=("x", "y", None)[i % 3], level=share),
+            "prototype": PrototypeView(shown=i > 1, exploded=share),
+            "singular": SingularView(ghost="δ2 = 0", strata=i > 2),
+            "tetrahedra": (i > 1, i > 2, i > 3),
+            "warn_below": None if i == 0 else 1.0 + share,
+            "ghosts": i % 2 == 0,
+        },
+    )
+
+
+def _limited(state: State, i: int, share: float) -> Action:
+    check_free(state)
+    return Change("", {"design": msgspec.structs.replace(state.design, limits=_limits(i, share))})
+
+
+def _limits(i: int, share: float) -> Limits:
+    return Limits(
+        d2=(share, None),
+        guide=None if i % 2 else (-share, 20.0),
+        box=((0.0, -12.0, -0.0), (20.0, 22.0, 18.0 + share)),
+        margin=(None, 0.0, share)[i % 3],
+        leg_radii=(share, 0.1, 0.2, 0.3),
+    )
+
+
+def _wish(_: State, i: int, share: float) -> Action:
+    return Change(
+        "optimisation.request",
+        {
+            "volume": None if i == 0 else 1.0 + 1e4 * share,
+            "clearance": share,
+            "free": (VARIABLES[i], YAW, PLACE),
+            "starts": i + 1,
+            "box": None if i < 3 else ((0.0, 0.0, 0.0), (share + 1.0, 2.0, 1 / 3)),
+        },
+    )
+
+
+def _end(state: State, count: int) -> Action:
+    run = state.optimisation.run
+    new = iterates_of(state, count)
+    shown = (() if run is None else run.iterates) + new
+    best = shown[-1] if shown else None
+    record = None if run is None or best is None else _record(run, shown, best)
+    verdict = SearchResult("stalled", "no step made it better", best, 2, 1, count, 0.1, record)
+    return EndRun(state.optimisation.count, verdict, new)
+
+
+def _record(run: Run, iterates: tuple[Iterate, ...], best: Iterate) -> Record:
+    return Record(
+        problem=run.problem,
+        settings=Settings(starts=run.starts),
+        design=best.design,
+        chosen=0,
+        runs=(
+            RunRecord(
+                start=run.problem.start_values,
+                status="stalled",
+                best=best.number,
+                iterations=9,
+                evaluations=99,
+                attempts=1,
+                holding="clearance",
+                message="no step made it better",
+            ),
+        ),
+        history=tuple(map(step_of, iterates)),
+        seconds=1 / 3,
+        versions={"python": "3.12"},
+    )
+
+
+MAKERS: tuple[Make, ...] = (
+    lambda state, i, share: SetJoint(i, _length(share)),
+    lambda state, i, share: SetPosition(i % 3, _length(share)),
+    lambda state, i, share: SetAngle(i % 3, 360.0 * share - 180.0),
+    lambda state, i, share: SetMode(i),
+    lambda state, i, share: SetVariable(VARIABLES[i], _length(share)),
+    lambda state, i, share: Change("", {"hold": "pose" if share < 0.5 else "legs"}),
+    lambda state, i, share: UseNearest(),
+    lambda state, i, share: GoHome(),
+    lambda state, i, share: Open(list(PRESETS.values())[i % 2]),
+    _limited,
+    _view,
+    lambda state, i, share: Jog(i, _length(share)),
+    lambda state, i, share: WatchModes(),
+    lambda state, i, share: SetPathTime(8.0 * share),
+    lambda state, i, share: Play(on=i > 2),
+    lambda state, i, share: StoreEnd("start" if i > 2 else "goal"),
+    lambda state, i, share: Change("paths", {"modes": (i, 7 - i), "seconds": 1e-3 + share}),
+    lambda state, i, share: Plan(),
+    _wish,
+    lambda state, i, share: StartRun(),
+    lambda state, i, share: Advance(state.optimisation.count, iterates_of(state, i)),
+    lambda state, i, share: CancelRun(),
+    lambda state, i, share: _end(state, i),
+    lambda state, i, share: Compare(state.optimisation.count, Comparison(MEASURED, MEASURED)),
+    lambda state, i, share: Accept(),
+    lambda state, i, share: Pin(state.design),
+    lambda state, i, share: Unpin(i % 3),
+    lambda state, i, share: Change("compared.look", {"millimetres": i > 2, "overlay": share < 0.5}),
+    lambda state, i, share: BrushAxis("volume", ((share, 10.0),)),
+)
+
+
+def samples(most: int = 30) -> st.SearchStrategy[list[Sample]]:
+    """Draw actions, each with an index and a share."""
+    one = st.tuples(st.sampled_from(MAKERS), st.integers(0, 5), st.floats(0, 1))
+    return st.lists(one, max_size=most)
+
+
+def states_of(actions: list[Sample]) -> list[State]:
+    """Return the states from the paper's optimum on, one after each action that is possible."""
+    states = [opened(OPTIMAL)]
+    for number, (make, index, share) in enumerate(actions):
+        with contextlib.suppress(ExplorerError):
+            action = make(states[-1], index, share)
+            act = UserAction(action, make, float(number))
+            states.append(act.apply(states[-1]))
+    return states
+
+
+def iterates_of(state: State, count: int) -> tuple[Iterate, ...]:
+    """Return iterates of the run of a state, in two starts; none without a run."""
+    run = state.optimisation.run
+    if run is None:
+        return ()
+    problem, iterates = run.problem, list[Iterate]()
+    for number in range(len(run.iterates), len(run.iterates) + count):
+        values = tuple(value * (1.0 + 1e-3 * number) for value in problem.start_values)
+        iterates.append(
+            Iterate(
+                number=number,
+                run=number // 4,
+                phase="solving",
+                design=problem.design_at(values),
+                values=values,
+                objective=1.0 / (1.0 + number % 5),
+                volume=8000.0 / 3.0 + number,
+                worst="clearance of legs 2 and 3" if number % 2 else "",
+                spare=-0.25 if number % 3 == 1 else 1.0 / 3.0,
+            )
+        )
+    return tuple(iterates)
+
+
+def rich_state() -> State:
+    """Return a state in which every saved value differs from that of a new state."""
+    limits = _limits(2, 1 / 3)
+    home = opened(OPTIMAL).pose
+    state = opened(msgspec.structs.replace(OPTIMAL, name="é «one»", limits=limits, home=home))
+    request = vars(varied(OptimisationRequest())) | {
+        "volume": 1e4 / 3,
+        "free": (VARIABLES[4], YAW, PLACE),
+        "box": ((0.0, 0.0, 0.0), (4 / 3, 2.0, 1 / 3)),
+    }
+    actions: list[Action | Callable[[State], Action]] = [
+        Change("optimisation.request", request),
+        SetVariable("b2", 2.7),
+        Change("", {"view": varied(View()), "hold": "legs"}),
+        StoreEnd("start"),
+        SetPosition(0, 11.1),
+        StoreEnd("goal"),
+        Change("paths", {"modes": (3, 5), "seconds": 1 / 3}),
+        StartRun(),
+        lambda state: _end(state, 6),
+        Accept(),
+        Jog(2, 1 / 3),
+        WatchModes(),
+        SetPathTime(10 / 3),
+        Pin(OPTIMAL),
+        Change("compared", {"look": varied(Look())}),
+        Change("", {"studies": varied(Studies())}),
+        BrushAxis("volume", ((1 / 3, 10.0),)),
+        SetJoint(0, 99.1),
+    ]
+    for action in actions:
+        made = action if isinstance(action, Action) else action(state)
+        state = made.apply(state)
+    return state
+
+
+Part = TypeVar("Part")
+
+
+def varied(part: Part) -> Part:
+    """Return a part of the state in which every value is another one, by its type."""
+    types = get_type_hints(type(part))
+    values = {name: _varied(getattr(part, name), kind) for name, kind in types.items()}
+    return replace(cast("Any", part), **values)
+
+
+def _varied(value: Any, kind: Any) -> Any:
+    if is_dataclass(value):
+        return varied(value)
+    if isinstance(value, bool):
+        return not value
+    if isinstance(value, int | float):
+        return value + (1 if isinstance(value, int) else 1 / 3)
+    if isinstance(value, tuple):
+        entries = reversed(cast("tuple[Any, ...]", value))
+        return tuple(not each if each is True else each for each in entries)
+    kinds = get_args(kind) if type(None) in get_args(kind) else (kind,)
+    samples = {str: "another", int: 7, float: 1 / 3}
+    choices = [each for one in kinds for each in (get_args(one) or (samples.get(one),))]
+    return next(each for each in choices if each not in (None, value))

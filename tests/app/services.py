@@ -1,0 +1,146 @@
+"""What a page offers its features, without a page: for tests of panels, feeds and scene parts."""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any, NamedTuple
+
+import viser
+
+from explorer.app.browser.downloads import Downloads, File
+from explorer.app.features.feature import Services
+from explorer.app.session.jobs import Worker
+from explorer.app.session.session import Session, Who
+from explorer.app.storage.user_data import UserData
+from explorer.app.widgets.buttons import Buttons
+
+
+def _ignore(message: str, who: Who) -> None:
+    del message, who
+
+
+class StubOrder(NamedTuple):
+    """An order of a `StubWorker`: its key, task and first argument, and how it is answered."""
+
+    key: object
+    task: Callable[..., Any]
+    request: Any
+    done: Callable[[Any], None]
+    failed: Callable[[str], None]
+
+
+class StubWorker(Worker):
+    """A worker that starts no process: it keeps its orders and executes them in `work`.
+
+    Args:
+        at_once: Whether an order is executed when it is submitted.
+    """
+
+    def __init__(self, *, at_once: bool = False) -> None:
+        super().__init__(lambda _: None)
+        self.orders: list[StubOrder] = []
+        self._at_once = at_once
+        self._waiting: list[Callable[[], None]] = []
+
+    def submit(
+        self,
+        key: object,
+        task: Callable[..., Any],
+        arguments: tuple[Any, ...],
+        done: Callable[[Any], None],
+        failed: Callable[[str], None],
+        receive: Callable[[Any], None] | None = None,
+        *,
+        is_drawing: bool = False,
+    ) -> int:
+        del receive, is_drawing
+        self.orders.append(StubOrder(key, task, arguments[0], done, failed))
+        # Arguments and results cross the border of a process.
+        self._waiting.append(lambda: done(_sent(task(*_sent(arguments)))))
+        if self._at_once:
+            self.work()
+        return len(self.orders)
+
+    def cancel(self, number: int, patience: float | None) -> None:
+        """Leave an order as it is."""
+
+    def work(self) -> None:
+        """Execute the orders that wait."""
+        while self._waiting:
+            self._waiting.pop(0)()
+
+
+class StubDownloads(Downloads):
+    """Downloads that are kept as pairs of a client and the name of a file, or what is made."""
+
+    def __init__(self, server: viser.ViserServer, worker: Worker) -> None:
+        super().__init__(server, worker, _ignore)
+        self.sent: list[tuple[Who, str]] = []
+
+    def send(self, who: Who, name: str, data: bytes) -> None:
+        del data
+        self.sent.append((who, name))
+
+    def compute(
+        self,
+        who: Who,
+        name: str,
+        task: Callable[..., bytes],
+        arguments: tuple[Any, ...],
+        notice: tuple[str, str] | None = None,
+    ) -> None:
+        del task, arguments, notice
+        self.sent.append((who, name))
+
+    def make(self, who: Who, doing: str, make: Callable[[viser.ClientHandle], File]) -> None:
+        del make
+        self.sent.append((who, doing))
+
+
+def services_for(
+    server: viser.ViserServer | None = None,
+    session: Session | None = None,
+    worker: Worker | None = None,
+    *,
+    buttons: Buttons | None = None,
+    complain: Callable[[str, Who], None] = _ignore,
+    tell: Callable[[str], None] = lambda _: None,
+    redraw: Callable[[], None] = lambda: None,
+    user_data: UserData | None = None,
+) -> Services:
+    """Return services for what needs only some of them; the others are missing.
+
+    Args:
+        server: On which everything is drawn.
+        session: To which changes are posted.
+        worker: Which computes; one that keeps its orders if None.
+        buttons: The buttons in markup.
+        complain: Called with a message for people and the client it is for.
+        tell: Called with a message for everybody.
+        redraw: Called in place of the redraw of a session that is missing.
+        user_data: The user's designs and session.
+    """
+    working = StubWorker() if worker is None else worker
+    some_server: Any = server
+    some_session: Any = SimpleNamespace(redraw=redraw) if session is None else session
+    missing: Any = None
+    return Services(
+        server=some_server,
+        session=some_session,
+        worker=working,
+        buttons=missing if buttons is None else buttons,
+        downloads=StubDownloads(some_server, working),
+        complain=complain,
+        tell=tell,
+        theme=missing,
+        drawer=missing,
+        user_data=user_data,
+        studies=None,
+        preferences=None,
+    )
+
+
+def _sent(value: Any) -> Any:
+    return pickle.loads(pickle.dumps(value))

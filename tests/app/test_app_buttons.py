@@ -1,0 +1,157 @@
+"""Buttons in markup: what the page sends of a press arrives, and nothing else does anything."""
+
+from __future__ import annotations
+
+import re
+import time
+from collections.abc import Callable, Generator
+from contextlib import closing
+
+import pytest
+import viser
+from client import press_update, presses_in
+from desk import CLIENT
+from socket_tab import SocketTab
+
+from explorer.app import look
+from explorer.app.server import Running, start
+from explorer.app.session.session import UNDO
+from explorer.app.state.compared import SLOTS
+from explorer.app.widgets.buttons import LONGEST_VALUE, Buttons, press_button
+from explorer.files.packaged import SOURCES, packaged_files
+from explorer.mechanism.design_file import PRESETS
+
+PATIENCE = 30.0
+
+
+@pytest.fixture(scope="module")
+def running() -> Generator[Running]:
+    made = start(PRESETS["paper-optimal"], port=0)
+    yield made
+    made.stop()
+
+
+@pytest.fixture
+def tab(running: Running) -> Generator[SocketTab]:
+    with closing(SocketTab(running.url)) as made:
+        wait_for(lambda: bool(running.viser.get_clients()))
+        yield made
+
+
+def wait_for(condition: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < deadline, "never came about"
+        time.sleep(0.01)
+
+
+def test_press_sent_by_a_client_does_what_is_registered_and_is_one_step(
+    running: Running, tab: SocketTab
+) -> None:
+    session = running.page.session
+    tab.update(*press_update(running, "compare.pin"))
+    wait_for(lambda: session.state.compared.pinned[0] is not None)
+    number = session.history.step.number
+    # The same press again is another press.
+    for on in (True, False, True):
+        tab.update(*press_update(running, "compare.turn", "Outlines"))
+        wait_for(lambda on=on: session.state.compared.look.outlines is on)
+    assert session.history.step.number == number + 3
+    assert ("compare.open", SLOTS[0]) in presses_in(running)
+    for _ in range(4):
+        session.travel(UNDO)
+    assert session.wait_until_idle()
+    assert session.state.compared.is_empty
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("compare.gone", ""),
+        ("compare.open", "D"),
+        ("compare.turn", "../../x"),
+        ("history.go", "-1"),
+        ("history.go", "9" * 4000),
+        ("strata.go", "5678"),
+        ("strata.go", "x"),
+        ("tour", "Next"),
+        ("x" * 101, ""),
+        ("compare.pin", "x" * (LONGEST_VALUE + 1)),
+    ],
+)
+def test_press_that_nothing_offers_does_nothing(
+    running: Running, tab: SocketTab, name: str, value: str
+) -> None:
+    session = running.page.session
+    before = session.history.step.number
+    tab.update(*press_update(running, name, value))
+    tab.flush()
+    assert running.page.wait_until_drawn()
+    assert session.history.step.number == before
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "compare.pin",
+        "null",
+        "[" * 2000,
+        '{"name":"compare.pin","value":""}',
+        '{"name":"compare.pin","value":1,"count":1}',
+        '{"name":"compare.pin","value":"","count":-1}',
+        '{"name":"compare.pin","value":"","count":1,"more":1}',
+        '{"name":"compare.pin","value":"","count":1}' + " " * 100_000,
+    ],
+)
+def test_text_that_the_script_does_not_send_is_dropped(
+    running: Running, tab: SocketTab, text: str
+) -> None:
+    inbox, _ = press_update(running, "compare.pin")
+    tab.update(inbox, text)
+    tab.flush()
+    assert running.page.session.wait_until_idle()
+    assert running.page.session.state.compared.is_empty
+
+
+def test_presses_of_one_client_are_handled_in_their_order(server: viser.ViserServer) -> None:
+    buttons = Buttons(server)
+    handled: list[str] = []
+
+    def wait(value: str, _: viser.ClientHandle) -> None:
+        time.sleep(float(value))
+        handled.append(value)
+
+    buttons.on("wait", wait)
+    with pytest.raises(ValueError, match="two buttons"):
+        buttons.on("wait", wait)
+    values = ["0.05", "0.01", "0.0"]
+    for count, value in enumerate(values):
+        buttons.receive(f'{{"name":"wait","value":"{value}","count":{count}}}', CLIENT)
+    wait_for(lambda: len(handled) == len(values))
+    assert handled == values
+    buttons.stop()
+    buttons.receive('{"name":"wait","value":"0","count":9}', CLIENT)
+    assert handled == values
+
+
+def test_button_of_markup_is_escaped_and_says_what_it_is() -> None:
+    html = press_button(
+        "open", '"<b>', "Open", hint='"Open"', label="Open it", is_on=True, is_disabled=True
+    )
+    assert html == (
+        '<button type="button" data-press="open" data-value="&quot;&lt;b&gt;" '
+        'title="&quot;Open&quot;" aria-label="Open it" aria-pressed="true" disabled>Open</button>'
+    )
+    assert press_button("open", 3, "x") == (
+        '<button type="button" data-press="open" data-value="3">x</button>'
+    )
+
+
+def test_every_class_of_the_markup_has_a_rule() -> None:
+    sources = "".join(path.read_text("utf-8") for path in (SOURCES / "explorer/app").rglob("*.py"))
+    used = set(re.findall(r"\bex-[a-z]+\b", sources))
+    (sheet,) = packaged_files(look.FOLDER, ".css")
+    ruled = set(re.findall(r"\.(ex-[a-z]+)", sheet.read_text("utf-8")))
+    variables = set(re.findall(r"--(ex-[a-z]+)", sheet.read_text("utf-8")))
+    assert used <= ruled | variables

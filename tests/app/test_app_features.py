@@ -1,0 +1,207 @@
+"""Features as the page takes them: each may be missing, a new one appears, controls set values."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+from desk import CLIENT
+
+from explorer.app.features.feature import Feature, Services, StateCommand, Tab
+from explorer.app.features.listed import FEATURES
+from explorer.app.scene.part import ScenePart
+from explorer.app.scene.placing import Placed
+from explorer.app.server import Running, start
+from explorer.app.session.session import UNDO
+from explorer.app.state.actions import Set
+from explorer.app.state.frame import Frame
+from explorer.app.state.values import value_at, with_value
+from explorer.app.storage.study_folders import StudyFolders
+from explorer.app.storage.user_data import open_user_data
+from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.commands import Key
+from explorer.app.widgets.controls import At, Bound, Control, Controls
+from explorer.app.widgets.pieces import Widget, widgets
+from explorer.mechanism.design_file import PRESETS
+from explorer.numerics.arrays import FloatArray
+
+OPTIMAL = PRESETS["paper-optimal"]
+
+
+@dataclass(frozen=True)
+class BoundByPath:
+    """A control of the page that is bound by a path.
+
+    Attributes:
+        widget: The control.
+        at: The value that it shows and sets.
+        options: The values by the words of a list; None where the control holds the value.
+    """
+
+    widget: Widget
+    at: At
+    options: Mapping[str, object] | None
+
+    def another(self) -> Any:
+        """Return a value that a browser could send, another than the one that is shown."""
+        handle = self.widget.handle
+        if self.widget.kind == "switch":
+            return not handle.value
+        if self.widget.kind == "list":
+            return next(each for each in handle.options if each != handle.value)
+        step = handle.step
+        return handle.value + (step if handle.max is None or handle.value < handle.max else -step)
+
+    def meant(self, value: Any) -> object:
+        """Return the value of the state that a value of the control stands for."""
+        return self.at.convert(value) if self.options is None else self.options[value]
+
+
+@pytest.fixture(scope="module")
+def running(tmp_path_factory: pytest.TempPathFactory) -> Generator[Running]:
+    studies = StudyFolders(tmp_path_factory.mktemp("studies"))
+    with pytest.MonkeyPatch.context() as patch:
+        record_controls(patch)
+        made = start(OPTIMAL, port=0, user_data=open_user_data(resume=False), studies=studies)
+    yield made
+    made.stop()
+
+
+# Controls by the time of their making, as long as the page is made.
+MADE: list[tuple[Any, At, Mapping[str, object] | None]] = []
+
+
+def record_controls(patch: pytest.MonkeyPatch) -> None:
+    """Record each control that is made with a path from here on."""
+    sources: dict[int, tuple[At, Mapping[str, object] | None]] = {}
+    control_type: Any = Control
+    bind, make = At.bound, control_type.__init__
+
+    def bound(at: At, name: str, options: Mapping[str, object] | None = None) -> Bound[Any]:
+        found = bind(at, name, options)
+        sources[id(found.write)] = at, options
+        return found
+
+    def made(control: Any, session: Any, handle: Any, bound: Any, **more: Any) -> None:
+        make(control, session, handle, bound, **more)
+        if id(bound.write) in sources:
+            MADE.append((handle, *sources[id(bound.write)]))
+
+    patch.setattr(At, "bound", bound)
+    patch.setattr(Control, "__init__", made)
+
+
+@pytest.fixture
+def bound_by_path(running: Running) -> list[BoundByPath]:
+    by_handle = {id(widget.handle): widget for widget in widgets(running.viser)}
+    return [BoundByPath(by_handle[id(handle)], at, options) for handle, at, options in MADE]
+
+
+def test_control_with_a_path_sets_the_value_there_and_no_other(
+    running: Running, bound_by_path: list[BoundByPath]
+) -> None:
+    page, session = running.page, running.page.session
+    assert len(bound_by_path) > 35
+    for each in bound_by_path:
+        name, handle = f"{each.widget.label} at {each.at.path}", each.widget.handle
+        before, shown, given = session.state, handle.value, each.another()
+        each.widget.use(CLIENT, given)
+        assert session.wait_until_idle()
+        after, meant = session.state, each.meant(given)
+        assert value_at(after, each.at.path) == meant != value_at(before, each.at.path), name
+        if each.at.action is Set:
+            assert after == with_value(before, each.at.path, meant), name
+        assert handle.value == given, name
+        session.travel(UNDO)
+        assert page.wait_until_drawn()
+        assert session.state == before, name
+        assert handle.value == shown, name
+
+
+# Without the mechanism there is nothing to look at.
+@pytest.mark.parametrize("name", [each.name for each in FEATURES if each.name != "mechanism"])
+def test_page_without_a_feature_starts_and_draws(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    left = tuple(each for each in FEATURES if each.name != name)
+    monkeypatch.setattr("explorer.app.page.FEATURES", left)
+    running = start(OPTIMAL, port=0)
+    try:
+        page = running.page
+        page.session.do(Set("view.labels", False))
+        assert page.wait_until_drawn()
+        assert np.isfinite(page.corners()).all()
+        titles = {tab.title for each in left for tab in each.tabs}
+        assert {each.path[0] for each in widgets(running.viser) if each.path} <= titles
+    finally:
+        running.stop()
+
+
+class MarkerPanel:
+    """A panel with one switch."""
+
+    def __init__(self, services: Services) -> None:
+        self._controls = Controls(services.gui, services.session)
+        self._controls.checkbox("Ghost platforms", "Draw the other modes.", "view.ghosts")
+
+    def updates(self, frame: Frame) -> Iterator[Update]:
+        """Yield what makes the panel show the frame."""
+        yield from self._controls.updates(frame)
+
+
+class Marker(ScenePart):
+    """A ball high above b4."""
+
+    def __init__(self, services: Services) -> None:
+        self.ball = services.scene.add_icosphere("/marker", radius=0.1, visible=False)
+
+    def updates(self, placed: Placed) -> Iterator[Update]:
+        """Yield what draws the ball."""
+        yield self.ball, "visible", True
+        yield self.ball, "position", tuple(self.corners(placed)[0].tolist())
+
+    def corners(self, placed: Placed) -> FloatArray:
+        """Return the centre of the ball."""
+        return (placed.points["b4"] + [0.0, 0.0, 70.0])[None]
+
+
+MARKER = Feature(
+    "marker",
+    tabs=(Tab("side", "Marker", MarkerPanel),),
+    scene=(Marker,),
+    commands=(
+        StateCommand(
+            "Marker › Warn at three", "Warn early.", lambda _: Set("view.warn_below", 3.0)
+        ),
+    ),
+    keys={"Marker › Warn at three": (Key("5"),), "Marker › Ghost platforms": (Key("6"),)},
+)
+
+
+def test_new_feature_appears_on_the_page_in_the_palette_and_in_the_scene(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("explorer.app.page.FEATURES", (*FEATURES, MARKER))
+    running = start(OPTIMAL, port=0)
+    try:
+        page = running.page
+        (widget,) = (each for each in widgets(running.viser) if each.path == ("Marker",))
+        assert widget.label == "Ghost platforms"
+        assert widget.hint.endswith("Key: 6.")
+        commands = {each.label: each for each in page.palette.commands}
+        assert {label: commands[label].keys for label in MARKER.keys} == MARKER.keys
+        for label in MARKER.keys:
+            commands[label].run(CLIENT)
+        assert page.wait_until_drawn()
+        view = page.session.state.view
+        assert (view.warn_below, view.ghosts) == (3.0, True)
+        ball = page.services.get(Marker).ball
+        assert ball.visible
+        top = Placed(Frame(page.session.state)).points["b4"] + [0.0, 0.0, 70.0]
+        assert tuple(ball.position) == pytest.approx(top.tolist())
+        assert page.corners().max(axis=0)[2] == pytest.approx(top[2])
+    finally:
+        running.stop()

@@ -1,0 +1,16 @@
+"""The command line of a test module: its `COMMAND`, with captured streams."""
+
+from __future__ import annotations
+
+from typing import Any, cast
+
+import pytest
+from command_line import CommandLine
+
+
+@pytest.fixture
+def cli(request: pytest.FixtureRequest, capsys: pytest.CaptureFixture[str]) -> CommandLine:
+    """The command of the test's module, or any command in a module without one."""
+    module: Any = cast("Any", request).module
+    command: tuple[str, ...] = getattr(module, "COMMAND", ())
+    return CommandLine(capsys, command, has_progress=bool({*command} & {"optimise", "sweep"}))

@@ -1,0 +1,213 @@
+"""Exact intervals of the joints, against dense sampling of the forward kinematics."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, strategies as st
+from refusals import refusal
+from strategies import Case, cases, designs, ordinary_cases, ordinary_designs, singular_cases
+
+from explorer import (
+    JOINTS,
+    PRESETS,
+    Design,
+    discriminants,
+    forward,
+    inverse,
+    rotation_from_yaw_pitch_roll,
+)
+from explorer.mechanism.design import LENGTHS
+from explorer.mechanism.feasible_intervals import Interval, feasible_intervals, nearest_feasible
+from explorer.numerics.arrays import BoolArray, FloatArray
+
+joint_indices = st.integers(0, 5)
+seeds = st.integers(0, 2**32 - 1)
+SAMPLES = 400
+
+
+def with_values(joints: FloatArray, joint: int, values: FloatArray) -> FloatArray:
+    """Return rows of joints of which one takes the values."""
+    rows = np.repeat(joints[None, :], len(values), axis=0)
+    rows[:, joint] = values
+    return rows
+
+
+def inside(intervals: tuple[Interval, ...], values: FloatArray, slack: float) -> BoolArray:
+    """Return which values lie in an interval, with its ends moved outwards by the slack."""
+    result = np.zeros(values.shape, dtype=np.bool_)
+    for low, high in intervals:
+        result |= (values >= low - slack) & (values <= high + slack)
+    return result
+
+
+def random_joints(design: Design, rng: np.random.Generator, apart: float) -> FloatArray:
+    """Return joints that need not close, with |d1 − d3| at most a share of |b3 − b2|."""
+    joints = rng.uniform(0.0, 20.0, 6)
+    joints[3] = joints[1] + rng.uniform(-apart, apart) * (design.b3 - design.b2)
+    return joints
+
+
+def check_by_samples(design: Design, joints: FloatArray, joint: int, size: float) -> None:
+    """Check the intervals of a joint by values far beyond those that close, and its own."""
+    intervals = feasible_intervals(design, joints)[joint]
+    lowest, own = (0.0 if JOINTS[joint] in LENGTHS else -6.0 * size), float(joints[joint])
+    narrow = np.linspace(own - 0.3 * size, own + 0.3 * size, SAMPLES)
+    values = np.append(np.linspace(lowest, 8.0 * size, SAMPLES), narrow[narrow >= lowest])
+    closes = forward(design, with_values(joints, joint, values)).feasible
+    slack = 1e-6 * size
+    # In a singular pose the interval may be the present value alone, which has no length.
+    alone = np.abs(values - own) <= slack if forward(design, joints).feasible else False
+    assert (inside(intervals, values, slack) | alone)[closes].all()
+    assert closes[inside(intervals, values, -slack)].all()
+
+
+@given(ordinary_cases() | singular_cases(among=ordinary_designs()), joint_indices)
+def test_intervals_of_closing_joints_are_where_samples_close(case: Case, joint: int) -> None:
+    check_by_samples(case.design, case.joints, joint, case.size)
+
+
+@given(ordinary_designs(), seeds, joint_indices)
+def test_intervals_of_joints_that_do_not_close_are_where_samples_close(
+    design: Design, seed: int, joint: int
+) -> None:
+    joints = random_joints(design, np.random.default_rng(seed), 1.5)
+    size = float(max(*np.abs(joints).tolist(), *map(abs, design.variables)))
+    check_by_samples(design, joints, joint, size)
+
+
+def test_intervals_of_random_joints_are_none_one_and_several() -> None:
+    design = PRESETS["paper-optimal"]
+    rng = np.random.default_rng(2)
+    counts: set[int] = set()
+    for _ in range(60):
+        other, position = random_joints(design, rng, 1.0), rng.uniform(-15.0, 15.0, 3)
+        rotation = rotation_from_yaw_pitch_roll(rng.uniform(-180.0, 180.0, 3))
+        for joints in (other, inverse(design, position, rotation)):
+            counts |= {len(intervals) for intervals in feasible_intervals(design, joints)}
+    assert {0, 1, 2} <= counts
+
+
+@given(cases(designs(nearness=(1.0, 1e-3))))
+def test_intervals_of_a_regular_pose_contain_its_joints(case: Case) -> None:
+    assume(case.regularity > 1e-3)
+    for value, intervals in zip(
+        case.joints, feasible_intervals(case.design, case.joints), strict=True
+    ):
+        assert inside(intervals, np.array([value]), 1e-9 * case.size).all()
+
+
+@given(ordinary_cases())
+def test_intervals_are_disjoint_ascending_and_of_lengths_not_negative(case: Case) -> None:
+    for name, intervals in zip(JOINTS, feasible_intervals(case.design, case.joints), strict=True):
+        ends = [end for interval in intervals for end in interval]
+        assert ends == sorted(ends)
+        assert all(low < high for low, high in intervals)
+        assert name not in LENGTHS or all(low >= 0.0 for low in ends)
+
+
+@given(ordinary_cases())
+def test_end_of_an_interval_is_singular_or_a_length_of_zero(case: Case) -> None:
+    assume(case.regularity > 1e-2)
+    count = 0
+    for joint, intervals in enumerate(feasible_intervals(case.design, case.joints)):
+        for end in (end for interval in intervals for end in interval):
+            count += 1
+            if end != 0.0 or JOINTS[joint] not in LENGTHS:
+                rows = with_values(case.joints, joint, np.array([end]))
+                least = float(discriminants(case.design, rows).min())
+                assert abs(least) <= 1e-7 * max(case.size, abs(end)) ** 2
+    assert count >= 12
+
+
+@given(ordinary_cases(), st.sampled_from([1e-20, 1e-6, 1e6, 1e20]))
+def test_intervals_scale_with_the_design(case: Case, scale: float) -> None:
+    assume(case.regularity > 1e-2)
+    larger = case.scaled(scale)
+    # At a double root an interval may be divided, so only the outer ends are compared.
+    for one, other in zip(
+        feasible_intervals(case.design, case.joints),
+        feasible_intervals(larger.design, case.joints * scale),
+        strict=True,
+    ):
+        ends = np.array([one[0][0], one[-1][1]]) * scale
+        np.testing.assert_allclose(
+            [other[0][0], other[-1][1]], ends, rtol=0, atol=1e-6 * scale * case.size
+        )
+
+
+def nearest(design: Design, joints: FloatArray, joint: int) -> float | None:
+    return nearest_feasible(design, joints, joint, feasible_intervals(design, joints)[joint])
+
+
+@given(ordinary_cases(), joint_indices, st.floats(-3.0, 3.0))
+def test_nearest_feasible_value_closes_and_no_nearer_one_does(
+    case: Case, joint: int, share: float
+) -> None:
+    assume(case.regularity > 1e-2)
+    joints, is_length = case.joints, JOINTS[joint] in LENGTHS
+    joints[joint] += share * case.size
+    if is_length:
+        joints[joint] = abs(joints[joint])
+    value = nearest(case.design, joints, joint)
+    assert value is not None
+    assert forward(case.design, with_values(joints, joint, np.array([value]))).feasible.all()
+    gap = abs(value - float(joints[joint]))
+    nearer = joints[joint] + np.linspace(-1.0, 1.0, SAMPLES) * (gap - 1e-6 * case.size)
+    nearer = nearer[nearer >= 0.0] if is_length else nearer
+    if gap > 1e-5 * case.size:
+        assert not forward(case.design, with_values(joints, joint, nearer)).feasible.any()
+
+
+@given(ordinary_cases(), joint_indices)
+def test_nearest_feasible_value_of_closing_joints_is_the_present_one(
+    case: Case, joint: int
+) -> None:
+    assume(case.regularity > 1e-2)
+    value = nearest(case.design, case.joints, joint)
+    assert value is not None
+    assert abs(value - case.joints[joint]) <= 1e-12 * case.size
+
+
+@given(singular_cases(among=designs(sizes=(10.0, 1e-6, 1e6), nearness=(1.0,))), joint_indices)
+def test_nearest_feasible_value_at_a_singular_pose_closes_or_is_none(
+    case: Case, joint: int
+) -> None:
+    value = nearest(case.design, case.joints, joint)
+    if value is not None:
+        rows = with_values(case.joints, joint, np.array([value]))
+        assert forward(case.design, rows).feasible.all()
+
+
+def test_nearest_feasible_value_is_none_if_no_value_closes() -> None:
+    design = PRESETS["paper-initial"]
+    # The carriages are farther apart than b2 and b3, at any lengths.
+    joints = np.array([9.0, 0.0, 8.0, 50.0, 7.0, 6.0])
+    intervals = feasible_intervals(design, joints)
+    for joint in (0, 2, 4, 5):
+        assert intervals[joint] == ()
+        assert nearest_feasible(design, joints, joint, intervals[joint]) is None
+
+
+@given(designs(), seeds)
+def test_intervals_of_any_design_and_joints_are_finite(design: Design, seed: int) -> None:
+    joints = np.random.default_rng(seed).uniform(0.0, 2.0, 6) * max(map(abs, design.variables))
+    for intervals in feasible_intervals(design, joints):
+        assert all(np.isfinite(end) for interval in intervals for end in interval)
+    assert len(feasible_intervals(design, np.zeros(6))) == 6
+    assert len(feasible_intervals(design, joints * 4e14)) == 6
+
+
+def test_intervals_at_the_identity_orientation_are_empty_for_the_radii_alone() -> None:
+    design = PRESETS["paper-initial"]
+    intervals = feasible_intervals(design, inverse(design, [5.0, 3.0, 5.0], np.eye(3)))
+    # With the lines parallel d2 = d4, so neither can move without the other.
+    empty = [name for name, some in zip(JOINTS, intervals, strict=True) if not some]
+    assert empty == ["d2", "d4"]
+
+
+@pytest.mark.parametrize(
+    "joints", [np.zeros(5), np.full(6, np.nan), np.full(6, -1.0), np.full(6, 1e300)]
+)
+def test_intervals_of_unusable_joints_are_refused(joints: FloatArray) -> None:
+    refusal(feasible_intervals, PRESETS["paper-initial"], joints)

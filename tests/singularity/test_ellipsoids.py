@@ -1,0 +1,142 @@
+"""Velocity and force ellipsoids, and singularity-free balls."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, strategies as st
+from numpy.testing import assert_allclose
+from scipy.spatial.transform import Rotation
+from strategies import Case, all_cases, ordinary_cases, singular_cases
+
+from explorer import (
+    PRESETS,
+    Pose,
+    home_pose,
+    inverse,
+    jacobian,
+    margins,
+)
+from explorer.mechanism.displacement import displacement
+from explorer.numerics.arrays import FloatArray
+from explorer.singularity.ellipsoids import (
+    certified_radius,
+    performance,
+    planes_of_singularity,
+    singularity_free_ball,
+)
+from explorer.singularity.jacobian import inverse_condition
+
+OPTIMAL = PRESETS["paper-optimal"]
+HOME = home_pose(OPTIMAL)
+
+
+def rates_of(case: Case) -> FloatArray:
+    """Return the Jacobian of a well-conditioned case."""
+    rates = jacobian(case.design, case.position, case.rotation)
+    assume(float(inverse_condition(rates, case.design.reach)) > 1e-6)
+    return rates
+
+
+@given(ordinary_cases(), st.integers(0, 2**32))
+def test_velocities_at_unit_actuator_speed_lie_in_the_ellipsoids(case: Case, seed: int) -> None:
+    found = performance(case.design, case.pose)
+    drive = np.random.default_rng(seed).normal(size=(100, 6))
+    drive /= np.linalg.norm(drive, axis=-1, keepdims=True)
+    twists = drive @ np.linalg.inv(rates_of(case)).T
+    for ellipsoid, way in (
+        (found.translation, twists[:, :3]),
+        (found.rotation, case.design.reach * twists[:, 3:]),
+    ):
+        shares = way @ ellipsoid.axes / ellipsoid.velocity
+        assert np.linalg.norm(shares, axis=-1).max() <= 1.0 + 1e-9
+
+
+@given(ordinary_cases())
+def test_unit_force_on_an_axis_takes_the_gain_of_actuator_force(case: Case) -> None:
+    found = performance(case.design, case.pose)
+    rates = rates_of(case)
+    for ellipsoid, start, unit in (
+        (found.translation, 0, 1.0),
+        (found.rotation, 3, case.design.reach),
+    ):
+        assert_allclose(ellipsoid.axes.T @ ellipsoid.axes, np.eye(3), atol=1e-12)
+        assert np.linalg.det(ellipsoid.axes) > 0.0
+        assert (np.diff(ellipsoid.gain) <= 0.0).all()
+        for index in range(3):
+            wrench = np.zeros(6)
+            # A moment over the reach.
+            wrench[start : start + 3] = unit * ellipsoid.axes[:, index]
+            force = np.linalg.solve(rates.T, wrench)
+            assert np.linalg.norm(force) == pytest.approx(ellipsoid.gain[index], rel=1e-6)
+            assert ellipsoid.force[index] == pytest.approx(1.0 / ellipsoid.gain[index])
+
+
+@given(singular_cases())
+def test_ellipsoids_of_singular_poses_have_finite_axes(case: Case) -> None:
+    found = performance(case.design, case.pose)
+    for ellipsoid in (found.translation, found.rotation):
+        assert np.isfinite(ellipsoid.axes).all()
+        assert (ellipsoid.gain >= 0.0).all()
+        assert np.isfinite(ellipsoid.force).all()
+
+
+def test_infinite_axis_is_a_motion_at_zero_actuator_speed() -> None:
+    # b4 on the base plane: it can leave that plane with all six lengths held to first order.
+    pose = Pose((10.0, 5.0, 0.0), Pose.of_yaw_pitch_roll((0, 0, 0), (-70.0, 20.0, 30.0)).quaternion)
+    found = performance(OPTIMAL, pose)
+    assert np.isinf(found.translation.gain).tolist() == [True, False, False]
+    assert found.translation.force[0] == 0.0
+    rates = jacobian(OPTIMAL, pose.position, pose.rotation)
+    motion = np.linalg.svd(rates)[2][-1]
+    step = 1e-6 * motion
+    turn = Rotation.from_rotvec(step[3:]).as_matrix()
+    moved = inverse(OPTIMAL, np.array(pose.position) + step[:3], turn @ pose.rotation)
+    assert_allclose(moved, inverse(OPTIMAL, pose.position, pose.rotation), atol=1e-11)
+    along = motion[:3] / np.linalg.norm(motion[:3])
+    assert abs(float(along @ found.translation.axes[:, 0])) == pytest.approx(1.0, abs=1e-9)
+
+
+@given(ordinary_cases())
+def test_margins_are_the_position_along_the_normals_of_their_planes(case: Case) -> None:
+    gradients = planes_of_singularity(case.rotation)
+    assert_allclose(gradients @ case.position, case.margins, atol=1e-13 * case.size)
+
+
+@given(ordinary_cases(), st.integers(0, 2**32))
+def test_singularity_free_ball_touches_a_plane_and_contains_no_singular_position(
+    case: Case, seed: int
+) -> None:
+    ball = singularity_free_ball(case.pose)
+    assume(ball.radius > 1e-6 * case.size)
+    assert np.linalg.norm(ball.touches - case.position) == pytest.approx(ball.radius)
+    touching = margins(ball.touches, case.rotation)
+    assert abs(touching[ball.incidence - 1]) <= 1e-13 * case.size
+    off = np.random.default_rng(seed).normal(size=(200, 3))
+    off *= 0.999 * ball.radius / np.linalg.norm(off, axis=-1, keepdims=True)
+    signs = np.sign(margins(case.position + off, case.rotation))
+    assert (signs == np.sign(case.margins)).all()
+
+
+@given(all_cases())
+def test_singularity_free_ball_of_any_pose_is_finite(case: Case) -> None:
+    ball = singularity_free_ball(case.pose)
+    assert np.isfinite(ball.touches).all()
+    assert ball.radius == ball.distances.min() >= 0.0
+    if np.hypot(case.rotation[1, 0], case.rotation[2, 0]) == 0.0:
+        assert ball.radius == 0.0
+
+
+@given(ordinary_cases(), st.integers(0, 2**32))
+def test_poses_within_the_certified_radius_are_regular(case: Case, seed: int) -> None:
+    radius = certified_radius(case.design, case.pose)
+    # The ball has only some of the motions, so it is no smaller.
+    assert radius <= singularity_free_ball(case.pose).radius + 1e-12
+    rng = np.random.default_rng(seed)
+    turns = Rotation.from_rotvec(rng.normal(size=(100, 3)) * rng.uniform(0, 0.5, (100, 1)))
+    rotations = turns.as_matrix() @ case.rotation
+    positions = case.position + rng.normal(size=(100, 3)) * radius
+    ways = displacement(case.design, case.position, case.rotation, positions, rotations)
+    near = ways < radius * (1.0 - 1e-9)
+    signs = np.sign(margins(positions[near], rotations[near]))
+    assert (signs == np.sign(case.margins)).all()

@@ -1,0 +1,123 @@
+"""Laws of every function of a pose: batches, empty batches, units, and refused poses."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, strategies as st
+from numpy.testing import assert_allclose
+from refusals import refusal
+from strategies import Case, ordinary_cases
+
+from explorer import (
+    PRESETS,
+    Design,
+    inverse,
+    jacobian,
+    leg_clearances,
+    margins,
+    nearest_singular_poses,
+    rotation_from_quaternion,
+    stratum,
+)
+from explorer.numerics.arrays import FloatArray
+from explorer.singularity.ellipsoids import singular_plane_distances
+from explorer.singularity.jacobian import determinant, inverse_condition, tetrahedron_volumes
+
+EYE = np.eye(3)
+
+
+@dataclass(frozen=True)
+class PoseFunction:
+    """A function of a design and poses.
+
+    Attributes:
+        name: Name of the function.
+        value: Function of a design, positions (..., 3) and rotations (..., 3, 3).
+        shape: Trailing axes of its result.
+        power: Power of the unit of length in its result.
+    """
+
+    name: str
+    value: Callable[[Design, Any, Any], Any]
+    shape: tuple[int, ...]
+    power: int
+
+
+def homogeneous_jacobian(design: Design, p: FloatArray, r: FloatArray) -> FloatArray:
+    return jacobian(design, p, r) / np.array([1.0] * 3 + [design.reach] * 3)
+
+
+FUNCTIONS = (
+    PoseFunction("inverse", inverse, (6,), 1),
+    PoseFunction("margins", lambda _, p, r: margins(p, r), (3,), 1),
+    PoseFunction("jacobian", homogeneous_jacobian, (6, 6), 0),
+    PoseFunction(
+        "inverse_condition",
+        lambda d, p, r: inverse_condition(jacobian(d, p, r), d.reach),
+        (),
+        0,
+    ),
+    PoseFunction(
+        "determinant", lambda d, p, r: determinant(d, inverse(d, p, r), margins(p, r)), (), 3
+    ),
+    PoseFunction("volumes", lambda d, p, r: tetrahedron_volumes(d, margins(p, r)), (3,), 3),
+    PoseFunction("stratum", lambda _, p, r: stratum(p, r), (4,), 0),
+    PoseFunction("plane_distances", lambda _, p, r: singular_plane_distances(p, r), (3,), 1),
+    PoseFunction("nearest", lambda d, p, r: nearest_singular_poses(d, p, r).distance, (3,), 1),
+    PoseFunction("clearance", lambda d, p, r: leg_clearances(d, p, r).clearance, (6,), 1),
+    PoseFunction("points", lambda d, p, r: leg_clearances(d, p, r).points, (6, 2, 3), 1),
+)
+each_function = pytest.mark.parametrize("function", FUNCTIONS, ids=lambda function: function.name)
+
+
+@each_function
+def test_pose_function_of_a_batch_equals_single_calls(function: PoseFunction) -> None:
+    design, rng = PRESETS["paper-optimal"], np.random.default_rng(7)
+    p = rng.uniform(-10.0, 10.0, (2, 1, 3))
+    r = rotation_from_quaternion(rng.normal(size=(3, 4)))
+    batch = function.value(design, p, r)
+    assert batch.shape == (2, 3, *function.shape)
+    for i, j in np.ndindex(2, 3):
+        assert_allclose(batch[i, j], function.value(design, p[i, 0], r[j]), rtol=1e-9, atol=1e-12)
+
+
+@each_function
+def test_pose_function_of_an_empty_batch_is_empty(function: PoseFunction) -> None:
+    value = function.value(PRESETS["paper-initial"], np.empty((0, 2, 3)), np.empty((0, 2, 3, 3)))
+    assert value.shape == (0, 2, *function.shape)
+
+
+@each_function
+def test_pose_function_in_another_unit_scales_by_its_power(function: PoseFunction) -> None:
+    @given(ordinary_cases(), st.sampled_from([1e-20, 1e-6, 1e-3, 1e3, 1e6, 1e20]))
+    def law(case: Case, factor: float) -> None:
+        other = case.scaled(factor)
+        expected = function.value(case.design, case.position, case.rotation)
+        value = function.value(other.design, other.position, other.rotation)
+        atol = 1e-9 * case.size**function.power
+        assert_allclose(value / factor**function.power, expected, rtol=1e-9, atol=atol)
+
+    law()
+
+
+@each_function
+@pytest.mark.parametrize(
+    ("position", "rotation"),
+    [
+        ([0.0, 1.0], EYE),
+        ([0.0, 1.0, math.nan], EYE),
+        ([0.0, math.inf, 1.0], EYE),
+        *(([0.0, 1.0, 2.0], matrix) for matrix in (np.eye(2), 2.0 * EYE, -EYE, np.ones((3, 3)))),
+        (np.zeros((2, 3)), np.broadcast_to(EYE, (3, 3, 3))),
+    ],
+)
+def test_pose_function_of_an_unusable_pose_is_refused(
+    function: PoseFunction, position: Any, rotation: Any
+) -> None:
+    refusal(function.value, PRESETS["paper-initial"], position, rotation)
