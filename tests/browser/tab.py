@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 import viser
-from playwright.sync_api import Browser, ConsoleMessage, Locator
+from playwright.sync_api import Browser, ConsoleMessage, Locator, expect
 
 from explorer.app.scene.camera import ViewName, framing
 from explorer.app.screenshot import PATIENCE_SECONDS, SCENE_CANVAS, fixed_resolution_url, settle
@@ -22,9 +22,6 @@ from explorer.numerics.arrays import FloatArray
 
 # Small, since what the pictures look like is tested elsewhere; panels and scene side by side.
 SIZE = (860, 480)
-
-# Far longer than a tab takes to turn.
-PRESS_AGAIN_SECONDS = 8.0
 
 # All that a console may say: what it logs, and these warnings. The first is viser's three.js
 # about itself, the second the software renderer about reading a frame back.
@@ -188,20 +185,10 @@ class Tab:
         self.page.get_by_role("button", name=words, exact=True).click()
 
     def turn_to(self, name: str) -> None:
-        """Turn to another tab of the panels.
-
-        A busy page now and then misses a press on a tab, which then is pressed again.
-        """
+        """Turn to another tab of the panels."""
         tab = self.page.get_by_role("tab", name=name, exact=True)
-        deadline = time.monotonic() + PATIENCE_SECONDS
-        is_selected = False
-        while not is_selected:
-            assert time.monotonic() < deadline, f"never turned to: {name}"
-            tab.click()
-            again = time.monotonic() + PRESS_AGAIN_SECONDS
-            while not is_selected and time.monotonic() < again:
-                self.page.wait_for_timeout(20)
-                is_selected = tab.get_attribute("aria-selected") == "true"
+        tab.click()
+        expect(tab).to_have_attribute("aria-selected", "true")
 
     def wait_for(self, condition: Callable[[], bool], what: str) -> None:
         """Wait until a condition is met.

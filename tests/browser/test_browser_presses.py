@@ -12,6 +12,16 @@ from explorer.app.state.frame import Frame
 
 REST = 1000 * (PAUSE_SECONDS + 0.3)
 
+# The page moves on as the pointer is released, and then does nothing for a second.
+BUSY_AT_RELEASE = """() => {
+    const move = () => {
+        const place = {bubbles: true, clientX: innerWidth, clientY: 0};
+        document.dispatchEvent(new MouseEvent("mousemove", place));
+        for (const end = performance.now() + 1000; performance.now() < end;);
+    };
+    addEventListener("pointerup", move, {capture: true, once: true});
+}"""
+
 
 def steps(tab: Tab) -> int:
     assert tab.running.page.session.wait_until_idle()
@@ -71,13 +81,25 @@ def test_drag_of_the_gizmo_that_rests_is_one_step(tab: Tab) -> None:
     assert steps(tab) == 1
 
 
+def test_last_value_that_a_busy_page_sends_late_is_of_the_press(tab: Tab) -> None:
+    settle(tab.page, tab.client)
+    x, y, width = grab(tab, "x")
+    move(tab, x + 0.05 * width, y)
+    tab.page.evaluate(BUSY_AT_RELEASE)
+    before = tab.state.pose
+    tab.page.mouse.up()
+    tab.wait_for(lambda: tab.state.pose != before, "the last value")
+    assert steps(tab) == 1
+
+
 def test_release_that_was_lost_ends_with_the_next_move_of_the_pointer(tab: Tab) -> None:
     settle(tab.page, tab.client)
     x, y, width = grab(tab, "x")
     move(tab, x + 0.05 * width, y)
     # In another window the page hears of none.
     tab.page.evaluate(
-        "addEventListener('pointerup', event => event.stopImmediatePropagation(), true)"
+        "addEventListener('pointerup', event => event.stopImmediatePropagation(),"
+        " {capture: true, once: true})"
     )
     tab.page.mouse.up()
     tab.page.mouse.move(x, y + 40, steps=2)

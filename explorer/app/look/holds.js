@@ -1,24 +1,37 @@
 window.explorer ??= {};
 
-// Reports when the pointer is held and released, to the number of this tab on the server.
+// Reports when the pointer is held and released, to the number of this tab on the server. A
+// control sends its last value up to 50 ms after the frame that follows its release, which is
+// reported after that.
 window.explorer.holds ??= (() => {
   // Id of the text control of this tab, which a new connection replaces.
   let inbox = null;
-  // Whether the pointer is held, and whether the explorer was told so.
+  const LATE_MILLISECONDS = 100;
+  // Whether the pointer is held, whether the explorer was told so, and how often that changed.
   let number = 0,
     isHeld = false,
-    isTold = false;
+    isTold = false,
+    changes = 0;
   const tell = (value) => {
     const message = { type: "GuiUpdateMessage", uuid: inbox, updates: { value } };
     window.__viserMutable?.sendMessage?.(message);
   };
   const goOn = () => {
+    changes += 1;
     if (!isTold) tell(number);
     isTold = true;
   };
-  const pause = () => {
+  const end = () => {
+    changes += 1;
     if (isTold) tell(-number);
     isTold = false;
+  };
+  const pause = () => {
+    const before = changes;
+    const endIfStill = () => {
+      if (changes === before) end();
+    };
+    requestAnimationFrame(() => setTimeout(endIfStill, LATE_MILLISECONDS));
   };
   const release = () => {
     isHeld = false;
@@ -29,7 +42,7 @@ window.explorer.holds ??= (() => {
     (event) => {
       if (!event.isPrimary || event.button !== 0) return;
       // The release of the previous press may have been lost.
-      release();
+      end();
       number += 1;
       isHeld = true;
       goOn();
@@ -52,6 +65,14 @@ window.explorer.holds ??= (() => {
     },
     true,
   );
+  // What a key does belongs to no press that is over.
+  addEventListener(
+    "keydown",
+    () => {
+      if (!isHeld) end();
+    },
+    true,
+  );
   // A touch may go on after the browser has cancelled its pointer.
   addEventListener(
     "pointercancel",
@@ -71,9 +92,10 @@ window.explorer.holds ??= (() => {
   }
   // A release in another window is never reported; a pointer that is still held moves again later.
   addEventListener("blur", pause);
-  addEventListener("pagehide", pause);
+  addEventListener("pagehide", end);
   document.addEventListener("visibilitychange", () => {
-    if (document.hidden) pause();
+    // A hidden page draws no frames.
+    if (document.hidden) end();
   });
   return (uuid) => {
     inbox = uuid;

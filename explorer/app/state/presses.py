@@ -10,9 +10,6 @@ import threading
 from collections import deque
 from dataclasses import dataclass
 
-# Time after a release in which values still count as of the press: a page sends the last value
-# of a control up to 0.05 s after its release.
-LATE_SECONDS = 0.3
 # Number of presses kept of each browser: changes may wait for the session during later presses.
 MOST_PRESSES = 16
 
@@ -37,7 +34,7 @@ class _Period:
     ended: float | None = None
 
     def contains(self, time: float) -> bool:
-        return self.began <= time and (self.ended is None or time <= self.ended + LATE_SECONDS)
+        return self.began <= time and (self.ended is None or time <= self.ended)
 
 
 class Presses:
