@@ -11,6 +11,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 import explorer
+from explorer.numerics.compiled import warm
 
 settings.register_profile(
     "laws",
@@ -46,3 +47,9 @@ def _data_of_its_own(  # pyright: ignore[reportUnusedFunction]
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("EXPLORER_DATA", str(tmp_path_factory.mktemp("data")))
         yield
+
+
+@pytest.fixture(scope="session")
+def warm_kernels() -> None:
+    """Compile all kernels before the first test that asks for it."""
+    warm()

@@ -6,7 +6,6 @@ import sys
 import threading
 import time
 import traceback
-from typing import get_args
 
 import numpy as np
 import viser
@@ -18,10 +17,11 @@ from explorer.app.features.feature import Panel, Place, Services
 from explorer.app.features.listed import FEATURES
 from explorer.app.layout import Layout
 from explorer.app.look import read_script, read_stylesheet
-from explorer.app.scene.camera import Cameras, ViewName
+from explorer.app.scene.camera import VIEWS, Cameras, ViewName
 from explorer.app.scene.placing import Placed
 from explorer.app.session.history import History
 from explorer.app.session.jobs import Worker
+from explorer.app.session.latest import start_timer
 from explorer.app.session.session import REDO, UNDO, Session, Who
 from explorer.app.state.frame import Frame
 from explorer.app.state.presses import Presses
@@ -53,7 +53,7 @@ REST_SECONDS, FEW_BROWSERS, LONGEST_REST_SECONDS = 0.002, 4, 0.04
 # Properties that decide whether a control can be used.
 USABILITY = ("disabled", "visible")
 HISTORY_MOVES = {"Undo": UNDO, "Redo": REDO}
-VIEW_LABELS: dict[str, ViewName] = {name.capitalize(): name for name in get_args(ViewName)}
+VIEW_LABELS: dict[str, ViewName] = {name.capitalize(): name for name in VIEWS}
 
 
 class Page:
@@ -265,9 +265,7 @@ class Page:
     def _schedule_redraw(self) -> None:
         """Schedule one more frame for when no control is moved, unless one is scheduled."""
         if self._redraw_timer is None:
-            self._redraw_timer = threading.Timer(QUIET_SECONDS, self._redraw)
-            self._redraw_timer.daemon = True
-            self._redraw_timer.start()
+            self._redraw_timer = start_timer(QUIET_SECONDS, self._redraw)
 
     def _redraw(self) -> None:
         self._redraw_timer = None

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
@@ -53,6 +53,17 @@ def limits_json(snapshot: Snapshot) -> dict[str, object]:
     """Return whether a pose is within the limits, and the limits that it violates."""
     violations = [str(violation) for violation in snapshot.violations]
     return {"within_limits": not violations, "violations": violations}
+
+
+def limits_lines(snapshot: Snapshot, subject: str = "") -> Iterator[str]:
+    """Yield whether a pose is within the limits, and the limits that it violates.
+
+    Args:
+        snapshot: Snapshot of the pose.
+        subject: Words before the verdict, such as "the start is ".
+    """
+    yield f"{subject}outside the limits:" if snapshot.violations else f"{subject}within the limits"
+    yield from (f"  {violation}" for violation in snapshot.violations)
 
 
 def write_lines(*lines: str) -> None:

@@ -28,6 +28,7 @@ from explorer.export.opencascade import (
     point,
     volume_of,
 )
+from explorer.measures.size import corners_of
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import FloatArray
@@ -164,8 +165,7 @@ class _Primitives:
                 yield from self._cone(limit)
 
     def _heights(self, plane: HalfSpace) -> FloatArray:
-        corners = np.array(np.meshgrid(*zip(self.lows, self.highs, strict=True)))
-        return corners.reshape(3, -1).T @ plane.normal
+        return corners_of(np.array([self.lows, self.highs])) @ plane.normal
 
     def _distances(self, limit: BallOrCylinder) -> tuple[float, float]:
         start = 0 if limit.is_ball else 1

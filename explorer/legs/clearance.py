@@ -8,6 +8,7 @@ both radii; a pair with a negative clearance collides.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +22,17 @@ from explorer.numerics.compiled import kernel
 
 PAIRS = ((1, 2), (1, 3), (1, 4), (2, 3), (2, 4), (3, 4))
 """Pairs of legs, in the order of every array axis of length six."""
+
+
+def pair_name(pair: tuple[int, int]) -> str:
+    """Return the name of a pair of legs, such as "1 – 2"."""
+    return f"{pair[0]} – {pair[1]}"
+
+
+def legs_of(pairs: Iterable[bool]) -> list[bool]:
+    """Return which of the four legs are in one of some pairs, given as truths as in `PAIRS`."""
+    chosen = [pair for pair, is_in in zip(PAIRS, pairs, strict=True) if is_in]
+    return [any(leg in pair for pair in chosen) for leg in (1, 2, 3, 4)]
 
 
 class LegClearances(NamedTuple):

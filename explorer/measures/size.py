@@ -20,7 +20,7 @@ def reach_of(design: Design) -> float:
     return max(design.reach, longest_length(design))
 
 
-def corners_of(box: tuple[Triple, Triple]) -> FloatArray:
+def corners_of(box: tuple[Triple, Triple] | FloatArray) -> FloatArray:
     """Return the corners of a box (lows, highs), shape (8, 3)."""
     lows, highs = box
     return np.array([[(lows, highs)[c >> a & 1][a] for a in range(3)] for c in range(8)])

@@ -26,13 +26,6 @@ from explorer.optimise.problem import YAW, Problem, Variable, start_value, varie
 from explorer.sweep.sampling import samples
 from explorer.sweep.study import RADIUS, Study, decode_study
 
-Status = Literal[
-    "done", "not converged", "empty workspace", "invalid design", "failed", "worker died"
-]
-"""Done: all is measured. Not converged: the search did not meet all demands; its best is measured.
-Empty workspace: only the design itself is measured. Invalid design: the variables make none.
-Failed: an error that is not the design's. Worker died: each process that tried it died."""
-
 Kind = Literal["count", "number", "flag", "text"]
 Value: TypeAlias = float | int | bool | str | None
 """Value of a row; None where there is none."""
@@ -64,7 +57,13 @@ class Rows:
 
 
 def columns_of(study: Study) -> dict[str, Kind]:
-    """Return the columns of a study's rows by name, in their order."""
+    """Return the columns of a study's rows by name, in their order.
+
+    The status is "done" (all is measured), "not converged" (the search did not meet all demands;
+    its best is measured), "empty workspace" (only the design itself is measured), "invalid
+    design" (the variables make none), "failed" (an error that is not the design's) or "worker
+    died" (each process that tried it died).
+    """
     columns: dict[str, Kind] = {"index": "count"}
     if study.polish is not None:
         columns.update((f"{SAMPLE}{name}", "number") for name in study.variables)

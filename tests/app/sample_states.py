@@ -39,6 +39,7 @@ from explorer.app.state.compared import Look
 from explorer.app.state.optimisation import PLACE, Comparison, OptimisationRequest, SearchResult
 from explorer.app.state.state import Run, State, opened
 from explorer.app.state.studies import Studies
+from explorer.app.state.values import value_at, with_value
 from explorer.app.state.view import PrototypeView, SingularView, View, WorkspaceView
 from explorer.errors import ExplorerError
 from explorer.measures.case import Case
@@ -65,14 +66,10 @@ class Change(Action):
     values: dict[str, Any]
 
     def apply(self, state: State) -> State:
-        return _changed(state, [*filter(None, self.part.split("."))], self.values)
-
-
-def _changed(value: Any, path: list[str], values: dict[str, Any]) -> Any:
-    if not path:
-        return replace(value, **values)
-    first, *rest = path
-    return replace(value, **{first: _changed(getattr(value, first), rest, values)})
+        if not self.part:
+            return replace(state, **self.values)
+        changed = replace(value_at(state, self.part), **self.values)
+        return with_value(state, self.part, changed)
 
 
 def _length(share: float) -> float:

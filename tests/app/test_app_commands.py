@@ -164,7 +164,7 @@ def heard(session: Session) -> Generator[list[object]]:
     asked: list[object] = []
     asks = threading.current_thread()
 
-    def post(_key: object, change: Any, *_: object) -> None:
+    def post(_key: object, change: Any, **_: object) -> None:
         if threading.current_thread() is not asks:
             return
         # What a state refuses is refused to whoever asks.
@@ -172,7 +172,7 @@ def heard(session: Session) -> Generator[list[object]]:
             asked.append(change(session.state) if callable(change) else change)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(session, "_post", post)
+        patch.setattr(session, "post", post)
         yield asked
     # The controls that were used go back to what is.
     session.redraw()

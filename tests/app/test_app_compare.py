@@ -21,7 +21,7 @@ from explorer.app.features.compare.bars import DRAWN, bars
 from explorer.app.features.compare.columns import Column, best_of, columns_of, notes, value_text
 from explorer.app.features.compare.drawing import ComparedRequest, compared_drawing
 from explorer.app.features.compare.feed import LIVE, CompareFeed
-from explorer.app.features.compare.panel import NO_DESIGN, ComparePanel
+from explorer.app.features.compare.panel import ComparePanel
 from explorer.app.features.compare.scene import APART, ComparedScene
 from explorer.app.features.compare.table import table
 from explorer.app.features.designs.saved_designs import SavedDesigns
@@ -39,6 +39,7 @@ from explorer.app.storage.user_data import UserData
 from explorer.app.widgets.assigning import Assigner
 from explorer.app.widgets.buttons import Buttons
 from explorer.app.widgets.colours import COMPARED
+from explorer.app.widgets.commands import NO_OPTION
 from explorer.errors import InputError
 from explorer.measures.case import Case
 from explorer.measures.catalogue import CATALOGUE, measures_in
@@ -383,7 +384,7 @@ def test_panel_pins_opens_unpins_and_switches(
     own = desk.state.design
     desk.press(buttons, "compare.pin")
     assert desk.state.compared.pinned == (own, None, None)
-    options = (NO_DESIGN, "variant 7", *PRESETS)
+    options = (NO_OPTION, "variant 7", *PRESETS)
     given = [
         value
         for handle, name, value in panel.updates(Frame(desk.state))

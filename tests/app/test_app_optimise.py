@@ -64,7 +64,6 @@ from explorer.mechanism.design import VARIABLES, Swing
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import Pose
-from explorer.numerics.compiled import warm
 from explorer.optimise.findings import paper_start
 from explorer.optimise.outcome import Iterate
 from explorer.optimise.problem import YAW
@@ -74,16 +73,13 @@ from explorer.optimise.solver import optimise_design
 from explorer.workspace.limits.constraints import constraints, slacks
 from explorer.workspace.slices.volume import workspace_volume
 
+pytestmark = pytest.mark.usefixtures("warm_kernels")
+
 OPTIMAL = PRESETS["paper-optimal"]
 PATIENCE = 240.0
 SMALL = OptimisationRequest(volume=8000.0)
 # With so many starts a search goes on until it is ended.
 ENDLESS = OptimisationRequest(objective="smallest-reach", volume=7053.0, starts=10_000)
-
-
-@pytest.fixture(autouse=True, scope="module")
-def _warm_kernels() -> None:  # pyright: ignore[reportUnusedFunction]
-    warm()
 
 
 class Bench:

@@ -49,21 +49,17 @@ from explorer.export.step import workspace_step
 from explorer.legs.clearance import PAIRS, leg_clearances
 from explorer.mechanism.design_file import PRESETS
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.compiled import warm
 from explorer.workspace.accessible.radii import RadiusCurve, radius_curve
 from explorer.workspace.accessible.start import StartError, check_start
 from explorer.workspace.accessible.workspace import reachable_workspace
 from explorer.workspace.least_clearance import least_clearances
 from explorer.workspace.limits.constraints import constraints, slacks
 
+pytestmark = pytest.mark.usefixtures("warm_kernels")
+
 OPTIMAL = PRESETS["paper-optimal"]
 RADIUS = 0.2
 Followed = TypeVar("Followed", bound=Feed)
-
-
-@pytest.fixture(autouse=True, scope="module")
-def _warm_kernels() -> None:  # pyright: ignore[reportUnusedFunction]
-    warm()
 
 
 @pytest.fixture

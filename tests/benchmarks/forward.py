@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from reference import read_reference
 
 from benchmarks.numeric_root import LoopEquations, nearby
 from benchmarks.samples import DESIGN, around_home, searches
@@ -18,7 +17,6 @@ from explorer.mechanism.margins import mode_of
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import warm
 
-CASES = Path(__file__).resolve().parents[1] / "data" / "kinematics.json"
 COUNT, CALLS, ROUNDS = 100_000, 500, 100
 
 
@@ -108,7 +106,7 @@ def error() -> Iterator[Row]:
 
 
 def _cases() -> list[Case]:
-    listing: list[dict[str, Any]] = json.loads(CASES.read_text("utf-8"))["cases"]
+    listing: list[dict[str, Any]] = read_reference("kinematics")["cases"]
     return [_case(entry) for entry in listing]
 
 

@@ -115,14 +115,14 @@ def logged(running: Running) -> Generator[Log]:
     session: Any = running.page.session
     scene: Any = running.viser.scene
     platform = scene._handle_from_node_name[PLATFORM]
-    post, handle = Session._post, Session._handle  # pyright: ignore[reportPrivateUsage]
+    post, handle = Session.post, Session._handle  # pyright: ignore[reportPrivateUsage]
 
-    def posting(self: Any, key: object, change: Any, stamp: Any, who: Any) -> None:
+    def posting(self: Any, key: object, change: Any, *, stamp: Any = None, who: Any = None) -> None:
         if isinstance(key, Slider):
             label = key.handle.label
             log.posted[label].append(time.monotonic())
             log.last[label][0] = max(stamp, log.last[label][0])
-        post(self, key, change, stamp, who)
+        post(self, key, change, stamp=stamp, who=who)
 
     def handling(self: Any, items: Sequence[Any]) -> None:
         log.began.append(time.monotonic())
@@ -133,12 +133,12 @@ def logged(running: Running) -> Generator[Log]:
             if isinstance(item.key, Slider):
                 log.last[item.key.handle.label][1] = item.stamp
 
-    session._post = posting.__get__(session)
+    session.post = posting.__get__(session)
     session._jobs._handle = handling.__get__(session)
     try:
         yield log
     finally:
-        del session._post
+        del session.post
         session._jobs._handle = session._handle
 
 

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import Any, cast
 
 import msgspec
 import numpy as np
 import pytest
-from limited_designs import limited, ordinary_case, reference_case, troubled_case
+from limited_designs import limited, ordinary_case, reference_case, scaled_design, troubled_case
 
 from explorer.legs.clearance import PAIRS, leg_clearances
 from explorer.measures.case import Case
@@ -16,7 +15,7 @@ from explorer.measures.catalogue import CATALOGUE, measures_in
 from explorer.measures.clearance import clearance_beyond, clearance_margin_of
 from explorer.measures.measurements import Measurements, measure_design
 from explorer.measures.snapshot import evaluate
-from explorer.mechanism.design import LENGTHS, VARIABLES, Design, Limits
+from explorer.mechanism.design import LENGTHS, VARIABLES, Design
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.margins import margins
@@ -45,33 +44,6 @@ def samples(design: Design, rotation: FloatArray, about: Solid, count: int = 800
 def compared(design: Design) -> Measurements:
     """Return the measures that Compare lists."""
     return measure_design(Case(design), measures_in("compare"))
-
-
-def scaled(design: Design, factor: float) -> Design:
-    """Return a design so many times as large."""
-
-    def times(value: Any) -> Any:
-        if isinstance(value, tuple):
-            return tuple(times(each) for each in cast("tuple[Any, ...]", value))
-        return value * factor if isinstance(value, float) else value
-
-    limits = {
-        name: times(getattr(design.limits, name))
-        for name in Limits.__struct_fields__
-        if name != "swing"
-    }
-    home = home_pose(design)
-    x, y, z = (value * factor for value in home.position)
-    return msgspec.structs.replace(
-        design,
-        a3=times(design.a3),
-        b1=times(design.b1),
-        b2=design.b2 * factor,
-        b3=design.b3 * factor,
-        node_step=times(design.node_step),
-        limits=msgspec.structs.replace(design.limits, **limits),
-        home=Pose((x, y, z), home.quaternion),
-    )
 
 
 @pytest.mark.parametrize("design", CASES, ids=lambda d: d.name)
@@ -172,7 +144,7 @@ def test_clearance_beyond_counts_off_singular_planes_only() -> None:
 @pytest.mark.parametrize("seed", range(3))
 def test_measures_of_scaled_design_have_their_power_of_length(seed: int, factor: float) -> None:
     design = ordinary_case(seed)[0]
-    one, other = compared(design), compared(scaled(design, factor))
+    one, other = compared(design), compared(scaled_design(design, factor))
     for name, small in one.values.items():
         measure, large = CATALOGUE[name], other[name]
         assert small is not None

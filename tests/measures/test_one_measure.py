@@ -19,20 +19,16 @@ from explorer.measures.catalogue import CATALOGUE, measures_in
 from explorer.measures.measurements import measure_design
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS, encode_design
-from explorer.numerics.compiled import warm
 from explorer.optimise.defaults import make_problem
 from explorer.optimise.findings import paper_start
 from explorer.optimise.problem import Problem
+
+pytestmark = pytest.mark.usefixtures("warm_kernels")
 
 Places = dict[str, dict[str, float | None]]
 
 SWIFT = [name for name, each in measures_in("studies").items() if each.cost == "low"]
 BOX = ((9.0, 4.0, 8.0), (11.0, 6.0, 10.0))
-
-
-@pytest.fixture(autouse=True, scope="module")
-def _warm_kernels() -> None:  # pyright: ignore[reportUnusedFunction]
-    warm()
 
 
 def problem() -> Problem:

@@ -16,7 +16,6 @@ from explorer.measures.clearance import CERTAIN, clearance_beyond
 from explorer.mechanism.design import Design, DesignError, Limits
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
-from explorer.numerics.compiled import warm
 from explorer.optimise.defaults import make_problem
 from explorer.optimise.problem import Problem, Variable
 from explorer.optimise.refutation.binding import find_binding_limit
@@ -34,13 +33,10 @@ from explorer.optimise.search.model import Model
 from explorer.optimise.search.trail import MET
 from explorer.optimise.solver import optimise_design
 
+pytestmark = pytest.mark.usefixtures("warm_kernels")
+
 INITIAL, OPTIMAL = PRESETS["paper-initial"], PRESETS["paper-optimal"]
 PROBLEMS, DESIGNS = 100, 4
-
-
-@pytest.fixture(autouse=True, scope="module")
-def _warm_kernels() -> None:  # pyright: ignore[reportUnusedFunction]
-    warm()
 
 
 def random_problem(rng: np.random.Generator) -> Problem:

@@ -6,14 +6,13 @@ orientations, and the answers of all parts for single poses with each other.
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
 from typing import Any
 
 import msgspec
 import numpy as np
 import pytest
 from limited_designs import limited, ordinary_case
+from reference import read_reference
 from scipy.spatial.transform import Rotation
 
 from explorer import (
@@ -41,9 +40,7 @@ from explorer.workspace.solids.solids import dexterous_solid, reachable_solid, w
 pytestmark = pytest.mark.usefixtures("warm_kernels")
 
 OPTIMAL = PRESETS["paper-optimal"]
-CASES: list[dict[str, Any]] = json.loads(
-    (Path(__file__).parents[1] / "data" / "orientation.json").read_text(encoding="utf-8")
-)["cases"]
+CASES: list[dict[str, Any]] = read_reference("orientation")["cases"]
 # Half a turn of the platform about the base's z-axis reverses the order of the carriages.
 MIRRORED = np.diag([-1.0, -1.0, 1.0]) @ home_pose(OPTIMAL).rotation
 

@@ -11,12 +11,12 @@ import itertools
 import json
 import math
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from limited_designs import limited, ordinary_case, shell_case, troubled_case
+from reference import read_reference
 
 from explorer import Design
 from explorer.mechanism.design import LENGTHS, VARIABLES, Swing
@@ -27,9 +27,7 @@ from explorer.workspace.limits.region import region_of
 from explorer.workspace.slices.integration import RESULTS, TOTAL, TOTAL_ERROR, integrate_slices
 from explorer.workspace.slices.volume import bounds, home_rotation, quadrature, workspace_volume
 
-DEFECTS: list[dict[str, Any]] = json.loads(
-    (Path(__file__).parents[1] / "data" / "defects_volume.json").read_text(encoding="utf-8")
-)["workspaces"]
+DEFECTS: list[dict[str, Any]] = read_reference("defects_volume")["workspaces"]
 SEEDS = 40
 PARTS = 150
 # The rounding of the sum of the parts, as a share of it.

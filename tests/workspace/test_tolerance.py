@@ -9,13 +9,13 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import msgspec
 import numpy as np
 import pytest
 from limited_designs import limited
+from reference import read_reference
 from scipy.spatial.transform import Rotation
 
 from explorer import (
@@ -45,9 +45,7 @@ from explorer.workspace.orientations import orientations_within
 
 pytestmark = pytest.mark.usefixtures("warm_kernels")
 
-DEFECTS: list[dict[str, Any]] = json.loads(
-    (Path(__file__).parents[1] / "data" / "defects_optimise.json").read_text(encoding="utf-8")
-)["optimise"]
+DEFECTS: list[dict[str, Any]] = read_reference("defects_optimise")["optimise"]
 # A share of the reach: far more than rounding, far less than a manufacturing tolerance.
 LITTLE = 1e-7
 

@@ -20,7 +20,8 @@ def read_script(name: str, *arguments: object) -> str:
         name: The script's name without the suffix.
         arguments: Values of JSON for the function that the script sets.
     """
-    source = packaged_file(FOLDER, f"{name}.js").read_text("utf-8")
+    # Scripts come to a page in any order, so that each brings what all of them use.
+    source = _text("base.js") + _text(f"{name}.js")
     if not arguments:
         return source
     values = ", ".join(msgspec.json.encode(each).decode() for each in arguments)
@@ -29,4 +30,8 @@ def read_script(name: str, *arguments: object) -> str:
 
 def read_stylesheet() -> str:
     """Return the script that puts the stylesheet into a page, in place of an older one."""
-    return read_script("style", packaged_file(FOLDER, "page.css").read_text("utf-8"))
+    return read_script("style", _text("page.css"))
+
+
+def _text(file: str) -> str:
+    return packaged_file(FOLDER, file).read_text("utf-8")

@@ -1,5 +1,3 @@
-window.explorer ??= {};
-
 // Sends presses on markup, [data-press=name] with an optional data-value, to the server's inbox.
 window.explorer.buttons ??= (() => {
   let inbox = null;
@@ -8,8 +6,7 @@ window.explorer.buttons ??= (() => {
   window.explorer.press = (name, value) => {
     count += 1;
     const text = JSON.stringify({ name, value, count });
-    const message = { type: "GuiUpdateMessage", uuid: inbox, updates: { value: text } };
-    window.__viserMutable?.sendMessage?.(message);
+    window.explorer.send(inbox, text);
   };
   const buttonAt = (target) => target.closest?.("[data-press]") ?? null;
   const isSame = (one, other) =>

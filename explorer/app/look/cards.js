@@ -1,5 +1,3 @@
-window.explorer ??= {};
-
 // Closes the card on top at Escape or a click beside it; opens the palette at a press on
 // [data-opens=commands].
 window.explorer.cards ??= (() => {

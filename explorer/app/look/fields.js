@@ -1,5 +1,3 @@
-window.explorer ??= {};
-
 // Lets number fields take a value only when it is complete, lets lines of text be emptied and typed
 // again, and sends keys where a user expects them.
 window.explorer.fields ??= (() => {

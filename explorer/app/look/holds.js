@@ -1,21 +1,18 @@
-window.explorer ??= {};
-
 // Reports when the pointer is held and released, to the number of this tab on the server. A
 // control sends its last value up to 50 ms after the frame that follows its release, which is
 // reported after that.
 window.explorer.holds ??= (() => {
-  // Id of the text control of this tab, which a new connection replaces.
-  let inbox = null;
+  // Time from that frame to the report.
   const LATE_MILLISECONDS = 100;
-  // Whether the pointer is held, whether the explorer was told so, and how often that changed.
+  // Id of the number field of this tab, which a new connection replaces.
+  let inbox = null;
+  // Number of the press, whether the pointer is held, whether the explorer was told so, and how
+  // often something was to be told.
   let number = 0,
     isHeld = false,
     isTold = false,
     changes = 0;
-  const tell = (value) => {
-    const message = { type: "GuiUpdateMessage", uuid: inbox, updates: { value } };
-    window.__viserMutable?.sendMessage?.(message);
-  };
+  const tell = (value) => window.explorer.send(inbox, value);
   const goOn = () => {
     changes += 1;
     if (!isTold) tell(number);

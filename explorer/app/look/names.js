@@ -1,5 +1,3 @@
-window.explorer ??= {};
-
 // Gives each control the words beside it as its name for screen readers.
 window.explorer.names ??= (() => {
   const CONTROLS =

@@ -1,5 +1,3 @@
-window.explorer ??= {};
-
 // Reports brushes and picks in the plots of studies as presses of "studies.plot".
 window.explorer.plots ??= (() => {
   const tell = (plot, event) => {

@@ -1,5 +1,3 @@
-window.explorer ??= {};
-
 // Makes the scene fill the room beside the panels, and keeps panels that grow within the window.
 window.explorer.room ??= (() => {
   // Milliseconds to wait; panels take less to glide to their places.

@@ -1,5 +1,3 @@
-window.explorer ??= {};
-
 // Puts the stylesheet into the page, in place of an older one.
 window.explorer.style ??= (() => {
   const element = document.createElement("style");

@@ -1,9 +1,5 @@
-window.explorer ??= {};
-
 // Reports the size of the window, and whether its user prefers dark pages, to a text control.
 window.explorer.window_facts ??= (uuid) => {
   const dark = matchMedia("(prefers-color-scheme: dark)").matches;
-  const value = JSON.stringify({ width: innerWidth, height: innerHeight, dark });
-  const message = { type: "GuiUpdateMessage", uuid, updates: { value } };
-  window.__viserMutable?.sendMessage?.(message);
+  window.explorer.send(uuid, JSON.stringify({ width: innerWidth, height: innerHeight, dark }));
 };

@@ -9,6 +9,7 @@ import numpy as np
 
 from explorer.app.scene.placing import Placed
 from explorer.app.widgets.assigning import Update
+from explorer.measures.size import corners_of
 from explorer.numerics.arrays import FloatArray
 
 # Half the edge of a cube about a joint, in scene units.
@@ -30,10 +31,5 @@ class ScenePart(ABC):
 
 def around(points: FloatArray) -> FloatArray:
     """Return the corners of cubes about points (n, 3) of the mechanism, shape (8 n, 3)."""
-    half = box_corners(np.array([[-HALF_JOINT] * 3, [HALF_JOINT] * 3]))
+    half = corners_of(np.array([[-HALF_JOINT] * 3, [HALF_JOINT] * 3]))
     return (points[:, None] + half).reshape(-1, 3)
-
-
-def box_corners(ends: FloatArray) -> FloatArray:
-    """Return the corners (8, 3) of a box with the lows and highs (2, 3)."""
-    return np.array(np.meshgrid(*ends.T)).reshape(3, -1).T

@@ -28,6 +28,9 @@ SIDES = np.array([[0, 1], [1, 2], [2, 3], [3, 0]])
 NO_MESH: Mesh = (np.zeros((3, 3)), np.array([[0, 1, 2]]))
 """The mesh before the first frame, where each frame has its own."""
 
+TETRAHEDRON_FACES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
+"""The faces of a tetrahedron, as indices of its corners."""
+
 
 def add_lines(
     scene: viser.SceneApi,

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Generic, Protocol, TypeVar, cast
 
 from explorer.app.session.jobs import LONG_SECONDS, Worker
+from explorer.app.session.latest import start_timer
 from explorer.app.session.worker import CANCELLED, Channel
 from explorer.app.state.frame import Frame
 
@@ -206,9 +207,7 @@ class Feed(Generic[Request, Drawing]):
             self._redraw()
         elif is_first:
             # The stage of a drawing that is done by then is not shown.
-            timer = threading.Timer(LONG_SECONDS, self._show_stage, (count,))
-            timer.daemon = True
-            timer.start()
+            start_timer(LONG_SECONDS, self._show_stage, count)
 
     def _show_stage(self, count: int) -> None:
         if count == self._status.count and not self.is_settled:

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from typing import IO, Any, cast
 
 from explorer.app.session.faults import Fault, Faults, log_fault
-from explorer.app.session.latest import LatestWins
+from explorer.app.session.latest import LatestWins, start_timer
 from explorer.app.session.worker import (
     Cancel,
     Message,
@@ -146,7 +146,7 @@ class Worker:
                 write_frame(cast("IO[bytes]", self._process.stdin), Cancel(number))
         self._drop_deadline(number)
         if patience is not None:
-            self._deadlines[number] = _start_timer(patience, self._kill, number)
+            self._deadlines[number] = start_timer(patience, self._kill, number)
 
     def _drop_deadline(self, number: int) -> None:
         deadline = self._deadlines.pop(number, None)
@@ -168,7 +168,7 @@ class Worker:
         if number != self._outdated and self._queue.is_waiting(key):
             self._outdated = number
             delay = max(0.0, since + LONG_SECONDS - time.monotonic())
-            _start_timer(delay, self._cancel_if_current, number)
+            start_timer(delay, self._cancel_if_current, number)
 
     def _cancel_if_current(self, number: int) -> None:
         with self._writing:
@@ -190,7 +190,7 @@ class Worker:
         return self._queue.wait_until_idle(timeout)
 
     def stop(self) -> None:
-        """End the process, whatever it is current."""
+        """End the process, whatever it is doing."""
         with self._lock:
             self._stopped = True
             if self._process is not None:
@@ -304,13 +304,6 @@ class Worker:
                     env={**os.environ, **paths},
                 )
             return self._process
-
-
-def _start_timer(seconds: float, call: Callable[[int], None], number: int) -> threading.Timer:
-    timer = threading.Timer(seconds, call, (number,))
-    timer.daemon = True
-    timer.start()
-    return timer
 
 
 def _receive(request: _Request, process: subprocess.Popen[bytes]) -> Reply:

@@ -90,17 +90,23 @@ class Session:
         return self._history
 
     def post(
-        self, key: object, change: Change, *, stamp: float | None = None, who: Who = None
+        self,
+        key: object,
+        change: Change | HistoryMove,
+        *,
+        stamp: float | None = None,
+        who: Who = None,
     ) -> None:
         """Queue a change, in place of one with the same key that waits.
 
         Args:
             key: Key of the change, for instance its slider.
-            change: Makes the action from the state at the time.
+            change: Makes the action from the state at the time, or moves through the history.
             stamp: Time of the event, in seconds; now if None.
             who: The client to tell if the change is not possible.
         """
-        self._post(key, change, stamp, who)
+        at = time.time() if stamp is None else stamp
+        self._jobs.post(key, at, _Posted(change, key, at, who))
 
     def do(self, action: Action, *, who: Who = None) -> None:
         """Queue an action that no other may replace."""
@@ -108,11 +114,12 @@ class Session:
 
     def travel(self, travel: HistoryMove, *, who: Who = None) -> None:
         """Queue a move through the history that no other may replace."""
-        self._post(object(), travel, None, who)
+        self.post(object(), travel, who=who)
 
     def travel_to(self, key: object, number: int, *, stamp: float | None, who: Who) -> None:
         """Queue a move to the step with a number, in place of one with the same key."""
-        self._post(key, HistoryMove(lambda history: history.move_to(number)), stamp, who)
+        move = HistoryMove(lambda history: history.move_to(number))
+        self.post(key, move, stamp=stamp, who=who)
 
     def is_waiting(self, key: object) -> bool:
         """Whether a change with this key waits."""
@@ -139,12 +146,6 @@ class Session:
     def stop(self) -> None:
         """End the session's thread."""
         self._jobs.stop()
-
-    def _post(
-        self, key: object, change: Change | HistoryMove, stamp: float | None, who: Who
-    ) -> None:
-        at = time.time() if stamp is None else stamp
-        self._jobs.post(key, at, _Posted(change, key, at, who))
 
     def _handle(self, items: Sequence[_Posted]) -> None:
         try:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import unicodedata
 from collections.abc import Generator
 from pathlib import Path
 
@@ -31,6 +32,17 @@ def data_folder() -> Path:
     if named:
         return Path(named).expanduser().absolute()
     return user_data_path(NAME, appauthor=False)
+
+
+def plain_words(name: str, most: int) -> str:
+    """Return the ASCII letters and digits of a name, words joined by hyphens; "" without any.
+
+    Args:
+        name: Any name.
+        most: Number of characters at most.
+    """
+    plain = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode()
+    return "-".join("".join(c if c.isalnum() else " " for c in plain).split())[:most].strip("-")
 
 
 def make_data_folder(folder: Path) -> Path:

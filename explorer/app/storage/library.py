@@ -17,7 +17,7 @@ from typing import Annotated
 
 import msgspec
 
-from explorer.app.storage.folder import data_folder, lock_folder
+from explorer.app.storage.folder import data_folder, lock_folder, plain_words
 from explorer.errors import InputError, StorageError
 from explorer.files.writing import make_folder, move, read_at_most, write_whole
 from explorer.mechanism.design import Design
@@ -284,10 +284,9 @@ class Library:
 
 def file_of(name: str) -> str:
     """Return the name of a design's file: plain on every system, different for each name."""
-    plain = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode().lower()
-    slug = "-".join("".join(c if c.isalnum() else " " for c in plain).split())[:_SLUG].strip("-")
+    slug = plain_words(name, _SLUG).lower() or "design"
     digest = hashlib.blake2b(name.encode("utf-8", "surrogatepass")).hexdigest()[:_DIGITS]
-    return f"{slug or 'design'}-{digest}.json"
+    return f"{slug}-{digest}.json"
 
 
 def _tidy(name: str) -> str:

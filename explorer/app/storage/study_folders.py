@@ -6,11 +6,10 @@ kept as a file beside the folder of its results, so that it is known before ther
 
 from __future__ import annotations
 
-import unicodedata
 from collections.abc import Sequence
 from pathlib import Path
 
-from explorer.app.storage.folder import make_data_folder
+from explorer.app.storage.folder import make_data_folder, plain_words
 from explorer.errors import InputError
 from explorer.files.writing import read_at_most, write_whole
 from explorer.sweep.parts import BadPartError, part_paths, read_part
@@ -70,9 +69,7 @@ class StudyFolders:
         Raises:
             StorageError: the folder of studies cannot be made.
         """
-        plain = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode()
-        words = "".join(c if c.isalnum() else " " for c in plain).split()
-        slug = "-".join(words)[:_LONGEST].strip("-") or "study"
+        slug = plain_words(name, _LONGEST) or "study"
         home = make_data_folder(self.home)
         number = 1
         taken = {path.stem for path in home.iterdir()}

@@ -146,11 +146,13 @@ class Control(Generic[Value]):
 
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that make the control show the frame."""
+        yield from self._show(frame.state, self._bound.read(frame))
+
+    def _show(self, state: State, value: Value) -> Iterator[Update]:
         if self._disabled is not None:
-            yield self.handle, "disabled", self._disabled(frame.state)
+            yield self.handle, "disabled", self._disabled(state)
         if self._visible is not None:
-            yield self.handle, "visible", self._visible(frame.state)
-        value = self._bound.read(frame)
+            yield self.handle, "visible", self._visible(state)
         # While a newer change waits, its value counts.
         if value != self._last_value and not self._session.is_waiting(self):
             self._last_value = value
@@ -169,13 +171,7 @@ class Slider(Control[float]):
         disabled: Condition | None,
         marks: Callable[[Frame], tuple[Mark, ...]] | None,
     ) -> None:
-
-        def shown(frame: Frame) -> float:
-            # A field would show rounding as −0.00.
-            span = self._span_in(frame.state)
-            return drop_rounding(bound.read(frame), max(abs(span.low), abs(span.high)))
-
-        super().__init__(session, handle, Bound(shown, bound.write), disabled=disabled)
+        super().__init__(session, handle, bound, disabled=disabled)
         self._slider = handle
         self._span = span
         self._marks = marks
@@ -184,8 +180,9 @@ class Slider(Control[float]):
 
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that make the slider show the frame, its range and marks first."""
-        span = self._span_in(frame.state)
-        value = self._bound.read(frame)
+        span = self._span if isinstance(self._span, Span) else self._span(frame.state)
+        # A field would show rounding as −0.00.
+        value = drop_rounding(self._bound.read(frame), max(abs(span.low), abs(span.high)))
         low, high = min(span.low, value), max(span.high, value)
         if (low, high, span.step) != self._range:
             self._range = (low, high, span.step)
@@ -195,10 +192,7 @@ class Slider(Control[float]):
             yield self._slider, "precision", decimals(span.step)
         if self._marks is not None:
             yield self._marks_of, "marks", self._marks(frame)
-        yield from super().updates(frame)
-
-    def _span_in(self, state: State) -> Span:
-        return self._span if isinstance(self._span, Span) else self._span(state)
+        yield from self._show(frame.state, value)
 
 
 class Number(Control[float]):

@@ -121,6 +121,11 @@ def _message(role: str, look: str, title: str, body: str) -> str:
     return f'<div role="{role}" class="{look}"><b>{escape(title)}</b><br>{escape(body)}</div>'
 
 
+def sentence(message: str) -> str:
+    """Return a message with a capital and a full stop."""
+    return f"{message[:1].upper()}{message[1:]}{'' if message.endswith('.') else '.'}"
+
+
 def signed(value: float, digits: int = 3) -> str:
     """Return a number with a true minus sign."""
     return set_true_minus(format_fixed(value, digits))

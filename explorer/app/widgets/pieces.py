@@ -13,6 +13,8 @@ from typing import Any, Literal
 
 import viser
 
+from explorer.app.browser.viser_gaps import resend
+
 Kind = Literal["button", "choice", "switch", "list", "upload", "value"]
 
 
@@ -62,15 +64,12 @@ class Widget:
             client: The browser.
             value: New value; None to leave the value, as with a button.
         """
-        from viser import _messages
-
         state: Any = self.handle._impl
         state.update_timestamp = time.time()
         if value is not None:
             state.value = value
             if not state.is_button:
-                message = _messages.GuiUpdateMessage(state.uuid, {"value": value})
-                state.gui_api._websock_interface.queue_message(message)
+                resend(self.handle, "value")
         for callback in tuple(state.update_cb):
             callback(viser.GuiEvent(client, client.client_id, self.handle))
 

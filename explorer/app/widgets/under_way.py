@@ -20,10 +20,11 @@ class UnderWay:
     Args:
         gui: Controls of the page, to which the buttons are added.
         what: Name of the drawing, such as "workspace".
+        feed: Feed of the drawing.
     """
 
-    def __init__(self, gui: viser.GuiApi, what: str) -> None:
-        self._feed: AnyFeed | None = None
+    def __init__(self, gui: viser.GuiApi, what: str, feed: AnyFeed) -> None:
+        self._feed = feed
         self._cancel = gui.add_button(
             f"Stop computing the {what}",
             icon=viser.Icon.PLAYER_STOP,
@@ -36,14 +37,13 @@ class UnderWay:
             hint=f"Compute the {what} again after it was stopped.",
             visible=False,
         )
-        self._cancel.on_click(lambda _: self._feed and self._feed.cancel())
-        self._retry.on_click(lambda _: self._feed and self._feed.retry())
+        self._cancel.on_click(lambda _: feed.cancel())
+        self._retry.on_click(lambda _: feed.retry())
 
-    def updates(self, feed: AnyFeed) -> Iterator[Update]:
-        """Yield the updates that show the stage of a feed."""
-        self._feed = feed
-        yield self._cancel, "visible", feed.stage is not None
-        yield self._retry, "visible", feed.is_cancelled
+    def updates(self) -> Iterator[Update]:
+        """Yield the updates that show the buttons that have an effect."""
+        yield self._cancel, "visible", self._feed.stage is not None
+        yield self._retry, "visible", self._feed.is_cancelled
 
 
 def progress(feed: AnyFeed) -> str:

@@ -15,6 +15,7 @@ from explorer.cli.output import (
     indented,
     lengths,
     limits_json,
+    limits_lines,
     pose_table,
     radii_line,
     table,
@@ -47,7 +48,7 @@ def pose_lines(snapshot: Snapshot) -> Iterator[str]:
     closest = _closest(design, int(legs.closest), legs.clearance)
     verdict = _exact_verdict(legs.clearance, legs.clearance)
     yield from (table(rows, "<>>><<<"), "", f"{verdict}; closest {closest}")
-    yield from _limits_verdict("the pose", snapshot)
+    yield from limits_lines(snapshot, "the pose is ")
 
 
 def move_lines(move: MoveClearance, start: Snapshot, end: Snapshot) -> Iterator[str]:
@@ -83,8 +84,8 @@ def move_lines(move: MoveClearance, start: Snapshot, end: Snapshot) -> Iterator[
         ("the paper's, without", f"{paper}, in {steps}"),
     ]
     yield from (table(rows, "<>>>><<<"), "", table(verdicts, "<<"))
-    yield from _limits_verdict("the start", start)
-    yield from _limits_verdict("the end", end)
+    yield from limits_lines(start, "the start is ")
+    yield from limits_lines(end, "the end is ")
 
 
 def pose_json(snapshot: Snapshot) -> dict[str, object]:
@@ -151,12 +152,6 @@ def _exact_verdict(clearance: FloatArray, bound: FloatArray) -> str:
     if (bound <= 0.0).any():
         return f"legs touch: {_names(bound <= 0.0)}"
     return "the legs are clear"
-
-
-def _limits_verdict(what: str, snapshot: Snapshot) -> Iterator[str]:
-    is_within = not snapshot.violations
-    yield f"{what} is within the limits" if is_within else f"{what} is outside the limits:"
-    yield from (f"  {violation}" for violation in snapshot.violations)
 
 
 def _closest(design: Design, pair: int, clearance: FloatArray) -> str:

@@ -85,9 +85,9 @@ def _steps_of(design: Design, start: Pose, end: Pose) -> int:
     Raises:
         InputError: The number exceeds `MOST_STEPS`.
     """
-    from explorer.workspace.slices.volume import STEPS_IN_REACH
+    from explorer.workspace.slices.volume import node_step_of
 
-    step = design.node_step or design.reach / STEPS_IN_REACH
+    step = node_step_of(design)
     turn = math.acos(
         min(1.0, max(-1.0, 0.5 * (float(np.trace(end.rotation @ start.rotation.T)) - 1.0)))
     )

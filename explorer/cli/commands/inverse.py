@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from explorer.cli.options import DesignOptions, JsonOptions, PoseOptions
-from explorer.cli.output import heading, lengths, limits_json, pose_table, table
+from explorer.cli.output import heading, lengths, limits_json, limits_lines, pose_table, table
 from explorer.measures.snapshot import Snapshot, evaluate
 from explorer.mechanism.design import JOINTS, LENGTHS
 
@@ -35,5 +35,4 @@ def _lines(snapshot: Snapshot) -> Iterator[str]:
         allowed = f"{bounds[0]:.6g} to {bounds[1]:.6g}" if bounds else "none"
         rows.append((name, *lengths(design, value, design.reach), allowed))
     yield from (heading(design), pose_table(design, snapshot.pose), "", table(rows, "<>><"), "")
-    yield "outside the limits:" if snapshot.violations else "within the limits"
-    yield from (f"  {violation}" for violation in snapshot.violations)
+    yield from limits_lines(snapshot)

@@ -6,7 +6,6 @@ import datetime as dt
 import shlex
 from collections.abc import Callable, Iterable, Iterator
 from hashlib import sha256
-from importlib import resources
 from xml.etree.ElementTree import Element
 
 from explorer import __version__
@@ -29,6 +28,7 @@ from explorer.export.report.sections.parts import parts_section
 from explorer.export.report.sections.search import search_section
 from explorer.export.report.sections.singularity import singularity_section
 from explorer.export.report.sections.workspace import workspace_section
+from explorer.files.packaged import packaged_file
 from explorer.files.versions import versions
 from explorer.measures.catalogue import CATALOGUE
 from explorer.mechanism.design_file import PRESETS, encode_design
@@ -48,9 +48,7 @@ def report_html(data: ReportData, date: dt.date) -> str:
         date: Date of the report.
     """
     title = f"{_name(data)} – design report"
-    style = (
-        resources.files("explorer.export.report").joinpath("style.css").read_text(encoding="utf-8")
-    )
+    style = packaged_file("export/report", "style.css").read_text("utf-8")
     head = element(
         "head",
         element("meta", charset="utf-8"),

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar
 
 from explorer.app.state.action import Action
-from explorer.app.state.compared import SLOTS, Pinned
+from explorer.app.state.compared import SLOTS
 from explorer.app.state.state import State
+from explorer.app.state.values import with_value
 from explorer.errors import InputError
 from explorer.mechanism.design import Design
 
@@ -36,7 +37,7 @@ class Pin(Action):
             raise InputError(
                 f"{name} cannot be pinned: {', '.join(SLOTS)} are taken; unpin one of them first"
             )
-        return _with_pinned(state, pinned.index(None), self.design)
+        return with_value(state, f"compared.pinned.{pinned.index(None)}", self.design)
 
 
 @dataclass(frozen=True)
@@ -54,12 +55,4 @@ class Unpin(Action):
 
     def apply(self, state: State) -> State:
         """Return the next state."""
-        return _with_pinned(state, self.slot, None)
-
-
-def _with_pinned(state: State, slot: int, design: Design | None) -> State:
-    places = list(state.compared.pinned)
-    places[slot] = design
-    a, b, c = places
-    pinned: Pinned = (a, b, c)
-    return replace(state, compared=replace(state.compared, pinned=pinned))
+        return with_value(state, f"compared.pinned.{self.slot}", None)

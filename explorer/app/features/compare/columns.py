@@ -10,11 +10,12 @@ from explorer.app.features.compare.feed import LIVE, CompareFeed
 from explorer.app.features.optimise.words import decimals_of
 from explorer.app.state.compared import SLOTS
 from explorer.app.state.state import State
-from explorer.app.widgets.colours import COMPARED, Rgb, css
+from explorer.app.widgets.colours import COMPARED, Rgb
 from explorer.app.widgets.markup import LEAST, MOST, format_number
 from explorer.measures.catalogue import Measure
 from explorer.measures.measurements import Measurements
 from explorer.mechanism.design import Design
+from explorer.numerics.number_text import set_true_minus
 
 # Values that differ by a smaller share are equally good.
 SAME = 1e-9
@@ -60,10 +61,6 @@ class Column:
         """Return a value in the unit of the comparison; None if it is unknown."""
         value = self.own_value(measure)
         return None if value is None else value * self.factor**measure.power
-
-    def swatch(self) -> str:
-        """Return a square in the colour of the design, as HTML."""
-        return f'<span class="ex-swatch" style="--colour:{css(self.colour)}"></span>'
 
 
 def columns_of(state: State, feed: CompareFeed) -> tuple[Column, ...]:
@@ -112,7 +109,7 @@ def value_text(measure: Measure, value: float, size: float, *, signed: bool = Fa
     """Return a value with the decimals that suit a size, the largest value of its row."""
     if measure.is_whole:
         text = f"{value:+,.0f}" if signed else f"{value:,.0f}"
-        return text.replace(",", "\N{NARROW NO-BREAK SPACE}").replace("-", "−")
+        return set_true_minus(text.replace(",", "\N{NARROW NO-BREAK SPACE}"))
     if size != 0.0 and not LEAST <= size < MOST:
         return ("+" if signed and value >= 0.0 else "") + format_number(value)
     digits = decimals_of(size)
@@ -121,7 +118,7 @@ def value_text(measure: Measure, value: float, size: float, *, signed: bool = Fa
         # A difference within rounding counts as none.
         least = SAME * size if signed else 0.0
         return "0" if abs(value) <= least else format_number(value, 3)
-    return text.replace("-", "−")
+    return set_true_minus(text)
 
 
 def size_of(values: list[float | None]) -> float:

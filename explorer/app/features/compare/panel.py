@@ -23,11 +23,12 @@ from explorer.app.state.state import State
 from explorer.app.state.values import value_at
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import Buttons, press_button
+from explorer.app.widgets.commands import NO_OPTION
+from explorer.app.widgets.markup import box, swatch
 from explorer.errors import InputError
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
 
-NO_DESIGN = "—"
 PIN_LABEL = "Pin another design"
 
 
@@ -106,7 +107,7 @@ class ComparePanel:
         self._library = None if services.user_data is None else services.get(SavedDesigns)
         self.another = gui.add_dropdown(
             PIN_LABEL,
-            (NO_DESIGN, *PRESETS),
+            (NO_OPTION, *PRESETS),
             hint="Keep a copy of a preset or of a design of yours beside the live one.",
         )
         self.another.on_update(self._pin_chosen)
@@ -118,10 +119,10 @@ class ComparePanel:
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that make the panel show the frame."""
         compared = frame.state.compared
-        options = (NO_DESIGN, *self._choices())
+        options = (NO_OPTION, *self._choices())
         yield self.another, "options", options
         if not self._session.is_waiting(self):
-            yield self.another, "value", NO_DESIGN
+            yield self.another, "value", NO_OPTION
         columns = columns_of(frame.state, self._feed)
         shown = (columns, compared)
         if shown != self._shown:
@@ -174,17 +175,17 @@ class ComparePanel:
     def _page(self, state: State, columns: tuple[Column, ...]) -> str:
         look = state.compared.look
         if state.compared.is_empty:
-            return (
-                f'<div class="ex-box">{_pin_button()}'
+            return box(
+                _pin_button(),
                 '<p class="ex-dim ex-after">Pin this design, then change it: the live '
                 "one stands beside its copy. Up to three can be pinned, presets and designs of "
-                "yours too; their workspaces can be drawn over one another.</p></div>"
+                "yours too; their workspaces can be drawn over one another.</p>",
             )
         if look.shows == "table":
             body = table(columns, millimetres=look.millimetres)
         else:
             legend = "".join(
-                f'<span class="ex-whole">{column.swatch()}'
+                f'<span class="ex-whole">{swatch(column.colour)}'
                 f"<b>{column.letter}</b> {escape(column.design.name)}</span>"
                 for column in columns
             )
@@ -206,13 +207,10 @@ class ComparePanel:
                 is_on=switch.is_on(state),
             )
             for switch in SWITCHES
-            if look.overlay or switch.words != "live as turned"
+            if look.overlay or switch.at != "compared.look.at_pose"
         )
         pin = _pin_button(is_full=None not in state.compared.pinned)
-        return (
-            f'<div class="ex-box"><div class="ex-flow ex-before">{pin}{chips}</div>'
-            f"{body}{remarks}</div>"
-        )
+        return box(f'<div class="ex-flow ex-before">{pin}{chips}</div>', body, remarks)
 
     def _choices(self) -> dict[str, Design]:
         """Return the designs to pin, by name; no saved design has the name of a preset."""

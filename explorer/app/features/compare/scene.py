@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 from explorer.app.features.compare.drawing import ComparedDrawing
 from explorer.app.features.compare.feed import COLUMNS, LIVE, CompareFeed, unit_ratio
 from explorer.app.features.feature import Services
-from explorer.app.features.workspace.scene import ArrayPair
-from explorer.app.scene.part import NO_POINTS, ScenePart, box_corners
+from explorer.app.scene.creases import Drawn
+from explorer.app.scene.part import NO_POINTS, ScenePart
 from explorer.app.scene.placing import Placed
-from explorer.app.scene.shapes import NO_MESH, add_translucent
+from explorer.app.scene.shapes import NO_MESH, add_lines, add_translucent
 from explorer.app.state.compared import SLOTS
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.colours import COMPARED
+from explorer.measures.size import corners_of
 from explorer.mechanism.design import Design
 from explorer.numerics.arrays import FloatArray
 
@@ -44,7 +45,7 @@ class ComparedScene(ScenePart):
     def corners(self, placed: Placed) -> FloatArray:
         """Return the corners of the boxes about the workspaces that are drawn."""
         extents = self._feed.extents(placed.frame.state)
-        boxes = [box_corners(placed.scale * extent) for extent in extents]
+        boxes = [corners_of(placed.scale * extent) for extent in extents]
         return np.concatenate(boxes) if boxes else NO_POINTS
 
 
@@ -57,17 +58,10 @@ class _Column:
         self._mesh = add_translucent(
             scene, f"{name}/workspace", NO_MESH, OPACITY, colour=colour, is_flat=True
         )
-        self._lines = scene.add_line_segments(
-            f"{name}/outline",
-            np.zeros((1, 2, 3)),
-            colour,
-            thickness=2.5,
-            thickness_units="screen",
-            visible=False,
-        )
+        self._lines = add_lines(scene, f"{name}/outline", 1, colour, 2.5)
         self._label = scene.add_label(f"{name}/label", NAMES[column], visible=False)
         self._drawn: tuple[ComparedDrawing, float] | None = None
-        self._workspace: ArrayPair | None = None
+        self._workspace: Drawn | None = None
         self._outline: NDArray[np.float32] = np.zeros((1, 2, 3), dtype=np.float32)
         self._top: tuple[float, float, float] = (0.0, 0.0, 0.0)
 

@@ -15,6 +15,7 @@ from explorer.app.features.compare.columns import (
 )
 from explorer.app.features.compare.feed import LIVE
 from explorer.app.widgets.buttons import press_button
+from explorer.app.widgets.markup import swatch
 from explorer.measures.catalogue import Measure, measures_in
 
 # The measures that begin a group of rows.
@@ -44,7 +45,7 @@ def _head(column: Column) -> str:
         beside += _link(column, "unpin", f"Unpin {name}")
     wait = "" if column.is_current else ' <span class="ex-dim">…</span>'
     return (
-        f'<td colspan="2" class="ex-head"><div class="ex-cut">{column.swatch()}'
+        f'<td colspan="2" class="ex-head"><div class="ex-cut">{swatch(column.colour)}'
         f"<b>{column.letter}</b> {beside}</div>"
         f'<div class="ex-cut" title="{escape(name)}">{escape(name)}{wait}</div></td>'
     )

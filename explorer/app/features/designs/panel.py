@@ -18,7 +18,7 @@ from explorer.app.storage.library import Entry
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import Does, press_button
 from explorer.app.widgets.controls import Bound, Controls
-from explorer.app.widgets.markup import format_number
+from explorer.app.widgets.markup import box, format_number, note
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import LARGEST_FILE, PRESETS
 
@@ -183,7 +183,7 @@ def status(live: Design, saved: Design | None) -> str:
         words = "Not saved under a name yet; it comes back with the session."
     else:
         words = "Changed since it was saved."
-    return f'<div class="ex-note ex-dim">{escape(words)}</div>'
+    return note(escape(words))
 
 
 def list_designs(rows: Sequence[Row], current: str, foot: str = "") -> str:
@@ -193,7 +193,7 @@ def list_designs(rows: Sequence[Row], current: str, foot: str = "") -> str:
         '</span><span class="ex-reach">reach |a3|</span><span class="ex-acts"></span></div>'
     )
     lines = "".join(_line(row, row.name == current) for row in rows)
-    return f'<div class="ex-box">{head}{lines}{foot}</div>'
+    return box(head, lines, foot)
 
 
 def _foot(first: int, count: int, total: int, ways: Iterable[str]) -> str:

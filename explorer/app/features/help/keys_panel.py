@@ -16,6 +16,7 @@ from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import press_button
 from explorer.app.widgets.commands import PAGE, PALETTE_KEY, STEP, Key, shift, with_keys
+from explorer.app.widgets.markup import caption
 from explorer.app.widgets.palette import Command, group_of
 
 # Keys and pointers with which viser moves the camera.
@@ -143,7 +144,7 @@ def keys_table(commands: Iterable[Command]) -> str:
             groups.setdefault(group_of(command), []).append(_row(words, caps))
     camera = [_row(words, keycap(keys)) for keys, words in CAMERA]
     blocks = "".join(
-        f'<div><div class="ex-caption">{escape(name)}</div>{"".join(rows)}</div>'
+        f"<div>{caption(name)}{''.join(rows)}</div>"
         for name, rows in {**groups, "Camera": camera}.items()
     )
     return f'<div class="ex-keys">{blocks}</div>'

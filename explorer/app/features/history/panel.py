@@ -12,6 +12,7 @@ from explorer.app.session.history import Step
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import press_button
+from explorer.app.widgets.markup import box
 
 PRESS = "history.go"
 # Rows of the list; the slider reaches all steps.
@@ -76,7 +77,7 @@ def list_steps(steps: tuple[Step, ...], here: Step) -> str:
         )
         for step in steps
     )
-    return f'<div class="ex-box">{rows}</div>'
+    return box(rows)
 
 
 def _state(step: Step, here: Step) -> str:

@@ -12,7 +12,7 @@ from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.controls import Controls
 from explorer.app.widgets.markup import box, caption, dim, format_number, row, status, table
-from explorer.legs.clearance import PAIRS
+from explorer.legs.clearance import PAIRS, pair_name
 
 
 class LegsPanel:
@@ -37,7 +37,7 @@ class LegsPanel:
                 "and the start of the tab Workspace.",
                 "view.radius_curve",
             )
-            self._plot = RadiusPlot(gui)
+            self._plot = RadiusPlot(gui, services.get(RadiusFeed))
 
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that make the panel show the frame."""
@@ -46,7 +46,7 @@ class LegsPanel:
         yield self._move, "visible", frame.state.view.swept
         if frame.state.view.swept:
             yield self._move, "content", move_table(frame)
-        yield from self._plot.updates(frame, self._feed)
+        yield from self._plot.updates(frame)
 
 
 def clearance_table(frame: Frame) -> str:
@@ -80,7 +80,9 @@ def move_table(frame: Frame) -> str:
     else:
         verb = "collide" if move.clearance.min() < 0.0 else "touch"
         result = status(f"Legs {verb} on the way", "beyond")
-    pairs = ", ".join(_name(index) for index, overlaps in enumerate(move.overlaps) if overlaps)
+    pairs = ", ".join(
+        pair_name(pair) for pair, overlaps in zip(PAIRS, move.overlaps, strict=True) if overlaps
+    )
     paper = f"overlap of {pairs}" if pairs else "no overlap"
     rows: list[str] = []
     for index, clearance in enumerate(move.clearance.tolist()):
@@ -97,11 +99,6 @@ def move_table(frame: Frame) -> str:
     )
 
 
-def _name(index: int) -> str:
-    first, second = PAIRS[index]
-    return f"{first} – {second}"
-
-
 def _lengths(clearance: float, unit_mm: float) -> tuple[str, str]:
     if math.isinf(clearance):
         return "joined", ""
@@ -110,4 +107,4 @@ def _lengths(clearance: float, unit_mm: float) -> tuple[str, str]:
 
 def _row(index: int, clearance: float, *cells: str, is_closest: bool) -> str:
     look = "ex-beyond " * (clearance < 0.0) + "ex-strong" * is_closest
-    return row(_name(index), *cells, look=look.strip())
+    return row(pair_name(PAIRS[index]), *cells, look=look.strip())

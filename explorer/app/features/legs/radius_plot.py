@@ -25,7 +25,7 @@ from explorer.app.widgets.charts import (
     line,
 )
 from explorer.app.widgets.colours import Rgb
-from explorer.app.widgets.markup import alert, box, dim, format_number, row, swatch, table
+from explorer.app.widgets.markup import alert, box, dim, format_number, row, sentence, swatch, table
 from explorer.app.widgets.under_way import UnderWay, problem, progress
 from explorer.legs.clearance import PAIRS
 from explorer.mechanism.design import Design
@@ -58,7 +58,7 @@ class RadiusMark(NamedTuple):
 class RadiusPlot:
     """The chart and its numbers, hidden until they are requested."""
 
-    def __init__(self, gui: viser.GuiApi) -> None:
+    def __init__(self, gui: viser.GuiApi, feed: RadiusFeed) -> None:
         marks = (dots(mark.label, mark.colour, mark.size) for mark in marks_of(None, None))
         self._chart = add_chart(
             gui,
@@ -71,15 +71,16 @@ class RadiusPlot:
             padding=(8, 14, 0, 0),
         )
         self._words = gui.add_html("", visible=False)
-        self._under_way = UnderWay(gui, "curve")
+        self._feed = feed
+        self._under_way = UnderWay(gui, "curve", feed)
         self._plotted: tuple[RadiusCurve, float | None] | None = None
         self._data: tuple[NDArray[Any], ...] = (BLANK,) * 5
 
-    def updates(self, frame: Frame, feed: RadiusFeed) -> Iterator[Update]:
+    def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that make the chart and its numbers show the frame."""
-        shown = frame.state.view.radius_curve
+        shown, feed = frame.state.view.radius_curve, self._feed
         drawing = feed.drawing if shown else None
-        yield from self._under_way.updates(feed)
+        yield from self._under_way.updates()
         yield self._words, "visible", shown
         if shown:
             yield self._words, "content", radius_words(frame, feed)
@@ -159,8 +160,7 @@ def radius_words(frame: Frame, feed: RadiusFeed) -> str:
     note = "" if feed.is_current else f' <span class="ex-dim ex-small">{progress(feed)}</span>'
     if drawing.curve is None:
         reason = "" if drawing.trouble is None else drawing.trouble.reason
-        text = f"{reason[:1].upper()}{reason[1:]}."
-        return alert("Nothing can be reached, even without radii", text) + note
+        return alert("Nothing can be reached, even without radii", sentence(reason)) + note
     curve = drawing.curve
     if float(curve.volumes[0]) <= 0.0:
         return box(dim(f"The workspace is empty.{note}"))

@@ -11,16 +11,14 @@ import viser
 from explorer.app.features.feature import Services
 from explorer.app.scene.part import ScenePart
 from explorer.app.scene.placing import Placed
-from explorer.app.scene.shapes import add_lines, add_translucent
+from explorer.app.scene.shapes import TETRAHEDRON_FACES, add_lines, add_translucent
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.colours import OUTLINE, SWEPT, Rgb
-from explorer.legs.clearance import PAIRS
+from explorer.legs.clearance import legs_of
 from explorer.legs.interference import swept_tetrahedra
-from explorer.legs.moves import MoveClearance
 from explorer.numerics.arrays import FloatArray
 
 # Vertices 0 and 1 are the base ends at the start and at the end, 2 and 3 the platform ends.
-SOLID = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
 # Legs 1 and 4 sweep triangles, since their base ends do not move; a face drawn twice would be twice
 # as opaque.
 TRIANGLE = np.array([[0, 2, 3]])
@@ -39,7 +37,7 @@ class SweptTetrahedra(ScenePart):
             add_translucent(
                 scene,
                 f"/swept/{leg}",
-                (np.zeros((4, 3)), TRIANGLE if leg in (1, 4) else SOLID),
+                (np.zeros((4, 3)), TRIANGLE if leg in (1, 4) else TETRAHEDRON_FACES),
                 OPACITY,
                 is_flat=True,
             )
@@ -64,7 +62,7 @@ class SweptTetrahedra(ScenePart):
             np.array(end.position),
             end.rotation,
         )
-        colours = [OUTLINE if overlaps else SWEPT for overlaps in overlapping_legs(move)]
+        colours = [OUTLINE if overlaps else SWEPT for overlaps in legs_of(move.overlaps)]
         for mesh, corners, colour in zip(self._meshes, tetrahedra, colours, strict=True):
             yield mesh, "vertices", corners.astype(np.float32)
             yield mesh, "color", colour
@@ -91,9 +89,3 @@ class _Lines:
         yield self.handle, "points", points.astype(np.float32)
         end_colours = np.repeat(np.array(colours, dtype=np.uint8), 2 * len(self._edges), axis=0)
         yield self.handle, "colors", end_colours.reshape(-1, 2, 3)
-
-
-def overlapping_legs(move: MoveClearance) -> list[bool]:
-    """Return which of the four legs sweep a tetrahedron that overlaps another's."""
-    pairs = [pair for pair, overlaps in zip(PAIRS, move.overlaps, strict=True) if overlaps]
-    return [any(leg in pair for pair in pairs) for leg in (1, 2, 3, 4)]

@@ -15,6 +15,7 @@ from explorer.app.state.actions import Open, Reset, Set, SetVariable
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import Hold, State
 from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.commands import NO_OPTION
 from explorer.app.widgets.controls import At, Bound, Controls, Span
 from explorer.app.widgets.ranges import coordinate_span, length_span, radius_span, variable_span
 from explorer.mechanism.design import LENGTHS, VARIABLES, Design, Limits, Pair, Range
@@ -30,7 +31,6 @@ VARIABLE_HINTS = {
     "b3": "x of b3 in the platform frame; leg 3 ends there, never at b2.",
 }
 HOLDS: dict[str, Hold] = {"hold the pose": "pose", "hold the legs": "legs"}
-NO_PRESET = "—"
 # Half-angle in degrees at which a joint has no bound.
 NO_SWING = 180.0
 
@@ -45,7 +45,7 @@ class DesignPanel:
             controls.dropdown(
                 "Preset",
                 "Open one of the designs of the paper's Table 1, in its home pose.",
-                (*PRESETS, NO_PRESET),
+                (*PRESETS, NO_OPTION),
                 Bound(_preset_name, lambda state, chosen: Open(PRESETS.get(chosen, state.design))),
             )
             controls.dropdown(
@@ -259,7 +259,7 @@ class DesignPanel:
 
 def _preset_name(frame: Frame) -> str:
     name = frame.state.design.name
-    return name if PRESETS.get(name) == frame.state.design else NO_PRESET
+    return name if PRESETS.get(name) == frame.state.design else NO_OPTION
 
 
 def _set_limit(name: str, value: object) -> Set:

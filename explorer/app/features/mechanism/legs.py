@@ -17,7 +17,7 @@ from explorer.app.scene.placing import Placed
 from explorer.app.scene.shapes import Balls, Boxes, Rods
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.colours import BALL, CARRIAGE, JOINT, OUTLINE, RAIL, ROD, TUBE
-from explorer.legs.clearance import PAIRS
+from explorer.legs.clearance import legs_of
 from explorer.measures.snapshot import Snapshot
 from explorer.numerics.arrays import FloatArray
 
@@ -171,12 +171,7 @@ class TwinLegs(ScenePart):
 
 def colliding_legs(snapshot: Snapshot) -> list[bool]:
     """Return which of the four legs collide with another."""
-    pairs = [
-        pair
-        for pair, clearance in zip(PAIRS, snapshot.clearances.clearance.tolist(), strict=True)
-        if clearance < 0.0
-    ]
-    return [any(leg in pair for pair in pairs) for leg in (1, 2, 3, 4)]
+    return legs_of(snapshot.clearances.clearance < 0.0)
 
 
 def guide_span(placed: Placed) -> tuple[float, float]:

@@ -10,12 +10,11 @@ import numpy as np
 from explorer.app.features.feature import Services
 from explorer.app.scene.part import ScenePart
 from explorer.app.scene.placing import Placed
-from explorer.app.scene.shapes import add_lines, add_translucent, of_one_colour
+from explorer.app.scene.shapes import TETRAHEDRON_FACES, add_lines, add_translucent, of_one_colour
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.colours import OUTLINE, proximity_colour
 from explorer.mechanism.margins import TETRAHEDRA
 
-FACES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
 EDGES = np.array(list(itertools.combinations(range(4), 2)))
 OPACITY = 0.1
 
@@ -27,7 +26,7 @@ class Tetrahedra(ScenePart):
     """
 
     def __init__(self, services: Services) -> None:
-        scene, flat = services.scene, (np.zeros((4, 3)), FACES)
+        scene, flat = services.scene, (np.zeros((4, 3)), TETRAHEDRON_FACES)
         self._meshes = [
             add_translucent(scene, f"/tetrahedra/{index}/faces", flat, OPACITY, is_flat=True)
             for index in (1, 2, 3)

@@ -19,16 +19,16 @@ from explorer.app.state.optimisation import PLACE, Comparison, SearchResult
 from explorer.app.state.parts import kept_on_open
 from explorer.app.state.state import Optimisation, Run, State
 from explorer.app.state.values import with_value
+from explorer.app.storage.library import LONGEST_NAME
 from explorer.errors import ExplorerError, NoAnswerError
 from explorer.mechanism.design import Design
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import Pose
 from explorer.optimise.outcome import Iterate
-from explorer.optimise.problem import YAW
+from explorer.optimise.problem import YAW, Box
 from explorer.optimise.refutation.refutation import PAPER_BOX, with_box, words_of
 
 SUFFIX = "-optimised"
-LONGEST_NAME = 100
 
 
 @dataclass(frozen=True)
@@ -93,36 +93,35 @@ class StartRun(Action):
         )
 
 
+class _ReplaceBox(Action):
+    """Replace the box in the design's limits; its home pose stays where it is."""
+
+    box: ClassVar[Box | None]
+
+    def apply(self, state: State) -> State:
+        """Return the next state.
+
+        Raises:
+            InputError: the design is being optimised.
+        """
+        check_free(state)
+        return replace(state, design=with_box(state.design, self.box))
+
+
 @dataclass(frozen=True)
-class LiftBox(Action):
-    """Take the box out of the design's limits; its home pose stays where it is."""
+class LiftBox(_ReplaceBox):
+    """Take the box out of the design's limits."""
 
     template: ClassVar[str] = "Lift the box"
-
-    def apply(self, state: State) -> State:
-        """Return the next state.
-
-        Raises:
-            InputError: the design is being optimised.
-        """
-        check_free(state)
-        return replace(state, design=with_box(state.design, None))
+    box: ClassVar[Box | None] = None
 
 
 @dataclass(frozen=True)
-class TakePaperBox(Action):
-    """Bound the design by the box of the paper's optimum; its home pose stays where it is."""
+class TakePaperBox(_ReplaceBox):
+    """Bound the design by the box of the paper's optimum."""
 
     template: ClassVar[str] = "Take the paper's box"
-
-    def apply(self, state: State) -> State:
-        """Return the next state.
-
-        Raises:
-            InputError: the design is being optimised.
-        """
-        check_free(state)
-        return replace(state, design=with_box(state.design, PAPER_BOX))
+    box: ClassVar[Box | None] = PAPER_BOX
 
 
 @dataclass(frozen=True)
@@ -188,8 +187,7 @@ class Compare(Action):
         run = state.optimisation.run
         if run is None or run.number != self.number:
             return state
-        changed = replace(run, comparison=self.comparison)
-        return replace(state, optimisation=replace(state.optimisation, run=changed))
+        return with_value(state, "optimisation.run.comparison", self.comparison)
 
 
 @dataclass(frozen=True)
@@ -203,8 +201,7 @@ class Accept(Action):
         run = state.optimisation.run
         if run is None or not run.is_undecided:
             return state
-        accepted = replace(run, accepted=True)
-        return replace(state, optimisation=replace(state.optimisation, run=accepted))
+        return with_value(state, "optimisation.run.accepted", True)
 
 
 @dataclass(frozen=True)
@@ -218,8 +215,7 @@ class Revert(Action):
         run = state.optimisation.run
         if run is None or not run.is_undecided:
             return state
-        without_run = replace(state, optimisation=replace(state.optimisation, run=None))
-        return _restore_own(without_run, run.own)
+        return _restore_own(with_value(state, "optimisation.run", None), run.own)
 
 
 def _with_run(state: State, change: Callable[[Run], Run]) -> State:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import viser
 
@@ -63,9 +63,6 @@ ACCEPT, REVERT = "Accept", "Revert"
 HULL_FILE, DESIGN_FILE, SEARCH_FILE = "Hull", "Design", "Search"
 CANCEL_COLOUR, REMEDY_COLOUR = "red", "gray"
 STEP = 0.001
-
-Send = Callable[[int | None], None]
-"""Function that sends a file to one browser."""
 
 
 class OptimisePanel:

@@ -17,6 +17,8 @@ from explorer.app.widgets.markup import (
     format_number,
     meter,
     row,
+    sentence,
+    signed,
     status,
     table,
 )
@@ -24,6 +26,7 @@ from explorer.measures.catalogue import CATALOGUE
 from explorer.measures.clearance import CERTAIN
 from explorer.measures.measurements import Measurements
 from explorer.mechanism.design import VARIABLES
+from explorer.numerics.number_text import set_true_minus
 from explorer.optimise.curves import CALLED
 from explorer.optimise.problem import YAW, ObjectiveName, Problem
 from explorer.optimise.refutation.refutation import BOX_LIMIT, Refutation
@@ -49,7 +52,7 @@ GOALS: dict[ObjectiveName, str] = {
 def refused_words(refusals: Sequence[Refutation]) -> str:
     """Return the demands that the limits rule out, as HTML."""
     title = "No design can keep these demands"
-    body = " ".join(_sentence(refusal.message) for refusal in refusals)
+    body = " ".join(sentence(refusal.message) for refusal in refusals)
     if any(refusal.limit != BOX_LIMIT for refusal in refusals):
         body += " Lower the demands, or change the limits in the tab Design."
     return alert(title, body)
@@ -76,9 +79,9 @@ def progress_line(run: Run) -> str:
 def verdict_words(state: State, run: Run, verdict: SearchResult) -> str:
     """Return the verdict on a run, as HTML."""
     if verdict.status == "failed":
-        return alert("No result", f"{_sentence(verdict.message)} Your design is as it was.")
+        return alert("No result", f"{sentence(verdict.message)} Your design is as it was.")
     title = "Cancelled" if verdict.best is None else TITLES[verdict.status]
-    message = _sentence(verdict.message.removeprefix(f"{verdict.status}: "))
+    message = sentence(verdict.message.removeprefix(f"{verdict.status}: "))
     remarks: list[str] = []
     if verdict.starts > 1:
         remarks.append(f"{verdict.starts} starts, {verdict.converged} converged")
@@ -213,12 +216,12 @@ def decimals_of(size: float) -> int:
 
 
 def _number(value: float | None, digits: int) -> str:
-    return "none" if value is None else f"{value:.{digits}f}".replace("-", "−")
+    return "none" if value is None else signed(value, digits)
 
 
 def _change(value: float, digits: int) -> str:
     text = f"{value:+.{digits}f}"
-    return "0" if float(text) == 0.0 else text.replace("-", "−")
+    return "0" if float(text) == 0.0 else set_true_minus(text)
 
 
 def _running(title: str, text: str, share: float) -> str:
@@ -227,11 +230,6 @@ def _running(title: str, text: str, share: float) -> str:
         f'<div class="ex-dim ex-cut">{escape(text) or "&nbsp;"}</div>',
         meter(100.0 * share),
     )
-
-
-def _sentence(text: str) -> str:
-    """Return a message with a capital and a full stop."""
-    return f"{text[:1].upper()}{text[1:]}{'' if text.endswith('.') else '.'}"
 
 
 def _pair(legs: tuple[int, int] | None) -> str:

@@ -72,7 +72,8 @@ class MarginPlot:
         if journey is None:
             return
         columns = columns_of(journey)
-        top = 1.08 * max(float(np.abs(column).max()) for column in columns[1:4])
+        # The line at the present time goes from bottom to top.
+        top = float(np.nanmax(columns[-1]))
         yield self._chart, "scales", _scales(float(columns[0][-1]), top)
         yield self._chart, "data", columns
         yield self._words, "content", path_words(journey)

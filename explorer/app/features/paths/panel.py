@@ -27,7 +27,7 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.controls import Bound, Controls, Span
-from explorer.app.widgets.markup import alert, box, dim, row, signed, table
+from explorer.app.widgets.markup import alert, box, dim, row, sentence, signed, table
 from explorer.export.trajectory import trajectory_csv
 from explorer.mechanism.pose import Pose, yaw_pitch_roll_from_rotation
 
@@ -176,8 +176,7 @@ def plan_words(state: State) -> str | None:
     if paths.is_planning:
         return box(dim(f"Planning, for {paths.seconds:g} s at most …"))
     if paths.problem is not None:
-        problem = paths.problem
-        return alert("No path", f"{problem[:1].upper()}{problem[1:]}.")
+        return alert("No path", sentence(paths.problem))
     return None
 
 

@@ -25,7 +25,8 @@ class PartsFeed(Feed[PartsRequest, PartsDrawing]):
     @property
     def floor(self) -> float | None:
         """Height of the lowest point of the base in design units; None without parts."""
-        return None if self.parts is None else float(self.parts.meshes[0][0][:, 2].min())
+        parts = self.parts
+        return None if parts is None else parts.floor
 
 
 def _request(frame: Frame) -> PartsRequest | None:

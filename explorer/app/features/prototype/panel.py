@@ -14,7 +14,7 @@ from explorer.app.features.prototype.tasks import export_assembly
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.controls import Controls, Span
-from explorer.app.widgets.markup import alert, box, caption, note, row, table
+from explorer.app.widgets.markup import alert, box, caption, note, row, sentence, table
 from explorer.export.assembly import FORMATS
 from explorer.mechanism.design import LENGTHS
 from explorer.prototype.bill import Actuator
@@ -62,7 +62,7 @@ class PrototypePanel:
                 (*FORMATS, STEP),
                 hint="Format of the file: 3MF in millimetres, with names and "
                 "colours; GLB with the tree of joints; a zip with an STL for each part; STEP "
-                "with exact faces, which needs the extra cad.",
+                'with exact faces, which needs pip install "flagged-explorer[cad]".',
             )
             button = gui.add_button(
                 "Export assembly",
@@ -86,10 +86,12 @@ class PrototypePanel:
         yield self._trouble, "visible", trouble is not None
         if trouble is not None:
             yield self._trouble, "content", trouble
-        yield self._folder, "visible", feed.parts is not None
-        if feed.parts is not None:
+        # A failure in the worker takes the parts away at any time.
+        parts = feed.parts
+        yield self._folder, "visible", parts is not None
+        if parts is not None:
             density = frame.state.view.prototype.density
-            yield self._bill, "content", parts_table(feed.parts.listed, density)
+            yield self._bill, "content", parts_table(parts.listed, density)
 
 
 def trouble_of(frame: Frame, feed: PartsFeed) -> str | None:
@@ -102,15 +104,13 @@ def trouble_of(frame: Frame, feed: PartsFeed) -> str | None:
         return alert("The parts could not be made", feed.problem)
     drawing = feed.drawing
     if drawing is not None and drawing.refusal is not None:
-        return alert("No prototype of this design", _sentence(drawing.refusal))
+        return alert("No prototype of this design", sentence(drawing.refusal))
     if drawing is None or drawing.parts is None:
         return note("Making the parts …")
     broken = drawing.parts.prototype.broken_joint_limits(
         frame.state.pose.position, frame.snapshot.rotation
     )
-    return (
-        alert("The parts do not take this pose", _sentence("; ".join(broken))) if broken else None
-    )
+    return alert("The parts do not take this pose", sentence("; ".join(broken))) if broken else None
 
 
 def parts_table(listed: PartsList, density: float) -> str:
@@ -162,10 +162,6 @@ def _is_enough(actuator: Actuator) -> bool:
 def assembly_name(file_format: str) -> str:
     """Return the end of the name of a file of the assembly."""
     return SUFFIXES.get(file_format, f"mechanism.{file_format}")
-
-
-def _sentence(text: str) -> str:
-    return f"{text[0].upper()}{text[1:]}."
 
 
 def _mm(value: float) -> str:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
+from functools import cached_property
 
 from explorer.app.features.prototype.parts_list import PartsList, parts_list
 from explorer.app.scene.creases import Drawn, creased
@@ -33,6 +33,11 @@ class Parts:
     meshes: tuple[Drawn, ...]
     listed: PartsList
 
+    @cached_property
+    def floor(self) -> float:
+        """Height of the lowest point of the base, in design units."""
+        return float(self.meshes[0][0][:, 2].min())
+
 
 @dataclass(frozen=True)
 class PartsDrawing:
@@ -42,22 +47,18 @@ class PartsDrawing:
         request: Request that it answers.
         parts: Parts; None if the design is too tight for them.
         refusal: Why there are none, and what would fit.
-        seconds: Computing time.
     """
 
     request: PartsRequest
     parts: Parts | None
     refusal: str | None
-    seconds: float
 
 
 def parts_drawing(request: PartsRequest) -> PartsDrawing:
     """Return the parts of a design, ready to be drawn."""
-    begin = time.perf_counter()
     try:
         prototype = make_prototype(request.design)
     except ExplorerError as error:
-        return PartsDrawing(request, None, str(error), time.perf_counter() - begin)
+        return PartsDrawing(request, None, str(error))
     meshes = tuple(creased(part.vertices, part.faces) for part in prototype.parts)
-    parts = Parts(prototype, meshes, parts_list(prototype))
-    return PartsDrawing(request, parts, None, time.perf_counter() - begin)
+    return PartsDrawing(request, Parts(prototype, meshes, parts_list(prototype)), None)

@@ -16,8 +16,9 @@ from explorer.app.features.mechanism.legs import colliding_legs
 from explorer.app.features.prototype.feed import PartsFeed
 from explorer.app.features.prototype.parts import Parts
 from explorer.app.scene.creases import Drawn
-from explorer.app.scene.part import NO_POINTS, ScenePart, box_corners
+from explorer.app.scene.part import NO_POINTS, ScenePart
 from explorer.app.scene.placing import Placed
+from explorer.app.scene.shapes import NO_MESH
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.colours import (
     BALL,
@@ -29,6 +30,7 @@ from explorer.app.widgets.colours import (
     TUBE,
     Rgb,
 )
+from explorer.measures.size import corners_of
 from explorer.mechanism.pose import quaternion_from_rotation
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.assembly import exploded_offsets
@@ -56,14 +58,13 @@ class PrototypeScene(ScenePart):
 
     def __init__(self, services: Services) -> None:
         scene, self._feed = services.scene, services.get(PartsFeed)
-        empty = np.zeros((3, 3)), np.array([[0, 1, 2]])
         self._nodes: dict[str, viser.MeshHandle] = {}
         for name in NAMES:
             # The platform is the parent of the balls, so that they move with it.
             path = f"platform/{name}" if name in BALLS else name
             kind = name.partition(" ")[0]
             self._nodes[name] = scene.add_mesh_simple(
-                f"/prototype/{path}", *empty, color=COLOURS[kind], visible=False
+                f"/prototype/{path}", *NO_MESH, color=COLOURS[kind], visible=False
             )
         self._drawn: tuple[Parts, float] | None = None
         self._meshes: dict[str, Drawn] = {}
@@ -93,7 +94,7 @@ class PrototypeScene(ScenePart):
         for (vertices, _), origin, rotation in zip(
             parts.meshes, places.origin, places.rotation, strict=True
         ):
-            corners = box_corners(np.stack([vertices.min(axis=0), vertices.max(axis=0)]))
+            corners = corners_of(np.stack([vertices.min(axis=0), vertices.max(axis=0)]))
             seen.append(placed.scale * (corners @ rotation.T + origin))
         return np.concatenate(seen)
 

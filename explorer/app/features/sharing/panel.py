@@ -15,12 +15,11 @@ from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.markup import note
 
-TWICE = "twice as shown"
 OTHER = "other"
 SIZES: dict[str, tuple[int, int] | float] = {
     "1920 × 1080": (1920, 1080),
     "3840 × 2160": (3840, 2160),
-    TWICE: 2.0,
+    "twice as shown": 2.0,
 }
 """Width and height, or a factor on the size in the browser."""
 
@@ -51,7 +50,7 @@ class SharePanel:
                 "Report",
                 tuple(reports),
                 hint="The design in its present pose on a few pages: drawings, slices, tables, "
-                "limits. PDF needs the extra screenshot and a Chromium.",
+                'limits. PDF needs pip install "flagged-explorer[screenshot]" and a Chromium.',
             )
             report.on_click(lambda event: files.report(reports[report.value], event.client_id))
             self._words = gui.add_html("")

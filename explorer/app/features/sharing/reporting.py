@@ -7,15 +7,13 @@ from __future__ import annotations
 
 import datetime as dt
 from concurrent.futures import ThreadPoolExecutor
-from typing import Literal, get_args
+from typing import Literal
 
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose
 from explorer.optimise.record import Record
 
 ReportFormat = Literal["html", "pdf"]
-
-FORMATS: tuple[ReportFormat, ...] = get_args(ReportFormat)
 
 
 def make_report(

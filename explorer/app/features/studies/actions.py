@@ -10,6 +10,7 @@ from explorer.app.state.action import Action
 from explorer.app.state.actions import Open
 from explorer.app.state.state import State
 from explorer.app.state.studies import Range, Studies, label_of
+from explorer.app.state.values import with_value
 from explorer.errors import InputError
 
 # Ranges of one axis.
@@ -46,7 +47,8 @@ class BrushAxis(Action):
         Raises:
             InputError: too many ranges, or one without numbers.
         """
-        return _with(state, state.studies.with_ranges(self.axis, _checked(self.axis, self.ranges)))
+        ranges = _checked(self.axis, self.ranges)
+        return replace(state, studies=state.studies.with_ranges(self.axis, ranges))
 
     def words(self) -> str:
         """Return what the action does."""
@@ -78,7 +80,7 @@ class BrushBox(Action):
         for index, axis in enumerate((self.across, self.up)):
             ranges = () if self.box is None else (self.box[index],)
             studies = studies.with_ranges(axis, _checked(axis, ranges))
-        return _with(state, studies)
+        return replace(state, studies=studies)
 
 
 @dataclass(frozen=True)
@@ -89,7 +91,7 @@ class ClearBrushes(Action):
 
     def apply(self, state: State) -> State:
         """Return the next state."""
-        return _with(state, replace(state.studies, brushes=()))
+        return with_value(state, "studies.brushes", ())
 
 
 @dataclass(frozen=True)
@@ -114,12 +116,7 @@ class PickDesign(Open):
         """
         if state.studies.name != self.study:
             raise InputError(f"the study {self.study!r} is not open any more")
-        after = super().apply(state)
-        return _with(after, replace(after.studies, picked=self.index))
-
-
-def _with(state: State, studies: Studies) -> State:
-    return replace(state, studies=studies)
+        return with_value(super().apply(state), "studies.picked", self.index)
 
 
 def _checked(axis: str, ranges: tuple[Range, ...]) -> tuple[Range, ...]:

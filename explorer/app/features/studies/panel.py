@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import Any, Literal
+from typing import Literal
 
 import viser
 
@@ -32,13 +32,13 @@ from explorer.app.state.studies import (
 )
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import Buttons, Does
-from explorer.app.widgets.controls import At, Bound, Control
+from explorer.app.widgets.commands import NO_OPTION
+from explorer.app.widgets.controls import At, Bound, Control, Controls, Span
 from explorer.app.widgets.markup import alert, note
 from explorer.errors import ExplorerError
 from explorer.measures.catalogue import measures_in
 from explorer.sweep.study import NAMES
 
-NONE = "—"
 Axis = Literal["across", "up", "colour"]
 AXES: dict[Axis, tuple[str, str]] = {
     "across": ("Across", "Measure or variable from left to right in the scatter plot."),
@@ -54,7 +54,7 @@ class StudiesPanel:
     def __init__(self, services: Services) -> None:
         if services.studies is None:
             raise RuntimeError("a page without folders of studies has no panel for them")
-        gui, session, none = services.gui, services.session, (NONE,)
+        gui, session, none = services.gui, services.session, (NO_OPTION,)
         self._services = services
         self._session = session
         self._complain = services.complain
@@ -69,8 +69,8 @@ class StudiesPanel:
             session,
             self.choice,
             Bound(
-                lambda frame: frame.state.studies.name or NONE,
-                lambda _, name: OpenStudy(None if name == NONE else name),
+                lambda frame: frame.state.studies.name or NO_OPTION,
+                lambda _, name: OpenStudy(None if name == NO_OPTION else name),
             ),
         )
         self.running = gui.add_html("", visible=False)
@@ -113,17 +113,16 @@ class StudiesPanel:
         """Yield the updates that show a frame."""
         self.feed.follow(frame, dark=self._services.theme.is_dark)
         studies, drawing, run = frame.state.studies, self.feed.drawing, self.runner.run
-        names = (NONE, *dict.fromkeys((*self.feed.names, *filter(None, (studies.name,)))))
+        names = (NO_OPTION, *dict.fromkeys((*self.feed.names, *filter(None, (studies.name,)))))
         yield self.choice, "options", names
         yield from self._control.updates(frame)
-        axes = (NONE,) if drawing is None or drawing.shown is None else drawing.shown.axes
+        axes = (NO_OPTION,) if drawing is None or drawing.shown is None else drawing.shown.axes
         for handle in self._places.values():
             yield handle, "options", axes
-            yield handle, "visible", axes != (NONE,)
+            yield handle, "visible", axes != (NO_OPTION,)
         for control in self._axes:
             yield from control.updates(frame)
-        for control in self._plan_controls:
-            yield from control.updates(frame)
+        yield from self._controls.updates(frame)
         # The texts are made again only after a change.
         key = (drawing, studies, run, self.feed.problem)
         if len(key) == len(self._key) and all(a is b for a, b in zip(key, self._key, strict=True)):
@@ -178,7 +177,7 @@ class StudiesPanel:
         def read(_: Frame) -> str:
             drawing = self.feed.drawing
             if drawing is None or drawing.shown is None:
-                return NONE
+                return NO_OPTION
             return str(getattr(drawing.shown, axis))
 
         return read
@@ -186,35 +185,24 @@ class StudiesPanel:
     def _write_axis(self, axis: Axis) -> Callable[[State, str], Action]:
         label, _ = AXES[axis]
         return lambda _, name: Set(
-            f"studies.{axis}", None if name == NONE else name, label, label_of(name)
+            f"studies.{axis}", None if name == NO_OPTION else name, label, label_of(name)
         )
 
     def _add_new_study(self, gui: viser.GuiApi) -> None:
-        count = gui.add_slider(
+        self._controls = controls = Controls(gui, self._session)
+        controls.slider(
             "Designs",
-            min=float(FEWEST),
-            max=float(MOST),
-            step=1.0,
-            initial_value=float(FEWEST),
-            hint="Number of designs, spread evenly by a Sobol sequence; powers of two spread best.",
+            "Number of designs, spread evenly by a Sobol sequence; powers of two spread best.",
+            At("studies.plan.count", convert=round),
+            Span(float(FEWEST), float(MOST), 1.0),
         )
-        percent = gui.add_slider(
+        controls.slider(
             "Around by ± %",
-            min=LEAST_PERCENT,
-            max=MOST_PERCENT,
-            step=1.0,
-            initial_value=LEAST_PERCENT,
-            hint="Range of the variables around the live design: a share of their value, or of a "
+            "Range of the variables around the live design: a share of their value, or of a "
             "20th of the reach where that is more; for the yaw a share of 90°.",
+            "studies.plan.percent",
+            Span(LEAST_PERCENT, MOST_PERCENT, 1.0),
         )
-        self._plan_controls: list[Control[Any]] = [
-            Control[float](
-                self._session, count, At("studies.plan.count", convert=round).bound("Designs")
-            ),
-            Control[float](
-                self._session, percent, At("studies.plan.percent").bound("Around by ± %")
-            ),
-        ]
         self.chips = gui.add_html("")
         self.start = gui.add_button(
             "Start study",

@@ -12,9 +12,9 @@ import msgspec
 
 from explorer.app.features.studies.actions import MOST_RANGES
 from explorer.app.security.client_messages import decode_text
+from explorer.app.state.studies import Range
 
 Word = Annotated[str, msgspec.Meta(max_length=200)]
-Range = tuple[float, float]
 Ranges = Annotated[tuple[Range, ...], msgspec.Meta(max_length=MOST_RANGES)]
 Index = Annotated[int, msgspec.Meta(ge=0, le=2**31)]
 

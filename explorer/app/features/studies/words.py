@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from html import escape
 
@@ -14,7 +13,15 @@ from explorer.app.features.studies.runner import Run
 from explorer.app.features.studies.shown import MOST_ROWS
 from explorer.app.state.studies import RADIUS, StudyPlan, label_of, title_of
 from explorer.app.widgets.buttons import press_button
-from explorer.app.widgets.markup import box, by_theme, dim, format_number, meter, signed
+from explorer.app.widgets.markup import (
+    box,
+    by_theme,
+    decimals_for,
+    dim,
+    format_number,
+    meter,
+    signed,
+)
 from explorer.measures.catalogue import measures_in
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.optimise.problem import REACH, YAW
@@ -170,7 +177,7 @@ def columns_shown(study: Study) -> tuple[str, ...]:
 def _decimals(values: FloatArray) -> int:
     """Return the decimals that give the largest of some values four digits."""
     largest = float(np.abs(values).max(initial=0.0))
-    return min(6, max(0, 3 - math.floor(math.log10(largest)))) if largest > 0.0 else 0
+    return min(6, decimals_for(largest, 4)) if largest > 0.0 else 0
 
 
 def _line(drawing: StudyDrawing, row: int, decimals: Mapping[str, int]) -> str:

@@ -27,6 +27,8 @@ from explorer.app.widgets.markup import (
     ticks,
 )
 from explorer.app.widgets.under_way import problem, progress
+from explorer.legs.clearance import pair_name
+from explorer.numerics.number_text import set_true_minus
 from explorer.singularity.colours import BAND_EDGES, band_colours
 from explorer.workspace.accessible.workspace import PairCost
 
@@ -131,7 +133,7 @@ def _numbers(drawing: WorkspaceDrawing) -> str:
     volume = drawing.volume if reached is None else reached.volume
     if volume > 0.0:
         error = 100.0 * (drawing.mesh_volume / volume - 1.0)
-        text = f"{error:+.2g} %".replace("-", "−")
+        text = set_true_minus(f"{error:+.2g} %")
         rows.append(("Mesh volume", text, "Volume of the drawn solid, against the one above"))
     if drawing.hull_volume is not None:
         rows.append(("Hull volume", f"{drawing.hull_volume:.6g}", "Volume of the convex hull"))
@@ -146,7 +148,10 @@ def _pairs(reached: Reached, *, is_coloured: bool) -> str:
     if min(pair.clearance for pair in reached.pairs) > 0.0:
         words = "No pair collides"
     elif blocking:
-        words, look = f"Legs {', '.join(map(_name, blocking))} collide", "beyond"
+        words, look = (
+            f"Legs {', '.join(pair_name(pair.legs) for pair in blocking)} collide",
+            "beyond",
+        )
     mark = swatch(COLLIDING) if is_coloured and blocking else ""
     radius = ""
     if reached.harmless_radius > 0.0:
@@ -161,13 +166,9 @@ def _pairs(reached: Reached, *, is_coloured: bool) -> str:
 def _pair(pair: PairCost) -> str:
     clearance = "joined" if math.isinf(pair.clearance) else format_number(pair.clearance, 3)
     if pair.blocked_volume > 0.0:
-        return row(_name(pair), clearance, format_number(pair.blocked_volume, 3), look="ex-beyond")
-    return row(_name(pair), clearance, "–")
-
-
-def _name(pair: PairCost) -> str:
-    first, second = pair.legs
-    return f"{first} – {second}"
+        blocked = format_number(pair.blocked_volume, 3)
+        return row(pair_name(pair.legs), clearance, blocked, look="ex-beyond")
+    return row(pair_name(pair.legs), clearance, "–")
 
 
 def _legend(colour: str, warn_below: float) -> str:

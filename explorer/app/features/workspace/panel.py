@@ -8,7 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 import viser
-from numpy.typing import NDArray
 
 from explorer.app.features.feature import Services
 from explorer.app.features.workspace.feed import WorkspaceFeed
@@ -21,7 +20,7 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.controls import At, Bound, Controls, Span
-from explorer.app.widgets.markup import alert, format_number, note
+from explorer.app.widgets.markup import alert, format_number, note, sentence
 from explorer.app.widgets.ranges import coordinate_span, fine_step, round_up
 from explorer.app.widgets.under_way import UnderWay
 from explorer.mechanism.pose import Pose
@@ -72,7 +71,7 @@ class WorkspacePanel:
                 "view.workspace.start",
                 disabled=lambda state: state.view.workspace.region == "limits",
             )
-            self._under_way = UnderWay(gui, "workspace")
+            self._under_way = UnderWay(gui, "workspace", self._feed)
             self._trouble = gui.add_html("", visible=False)
             self._go = gui.add_button(
                 "Go there",
@@ -136,7 +135,8 @@ class WorkspacePanel:
                 "Format",
                 FORMATS,
                 hint="3MF carries unit, name and colour; STL is a bare mesh in millimetres; STEP "
-                "has the exact faces of the workspace within the limits, and needs the extra cad.",
+                "has the exact faces of the workspace within the limits, and needs pip install "
+                '"flagged-explorer[cad]".',
             )
             file_format.on_update(lambda _: files.choose(file_format.value))
             for what in ("workspace", "hull"):
@@ -146,7 +146,7 @@ class WorkspacePanel:
         """Yield the updates that show a frame."""
         drawing = self._drawing = self._feed.drawing
         yield from self._controls.updates(frame)
-        yield from self._under_way.updates(self._feed)
+        yield from self._under_way.updates()
         yield from self._show_trouble(drawing)
         slice_map = drawing.slice_map if drawing is not None else None
         for handle in (self._caption, self._map):
@@ -162,7 +162,7 @@ class WorkspacePanel:
             if drawing.reached is not None:
                 text += "; pale red: within the limits, not reachable"
             yield self._caption, "content", note(text)
-            yield self._map, "image", _enlarged(slice_map.pixels)
+            yield self._map, "image", slice_map.picture
 
     def _cut(self, state: State, axis: Axis | None) -> Action:
         """Return the action that cuts the solid open; a new axis starts in the middle."""
@@ -206,10 +206,9 @@ class WorkspacePanel:
         if drawing is not None and trouble is not None:
             if trouble.nearest is not None:
                 self._nearest_start = Pose.of(trouble.nearest, drawing.request.rotation)
-            text = f"{trouble.reason[0].upper()}{trouble.reason[1:]}."
             which = "home" if drawing.request.start is None else "present"
             title = f"The {which} position is no start"
-            yield self._trouble, "content", alert(title, text)
+            yield self._trouble, "content", alert(title, sentence(trouble.reason))
         yield self._go, "visible", self._nearest_start is not None
 
     def _go_there(self, event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
@@ -224,11 +223,6 @@ class WorkspacePanel:
         @button.on_click
         def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
             files.send(what, event.client_id)
-
-
-def _enlarged(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return the map three times as large, so that its pixels stay sharp."""
-    return np.repeat(np.repeat(pixels, 3, axis=0), 3, axis=1)
 
 
 def _tolerance_span(state: State) -> Span:

@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TypeAlias
 
 import numpy as np
 import viser
-from numpy.typing import NDArray
 
 from explorer.app.features.feature import Services
 from explorer.app.features.workspace.feed import WorkspaceFeed, workspace_rotation
 from explorer.app.features.workspace.tasks import WorkspaceDrawing
 from explorer.app.scene.bands import COLLIDING, PLAIN, Shell
-from explorer.app.scene.part import NO_POINTS, ScenePart, box_corners
+from explorer.app.scene.creases import Drawn
+from explorer.app.scene.part import NO_POINTS, ScenePart
 from explorer.app.scene.placing import Placed
 from explorer.app.scene.shapes import NO_MESH, Patch, add_lines, add_translucent
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.colours import OUTLINE, Rgb, proximity_colour
+from explorer.measures.size import corners_of
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
 from explorer.singularity.colours import band_colours
@@ -28,8 +28,6 @@ from explorer.workspace.limits.constraints import (
     Never,
     constraints,
 )
-
-ArrayPair: TypeAlias = tuple[NDArray[np.float32], NDArray[np.uint32]]
 
 SOLID_OPACITY = 0.42
 # Opacity where legs collide, so that this is visible through the rest.
@@ -73,8 +71,8 @@ class WorkspaceScene(ScenePart):
             "/workspace/broken/label", "limit", font_screen_scale=0.9, visible=False
         )
         self._scaled_from: tuple[WorkspaceDrawing, float] | None = None
-        self._scaled: dict[Rgb, ArrayPair] = {}
-        self._scaled_hull: ArrayPair | None = None
+        self._scaled: dict[Rgb, Drawn] = {}
+        self._scaled_hull: Drawn | None = None
 
     def updates(self, placed: Placed) -> Iterator[Update]:
         """Yield the updates that draw the workspace of a frame."""
@@ -103,7 +101,7 @@ class WorkspaceScene(ScenePart):
         drawing = self._feed.drawing
         if drawing is None or drawing.extent is None:
             return NO_POINTS
-        return box_corners(placed.scale * np.array(drawing.extent))
+        return corners_of(placed.scale * np.array(drawing.extent))
 
     def _scale(self, drawing: WorkspaceDrawing | None, scale: float) -> None:
         """Scale a new drawing to scene units, once, so that updates compare it by identity."""
@@ -186,7 +184,7 @@ def _opacity(colour: Rgb, *, is_cut: bool) -> float:
     return COLLIDING_OPACITY if colour == COLLIDING else SOLID_OPACITY
 
 
-def _scaled(shell: Shell, scale: float) -> ArrayPair:
+def _scaled(shell: Shell, scale: float) -> Drawn:
     vertices = np.asarray(shell.vertices * scale, dtype=np.float32)
     return vertices, np.asarray(shell.faces, dtype=np.uint32)
 

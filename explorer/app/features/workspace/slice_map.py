@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -31,12 +32,17 @@ BLOCKED = (*OUTLINE, 96)
 
 @dataclass(frozen=True)
 class SliceMap:
-    """A picture of the slice: pixels (h, w, 4), from its lows to its highs on two axes."""
+    """A map of the slice: pixels (h, w, 4), from its lows to its highs on two axes."""
 
     pixels: NDArray[np.uint8]
     axes: tuple[Axis, Axis]
     lows: tuple[float, float]
     highs: tuple[float, float]
+
+    @cached_property
+    def picture(self) -> NDArray[np.uint8]:
+        """The pixels three times as large, so that a browser draws them sharp."""
+        return np.repeat(np.repeat(self.pixels, 3, axis=0), 3, axis=1)
 
 
 def level_within(low: float, high: float, level: float | None) -> float:
