@@ -86,7 +86,7 @@ def picture(
     Raises:
         PictureError: the browser did not draw in time.
     """
-    running = start(design, pose, port=0, docked=panels)
+    running = start(design, pose, port=0, panels=panels)
     try:
         if prepare is not None:
             prepare(running)

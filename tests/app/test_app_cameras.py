@@ -57,6 +57,7 @@ def browser() -> Any:
 def cameras(browser: Any) -> Cameras:
     first: Any = SimpleNamespace()
     made = Cameras(first, lambda: POINTS, browser.put)
+    made.frame_first()
     assert np.allclose(first.position, FIRST)
     return made
 
@@ -108,6 +109,7 @@ def test_camera_is_put_last_for_the_shape_that_its_browser_told_last(browser: An
         return POINTS
 
     cameras = Cameras(first, points, browser.put)
+    cameras.frame_first()
     cameras.connected(browser)
     browser.camera.aspect = 1.6
     browser.tell(EYE)

@@ -56,7 +56,7 @@ def test_the_reachable_solid_takes_the_place_of_the_other_and_the_page_stays_ali
     try:
         tab.choose("Region", "reachable")
         tab.page.get_by_text("computing …").wait_for()
-        tab.turn_to("Move")
+        tab.turn_to("Pose")
         before = tab.state
         goal = tab.drag(JOINT_LABELS["l4"], 0.5)
         tab.wait_for(lambda: abs(tab.state.joints[5] - goal) < 0.2, "the length dragged to")
@@ -77,10 +77,8 @@ def test_the_reachable_solid_takes_the_place_of_the_other_and_the_page_stays_ali
     expect(tab.page.get_by_text(f"{drawing.reached.volume:.6g} units³")).to_be_visible()
     assert red_pixels(tab) > without + MANY
 
-    tab.page.get_by_role("tab", name="Workspace", exact=True).last.click()
-    with tab.page.expect_download() as download:
-        tab.push("Export workspace")
-    assert download.value.suggested_filename == "paper-optimal-reachable-workspace.3mf"
+    download = tab.export("Workspace", "3MF")
+    assert download.suggested_filename == "paper-optimal-reachable-workspace.3mf"
 
 
 def test_a_home_that_is_no_start_is_told_and_the_button_goes_to_one(tab: Tab) -> None:

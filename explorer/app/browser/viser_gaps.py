@@ -326,3 +326,15 @@ def panel_in(client: viser.ClientHandle, panel: viser.PanelHandle) -> viser.Pane
     own = viser.PanelHandle.__new__(viser.PanelHandle)
     own.__dict__.update({**panel.__dict__, "_placement_gui_api": client.gui})
     return own
+
+
+def dock_below_in(
+    client: viser.ClientHandle, panel: viser.PanelHandle, anchor: viser.PanelHandle
+) -> None:
+    """Dock a panel below another one in one browser alone; all browsers share both.
+
+    viser's own handle refuses an anchor that was not made for that browser.
+    """
+    internals: Any = anchor
+    own: Any = panel_in(client, panel)
+    own._set_position({"kind": "split", "anchor_uuid": internals._impl.uuid, "side": "below"})

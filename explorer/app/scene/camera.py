@@ -98,7 +98,7 @@ class Cameras:
     that its browser reported, since a browser may miss what was sent to it.
 
     Args:
-        first: First camera of a new browser; set here to frame the points.
+        first: First camera of a new browser.
         points: Function that returns the points to frame, shape (n, 3).
         put: Function that sends a browser eye and target of its camera, and has it report them.
     """
@@ -115,7 +115,11 @@ class Cameras:
         self._placements: dict[int, _Placement] = {}
         # Browsers report several sizes at once while they load: the last one counts.
         self._lock = threading.RLock()
-        first.position, first.look_at = framing(points(), "isometric", FIRST_ASPECT)
+
+    def frame_first(self) -> None:
+        """Make the first camera of new browsers frame the points."""
+        first = self._first
+        first.position, first.look_at = framing(self._points(), "isometric", FIRST_ASPECT)
 
     def point(self, client: viser.ClientHandle, view: ViewName) -> None:
         """Show the mechanism in one browser from a view."""
