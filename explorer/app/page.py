@@ -48,6 +48,8 @@ REFUSAL = "That is not possible"
 NOTICE_SECONDS = 6.0
 # Seconds between two updates of all panels, while events come faster than frames.
 PANELS_SECONDS = 0.1
+# Seconds without a frame after which cameras follow what was drawn.
+FOLLOW_SECONDS = 0.35
 # Seconds to send a frame to one browser, and number of browsers that need no rest.
 REST_SECONDS, FEW_BROWSERS, LONGEST_REST_SECONDS = 0.002, 4, 0.04
 # Properties that decide whether a control can be used.
@@ -83,11 +85,14 @@ class Page:
         self._notified: dict[str, float] = {}
         self._panels_updated = 0.0
         self._redraw_timer: threading.Timer | None = None
+        # Looks after the cameras once nothing has been drawn for a while.
+        self._camera_timer: threading.Timer | None = None
+        self._drawn_at = 0.0
         # Other threads may ask for a frame before the last panel is there.
         self._is_complete = False
         self._frame = Frame(state)
         self._assigner = Assigner(server)
-        presses = Presses()
+        self._presses = presses = Presses()
         self.session = Session(
             state, self._draw, self._complain, self._report, history, press_at=presses.at
         )
@@ -156,8 +161,9 @@ class Page:
 
     def stop(self) -> None:
         """End the session, the features and the worker."""
-        if self._redraw_timer is not None:
-            self._redraw_timer.cancel()
+        for timer in (self._redraw_timer, self._camera_timer):
+            if timer is not None:
+                timer.cancel()
         self.buttons.stop()
         self.session.stop()
         self.services.stop()
@@ -224,11 +230,25 @@ class Page:
                 self.palette.offer(feature.name, feature.passing(self.services))
         if self._assigner.settle():
             self._schedule_redraw()
+        self._drawn_at = time.monotonic()
+        if self._camera_timer is None:
+            self._camera_timer = start_timer(FOLLOW_SECONDS, self._follow)
 
     def _schedule_redraw(self) -> None:
         """Schedule one more frame for when no control is moved, unless one is scheduled."""
         if self._redraw_timer is None:
             self._redraw_timer = start_timer(QUIET_SECONDS, self._redraw)
+
+    def _follow(self) -> None:
+        """Have the cameras follow what was drawn, once a user holds nothing and nothing changes."""
+        clients, now = self._server.get_clients(), time.time()
+        held = [number for number in clients if self._presses.at(number, now) is not None]
+        waits = time.monotonic() - self._drawn_at < 0.9 * FOLLOW_SECONDS
+        if waits or held:
+            self._camera_timer = start_timer(FOLLOW_SECONDS, self._follow)
+            return
+        self._camera_timer = None
+        self.services.cameras.follow(clients.values())
 
     def _redraw(self) -> None:
         self._redraw_timer = None
