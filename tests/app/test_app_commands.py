@@ -31,6 +31,7 @@ from explorer.app.features.paths.actions import (
 )
 from explorer.app.features.singularity.actions import Jog
 from explorer.app.features.studies.actions import BrushAxis, BrushBox, PickDesign
+from explorer.app.features.view.camera_buttons import HINTS as CAMERA_HINTS
 from explorer.app.server import Running, start
 from explorer.app.session.gestures import UserAction
 from explorer.app.session.session import UNDO, Session
@@ -78,8 +79,8 @@ OF_VALUES = {
 OF_NOBODY = (UserAction, MarkSaved, ShowIterates, PlayOn, EndRun, Compare, TakePlan)
 """Actions that nobody asks for: they tell of what goes on, or stand for another."""
 
-OF_BROWSERS = {f"View › {view}" for view in ("Isometric", "Front", "Side", "Top", "Fit")}
-"""Commands that change the camera of one browser, which there is none of."""
+OF_BROWSERS = {f"View › {name}" for name in (*CAMERA_HINTS, "Reset layout")}
+"""Commands that change the camera or the panels of one browser, which there is none of."""
 
 WHERE_IT_IS_SHOWN = {StartThere: "Workspace › Go there"}
 """Actions of commands that do nothing unless something is shown."""
