@@ -1,7 +1,14 @@
-"""Surfaces in bands of colour: by the proximity to singularities, or by what bounds them."""
+"""Surfaces in bands of colour: by the proximity to singularities, or by what bounds them.
+
+At one orientation margins are linear in the position, so that bands of the smallest margin are
+exact on each facet: their edges bend only where another margin becomes the smallest, and by the
+angle between facets, which the tolerance of the solid bounds. The condition number is not linear:
+it is computed at the corners of small facets, split at the singular planes where it has a kink.
+"""
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -11,15 +18,14 @@ from numpy.typing import NDArray
 from explorer.mechanism.design import Design
 from explorer.mechanism.margins import margins
 from explorer.numerics.arrays import FloatArray, IntArray
-from explorer.singularity.colours import BAND_EDGES, OUTLINE, Rgb, band_colours
+from explorer.singularity.colours import BAND_EDGES, OUTLINE, WARN_CONDITION, Rgb, band_colours
+from explorer.singularity.ellipsoids import planes_of_singularity
 from explorer.singularity.jacobian import inverse_condition, jacobian
 from explorer.workspace.accessible.workspace import PAIR_NAMES
 from explorer.workspace.solids.solid import Solid
 
 Measure = Literal["plain", "margin", "condition"]
 
-# An inverse condition number below this is coloured as a warning.
-WARN_CONDITION = 0.01
 PLAIN: Rgb = (110, 150, 196)
 # Where legs begin to collide: what collides has this colour all over the page.
 COLLIDING: Rgb = OUTLINE
@@ -64,17 +70,30 @@ class Colouring:
     def shells(self, solid: Solid) -> tuple[tuple[Shell, ...], float | None]:
         """Return the parts of a surface, one for each colour, and its longest edge.
 
-        The longest edge of a coloured facet, in design units, is given if it is longer than usual,
-        because the surface is large beside the reach; it is None otherwise.
+        The longest edge of a facet that is coloured by the condition number, in design units, is
+        given if it is longer than usual, because the surface is large beside the reach; it is None
+        otherwise.
         """
         if solid.is_empty:
             return (), None
         if self.measure == "plain":
             return _by_cause(solid), None
-        usual = COLOURED_EDGE * self.design.reach
-        vertices, faces = cut_to_size(solid, usual)
-        longest = float(edge_lengths(vertices, faces).max())
-        rest = vertices[faces]
+        coarse_edge = None
+        planes = planes_of_singularity(self.rotation)
+        if self.measure == "condition":
+            usual = COLOURED_EDGE * self.design.reach
+            vertices, faces = cut_to_size(solid, usual)
+            longest = float(edge_lengths(vertices, faces).max())
+            coarse_edge = longest if longest > usual else None
+            rest = vertices[faces]
+        else:
+            rest = solid.vertices[solid.faces]
+            # Where two margins are equal, another one becomes the smallest.
+            pairs = itertools.combinations(planes, 2)
+            planes = np.array([*planes, *(a + s * b for a, b in pairs for s in (-1.0, 1.0))])
+        for normal in planes:
+            low, high, _ = split_at(rest, rest @ normal, 0.0)
+            rest = np.concatenate([low, high])
         share = self.values(rest.reshape(-1, 3)).reshape(-1, 3)
         shells: list[Shell] = []
         for colour, edge in zip(band_colours(), (*BAND_EDGES[1:], np.inf), strict=True):
@@ -82,7 +101,7 @@ class Colouring:
             if len(band):
                 corners = np.arange(3 * len(band), dtype=np.int32).reshape(-1, 3)
                 shells.append(Shell(colour, band.reshape(-1, 3), corners))
-        return tuple(shells), longest if longest > usual else None
+        return tuple(shells), coarse_edge
 
 
 def cut_to_size(solid: Solid, edge: float) -> tuple[FloatArray, IntArray]:
