@@ -18,7 +18,12 @@ from explorer.app.features.workspace.orientation import workspace_pose
 from explorer.app.features.workspace.slice_map import Axis, level_within, map_picture
 from explorer.app.features.workspace.tasks import WorkspaceDrawing
 from explorer.app.features.workspace.volume import VolumeFeed
-from explorer.app.features.workspace.words import legend, volume_headline, workspace_details
+from explorer.app.features.workspace.words import (
+    drawing_words,
+    legend,
+    volume_headline,
+    workspace_details,
+)
 from explorer.app.look import read_script
 from explorer.app.security.client_messages import decode_text
 from explorer.app.session.session import Session
@@ -32,7 +37,7 @@ from explorer.app.widgets.buttons import Buttons
 from explorer.app.widgets.chips import Chip, Chips
 from explorer.app.widgets.commands import Key, shift
 from explorer.app.widgets.controls import At, Bound, Controls, Span
-from explorer.app.widgets.markup import alert, sentence
+from explorer.app.widgets.markup import alert, box, sentence
 from explorer.app.widgets.ranges import coordinate_span, fine_step, round_up
 from explorer.app.widgets.under_way import UnderWay
 from explorer.mechanism.pose import Pose, Triple
@@ -149,8 +154,15 @@ class WorkspacePanel:
         """Yield the updates that show a frame."""
         drawing = self._drawing = self._feed.drawing
         state, view = frame.state, frame.state.view.workspace
-        headline = volume_headline(frame, self._volumes, self._feed)
-        yield self._top, "content", f'<div class="ex-box">{headline}{self._show.html(state)}</div>'
+        yield (
+            self._top,
+            "content",
+            box(
+                volume_headline(frame, self._volumes),
+                drawing_words(frame, self._feed),
+                self._show.html(state),
+            ),
+        )
         yield from self._controls.updates(frame)
         yield from self._under_way.updates()
         yield from self._show_trouble(drawing)
@@ -159,11 +171,11 @@ class WorkspacePanel:
         yield self._legend, "visible", has_legend
         if has_legend:
             yield self._legend, "content", legend(view.colour, state.warn_below, drawing)
-        yield self._cut, "content", f'<div class="ex-box">{self._cuts.html(state)}</div>'
+        yield self._cut, "content", box(self._cuts.html(state))
         yield self._map, "visible", mapped is not None
         if mapped is not None:
             picture = map_picture(mapped, state.pose, state.design.reach)
-            yield self._map, "content", f'<div class="ex-box">{picture}</div>'
+            yield self._map, "content", box(picture)
         yield self._details, "content", workspace_details(frame, self._feed)
 
     def _level(self, state: State) -> float:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 from typing import Literal
 
@@ -99,7 +98,6 @@ class WorkspaceDrawing:
         extent: (lows, highs) of the solid; None if it is empty.
         nodes: The paper's node count within the limits; None if the grid is too fine.
         empty_because: Names of the limits that empty the workspace.
-        seconds: Computing time.
     """
 
     request: WorkspaceRequest
@@ -118,7 +116,6 @@ class WorkspaceDrawing:
     extent: tuple[FloatArray, FloatArray] | None
     nodes: NodeCount | None
     empty_because: tuple[str, ...]
-    seconds: float
 
 
 def draw_workspace(request: WorkspaceRequest, channel: Channel | None = None) -> WorkspaceDrawing:
@@ -128,7 +125,6 @@ def draw_workspace(request: WorkspaceRequest, channel: Channel | None = None) ->
         request: Workspace to draw.
         channel: Channel to the parent, which gets each `Stage` and may cancel; None for neither.
     """
-    begin = time.perf_counter()
     design, rotation = request.design, np.array(request.rotation)
     tolerance = request.tolerance or LIVE_TOLERANCE * design.reach
     watch = watch_of(channel)
@@ -175,7 +171,6 @@ def draw_workspace(request: WorkspaceRequest, channel: Channel | None = None) ->
         extent=extent,
         nodes=nodes,
         empty_because=measured.empty_because,
-        seconds=time.perf_counter() - begin,
     )
 
 

@@ -35,20 +35,41 @@ from explorer.workspace.accessible.workspace import PairCost
 DEVIATIONS = (0.001, 0.01, 0.1, 1.0)
 
 
-def volume_headline(frame: Frame, volumes: VolumeFeed, feed: WorkspaceFeed) -> str:
-    """Return the volume in large type, and that of the accessible part if it is drawn, as HTML."""
-    newest = volumes.drawing
-    if volumes.problem is not None:
-        return alert("The volume could not be computed", volumes.problem)
+def volume_headline(frame: Frame, feed: VolumeFeed) -> str:
+    """Return the volume within the limits in large type as HTML."""
+    newest = feed.drawing
+    if feed.problem is not None:
+        return alert("The volume could not be computed", feed.problem)
     if newest is None:
         return '<div class="ex-figure ex-dim">computing …</div>'
-    look = "" if volumes.is_current else " is-outdated"
-    text = f'<div class="ex-headline{look}">{_volume(newest, frame)}</div>'
+    look = "" if feed.is_current else " is-outdated"
+    return f'<div class="ex-headline{look}">{_volume(newest, frame)}</div>'
+
+
+def drawing_words(frame: Frame, feed: WorkspaceFeed) -> str:
+    """Return why there is no drawing, or the volume of the accessible part, as HTML; "" for none.
+
+    While the accessible part is computed, its progress is told.
+    """
     if feed.problem is not None:
-        return text + problem(feed, "The workspace could not be drawn", "Compute the workspace")
-    if frame.state.view.workspace.region == "reachable" and feed.request is not None:
-        text += _accessible(feed)
-    return text
+        return problem(feed, "The workspace could not be drawn", "Compute the workspace")
+    if frame.state.view.workspace.region == "limits" or feed.request is None:
+        return ""
+    drawing = feed.drawing
+    waiting = "" if feed.is_current else progress(feed)
+    if drawing is None or drawing.request.region == "limits":
+        return dim(waiting.capitalize())
+    reached = drawing.reached
+    if reached is None:
+        which = "home" if drawing.request.start is None else "present"
+        return f'<div class="ex-beyond">Nothing is accessible from the {which} position.</div>'
+    if drawing.volume <= 0.0:
+        return ""
+    percent = 100.0 * reached.volume / drawing.volume
+    return (
+        f'<div class="ex-line"><span>{reached.volume:.6g} units³ accessible, '
+        f"{percent:.4g} %</span>{dim(waiting)}</div>" + meter(percent, PLAIN, COLLIDING)
+    )
 
 
 def _volume(newest: MeasuredVolume, frame: Frame) -> str:
@@ -69,25 +90,6 @@ def _volume(newest: MeasuredVolume, frame: Frame) -> str:
 def _litres(volume: float, unit_mm: float) -> str:
     cubic_centimetres = volume * (0.1 * unit_mm) ** 3
     return f"{cubic_centimetres:.4g} cm³ ({0.001 * cubic_centimetres:.4g} l)"
-
-
-def _accessible(feed: WorkspaceFeed) -> str:
-    """Return the volume of the accessible part, or how far its computation is."""
-    drawing = feed.drawing
-    waiting = "" if feed.is_current else progress(feed)
-    if drawing is None or drawing.request.region == "limits":
-        return dim(waiting.capitalize())
-    reached = drawing.reached
-    if reached is None:
-        which = "home" if drawing.request.start is None else "present"
-        return f'<div class="ex-beyond">Nothing is accessible from the {which} position.</div>'
-    if drawing.volume <= 0.0:
-        return ""
-    percent = 100.0 * reached.volume / drawing.volume
-    return (
-        f'<div class="ex-line"><span>{reached.volume:.6g} units³ accessible, '
-        f"{percent:.4g} %</span>{dim(waiting)}</div>" + meter(percent, PLAIN, COLLIDING)
-    )
 
 
 def workspace_details(frame: Frame, feed: WorkspaceFeed) -> str:
