@@ -49,6 +49,7 @@ APP_ROOMS = (
     "features.feature",
     "features",
     "features.listed",
+    "bar",
     "layout",
     "page",
     "server",

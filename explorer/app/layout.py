@@ -1,4 +1,4 @@
-"""The layout of the panels, and what each new browser needs: its room, theme and camera."""
+"""The places of the panels, and what each new browser needs: its room, theme and camera."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ import time
 import viser
 
 from explorer.app.browser.browser_facts import BrowserFacts, ask_browser
-from explorer.app.browser.viser_gaps import panel_in
-from explorer.app.features.feature import DRAWER_HEIGHT
+from explorer.app.browser.viser_gaps import dock_below_in, run_script
+from explorer.app.features.feature import Place, Tab
+from explorer.app.look import read_script
 from explorer.app.scene.camera import Cameras
 from explorer.app.widgets.theme import Theme
 
@@ -20,10 +21,57 @@ MOST_LOOKS, LONGEST_PAUSE_SECONDS = 12, 5.0
 # Width and height of a window in pixels: in a narrower one the left panel goes below the right
 # one, which leaves the scene room, if the window is high enough for both.
 NARROW, HIGH_ENOUGH = 1100, 700
-# Widths of the panels, and of the space beside what lies over the scene, in pixels.
-RIGHT_WIDTH, LEFT_WIDTH, FREE = 350, 286, 16
-# Width of the open drawer in pixels; the scene of a small laptop's screen is as wide.
-DRAWER_WIDTH = 620
+# Widths of the panels on the left and on the right, and height of the open drawer, in pixels.
+LEFT_WIDTH, RIGHT_WIDTH, DRAWER_HEIGHT = 300, 360, 300
+# Width and height that a window of the page has before the stylesheet gives it its place.
+ANY_WIDTH, ANY_PLACE = 640, 80
+
+
+class Panels:
+    """The panels of the page, which hold the tabs.
+
+    Args:
+        gui: Controls of the page.
+    """
+
+    def __init__(self, gui: viser.GuiApi) -> None:
+        self._gui = gui
+        self.build, self.analyse, self.work = (gui.add_panel() for _ in range(3))
+        self._dialogs: list[viser.PanelHandle] = []
+        self._tabs: dict[tuple[Place, str], viser.GuiTabHandle] = {}
+
+    def tab(self, tab: Tab) -> viser.GuiTabHandle:
+        """Return the tab of a place with a title, made at the first call."""
+        key = (tab.place, tab.title)
+        if key not in self._tabs:
+            self._tabs[key] = self._panel(tab.place).add_tab(tab.title, tab.icon)
+        return self._tabs[key]
+
+    def titles(self, place: Place) -> list[str]:
+        """Return the titles of the tabs in a place."""
+        return [title for each, title in self._tabs if each == place]
+
+    def _panel(self, place: Place) -> viser.PanelHandle:
+        if place != "dialog":
+            return getattr(self, place)
+        dialog = self._gui.add_panel()
+        dialog.float(x=ANY_PLACE, y=ANY_PLACE, width=ANY_WIDTH)
+        self._dialogs.append(dialog)
+        return dialog
+
+    def lay_out(self) -> None:
+        """Put the panels into their places, as they are at first; dialogs are closed."""
+        self._gui.main_panel.float()
+        self.build.dock_left()
+        self.build.set_width(LEFT_WIDTH)
+        self.analyse.dock_right()
+        self.analyse.set_width(RIGHT_WIDTH)
+        self.work.float(x=0, y=-1, width=ANY_WIDTH, height=DRAWER_HEIGHT)
+        self.work.minimize()
+
+    def narrow(self, client: viser.ClientHandle) -> None:
+        """Put the left panel below the right one in a browser whose window is narrow."""
+        dock_below_in(client, self.build, self.analyse)
 
 
 class Layout:
@@ -33,9 +81,7 @@ class Layout:
         server: Server of the page.
         theme: Theme of the page.
         cameras: Cameras of the browsers.
-        side: The panel on the left.
-        drawer: The panel over the foot of the scene.
-        docked: Whether panels lie beside the scene.
+        panels: The panels, with all their tabs; None to show the scene alone.
     """
 
     def __init__(
@@ -43,23 +89,15 @@ class Layout:
         server: viser.ViserServer,
         theme: Theme,
         cameras: Cameras,
-        side: viser.PanelHandle,
-        drawer: viser.PanelHandle,
-        *,
-        docked: bool,
+        panels: Panels | None,
     ) -> None:
         self._theme = theme
         self._cameras = cameras
-        self._docked: tuple[viser.PanelHandle, viser.PanelHandle] | None = None
-        drawer.float(x=FREE // 2, y=-FREE // 2, width=DRAWER_WIDTH, height=DRAWER_HEIGHT)
-        drawer.minimize()
-        if docked:
-            main = server.gui.main_panel
-            main.dock_right()
-            main.set_width(RIGHT_WIDTH)
-            side.dock_left()
-            side.set_width(LEFT_WIDTH)
-            self._docked = (side, drawer)
+        self._panels = panels
+        if panels is not None:
+            panels.lay_out()
+            titles = {"drawer": panels.titles("work"), "dialogs": panels.titles("dialog")}
+            run_script(server, read_script("places", titles))
         server.on_client_connect(self._connected)
 
     def _connected(self, client: viser.ClientHandle) -> None:
@@ -72,8 +110,8 @@ class Layout:
         ).start()
 
     def _suit(self, client: viser.ClientHandle, facts: BrowserFacts) -> None:
-        if self._docked is not None:
-            _make_room(client, facts, *self._docked)
+        if self._panels is not None and is_narrow(facts):
+            self._panels.narrow(client)
         self._theme.follow_browser(dark=facts.dark)
         # Some browsers report the size of the scene before its panels are laid out, and not again
         # before the camera moves; slow ones miss where it is put. Each try makes them report.
@@ -90,16 +128,3 @@ class Layout:
 def is_narrow(facts: BrowserFacts) -> bool:
     """Whether panels on both sides would leave the scene too little room."""
     return facts.width < NARROW and facts.height >= HIGH_ENOUGH
-
-
-def _make_room(
-    client: viser.ClientHandle,
-    facts: BrowserFacts,
-    side: viser.PanelHandle,
-    drawer: viser.PanelHandle,
-) -> None:
-    if not is_narrow(facts):
-        return
-    panel_in(client, side).dock_below(client.gui.main_panel)
-    room = facts.width - RIGHT_WIDTH - FREE
-    panel_in(client, drawer).set_width(min(DRAWER_WIDTH, room))

@@ -10,19 +10,20 @@ import traceback
 import numpy as np
 import viser
 
+from explorer.app.bar import Bar
 from explorer.app.browser.downloads import Downloads
 from explorer.app.browser.press_events import listen
 from explorer.app.browser.viser_gaps import run_script
-from explorer.app.features.feature import Panel, Place, Services
+from explorer.app.features.feature import Panel, Services
 from explorer.app.features.listed import FEATURES
-from explorer.app.layout import Layout
+from explorer.app.layout import Layout, Panels
 from explorer.app.look import read_script, read_stylesheet
-from explorer.app.scene.camera import VIEWS, Cameras, ViewName
+from explorer.app.scene.camera import Cameras, ViewName
 from explorer.app.scene.placing import Placed
 from explorer.app.session.history import History
 from explorer.app.session.jobs import Worker
 from explorer.app.session.latest import start_timer
-from explorer.app.session.session import REDO, UNDO, Session, Who
+from explorer.app.session.session import Session, Who
 from explorer.app.state.frame import Frame
 from explorer.app.state.presses import Presses
 from explorer.app.state.state import State
@@ -32,8 +33,7 @@ from explorer.app.storage.study_folders import StudyFolders
 from explorer.app.storage.user_data import UserData
 from explorer.app.widgets.assigning import QUIET_SECONDS, Assigner, Update
 from explorer.app.widgets.buttons import Buttons
-from explorer.app.widgets.commands import KEYS
-from explorer.app.widgets.palette import Command, Palette
+from explorer.app.widgets.palette import Palette
 from explorer.app.widgets.theme import Theme
 from explorer.numerics.arrays import FloatArray
 
@@ -41,19 +41,19 @@ TITLE = "Flagged 4-4 explorer"
 # Modules that the worker imports at its start.
 TASKS = tuple({task.__module__: None for feature in FEATURES for task in feature.tasks})
 # Scripts of the whole page.
-SCRIPTS = ("fields", "room", "names", "cards")
+SCRIPTS = ("fields", "names", "opens")
 # Title of a notice that a request is refused.
 REFUSAL = "That is not possible"
 # Seconds for which a notice is shown, and not repeated.
 NOTICE_SECONDS = 6.0
 # Seconds between two updates of all panels, while events come faster than frames.
 PANELS_SECONDS = 0.1
+# Seconds without a frame after which cameras follow what was drawn.
+FOLLOW_SECONDS = 0.35
 # Seconds to send a frame to one browser, and number of browsers that need no rest.
 REST_SECONDS, FEW_BROWSERS, LONGEST_REST_SECONDS = 0.002, 4, 0.04
 # Properties that decide whether a control can be used.
 USABILITY = ("disabled", "visible")
-HISTORY_MOVES = {"Undo": UNDO, "Redo": REDO}
-VIEW_LABELS: dict[str, ViewName] = {name.capitalize(): name for name in VIEWS}
 
 
 class Page:
@@ -62,7 +62,7 @@ class Page:
     Args:
         server: Server that the page is drawn on.
         state: The first state.
-        docked: Whether the panels lie beside the scene, rather than over it.
+        panels: Whether there is room for panels beside the scene; else the scene is alone.
         user_data: The user's designs and where the session is saved; None to save nothing.
         history: History that led to the state; None to start one with it.
         preferences: Where theme and tour are remembered; None to be light and to begin no
@@ -75,7 +75,7 @@ class Page:
         server: viser.ViserServer,
         state: State,
         *,
-        docked: bool = True,
+        panels: bool = True,
         user_data: UserData | None = None,
         history: History | None = None,
         preferences: PreferenceFile | None = None,
@@ -85,11 +85,14 @@ class Page:
         self._notified: dict[str, float] = {}
         self._panels_updated = 0.0
         self._redraw_timer: threading.Timer | None = None
+        # Looks after the cameras once nothing has been drawn for a while.
+        self._camera_timer: threading.Timer | None = None
+        self._drawn_at = 0.0
         # Other threads may ask for a frame before the last panel is there.
         self._is_complete = False
         self._frame = Frame(state)
         self._assigner = Assigner(server)
-        presses = Presses()
+        self._presses = presses = Presses()
         self.session = Session(
             state, self._draw, self._complain, self._report, history, press_at=presses.at
         )
@@ -107,7 +110,7 @@ class Page:
         run_script(server, read_stylesheet())
         for script in SCRIPTS:
             run_script(server, read_script(script))
-        side, drawer = gui.add_panel(), gui.add_panel()
+        self.panels = Panels(gui)
         self.services = Services(
             server,
             self.session,
@@ -117,7 +120,7 @@ class Page:
             self._complain,
             self._announce,
             theme,
-            drawer,
+            Cameras(server.initial_camera, self.corners),
             user_data,
             studies,
             preferences,
@@ -127,6 +130,7 @@ class Page:
         self.autosaver = None if user_data is None else Autosaver(user_data.store, self._announce)
         server.scene.set_up_direction("+z")
         self._features = tuple(each for each in FEATURES if each.is_offered(self.services))
+        self.services.exports = tuple(each for one in self._features for each in one.exports)
         self._feeds = [
             self.services.get(kind) for feature in self._features for kind in feature.feeds
         ]
@@ -134,12 +138,12 @@ class Page:
         self._runners = [
             self.services.get(kind) for each in self._features for kind in each.runners
         ]
-        self._cameras = Cameras(server.initial_camera, self.corners)
-        self._panels = self._add_panels(side, drawer)
+        self.services.cameras.frame_first()
+        self._panels = self._add_panels()
         self.palette = self._add_palette()
-        Layout(server, theme, self._cameras, side, drawer, docked=docked)
-        server.on_client_connect(self._cameras.connected)
-        server.on_client_disconnect(self._cameras.disconnected)
+        Layout(server, theme, self.services.cameras, self.panels if panels else None)
+        server.on_client_connect(self.services.cameras.connected)
+        server.on_client_disconnect(self.services.cameras.disconnected)
         server.on_client_connect(lambda client: listen(client, presses))
         server.on_client_disconnect(lambda client: presses.forget(client.client_id))
         self._is_complete = True
@@ -157,8 +161,9 @@ class Page:
 
     def stop(self) -> None:
         """End the session, the features and the worker."""
-        if self._redraw_timer is not None:
-            self._redraw_timer.cancel()
+        for timer in (self._redraw_timer, self._camera_timer):
+            if timer is not None:
+                timer.cancel()
         self.buttons.stop()
         self.session.stop()
         self.services.stop()
@@ -181,57 +186,21 @@ class Page:
     def point_cameras(self, view: ViewName) -> None:
         """Point the camera of every open browser."""
         for client in self._server.get_clients().values():
-            self._cameras.point(client, view)
+            self.services.cameras.point(client, view)
 
-    def _add_panels(self, side: viser.PanelHandle, drawer: viser.PanelHandle) -> list[Panel]:
-        gui = self._server.gui
-        declared = [tab for feature in self._features for tab in feature.tabs]
-        panels = [self.services.get(tab.panel) for tab in declared if tab.place == "top"]
-        self._add_edit_buttons(gui)
-        self._add_view_buttons(gui)
-        places = {"main": gui.add_tab_group(), "side": side, "drawer": drawer}
-        tabs: dict[tuple[Place, str], viser.GuiTabHandle] = {}
-        for tab in declared:
-            if tab.place == "top":
-                continue
-            key = (tab.place, tab.title)
-            if key not in tabs:
-                tabs[key] = places[tab.place].add_tab(tab.title)
-            self.services.tab = tabs[key]
-            with tabs[key]:
+    def _add_panels(self) -> list[Panel]:
+        panels: list[Panel] = [Bar(self.services, self._features)]
+        for tab in (tab for feature in self._features for tab in feature.tabs):
+            self.services.tab = self.panels.tab(tab)
+            with self.services.tab:
                 panels.append(self.services.get(tab.panel))
         return panels
 
     def _add_palette(self) -> Palette:
-        fit = Command(
-            "View › Fit", "Show the whole mechanism from where you look.", self._cameras.fit
-        )
         commands = [each.of(self.session) for one in self._features for each in one.commands]
-        keys = dict(KEYS)
-        for feature in self._features:
-            keys.update(feature.keys)
+        keys = {name: each for one in self._features for name, each in one.keys.items()}
         lists = {label for feature in self._features for label in feature.lists}
-        return Palette(self._server, (*self.buttons.commands, fit, *commands), keys, lists)
-
-    def _add_view_buttons(self, gui: viser.GuiApi) -> None:
-        buttons = gui.add_button_group(
-            "View", tuple(VIEW_LABELS), hint="Frame the mechanism from one of four sides."
-        )
-
-        @buttons.on_click
-        def _(event: viser.GuiEvent[viser.GuiButtonGroupHandle]) -> None:
-            if event.client is not None:
-                self._cameras.point(event.client, VIEW_LABELS[buttons.value])
-
-    def _add_edit_buttons(self, gui: viser.GuiApi) -> None:
-        buttons = gui.add_button_group(
-            "Edit",
-            tuple(HISTORY_MOVES),
-            hint="Undo the last step, or redo it; the drawer lists them all.",
-        )
-        buttons.on_click(
-            lambda event: self.session.travel(HISTORY_MOVES[buttons.value], who=event.client_id)
-        )
+        return Palette(self._server, (*self.buttons.commands, *commands), keys, lists)
 
     def _draw(self, frame: Frame) -> None:
         if not self._is_complete:
@@ -261,11 +230,25 @@ class Page:
                 self.palette.offer(feature.name, feature.passing(self.services))
         if self._assigner.settle():
             self._schedule_redraw()
+        self._drawn_at = time.monotonic()
+        if self._camera_timer is None:
+            self._camera_timer = start_timer(FOLLOW_SECONDS, self._follow)
 
     def _schedule_redraw(self) -> None:
         """Schedule one more frame for when no control is moved, unless one is scheduled."""
         if self._redraw_timer is None:
             self._redraw_timer = start_timer(QUIET_SECONDS, self._redraw)
+
+    def _follow(self) -> None:
+        """Have the cameras follow what was drawn, once a user holds nothing and nothing changes."""
+        clients, now = self._server.get_clients(), time.time()
+        held = [number for number in clients if self._presses.at(number, now) is not None]
+        waits = time.monotonic() - self._drawn_at < 0.9 * FOLLOW_SECONDS
+        if waits or held:
+            self._camera_timer = start_timer(FOLLOW_SECONDS, self._follow)
+            return
+        self._camera_timer = None
+        self.services.cameras.follow(clients.values())
 
     def _redraw(self) -> None:
         self._redraw_timer = None

@@ -6,12 +6,14 @@ no graphics card.
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from explorer.app.browser.headless import PictureError, headless_browser
+from explorer.app.browser.viser_gaps import mark_broadcasts
 from explorer.app.scene.camera import ViewName
 from explorer.app.server import Running, start
 from explorer.files.writing import write_whole
@@ -26,6 +28,8 @@ if TYPE_CHECKING:
 PATIENCE_SECONDS = 60.0
 # Selector of the canvas with the scene: charts have canvases too, but three.js marks its own.
 SCENE_CANVAS = "canvas[data-engine]"
+HAS_ARRIVED = "mark => window.explorer?.mark >= mark"
+_marks = itertools.count(1)
 # Seconds after which the camera is moved a little if the size of the canvas is not known.
 NUDGE_SECONDS = 2.0
 # Relative difference of aspect ratios that count as equal; a panel that docks changes the shape
@@ -86,7 +90,7 @@ def picture(
     Raises:
         PictureError: the browser did not draw in time.
     """
-    running = start(design, pose, port=0, docked=panels)
+    running = start(design, pose, port=0, panels=panels)
     try:
         if prepare is not None:
             prepare(running)
@@ -145,7 +149,9 @@ def settle(page: Page, client: ClientHandle) -> None:
     """
     deadline = time.monotonic() + PATIENCE_SECONDS
     nudged = time.monotonic()
-    while not _is_size_known(page, client):
+    mark = next(_marks)
+    mark_broadcasts(client, mark)
+    while not (_is_size_known(page, client) and page.evaluate(HAS_ARRIVED, mark)):
         now = time.monotonic()
         if now > deadline:
             raise PictureError("the page did not come to rest in time")
@@ -154,7 +160,7 @@ def settle(page: Page, client: ClientHandle) -> None:
             client.camera.position = client.camera.position * (1.0 + 1e-4)
             nudged = now
         page.wait_for_timeout(50)
-    # A frame that comes back shows that all earlier messages have arrived.
+    # A frame that comes back shows what the messages before it changed.
     try:
         client.get_render(16, 16, timeout=PATIENCE_SECONDS)
     except (TimeoutError, RuntimeError):

@@ -75,7 +75,7 @@ def start(
     host: str = "127.0.0.1",
     port: int = 8080,
     token: str | None = None,
-    docked: bool = True,
+    panels: bool = True,
     user_data: UserData | None = None,
     preferences: PreferenceFile | None = None,
     studies: StudyFolders | None = None,
@@ -89,7 +89,7 @@ def start(
         port: The port to listen on; any free one if 0.
         token: What has to be known to get in; if None a random one is made, but none for
             a host that only this machine reaches.
-        docked: Whether the panels lie beside the scene, rather than over it.
+        panels: Whether there are panels beside the scene; else the scene is alone.
         user_data: The user's designs, where the session is saved and the history to go on with;
             None to save nothing.
         preferences: Where theme and tour are remembered; None to be light and to begin no
@@ -115,7 +115,7 @@ def start(
     page = Page(
         server,
         state,
-        docked=docked,
+        panels=panels,
         user_data=user_data,
         history=history,
         preferences=preferences,

@@ -135,7 +135,7 @@ def services_for(
         complain=complain,
         tell=tell,
         theme=missing,
-        drawer=missing,
+        cameras=missing,
         user_data=user_data,
         studies=None,
         preferences=None,

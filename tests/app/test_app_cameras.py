@@ -8,8 +8,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, strategies as st
 
-from explorer.app.scene.camera import FIRST_ASPECT, REMEMBERED, Cameras, framing
+from explorer.app.scene.camera import (
+    FIELD_OF_VIEW,
+    FIRST_ASPECT,
+    REMEMBERED,
+    Cameras,
+    are_in_picture,
+    framing,
+)
 from explorer.numerics.arrays import FloatArray
 
 POINTS = np.random.default_rng(5).uniform(-6.0, 9.0, (20, 3))
@@ -31,6 +39,9 @@ class Browser:
         up_direction = (0.0, 0.0, 1.0)
         position = UNTOLD
         look_at = np.zeros(3)
+
+        def __init__(self) -> None:
+            self.updated: Any = lambda _: None
 
         def on_update(self, callback: Any) -> None:
             self.updated = callback
@@ -57,6 +68,7 @@ def browser() -> Any:
 def cameras(browser: Any) -> Cameras:
     first: Any = SimpleNamespace()
     made = Cameras(first, lambda: POINTS, browser.put)
+    made.frame_first()
     assert np.allclose(first.position, FIRST)
     return made
 
@@ -108,6 +120,7 @@ def test_camera_is_put_last_for_the_shape_that_its_browser_told_last(browser: An
         return POINTS
 
     cameras = Cameras(first, points, browser.put)
+    cameras.frame_first()
     cameras.connected(browser)
     browser.camera.aspect = 1.6
     browser.tell(EYE)
@@ -139,3 +152,55 @@ def test_a_camera_is_put_again_when_its_browser_changes_its_shape(
     browser.tell(EYE)
     assert len(browser.puts) == 2
     assert cameras.stands(browser)
+
+
+directions = st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0), st.floats(-0.9, 0.9)).filter(
+    lambda d: np.hypot(d[0], d[1]) > 0.2
+)
+
+
+@given(directions, st.floats(0.4, 2.5), st.integers(0, 2**32 - 1), st.floats(0.01, 100.0))
+def test_what_is_framed_is_in_the_picture_and_what_is_framed_closer_is_not(
+    direction: tuple[float, float, float], aspect: float, seed: int, size: float
+) -> None:
+    points = size * np.random.default_rng(seed).uniform(-6.0, 9.0, (20, 3))
+    eye, target = framing(points, np.array(direction), aspect)
+    assert are_in_picture(points, eye, target, FIELD_OF_VIEW, aspect)
+    closer = target + 0.85 * (eye - target)
+    assert not are_in_picture(points, closer, target, FIELD_OF_VIEW, aspect)
+    # Nothing behind a camera is in its picture.
+    assert not are_in_picture(2.0 * eye - target + 0.0 * points, eye, target, 2.0, aspect)
+
+
+def test_camera_follows_what_leaves_its_picture_and_keeps_its_direction(browser: Any) -> None:
+    points = POINTS.copy()
+    first: Any = SimpleNamespace()
+    browser.camera.fov = FIELD_OF_VIEW
+    cameras = Cameras(first, lambda: points, lambda _, eye, target: look(eye, target))
+
+    def look(eye: FloatArray, target: FloatArray) -> None:
+        browser.puts.append(eye)
+        browser.camera.look_at = target
+        browser.tell(eye)
+
+    cameras.frame_first()
+    cameras.connected(browser)
+    cameras.follow([browser])
+    assert len(browser.puts) == 1
+    # Turned by a hand, to where everything is seen.
+    eye, target = framing(points, np.array([-1.0, -0.4, 0.3]), 0.7)
+    browser.camera.look_at = target
+    browser.tell(target + 1.2 * (eye - target))
+    points[:] *= 1.1
+    cameras.follow([browser])
+    assert len(browser.puts) == 1
+    points[:] *= 2.0
+    cameras.follow([browser])
+    assert len(browser.puts) == 2
+    towards = (browser.camera.position - browser.camera.look_at) / (eye - target)
+    assert np.ptp(towards) < 1e-9
+    # A hand comes closer to look at a part, and stays there.
+    browser.tell(browser.camera.look_at + 0.3 * (eye - target))
+    points[:] *= 1.5
+    cameras.follow([browser])
+    assert len(browser.puts) == 2

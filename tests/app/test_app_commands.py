@@ -49,7 +49,6 @@ from explorer.app.storage.study_folders import StudyFolders
 from explorer.app.storage.user_data import open_user_data
 from explorer.app.widgets.commands import (
     CAMERA_KEYS,
-    KEYS,
     PALETTE_KEY,
     offers,
     with_keys,
@@ -79,10 +78,8 @@ OF_VALUES = {
 OF_NOBODY = (UserAction, MarkSaved, ShowIterates, PlayOn, EndRun, Compare, TakePlan)
 """Actions that nobody asks for: they tell of what goes on, or stand for another."""
 
-OF_BROWSERS = {f"View › {view}" for view in ("Isometric", "Front", "Side", "Top", "Fit")} | {
-    "Studies › Taller drawer"
-}
-"""Commands that change the camera or a panel of one browser, which there is none of."""
+OF_BROWSERS = {f"View › {view}" for view in ("Isometric", "Front", "Side", "Top", "Fit")}
+"""Commands that change the camera of one browser, which there is none of."""
 
 WHERE_IT_IS_SHOWN = {StartThere: "Workspace › Go there"}
 """Actions of commands that do nothing unless something is shown."""
@@ -100,10 +97,7 @@ CHOSEN_IN_THE_PANEL = {
 }
 """Lists of which an option alone does nothing, or whose options come and go."""
 
-ALL_KEYS = {
-    **KEYS,
-    **{label: keys for feature in FEATURES for label, keys in feature.keys.items()},
-}
+ALL_KEYS = {label: keys for feature in FEATURES for label, keys in feature.keys.items()}
 OPEN_LISTS = {label for feature in FEATURES for label in feature.lists}
 
 # What browsers do with keys; undo and redo are theirs too, and meant for pages.
@@ -183,7 +177,7 @@ def test_every_action_is_a_command_or_asks_for_a_value(running: Running, palette
     with heard(running.page.session) as asked:
         for label, command in labelled(palette).items():
             # The others do something to one browser, or send it a file.
-            if label in OF_BROWSERS or label.startswith(("Page › ", "Share › ")):
+            if label in OF_BROWSERS or label.startswith(("Page › ", "Export › ")):
                 continue
             command.run(CLIENT)
         saved = running.page.services.get(SavedDesigns)
@@ -252,7 +246,7 @@ def test_names_and_keys_are_told_apart(palette: Palette) -> None:
 
 
 def test_every_key_belongs_to_a_command_and_to_one_owner(palette: Palette) -> None:
-    assert len(ALL_KEYS) == len(KEYS) + sum(len(feature.keys) for feature in FEATURES)
+    assert len(ALL_KEYS) == sum(len(feature.keys) for feature in FEATURES)
     assert set(ALL_KEYS) <= set(labelled(palette))
 
 
@@ -295,8 +289,8 @@ def test_a_hint_tells_the_keys_that_do_the_same(running: Running) -> None:
 
 def test_keys_are_told_behind_the_hint() -> None:
     assert with_keys("Go.", ()) == "Go."
-    assert with_keys("Go.", KEYS["Edit › Undo"]) == "Go. Key: Ctrl+Z."
-    assert with_keys("Go.", KEYS["Edit › Redo"]) == "Go. Keys: Ctrl+Shift+Z, Ctrl+Y."
+    assert with_keys("Go.", ALL_KEYS["Edit › Undo"]) == "Go. Key: Ctrl+Z."
+    assert with_keys("Go.", ALL_KEYS["Edit › Redo"]) == "Go. Keys: Ctrl+Shift+Z, Ctrl+Y."
 
 
 def test_only_what_can_be_done_can_be_chosen(running: Running, palette: Palette) -> None:
@@ -317,9 +311,9 @@ def test_only_what_can_be_done_can_be_chosen(running: Running, palette: Palette)
 
 
 SWITCHES: dict[str, Callable[[State], bool]] = {
-    "View › Grid": lambda state: state.view.grid,
-    "View › Prototype": lambda state: state.view.prototype.shown,
-    "View › All tetrahedra": lambda state: state.view.tetrahedra == (True, True, True),
+    "Show › Grid": lambda state: state.view.grid,
+    "Prototype › Show the parts": lambda state: state.view.prototype.shown,
+    "Show › All tetrahedra": lambda state: state.view.tetrahedra == (True, True, True),
     "Workspace › Convex hull": lambda state: state.view.workspace.hull,
 }
 
@@ -342,25 +336,25 @@ def test_modes_follow_one_another_in_both_ways(running: Running, palette: Palett
     first = session.state.mode
     seen = [first]
     for _ in range(8):
-        commands["Move › Next assembly mode"].run(CLIENT)
+        commands["Pose › Next assembly mode"].run(CLIENT)
         assert session.wait_until_idle()
         seen.append(session.state.mode)
     assert sorted(seen[:8]) == list(range(8))
     assert seen[8] == first
-    commands["Move › Previous assembly mode"].run(CLIENT)
+    commands["Pose › Previous assembly mode"].run(CLIENT)
     assert session.wait_until_idle()
     assert session.state.mode == seen[7]
 
 
 def test_undo_and_redo_are_the_session_s(running: Running, palette: Palette) -> None:
     session, commands = running.page.session, labelled(palette)
-    commands["View › Labels"].run(CLIENT)
+    commands["Design › Preset › paper-initial"].run(CLIENT)
     assert session.wait_until_idle()
-    assert not session.state.view.labels
-    for label, expected in (("Edit › Undo", True), ("Edit › Redo", False), ("Edit › Undo", True)):
-        commands[label].run(CLIENT)
+    moves = (("Undo", "paper-optimal"), ("Redo", "paper-initial"), ("Undo", "paper-optimal"))
+    for label, expected in moves:
+        commands[f"Edit › {label}"].run(CLIENT)
         assert session.wait_until_idle()
-        assert session.state.view.labels is expected
+        assert session.state.design.name == expected
 
 
 def test_a_control_used_from_the_palette_shows_its_new_value_everywhere(

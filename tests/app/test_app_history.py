@@ -5,6 +5,8 @@ from __future__ import annotations
 import importlib
 import itertools
 import pkgutil
+from contextlib import suppress
+from dataclasses import replace
 
 import pytest
 from desk import Desk
@@ -76,9 +78,7 @@ class Recorder:
         self.history = self.history.record(event, self.state)
 
     def move(self, steps: int) -> None:
-        history = self.history.move(steps)
-        self.state = restore(history.step, self.state)
-        self.history = history
+        self.state, self.history = restore(self.history.move(steps), self.state)
 
     @property
     def words(self) -> list[str]:
@@ -231,6 +231,35 @@ def test_unclosed_length_is_undone_with_its_message(recorder: Recorder) -> None:
     assert (recorder.state.unclosed, recorder.state.joints) == (None, opened(OPTIMAL).joints)
 
 
+VIEWS: list[Action] = [
+    Set("view.flags", False, "Flags"),
+    Set("view.warn_below", 0.5),
+    Set("view.workspace.cut", "x", "Cut open", "across x"),
+]
+CHANGES: list[Action] = [SetPosition(0, 9.0), SetVariable("a3x", 18.0), SetJoint(0, 12.0)]
+
+
+@given(st.lists(st.sampled_from([*VIEWS, *CHANGES, "undo", "redo"]), max_size=20))
+def test_what_is_shown_is_no_step_and_undo_leaves_it(done: list[Action | str]) -> None:
+    recorder, alone = Recorder(opened(OPTIMAL)), Recorder(opened(OPTIMAL))
+    view = recorder.state.view
+    for each in done:
+        if isinstance(each, Action):
+            recorder.do(each)
+            if each in VIEWS:
+                view = each.apply(replace(recorder.state, view=view)).view
+            else:
+                alone.do(each)
+        else:
+            for one in (recorder, alone):
+                with suppress(InputError):
+                    one.move(-1 if each == "undo" else 1)
+        assert recorder.state.view == view
+        assert recorder.history.step.state.view == view
+        assert recorder.words == alone.words
+        assert settle(recorder.state) == settle(replace(alone.state, view=view))
+
+
 WORDED = [
     (SetJoint(0, 12.5), "l1 = 12.5"),
     (SetPosition(2, 9.25), "z = 9.25"),
@@ -244,9 +273,6 @@ WORDED = [
     (Open(OTHER), f"Open {OTHER.name}"),
     (OpenStudy("trade-off"), "Study trade-off"),
     (BrushAxis("mean_margin", ((1.0, 2.0),)), "Brush mean margin at nodes"),
-    (Set("view.flags", False, "Flags"), "Flags off"),
-    (Set("view.warn_below", 0.5), "Warn below = 0.5"),
-    (Set("view.workspace.cut", "x", "Cut open", "across x"), "Cut open: across x"),
 ]
 
 

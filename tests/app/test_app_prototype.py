@@ -18,12 +18,9 @@ from explorer.app.features.feature import Services
 from explorer.app.features.mechanism.bodies import Bodies
 from explorer.app.features.mechanism.legs import Legs
 from explorer.app.features.prototype.feed import PartsFeed
+from explorer.app.features.prototype.files import ASSEMBLIES
 from explorer.app.features.prototype.panel import (
-    PROTOTYPE,
-    SCHEMATIC,
-    STEP,
     PrototypePanel,
-    assembly_name,
     parts_table,
     trouble_of,
 )
@@ -371,7 +368,7 @@ def test_the_panel_shows_and_changes_how_the_prototype_is_drawn(
     begin = list(panel.updates(Frame(desk.state)))
     drawn, apart, density = (handle for handle, name, _ in begin if name == "value")
     assert not any(value for _, name, value in begin if name == "visible")
-    desk.use(drawn, PROTOTYPE)
+    desk.use(drawn, True)
     desk.use(apart, 0.25)
     desk.use(density, 7850.0)
     assert desk.state.view.prototype == PrototypeView(True, 0.25, 7850.0)
@@ -385,7 +382,7 @@ def test_the_panel_shows_and_changes_how_the_prototype_is_drawn(
     table = parts_table(feed.parts.listed, 7850.0)
     assert table in [value for _, name, value in updates if name == "content"]
     assert [value for _, name, value in updates if name == "visible"] == [False, True]
-    desk.use(drawn, SCHEMATIC)
+    desk.use(drawn, False)
     assert not desk.state.view.prototype.shown
 
 
@@ -394,11 +391,10 @@ def test_files_of_the_assembly_are_those_of_the_library() -> None:
     for file_format in set(FORMATS) & {"glb", "stl-zip"}:
         expected = assembly_bytes(make_prototype(OPTIMAL), file_format)
         assert export_assembly(OPTIMAL, file_format) == expected
-    for file_format in ("glb", STEP):
+    for file_format in ("glb", "step"):
         with pytest.raises(InputError, match="too tight"):
             export_assembly(thick(opened(OPTIMAL), 0.4).design, file_format)
-    assert assembly_name("3mf") == "mechanism.3mf"
-    assert assembly_name("stl-zip") == "parts-stl.zip"
+    assert {file_format for file_format, _ in ASSEMBLIES.values()} == {*FORMATS, "step"}
 
 
 def test_step_is_exact_faces_or_a_word_on_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -410,14 +406,14 @@ def test_step_is_exact_faces_or_a_word_on_how_to_get_it(monkeypatch: pytest.Monk
         return b"ISO-10303-21"
 
     monkeypatch.setattr("explorer.export.step_assembly.assembly_step", write)
-    assert export_assembly(OPTIMAL, STEP) == b"ISO-10303-21"
+    assert export_assembly(OPTIMAL, "step") == b"ISO-10303-21"
     assert written == [sizes]
     monkeypatch.undo()
     monkeypatch.setitem(sys.modules, "OCP", None)
     for name in [name for name in sys.modules if name.startswith("OCP.")]:
         monkeypatch.delitem(sys.modules, name)
     with pytest.raises(MissingExtraError, match=r"flagged-explorer\[cad\]"):
-        export_assembly(OPTIMAL, STEP)
+        export_assembly(OPTIMAL, "step")
 
 
 def test_shares_and_densities_out_of_range_are_refused() -> None:

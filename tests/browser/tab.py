@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 import viser
-from playwright.sync_api import Browser, ConsoleMessage, Locator, expect
+from playwright.sync_api import Browser, ConsoleMessage, Download, Locator, expect
 
 from explorer.app.scene.camera import ViewName, framing
 from explorer.app.screenshot import PATIENCE_SECONDS, SCENE_CANVAS, fixed_resolution_url, settle
@@ -21,7 +21,7 @@ from explorer.mechanism.design_file import PRESETS
 from explorer.numerics.arrays import FloatArray
 
 # Small, since what the pictures look like is tested elsewhere; panels and scene side by side.
-SIZE = (860, 480)
+SIZE = (940, 540)
 
 # All that a console may say: what it logs, and these warnings. The first is viser's three.js
 # about itself, the second the software renderer about reading a frame back.
@@ -101,7 +101,7 @@ class Tab:
             first = group.get_by_role("tab").first
             if first.get_attribute("aria-selected") != "true":
                 first.click()
-        page.services.drawer.minimize()
+        page.panels.work.minimize()
         page.point_cameras("isometric")
         settle(self.page, self.client)
 
@@ -189,6 +189,19 @@ class Tab:
         tab = self.page.get_by_role("tab", name=name, exact=True)
         tab.click()
         expect(tab).to_have_attribute("aria-selected", "true")
+
+    def open_dialog(self, name: str) -> None:
+        """Open a dialog by its button in the bar."""
+        self.page.locator(f"[data-opens={name}]").first.click()
+        self.page.get_by_role("dialog", name=name).wait_for()
+
+    def export(self, what: str, file_format: str) -> Download:
+        """Download a file by the dialog Export."""
+        self.open_dialog("Export")
+        with self.page.expect_download() as download:
+            self.push(f"Export {what} as {file_format}")
+        self.page.keyboard.press("Escape")
+        return download.value
 
     def wait_for(self, condition: Callable[[], bool], what: str) -> None:
         """Wait until a condition is met.

@@ -13,7 +13,6 @@ from tab import Tab
 
 from explorer.app.features.mechanism.pose_panel import JOINT_LABELS
 from explorer.app.features.workspace.feed import WorkspaceFeed
-from explorer.app.features.workspace.files import WorkspaceFiles
 from explorer.app.screenshot import PATIENCE_SECONDS
 from explorer.app.state.actions import Set
 from explorer.workspace.accessible.radii import with_radius
@@ -56,7 +55,7 @@ def test_the_accessible_solid_takes_the_place_of_the_other_and_the_page_stays_al
     try:
         tab.choose("Region", "accessible from home")
         tab.page.get_by_text("Computing …").wait_for()
-        tab.turn_to("Move")
+        tab.turn_to("Pose")
         before = tab.state
         goal = tab.drag(JOINT_LABELS["l4"], 0.5)
         tab.wait_for(lambda: abs(tab.state.joints[5] - goal) < 0.2, "the length dragged to")
@@ -78,9 +77,8 @@ def test_the_accessible_solid_takes_the_place_of_the_other_and_the_page_stays_al
     expect(accessible).to_contain_text(f"{drawing.reached.volume:.6g} units³")
     assert red_pixels(tab) > without + MANY
 
-    with tab.page.expect_download() as download:
-        page.services.get(WorkspaceFiles).send("workspace", "3mf", tab.client.client_id)
-    assert download.value.suggested_filename == "paper-optimal-accessible-workspace.3mf"
+    download = tab.export("Workspace", "3MF")
+    assert download.suggested_filename == "paper-optimal-accessible-workspace.3mf"
 
 
 def test_a_home_that_is_no_start_is_told_and_the_button_goes_to_one(tab: Tab) -> None:

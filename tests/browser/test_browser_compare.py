@@ -64,7 +64,7 @@ def test_designs_are_pinned_told_overlaid_and_opened(tab: Tab) -> None:
     assert page.wait_until_drawn(PATIENCE_SECONDS)
     assert purple_pixels(tab) > before + MANY
     press(tab, "Make paper-optimal the live design", lambda: tab.state.design == pinned)
-    tab.push("Undo")
+    tab.page.get_by_role("button", name="Undo").click()
     tab.wait_for(lambda: tab.state.design == PRESETS["paper-initial"], "what was there before")
     press(tab, "Unpin paper-optimal", lambda: tab.state.compared.is_empty)
     assert page.wait_until_drawn(PATIENCE_SECONDS)

@@ -35,7 +35,7 @@ def test_a_preset_opens_in_its_home_pose(tab: Tab) -> None:
     tab.wait_for(lambda: tab.state.design == INITIAL, "the preset")
     assert tab.state.pose == opened(INITIAL).pose
     assert_variables_shown(tab)
-    tab.turn_to("Move")
+    tab.turn_to("Pose")
     for axis, name in enumerate("xyz"):
         tab.wait_until_shown(name, tab.state.pose.position[axis])
 

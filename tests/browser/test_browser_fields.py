@@ -157,7 +157,7 @@ def test_enter_leaves_a_field_so_that_the_next_key_is_a_command(browser: Browser
         tab.wait_until_shown("x", 4.0)
         tab.page.keyboard.press("g")
         tab.wait_for(lambda: tab.state.view.grid, "the grid again")
-        tab.turn_to("Designs")
+        tab.open_dialog("Designs")
         name = tab.row("Name").locator("input")
         name.fill("mine")
         tab.page.keyboard.press("Enter")
@@ -261,7 +261,7 @@ def test_an_input_method_is_not_disturbed_and_its_digits_count(tab: Tab) -> None
 def test_a_name_may_hold_blanks_and_be_typed_anew(browser: Browser) -> None:
     with explorer_with_data() as running:
         tab = Tab(browser, running)
-        tab.turn_to("Designs")
+        tab.open_dialog("Designs")
         name = tab.row("Name").locator("input")
 
         def named(expected: str) -> None:

@@ -8,12 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from playwright.sync_api import Browser, Locator
+from playwright.sync_api import Browser, FloatRect, Locator
 from tab import Tab
 
-from explorer.app.features.feature import DRAWER_HEIGHT, TALL_DRAWER
 from explorer.app.features.help.tour import STEPS
-from explorer.app.layout import NARROW
+from explorer.app.layout import DRAWER_HEIGHT, NARROW
 from explorer.app.scene.camera import framing
 from explorer.app.screenshot import SCENE_CANVAS, settle
 from explorer.app.server import Running, start
@@ -23,9 +22,12 @@ from explorer.mechanism.design_file import PRESETS
 # A small laptop's screen, and a tablet either way up.
 SIZES = ((1280, 720), (1024, 768), (768, 1024))
 LEAST_SHARE = 0.4
-RIGHT = ("Move", "Design", "Workspace", "Optimise", "View")
-LEFT = ("Singularity", "Workspace", "Legs", "Paths")
-DRAWER = ("Compare", "History", "Share")
+TABS = {
+    *("Pose", "Design", "Show"),
+    *("Singularity", "Workspace", "Legs", "Prototype"),
+    *("Optimise", "Compare", "Paths"),
+}
+DIALOGS = ("History", "Export", "Help")
 
 # Controls that stick out of what holds them, or of the page, to the left or to the right.
 CUT_OFF = """() => {
@@ -63,15 +65,15 @@ def press(tab: Tab, key: str) -> None:
 
 
 def test_the_palette_finds_a_command_and_does_it(tab: Tab) -> None:
-    tab.page.get_by_role("button", name="Commands Ctrl+K").click()
+    tab.page.get_by_role("button", name="Commands").click()
     search = tab.page.get_by_placeholder("Search commands")
     search.fill("convex hull")
     press(tab, "Enter")
     tab.wait_for(lambda: tab.state.view.workspace.hull, "the hull")
     search.wait_for(state="detached")
     press(tab, "ControlOrMeta+k")
-    search.fill("prototype")
-    tab.page.get_by_text("View › Prototype").first.click()
+    search.fill("show the parts")
+    tab.page.get_by_text("Prototype › Show the parts").first.click()
     tab.wait_for(lambda: tab.state.view.prototype.shown, "the prototype")
 
 
@@ -148,46 +150,81 @@ def test_card_of_keys_is_closed_by_escape_and_by_a_click_beside_it(tab: Tab) -> 
 def drawer_of(tab: Tab) -> Locator:
     """Return the drawer, opened."""
     tab.turn_to("Compare")
-    drawer = tab.page.locator("[data-floating-window]", has=tab.page.get_by_role("tab")).first
-    tab.wait_for(lambda: _bottom(drawer) - _top(drawer) > DRAWER_HEIGHT - 8, "an open drawer")
+    drawer = tab.page.locator("[data-ex=drawer]")
+    tab.wait_for(lambda: abs(_height(drawer) - DRAWER_HEIGHT) < 2, "an open drawer")
     return drawer
 
 
-def _top(box: Locator) -> float:
-    found = box.bounding_box()
+def _box(each: Locator) -> FloatRect:
+    found = each.bounding_box()
     assert found is not None
-    return found["y"]
+    return found
 
 
-def _bottom(box: Locator) -> float:
-    found = box.bounding_box()
-    assert found is not None
-    return found["y"] + found["height"]
+def _height(each: Locator) -> float:
+    return _box(each)["height"]
 
 
-def test_drawer_that_was_moved_grows_and_shrinks_within_the_window(
+def test_drawer_is_as_wide_as_the_scene_which_ends_above_it(
     browser: Browser, running: Running
 ) -> None:
     width, height = SIZES[0]
     with closing(Tab(browser, running, size=SIZES[0])) as tab:
-        drawer = drawer_of(tab)
-        # By a hand: from then on it is no more tied to the foot of the page.
-        grip = drawer.locator("[data-dock-resize=top]").bounding_box()
-        assert grip is not None
-        tab.page.mouse.move(grip["x"] + 0.5 * grip["width"], grip["y"] + 0.5 * grip["height"])
-        tab.page.mouse.down()
-        tab.page.mouse.move(grip["x"] + 0.5 * grip["width"], grip["y"] + 30, steps=4)
-        tab.page.mouse.up()
-        tab.running.page.services.resize_drawer(tab.client, tall=True)
-        tab.wait_for(lambda: _bottom(drawer) - _top(drawer) > TALL_DRAWER - 8, "a tall drawer")
-        tab.wait_for(lambda: _bottom(drawer) <= height + 1 and _top(drawer) >= 0, "all of it")
-        for less in (200, 300):
+        drawer, scene = drawer_of(tab), tab.page.locator(SCENE_CANVAS)
+
+        def is_below_the_scene() -> bool:
+            low, high = _box(drawer), _box(scene)
+            beside = (low["x"], low["width"]) == (high["x"], high["width"])
+            touches = abs(high["y"] + high["height"] - low["y"]) < 2
+            foot = tab.page.viewport_size or {"height": 0}
+            at_the_foot = abs(low["y"] + low["height"] - foot["height"]) < 2
+            return beside and touches and at_the_foot and low["y"] > 100
+
+        tab.wait_for(is_below_the_scene, "the drawer below the scene")
+        grip = _box(drawer.locator("[data-dock-resize=top]"))
+        x, y = grip["x"] + 0.5 * grip["width"], grip["y"] + 0.5 * grip["height"]
+        for pull in (-150, 200, -400):
+            before = _height(drawer)
+            tab.page.mouse.move(x, y)
+            tab.page.mouse.down()
+            y += pull
+            tab.page.mouse.move(x, y, steps=4)
+            tab.page.mouse.up()
+            tab.wait_for(lambda before=before: _height(drawer) != before, "another height")
+            tab.wait_for(is_below_the_scene, "the drawer below the scene")
+            grip = _box(drawer.locator("[data-dock-resize=top]"))
+            y = grip["y"] + 0.5 * grip["height"]
+        for less in (150, 250):
             tab.page.set_viewport_size({"width": width, "height": height - less})
-            tab.wait_for(
-                lambda less=less: _bottom(drawer) <= height - less + 1 and _top(drawer) >= 0,
-                "all of it in a smaller window",
-            )
+            tab.wait_for(is_below_the_scene, "the drawer in a smaller window")
+        tab.page.get_by_role("button", name="Minimize panel").click()
+        tab.wait_for(lambda: _height(drawer) < 50, "a closed drawer")
+        tab.wait_for(
+            lambda: abs(_box(scene)["y"] + _height(scene) - _box(drawer)["y"]) < 2, "the scene"
+        )
         assert tab.complaints() == []
+
+
+def test_dialogs_open_from_the_bar_and_close_by_escape_beside_and_by_their_button(
+    tab: Tab,
+) -> None:
+    for name in DIALOGS:
+        dialog = tab.page.get_by_role("dialog", name=name)
+        closes = (
+            lambda: press(tab, "Escape"),
+            lambda: tab.page.mouse.click(5, 300),
+            lambda: tab.page.get_by_role("button", name="Close the dialog").click(),
+            # The same button of the bar.
+            lambda name=name: tab.page.locator(f"[data-opens={name}]").click(),
+        )
+        for close in closes:
+            tab.open_dialog(name)
+            close()
+            dialog.wait_for(state="hidden")
+    # Only one is open.
+    tab.open_dialog("Help")
+    tab.open_dialog("Export")
+    tab.page.get_by_role("dialog", name="Help").wait_for(state="hidden")
 
 
 def test_scene_keeps_beside_the_panels_where_the_page_gave_it_the_size_before_them(
@@ -239,13 +276,16 @@ def test_there_is_room_on_a_small_screen(
         # In a narrow window the panels are laid out once the browser has told its size.
         tab.wait_for(lambda: LEAST_SHARE <= share() < 1.0, "room for the scene")
         if size[0] < NARROW:
-            tab.wait_for(lambda: abs(_left(tab, "Singularity") - _left(tab, "Move")) < 8, "a stack")
+            tab.wait_for(lambda: abs(_left(tab, "Singularity") - _left(tab, "Pose")) < 8, "a stack")
         tabs = tab.page.get_by_role("tab")
         names = tabs.all_inner_texts()
-        assert set(RIGHT) | set(LEFT) | set(DRAWER) <= {name.strip() for name in names}
-        for index, name in enumerate(names):
-            tabs.nth(index).click()
+        assert {name.strip() for name in names} == TABS
+        for name in names:
+            tab.turn_to(name.strip())
             tab.page.wait_for_timeout(100)
+            assert tab.page.evaluate(CUT_OFF) == [], f"in {name}"
+        for name in DIALOGS:
+            tab.open_dialog(name)
             assert tab.page.evaluate(CUT_OFF) == [], f"in {name}"
         assert tab.complaints() == []
 
@@ -265,7 +305,7 @@ def test_the_page_is_as_dark_as_its_user_prefers_until_one_chooses(
         tab.wait_for(lambda: _scheme(tab) == "dark", "a dark page")
         # Nobody chose, so nothing is remembered.
         assert PreferenceFile(tmp_path).chosen.dark is None
-        tab.page.get_by_text("Theme").first.click()
+        tab.push("Theme")
         tab.wait_for(lambda: _scheme(tab) == "light", "a light page")
         tab.wait_for(lambda: PreferenceFile(tmp_path).chosen.dark is False, "what was chosen")
     with page_with(browser, PreferenceFile(tmp_path), dark=True) as tab:
@@ -297,7 +337,8 @@ def test_the_tour_leads_through_five_steps_once(browser: Browser, tmp_path: Path
         tab.reload()
         assert tab.page.get_by_text("of 5").count() == 0
         # By command it begins again, and can be skipped at once.
-        tab.page.get_by_text("Tour", exact=True).first.click()
+        tab.open_dialog("Help")
+        tab.push("Tour")
         tab.page.get_by_text("step 1 of 5").wait_for()
         _words(tab, "Skip the tour").click()
         tab.page.get_by_text("step 1 of 5").wait_for(state="detached")

@@ -109,7 +109,7 @@ class Stage:
 
 @pytest.fixture(scope="module")
 def opened_stage(browser: Browser) -> Iterator[Stage]:
-    running = start(DESIGN, port=0, docked=False)
+    running = start(DESIGN, port=0, panels=False)
     page, client = open_page(browser, running, SCENES["home"].size)
     page.add_style_tag(content=SCENE_ALONE)
     settle(page, client)

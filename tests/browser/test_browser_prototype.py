@@ -9,6 +9,7 @@ from playwright.sync_api import expect
 from tab import Tab
 
 from explorer.app.features.prototype.feed import PartsFeed
+from explorer.app.features.prototype.tasks import export_simulation
 from explorer.app.screenshot import PATIENCE_SECONDS
 from explorer.app.state.actions import Set, SetPosition
 from explorer.workspace.accessible.radii import with_radius
@@ -31,11 +32,11 @@ def test_the_prototype_takes_the_place_of_the_schematic_moves_and_is_exported(ta
     page, session = tab.running.page, tab.running.page.session
     bare = replace(tab.state.view, handle=False, flags=False, tetrahedra=(False, False, False))
     session.do(Set("view", bare))
-    tab.turn_to("View")
+    tab.turn_to("Prototype")
     schematic = tab.picture()
-    expect(tab.page.get_by_role("button", name="Export assembly")).to_be_hidden()
-    tab.choose("Drawn as", "prototype")
-    tab.page.get_by_role("button", name="Export assembly").wait_for()
+    expect(tab.label("Exploded")).to_be_hidden()
+    tab.switch("Show the parts", on=True)
+    tab.label("Exploded").wait_for()
     wait_until_drawn(tab)
     together = tab.picture()
     assert difference(schematic, together) > PLAIN_TO_SEE
@@ -58,27 +59,28 @@ def test_the_prototype_takes_the_place_of_the_schematic_moves_and_is_exported(ta
     tab.type("Density (kg/m³)", "7850")
     tab.wait_for(lambda: tab.state.view.prototype.density == 7850.0, "steel")
     expect(tab.page.get_by_text(f"{made.listed.mass(7850.0):.1f} g")).to_be_visible()
-    for file_format, name in (("glb", "mechanism.glb"), ("stl-zip", "parts-stl.zip")):
-        tab.choose("Format", file_format)
-        with tab.page.expect_download() as download:
-            tab.push("Export assembly")
-        assert download.value.suggested_filename == f"paper-optimal-{name}"
-        assert download.value.path().stat().st_size > 10_000
+    for file_format, name in (("GLB", "mechanism.glb"), ("STL (zip)", "parts-stl.zip")):
+        download = tab.export("Mechanism", file_format)
+        assert download.suggested_filename == f"paper-optimal-{name}"
+        assert download.path().stat().st_size > 10_000
+    download = tab.export("Simulation", "MJCF")
+    assert download.suggested_filename == "paper-optimal-simulation.xml"
+    assert download.path().read_bytes() == export_simulation(tab.state.design, 7850.0)
 
 
 def test_a_design_too_tight_is_told_and_stays_schematic(tab: Tab) -> None:
-    tab.turn_to("View")
+    tab.turn_to("Prototype")
     tab.running.page.session.do(Set("design.limits", with_radius(tab.state.design, 0.4).limits))
     schematic = tab.picture()
-    tab.choose("Drawn as", "prototype")
+    tab.switch("Show the parts", on=True)
     alert = tab.page.get_by_role("alert").filter(has_text="No prototype of this design")
     alert.wait_for()
     expect(alert).to_contain_text("carriages 2 and 3 at home are 6.69 mm apart and need 8.2 mm")
-    expect(tab.page.get_by_role("button", name="Export assembly")).to_be_hidden()
+    expect(tab.label("Exploded")).to_be_hidden()
     wait_until_drawn(tab)
     assert difference(schematic, tab.picture()) < ALIKE
     tab.running.page.session.do(Set("design.limits", with_radius(tab.state.design, 0.3).limits))
-    tab.page.get_by_role("button", name="Export assembly").wait_for()
+    tab.label("Exploded").wait_for()
     expect(alert).to_be_hidden()
     wait_until_drawn(tab)
     assert difference(schematic, tab.picture()) > PLAIN_TO_SEE

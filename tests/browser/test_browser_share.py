@@ -60,8 +60,7 @@ def pixels_of(download: Download) -> Pixels:
     return untyped.imread(download.path().read_bytes(), extension=".png")
 
 
-def picture(tab: Tab, size: str, *, transparent: bool) -> Pixels:
-    tab.choose("Size (px)", size)
+def picture(tab: Tab, *, transparent: bool) -> Pixels:
     tab.switch("Transparent", on=transparent)
     with tab.page.expect_download() as download:
         tab.push("Download picture")
@@ -70,16 +69,16 @@ def picture(tab: Tab, size: str, *, transparent: bool) -> Pixels:
 
 
 def test_a_picture_has_the_size_and_the_background_asked_for_and_no_handle(tab: Tab) -> None:
-    tab.turn_to("Share")
+    tab.open_dialog("Export")
     settle(tab.page, tab.client)
-    tab.choose("Size (px)", "other")
+    tab.page.get_by_text("Picture of another size").click()
     tab.type("Width (px)", "320")
     tab.type("Height (px)", "240")
     tab.page.keyboard.press("Tab")
-    opaque = picture(tab, "other", transparent=False)
+    opaque = picture(tab, transparent=False)
     assert opaque.shape == (240, 320, 3)
     assert (opaque[0, 0] > 240).all()
-    clear = picture(tab, "other", transparent=True)
+    clear = picture(tab, transparent=True)
     assert clear.shape == (240, 320, 4)
     assert clear[..., 3].min() == 0
     assert clear[..., 3].max() == 255
@@ -102,12 +101,11 @@ def reds(pixels: NDArray[Any]) -> int:
 def test_a_picture_twice_as_large_as_shown_shows_the_same(tab: Tab) -> None:
     tab.running.page.session.do(Set("view", View(handle=False)))
     shown = decoded(tab.picture())
-    tab.turn_to("Share")
-    taken = picture(tab, "twice as shown", transparent=False) / 255.0
+    taken = pixels_of(tab.export("Picture", "PNG twice as shown")) / 255.0
     height, width = shown.shape[:2]
     assert taken.shape == (2 * height, 2 * width, 3)
-    # The drawer lies over the foot of the scene.
-    found = likeness(shown[: height // 2], blocks(taken, 2)[: height // 2])
+    # The buttons of the views lie over the scene.
+    found = likeness(shown[height // 4 :], blocks(taken, 2)[height // 4 :])
     assert found.spot < PLAIN_TO_SEE
     assert found.structure < 0.05
 
@@ -128,11 +126,9 @@ def test_a_size_out_of_bounds_is_refused_to_the_one_who_asked(open_tab: OpenTab)
 def test_the_scene_is_one_page_that_works_without_network(tab: Tab, browser: Browser) -> None:
     tab.running.page.session.do(Set("view", View(handle=False)))
     tab.look_from("front")
-    tab.turn_to("Share")
-    with tab.page.expect_download() as download:
-        tab.push("Scene (HTML)")
-    assert download.value.suggested_filename == "paper-optimal-scene.html"
-    file = download.value.path().rename(download.value.path().with_suffix(".html"))
+    download = tab.export("Scene", "HTML")
+    assert download.suggested_filename == "paper-optimal-scene.html"
+    file = download.path().rename(download.path().with_suffix(".html"))
     asked: list[str] = []
     said: list[str] = []
     context = browser.new_context(offline=True, viewport={"width": 640, "height": 480})
@@ -187,11 +183,9 @@ def test_the_session_comes_as_a_table_to_the_one_who_asked(open_tab: OpenTab) ->
     assert session.wait_until_idle()
     session.do(SetPosition(2, 7.0))
     assert session.wait_until_idle()
-    asking.turn_to("Share")
-    with asking.page.expect_download() as download:
-        asking.push("Session (CSV)")
-    assert download.value.suggested_filename == "paper-optimal-session.csv"
-    rows = list(csv.DictReader(io.StringIO(download.value.path().read_text(encoding="utf-8"))))
+    download = asking.export("Session", "CSV")
+    assert download.suggested_filename == "paper-optimal-session.csv"
+    rows = list(csv.DictReader(io.StringIO(download.path().read_text(encoding="utf-8"))))
     poses = [[float(row[name]) for name in "xyz"] for row in rows]
     assert poses[0] == [10.0, 5.0, 9.0]
     assert poses[-1] == list(asking.state.pose.position)

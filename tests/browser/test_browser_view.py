@@ -23,7 +23,7 @@ def shows_tetrahedron(index: int) -> Callable[[View], bool]:
 
 
 def test_every_switch_of_the_view_switches_its_part_and_no_other(tab: Tab) -> None:
-    tab.turn_to("View")
+    tab.turn_to("Show")
     switches = {label: shows(name) for name, label, _ in SWITCHES}
     for index, points in enumerate(TETRAHEDRA):
         switches[f"δ{index + 1}: {' '.join(points)}"] = shows_tetrahedron(index)

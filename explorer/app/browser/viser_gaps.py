@@ -239,6 +239,24 @@ def run_script_in(client: viser.ClientHandle, source: str) -> None:
     internals._websock_connection.queue_message(_script(source))
 
 
+def mark_broadcasts(client: viser.ClientHandle, number: int) -> None:
+    """Give all browsers a number, after all that was sent to all of them so far.
+
+    A browser has received those messages when its `window.explorer.mark` is the number. What is
+    sent to one browser alone takes a way of its own and may arrive earlier.
+    """
+    from viser import _messages
+
+    # The type of a message is the name of its class.
+    class RunJavascriptMessage(_messages.RunJavascriptMessage):
+        def redundancy_key(self) -> str:
+            return "mark"
+
+    internals: Any = client
+    source = f"(window.explorer ??= {{}}).mark = {number};"
+    internals._viser_server._websock_server.queue_message(RunJavascriptMessage(source=source))
+
+
 def _script(source: str) -> Any:
     """Return the message that runs a script, whose errors a browser logs.
 
@@ -326,3 +344,15 @@ def panel_in(client: viser.ClientHandle, panel: viser.PanelHandle) -> viser.Pane
     own = viser.PanelHandle.__new__(viser.PanelHandle)
     own.__dict__.update({**panel.__dict__, "_placement_gui_api": client.gui})
     return own
+
+
+def dock_below_in(
+    client: viser.ClientHandle, panel: viser.PanelHandle, anchor: viser.PanelHandle
+) -> None:
+    """Dock a panel below another one in one browser alone; all browsers share both.
+
+    viser's own handle refuses an anchor that was not made for that browser.
+    """
+    internals: Any = anchor
+    own: Any = panel_in(client, panel)
+    own._set_position({"kind": "split", "anchor_uuid": internals._impl.uuid, "side": "below"})

@@ -14,7 +14,7 @@ from typing import Any, Literal, Protocol, TypeVar
 import viser
 
 from explorer.app.browser.downloads import Downloads
-from explorer.app.browser.viser_gaps import panel_in
+from explorer.app.scene.camera import Cameras
 from explorer.app.scene.part import ScenePart
 from explorer.app.session.faults import Faults
 from explorer.app.session.jobs import Worker
@@ -32,11 +32,9 @@ from explorer.app.widgets.palette import Command
 from explorer.app.widgets.theme import Theme
 from explorer.errors import StorageError
 
-Place = Literal["top", "main", "side", "drawer"]
+Place = Literal["build", "analyse", "work", "dialog"]
+Side = Literal["left", "middle", "right"]
 Shared = TypeVar("Shared")
-
-# Heights of the open drawer, in pixels.
-DRAWER_HEIGHT, TALL_DRAWER = 300, 540
 
 
 @dataclass
@@ -52,11 +50,12 @@ class Services:
         complain: Function that shows a problem to one client, or to all for None.
         tell: Function that shows a message to all clients.
         theme: Theme of the page, light or dark.
-        drawer: Panel over the foot of the scene.
+        cameras: Cameras of the browsers; they frame all that the features draw.
         user_data: The user's designs and session; None to save nothing.
         studies: Folders of design studies; None to offer none.
         preferences: File that remembers theme and tour; None to remember nothing.
         commands: Function that returns the commands of the palette.
+        exports: The files that the features of the page offer.
         tab: Tab whose panels are being made.
     """
 
@@ -68,11 +67,12 @@ class Services:
     complain: Callable[[str, Who], None]
     tell: Callable[[str], None]
     theme: Theme
-    drawer: viser.PanelHandle
+    cameras: Cameras
     user_data: UserData | None
     studies: StudyFolders | None
     preferences: PreferenceFile | None
     commands: Callable[[], tuple[Command, ...]] = tuple
+    exports: tuple[Export, ...] = ()
     tab: viser.GuiTabHandle | None = None
     _shared: dict[object, Any] = field(default_factory=dict[object, Any])
     _ends: list[Callable[[], None]] = field(default_factory=list[Callable[[], None]])
@@ -118,10 +118,6 @@ class Services:
         except StorageError as error:
             self.complain(str(error), who)
 
-    def resize_drawer(self, client: viser.ClientHandle, *, tall: bool) -> None:
-        """Make the drawer tall in a browser, or as low as it is at first."""
-        panel_in(client, self.drawer).set_height(TALL_DRAWER if tall else DRAWER_HEIGHT)
-
 
 class Panel(Protocol):
     """The content of a tab, or a part of it."""
@@ -160,15 +156,56 @@ class Tab:
     """A panel in a tab of the page.
 
     Attributes:
-        place: Place of the tab: "main" is the panel on the right, "side" that on the left, "drawer"
-            that over the foot of the scene; "top" is the part above all tabs on the right.
+        place: Place of the tab: the panel on the left, where the mechanism is built; that on the
+            right, where it is analysed; the drawer at the foot of the scene, for work that needs
+            width; or a dialog of its own over the scene.
         title: Title of the tab; several panels may share one, in their order.
         panel: Function that makes the panel.
+        icon: Icon above the title, for the first panel of a title.
     """
 
     place: Place
     title: str
     panel: Callable[[Services], Panel]
+    icon: viser.IconName | None = None
+
+
+class BarPart(Protocol):
+    """A part of the bar on top of the page."""
+
+    def markup(self, frame: Frame, /) -> str:
+        """Return the part for a frame, as HTML."""
+        ...
+
+
+@dataclass(frozen=True)
+class InBar:
+    """The declaration of a part of the bar on top of the page.
+
+    Attributes:
+        side: Where in the bar it stands; parts of one side keep the order of the features.
+        part: Function that makes the part.
+    """
+
+    side: Side
+    part: Callable[[Services], BarPart]
+
+
+@dataclass(frozen=True)
+class Export:
+    """Files of one thing in several formats, as the dialog Export offers them.
+
+    Attributes:
+        title: Name of the thing, such as "Workspace".
+        hint: Sentence on what the files hold.
+        formats: Names of the formats, each that of a button.
+        sender: Function that makes the function that sends a client a file in a format.
+    """
+
+    title: str
+    hint: str
+    formats: tuple[str, ...]
+    sender: Callable[[Services], Callable[[str, Who], None]]
 
 
 @dataclass(frozen=True)
@@ -210,6 +247,8 @@ class Feature:
     Attributes:
         name: Name of its folder.
         tabs: Its panels, in their order.
+        bar: Its parts of the bar on top of the page.
+        exports: The files that it offers.
         scene: Classes of its parts of the scene.
         feeds: Classes that request drawings from the worker.
         runners: Classes that do long work.
@@ -226,6 +265,8 @@ class Feature:
 
     name: str
     tabs: tuple[Tab, ...] = ()
+    bar: tuple[InBar, ...] = ()
+    exports: tuple[Export, ...] = ()
     scene: tuple[Callable[[Services], ScenePart], ...] = ()
     feeds: tuple[Callable[[Services], Feed], ...] = ()
     runners: tuple[Callable[[Services], Runner], ...] = ()

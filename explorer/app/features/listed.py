@@ -1,4 +1,4 @@
-"""The features of the page, in the order of their tabs."""
+"""The features of the page, in the order of their tabs and of their parts of the bar."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from explorer.app.features.view.feature import VIEW
 from explorer.app.features.workspace.feature import WORKSPACE
 
 FEATURES: tuple[Feature, ...] = (
-    HELP,
+    DESIGNS,
+    HISTORY,
     MECHANISM,
+    VIEW,
     SINGULARITY,
     WORKSPACE,
     LEGS,
-    PATHS,
-    OPTIMISE,
     PROTOTYPE,
-    VIEW,
-    DESIGNS,
-    COMPARE,
+    OPTIMISE,
     STUDIES,
-    HISTORY,
+    COMPARE,
+    PATHS,
     SHARING,
+    HELP,
 )

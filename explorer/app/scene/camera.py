@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Literal, get_args
 
@@ -29,6 +29,8 @@ DIRECTIONS: dict[ViewName, tuple[float, float, float]] = {
 
 # Number of earlier positions at which a camera counts as not moved by its user.
 REMEMBERED = 4
+# Share by which points may lie beyond the edge of a picture and still count as in it.
+EDGE = 0.02
 # Guess of width over height of the scene in a new browser.
 FIRST_ASPECT = 1.2
 
@@ -59,6 +61,28 @@ def framing(
         distance = max(distance, 0.5 * (high - low) / slope)
         target = target + 0.5 * (low + high) * axis
     return target - 1.05 * distance * forward, target
+
+
+def are_in_picture(
+    points: FloatArray, eye: FloatArray, target: FloatArray, field_of_view: float, aspect: float
+) -> bool:
+    """Whether an upright camera sees all of some points.
+
+    Args:
+        points: Points, shape (n, 3).
+        eye: Position of the camera.
+        target: Point that it looks at.
+        field_of_view: Vertical angle of view, in radians.
+        aspect: Width over height of the picture.
+    """
+    forward = (target - eye) / np.linalg.norm(target - eye)
+    right = np.cross(forward, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    up = np.cross(right, forward)
+    away = points - eye
+    half = (1.0 + EDGE) * math.tan(0.5 * field_of_view) * (away @ forward)
+    # Behind the camera the half height is negative.
+    return bool((np.abs(away @ up) <= half).all() and (np.abs(away @ right) <= aspect * half).all())
 
 
 @dataclass(frozen=True)
@@ -97,8 +121,11 @@ class Cameras:
     moved it back to the first position while loading. The position of a camera is always the one
     that its browser reported, since a browser may miss what was sent to it.
 
+    A camera that showed all points follows them when they leave the picture, as after a change of
+    the design, and keeps its direction. A user who came closer to look at a part stays there.
+
     Args:
-        first: First camera of a new browser; set here to frame the points.
+        first: First camera of a new browser.
         points: Function that returns the points to frame, shape (n, 3).
         put: Function that sends a browser eye and target of its camera, and has it report them.
     """
@@ -113,9 +140,16 @@ class Cameras:
         self._points = points
         self._send = _put_camera if put is None else put
         self._placements: dict[int, _Placement] = {}
+        # The points that cameras followed last, and the browsers that show all of them.
+        self._followed: FloatArray | None = None
+        self._showing: set[int] = set()
         # Browsers report several sizes at once while they load: the last one counts.
         self._lock = threading.RLock()
-        first.position, first.look_at = framing(points(), "isometric", FIRST_ASPECT)
+
+    def frame_first(self) -> None:
+        """Make the first camera of new browsers frame the points."""
+        first = self._first
+        first.position, first.look_at = framing(self._points(), "isometric", FIRST_ASPECT)
 
     def point(self, client: viser.ClientHandle, view: ViewName) -> None:
         """Show the mechanism in one browser from a view."""
@@ -137,6 +171,21 @@ class Cameras:
         """Forget a browser."""
         with self._lock:
             self._placements.pop(client.client_id, None)
+            self._showing.discard(client.client_id)
+
+    def follow(self, clients: Iterable[viser.ClientHandle]) -> None:
+        """Move the cameras that showed all points and no longer do, keeping their directions.
+
+        Args:
+            clients: Browsers whose users hold nothing.
+        """
+        points = self._points()
+        for client in clients:
+            with self._lock:
+                is_left = client.client_id in self._showing and not _shows(client, points)
+            if is_left:
+                self.fit(client)
+        self._followed = points
 
     def look_again(self, client: viser.ClientHandle) -> None:
         """Put a browser's camera at its last position again, unless its user moved it."""
@@ -162,6 +211,10 @@ class Cameras:
     def _follow(self, client: viser.ClientHandle) -> None:
         """Put a browser's camera again if its report calls for that."""
         with self._lock:
+            if self._followed is None or _shows(client, self._followed):
+                self._showing.add(client.client_id)
+            else:
+                self._showing.discard(client.client_id)
             placement = self._placements.get(client.client_id)
             if placement is None:
                 return
@@ -183,6 +236,13 @@ class Cameras:
                 view, reported, first, (*before, eye), target
             )
             self._send(client, eye, target)
+
+
+def _shows(client: viser.ClientHandle, points: FloatArray) -> bool:
+    """Whether a browser's camera shows all of some points."""
+    camera = client.camera
+    eye, target = np.asarray(camera.position), np.asarray(camera.look_at)
+    return are_in_picture(points, eye, target, camera.fov, camera.aspect)
 
 
 def _put_camera(client: viser.ClientHandle, eye: FloatArray, target: FloatArray) -> None:

@@ -2,8 +2,8 @@
 
 A step is one gesture with one control, from press to release, so that a drag of many events is
 one step; without a press, as with keys, a pause ends it. A change that happens by itself, such as
-a path that plays on, belongs to the step before it. Steps hold whole states, which share all that
-did not change.
+a path that plays on, belongs to the step before it, and so does what is shown and how: undo leaves
+it as it is. Steps hold whole states, which share all that did not change.
 """
 
 from __future__ import annotations
@@ -68,9 +68,8 @@ class History:
         if state.optimisation.is_on or settled == present.state:
             return self
         earlier = self.steps[: self.at]
-        if event.action.continues:
-            steps = (*earlier, replace(present, state=settled), *self.steps[self.at + 1 :])
-            return replace(self, steps=steps)
+        if event.action.continues or replace(settled, view=present.state.view) == present.state:
+            return self.with_state(settled)
         if self.is_open and event.continues(present.source, present.last, present.press):
             if earlier and earlier[-1].state == settled:
                 # The gesture ended where it began, so that its step is dropped.
@@ -83,6 +82,11 @@ class History:
         step = Step(present.number + 1, words, settled, event.source, event.time, event.press)
         steps = (*earlier, present, step)[-MOST_STEPS:]
         return History(steps, len(steps) - 1, is_open=True)
+
+    def with_state(self, state: State) -> History:
+        """Return the history with another state in the step that the page shows."""
+        step = replace(self.step, state=state)
+        return replace(self, steps=(*self.steps[: self.at], step, *self.steps[self.at + 1 :]))
 
     def move(self, steps: int) -> History:
         """Return the history moved by a number of steps; a negative number undoes.
@@ -125,8 +129,10 @@ def settle(state: State) -> State:
     return replace(state, gesture=None, paths=paths)
 
 
-def restore(step: Step, present: State) -> State:
-    """Return the state of a step, with the counts of requests that the present state has.
+def restore(history: History, present: State) -> tuple[State, History]:
+    """Return the state of the step of a history, and the history with this state in its step.
+
+    The view and the counts of requests are those of the present state.
 
     Raises:
         InputError: a design is being optimised.
@@ -135,12 +141,14 @@ def restore(step: Step, present: State) -> State:
         raise InputError(
             "the design is being optimised: cancel that first, then undo what led to it"
         )
-    state = step.state
+    state = history.step.state
     # No number of a request is used twice.
     request = max(state.paths.request, present.paths.request)
     count = max(state.optimisation.count, present.optimisation.count)
-    return replace(
+    restored = replace(
         state,
+        view=present.view,
         paths=replace(state.paths, request=request),
         optimisation=replace(state.optimisation, count=count),
     )
+    return restored, history.with_state(replace(state, view=present.view))

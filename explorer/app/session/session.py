@@ -162,8 +162,7 @@ class Session:
     def _apply(self, item: _Posted) -> None:
         if isinstance(item.change, HistoryMove):
             history = item.change.move(self._history)
-            self._state = restore(history.step, self._state)
-            self._history = history
+            self._state, self._history = restore(history, self._state)
             return
         press = None if self._press_at is None else self._press_at(item.who, item.stamp)
         event = UserAction(item.change(self._state), item.key, item.stamp, press)

@@ -174,3 +174,34 @@ def press_button(
     attributes = "".join(f' {key}="{escape(text)}"' for key, text in values.items() if text)
     disabled = " disabled" if is_disabled else ""
     return f'<button type="button"{attributes}{disabled}>{content}</button>'
+
+
+def open_button(
+    title: str, content: str, *, hint: str = "", label: str = "", class_name: str = ""
+) -> str:
+    """Return a button as HTML that opens a tab or a dialog; "commands" opens the palette.
+
+    Args:
+        title: Title of the tab.
+        content: The visible content, HTML.
+        hint: Words on what it opens, shown when a pointer rests on the button.
+        label: The name for screen readers; the content if "".
+        class_name: The classes of the stylesheet.
+    """
+    values = {"class": class_name, "data-opens": title, "title": hint, "aria-label": label}
+    attributes = "".join(f' {key}="{escape(text)}"' for key, text in values.items() if text)
+    return f'<button type="button"{attributes}>{content}</button>'
+
+
+def figure(opens: str, name: str, value: str, *, hint: str, look: str = "") -> str:
+    """Return a figure of the bar as HTML, a button that opens the tab that explains it.
+
+    Args:
+        opens: Title of the tab.
+        name: Name of the figure.
+        value: Value with its unit, HTML.
+        hint: Sentence on what it measures.
+        look: Class of the value, such as "ex-close".
+    """
+    content = f'<span class="ex-dim">{escape(name)}</span><b class="{look}">{value}</b>'
+    return open_button(opens, content, hint=hint, class_name="ex-figure")

@@ -1,9 +1,9 @@
 """The names of the commands in the palette, and their keys.
 
-The palette offers every button, switch and list of the page under its name there; the page adds
-commands that have no control. Keys are those of other 3D programs: 0, 1, 3 and 7 for the views,
-F to fit, H for home, letters for visible parts. None is a key of the browser, and W, A, S, D, Q, E
-and the arrows move the camera.
+The palette offers every button, switch and list of the page under its name there; features add
+commands that have no control, and keys. Keys are those of other 3D programs: 0, 1, 3 and 7 for the
+views, F to fit, H for home, letters for visible parts. None is a key of the browser, and W, A, S,
+D, Q, E and the arrows move the camera.
 """
 
 from __future__ import annotations
@@ -51,22 +51,11 @@ def shift(key: str) -> Key:
     return Key(key, "shift")
 
 
-KEYS: dict[str, tuple[Key, ...]] = {
-    "Edit › Undo": (Key("Z", "cmd/ctrl"),),
-    "Edit › Redo": (Key("Z", "cmd/ctrl+shift"), Key("Y", "cmd/ctrl")),
-    "View › Isometric": (Key("0"),),
-    "View › Front": (Key("1"),),
-    "View › Side": (Key("3"),),
-    "View › Top": (Key("7"),),
-    "View › Fit": (Key("F"),),
-}
-"""Keys of the commands above all tabs, by name; features bring their own keys."""
-
 NAMES = {"δ1 δ2 δ3": "Assembly mode"}
 """Names of commands by the label of their control, where nobody would search for the label."""
 
 PAGE = "Page"
-"""First part of the names of commands above all tabs."""
+"""First part of the names of commands of the whole page."""
 
 NAMED_WITH_FOLDER = frozenset({"Free variables", "Tetrahedra"})
 """Folders whose title is part of the names of their switches."""

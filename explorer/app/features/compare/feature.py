@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import viser
+
 from explorer.app.features.compare.drawing import compared_drawing
 from explorer.app.features.compare.feed import CompareFeed
 from explorer.app.features.compare.panel import ComparePanel
@@ -10,7 +12,7 @@ from explorer.app.features.feature import Feature, Tab
 
 COMPARE = Feature(
     "compare",
-    tabs=(Tab("drawer", "Compare", ComparePanel),),
+    tabs=(Tab("work", "Compare", ComparePanel, viser.Icon.COLUMNS_3),),
     scene=(ComparedScene,),
     feeds=(CompareFeed,),
     tasks=(compared_drawing,),

@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
+from explorer.app.features.designs.files import DesignFile
+from explorer.app.features.designs.name import DesignName
 from explorer.app.features.designs.panel import DesignsPanel
 from explorer.app.features.designs.saved_designs import SavedDesigns
-from explorer.app.features.feature import Feature, Tab
+from explorer.app.features.feature import Export, Feature, InBar, Tab
 
 DESIGNS = Feature(
     "designs",
-    tabs=(Tab("drawer", "Designs", DesignsPanel),),
+    tabs=(Tab("dialog", "Designs", DesignsPanel),),
+    bar=(InBar("left", DesignName),),
+    exports=(
+        Export(
+            "Design",
+            "A file to open again, here or with explorer --design.",
+            ("JSON",),
+            lambda services: lambda _, who: services.get(DesignFile).send(who),
+        ),
+    ),
     passing=lambda services: services.get(SavedDesigns).commands,
     is_offered=lambda services: services.user_data is not None,
 )

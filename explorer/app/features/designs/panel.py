@@ -9,6 +9,7 @@ from html import escape
 import viser
 
 from explorer.app.features.designs.files import DesignFile
+from explorer.app.features.designs.name import saved_words
 from explorer.app.features.designs.saved_designs import SavedDesigns
 from explorer.app.features.feature import Services
 from explorer.app.session.session import Who
@@ -116,8 +117,8 @@ class DesignsPanel:
         self._saved.look()
         yield from self._controls.updates(frame)
         live, base = frame.state.design, frame.state.base
-        saved = {entry.name: entry.design for entry in self._saved.entries}
-        yield self.status, "content", status(live, saved.get(live.name))
+        _, words = saved_words(live, self._saved.find(live.name))
+        yield self.status, "content", note(words)
         rows = rows_of(self._saved.entries)
         first = min(self.first, (len(rows) - 1) // ROWS * ROWS)
         self.first, self._total, self.rows = first, len(rows), rows[first : first + ROWS]
@@ -171,19 +172,6 @@ def rows_of(entries: Sequence[Entry]) -> tuple[Row, ...]:
     presets = [Row(design.name, design, is_preset=True) for design in PRESETS.values()]
     own = [Row(entry.name, entry.design, entry.problem) for entry in entries]
     return (*own, *presets)
-
-
-def status(live: Design, saved: Design | None) -> str:
-    """Return in words whether the live design is saved, as HTML."""
-    if saved == live:
-        words = "Saved."
-    elif live.name in PRESETS and live == PRESETS[live.name]:
-        words = "An unchanged preset."
-    elif saved is None:
-        words = "Not saved under a name yet; it comes back with the session."
-    else:
-        words = "Changed since it was saved."
-    return note(escape(words))
 
 
 def list_designs(rows: Sequence[Row], current: str, foot: str = "") -> str:

@@ -59,6 +59,10 @@ class SavedDesigns:
         services.at_end(self.stop)
         self.look()
 
+    def find(self, name: str) -> Design | None:
+        """Return the saved design with a name; None if there is none that can be used."""
+        return next((each.design for each in self.entries if each.name == name), None)
+
     def look(self) -> None:
         """Request to read the folder again if it has changed; return at once."""
         now = time.monotonic()

@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
-from explorer.app.features.feature import Feature, Tab
-from explorer.app.features.help.keys_panel import TOOLBAR_KEYS, Toolbar
+from explorer.app.features.feature import Feature, InBar, Tab
+from explorer.app.features.help.bar import HELP_KEYS, HelpButtons, HelpDialog
 from explorer.app.features.help.tour_panel import TourGuide
 
-HELP = Feature("help", tabs=(Tab("top", "", Toolbar),), runners=(TourGuide,), keys=TOOLBAR_KEYS)
+HELP = Feature(
+    "help",
+    tabs=(Tab("dialog", "Help", HelpDialog),),
+    bar=(InBar("right", HelpButtons),),
+    runners=(TourGuide,),
+    keys=HELP_KEYS,
+)

@@ -1,21 +1,15 @@
-"""The card of all keys, and the toolbar of the page."""
+"""The card of all keys."""
 
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from html import escape
 
 import viser
 
 from explorer.app.browser.viser_gaps import element_id
-from explorer.app.features.feature import Services
-from explorer.app.features.help.manual_panel import ManualReader
-from explorer.app.features.help.tour_panel import TourGuide
-from explorer.app.state.frame import Frame
-from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.buttons import press_button
-from explorer.app.widgets.commands import PAGE, PALETTE_KEY, STEP, Key, shift, with_keys
+from explorer.app.widgets.commands import PAGE, PALETTE_KEY, STEP
 from explorer.app.widgets.markup import caption
 from explorer.app.widgets.palette import Command, group_of
 
@@ -27,15 +21,8 @@ CAMERA = (
     ("W A S D Q E", "Fly"),
 )
 # viser closes a card from the server only. An attribute with this name therefore holds the id of
-# the card's close button, which the script `cards` presses.
+# the card's close button, which the script `opens` presses.
 CLOSED_BY = "data-closed-by"
-
-TOOLBAR_KEYS = {
-    f"{PAGE}{STEP}Theme": (shift("L"),),
-    f"{PAGE}{STEP}Keys": (Key("K"),),
-}
-
-Press = Callable[[viser.ClientHandle], None]
 
 
 class KeysCard:
@@ -70,57 +57,6 @@ class KeysCard:
     def disconnected(self, client: viser.ClientHandle) -> None:
         """Forget a browser."""
         self._open.pop(client.client_id, None)
-
-
-class Toolbar:
-    """The line on top of the page: commands, keys, theme, manual and tour."""
-
-    def __init__(self, services: Services) -> None:
-        self._services = services
-        self._keys = KeysCard()
-        services.server.on_client_disconnect(self._keys.disconnected)
-        presses: dict[str, tuple[str, Press]] = {
-            "Keys": ("Show all keys on a card.", self._show_keys),
-            "Theme": ("Turn the page dark, or light again.", self._toggle_theme),
-            "Manual": ("Read the manual beside the scene.", services.get(ManualReader).toggle),
-            "Tour": ("Begin the tour of five steps.", services.get(TourGuide).begin),
-        }
-        buttons = services.buttons
-        for name, (hint, press) in presses.items():
-            buttons.on(f"page.{name}", lambda _, client, press=press: press(client))
-            buttons.offer(f"{PAGE}{STEP}{name}", hint, f"page.{name}")
-        services.gui.add_html(toolbar_line({name: hint for name, (hint, _) in presses.items()}))
-
-    def updates(self, _: Frame) -> Iterator[Update]:
-        """Yield nothing: the line stays as it is."""
-        return iter(())
-
-    def _show_keys(self, client: viser.ClientHandle) -> None:
-        self._keys.toggle(client, self._services.commands())
-
-    def _toggle_theme(self, client: viser.ClientHandle) -> None:
-        theme = self._services.theme
-        theme.choose(dark=not theme.is_dark)
-        self._services.remember(client.client_id, dark=theme.is_dark)
-
-
-def toolbar_line(hints: dict[str, str]) -> str:
-    """Return the line as HTML: the palette first, then a button for each hint, by name."""
-    palette = (
-        '<button type="button" data-opens="commands" '
-        'title="Search for anything that can be done, and do it.">Commands '
-        f"{keycap(str(PALETTE_KEY))}</button>"
-    )
-    others = "".join(
-        press_button(
-            f"page.{name}",
-            "",
-            escape(name),
-            hint=with_keys(hint, TOOLBAR_KEYS.get(f"{PAGE}{STEP}{name}", ())),
-        )
-        for name, hint in hints.items()
-    )
-    return f'<div class="ex-toolbar">{palette}{others}</div>'
 
 
 def keycap(key: str) -> str:

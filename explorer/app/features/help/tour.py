@@ -77,16 +77,16 @@ def _is_optimised(before: Frame, now: Frame) -> bool:
 STEPS = (
     Step(
         "Move the platform",
-        "Drag an arrow or an arc at b4, or a slider of Move. The legs and the pose stay in step.",
-        "Move",
+        "Drag an arrow or an arc at b4, or a slider of Pose. The legs and the pose stay in step.",
+        "Pose",
         _is_moved,
         _move,
     ),
     Step(
         "Come close to a singularity",
         "Lower z. The two flags turn from blue to orange as they come close: where they meet, the "
-        "mechanism is singular. Singularity, on the left, tells how far it is.",
-        "Move",
+        "mechanism is singular. Singularity, on the right, tells how far it is.",
+        "Pose",
         _is_near,
         _approach,
         GoHome(),
@@ -108,8 +108,8 @@ STEPS = (
     ),
     Step(
         "Optimise, and take it with you",
-        "Press Optimise, and accept or revert what it finds. Files for CAD, simulation and print "
-        "are in Workspace, View and Share. Ctrl-Z undoes every step of this tour.",
+        "Press Optimise, and accept or revert what it finds. Export, on top of the page, has files "
+        "for CAD, simulation and print. Ctrl-Z undoes every step of this tour.",
         "Optimise",
         _is_optimised,
         lambda _: StartRun(),

@@ -11,7 +11,7 @@ import viser
 from explorer.app.features.feature import Runner, Services
 from explorer.app.features.help.tour import STEPS, Tour, start_tour
 from explorer.app.state.frame import Frame
-from explorer.app.widgets.buttons import press_button
+from explorer.app.widgets.buttons import open_button, press_button
 
 # Place from the upper left corner of the scene, and width, in pixels.
 PLACE, WIDTH = (14, 14), 330
@@ -129,6 +129,7 @@ def card_words(tour: Tour) -> str:
         for i in range(len(STEPS))
     )
     done = '<span class="ex-within ex-strong">Done</span>' if tour.is_done else ""
+    opens = open_button(step.tab, f"Open the tab {escape(step.tab)}", class_name="ex-link")
     first = "" if tour.at == 0 else _button("Back")
     show = "" if tour.is_done else _button("Show me")
     last = _button("Next", "Finish" if tour.is_last else "Next", look="is-main")
@@ -136,7 +137,7 @@ def card_words(tour: Tour) -> str:
         '<div class="ex-card"><div class="ex-line ex-dim">'
         f"<span>{dots}</span><span>step {tour.at + 1} of {len(STEPS)}</span></div>"
         f"<h4>{escape(step.title)}</h4><div>{escape(step.text)}</div>"
-        f'<div class="ex-dim">Tab {escape(step.tab)}, on the right. {done}</div>'
+        f"<div>{opens} {done}</div>"
         f'<div class="ex-ends">{_button("Skip", "Skip the tour", look="is-quiet")}'
         f"{first}{show}{last}</div></div>"
     )

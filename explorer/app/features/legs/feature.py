@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from explorer.app.features.feature import Feature, Tab
+import viser
+
+from explorer.app.features.feature import Feature, InBar, Tab
 from explorer.app.features.legs.clearance import ClearanceScene
+from explorer.app.features.legs.clearance_figure import ClearanceFigure
 from explorer.app.features.legs.feed import RadiusFeed
 from explorer.app.features.legs.panel import LegsPanel
 from explorer.app.features.legs.swept import SweptTetrahedra
@@ -11,7 +14,8 @@ from explorer.app.features.legs.tasks import draw_radius_curve
 
 LEGS = Feature(
     "legs",
-    tabs=(Tab("side", "Legs", LegsPanel),),
+    tabs=(Tab("analyse", "Legs", LegsPanel, viser.Icon.LINE),),
+    bar=(InBar("middle", ClearanceFigure),),
     scene=(ClearanceScene, SweptTetrahedra),
     feeds=(RadiusFeed,),
     tasks=(draw_radius_curve,),

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from explorer.app.features.feature import Feature, StateCommand, Tab
+import viser
+
+from explorer.app.features.feature import Feature, InBar, StateCommand, Tab
 from explorer.app.features.mechanism.bodies import Bodies
 from explorer.app.features.mechanism.design_panel import DesignPanel
+from explorer.app.features.mechanism.figures import LimitsFigure
 from explorer.app.features.mechanism.flags import Flags
 from explorer.app.features.mechanism.legs import Legs, TwinLegs
 from explorer.app.features.mechanism.marks import DragHandle, Ghosts, Labels
@@ -18,27 +21,31 @@ MODE_COUNT = 8
 
 MECHANISM = Feature(
     "mechanism",
-    tabs=(Tab("main", "Move", MovePanel), Tab("main", "Design", DesignPanel)),
+    tabs=(
+        Tab("build", "Pose", MovePanel, viser.Icon.ARROWS_MOVE),
+        Tab("build", "Design", DesignPanel, viser.Icon.RULER_2),
+    ),
+    bar=(InBar("middle", LimitsFigure),),
     # Bodies come first: they make the platform's frame, to which others attach.
     scene=(Bodies, Flags, Legs, TwinLegs, Tetrahedra, Labels, Ghosts, DragHandle),
     commands=(
         StateCommand(
-            "Move › Next assembly mode",
+            "Pose › Next assembly mode",
             "Assemble the same leg lengths in the next of the eight ways.",
             lambda state: SetMode((state.mode + 1) % MODE_COUNT),
         ),
         StateCommand(
-            "Move › Previous assembly mode",
+            "Pose › Previous assembly mode",
             "Assemble the same leg lengths in the previous of the eight ways.",
             lambda state: SetMode((state.mode - 1) % MODE_COUNT),
         ),
     ),
     keys={
-        "Move › Home pose": (Key("H"),),
-        "Move › Next assembly mode": (Key("N"),),
-        "Move › Previous assembly mode": (shift("N"),),
-        "Move › Use the nearest length": (Key("U"),),
-        "Move › Other modes as ghosts": (Key("M"),),
+        "Pose › Home pose": (Key("H"),),
+        "Pose › Next assembly mode": (Key("N"),),
+        "Pose › Previous assembly mode": (shift("N"),),
+        "Pose › Use the nearest length": (Key("U"),),
+        "Pose › Other modes as ghosts": (Key("M"),),
     },
     lists=("δ1 δ2 δ3", "Preset", "On a change"),
 )

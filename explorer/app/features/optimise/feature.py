@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import viser
+
 from explorer.app.features.feature import Feature, Tab
 from explorer.app.features.optimise.panel import OptimisePanel
 from explorer.app.features.optimise.runner import Optimiser
@@ -10,7 +12,7 @@ from explorer.app.widgets.commands import Key, shift
 
 OPTIMISE = Feature(
     "optimise",
-    tabs=(Tab("main", "Optimise", OptimisePanel),),
+    tabs=(Tab("work", "Optimise", OptimisePanel, viser.Icon.SPARKLES),),
     scene=(RequiredBox,),
     runners=(Optimiser,),
     keys={"Optimise › Optimise": (Key("O"),), "Optimise › Cancel": (shift("O"),)},

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import viser
+
 from explorer.app.features.feature import Feature, StateCommand, Tab
 from explorer.app.features.paths.actions import Play
 from explorer.app.features.paths.panel import PathsPanel
@@ -11,7 +13,7 @@ from explorer.app.widgets.commands import Key, shift
 
 PATHS = Feature(
     "paths",
-    tabs=(Tab("side", "Paths", PathsPanel),),
+    tabs=(Tab("work", "Paths", PathsPanel, viser.Icon.ROUTE),),
     scene=(PathScene,),
     runners=(PathRunner,),
     commands=(

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from explorer.app.features.feature import Feature, Services, StateCommand, Tab
+import viser
+
+from explorer.app.features.feature import Export, Feature, Services, Tab
 from explorer.app.features.prototype.feed import PartsFeed
+from explorer.app.features.prototype.files import ASSEMBLIES, MechanismFiles
 from explorer.app.features.prototype.panel import PrototypePanel
 from explorer.app.features.prototype.scene import PrototypeScene
-from explorer.app.state.actions import Set
 from explorer.app.widgets.commands import Key
 
 
@@ -16,18 +18,23 @@ def _floor(services: Services) -> float | None:
 
 PROTOTYPE = Feature(
     "prototype",
-    tabs=(Tab("main", "View", PrototypePanel),),
-    scene=(PrototypeScene,),
-    feeds=(PartsFeed,),
-    commands=(
-        StateCommand(
-            "View › Prototype",
-            "Draw the mechanism as parts that can be made, or schematically again.",
-            lambda state: Set("view.prototype.shown", not state.view.prototype.shown, "Prototype"),
-            lambda state: not state.view.twin,
+    tabs=(Tab("analyse", "Prototype", PrototypePanel, viser.Icon.ENGINE),),
+    exports=(
+        Export(
+            "Mechanism",
+            "Parts that can be made, assembled in the home pose, in millimetres.",
+            tuple(ASSEMBLIES),
+            lambda services: services.get(MechanismFiles).assembly,
+        ),
+        Export(
+            "Simulation",
+            "A model with joints, masses and servos for MuJoCo and other physics engines.",
+            ("MJCF",),
+            lambda services: lambda _, who: services.get(MechanismFiles).simulation(who),
         ),
     ),
-    keys={"View › Prototype": (Key("R"),)},
-    lists=("Drawn as",),
+    scene=(PrototypeScene,),
+    feeds=(PartsFeed,),
+    keys={"Prototype › Show the parts": (Key("R"),)},
     floor=_floor,
 )

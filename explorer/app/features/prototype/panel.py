@@ -1,46 +1,35 @@
-"""Controls of the prototype, its bill of materials, and files of it."""
+"""Controls of the prototype, and its bill of materials."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from html import escape
 
-import viser
-
 from explorer.app.features.feature import Services
 from explorer.app.features.prototype.feed import PartsFeed
 from explorer.app.features.prototype.parts_list import PartsList
-from explorer.app.features.prototype.tasks import export_assembly
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.controls import Controls, Span
 from explorer.app.widgets.markup import alert, box, caption, note, row, sentence, table
-from explorer.export.assembly import FORMATS
 from explorer.mechanism.design import LENGTHS
 from explorer.prototype.bill import Actuator
 
-SCHEMATIC, PROTOTYPE = "schematic", "prototype"
-STEP = "step"
-# Suffix of the format whose name is none.
-SUFFIXES = {"stl-zip": "parts-stl.zip"}
-
 
 class PrototypePanel:
-    """Controls that draw, explode, list and export the parts."""
+    """Controls that draw, explode and list the parts."""
 
     def __init__(self, services: Services) -> None:
         gui, self._feed = services.gui, services.get(PartsFeed)
         self._controls = controls = Controls(gui, services.session)
-        with gui.add_folder("Mechanism"):
-            controls.dropdown(
-                "Drawn as",
-                "Schematic legs and plates, or parts that can be made: sized from the design, "
-                "the radii of its legs and its unit.",
-                {SCHEMATIC: False, PROTOTYPE: True},
-                "view.prototype.shown",
-                disabled=lambda state: state.view.twin,
-            )
-            self._trouble = gui.add_html("", visible=False)
+        controls.checkbox(
+            "Show the parts",
+            "Draw the mechanism as parts that can be made: sized from the design, the radii of "
+            "its legs and its unit.",
+            "view.prototype.shown",
+            disabled=lambda state: state.view.twin,
+        )
+        self._trouble = gui.add_html("", visible=False)
         self._folder = gui.add_folder("Prototype", visible=False)
         with self._folder:
             controls.slider(
@@ -57,26 +46,6 @@ class PrototypePanel:
                 step=1.0,
             )
             self._bill = gui.add_html("")
-            self._format = gui.add_dropdown(
-                "Format",
-                (*FORMATS, STEP),
-                hint="Format of the file: 3MF in millimetres, with names and "
-                "colours; GLB with the tree of joints; a zip with an STL for each part; STEP "
-                'with exact faces, which needs pip install "flagged-explorer[cad]".',
-            )
-            button = gui.add_button(
-                "Export assembly",
-                icon=viser.Icon.DOWNLOAD,
-                hint="Download the parts, assembled in the home pose.",
-            )
-
-            @button.on_click
-            def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
-                design, file_format = services.session.state.design, self._format.value
-                name = f"{design.name}-{assembly_name(file_format)}"
-                services.downloads.compute(
-                    event.client_id, name, export_assembly, (design, file_format)
-                )
 
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that show a frame."""
@@ -157,11 +126,6 @@ def _is_enough(actuator: Actuator) -> bool:
     needed, stroke = actuator.required, actuator.stroke
     slack = 1e-9 * needed.longest
     return stroke.shortest <= needed.shortest + slack and stroke.longest >= needed.longest - slack
-
-
-def assembly_name(file_format: str) -> str:
-    """Return the end of the name of a file of the assembly."""
-    return SUFFIXES.get(file_format, f"mechanism.{file_format}")
 
 
 def _mm(value: float) -> str:

@@ -1,4 +1,4 @@
-"""The worker's task for the prototype."""
+"""The worker's tasks for files of the mechanism."""
 
 from __future__ import annotations
 
@@ -24,3 +24,18 @@ def export_assembly(design: Design, file_format: str) -> bytes:
 
         return assembly_step(sizes_of(design))
     return assembly_bytes(make_prototype(design), file_format)
+
+
+def export_simulation(design: Design, density: float) -> bytes:
+    """Return the model for physics engines as MJCF.
+
+    Args:
+        design: The manipulator.
+        density: Density of its bodies, in kg/m³.
+
+    Raises:
+        ExplorerError: a design without a model, such as one with legs of length zero.
+    """
+    from explorer.export.simulation import simulation_mjcf
+
+    return simulation_mjcf(design, density).encode()

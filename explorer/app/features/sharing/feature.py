@@ -1,9 +1,53 @@
-"""Pictures, scenes, tables and reports to take away."""
+"""The dialog of all files, and those of the view, the scene, the session and the report."""
 
 from __future__ import annotations
 
-from explorer.app.features.feature import Feature, Tab
-from explorer.app.features.sharing.files import SessionRecorder
-from explorer.app.features.sharing.panel import SharePanel
+from explorer.app.features.feature import Export, Feature, InBar, Tab
+from explorer.app.features.sharing.files import SessionRecorder, SharedFiles
+from explorer.app.features.sharing.panel import ExportButton, ExportDialog
+from explorer.app.features.sharing.reporting import ReportFormat
 
-SHARING = Feature("sharing", tabs=(Tab("drawer", "Share", SharePanel),), runners=(SessionRecorder,))
+PICTURES: dict[str, tuple[int, int] | float] = {
+    "PNG 1920 × 1080": (1920, 1080),
+    "PNG 3840 × 2160": (3840, 2160),
+    "PNG twice as shown": 2.0,
+}
+"""Formats of pictures: width and height, or a factor on the size in the browser."""
+REPORTS: dict[str, ReportFormat] = {"HTML": "html", "PDF": "pdf"}
+
+SHARING = Feature(
+    "sharing",
+    tabs=(Tab("dialog", "Export", ExportDialog),),
+    bar=(InBar("right", ExportButton),),
+    exports=(
+        Export(
+            "Report",
+            "The design in its pose on a few pages: drawings, slices, tables, limits.",
+            tuple(REPORTS),
+            lambda services: lambda name, who: services.get(SharedFiles).report(REPORTS[name], who),
+        ),
+        Export(
+            "Picture",
+            "The scene with its labels, from your camera.",
+            tuple(PICTURES),
+            lambda services: (
+                lambda name, who: services.get(SharedFiles).picture(
+                    PICTURES[name], transparent=False, client_id=who
+                )
+            ),
+        ),
+        Export(
+            "Scene",
+            "One file to turn and zoom in any browser, without network.",
+            ("HTML",),
+            lambda services: lambda _, who: services.get(SharedFiles).scene(who),
+        ),
+        Export(
+            "Session",
+            "A table of all poses so far.",
+            ("CSV",),
+            lambda services: lambda _, who: services.get(SharedFiles).session(who),
+        ),
+    ),
+    runners=(SessionRecorder,),
+)

@@ -1,103 +1,97 @@
-"""Downloads: the view as a picture, the scene as a page, the session as a table, the report."""
+"""The dialog Export: every file that the page offers, by what it holds and in which format."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from html import escape
 
 import viser
 
-from explorer.app.features.designs.files import DesignFile
-from explorer.app.features.feature import Services
-from explorer.app.features.sharing.files import SessionRecorder, SharedFiles
-from explorer.app.features.sharing.reporting import ReportFormat
+from explorer.app.features.feature import Export, Services
+from explorer.app.features.sharing.files import SharedFiles
 from explorer.app.features.sharing.view_picture import LEAST, MOST
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.markup import note
+from explorer.app.widgets.buttons import open_button, press_button
+from explorer.app.widgets.markup import box
 
-OTHER = "other"
-SIZES: dict[str, tuple[int, int] | float] = {
-    "1920 × 1080": (1920, 1080),
-    "3840 × 2160": (3840, 2160),
-    "twice as shown": 2.0,
-}
-"""Width and height, or a factor on the size in the browser."""
+PRESS = "export"
+# Separator of the title and the format in the value of a button.
+STEP = " as "
 
 
-class SharePanel:
-    """Buttons that download pictures, files and reports."""
+class ExportButton:
+    """The button of the bar that opens the dialog."""
 
     def __init__(self, services: Services) -> None:
-        gui, files = services.gui, services.get(SharedFiles)
-        self._log = services.get(SessionRecorder).log
-        with gui.add_folder("Picture of the view"):
-            self._add_picture(gui, files)
-        with gui.add_folder("Files"):
-            sends = {
-                "Scene (HTML)": files.scene,
-                "Session (CSV)": files.session,
-                "Design (JSON)": services.get(DesignFile).send,
-            }
-            kinds = gui.add_button_group(
-                "Download",
-                tuple(sends),
-                hint="The present scene, to turn in any browser; a table of all poses so "
-                "far; a file that explorer --design opens.",
-            )
-            kinds.on_click(lambda event: sends[kinds.value](event.client_id))
-            reports: dict[str, ReportFormat] = {"HTML": "html", "PDF": "pdf"}
-            report = gui.add_button_group(
-                "Report",
-                tuple(reports),
-                hint="The design in its present pose on a few pages: drawings, slices, tables, "
-                'limits. PDF needs pip install "flagged-explorer[screenshot]" and a Chromium.',
-            )
-            report.on_click(lambda event: files.report(reports[report.value], event.client_id))
-            self._words = gui.add_html("")
+        del services
+
+    def markup(self, _: Frame) -> str:
+        """Return the button as HTML."""
+        hint = "Download the workspace, the mechanism, pictures, reports and more."
+        return open_button("Export", "Export", hint=hint, class_name="ex-tool ex-outlined")
+
+
+class ExportDialog:
+    """A row for each thing, with a button for each format; then pictures of any size."""
+
+    def __init__(self, services: Services) -> None:
+        gui, buttons = services.gui, services.buttons
+        self._sends = {each.title: each.sender(services) for each in services.exports}
+        values = {f"{each.title}{STEP}{name}" for each in services.exports for name in each.formats}
+        buttons.on(PRESS, self._send, values=values)
+        for each in services.exports:
+            for name in each.formats:
+                label = f"Export › {each.title} › {name}"
+                buttons.offer(label, each.hint, PRESS, f"{each.title}{STEP}{name}")
+        gui.add_html(box("".join(_row(each) for each in services.exports)))
+        with gui.add_folder("Picture of another size", expand_by_default=False):
+            _add_picture(gui, services.get(SharedFiles))
 
     def updates(self, _: Frame) -> Iterator[Update]:
-        """Yield the updates that show the number of poses of the session."""
-        yield self._words, "content", words(len(self._log))
+        """Yield nothing: the dialog stays as it is."""
+        return iter(())
 
-    def _add_picture(self, gui: viser.GuiApi, files: SharedFiles) -> None:
-        size = gui.add_dropdown(
-            "Size (px)", (*SIZES, OTHER), hint="Width and height; lines and labels grow with it."
+    def _send(self, value: str, client: viser.ClientHandle) -> None:
+        title, _, name = value.partition(STEP)
+        self._sends[title](name, client.client_id)
+
+
+def _row(export: Export) -> str:
+    buttons = "".join(
+        press_button(
+            PRESS,
+            f"{export.title}{STEP}{name}",
+            escape(name),
+            label=f"Export {export.title} as {name}",
+            class_name="ex-button",
         )
-        width = gui.add_number(
-            "Width (px)", 1600, min=LEAST, max=MOST, step=1, visible=False, hint=_bounds("Width")
-        )
-        height = gui.add_number(
-            "Height (px)", 1200, min=LEAST, max=MOST, step=1, visible=False, hint=_bounds("Height")
-        )
-        transparent = gui.add_checkbox(
-            "Transparent",
-            initial_value=False,
-            hint="Leave out the background.",
-        )
-        button = gui.add_button(
-            "Download picture",
-            icon=viser.Icon.PHOTO,
-            hint="PNG of the scene with its labels, as in the tab View, from your camera.",
-        )
-
-        @size.on_update
-        def _(_: object) -> None:
-            width.visible = height.visible = size.value == OTHER
-
-        @button.on_click
-        def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
-            sides = SIZES.get(size.value, (width.value, height.value))
-            files.picture(sides, transparent=transparent.value, client_id=event.client_id)
-
-
-def _bounds(name: str) -> str:
-    return f"{name} of the picture, {LEAST} to {MOST} pixels."
-
-
-def words(poses: int) -> str:
-    """Return a note on the files as HTML, for a session of so many poses."""
-    count = "1 pose" if poses == 1 else f"{poses:,} poses"
-    return note(
-        "The scene is one file to turn and zoom in any browser, without network. "
-        f"The session has {count} so far."
+        for name in export.formats
     )
+    return (
+        f'<div class="ex-export"><div><b>{escape(export.title)}</b>'
+        f'<div class="ex-dim">{escape(export.hint)}</div></div>'
+        f'<div class="ex-flow">{buttons}</div></div>'
+    )
+
+
+def _add_picture(gui: viser.GuiApi, files: SharedFiles) -> None:
+    width = gui.add_number(
+        "Width (px)", 1600, min=LEAST, max=MOST, step=1, hint=f"{LEAST} to {MOST} pixels."
+    )
+    height = gui.add_number(
+        "Height (px)", 1200, min=LEAST, max=MOST, step=1, hint=f"{LEAST} to {MOST} pixels."
+    )
+    transparent = gui.add_checkbox(
+        "Transparent", initial_value=False, hint="Leave out the background."
+    )
+    button = gui.add_button(
+        "Download picture",
+        icon=viser.Icon.PHOTO,
+        hint="PNG of the scene with its labels, from your camera.",
+    )
+
+    @button.on_click
+    def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
+        sides = (width.value, height.value)
+        files.picture(sides, transparent=transparent.value, client_id=event.client_id)

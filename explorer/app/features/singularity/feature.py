@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from explorer.app.features.feature import Feature, StateCommand, Tab
+import viser
+
+from explorer.app.features.feature import Feature, InBar, StateCommand, Tab
 from explorer.app.features.singularity.actions import GoToSingularity
+from explorer.app.features.singularity.distance_figure import DistanceFigure
 from explorer.app.features.singularity.feed import StrataFeed
 from explorer.app.features.singularity.jog_panel import JogPanel
 from explorer.app.features.singularity.jog_scene import JogScene
@@ -13,7 +16,11 @@ from explorer.app.widgets.commands import shift
 
 SINGULARITY = Feature(
     "singularity",
-    tabs=(Tab("main", "Move", JogPanel), Tab("side", "Singularity", SingularityPanel)),
+    tabs=(
+        Tab("analyse", "Singularity", SingularityPanel, viser.Icon.ALERT_TRIANGLE),
+        Tab("analyse", "Singularity", JogPanel),
+    ),
+    bar=(InBar("middle", DistanceFigure),),
     scene=(NearestGhost, EllipsoidScene, BallScene, JogScene),
     feeds=(StrataFeed,),
     commands=(

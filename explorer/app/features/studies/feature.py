@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import viser
+
 from explorer.app.features.feature import Feature, Tab
 from explorer.app.features.studies.panel import StudiesPanel
 
 STUDIES = Feature(
     "studies",
-    tabs=(Tab("drawer", "Studies", StudiesPanel),),
+    tabs=(Tab("work", "Studies", StudiesPanel, viser.Icon.CHART_DOTS),),
     is_offered=lambda services: services.studies is not None,
 )

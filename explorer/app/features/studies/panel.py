@@ -58,8 +58,6 @@ class StudiesPanel:
         self._services = services
         self._session = session
         self._complain = services.complain
-        # Browsers with a tall drawer.
-        self._tall: set[int] = set()
         self.choice = gui.add_dropdown(
             "Study",
             none,
@@ -225,15 +223,11 @@ class StudiesPanel:
         buttons.on("studies.vary", self._switch("variable"), values=NAMES)
         buttons.on("studies.measure", self._switch("measure"), values=measures_in("studies"))
         buttons.on("studies.clear", self._clear)
-        buttons.on("studies.taller", self._toggle_height)
         buttons.offer(
             "Studies › Clear brushes",
             "Free all axes.",
             "studies.clear",
             is_ready=lambda: bool(self._session.state.studies.brushes),
-        )
-        buttons.offer(
-            "Studies › Taller drawer", "Make the drawer taller, or lower again.", "studies.taller"
         )
 
     def _go_on(self, who: Who) -> None:
@@ -255,10 +249,6 @@ class StudiesPanel:
 
     def _clear(self, _: str, client: viser.ClientHandle) -> None:
         self._session.do(ClearBrushes(), who=client.client_id)
-
-    def _toggle_height(self, _: str, client: viser.ClientHandle) -> None:
-        self._tall ^= {client.client_id}
-        self._services.resize_drawer(client, tall=client.client_id in self._tall)
 
     def _switch(self, what: Literal["variable", "measure"]) -> Does:
         def press(name: str, client: viser.ClientHandle) -> None:

@@ -62,15 +62,8 @@ def status(drawing: StudyDrawing) -> str:
     )
     unit = f"1 unit (u) = {format_number(study.base.unit_mm, 6)} mm"
     note = f"{f'objectives: {escape(objectives)}' if objectives else 'no objectives'} · {unit}"
-    resize = press_button(
-        "studies.taller",
-        "",
-        "Taller ⇕",
-        hint="Make the drawer taller, or lower again",
-        class_name="ex-link ex-whole",
-    )
     return box(
-        f'<div class="ex-line"><span>{words}</span>{resize}</div>',
+        f"<div>{words}</div>",
         f'<div class="ex-dim ex-small">{note}</div>',
         failures(drawing),
     )

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from explorer.app.features.feature import Feature, StateCommand, Tab
+import viser
+
+from explorer.app.features.feature import Feature, InBar, StateCommand, Tab
+from explorer.app.features.view.camera_buttons import CAMERA_KEYS, CameraButtons
 from explorer.app.features.view.panel import ViewPanel
 from explorer.app.state.action import Action
 from explorer.app.state.actions import Set
@@ -17,23 +20,25 @@ def _toggle_tetrahedra(state: State) -> Action:
 
 VIEW = Feature(
     "view",
-    tabs=(Tab("main", "View", ViewPanel),),
+    tabs=(Tab("build", "Show", ViewPanel, viser.Icon.EYE),),
+    bar=(InBar("right", CameraButtons),),
     commands=(
         StateCommand(
-            "View › All tetrahedra",
+            "Show › All tetrahedra",
             "Show or hide the three tetrahedra that are flat where the mechanism is singular.",
             _toggle_tetrahedra,
         ),
     ),
     keys={
-        "View › Flags": (shift("F"),),
-        "View › Bodies": (Key("B"),),
-        "View › Legs": (shift("B"),),
-        "View › Labels": (Key("L"),),
-        "View › Grid": (Key("G"),),
-        "View › Drag handle": (shift("H"),),
-        "View › All tetrahedra": (Key("T"),),
-        "View › 6-4 twin": (shift("T"),),
-        "View › Closest pair": (shift("C"),),
+        **CAMERA_KEYS,
+        "Show › Flags": (shift("F"),),
+        "Show › Bodies": (Key("B"),),
+        "Show › Legs": (shift("B"),),
+        "Show › Labels": (Key("L"),),
+        "Show › Grid": (Key("G"),),
+        "Show › Drag handle": (shift("H"),),
+        "Show › All tetrahedra": (Key("T"),),
+        "Show › 6-4 twin": (shift("T"),),
+        "Show › Closest pair": (shift("C"),),
     },
 )

@@ -41,9 +41,9 @@ def volume_headline(frame: Frame, feed: VolumeFeed) -> str:
     if feed.problem is not None:
         return alert("The volume could not be computed", feed.problem)
     if newest is None:
-        return '<div class="ex-figure ex-dim">computing …</div>'
-    look = "" if feed.is_current else " is-outdated"
-    return f'<div class="ex-headline{look}">{_volume(newest, frame)}</div>'
+        return '<div class="ex-large ex-dim">computing …</div>'
+    look = "" if feed.is_current else "is-outdated"
+    return f'<div class="{look}">{_volume(newest, frame)}</div>'
 
 
 def drawing_words(frame: Frame, feed: WorkspaceFeed) -> str:
@@ -79,7 +79,7 @@ def _volume(newest: MeasuredVolume, frame: Frame) -> str:
         return alert("The workspace is empty", f"Emptied by: {causes}.")
     which = "present" if frame.state.view.workspace.orientation == "pose" else "home"
     return (
-        f'<div class="ex-line"><span class="ex-figure">{measured.volume:.6g} units³</span>'
+        f'<div class="ex-line"><span class="ex-large">{measured.volume:.6g} units³</span>'
         f"{dim(f'± {format_power(measured.error, 1)}')}</div>"
         + caption(
             f"{_litres(measured.volume, unit_mm)} within the limits, in the {which} orientation"

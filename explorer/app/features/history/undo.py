@@ -1,0 +1,69 @@
+"""The buttons that undo and redo, each with the step that it undoes."""
+
+from __future__ import annotations
+
+from html import escape
+
+import viser
+
+from explorer.app.features.feature import Services
+from explorer.app.session.history import History
+from explorer.app.session.session import REDO, UNDO
+from explorer.app.state.frame import Frame
+from explorer.app.widgets.buttons import open_button, press_button
+from explorer.app.widgets.commands import Key, with_keys
+
+PRESS = "history.move"
+UNDO_KEYS = {
+    "Edit › Undo": (Key("Z", "cmd/ctrl"),),
+    "Edit › Redo": (Key("Z", "cmd/ctrl+shift"), Key("Y", "cmd/ctrl")),
+}
+MOVES = {"Undo": UNDO, "Redo": REDO}
+ARROWS = {"Undo": "↶", "Redo": "↷"}
+
+
+class UndoButtons:
+    """Undo, redo, and the button that opens the list of all steps."""
+
+    def __init__(self, services: Services) -> None:
+        self._session = services.session
+        services.buttons.on(PRESS, self._move, values=MOVES)
+        for name in MOVES:
+            # Always ready: a key that is pressed before the page knows of the last step counts.
+            services.buttons.offer(f"Edit › {name}", f"{name} the last step.", PRESS, name)
+
+    def markup(self, frame: Frame) -> str:
+        """Return the buttons for a frame, as HTML."""
+        history, is_busy = self._session.history, frame.state.optimisation.is_on
+        buttons = "".join(self._button(name, history, is_busy=is_busy) for name in MOVES)
+        steps = open_button(
+            "History",
+            "History",
+            hint="List all steps, and go to any of them.",
+            class_name="ex-tool",
+        )
+        return f'<span class="ex-undo">{buttons}{steps}</span>'
+
+    def _button(self, name: str, history: History, *, is_busy: bool) -> str:
+        words = step_words(history, name)
+        hint = f"{name}: {words}." if words is not None else f"Nothing to {name.lower()}."
+        return press_button(
+            PRESS,
+            name,
+            ARROWS[name],
+            hint=with_keys(hint, UNDO_KEYS[f"Edit › {name}"]),
+            label=name if words is None else f"{name} {escape(words)}",
+            class_name="ex-tool ex-arrow",
+            is_disabled=words is None or is_busy,
+        )
+
+    def _move(self, name: str, client: viser.ClientHandle) -> None:
+        self._session.travel(MOVES[name], who=client.client_id)
+
+
+def step_words(history: History, move: str) -> str | None:
+    """Return the words of the step that "Undo" or "Redo" goes over; None if there is none."""
+    if move == "Undo":
+        return history.step.words if history.at > 0 else None
+    following = history.steps[history.at + 1 :]
+    return following[0].words if following else None

@@ -1,0 +1,92 @@
+// Opens what [data-opens=title] names: a tab of a panel, or a dialog; "commands" is the palette.
+// Closes the dialog or the card on top at Escape, at a click beside it, and at its button.
+window.explorer.opens ??= (() => {
+  const DIALOG = "[data-floating-window][data-ex=dialog]",
+    OPEN = `${DIALOG}[data-ex-open]`,
+    CARD = ".mantine-Modal-content",
+    AROUND = ".mantine-Modal-inner, .mantine-Modal-overlay";
+  // viser opens its palette at this key, which nothing on the server can press.
+  const PALETTE_KEY = { key: "k", code: "KeyK", ctrlKey: true, bubbles: true };
+  const ENTER = { key: "Enter", code: "Enter", bubbles: true };
+  const shade = document.createElement("div");
+  shade.className = "ex-shade";
+  const closeDialogs = () => {
+    for (const each of document.querySelectorAll(OPEN)) delete each.dataset.exOpen;
+    shade.remove();
+  };
+  const closeButton = () => {
+    const button = document.createElement("button");
+    button.type = "button";
+    button.className = "ex-closes";
+    button.textContent = "×";
+    button.title = "Close";
+    button.setAttribute("aria-label", "Close the dialog");
+    button.addEventListener("click", closeDialogs);
+    return button;
+  };
+  const openDialog = (dialog, title) => {
+    const wasOpen = dialog.dataset.exOpen !== undefined;
+    closeDialogs();
+    if (wasOpen) return;
+    dialog.dataset.exOpen = "";
+    dialog.setAttribute("role", "dialog");
+    dialog.setAttribute("aria-label", title);
+    dialog.parentElement.append(shade);
+    if (!dialog.querySelector(".ex-closes")) dialog.append(closeButton());
+    dialog.querySelector(".ex-closes").focus({ preventScroll: true });
+  };
+  const open = (title) => {
+    const tabs = [...document.querySelectorAll("[data-dock-tab]")];
+    const tab = tabs.find((each) => each.title === title);
+    if (!tab) return;
+    const dialog = tab.closest(DIALOG);
+    if (dialog) openDialog(dialog, title);
+    else {
+      closeDialogs();
+      tab.dispatchEvent(new KeyboardEvent("keydown", ENTER));
+    }
+  };
+  addEventListener("click", ({ target }) => {
+    const title = target.closest?.("[data-opens]")?.dataset.opens;
+    if (title === "commands") {
+      document.documentElement.dispatchEvent(new KeyboardEvent("keydown", PALETTE_KEY));
+    } else if (title) open(title);
+  });
+  // What a dialog was opened for is done: it leaves the view of the result.
+  addEventListener("click", ({ target }) => {
+    if (target.closest?.("[data-closes] [data-press]")) closeDialogs();
+  });
+  const closeCard = () => {
+    const card = [...document.querySelectorAll(`${CARD} [data-closed-by]`)].at(-1);
+    if (card) document.getElementById(card.getAttribute("data-closed-by"))?.click();
+    else closeDialogs();
+  };
+  addEventListener(
+    "keydown",
+    ({ key, target }) => {
+      // The palette may lie over a card, and is closed first; a list in a dialog too.
+      const isOver = target.closest?.(".mantine-Spotlight-content, [aria-expanded=true]");
+      if (key === "Escape" && !isOver) closeCard();
+    },
+    true,
+  );
+  // A pointer that is pressed on a card and released beside it, as to select text, closes nothing.
+  const isBeside = (it) => it === shade || (!!it.closest?.(AROUND) && !it.closest(CARD));
+  let isPressedBeside = false;
+  addEventListener(
+    "pointerdown",
+    ({ target }) => {
+      isPressedBeside = isBeside(target);
+    },
+    true,
+  );
+  addEventListener(
+    "click",
+    ({ target }) => {
+      if (isPressedBeside && isBeside(target)) closeCard();
+    },
+    true,
+  );
+  window.explorer.open = open;
+  return true;
+})();
