@@ -113,7 +113,7 @@ window.explorer.map ??= (() => {
     const reading = map && readingOf(map);
     if (reading) reading.textContent = read(map, last);
   };
-  addEventListener("pointermove", ({ target, clientX, clientY }) => {
+  const follow = ({ target, clientX, clientY }) => {
     const map = mapAt(target);
     if (!map && last?.target.isConnected) {
       const left = mapAt(last.target);
@@ -122,7 +122,9 @@ window.explorer.map ??= (() => {
     }
     last = map ? { target, clientX, clientY } : null;
     show();
-  });
+  };
+  addEventListener("pointermove", follow);
+  addEventListener("pointerdown", follow);
   new MutationObserver(() => {
     if (!last || last.target.isConnected) return;
     const target = document.elementFromPoint(last.clientX, last.clientY);
@@ -132,7 +134,8 @@ window.explorer.map ??= (() => {
   addEventListener("click", (event) => {
     const map = mapAt(event.target),
       facts = map && factsOf(map);
-    const p = map && positionAt(map, facts, event);
+    // A click tells whole pixels, other than the pointer that read the map.
+    const p = map && positionAt(map, facts, last ?? event);
     if (!p) return;
     // A pixel is wider than the last decimal.
     const rounded = p.map((value) => Number(value.toFixed(facts.decimals)));
