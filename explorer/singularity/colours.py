@@ -21,6 +21,8 @@ OUTLINE: Rgb = (190, 24, 60)
 
 # Default warning length as a share of the reach.
 WARN_SHARE = 0.05
+# An inverse condition number below this is coloured as a warning.
+WARN_CONDITION = 0.01
 # Number of warning lengths at which the scale ends.
 FAR_WARNINGS = 4.0
 # Edges of the colour bands of a surface, in warning lengths.

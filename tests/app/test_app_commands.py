@@ -297,13 +297,13 @@ def test_keys_are_told_behind_the_hint() -> None:
 def test_only_what_can_be_done_can_be_chosen(running: Running, palette: Palette) -> None:
     commands = labelled(palette)
     session = running.page.session
-    assert not commands["Workspace › Reached from › the present position"].is_ready()
-    commands["Workspace › Region › reachable"].run(CLIENT)
+    assert not commands["Workspace › Cut open › other side"].is_ready()
+    commands["Workspace › Cut open › across x"].run(CLIENT)
     assert running.page.wait_until_drawn()
-    assert session.state.view.workspace.region == "reachable"
-    assert commands["Workspace › Reached from › the present position"].is_ready()
+    assert session.state.view.workspace.cut == "x"
+    assert commands["Workspace › Cut open › other side"].is_ready()
     disabled = {label: each.disabled for label, each in commands_on(running.viser).items()}
-    assert disabled["Workspace › Reached from › the present position"] is False
+    assert disabled["Workspace › Cut open › other side"] is False
     assert disabled["Optimise › Cancel"] is True
     # What the diagram leads to can be done whether or not it is shown.
     strata = [label for label in commands if label.startswith("Singularity › Go to (")]

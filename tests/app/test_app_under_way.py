@@ -14,9 +14,9 @@ from services import StubWorker, services_for
 
 from explorer.app.features.legs.tasks import RadiusRequest, draw_radius_curve
 from explorer.app.features.workspace.feed import WorkspaceFeed
-from explorer.app.features.workspace.numbers import workspace_summary
 from explorer.app.features.workspace.reached import MOST_LIVE_NODES, reach_workspace
 from explorer.app.features.workspace.tasks import WorkspaceRequest, draw_workspace
+from explorer.app.features.workspace.words import drawing_words
 from explorer.app.session import feed as session_feed
 from explorer.app.session.feed import Stage
 from explorer.app.session.jobs import Worker
@@ -49,6 +49,7 @@ def reachable_request(design: Design, **changes: Any) -> WorkspaceRequest:
         colour="plain",
         cut=None,
         level=0.0,
+        flipped=False,
         tolerance=0.5,
         hull=False,
         warn_below=1.0,
@@ -171,12 +172,12 @@ def test_a_drawing_shows_its_stage_and_can_be_cancelled_and_asked_for_again(
     feed = followed.feed
     feed.follow(frame)
     followed.wait_for(lambda: feed.stage is not None)
-    assert "% done" in workspace_summary(frame, feed)
+    assert "% done" in drawing_words(frame, feed)
     feed.cancel()
     assert feed.is_cancelled
     assert feed.is_settled
     assert feed.stage is None
-    assert "Stopped" in workspace_summary(frame, feed)
+    assert "Stopped" in drawing_words(frame, feed)
     # The same frame does not ask for it again by itself.
     feed.follow(frame)
     assert worker.wait_until_idle(PATIENCE)
@@ -185,7 +186,7 @@ def test_a_drawing_shows_its_stage_and_can_be_cancelled_and_asked_for_again(
     feed.retry()
     followed.wait_for(lambda: feed.is_current)
     assert not feed.is_cancelled
-    assert "units³" in workspace_summary(frame, feed)
+    assert "units³" in drawing_words(frame, feed)
 
 
 def test_what_is_shown_no_more_is_not_computed_to_its_end(

@@ -14,7 +14,7 @@ from services import services_for
 
 from explorer.app.features.workspace.feed import WorkspaceFeed
 from explorer.app.features.workspace.tasks import WorkspaceRequest, draw_workspace
-from explorer.app.scene.bands import COLOURED_EDGE, MOST_COLOURED, split_at
+from explorer.app.scene.bands import COLOURED_EDGE, MOST_COLOURED, Colouring, split_at
 from explorer.app.session.jobs import Worker
 from explorer.app.state.actions import Set, SetVariable
 from explorer.app.state.frame import Frame
@@ -22,7 +22,11 @@ from explorer.app.state.state import State, opened
 from explorer.mechanism.design import Design, Limits
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.home import home_pose
+from explorer.mechanism.margins import margins
+from explorer.mechanism.pose import rotation_from_yaw_pitch_roll
+from explorer.numerics.arrays import FloatArray
 from explorer.singularity.colours import BAND_EDGES, band_colours
+from explorer.workspace.solids.solids import workspace_solid
 
 OPTIMAL = PRESETS["paper-optimal"]
 PATIENCE = 120.0
@@ -38,6 +42,7 @@ def a_request(**changes: Any) -> WorkspaceRequest:
         colour="plain",
         cut=None,
         level=0.0,
+        flipped=False,
         tolerance=0.2,
         hull=False,
         warn_below=1.0,
@@ -127,23 +132,43 @@ def test_workspace_large_beside_the_reach_has_a_bounded_number_of_facets(
 ) -> None:
     design = large_beside_its_reach(reach)
     plain = draw_workspace(a_request(design=design)).shells
-    drawing = draw_workspace(a_request(design=design, colour="margin"))
+    drawing = draw_workspace(a_request(design=design, colour="condition"))
     # A facet that lies in several bands is split between them.
     assert sum(len(shell.faces) for shell in drawing.shells) < 1.5 * MOST_COLOURED
     total = sum(area(shell.vertices[shell.faces]) for shell in drawing.shells)
     assert total == pytest.approx(sum(area(s.vertices[s.faces]) for s in plain), rel=1e-9)
-    # It is told that the colours are coarser than usual.
+    # Their edge is told, since the colours are coarser than usual; margins need no small facets.
     assert drawing.coarse_edge is not None
     assert drawing.coarse_edge > COLOURED_EDGE * design.reach
-    assert draw_workspace(a_request(colour="margin")).coarse_edge is None
+    assert draw_workspace(a_request(colour="condition")).coarse_edge is None
+    assert draw_workspace(a_request(design=design, colour="margin")).coarse_edge is None
 
 
-def test_bands_contain_the_values_of_their_colour() -> None:
-    for shell in draw_workspace(a_request(colour="margin")).shells:
+ORIENTATIONS = (
+    home_pose(OPTIMAL).rotation,
+    # Singular everywhere, and almost so.
+    np.eye(3),
+    rotation_from_yaw_pitch_roll((1e-7, 0.0, 0.0)),
+    *(rotation_from_yaw_pitch_roll(angles) for angles in ((-40, 25, 10), (-120, -35, 60))),
+)
+
+
+@pytest.mark.parametrize("rotation", ORIENTATIONS)
+@pytest.mark.parametrize("warn_below", [1.0, 0.3, 4.0])
+def test_bands_of_margins_contain_the_values_of_their_colour(
+    rotation: FloatArray, warn_below: float
+) -> None:
+    """Also within facets, which margins cross linearly and their minimum does not."""
+    solid = workspace_solid(OPTIMAL, rotation, 0.3)
+    colouring = Colouring(OPTIMAL, rotation, "margin", warn_below)
+    shells, coarse_edge = colouring.shells(solid)
+    assert coarse_edge is None
+    rng = np.random.default_rng(3)
+    for shell in shells:
         index = band_colours().index(shell.colour)
-        # At this orientation δ1 and δ3 are ∓z, and δ2 is z times a sine below one.
-        sine = abs(float(home_pose(OPTIMAL).rotation[1, 0]))
-        values = sine * shell.vertices[:, 2]
+        weights = rng.dirichlet([0.5, 0.5, 0.5], len(shell.faces))
+        points = (shell.vertices[shell.faces] * weights[:, :, None]).sum(axis=1)
+        values = np.abs(margins(points, rotation)).min(axis=-1) / warn_below
         assert values.min() >= BAND_EDGES[index] - 1e-9
         if index + 1 < len(BAND_EDGES):
             assert values.max() <= BAND_EDGES[index + 1] + 1e-9
@@ -166,10 +191,8 @@ def test_cut_shows_the_slice_at_its_level() -> None:
     assert drawing.extent[1][2] == pytest.approx(18.0, abs=1e-6)
     highest = max(float(shell.vertices[:, 2].max()) for shell in drawing.shells)
     assert highest == pytest.approx(5.0, abs=1e-6)
-    slice_map = drawing.slice_map
-    assert slice_map is not None
-    assert slice_map.axes == ("x", "y")
-    share = float((slice_map.pixels[..., 3] > 0).mean())
-    assert 0.3 < share < 1.0
+    assert drawing.slice_map is not None
+    assert drawing.slice_map.plane == (0, 1)
+    assert drawing.slice_map.level == drawing.level == 5.0
     assert drawing.hull_volume is not None
     assert drawing.hull_volume >= drawing.mesh_volume * (1.0 - 1e-12)

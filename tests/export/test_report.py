@@ -408,8 +408,7 @@ def test_slice_bands_hold_the_positions_of_their_margins() -> None:
     level, share = 5.0, 1.5
     points = rng.uniform(slices.lows, slices.highs, (400, 3))
     points[:, 1] = level
-    untyped: Any = slices
-    polygons = list(untyped._beyond("y", level, share))
+    polygons = list(slices.beyond("y", level)(share))
     least = np.abs(explorer.margins(points, home.rotation)).min(axis=-1)
     for point, margin in zip(points[:, [0, 2]], least.tolist(), strict=True):
         within = any(_holds(polygon, point) for polygon in polygons)

@@ -80,7 +80,12 @@ window.explorer.places ??= (() => {
     markWindows();
     const scene = window.__viserMutable?.canvas;
     const around = document.querySelector(`${ROOT} > :first-child`);
-    for (const each of [scene, scene?.parentElement, around, ...document.querySelectorAll(WINDOW)]) {
+    for (const each of [
+      scene,
+      scene?.parentElement,
+      around,
+      ...document.querySelectorAll(WINDOW),
+    ]) {
       if (!each || watched.has(each)) continue;
       watched.add(each);
       sizes.observe(each);

@@ -1,7 +1,14 @@
-"""Surfaces in bands of colour: by the proximity to singularities, or by what bounds them."""
+"""Surfaces in bands of colour: by the proximity to singularities, or by what bounds them.
+
+At one orientation margins are linear in the position, so that bands of the smallest margin are
+exact on each facet: their edges bend only where another margin becomes the smallest, and by the
+angle between facets, which the tolerance of the solid bounds. The condition number is not linear:
+it is computed at the corners of small facets, and signed, so that it is smooth where it is zero.
+"""
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -11,20 +18,19 @@ from numpy.typing import NDArray
 from explorer.mechanism.design import Design
 from explorer.mechanism.margins import margins
 from explorer.numerics.arrays import FloatArray, IntArray
-from explorer.singularity.colours import BAND_EDGES, OUTLINE, Rgb, band_colours
+from explorer.singularity.colours import BAND_EDGES, OUTLINE, WARN_CONDITION, Rgb, band_colours
+from explorer.singularity.ellipsoids import planes_of_singularity
 from explorer.singularity.jacobian import inverse_condition, jacobian
 from explorer.workspace.accessible.workspace import PAIR_NAMES
 from explorer.workspace.solids.solid import Solid
 
 Measure = Literal["plain", "margin", "condition"]
 
-# An inverse condition number below this is coloured as a warning.
-WARN_CONDITION = 0.01
 PLAIN: Rgb = (110, 150, 196)
 # Where legs begin to collide: what collides has this colour all over the page.
 COLLIDING: Rgb = OUTLINE
 # Longest edge of a coloured facet as a share of the reach, unless that takes too many facets.
-COLOURED_EDGE = 0.08
+COLOURED_EDGE = 0.05
 # Most facets into which a surface is cut to be coloured.
 MOST_COLOURED = 100_000
 
@@ -64,25 +70,53 @@ class Colouring:
     def shells(self, solid: Solid) -> tuple[tuple[Shell, ...], float | None]:
         """Return the parts of a surface, one for each colour, and its longest edge.
 
-        The longest edge of a coloured facet, in design units, is given if it is longer than usual,
-        because the surface is large beside the reach; it is None otherwise.
+        The longest edge of a facet that is coloured by the condition number, in design units, is
+        given if it is longer than usual, because the surface is large beside the reach; it is None
+        otherwise.
         """
         if solid.is_empty:
             return (), None
         if self.measure == "plain":
             return _by_cause(solid), None
-        usual = COLOURED_EDGE * self.design.reach
-        vertices, faces = cut_to_size(solid, usual)
-        longest = float(edge_lengths(vertices, faces).max())
-        rest = vertices[faces]
-        share = self.values(rest.reshape(-1, 3)).reshape(-1, 3)
+        coarse_edge = None
+        if self.measure == "condition":
+            rest, share, longest = self._conditioned(solid)
+            coarse_edge = longest if longest > COLOURED_EDGE * self.design.reach else None
+        else:
+            rest = self._split_at_margins(solid.vertices[solid.faces])
+            share = self.values(rest.reshape(-1, 3)).reshape(-1, 3)
         shells: list[Shell] = []
         for colour, edge in zip(band_colours(), (*BAND_EDGES[1:], np.inf), strict=True):
             band, rest, share = split_at(rest, share, edge)
             if len(band):
                 corners = np.arange(3 * len(band), dtype=np.int32).reshape(-1, 3)
                 shells.append(Shell(colour, band.reshape(-1, 3), corners))
-        return tuple(shells), longest if longest > usual else None
+        return tuple(shells), coarse_edge
+
+    def _split_at_margins(self, triangles: FloatArray) -> FloatArray:
+        """Return triangles (n, 3, 3) split where the smallest margin is not linear."""
+        planes = planes_of_singularity(self.rotation)
+        # Where two margins are equal, another one becomes the smallest.
+        pairs = itertools.combinations(planes, 2)
+        for normal in (*planes, *(a + sign * b for a, b in pairs for sign in (-1.0, 1.0))):
+            low, high, _ = split_at(triangles, triangles @ normal, 0.0)
+            triangles = np.concatenate([low, high])
+        return triangles
+
+    def _conditioned(self, solid: Solid) -> tuple[FloatArray, FloatArray, float]:
+        """Return small triangles (n, 3, 3), their measure (n, 3), and their longest edge."""
+        vertices, faces = cut_to_size(solid, COLOURED_EDGE * self.design.reach)
+        # With the sign of the determinant the measure is smooth where it is zero.
+        sign = np.where(margins(vertices, self.rotation).prod(axis=-1) < 0.0, -1.0, 1.0)
+        triangles, signed = vertices[faces], (sign * self.values(vertices))[faces]
+        _, positive, above = split_at(triangles, signed, 0.0)
+        # A facet of which every position is singular is one of the positive ones.
+        _, negative, below = split_at(triangles, -signed, np.nextafter(0.0, 1.0))
+        return (
+            np.concatenate([positive, negative]),
+            np.concatenate([above, below]),
+            float(edge_lengths(vertices, faces).max()),
+        )
 
 
 def cut_to_size(solid: Solid, edge: float) -> tuple[FloatArray, IntArray]:

@@ -27,6 +27,7 @@ class WorkspaceView:
         cut: The axis along which it is cut open, or None.
         level: The coordinate at which it is cut, in design units; None for the middle of its
             extent, which also counts where this is beyond it.
+        flipped: Whether the cut keeps the side that faces the isometric camera.
         tolerance: Largest distance of a facet from the true surface, in design units; None
             for a share of the reach.
     """
@@ -40,6 +41,7 @@ class WorkspaceView:
     colour: Literal["plain", "margin", "condition"] = "plain"
     cut: Literal["x", "y", "z"] | None = None
     level: float | None = None
+    flipped: bool = False
     tolerance: float | None = None
 
 
@@ -102,7 +104,7 @@ class View:
         tetrahedra: Whether each of the three is drawn.
         clearance: Whether the closest pair of legs is marked.
         swept: Whether the tetrahedra are drawn that the legs swept in the last move.
-        radius_curve: Whether the reachable volume is drawn against the radius of the legs.
+        radius_curve: Whether the accessible volume is drawn against the radius of the legs.
         ghosts: Whether the seven other assembly modes are drawn.
         twin: Whether the 6-4 twin's six legs replace the four.
         warn_below: The length below which margins are warned of, in design units; distances

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from explorer.app.features.feature import Services
 from explorer.app.features.legs.tasks import RadiusDrawing, RadiusRequest, draw_radius_curve
-from explorer.app.features.workspace.feed import workspace_rows, workspace_start
+from explorer.app.features.workspace.orientation import workspace_rows, workspace_start
 from explorer.app.session.feed import Feed
 from explorer.app.state.frame import Frame
 from explorer.workspace.accessible.radii import with_radius
 
 
 class RadiusFeed(Feed[RadiusRequest, RadiusDrawing]):
-    """Drawings of the reachable volume against the radius of the legs."""
+    """Drawings of the accessible volume against the radius of the legs."""
 
     def __init__(self, services: Services) -> None:
         super().__init__(

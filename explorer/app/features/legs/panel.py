@@ -33,7 +33,7 @@ class LegsPanel:
         with gui.add_folder("Leg radius"):
             self._controls.checkbox(
                 "Volume against radius",
-                "Draw the reachable volume over one radius of all four legs, for the orientation "
+                "Draw the accessible volume over one radius of all four legs, for the orientation "
                 "and the start of the tab Workspace.",
                 "view.radius_curve",
             )

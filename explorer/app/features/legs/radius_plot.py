@@ -1,4 +1,4 @@
-"""The reachable volume against one radius of all four legs, as a chart and in words."""
+"""The accessible volume against one radius of all four legs, as a chart and in words."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class RadiusPlot:
             (line("volume", BLUE), *marks),
             (
                 axis("radius of all four legs (units)", label_size=20, size=28),
-                axis("reachable volume (units³)", label_size=18, size=46),
+                axis("accessible volume (units³)", label_size=18, size=46),
             ),
             height=HEIGHT,
             padding=(8, 14, 0, 0),
@@ -110,14 +110,14 @@ def marks_of(
     return (
         RadiusMark("present radius", ORANGE, 10, radius),
         RadiusMark(
-            "99 % reachable up to", TEAL, 8, None if curve is None else curve.radius_at(SHARE)
+            "99 % accessible up to", TEAL, 8, None if curve is None else curve.radius_at(SHARE)
         ),
         RadiusMark("no loss up to", VIOLET, 8, None if curve is None else curve.harmless),
     )
 
 
 def volume_at(curve: RadiusCurve, radius: float) -> float:
-    """Return the reachable volume at a radius; 0 beyond the last radius of the curve."""
+    """Return the accessible volume at a radius; 0 beyond the last radius of the curve."""
     return float(np.interp(radius, *_without_drop(curve), right=0.0))
 
 
@@ -160,14 +160,14 @@ def radius_words(frame: Frame, feed: RadiusFeed) -> str:
     note = "" if feed.is_current else f' <span class="ex-dim ex-small">{progress(feed)}</span>'
     if drawing.curve is None:
         reason = "" if drawing.trouble is None else drawing.trouble.reason
-        return alert("Nothing can be reached, even without radii", sentence(reason)) + note
+        return alert("Nothing is accessible, even without radii", sentence(reason)) + note
     curve = drawing.curve
     if float(curve.volumes[0]) <= 0.0:
         return box(dim(f"The workspace is empty.{note}"))
     design = frame.state.design
     marks = marks_of(curve, common_radius(design))
     return box(
-        f'<div class="ex-line"><b>Reachable volume</b>{note}</div>',
+        f'<div class="ex-line"><b>Accessible volume</b>{note}</div>',
         table(_row(mark, curve, design.unit_mm) for mark in marks),
         f'<div class="ex-dim ex-after">{where_legs_meet(curve, design.reach)}</div>',
     )

@@ -1,4 +1,4 @@
-"""The worker's task for the legs: the reachable volume over their radius."""
+"""The worker's task for the legs: the accessible volume over their radius."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from explorer.workspace.accessible.radii import RadiusCurve, radius_curve
 
 @dataclass(frozen=True)
 class RadiusRequest:
-    """A request for the reachable volume over the radius of the legs.
+    """A request for the accessible volume over the radius of the legs.
 
     Attributes:
         design: The manipulator, its legs without radii.
         rotation: Rotation from platform to base, rows of the matrix.
-        start: Position of b4 from which others are reached; None for the home position.
+        start: Position of b4 from which paths start; None for the home position.
     """
 
     design: Design
@@ -36,7 +36,7 @@ class RadiusRequest:
 
 @dataclass(frozen=True)
 class RadiusDrawing:
-    """The reachable volume over the radius of the legs.
+    """The accessible volume over the radius of the legs.
 
     Attributes:
         request: The request.
@@ -50,7 +50,7 @@ class RadiusDrawing:
 
 
 def draw_radius_curve(request: RadiusRequest, channel: Channel | None = None) -> RadiusDrawing:
-    """Return the reachable volume over the radius of all legs; `channel` sends progress."""
+    """Return the accessible volume over the radius of all legs; `channel` sends progress."""
     design, rotation = request.design, np.array(request.rotation)
     try:
         curve = radius_curve(design, rotation, start=request.start, watch=watch_of(channel))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 
 import viser
 
@@ -115,12 +116,12 @@ class OptimisePanel:
         self._files = gui.add_button_group(
             "Download",
             (HULL_FILE, DESIGN_FILE, SEARCH_FILE),
-            hint="The convex hull of the workspace, in the format chosen in the tab Workspace; "
-            "the design as a file to open again; the record to repeat the search from.",
+            hint="The convex hull of the workspace as 3MF; the design as a file to open again; the "
+            "record to repeat the search from.",
             visible=False,
         )
         self._sends = {
-            HULL_FILE: services.get(WorkspaceFiles).send_hull_at_home,
+            HULL_FILE: partial(services.get(WorkspaceFiles).send_hull_at_home, "3mf"),
             DESIGN_FILE: services.get(DesignFile).send,
             SEARCH_FILE: self._send_record,
         }

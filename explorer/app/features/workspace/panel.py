@@ -1,180 +1,182 @@
-"""Controls of the workspace: its drawing, its cut and its files."""
+"""The panel of the workspace: its volume, what is shown of it, its cut with a map, its numbers."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from typing import Annotated, Literal
 
-import numpy as np
+import msgspec
 import viser
 
+from explorer.app.browser.viser_gaps import run_script
 from explorer.app.features.feature import Services
 from explorer.app.features.workspace.feed import WorkspaceFeed
-from explorer.app.features.workspace.files import FORMATS, WorkspaceFiles, tolerance_of
-from explorer.app.features.workspace.slice_map import Axis, level_within
+from explorer.app.features.workspace.files import tolerance_of
+from explorer.app.features.workspace.orientation import workspace_pose
+from explorer.app.features.workspace.slice_map import Axis, level_within, map_picture
 from explorer.app.features.workspace.tasks import WorkspaceDrawing
+from explorer.app.features.workspace.volume import VolumeFeed
+from explorer.app.features.workspace.words import (
+    drawing_words,
+    legend,
+    volume_headline,
+    workspace_details,
+)
+from explorer.app.look import read_script
+from explorer.app.security.client_messages import decode_text
+from explorer.app.session.session import Session
 from explorer.app.state.action import Action
-from explorer.app.state.actions import Set, StartThere
+from explorer.app.state.actions import Set, SetPose, StartThere
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
+from explorer.app.state.view import WorkspaceView
 from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.buttons import Buttons
+from explorer.app.widgets.chips import Chip, Chips
+from explorer.app.widgets.commands import Key, shift
 from explorer.app.widgets.controls import At, Bound, Controls, Span
-from explorer.app.widgets.markup import alert, format_number, note, sentence
+from explorer.app.widgets.markup import alert, box, sentence
 from explorer.app.widgets.ranges import coordinate_span, fine_step, round_up
 from explorer.app.widgets.under_way import UnderWay
-from explorer.mechanism.pose import Pose
+from explorer.mechanism.pose import Pose, Triple
 
-REGIONS = {"within the limits": "limits", "reachable": "reachable"}
-STARTS = {"the home position": "home", "the present position": "pose"}
+KEYS: Mapping[str, tuple[Key, ...]] = {
+    "Workspace › Solid": (Key("V"),),
+    "Workspace › Convex hull": (shift("V"),),
+    "Workspace › Singular planes": (shift("P"),),
+    "Workspace › Cut open › across x": (Key("X"),),
+    "Workspace › Cut open › across y": (Key("Y"),),
+    "Workspace › Cut open › across z": (Key("Z"),),
+    "Workspace › Cut open › no cut": (Key("C"),),
+}
+"""Keys by the names of commands."""
+
+SHOWN = {
+    "solid": ("Solid", "Draw the positions of b4 within all limits at one orientation."),
+    "hull": ("Convex hull", "Draw the convex hull of the workspace."),
+    "planes": (
+        "Singular planes",
+        "Draw the three planes of singular positions, at the present orientation.",
+    ),
+}
+"""Words and hint of each part that can be shown."""
+
+REGIONS: dict[str, tuple[Literal["limits", "reachable"], Literal["home", "pose"]]] = {
+    "within the limits": ("limits", "home"),
+    "accessible from home": ("reachable", "home"),
+    "accessible from the present position": ("reachable", "pose"),
+}
+"""Region and start of the paths."""
+
 COLOURINGS = {"one colour": "plain", "smallest margin": "margin", "1 / cond J": "condition"}
 ORIENTATIONS = {"of the present pose": "pose", "of the home pose": "home"}
-CUTS: dict[str, Axis | None] = {
-    "no cut": None,
-    "across x": "x",
-    "across y": "y",
-    "across z": "z",
-}
-CUT_WORDS = {axis: words for words, axis in CUTS.items()}
-BLANK = np.zeros((8, 8, 4), dtype=np.uint8)
+CUTS: dict[str, Axis | None] = {"none": None, "x": "x", "y": "y", "z": "z"}
+"""Axis of the cut by the words on its button."""
+
+_POSITION = msgspec.json.Decoder(
+    tuple[
+        Annotated[float, msgspec.Meta(ge=-1e12, le=1e12)],
+        Annotated[float, msgspec.Meta(ge=-1e12, le=1e12)],
+        Annotated[float, msgspec.Meta(ge=-1e12, le=1e12)],
+    ]
+)
 
 
 class WorkspacePanel:
-    """Controls of the workspace."""
+    """The panel of the workspace."""
 
     def __init__(self, services: Services) -> None:
-        gui = services.gui
-        self._controls = controls = Controls(gui, services.session)
-        self._session = services.session
-        self._feed = services.get(WorkspaceFeed)
-        files = services.get(WorkspaceFiles)
+        gui, session, buttons = services.gui, services.session, services.buttons
+        self._controls = controls = Controls(gui, session)
+        self._session = session
+        self._feed, self._volumes = services.get(WorkspaceFeed), services.get(VolumeFeed)
         self._nearest_start: Pose | None = None
         # The drawing whose solid is cut.
         self._drawing: WorkspaceDrawing | None = None
-        with gui.add_folder("Workspace of constant orientation"):
-            controls.checkbox(
-                "Solid",
-                "Draw the positions of b4 within all limits at one orientation.",
-                "view.workspace.solid",
-            )
-            controls.dropdown(
-                "Region",
-                "All positions within the limits, or those that a path without a collision "
-                "of legs leads to.",
-                REGIONS,
-                "view.workspace.region",
-            )
-            controls.dropdown(
-                "Reached from",
-                "Where the paths start, at the orientation of the workspace.",
-                STARTS,
-                "view.workspace.start",
-                disabled=lambda state: state.view.workspace.region == "limits",
-            )
-            self._under_way = UnderWay(gui, "workspace", self._feed)
-            self._trouble = gui.add_html("", visible=False)
-            self._go = gui.add_button(
-                "Go there",
-                icon=viser.Icon.MAP_PIN,
-                hint="Move the platform to that position and let the paths start from it.",
-                visible=False,
-            )
-            self._go.on_click(self._go_there)
-            controls.dropdown(
-                "Orientation",
-                "The orientation of the platform all over the workspace.",
-                ORIENTATIONS,
-                "view.workspace.orientation",
-            )
-            controls.dropdown(
-                "Colour by",
-                "One colour, the smallest margin |δ|, or the inverse condition number.",
-                COLOURINGS,
-                "view.workspace.colour",
-            )
-            controls.checkbox(
-                "Convex hull",
-                "Draw the convex hull of the workspace.",
-                "view.workspace.hull",
-            )
-            controls.checkbox(
-                "Singular planes",
-                "Draw the three planes of singular positions, at the present orientation.",
-                "view.workspace.planes",
-            )
-        with gui.add_folder("Cut"):
-            controls.dropdown(
-                "Cut open",
-                "Take away one side of the solid, to see inside.",
-                CUTS,
-                Bound(
-                    lambda frame: CUT_WORDS[frame.state.view.workspace.cut],
-                    lambda state, chosen: self._cut(state, CUTS[chosen]),
-                ),
-            )
+        self._show = shown_chips(buttons, session)
+        self._cuts = cut_chips(buttons, session)
+        self._top = gui.add_html("")
+        controls.dropdown(
+            "Region",
+            "All positions within the limits, or those that a path without a collision of legs "
+            "leads to, from home or from the present position.",
+            REGIONS,
+            Bound(_region, _set_region),
+        )
+        self._under_way = UnderWay(gui, "workspace", self._feed)
+        self._trouble = gui.add_html("", visible=False)
+        self._go = gui.add_button(
+            "Go there",
+            icon=viser.Icon.MAP_PIN,
+            hint="Move the platform to that position and let the paths start from it.",
+            visible=False,
+        )
+        self._go.on_click(self._go_there)
+        controls.dropdown(
+            "Orientation",
+            "The orientation of the platform all over the workspace.",
+            ORIENTATIONS,
+            "view.workspace.orientation",
+        )
+        controls.dropdown(
+            "Colour by",
+            "One colour, the smallest margin |δ|, or the inverse condition number.",
+            COLOURINGS,
+            "view.workspace.colour",
+        )
+        self._legend = gui.add_html("", visible=False)
+        self._cut = gui.add_html("")
+        controls.slider(
+            "Cut at",
+            "Position of the cutting plane on its axis, in design units.",
+            Bound(
+                lambda frame: self._level(frame.state),
+                lambda _, value: Set("view.workspace.level", value, "Cut at"),
+            ),
+            self._cut_span,
+            disabled=lambda state: state.view.workspace.cut is None,
+        )
+        self._map = gui.add_html("", visible=False)
+        with gui.add_folder("Details", expand_by_default=False):
+            self._details = gui.add_html("")
             controls.slider(
-                "at",
-                "Position of the cutting plane, in design units.",
-                Bound(
-                    lambda frame: self._level(frame.state),
-                    lambda _, value: Set("view.workspace.level", value, "Cut at"),
-                ),
-                self._cut_span,
-                disabled=lambda state: state.view.workspace.cut is None,
-            )
-            self._caption = gui.add_html("", visible=False)
-            self._map = gui.add_image(BLANK, format="png", visible=False)
-        with gui.add_folder("Export (millimetres)"):
-            controls.slider(
-                "tolerance",
+                "Mesh tolerance",
                 "Largest distance of a facet from the true surface, in design units.",
                 At("view.workspace.tolerance", default=tolerance_of),
                 _tolerance_span,
             )
-            file_format = gui.add_dropdown(
-                "Format",
-                FORMATS,
-                hint="3MF carries unit, name and colour; STL is a bare mesh in millimetres; STEP "
-                "has the exact faces of the workspace within the limits, and needs pip install "
-                '"flagged-explorer[cad]".',
-            )
-            file_format.on_update(lambda _: files.choose(file_format.value))
-            for what in ("workspace", "hull"):
-                self._add_export(gui, what, files)
+        buttons.on("workspace.go", self._go_to)
+        run_script(services.server, read_script("map"))
 
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that show a frame."""
         drawing = self._drawing = self._feed.drawing
+        state, view = frame.state, frame.state.view.workspace
+        yield (
+            self._top,
+            "content",
+            box(
+                volume_headline(frame, self._volumes),
+                drawing_words(frame, self._feed),
+                self._show.html(state),
+            ),
+        )
         yield from self._controls.updates(frame)
         yield from self._under_way.updates()
         yield from self._show_trouble(drawing)
-        slice_map = drawing.slice_map if drawing is not None else None
-        for handle in (self._caption, self._map):
-            yield handle, "visible", slice_map is not None
-        if drawing is not None and slice_map is not None:
-            across, up = slice_map.axes
-            reach = frame.state.design.reach
-            (left, low), (right, high) = (
-                [format_number(float(end), size=reach) for end in ends]
-                for ends in (slice_map.lows, slice_map.highs)
-            )
-            text = f"{across} from {left} to {right}, {up} from {low} to {high} upwards"
-            if drawing.reached is not None:
-                text += "; pale red: within the limits, not reachable"
-            yield self._caption, "content", note(text)
-            yield self._map, "image", slice_map.picture
-
-    def _cut(self, state: State, axis: Axis | None) -> Action:
-        """Return the action that cuts the solid open; a new axis starts in the middle."""
-        view, level = state.view.workspace, None
-        ends = None if axis is None else self._ends(axis)
-        if axis is None or axis == view.cut:
-            level = view.level
-        elif ends is not None:
-            step = coordinate_span(state).step
-            level = level_within(*ends, round(0.5 * sum(ends) / step) * step)
-        new = replace(view, cut=axis, level=level)
-        return Set("view.workspace", new, "Cut open", CUT_WORDS[axis])
+        mapped = None if drawing is None or view.cut is None else drawing.slice_map
+        has_legend = view.colour != "plain" or mapped is not None
+        yield self._legend, "visible", has_legend
+        if has_legend:
+            yield self._legend, "content", legend(view.colour, state.warn_below, drawing)
+        yield self._cut, "content", box(self._cuts.html(state))
+        yield self._map, "visible", mapped is not None
+        if mapped is not None:
+            picture = map_picture(mapped, state.pose, state.design.reach)
+            yield self._map, "content", box(picture)
+        yield self._details, "content", workspace_details(frame, self._feed)
 
     def _level(self, state: State) -> float:
         """Return the level of the cut, or the level that a cut would have."""
@@ -183,7 +185,7 @@ class WorkspacePanel:
         return (view.level or 0.0) if ends is None else level_within(*ends, view.level)
 
     def _cut_span(self, state: State) -> Span:
-        """Return the extent of the solid on the axis across which it is cut."""
+        """Return the extent of the workspace on the axis across which it is cut."""
         span, axis = coordinate_span(state), state.view.workspace.cut
         ends = None if axis is None else self._ends(axis)
         if ends is None:
@@ -192,14 +194,14 @@ class WorkspacePanel:
         return Span(low * span.step, high * span.step, span.step) if low < high else span
 
     def _ends(self, axis: str) -> tuple[float, float] | None:
-        """Return the extent of the drawn solid on an axis; None without a solid."""
+        """Return the extent of the drawn workspace on an axis; None without a drawing."""
         if self._drawing is None or self._drawing.extent is None:
             return None
         low, high = (float(end["xyz".index(axis)]) for end in self._drawing.extent)
         return low, high
 
     def _show_trouble(self, drawing: WorkspaceDrawing | None) -> Iterator[Update]:
-        """Yield why nothing can be reached, and the nearest position to start from."""
+        """Yield why nothing is accessible, and the nearest position to start from."""
         trouble = None if drawing is None else drawing.trouble
         self._nearest_start = None
         yield self._trouble, "visible", trouble is not None
@@ -215,14 +217,94 @@ class WorkspacePanel:
         if self._nearest_start is not None:
             self._session.do(StartThere(self._nearest_start), who=event.client_id)
 
-    def _add_export(self, gui: viser.GuiApi, what: str, files: WorkspaceFiles) -> None:
-        button = gui.add_button(
-            f"Export {what}", icon=viser.Icon.DOWNLOAD, hint=f"Download the {what} as a file."
+    def _go_to(self, text: str, client: viser.ClientHandle) -> None:
+        """Move b4 to a position that a page sent, in the orientation of the map."""
+        position: Triple | None = decode_text(text, _POSITION)
+        if position is not None:
+            self._session.post(
+                object(),
+                lambda state: SetPose(Pose(position, workspace_pose(Frame(state)).quaternion)),
+                who=client.client_id,
+            )
+
+
+def shown_chips(buttons: Buttons, session: Session) -> Chips:
+    """Return the switches of what is shown."""
+
+    def chip(name: str, words: str, hint: str) -> Chip:
+        path, command = f"view.workspace.{name}", f"Workspace › {words}"
+
+        def is_on(state: State) -> bool:
+            return bool(getattr(state.view.workspace, name))
+
+        return Chip(
+            words,
+            command,
+            hint,
+            lambda state: Set(path, not is_on(state), words),
+            is_on,
+            keys=KEYS[command],
         )
 
-        @button.on_click
-        def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
-            files.send(what, event.client_id)
+    chips = {name: chip(name, words, hint) for name, (words, hint) in SHOWN.items()}
+    return Chips(buttons, session, "workspace.show", "Show", chips)
+
+
+def cut_chips(buttons: Buttons, session: Session) -> Chips:
+    """Return the options of the cut, and the switch of the side that it keeps."""
+
+    def chip(words: str, axis: Axis | None) -> Chip:
+        option = "no cut" if axis is None else f"across {axis}"
+        command = f"Workspace › Cut open › {option}"
+        hint = (
+            "Show the whole solid."
+            if axis is None
+            else f"Cut the workspace open across {axis}, in its middle, and show the map of the "
+            "slice."
+        )
+        return Chip(
+            words,
+            command,
+            hint,
+            lambda state: _set_cut(state.view.workspace, axis, option),
+            lambda state: state.view.workspace.cut == axis,
+            keys=KEYS[command],
+        )
+
+    chips = {words: chip(words, axis) for words, axis in CUTS.items()}
+    chips["flip"] = Chip(
+        "other side",
+        "Workspace › Cut open › other side",
+        "Keep the other side of the cut.",
+        lambda state: Set(
+            "view.workspace.flipped", not state.view.workspace.flipped, "Other side of the cut"
+        ),
+        lambda state: state.view.workspace.flipped,
+        lambda state: state.view.workspace.cut is not None,
+    )
+    return Chips(buttons, session, "workspace.cut", "Cut", chips)
+
+
+def _set_cut(view: WorkspaceView, axis: Axis | None, words: str) -> Action:
+    """Return the action that cuts the workspace open; a new cut shows the solid, in its middle."""
+    level = view.level if axis in (None, view.cut) else None
+    new = replace(view, cut=axis, level=level, solid=view.solid or axis is not None)
+    return Set("view.workspace", new, "Cut open", words)
+
+
+def _region(frame: Frame) -> str:
+    view = frame.state.view.workspace
+    return next(
+        words
+        for words, (region, start) in REGIONS.items()
+        if region == view.region and (region == "limits" or start == view.start)
+    )
+
+
+def _set_region(state: State, words: str) -> Action:
+    region, start = REGIONS[words]
+    view = replace(state.view.workspace, region=region, start=start)
+    return Set("view.workspace", view, "Region", words)
 
 
 def _tolerance_span(state: State) -> Span:

@@ -1,4 +1,4 @@
-"""The reachable part of a workspace, computed in stages in the worker, and a cache of it."""
+"""The accessible part of a workspace, computed in stages in the worker, and a cache of it."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def rows_of(matrix: FloatArray) -> Rows:
 
 @dataclass(frozen=True)
 class Trouble:
-    """Why nothing can be reached.
+    """Why nothing is accessible.
 
     Attributes:
         reason: Words for the page.
@@ -50,7 +50,7 @@ class Trouble:
 
 @dataclass(frozen=True)
 class Reached:
-    """The numbers of the reachable part of a workspace.
+    """The numbers of the accessible part of a workspace.
 
     Attributes:
         volume: Volume in cubed design units.
@@ -71,7 +71,7 @@ _cache: dict[tuple[Design, Rows, Triple | None, float], ReachableWorkspace | Tro
 def reach_workspace(
     design: Design, rotation: Rows, start: Triple | None, tolerance: float, watch: Watch
 ) -> ReachableWorkspace | Trouble:
-    """Return the reachable workspace, or why there is none; cache the newest few."""
+    """Return the accessible workspace, or why there is none; cache the newest few."""
     key = (design, rotation, start, tolerance)
     result = _cache.pop(key, None)
     if result is None:
@@ -114,7 +114,7 @@ def trouble_of(error: ExplorerError) -> Trouble:
 
 
 def reached_of(workspace: ReachableWorkspace) -> Reached:
-    """Return the numbers of a reachable workspace."""
+    """Return the numbers of an accessible workspace."""
     return Reached(
         workspace.reachable_volume,
         workspace.reachable_node_count,

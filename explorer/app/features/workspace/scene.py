@@ -8,7 +8,8 @@ import numpy as np
 import viser
 
 from explorer.app.features.feature import Services
-from explorer.app.features.workspace.feed import WorkspaceFeed, workspace_rotation
+from explorer.app.features.workspace.feed import WorkspaceFeed
+from explorer.app.features.workspace.orientation import workspace_rotation
 from explorer.app.features.workspace.tasks import WorkspaceDrawing
 from explorer.app.scene.bands import COLLIDING, PLAIN, Shell
 from explorer.app.scene.creases import Drawn

@@ -1,21 +1,27 @@
-"""The map of a slice of the workspace, a picture in the colours of a measure."""
+"""The map of a slice of the workspace: the report's exact drawing, with axes, and the pose in it.
+
+The worker draws the map itself; the page puts it between axes, marks b4, and lets
+`look/map.js` read it under the pointer.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Literal
+from html import escape
+from typing import Any, Literal
+from xml.etree.ElementTree import Element
 
+import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
 from explorer.app.scene.bands import Colouring
-from explorer.app.widgets.colours import FAR_WARNINGS, OUTLINE, proximity_colour
-from explorer.legs.clearance import leg_clearances
-from explorer.numerics.arrays import BoolArray, FloatArray
-from explorer.workspace.limits.constraints import constraints, slacks
-from explorer.workspace.limits.region import region_of
-from explorer.workspace.slices.volume import bounds
+from explorer.app.widgets.markup import decimals_for
+from explorer.export.report.drawings.slice_drawing import cross, placing, ruler
+from explorer.export.report.drawings.slices import Slices, in_plane
+from explorer.export.report.markup import as_html, coordinate, element
+from explorer.mechanism.pose import Pose
+from explorer.numerics.arrays import FloatArray, IntArray
+from explorer.singularity.ellipsoids import planes_of_singularity
 from explorer.workspace.solids.solid import Solid
 
 Axis = Literal["x", "y", "z"]
@@ -24,25 +30,41 @@ AXES: tuple[Axis, ...] = ("x", "y", "z")
 CUT = "cut"
 """Name of the limit whose faces lie in the plane of a cut."""
 
-# Pixels on the longer side of the map of a slice.
-MAP_PIXELS = 110
-# Colour and opacity of positions within the limits that are not reachable.
-BLOCKED = (*OUTLINE, 96)
+# Width and greatest height of the picture, and the space around the map, in pixels.
+WIDTH, MOST_HEIGHT = 316.0, 236.0
+LEFT, RIGHT, TOP, BOTTOM = 42.0, 10.0, 8.0, 36.0
+# Digits of a coordinate of the size of the reach.
+DIGITS = 4
+# Distance up to which b4 counts as in the slice, over the reach.
+IN_SLICE = 1e-3
 
 
 @dataclass(frozen=True)
 class SliceMap:
-    """A map of the slice: pixels (h, w, 4), from its lows to its highs on two axes."""
+    """The map of a slice, without its axes.
 
-    pixels: NDArray[np.uint8]
-    axes: tuple[Axis, Axis]
+    Attributes:
+        axis: Axis across which the slice is cut.
+        level: Coordinate of the slice on this axis, in design units.
+        lows, highs: Ends of the map on the two other axes, in design units.
+        own_scale: The map's own points per design unit.
+        markup: The map as SVG, from its lows, y upwards.
+        facts: What the page's script needs to compute the measure at a position.
+    """
+
+    axis: Axis
+    level: float
     lows: tuple[float, float]
     highs: tuple[float, float]
+    own_scale: float
+    markup: str
+    facts: dict[str, Any]
 
-    @cached_property
-    def picture(self) -> NDArray[np.uint8]:
-        """The pixels three times as large, so that a browser draws them sharp."""
-        return np.repeat(np.repeat(self.pixels, 3, axis=0), 3, axis=1)
+    @property
+    def plane(self) -> tuple[int, int]:
+        """The indices of the two axes of the map."""
+        first, second = in_plane(self.axis)
+        return first, second
 
 
 def level_within(low: float, high: float, level: float | None) -> float:
@@ -51,79 +73,136 @@ def level_within(low: float, high: float, level: float | None) -> float:
 
 
 def slice_map(
-    colouring: Colouring, axis: Axis, level: float, whole: Solid | None, reached: Solid | None
-) -> SliceMap | None:
-    """Return the map of a slice through a workspace, None if it has no extent.
+    colouring: Colouring,
+    extent: tuple[FloatArray, FloatArray],
+    axis: Axis,
+    level: float,
+    whole: Solid | None,
+    accessible: Solid | None,
+) -> SliceMap:
+    """Return the map of a slice through a workspace that is not empty.
 
     Args:
-        colouring: Colouring of the workspace by a measure.
+        colouring: Colouring of the workspace by a measure; margins where that is plain.
+        extent: Lows and highs of the workspace within the limits.
         axis: Axis across which the workspace is cut.
         level: Coordinate of the cut on that axis.
         whole: Cut solid of the workspace within the limits; None if collisions do not count.
-        reached: Cut solid of its reachable part; None likewise.
+        accessible: Cut solid of its accessible part; None likewise.
     """
-    limits = constraints(colouring.design, colouring.rotation)
-    lows, highs = bounds(region_of(limits))
-    if not np.isfinite([lows, highs]).all() or not (lows < highs).all():
-        return None
-    cut = AXES.index(axis)
-    first, second = (index for index in range(3) if index != cut)
-    width, height = float(highs[first] - lows[first]), float(highs[second] - lows[second])
-    pixel = max(width, height) / MAP_PIXELS
-    columns = lows[first] + pixel * (np.arange(max(1, round(width / pixel))) + 0.5)
-    rows = lows[second] + pixel * (np.arange(max(1, round(height / pixel))) + 0.5)
-    points = np.zeros((len(rows), len(columns), 3))
-    points[..., cut] = level
-    points[..., first] = columns
-    # The first row of a picture is at the top.
-    points[..., second] = rows[::-1, None]
-    inside = np.asarray((slacks(limits, points) >= 0.0).all(axis=-1))
-    pixels = np.zeros((*inside.shape, 4), dtype=np.uint8)
-    if whole is not None and reached is not None:
-        flat = points[..., [first, second]]
-        in_section = inside & section(whole, (first, second), flat)
-        blocked = in_section & ~section(reached, (first, second), flat)
-        # Facets leave out a rim at the limits, where only collisions of legs are checked.
-        rim = inside & ~in_section
-        clearance = leg_clearances(colouring.design, points[rim], colouring.rotation).clearance
-        blocked[rim] = (clearance <= 0.0).any(axis=-1)
-        inside &= ~blocked
-        pixels[blocked] = BLOCKED
-    if inside.any():
-        share = colouring.values(points[inside])
-        table = np.array([proximity_colour(s, 1.0) for s in np.linspace(0.0, FAR_WARNINGS, 201)])
-        index = np.clip(np.rint(share / FAR_WARNINGS * 200.0), 0, 200).astype(np.int64)
-        pixels[inside, :3] = table[index]
-        pixels[inside, 3] = 255
+    measure = "condition" if colouring.measure == "condition" else "margin"
+    slices = Slices.of(colouring.design, colouring.rotation, extent, colouring.warn_below, measure)
+    first, second = in_plane(axis)
+    loops: list[FloatArray] = []
+    if whole is not None and accessible is not None:
+        # By the even-odd rule, the one without the other.
+        loops = [
+            loop for solid in (whole, accessible) for loop in cut_loops(solid, (first, second))
+        ]
+    drawn = slices.map(axis, level, "workspace-slice", loops)
+    (u0, v0), (u1, v1) = (ends[[first, second]].tolist() for ends in (slices.lows, slices.highs))
     return SliceMap(
-        pixels,
-        (AXES[first], AXES[second]),
-        (float(lows[first]), float(lows[second])),
-        (float(highs[first]), float(highs[second])),
+        axis,
+        level,
+        (u0, v0),
+        (u1, v1),
+        slices.own_scale,
+        as_html(drawn),
+        _facts(colouring, measure),
     )
 
 
-def section(solid: Solid, axes: tuple[int, int], points: FloatArray) -> BoolArray:
-    """Return which points of the plane of a cut lie in the faces of the cut.
+def _facts(colouring: Colouring, measure: str) -> dict[str, Any]:
+    """Return the gradients of the margins, and for the condition number the arms of the joints."""
+    facts: dict[str, Any] = {"gradients": planes_of_singularity(colouring.rotation).tolist()}
+    if measure == "condition":
+        design, rotation = colouring.design, colouring.rotation
+        platform = np.array([[*design.b1, 0.0], [design.b2, 0.0, 0.0], [design.b3, 0.0, 0.0]])
+        facts["arms"] = (platform @ rotation.T).tolist()
+        facts["a3"] = [*design.a3, 0.0]
+        facts["reach"] = design.reach
+    return facts
+
+
+def cut_loops(solid: Solid, axes: tuple[int, int]) -> list[FloatArray]:
+    """Return the polygons around the faces of a cut, each of shape (n, 2).
 
     Args:
         solid: Solid that was cut; its cut faces have the limit `CUT`.
         axes: Two axes of the plane.
-        points: Coordinates on these axes of a grid of points, shape (h, w, 2).
     """
-    inside = np.zeros(points.shape[:2], dtype=np.bool_)
     if CUT not in solid.limits:
-        return inside
-    faces = solid.faces[solid.limit_of_face == solid.limits.index(CUT)]
-    for corners in solid.vertices[faces][:, :, axes]:
-        low, high = corners.min(axis=0), corners.max(axis=0)
-        near = ((points >= low) & (points <= high)).all(axis=-1)
-        sides = np.stack([_side(corners[k - 1], corners[k], points[near]) for k in range(3)])
-        inside[near] |= (sides >= 0.0).all(axis=0) | (sides <= 0.0).all(axis=0)
-    return inside
+        return []
+    faces: IntArray = solid.faces[solid.limit_of_face == solid.limits.index(CUT)].astype(np.int64)
+    sides = {
+        (a, b) for face in faces.tolist() for a, b in zip(face, (*face[1:], face[0]), strict=True)
+    }
+    # A side between two faces of the cut runs both ways.
+    following: dict[int, list[int]] = {}
+    for a, b in sides:
+        if (b, a) not in sides:
+            following.setdefault(a, []).append(b)
+    loops: list[FloatArray] = []
+    while following:
+        chain = [next(iter(following))]
+        while chain[-1] in following:
+            after = following[chain[-1]]
+            chain.append(after.pop())
+            if not after:
+                del following[chain[-2]]
+        loops.append(solid.vertices[chain][:, axes])
+    return loops
 
 
-def _side(start: FloatArray, end: FloatArray, points: FloatArray) -> FloatArray:
-    """Return numbers (n,) whose signs say on which side of a line points (n, 2) lie."""
-    (x, y), offsets = end - start, points - start
-    return x * offsets[:, 1] - y * offsets[:, 0]
+def map_picture(mapped: SliceMap, pose: Pose, reach: float) -> str:
+    """Return the map between its axes as SVG, with b4 as a cross, for a panel.
+
+    Args:
+        mapped: The map.
+        pose: The present pose.
+        reach: Reach of the design, in design units.
+    """
+    (u0, v0), (u1, v1) = mapped.lows, mapped.highs
+    first, second = mapped.plane
+    scale = min((WIDTH - LEFT - RIGHT) / (u1 - u0), (MOST_HEIGHT - TOP - BOTTOM) / (v1 - v0))
+    height = TOP + BOTTOM + scale * (v1 - v0)
+    left, bottom = LEFT, height - BOTTOM
+    u, v = pose.position[first], pose.position[second]
+    pieces: list[Element] = []
+    if u0 <= u <= u1 and v0 <= v <= v1:
+        off = abs(pose.position[AXES.index(mapped.axis)] - mapped.level)
+        # Beside the slice b4 is projected to it, and drawn faint.
+        look = "ex-here" if off <= IN_SLICE * reach else "ex-here is-off"
+        pieces.append(
+            element("g", *cross(left + scale * (u - u0), bottom - scale * (v - v0)), class_=look)
+        )
+    pieces += [
+        ruler(f"{AXES[first]} (units)", (u0, u1), left, scale, across=bottom, up=False),
+        ruler(AXES[second], (v0, v1), bottom, scale, across=left, up=True),
+    ]
+    facts = {
+        "axis": AXES.index(mapped.axis),
+        "level": mapped.level,
+        "lows": mapped.lows,
+        "highs": mapped.highs,
+        "place": (left, bottom, scale),
+        "decimals": decimals_for(reach, DIGITS),
+        **mapped.facts,
+    }
+    frame = element(
+        "rect",
+        x=left,
+        y=bottom - scale * (v1 - v0),
+        width=scale * (u1 - u0),
+        height=scale * (v1 - v0),
+        class_="frame",
+    )
+    size = placing(scale / mapped.own_scale, left, bottom)
+    words = f"Map of the slice at {mapped.axis} = {mapped.level:.4g}"
+    return (
+        f'<svg class="ex-map" viewBox="0 0 {coordinate(WIDTH)} {coordinate(height)}" role="img" '
+        f'aria-label="{words}" data-map="{escape(msgspec.json.encode(facts).decode())}">'
+        f'{as_html(frame)}<g transform="{size}" data-within="">{mapped.markup}</g>'
+        f"{''.join(map(as_html, pieces))}</svg>"
+        '<div class="ex-reading ex-dim">Point at the map to read it, click to go there.</div>'
+    )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 from typing import Literal
 
@@ -24,6 +23,7 @@ from explorer.app.features.workspace.slice_map import (
     level_within,
     slice_map,
 )
+from explorer.app.features.workspace.volume import exact_volume
 from explorer.app.scene.bands import PLAIN, Colouring, Measure, Shell
 from explorer.app.session.worker import Channel
 from explorer.errors import InputError
@@ -31,8 +31,9 @@ from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.stages import unwatched
+from explorer.workspace.extremes import extent_of
 from explorer.workspace.limits.constraints import HalfSpace
-from explorer.workspace.slices.volume import NodeCount, workspace_nodes, workspace_volume
+from explorer.workspace.slices.volume import NodeCount, workspace_nodes
 from explorer.workspace.solids.solid import Solid
 from explorer.workspace.solids.solids import convex_hull, cut_solid, workspace_solid
 
@@ -51,11 +52,12 @@ class WorkspaceRequest:
     Attributes:
         design: The manipulator.
         rotation: Rows of the matrix, platform to base.
-        region: All that is within the limits, or its reachable part.
+        region: All that is within the limits, or its accessible part.
         start: Position where paths start; None for home.
         colour: Measure that colours the surface.
         cut: Axis across which the solid is cut open, or None.
         level: Coordinate of the cut; None, or one beyond the extent, for the middle.
+        flipped: Whether the side is kept that faces the isometric camera.
         tolerance: Chord tolerance; None for a share of the reach.
         hull: Whether to make the convex hull.
         warn_below: Length below which margins raise a warning.
@@ -68,6 +70,7 @@ class WorkspaceRequest:
     colour: Measure
     cut: Axis | None
     level: float | None
+    flipped: bool
     tolerance: float | None
     hull: bool
     warn_below: float
@@ -87,15 +90,14 @@ class WorkspaceDrawing:
         level: Coordinate of the cut, if the solid is cut.
         volume: Exact volume within the limits, see `explorer.workspace.slices.volume`.
         error: Bound of the error of that volume.
-        reached: Numbers of the reachable part, if requested and there is no trouble.
-        trouble: Why nothing is reachable, if all within the limits is drawn instead.
+        reached: Numbers of the accessible part, if requested and there is no trouble.
+        trouble: Why nothing is accessible, if all within the limits is drawn instead.
         mesh_volume: Volume of the uncut solid.
         mesh_agrees: Whether the volume of the solid within the limits agrees with the exact one.
         hull_volume: Volume of the hull, if requested.
         extent: (lows, highs) of the solid; None if it is empty.
         nodes: The paper's node count within the limits; None if the grid is too fine.
         empty_because: Names of the limits that empty the workspace.
-        seconds: Computing time.
     """
 
     request: WorkspaceRequest
@@ -114,7 +116,6 @@ class WorkspaceDrawing:
     extent: tuple[FloatArray, FloatArray] | None
     nodes: NodeCount | None
     empty_because: tuple[str, ...]
-    seconds: float
 
 
 def draw_workspace(request: WorkspaceRequest, channel: Channel | None = None) -> WorkspaceDrawing:
@@ -124,11 +125,10 @@ def draw_workspace(request: WorkspaceRequest, channel: Channel | None = None) ->
         request: Workspace to draw.
         channel: Channel to the parent, which gets each `Stage` and may cancel; None for neither.
     """
-    begin = time.perf_counter()
     design, rotation = request.design, np.array(request.rotation)
     tolerance = request.tolerance or LIVE_TOLERANCE * design.reach
     watch = watch_of(channel)
-    measured = workspace_volume(design, rotation)
+    measured = exact_volume(design, request.rotation)
     whole = workspace_solid(design, rotation, tolerance, volume=measured)
     reached = trouble = None
     if request.region == "reachable":
@@ -138,16 +138,17 @@ def draw_workspace(request: WorkspaceRequest, channel: Channel | None = None) ->
     hull = convex_hull(solid) if request.hull and not solid.is_empty else None
     colouring = Colouring(design, rotation, request.colour, request.warn_below)
     shown, mapped, level = solid, None, None
-    extent = _extent(solid)
-    if request.cut is not None and extent is not None:
+    whole_extent = None if whole.is_empty else extent_of(design, rotation, whole)
+    extent = whole_extent if reached is None else _extent(solid)
+    if request.cut is not None and extent is not None and whole_extent is not None:
         axis = AXES.index(request.cut)
         level = level_within(float(extent[0][axis]), float(extent[1][axis]), request.level)
         # The half that faces the isometric camera is cut away.
-        side = -1.0 if request.cut == "y" else 1.0
+        side = -1.0 if (request.cut == "y") != request.flipped else 1.0
         half_space = HalfSpace(CUT, side * np.eye(3)[axis], side * level)
         shown = cut_solid(solid, half_space)
         cut_solids = (None, None) if reached is None else (cut_solid(whole, half_space), shown)
-        mapped = slice_map(colouring, request.cut, level, *cut_solids)
+        mapped = slice_map(colouring, whole_extent, request.cut, level, *cut_solids)
     try:
         nodes = workspace_nodes(design, rotation)
     except InputError:
@@ -170,7 +171,6 @@ def draw_workspace(request: WorkspaceRequest, channel: Channel | None = None) ->
         extent=extent,
         nodes=nodes,
         empty_because=measured.empty_because,
-        seconds=time.perf_counter() - begin,
     )
 
 
@@ -189,13 +189,13 @@ def export_mesh(
         design: The manipulator.
         rotation: Rows of the matrix, platform to base.
         tolerance: Chord tolerance, in design units.
-        region: All that is within the limits, or its reachable part.
+        region: All that is within the limits, or its accessible part.
         start: Position where paths start; None for home.
         what: "workspace" or "hull".
         file_format: A format of `explorer.export.mesh`, or `STEP`.
 
     Raises:
-        ExplorerError: an empty workspace, nothing reachable, a missing library, or STEP of a solid
+        ExplorerError: an empty workspace, nothing accessible, a missing library, or STEP of a solid
             without exact faces.
     """
     if file_format == STEP:
@@ -217,7 +217,7 @@ def _exact_file(design: Design, rotation: Rows, region: Region, what: str) -> by
     """Return a STEP file of the workspace within the limits.
 
     Raises:
-        InputError: a hull or the reachable part; neither has exact faces.
+        InputError: a hull or the accessible part; neither has exact faces.
         ExplorerError: as of `explorer.export.step.workspace_step`.
     """
     meshes = "export it as 3mf, stl, glb, obj or ply"
@@ -235,7 +235,7 @@ def _exact_file(design: Design, rotation: Rows, region: Region, what: str) -> by
 
 def exported_name(region: Region, what: str) -> str:
     """Return the name of a file with a "workspace" or a "hull"."""
-    return what if region == "limits" else f"reachable {what}"
+    return what if region == "limits" else f"accessible {what}"
 
 
 def _extent(solid: Solid) -> tuple[FloatArray, FloatArray] | None:

@@ -33,12 +33,11 @@ def slices_through(slices: Slices, position: Sequence[float]) -> Element:
         width, tall = (float(scale * spans[k]) for k in (first, second))
         x, y = left + LEFT, TOP + tall
         maps.append(_placed(slices, axis, level, x, y, scale, f"slice-{axis}"))
-        for index, (k, low) in enumerate(((first, x), (second, y))):
-            maps.append(_ruler(slices, k, low, scale, across=x if index else y, up=bool(index)))
+        for k, low, across in ((first, x, y), (second, y, x)):
+            ends = float(slices.lows[k]), float(slices.highs[k])
+            maps.append(ruler(AXES[k], ends, low, scale, across=across, up=k == second))
         home_u, home_v = (float(position[k] - slices.lows[k]) * scale for k in (first, second))
-        cross = f"M{coordinate(x + home_u - 5)},{coordinate(y - home_v)}h10m-5,-5v10"
-        maps.append(element("path", d=cross, class_="cross casing"))
-        maps.append(element("path", d=cross, class_="cross"))
+        maps.extend(cross(x + home_u, y - home_v))
         title = f"{axis} = {format_number(level, 4)}"
         maps.append(element("text", title, x=x, y=y - tall - 10.0, class_="title"))
         left += LEFT + width + RIGHT
@@ -92,34 +91,62 @@ def _placed(
     slices: Slices, axis: str, level: float, x: float, y: float, scale: float, name: str
 ) -> Element:
     """Return a map with its lows at (x, y) on paper, at a scale in points per design unit."""
-    size = scale / slices.own_scale
     group = slices.map(axis, level, name)
-    group.set("transform", f"matrix({size:.6g} 0 0 {-size:.6g} {x:.6g} {y:.6g})")
+    group.set("transform", placing(scale / slices.own_scale, x, y))
     return group
 
 
-def _ruler(
-    slices: Slices, k: int, start: float, scale: float, *, across: float, up: bool
+def placing(size: float, x: float, y: float) -> str:
+    """Return the transform that puts a map's lows at (x, y), at a size in points per own point."""
+    return f"matrix({size:.6g} 0 0 {-size:.6g} {x:.6g} {y:.6g})"
+
+
+def cross(x: float, y: float) -> tuple[Element, Element]:
+    """Return a cross with its middle at (x, y), over its own light rim."""
+    data = f"M{coordinate(x - 5)},{coordinate(y)}h10m-5,-5v10"
+    return (
+        element("path", d=data, class_="cross casing"),
+        element("path", d=data, class_="cross"),
+    )
+
+
+def ruler(
+    title: str,
+    ends: tuple[float, float],
+    start: float,
+    scale: float,
+    *,
+    across: float,
+    up: bool,
 ) -> Element:
-    """Return an axis with ticks at round numbers, below a map or to its left."""
-    low, high = float(slices.lows[k]), float(slices.highs[k])
+    """Return an axis with ticks at round numbers, below a map or to its left.
+
+    Args:
+        title: Words beside the axis.
+        ends: Coordinates of the map's lowest and highest end, in design units.
+        start: Place of the lowest end on paper, along the axis.
+        scale: Points of paper per design unit.
+        across: Place of the axis on paper, across it.
+        up: Whether the axis goes up, at the left of the map.
+    """
+    low, high = ends
     step = round_length((high - low) / _TICKS * 1.6)
-    ruler = element("g", class_="ruler")
+    axis = element("g", class_="ruler")
     way = -1.0 if up else 1.0
     end = start + way * scale * (high - low)
     ticks = range(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1)
     line = (across, start, across, end) if up else (start, across, end, across)
-    ruler.append(element("line", **dict(zip(("x1", "y1", "x2", "y2"), line, strict=True))))
+    axis.append(element("line", **dict(zip(("x1", "y1", "x2", "y2"), line, strict=True))))
     for tick in ticks:
         at = start + way * scale * (tick * step - low)
         x1, y1, x2, y2 = (across, at, across - 4.0, at) if up else (at, across, at, across + 4.0)
-        ruler.append(element("line", x1=x1, y1=y1, x2=x2, y2=y2))
+        axis.append(element("line", x1=x1, y1=y1, x2=x2, y2=y2))
         words = format_number(tick * step, 4)
         if up:
-            ruler.append(drawing_text(words, across - 7.0, at + 3.5, anchor="end"))
+            axis.append(drawing_text(words, across - 7.0, at + 3.5, anchor="end"))
         else:
-            ruler.append(drawing_text(words, at, across + 15.0))
+            axis.append(drawing_text(words, at, across + 15.0))
     middle = 0.5 * (start + end)
     x, y = (across - 30.0, middle + 3.5) if up else (middle, across + 30.0)
-    ruler.append(drawing_text(AXES[k], x, y, class_="axis"))
-    return ruler
+    axis.append(drawing_text(title, x, y, class_="axis"))
+    return axis

@@ -1,16 +1,17 @@
-"""Maps of slices as drawings: exact outlines, filled in bands by the smallest margin.
+"""Maps of slices as drawings, for the report and the page: exact outlines, filled in bands.
 
 At one orientation each margin is linear in the position, so the positions of a slice at which
-every margin is at least a level are polygons: the bands are as exact as the outline.
+every margin is at least a level are polygons: these bands are as exact as the outline. Bands of the
+condition number, limits on swings and collisions of legs are outlined on a fine grid.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Literal
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -20,23 +21,35 @@ from explorer.export.report.drawings.mechanism import path_of, round_length
 from explorer.export.report.markup import coordinate, element
 from explorer.legs.clearance import leg_clearances
 from explorer.mechanism.design import Design, Swing
-from explorer.numerics.arrays import BoolArray, FloatArray
-from explorer.singularity.colours import BAND_EDGES, OUTLINE, WARN_SHARE, band_colours, css
+from explorer.mechanism.margins import margins
+from explorer.numerics.arrays import FloatArray
+from explorer.singularity.colours import (
+    BAND_EDGES,
+    OUTLINE,
+    WARN_CONDITION,
+    WARN_SHARE,
+    band_colours,
+    css,
+)
 from explorer.singularity.ellipsoids import planes_of_singularity
-from explorer.workspace.limits.constraints import constraints
+from explorer.singularity.jacobian import inverse_condition, jacobian
+from explorer.workspace.limits.constraints import constraints, slacks
 from explorer.workspace.limits.region import region_of
 from explorer.workspace.slices.axes import AXES
-from explorer.workspace.slices.fields import slice_field
+from explorer.workspace.slices.level_loops import level_loops
 from explorer.workspace.slices.outline import Edge, Outline, slice_outline
 from explorer.workspace.slices.volume import bounds
 
 # The longer side of a workspace in the drawing's own coordinates.
 OWN_SIZE = 1000.0
-# Cells on the longer side, where a slice has no exact outline and where legs collide.
-CELLS = 240
-COLLISION_CELLS = 160
+# Cells of a grid on the longer side; those of the condition number take long.
+CELLS, CONDITION_CELLS = 160, 100
 # More contours than a workspace can have.
 CONTOURS = 60
+# Colour and opacity of positions within the limits that are not accessible.
+NOT_ACCESSIBLE, NOT_ACCESSIBLE_OPACITY = OUTLINE, 0.38
+
+BandMeasure = Literal["margin", "condition"]
 
 
 @dataclass(frozen=True)
@@ -47,23 +60,38 @@ class Slices:
         design: The manipulator.
         rotation: Rotation from platform to base, shape (3, 3).
         lows, highs: Corners of a box that holds the workspace, each of shape (3,).
+        warn_below: The warning length of margins, in design units.
+        measure: The measure of the bands: the smallest margin |δ|, or the inverse condition number.
     """
 
     design: Design
     rotation: FloatArray
     lows: FloatArray
     highs: FloatArray
+    warn_below: float
+    measure: BandMeasure = "margin"
 
     @staticmethod
-    def of(design: Design, rotation: FloatArray, extent: tuple[FloatArray, FloatArray]) -> Slices:
-        """Return the slices of a workspace that is not empty, of known extent."""
-        lows, highs = bounds(region_of(constraints(design, rotation)))
-        return Slices(design, rotation, np.maximum(lows, extent[0]), np.minimum(highs, extent[1]))
+    def of(
+        design: Design,
+        rotation: FloatArray,
+        extent: tuple[FloatArray, FloatArray],
+        warn_below: float | None = None,
+        measure: BandMeasure = "margin",
+    ) -> Slices:
+        """Return the slices of a workspace that is not empty, of known extent.
 
-    @property
-    def warn_below(self) -> float:
-        """The warning length of margins, in design units."""
-        return WARN_SHARE * self.design.reach
+        Without a warning length, that of a new page counts.
+        """
+        lows, highs = bounds(region_of(constraints(design, rotation)))
+        return Slices(
+            design,
+            rotation,
+            np.maximum(lows, extent[0]),
+            np.minimum(highs, extent[1]),
+            WARN_SHARE * design.reach if warn_below is None else warn_below,
+            measure,
+        )
 
     @property
     def own_scale(self) -> float:
@@ -89,52 +117,87 @@ class Slices:
         """Return the exact outline of a slice; None with cones."""
         return slice_outline(self.design, self.rotation, axis, level)
 
-    def map(self, axis: str, level: float, name: str) -> Element:
+    def map(
+        self,
+        axis: str,
+        level: float,
+        name: str,
+        not_accessible: Sequence[FloatArray] = (),
+    ) -> Element:
         """Return the map of a slice, in its own coordinates: scaled, from the lows, y upwards.
 
         Args:
             axis: Axis that the slice is normal to.
             level: Coordinate of the slice on that axis, in design units.
             name: Identifier of the outline, unique in the document.
+            not_accessible: Polygons around the positions that are not accessible, each of shape
+                (n, 2), filled by the even-odd rule; () to mark none.
         """
-        outline = self.outline(axis, level)
         to_map = _ToMap(self.lows[in_plane(axis)], self.own_scale)
-        if outline is None:
-            extent = (self.lows, self.highs)
-            places: dict[str, Any] = {"axis": axis, "level": level, "extent": extent}
-            field = slice_field(self.design, self.rotation, "margin", steps=CELLS, **places)
-            data, edge = _runs(field.inside, to_map(_ends(field.columns, field.rows))), None
-        else:
-            data = "".join(_loop(loop, to_map) for loop in outline.loops)
-            edge = element("path", d=data, class_="edge") if data else None
+        data = self._outline_data(axis, level, to_map)
         if not data:
             return element("g")
         filled = element("g", clip_path=f"url(#{name})")
 
-        def add(share: float, **look: str) -> None:
-            polygons = [path_of(to_map(polygon)) for polygon in self._beyond(axis, level, share)]
-            if polygons:
-                filled.append(element("path", d="".join(polygons), **look))
+        def add(polygons: Iterable[FloatArray], **look: str) -> None:
+            paths = [path_of(to_map(polygon)) for polygon in polygons]
+            if paths:
+                filled.append(element("path", d="".join(paths), **look))
 
         first, *others = band_colours()
-        filled.append(element("path", d=path_of(to_map(self._corners(axis))), fill=css(first)))
+        add([self._corners(axis)], fill=css(first))
+        beyond = self.beyond(axis, level)
         for share, colour in zip(BAND_EDGES[1:], others, strict=True):
-            add(share, fill=css(colour))
-        for number in range(1, CONTOURS):
-            share = number * self.contour_step / self.warn_below
-            if share > BAND_EDGES[-1]:
-                add(share, class_="contour")
+            add(beyond(share), fill=css(colour), fill_rule="evenodd")
+        if self.measure == "margin":
+            for number in range(1, CONTOURS):
+                share = number * self.contour_step / self.warn_below
+                if share > BAND_EDGES[-1]:
+                    add(beyond(share), class_="contour")
+        add(
+            not_accessible,
+            fill=css(NOT_ACCESSIBLE),
+            fill_opacity=f"{NOT_ACCESSIBLE_OPACITY:g}",
+            fill_rule="evenodd",
+            class_="is-blocked",
+        )
         if any(self.design.limits.leg_radii):
-            filled.append(self._collisions(axis, level, to_map))
+            grid = self._grid(axis, level, CELLS)
+            clearance = leg_clearances(self.design, grid.points, self.rotation).clearance
+            add(
+                grid.loops(-clearance.min(axis=-1), 0.0),
+                fill=css(OUTLINE),
+                fill_rule="evenodd",
+                class_="is-colliding",
+            )
         clip = element("clipPath", element("path", d=data, clip_rule="evenodd"), id=name)
-        return element("g", clip, filled, edge)
+        return element("g", clip, filled, element("path", d=data, class_="edge"))
+
+    def _outline_data(self, axis: str, level: float, to_map: _ToMap) -> str:
+        """Return the outline of a slice as the data of a path; "" if the slice is empty."""
+        outline = self.outline(axis, level)
+        if outline is not None:
+            return "".join(_loop(loop, to_map) for loop in outline.loops)
+        grid = self._grid(axis, level, CELLS)
+        slack = slacks(constraints(self.design, self.rotation), grid.points).min(axis=-1)
+        return "".join(path_of(to_map(loop)) for loop in grid.loops(slack, 0.0))
 
     def _corners(self, axis: str) -> FloatArray:
         (u0, v0), (u1, v1) = self.lows[in_plane(axis)], self.highs[in_plane(axis)]
         return np.array([[u0, v0], [u1, v0], [u1, v1], [u0, v1]])
 
-    def _beyond(self, axis: str, level: float, share: float) -> Iterator[FloatArray]:
-        """Yield the polygons in which every margin is at least a share of the warning length."""
+    def beyond(self, axis: str, level: float) -> Callable[[float], Iterable[FloatArray]]:
+        """Return the function from levels of the measure to the polygons of a slice beyond them.
+
+        Levels are multiples of the measure's value for a warning. The polygons, each of shape
+        (n, 2) in design units, are filled by the even-odd rule; they may go beyond the limits.
+        """
+        if self.measure == "margin":
+            return lambda share: self._beyond_margin(axis, level, share)
+        grid = self._grid(axis, level, CONDITION_CELLS)
+        return _beyond_condition(self.design, self.rotation, grid)
+
+    def _beyond_margin(self, axis: str, level: float, share: float) -> Iterator[FloatArray]:
         gradients = planes_of_singularity(self.rotation)
         for signs in itertools.product((-1.0, 1.0), repeat=3):
             polygon = self._corners(axis)
@@ -147,18 +210,40 @@ class Slices:
             else:
                 yield polygon
 
-    def _collisions(self, axis: str, level: float, to_map: _ToMap) -> Element:
+    def _grid(self, axis: str, level: float, cells: int) -> _Grid:
         lows, sides = self.lows[in_plane(axis)], (self.highs - self.lows)[in_plane(axis)]
-        many = np.maximum(1.0, np.rint(COLLISION_CELLS * sides / sides.max())).astype(int)
+        many = np.maximum(2.0, np.rint(cells * sides / sides.max())).astype(int) + 1
         columns, rows = (
-            low + side / n * (np.arange(n, dtype=np.float64) + 0.5)
+            np.linspace(low, low + side, n, dtype=np.float64)
             for low, side, n in zip(lows.tolist(), sides.tolist(), many.tolist(), strict=True)
         )
         points = np.full((len(rows), len(columns), 3), level)
         first, second = in_plane(axis)
         points[..., first], points[..., second] = columns, rows[:, None]
-        collide = leg_clearances(self.design, points, self.rotation).clearance.min(axis=-1) <= 0.0
-        return element("path", d=_runs(collide, to_map(_ends(columns, rows))), fill=css(OUTLINE))
+        return _Grid(columns, rows, points)
+
+
+@dataclass(frozen=True)
+class _Grid:
+    """A grid of positions on a slice: columns (n,), rows (m,), points (m, n, 3), all ascending."""
+
+    columns: FloatArray
+    rows: FloatArray
+    points: FloatArray
+
+    def loops(self, values: FloatArray, level: float) -> list[FloatArray]:
+        """Return the polygons around the parts in which values (m, n) are at least a level."""
+        return level_loops(self.columns, self.rows, values, level)
+
+
+def _beyond_condition(
+    design: Design, rotation: FloatArray, grid: _Grid
+) -> Callable[[float], list[FloatArray]]:
+    # With the sign of the determinant the field is smooth where it is zero.
+    sign = np.sign(margins(grid.points, rotation).prod(axis=-1))
+    condition = inverse_condition(jacobian(design, grid.points, rotation), design.reach)
+    field = sign * condition / WARN_CONDITION
+    return lambda share: [*grid.loops(field, share), *grid.loops(-field, share)]
 
 
 def in_plane(axis: str) -> list[int]:
@@ -215,28 +300,3 @@ def _clipped(polygon: FloatArray, values: FloatArray) -> FloatArray:
         if b >= 0.0:
             corners.append(polygon[k])
     return np.array(corners) if len(corners) > 2 else np.zeros((0, 2))
-
-
-def _ends(columns: FloatArray, rows: FloatArray) -> FloatArray:
-    """Return the edges of cells about columns and rows, as points (n + 1, 2), NaN-padded."""
-    many = max(len(columns), len(rows)) + 1
-    ends = np.full((many, 2), np.nan)
-    for k, middles in enumerate((columns, rows)):
-        step = float(middles[1] - middles[0]) if len(middles) > 1 else 1.0
-        ends[: len(middles) + 1, k] = middles[0] + step * (np.arange(len(middles) + 1) - 0.5)
-    return ends
-
-
-def _runs(cells: BoolArray, ends: FloatArray) -> str:
-    """Return the set cells as the data of a path, one rectangle for a run in a row."""
-    data: list[str] = []
-    for row, flags in enumerate(cells):
-        jumps = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
-        low, high = float(ends[row, 1]), float(ends[row + 1, 1])
-        for first, last in jumps.reshape(-1, 2).tolist():
-            left, right = float(ends[first, 0]), float(ends[last, 0])
-            data.append(
-                f"M{coordinate(left)},{coordinate(low)}H{coordinate(right)}"
-                f"V{coordinate(high)}H{coordinate(left)}Z"
-            )
-    return "".join(data)

@@ -1,4 +1,4 @@
-"""The reachable workspace in a real page: another mesh, a page alive, messages, files."""
+"""The accessible workspace in a real page: another mesh, a page alive, messages, files."""
 
 from __future__ import annotations
 
@@ -23,11 +23,10 @@ MANY = 800
 
 @pytest.fixture
 def tab(tab: Tab) -> Tab:
-    """A tab with legs of radius 0.2, both its workspace tabs open."""
+    """A tab with legs of radius 0.2, the tab of the workspace open."""
     limits = with_radius(tab.state.design, 0.2).limits
     tab.running.page.session.do(Set("design.limits", limits))
-    for panel in range(2):
-        tab.page.get_by_role("tab", name="Workspace", exact=True).nth(panel).click()
+    tab.turn_to("Workspace")
     return tab
 
 
@@ -41,12 +40,12 @@ def wait_until_drawn(tab: Tab) -> None:
     assert tab.running.page.wait_until_drawn(PATIENCE_SECONDS)
 
 
-def test_the_reachable_solid_takes_the_place_of_the_other_and_the_page_stays_alive(
+def test_the_accessible_solid_takes_the_place_of_the_other_and_the_page_stays_alive(
     tab: Tab,
 ) -> None:
     page = tab.running.page
-    tab.switch("Solid", on=True)
-    tab.page.get_by_text("exact volume").wait_for()
+    tab.push("Solid")
+    tab.page.get_by_text("within the limits, in the present orientation").wait_for()
     wait_until_drawn(tab)
     without = red_pixels(tab)
     process = page.worker.process_id
@@ -54,8 +53,8 @@ def test_the_reachable_solid_takes_the_place_of_the_other_and_the_page_stays_ali
     # A worker that is never done: whatever happens now happens while it computes.
     os.kill(process, signal.SIGSTOP)
     try:
-        tab.choose("Region", "reachable")
-        tab.page.get_by_text("computing …").wait_for()
+        tab.choose("Region", "accessible from home")
+        tab.page.get_by_text("Computing …").wait_for()
         tab.turn_to("Pose")
         before = tab.state
         goal = tab.drag(JOINT_LABELS["l4"], 0.5)
@@ -68,24 +67,25 @@ def test_the_reachable_solid_takes_the_place_of_the_other_and_the_page_stays_ali
         tab.wait_for(lambda: tab.state.pose == before.pose, "the home pose")
     finally:
         os.kill(process, signal.SIGCONT)
-    tab.page.get_by_text("reachable volume").wait_for()
+    accessible = tab.page.get_by_text("units³ accessible")
+    accessible.wait_for()
     wait_until_drawn(tab)
     expect(tab.page.get_by_text("computing …")).to_be_hidden()
     drawing = page.services.get(WorkspaceFeed).drawing
     assert drawing is not None
     assert drawing.reached is not None
-    expect(tab.page.get_by_text(f"{drawing.reached.volume:.6g} units³")).to_be_visible()
+    expect(accessible).to_contain_text(f"{drawing.reached.volume:.6g} units³")
     assert red_pixels(tab) > without + MANY
 
     download = tab.export("Workspace", "3MF")
-    assert download.suggested_filename == "paper-optimal-reachable-workspace.3mf"
+    assert download.suggested_filename == "paper-optimal-accessible-workspace.3mf"
 
 
 def test_a_home_that_is_no_start_is_told_and_the_button_goes_to_one(tab: Tab) -> None:
     limits = msgspec.structs.replace(tab.state.design.limits, l4=(0.0, 12.5))
     tab.running.page.session.do(Set("design.limits", limits))
-    tab.switch("Solid", on=True)
-    tab.choose("Region", "reachable")
+    tab.push("Solid")
+    tab.choose("Region", "accessible from home")
     alert = tab.page.get_by_role("alert").filter(has_text="The home position is no start")
     alert.wait_for()
     expect(alert).to_contain_text(
@@ -95,7 +95,7 @@ def test_a_home_that_is_no_start_is_told_and_the_button_goes_to_one(tab: Tab) ->
     tab.push("Go there")
     tab.wait_for(lambda: tab.state.pose != home, "another pose")
     expect(alert).to_be_hidden()
-    tab.page.get_by_text("reachable volume").wait_for()
+    tab.page.get_by_text("units³ accessible").wait_for()
 
 
 def test_the_curve_is_drawn_when_it_is_asked_for(tab: Tab) -> None:

@@ -1,0 +1,32 @@
+"""The orientation of the workspace that is shown, and where its paths start."""
+
+from __future__ import annotations
+
+from explorer.app.features.workspace.reached import Rows, rows_of
+from explorer.app.state.frame import Frame
+from explorer.mechanism.home import home_pose
+from explorer.mechanism.pose import Pose, Triple
+from explorer.numerics.arrays import FloatArray
+
+
+def workspace_pose(frame: Frame) -> Pose:
+    """Return the pose whose orientation the workspace has: the present one, or that of home."""
+    state = frame.state
+    is_home = state.view.workspace.orientation == "home"
+    return home_pose(state.design) if is_home else state.pose
+
+
+def workspace_rotation(frame: Frame) -> FloatArray:
+    """Return the orientation of the workspace that is shown, shape (3, 3)."""
+    return workspace_pose(frame).rotation
+
+
+def workspace_rows(frame: Frame) -> Rows:
+    """Return the rows of `workspace_rotation` as plain numbers."""
+    return rows_of(workspace_rotation(frame))
+
+
+def workspace_start(frame: Frame) -> Triple | None:
+    """Return the position where paths start; None for home."""
+    state = frame.state
+    return state.pose.position if state.view.workspace.start == "pose" else None

@@ -1,0 +1,221 @@
+"""The workspace in words: its volume, its numbers in detail, and the legend of its colours."""
+
+from __future__ import annotations
+
+import math
+
+from explorer.app.features.workspace.feed import WorkspaceFeed
+from explorer.app.features.workspace.reached import Reached
+from explorer.app.features.workspace.tasks import WorkspaceDrawing
+from explorer.app.features.workspace.volume import MeasuredVolume, VolumeFeed
+from explorer.app.scene.bands import COLLIDING, PLAIN
+from explorer.app.state.frame import Frame
+from explorer.app.widgets.colours import css
+from explorer.app.widgets.markup import (
+    alert,
+    box,
+    caption,
+    dim,
+    format_number,
+    meter,
+    note,
+    row,
+    swatch,
+    table,
+    ticks,
+)
+from explorer.app.widgets.under_way import problem, progress
+from explorer.export.report.drawings.slices import NOT_ACCESSIBLE, NOT_ACCESSIBLE_OPACITY
+from explorer.export.report.markup import format_number as format_power
+from explorer.legs.clearance import pair_name
+from explorer.singularity.colours import BAND_EDGES, WARN_CONDITION, band_colours
+from explorer.workspace.accessible.workspace import PairCost
+
+# Bounds of a deviation that are told, in percent.
+DEVIATIONS = (0.001, 0.01, 0.1, 1.0)
+
+
+def volume_headline(frame: Frame, feed: VolumeFeed) -> str:
+    """Return the volume within the limits in large type as HTML."""
+    newest = feed.drawing
+    if feed.problem is not None:
+        return alert("The volume could not be computed", feed.problem)
+    if newest is None:
+        return '<div class="ex-large ex-dim">computing …</div>'
+    look = "" if feed.is_current else "is-outdated"
+    return f'<div class="{look}">{_volume(newest, frame)}</div>'
+
+
+def drawing_words(frame: Frame, feed: WorkspaceFeed) -> str:
+    """Return why there is no drawing, or the volume of the accessible part, as HTML; "" for none.
+
+    While the accessible part is computed, its progress is told.
+    """
+    if feed.problem is not None:
+        return problem(feed, "The workspace could not be drawn", "Compute the workspace")
+    if frame.state.view.workspace.region == "limits" or feed.request is None:
+        return ""
+    drawing = feed.drawing
+    waiting = "" if feed.is_current else progress(feed)
+    if drawing is None or drawing.request.region == "limits":
+        return dim(waiting.capitalize())
+    reached = drawing.reached
+    if reached is None:
+        which = "home" if drawing.request.start is None else "present"
+        return f'<div class="ex-beyond">Nothing is accessible from the {which} position.</div>'
+    if drawing.volume <= 0.0:
+        return ""
+    percent = 100.0 * reached.volume / drawing.volume
+    return (
+        f'<div class="ex-line"><span>{reached.volume:.6g} units³ accessible, '
+        f"{percent:.4g} %</span>{dim(waiting)}</div>" + meter(percent, PLAIN, COLLIDING)
+    )
+
+
+def _volume(newest: MeasuredVolume, frame: Frame) -> str:
+    measured, unit_mm = newest.measured, newest.request.design.unit_mm
+    if measured.volume <= 0.0:
+        causes = ", ".join(measured.empty_because)
+        return alert("The workspace is empty", f"Emptied by: {causes}.")
+    which = "present" if frame.state.view.workspace.orientation == "pose" else "home"
+    return (
+        f'<div class="ex-line"><span class="ex-large">{measured.volume:.6g} units³</span>'
+        f"{dim(f'± {format_power(measured.error, 1)}')}</div>"
+        + caption(
+            f"{_litres(measured.volume, unit_mm)} within the limits, in the {which} orientation"
+        )
+    )
+
+
+def _litres(volume: float, unit_mm: float) -> str:
+    cubic_centimetres = volume * (0.1 * unit_mm) ** 3
+    return f"{cubic_centimetres:.4g} cm³ ({0.001 * cubic_centimetres:.4g} l)"
+
+
+def workspace_details(frame: Frame, feed: WorkspaceFeed) -> str:
+    """Return the numbers of the drawn workspace as HTML."""
+    drawing = feed.drawing
+    if drawing is None:
+        return note("Show the solid or the hull to see its numbers.")
+    view = frame.state.view.workspace
+    parts: list[str] = []
+    if drawing.mesh_agrees is False:
+        parts.append(
+            alert(
+                "The solid is not quite the workspace",
+                "The workspace is too thin for its triangles: their volume is not the exact one.",
+            )
+        )
+    parts.append(_numbers(drawing))
+    if drawing.reached is not None and drawing.volume > 0.0:
+        parts.append(_pairs(drawing.reached, is_coloured=view.colour == "plain"))
+    if drawing.coarse_edge is not None:
+        parts.append(
+            '<div class="ex-dim ex-after">The workspace is large beside the reach: its condition '
+            f"number is computed at corners up to {drawing.coarse_edge:.3g} units apart.</div>"
+        )
+    return box(*parts)
+
+
+def _numbers(drawing: WorkspaceDrawing) -> str:
+    """Return the table of nodes, extent and volumes."""
+    rows: list[tuple[str, str, str]] = []
+    nodes, reached = drawing.nodes, drawing.reached
+    if nodes is not None:
+        count, volume = f"{nodes.count:,}", nodes.volume
+        hint = "The paper's measure: grid nodes within the limits"
+        volume_hint = "Nodes times step³; it overstates the volume"
+        if reached is not None and reached.node_count is not None:
+            count, volume = f"{reached.node_count:,} of {count}", reached.node_count * nodes.step**3
+            hint = "Nodes that collision-free steps of the grid lead to, of all within the limits"
+            volume_hint = "Accessible nodes times step³, the paper's measure"
+        elif reached is not None:
+            hint += "; too many to check each step between them"
+        rows += [
+            ("Nodes", count, hint),
+            ("Node volume", f"{volume:.6g}", volume_hint),
+            ("Node step", f"{nodes.step:.4g}", "Step of the grid, in design units"),
+        ]
+    if drawing.extent is not None:
+        size = drawing.request.design.reach
+        for axis, low, high in zip("xyz", *drawing.extent, strict=True):
+            text = f"{format_number(low, size=size)} … {format_number(high, size=size)}"
+            rows.append((f"Extent {axis}", text, "Extent of the workspace, in design units"))
+    if drawing.hull_volume is not None:
+        rows.append(("Hull volume", f"{drawing.hull_volume:.6g}", "Volume of the convex hull"))
+    volume = drawing.volume if reached is None else reached.volume
+    if volume > 0.0:
+        rows.append(
+            (
+                "Mesh",
+                deviation_text(drawing.mesh_volume / volume - 1.0),
+                "Volume of the drawn solid, against the exact one",
+            )
+        )
+    return table(row(dim(name), value, hint=hint) for name, value, hint in rows)
+
+
+def deviation_text(deviation: float) -> str:
+    """Return a bound of a relative deviation in words, such as "off by less than 0.01 %"."""
+    percent = 100.0 * abs(deviation)
+    bound = next((bound for bound in DEVIATIONS if percent < bound), None)
+    return f"off by {percent:.2g} %" if bound is None else f"off by less than {bound:g} %"
+
+
+def _pairs(reached: Reached, *, is_coloured: bool) -> str:
+    """Return the clearance of each pair of legs, and the volume that it blocks."""
+    blocking = [pair for pair in reached.pairs if pair.blocked_volume > 0.0]
+    words, look = "Legs touch, but block nothing", "within"
+    if min(pair.clearance for pair in reached.pairs) > 0.0:
+        words = "No pair collides"
+    elif blocking:
+        words, look = (
+            f"Legs {', '.join(pair_name(pair.legs) for pair in blocking)} collide",
+            "beyond",
+        )
+    mark = swatch(COLLIDING) if is_coloured and blocking else ""
+    radius = ""
+    if reached.harmless_radius > 0.0:
+        radius = (
+            '<div class="ex-dim ex-after">No two legs collide if all radii grow by up to '
+            f"{format_number(reached.harmless_radius)}</div>"
+        )
+    rows = table(map(_pair, reached.pairs), ("legs", "least clearance", "blocked, units³"))
+    return f'<div class="ex-strong ex-after ex-{look}">{mark}{words}</div>{rows}{radius}'
+
+
+def _pair(pair: PairCost) -> str:
+    clearance = "joined" if math.isinf(pair.clearance) else format_number(pair.clearance, 3)
+    if pair.blocked_volume > 0.0:
+        blocked = format_number(pair.blocked_volume, 3)
+        return row(pair_name(pair.legs), clearance, blocked, look="ex-beyond")
+    return row(pair_name(pair.legs), clearance, "–")
+
+
+def legend(measure: str, warn_below: float, drawing: WorkspaceDrawing | None) -> str:
+    """Return the bands of colours with the values at their edges, and the colours of the map."""
+    unit, name = (
+        (WARN_CONDITION, "1 / cond J")
+        if measure == "condition"
+        else (warn_below, "Smallest |δ| (units)")
+    )
+    # All bands are drawn equally wide, so the values at their edges are not evenly spaced.
+    width = 100.0 / len(BAND_EDGES)
+    colours = ",".join(
+        f"{css(band)} 0 {width * (index + 1):g}%" for index, band in enumerate(band_colours())
+    )
+    edges = ((width * index, f"{BAND_EDGES[index] * unit:.2g}") for index in (0, 2, 4, 6, 9))
+    marks = ""
+    if drawing is not None and drawing.slice_map is not None:
+        if any(drawing.request.design.limits.leg_radii):
+            marks += f"<span>{swatch(COLLIDING)}legs collide</span>"
+        if drawing.reached is not None:
+            faint = f"opacity:{NOT_ACCESSIBLE_OPACITY:g}"
+            marks += (
+                f'<span><span style="{faint}">{swatch(NOT_ACCESSIBLE)}</span>not accessible</span>'
+            )
+    return box(
+        f'<div class="ex-line"><span class="ex-dim">{name}</span>'
+        f'<span class="ex-flow ex-dim">{marks}</span></div>'
+        f'<div class="ex-legend" style="--colours:{colours}"></div>{ticks(*edges)}'
+    )

@@ -1,0 +1,145 @@
+// Reads the map of a slice under the pointer: coordinates, the measure that colours it, and what
+// is there; a click goes there, as a press of "workspace.go".
+window.explorer.map ??= (() => {
+  const AXES = ["x", "y", "z"],
+    HINT = "Point at the map to read it, click to go there.";
+  const dot = (a, b) => a.reduce((sum, value, k) => sum + value * b[k], 0);
+  const plus = (a, b) => a.map((value, k) => value + b[k]);
+  const unit = (a) => {
+    const length = Math.hypot(...a);
+    return length ? a.map((value) => value / length) : [0, 0, 0];
+  };
+  const cross = ([a, b, c], [x, y, z]) => [b * z - c * y, c * x - a * z, a * y - b * x];
+
+  // The smallest |δ| at a position and its number: margins are linear, and zero at a1.
+  const leastMargin = ({ gradients }, p) => {
+    const sizes = gradients.map((gradient) => Math.abs(dot(gradient, p)));
+    const least = Math.min(...sizes);
+    return { least, number: sizes.indexOf(least) + 1 };
+  };
+
+  // The actuator Jacobian, made homogeneous with the reach; a row for each of l1, d1 to d4, l4.
+  const jacobian = ({ arms: [b1, b2, b3], a3, reach }, p) => {
+    const radial = (arm) => unit([0, p[1] + arm[1], p[2] + arm[2]]);
+    const rows = [
+      [unit(plus(p, b1)), b1],
+      [[1, 0, 0], b2],
+      [radial(b2), b2],
+      [[1, 0, 0], b3],
+      [radial(b3), b3],
+      [unit(p.map((value, k) => value - a3[k])), [0, 0, 0]],
+    ];
+    return rows.map(([along, arm]) =>
+      along.concat(cross(arm, along).map((moment) => moment / reach)),
+    );
+  };
+
+  // Smallest over largest singular value of a matrix, by Jacobi's one-sided rotations of its rows.
+  const inverseCondition = (matrix) => {
+    const rows = matrix.map((row) => [...row]);
+    for (let sweep = 0; sweep < 30; sweep += 1) {
+      let off = 0;
+      for (let i = 0; i < rows.length; i += 1) {
+        for (let j = i + 1; j < rows.length; j += 1) {
+          const [a, b] = [rows[i], rows[j]];
+          const [aa, bb, ab] = [dot(a, a), dot(b, b), dot(a, b)];
+          if (Math.abs(ab) <= 1e-15 * Math.sqrt(aa * bb)) continue;
+          off = Math.max(off, Math.abs(ab));
+          const zeta = (bb - aa) / (2 * ab);
+          const t = (zeta < 0 ? -1 : 1) / (Math.abs(zeta) + Math.hypot(1, zeta));
+          const c = 1 / Math.hypot(1, t),
+            s = c * t;
+          rows[i] = a.map((value, k) => c * value - s * b[k]);
+          rows[j] = a.map((value, k) => s * value + c * b[k]);
+        }
+      }
+      if (!off) break;
+    }
+    const lengths = rows.map((row) => Math.hypot(...row));
+    const largest = Math.max(...lengths);
+    return largest ? Math.min(...lengths) / largest : 0;
+  };
+
+  const number = (value, decimals) =>
+    value
+      .toFixed(decimals)
+      .replace(/^-(0\.?0*)$/, "$1")
+      .replace("-", "\u2212");
+  const measure = (facts, p) => {
+    if (facts.arms) {
+      const value = inverseCondition(jacobian(facts, p));
+      return `1 / cond J ${number(value, 5)}`;
+    }
+    const { least, number: which } = leastMargin(facts, p);
+    return `min |δ| ${number(least, facts.decimals)} (δ${which})`;
+  };
+
+  const factsOf = (map) => JSON.parse(map.dataset.map);
+  // The position in the base's frame under an event on a map; null beside its frame.
+  const positionAt = (map, facts, { clientX, clientY }) => {
+    const matrix = map.getScreenCTM();
+    if (!matrix) return null;
+    const at = new DOMPoint(clientX, clientY).matrixTransform(matrix.inverse());
+    const [left, bottom, scale] = facts.place;
+    const inPlane = [
+      facts.lows[0] + (at.x - left) / scale,
+      facts.lows[1] + (bottom - at.y) / scale,
+    ];
+    if (inPlane.some((value, k) => value < facts.lows[k] || value > facts.highs[k])) return null;
+    const p = [...inPlane];
+    p.splice(facts.axis, 0, facts.level);
+    return p;
+  };
+  const place = (target) => {
+    if (target.classList?.contains("is-colliding")) return ", legs collide";
+    if (target.classList?.contains("is-blocked")) return ", not accessible";
+    return target.closest("[data-within]") ? "" : ", beyond the limits";
+  };
+  const read = (map, event) => {
+    const facts = factsOf(map),
+      p = positionAt(map, facts, event);
+    if (!p) return HINT;
+    const axes = [0, 1, 2].filter((k) => k !== facts.axis);
+    const words = axes.map((k) => `${AXES[k]} ${number(p[k], facts.decimals)}`).join(", ");
+    return `${words} units: ${measure(facts, p)}${place(event.target)}`;
+  };
+  const mapAt = (target) => target.closest?.("[data-map]") ?? null;
+  const readingOf = (map) => map.parentElement?.querySelector(".ex-reading");
+  // The last pointer over a map: its words stay while the map is drawn anew.
+  let last = null;
+  const show = () => {
+    if (!last) return;
+    const map = mapAt(last.target) ?? null;
+    const reading = map && readingOf(map);
+    if (reading) reading.textContent = read(map, last);
+  };
+  const follow = ({ target, clientX, clientY }) => {
+    const map = mapAt(target);
+    if (!map && last?.target.isConnected) {
+      const left = mapAt(last.target);
+      const reading = left && readingOf(left);
+      if (reading) reading.textContent = HINT;
+    }
+    last = map ? { target, clientX, clientY } : null;
+    show();
+  };
+  addEventListener("pointermove", follow);
+  addEventListener("pointerdown", follow);
+  new MutationObserver(() => {
+    if (!last || last.target.isConnected) return;
+    const target = document.elementFromPoint(last.clientX, last.clientY);
+    last = target && mapAt(target) ? { ...last, target } : null;
+    show();
+  }).observe(document.body, { childList: true, subtree: true });
+  addEventListener("click", (event) => {
+    const map = mapAt(event.target),
+      facts = map && factsOf(map);
+    // A click tells whole pixels, other than the pointer that read the map.
+    const p = map && positionAt(map, facts, last ?? event);
+    if (!p) return;
+    // A pixel is wider than the last decimal.
+    const rounded = p.map((value) => Number(value.toFixed(facts.decimals)));
+    window.explorer.press("workspace.go", JSON.stringify(rounded));
+  });
+  return { leastMargin, inverseCondition, jacobian };
+})();

@@ -1,0 +1,101 @@
+"""A row of small buttons in markup, bound to the state: switches, or options of which one is on.
+
+Each of them is a command of the palette too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from html import escape
+
+from explorer.app.session.session import Session
+from explorer.app.state.action import Action
+from explorer.app.state.state import State
+from explorer.app.widgets.buttons import Buttons, press_button
+from explorer.app.widgets.commands import Key, with_keys
+
+
+def _always(_: State) -> bool:
+    return True
+
+
+@dataclass(frozen=True)
+class Chip:
+    """A small button bound to the state.
+
+    Attributes:
+        words: The words on it.
+        command: Its name in the palette, from the tab to the option.
+        hint: Sentence on what a press does.
+        change: Function from the state to the action of a press.
+        is_on: Function that tells whether it is on.
+        is_ready: Function that tells whether it can be pressed.
+        keys: Keys that press it, told in its hint.
+    """
+
+    words: str
+    command: str
+    hint: str
+    change: Callable[[State], Action]
+    is_on: Callable[[State], bool]
+    is_ready: Callable[[State], bool] = _always
+    keys: tuple[Key, ...] = ()
+
+
+class Chips:
+    """A row of chips.
+
+    Args:
+        buttons: Buttons of the page, among which the chips are registered.
+        session: Session to which they post.
+        name: Name of the row among the buttons, such as "workspace.show".
+        title: Words before the row.
+        chips: The chips by the values that their presses send.
+    """
+
+    def __init__(
+        self,
+        buttons: Buttons,
+        session: Session,
+        name: str,
+        title: str,
+        chips: Mapping[str, Chip],
+    ) -> None:
+        self._name = name
+        self._title = title
+        self._chips = chips
+        buttons.on(
+            name,
+            lambda value, client: session.post(object(), chips[value].change, who=client.client_id),
+            values=chips,
+        )
+        for value, chip in chips.items():
+            is_ready = chip.is_ready
+            buttons.offer(
+                chip.command,
+                chip.hint,
+                name,
+                value,
+                # A default binds the chip of this round.
+                lambda is_ready=is_ready: is_ready(session.state),
+            )
+
+    def html(self, state: State) -> str:
+        """Return the row as HTML."""
+        chips = "".join(
+            press_button(
+                self._name,
+                value,
+                escape(chip.words),
+                hint=with_keys(chip.hint, chip.keys),
+                class_name="ex-chip",
+                is_on=chip.is_on(state),
+                is_disabled=not chip.is_ready(state),
+            )
+            for value, chip in self._chips.items()
+        )
+        return (
+            f'<div class="ex-chips" role="group" aria-label="{escape(self._title)}">'
+            f'<span class="ex-dim">{escape(self._title)}</span>{chips}</div>'
+        )

@@ -1,0 +1,157 @@
+"""The workspace in a real page: its volume, a cut in the middle, a map that is read and clicked."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from playwright.sync_api import Browser, Locator, expect
+from tab import Tab
+
+from explorer.app.features.workspace.feed import WorkspaceFeed
+from explorer.app.screenshot import PATIENCE_SECONDS
+from explorer.app.server import Running
+from explorer.app.state.actions import Set, SetVariable
+from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.margins import margins
+from explorer.mechanism.pose import rotation_from_yaw_pitch_roll
+from explorer.singularity.ellipsoids import planes_of_singularity
+from explorer.singularity.jacobian import inverse_condition, jacobian
+from explorer.workspace.slices.volume import workspace_volume
+
+OPTIMAL = PRESETS["paper-optimal"]
+READING = re.compile(r"x ([−\d.]+), z ([−\d.]+) units: min \|δ\| ([\d.]+) \(δ(\d)\)")
+
+
+@pytest.fixture
+def tab(browser: Browser, running: Running) -> Iterator[Tab]:
+    """A tab in a window of a small laptop."""
+    tab = Tab(browser, running, size=(1280, 720))
+    yield tab
+    assert tab.complaints() == []
+    tab.close()
+
+
+def map_in(tab: Tab) -> Locator:
+    return tab.page.locator("[data-map]")
+
+
+def rest_on(tab: Tab, across: float, up: float) -> None:
+    """Rest the pointer on a place of the map, in shares of its picture."""
+    box = map_in(tab).bounding_box()
+    assert box is not None
+    tab.page.mouse.move(box["x"] + across * box["width"], box["y"] + up * box["height"])
+
+
+def number(text: str) -> float:
+    return float(text.replace("−", "-"))
+
+
+def test_workspace_is_seen_cut_read_and_left_as_a_file(tab: Tab) -> None:
+    page = tab.running.page
+    page.session.do(SetVariable("a3x", 17.0))
+    assert page.wait_until_drawn(PATIENCE_SECONDS)
+    # Its volume is in sight without any press, and its solid after two.
+    volume = f"{workspace_volume(tab.state.design).volume:.6g} units³"
+    expect(tab.page.get_by_text(volume).first).to_be_visible()
+    tab.turn_to("Workspace")
+    expect(tab.page.get_by_text(volume).last).to_be_visible()
+    tab.push("Solid")
+    tab.wait_for(lambda: page.services.get(WorkspaceFeed).drawing is not None, "the solid")
+    # One more cuts it in its middle, and the pointer reads the map.
+    tab.push("y")
+    map_in(tab).wait_for()
+    drawing = page.services.get(WorkspaceFeed).drawing
+    assert drawing is not None
+    assert drawing.extent is not None
+    middle = 0.5 * float(drawing.extent[0][1] + drawing.extent[1][1])
+    assert drawing.level == pytest.approx(middle)
+    reading = tab.page.locator(".ex-reading")
+    expect(reading).to_have_text("Point at the map to read it, click to go there.")
+    rest_on(tab, 0.5, 0.5)
+    expect(reading).to_have_text(READING)
+    found = READING.match(reading.inner_text())
+    assert found is not None
+    position = np.array([number(found[1]), middle, number(found[2])])
+    sizes = np.abs(margins(position, tab.state.pose.rotation))
+    assert number(found[3]) == pytest.approx(float(sizes.min()), abs=0.02)
+    assert int(found[4]) == int(sizes.argmin()) + 1
+    # Beside the outline, and beside the frame.
+    rest_on(tab, 0.2, 0.1)
+    expect(reading).to_contain_text("beyond the limits")
+    rest_on(tab, 0.02, 0.02)
+    expect(reading).to_have_text("Point at the map to read it, click to go there.")
+    # A click goes to what is read.
+    rest_on(tab, 0.6, 0.6)
+    expect(reading).to_have_text(READING)
+    found = READING.match(reading.inner_text())
+    assert found is not None
+    tab.page.mouse.down()
+    tab.page.mouse.up()
+    goal = [number(found[1]), middle, number(found[2])]
+    tab.wait_for(
+        lambda: bool(np.allclose(tab.state.pose.position, goal, atol=0.006)), "the position read"
+    )
+    # Its type is legible in a panel as narrow as this.
+    sizes_of_type = map_in(tab).evaluate(
+        """map => {
+            const scale = map.getScreenCTM().a;
+            return [...map.querySelectorAll("text")].map(
+                (text) => scale * parseFloat(getComputedStyle(text).fontSize));
+        }"""
+    )
+    assert min(sizes_of_type) >= 11.0 - 1e-3
+    download = tab.export("Workspace", "STEP")
+    assert download.suggested_filename.endswith("-workspace.step")
+
+
+def test_page_computes_margins_and_conditioning_as_the_library_does(tab: Tab) -> None:
+    rng = np.random.default_rng(8)
+    platform = np.array([[*OPTIMAL.b1, 0.0], [OPTIMAL.b2, 0.0, 0.0], [OPTIMAL.b3, 0.0, 0.0]])
+    cases: list[dict[str, object]] = []
+    expected: list[list[float]] = []
+    for trial in range(60):
+        rotation = rotation_from_yaw_pitch_roll(rng.uniform(-80.0, 80.0, 3))
+        position = rng.uniform(-20.0, 20.0, 3)
+        if trial % 4 == 0:
+            # Near a singular position, or at one.
+            position[2] = (0.0, 1e-9, 1e-4)[trial % 3]
+        rates = jacobian(OPTIMAL, position, rotation)
+        expected.append(
+            [
+                float(np.abs(margins(position, rotation)).min()),
+                float(inverse_condition(rates, OPTIMAL.reach)),
+            ]
+        )
+        facts = {
+            "gradients": planes_of_singularity(rotation).tolist(),
+            "arms": (platform @ rotation.T).tolist(),
+            "a3": [*OPTIMAL.a3, 0.0],
+            "reach": OPTIMAL.reach,
+        }
+        cases.append({"facts": facts, "p": position.tolist()})
+    tab.wait_for(lambda: bool(tab.page.evaluate("!!window.explorer?.map")), "the script")
+    computed = tab.page.evaluate(
+        """cases => cases.map(({ facts, p }) => {
+            const { leastMargin, inverseCondition, jacobian } = window.explorer.map;
+            return [leastMargin(facts, p).least, inverseCondition(jacobian(facts, p))];
+        })""",
+        cases,
+    )
+    np.testing.assert_allclose(computed, expected, rtol=1e-9, atol=1e-12)
+
+
+def test_reading_stays_while_the_map_is_drawn_anew(tab: Tab) -> None:
+    tab.turn_to("Workspace")
+    tab.push("y")
+    map_in(tab).wait_for()
+    rest_on(tab, 0.5, 0.5)
+    reading = tab.page.locator(".ex-reading")
+    expect(reading).to_have_text(READING)
+    before = reading.inner_text()
+    tab.running.page.session.do(Set("view.workspace.level", 9.0))
+    assert tab.running.page.wait_until_drawn(PATIENCE_SECONDS)
+    expect(map_in(tab)).to_have_attribute("aria-label", "Map of the slice at y = 9")
+    expect(reading).to_have_text(before)
