@@ -29,10 +29,10 @@ from explorer.app.features.studies.actions import (
     PickDesign,
 )
 from explorer.app.features.studies.feed import Request, StudyDrawing, StudyFeed, reasons
-from explorer.app.features.studies.figures import PAPER, packed, parallel, scatter
+from explorer.app.features.studies.figures import PAPER, pack, parallel, scatter
 from explorer.app.features.studies.plot_events import Boxed, Brushed, Picked, event_of
+from explorer.app.features.studies.plot_rows import PlotRows, default_axes, select_rows, thin_out
 from explorer.app.features.studies.runner import StudyRunner
-from explorer.app.features.studies.shown import Shown, default_axes, shown, thinned
 from explorer.app.features.studies.words import legend, status
 from explorer.app.session.session import UNDO
 from explorer.app.state.actions import Set, SetVariable
@@ -132,7 +132,7 @@ def test_another_study_begins_without_brushes_and_the_same_keeps_them() -> None:
 @given(st.lists(st.booleans(), min_size=1, max_size=80).map(np.array), st.integers(2, 30))
 def test_of_too_many_rows_those_to_keep_stay_first(keep: Any, most: int) -> None:
     rows = np.arange(len(keep)) * 3
-    found = thinned(rows, keep, most)
+    found = thin_out(rows, keep, most)
     assert len(found) == min(most, len(rows))
     assert np.all(np.diff(found) > 0)
     assert np.isin(found, rows).all()
@@ -362,8 +362,8 @@ def test_what_is_drawn_is_what_was_computed(feed: StudyFeed, home: Path) -> None
 @pytest.mark.parametrize("dark", [False, True])
 def test_greater_stands_out_more_on_either_page(feed: StudyFeed, dark: bool) -> None:
     drawing = drawn(feed, Studies(name="some"))
-    assert drawing.shown is not None
-    points: Any = scatter(drawing.shown, 1, dark=dark)
+    assert drawing.plotted is not None
+    points: Any = scatter(drawing.plotted, 1, dark=dark)
     scale = [colour for _, colour in points["data"][1]["marker"]["colorscale"]]
     paper = _light(PAPER[dark])
     apart = [abs(_light(colour) - paper) for colour in scale]
@@ -472,7 +472,7 @@ def results_of(columns: dict[str, list[Any]], **more: Any) -> Results:
 def test_what_is_the_same_in_all_designs_has_no_axis() -> None:
     columns = {"b2": [0.0, 1.0, 2.0], "volume": [1.0, 2.0, 3.0], "reach": [5.0, 5.0, 5.0]}
     results = results_of(columns, objectives=(Objective("reach", "min"),))
-    seen = shown(results, results.front(), Studies(name="s"))
+    seen = select_rows(results, results.front(), Studies(name="s"))
     assert seen is not None
     assert seen.axes == ("b2", "volume")
     assert (seen.across, seen.up) == ("volume", "b2")
@@ -483,7 +483,7 @@ def test_what_is_the_same_in_all_designs_has_no_axis() -> None:
 def test_too_few_designs_are_not_drawn(volumes: list[float]) -> None:
     columns = {"b2": [0.5, 1.5][: len(volumes)], "volume": volumes, "reach": [2.0] * len(volumes)}
     results = results_of(columns)
-    assert shown(results, results.front(), Studies(name="s")) is None
+    assert select_rows(results, results.front(), Studies(name="s")) is None
 
 
 def test_a_measure_that_some_designs_lack_hides_no_point_that_it_is_no_axis_of() -> None:
@@ -492,7 +492,7 @@ def test_a_measure_that_some_designs_lack_hides_no_point_that_it_is_no_axis_of()
     wanted = (Objective("volume", "max"),)
     results = results_of(columns, objectives=wanted)
     studies = Studies(name="s", across="volume", up="b2", colour="reach")
-    seen = shown(results, results.front(), studies)
+    seen = select_rows(results, results.front(), studies)
     assert seen is not None
     assert seen.axes == ("b2", "volume", "reach")
     assert points_of(scatter(seen, 1, dark=False)) == [0, 1, 2, 3]
@@ -503,7 +503,7 @@ def test_a_measure_that_some_designs_lack_hides_no_point_that_it_is_no_axis_of()
         assert unpacked(dimension["values"]) == [columns[dimension["name"]][k] for k in (0, 2)]
     assert "<b>2</b> without a line, which lack reach" in status_of(results, seen)
     # As an axis it places no design that lacks it, picked or not.
-    other = shown(results, results.front(), replace(studies, up="reach", picked=1))
+    other = select_rows(results, results.front(), replace(studies, up="reach", picked=1))
     assert other is not None
     assert points_of(scatter(other, 1, dark=False)) == [0, 2]
 
@@ -511,7 +511,7 @@ def test_a_measure_that_some_designs_lack_hides_no_point_that_it_is_no_axis_of()
 def test_a_measure_that_all_designs_lack_is_no_axis_and_hides_nothing() -> None:
     columns = {"b2": [0.0, 1.0, 2.0], "volume": [4.0, 2.0, 3.0], "reach": [math.nan] * 3}
     results = results_of(columns)
-    seen = shown(results, results.front(), Studies(name="s"))
+    seen = select_rows(results, results.front(), Studies(name="s"))
     assert seen is not None
     assert seen.axes == ("b2", "volume")
     assert points_of(scatter(seen, 1, dark=False)) == [0, 1, 2]
@@ -524,11 +524,11 @@ def test_where_no_design_has_all_axes_points_are_drawn_and_no_line() -> None:
     columns = {"b2": [0.0, 1.0, 2.0, 3.0], "volume": [4.0, 2.0, nan, nan]}
     columns["reach"] = [nan, nan, 3.0, 1.0]
     results = results_of(columns)
-    seen = shown(results, results.front(), Studies(name="s"))
+    seen = select_rows(results, results.front(), Studies(name="s"))
     assert seen is not None
     assert points_of(scatter(seen, 1, dark=False)) == []
     assert parallel(seen, 1, dark=True)["layout"]["meta"]["designs"] == []
-    other = shown(results, results.front(), Studies(name="s", across="b2", up="reach"))
+    other = select_rows(results, results.front(), Studies(name="s", across="b2", up="reach"))
     assert other is not None
     assert points_of(scatter(other, 1, dark=False)) == [2, 3]
     assert "<b>4</b> without a line, which lack volume or reach" in status_of(results, other)
@@ -540,7 +540,7 @@ def points_of(figure: dict[str, Any]) -> list[int]:
     return sorted({index for each in traces for index in unpacked(each["customdata"])})
 
 
-def status_of(results: Results, seen: Shown) -> str:
+def status_of(results: Results, seen: PlotRows) -> str:
     request = Request(seen.studies, 1, dark=False)
     return status(
         StudyDrawing(request, results, np.flatnonzero(seen.front), seen.inside, seen, None, ())
@@ -552,11 +552,11 @@ def test_the_front_of_the_two_objectives_shown_is_a_line() -> None:
     columns["reach"] = [4.0, 2.0, 3.0, 5.0]
     wanted = (Objective("volume", "max"), Objective("reach", "min"))
     results = results_of(columns, objectives=wanted)
-    seen = shown(results, results.front(), Studies(name="s"))
+    seen = select_rows(results, results.front(), Studies(name="s"))
     assert seen is not None
     (line,) = [t for t in scatter(seen, 1, dark=False)["data"] if t["mode"] == "lines"]
     assert unpacked(line["x"]) == [2.0, 3.0, 4.0]
-    other = shown(results, results.front(), Studies(name="s", across="b2"))
+    other = select_rows(results, results.front(), Studies(name="s", across="b2"))
     assert other is not None
     assert all(t["mode"] == "markers" for t in scatter(other, 1, dark=True)["data"])
     assert parallel(other, 2, dark=True)["data"][0]["uirevision"] == 2
@@ -564,8 +564,8 @@ def test_the_front_of_the_two_objectives_shown_is_a_line() -> None:
 
 def test_numbers_come_through_packed() -> None:
     numbers = np.array([0.0, -1.5, 3.25e7])
-    assert unpacked(packed(numbers)) == numbers.tolist()
-    assert unpacked(packed(np.array([1, 2**31 - 1]), "i4")) == [1, 2**31 - 1]
+    assert unpacked(pack(numbers)) == numbers.tolist()
+    assert unpacked(pack(np.array([1, 2**31 - 1]), "i4")) == [1, 2**31 - 1]
 
 
 def test_reasons_are_counted_the_most_frequent_first() -> None:

@@ -116,7 +116,7 @@ class StudiesPanel:
         names = (NO_OPTION, *dict.fromkeys((*self.feed.names, *filter(None, (studies.name,)))))
         yield self.choice, "options", names
         yield from self._control.updates(frame)
-        axes = (NO_OPTION,) if drawing is None or drawing.shown is None else drawing.shown.axes
+        axes = (NO_OPTION,) if drawing is None or drawing.plotted is None else drawing.plotted.axes
         for handle in self._places.values():
             yield handle, "options", axes
             yield handle, "visible", axes != (NO_OPTION,)
@@ -176,9 +176,9 @@ class StudiesPanel:
     def _read_axis(self, axis: Axis) -> Callable[[Frame], str]:
         def read(_: Frame) -> str:
             drawing = self.feed.drawing
-            if drawing is None or drawing.shown is None:
+            if drawing is None or drawing.plotted is None:
                 return NO_OPTION
-            return str(getattr(drawing.shown, axis))
+            return str(getattr(drawing.plotted, axis))
 
         return read
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from explorer.app.features.studies.feed import StudyDrawing
 from explorer.app.features.studies.figures import FRONT, PICKED, SCALE
+from explorer.app.features.studies.plot_rows import MOST_ROWS
 from explorer.app.features.studies.runner import Run
-from explorer.app.features.studies.shown import MOST_ROWS
 from explorer.app.state.studies import RADIUS, StudyPlan, label_of, title_of
 from explorer.app.widgets.buttons import press_button
 from explorer.app.widgets.markup import (
@@ -49,13 +49,13 @@ def status(drawing: StudyDrawing) -> str:
             "studies.clear", "", "clear", hint="Clear all brushes", class_name="ex-link"
         )
         words += f" · <b>{inside}</b> within the brushes {clear}"
-    if drawing.shown is not None and drawing.shown.count > MOST_ROWS:
-        words += f" · {len(drawing.shown.rows)} of them drawn, the front first"
-    if drawing.shown is not None and drawing.shown.lacking[0]:
-        lacking, names = drawing.shown.lacking
+    if drawing.plotted is not None and drawing.plotted.count > MOST_ROWS:
+        words += f" · {len(drawing.plotted.rows)} of them drawn, the front first"
+    if drawing.plotted is not None and drawing.plotted.lacking[0]:
+        lacking, names = drawing.plotted.lacking
         words += f" · <b>{lacking}</b> without a line, which lack "
         words += escape(" or ".join(map(label_of, names)))
-    if count and drawing.shown is None:
+    if count and drawing.plotted is None:
         words += " · nothing to draw yet: the designs done so far differ in fewer than two values"
     objectives = ", ".join(
         f"{label_of(objective.measure)} {ARROWS[objective.sense]}" for objective in study.objectives
@@ -117,14 +117,14 @@ def duration(seconds: float) -> str:
 
 def legend(drawing: StudyDrawing) -> str:
     """Return the legend of the plots and how to use them, as HTML."""
-    shown = drawing.shown
-    if shown is None:
+    plotted = drawing.plotted
+    if plotted is None:
         return ""
     colours = ",".join(map(by_theme, SCALE[False], SCALE[True]))
     bar = f'<span class="ex-legend is-inline" style="--colours:{colours}"></span>'
     return (
         f'<div class="ex-note ex-dim">{_dot(FRONT)}Pareto front &nbsp; '
-        f"{bar}other designs, by {escape(label_of(shown.colour))} &nbsp; "
+        f"{bar}other designs, by {escape(label_of(plotted.colour))} &nbsp; "
         f'<span class="ex-ring" style="--colour:{PICKED}"></span>'
         "picked<br>Drag along an axis above, or a box below, to brush; "
         "double-click frees it; click a design to make it the live one.</div>"
@@ -151,7 +151,7 @@ def table(drawing: StudyDrawing) -> str:
     rows = window(drawing.front_inside, drawing.request.studies.picked, results.columns["index"])
     if not study.objectives:
         return ""
-    names = columns_shown(study)
+    names = table_columns(study)
     head = "".join(
         f'<span title="{escape(_hint(name))}">{escape(label_of(name))}{_arrow(study, name)}</span>'
         for name in names
@@ -168,7 +168,7 @@ def table(drawing: StudyDrawing) -> str:
     )
 
 
-def columns_shown(study: Study) -> tuple[str, ...]:
+def table_columns(study: Study) -> tuple[str, ...]:
     """Return the columns of the table: the objectives, then the varied values."""
     objectives = [objective.measure for objective in study.objectives]
     return tuple(dict.fromkeys((*objectives, *study.varied)))[:MOST_COLUMNS]
