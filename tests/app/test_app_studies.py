@@ -7,11 +7,13 @@ import itertools
 import json
 import math
 import os
+import re
 import signal
 import time
 from collections.abc import Generator
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import msgspec
@@ -20,6 +22,7 @@ import pytest
 from desk import Desk
 from hypothesis import given, strategies as st
 
+from explorer.app.features.feature import Services
 from explorer.app.features.studies.actions import (
     MOST_RANGES,
     BrushAxis,
@@ -30,16 +33,18 @@ from explorer.app.features.studies.actions import (
 )
 from explorer.app.features.studies.feed import Request, StudyDrawing, StudyFeed, reasons
 from explorer.app.features.studies.figures import PAPER, pack, parallel, scatter
+from explorer.app.features.studies.panel import StudiesPanel
 from explorer.app.features.studies.plot_events import Boxed, Brushed, Picked, event_of
 from explorer.app.features.studies.plot_rows import PlotRows, default_axes, select_rows, thin_out
-from explorer.app.features.studies.runner import StudyRunner
-from explorer.app.features.studies.words import legend, status
+from explorer.app.features.studies.runner import Run, StudyRunner
+from explorer.app.features.studies.words import acts, head, legend, status
 from explorer.app.session.session import UNDO
 from explorer.app.state.actions import Set, SetVariable
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, opened
 from explorer.app.state.studies import Brush, Studies, StudyPlan, range_around, study_around, within
 from explorer.app.storage.study_folders import StudyFolders, check_given, keep_study, study_in
+from explorer.app.widgets.buttons import Buttons
 from explorer.errors import InputError
 from explorer.measures.catalogue import measures_in
 from explorer.mechanism.design import VARIABLES, Design
@@ -47,6 +52,7 @@ from explorer.mechanism.design_file import PRESETS
 from explorer.sweep.parts import part_paths, write_part
 from explorer.sweep.results import Results, load_results
 from explorer.sweep.rows import evaluate
+from explorer.sweep.run import Progress
 from explorer.sweep.study import NAMES, Objective, Sampling, Study, encode_study
 
 OPTIMAL = PRESETS["paper-optimal"]
@@ -666,6 +672,89 @@ def test_a_process_that_dies_is_told_and_what_is_finished_is_kept(studio: Studio
     name = studio.desk.state.studies.name
     assert name is not None
     assert load_results(studio.folders.folder(name)).count > 0
+
+
+@pytest.fixture
+def panel(services: Services, home: Path) -> Generator[StudiesPanel]:
+    theme: Any = SimpleNamespace(is_dark=False)
+    used = replace(services, studies=StudyFolders(home), theme=theme)
+    yield StudiesPanel(used)
+    used.stop()
+
+
+def markup_of(panel: StudiesPanel, desk: Desk) -> tuple[bool, str]:
+    """Return whether the settings of a new study are shown, and all markup of the panel."""
+    assert panel.feed.wait_until_idle(PATIENCE)
+    updates = [*panel.updates(Frame(desk.state))]
+    assert panel.feed.wait_until_idle(PATIENCE)
+    updates += panel.updates(Frame(desk.state))
+    shown: list[Any] = [v for h, n, v in updates if h is panel.form and n == "visible"]
+    words = "".join(str(value) for _, name, value in updates if name == "content")
+    return shown[-1], words
+
+
+def test_settings_are_shown_while_no_study_is_open_and_when_they_are_asked_for(
+    panel: StudiesPanel, desk: Desk, buttons: Buttons
+) -> None:
+    is_form, words = markup_of(panel, desk)
+    assert is_form
+    assert "Start study" in words
+    assert "256</b> designs around <b>paper-optimal" in words
+    desk.session.do(OpenStudy("some"))
+    is_form, words = markup_of(panel, desk)
+    assert not is_form
+    assert "12</b> of 16 designs" in words
+    assert "objectives: volume ↑, reach ↓ · varied: a3x, b2 · 1 unit (u) = 10 mm" in words
+    assert {"studies.continue", "studies.new"} <= pressed(words)
+    desk.press(buttons, "studies.new", "on")
+    is_form, words = markup_of(panel, desk)
+    assert is_form
+    assert {"studies.start", "studies.new"} <= pressed(words)
+    assert "studies.continue" not in pressed(words)
+    desk.press(buttons, "studies.new", "off")
+    assert not markup_of(panel, desk)[0]
+    desk.session.do(OpenStudy(None))
+    assert markup_of(panel, desk)[0]
+
+
+def test_next_and_previous_go_along_the_front(
+    panel: StudiesPanel, desk: Desk, buttons: Buttons
+) -> None:
+    desk.session.do(OpenStudy("some"))
+    markup_of(panel, desk)
+    drawing = panel.feed.drawing
+    assert drawing is not None
+    front = drawing.results.columns["index"][drawing.front].tolist()
+    walked: list[int | None] = []
+    for step in [1] * len(front) + [-1]:
+        desk.press(buttons, "studies.along", step)
+        walked.append(desk.state.studies.picked)
+    # At the end it stays.
+    assert walked == [*front, front[-2]]
+
+
+def pressed(words: str) -> set[str]:
+    """Return the names of the buttons in some markup."""
+    return set(re.findall('data-press="([^"]*)"', words))
+
+
+@pytest.mark.parametrize("done", [0, 96, 256])
+def test_progress_of_a_study_is_told_with_a_bar_and_no_count_of_its_rows(
+    feed: StudyFeed, done: int
+) -> None:
+    drawing = drawn(feed, Studies(name="some"))
+    run = Run("some", drawing.study, Progress(256, done, 0, {}, 10.0))
+    words = head(drawing, run, None, "x")
+    assert f"some: <b>{done}</b> of 256 designs" in words
+    assert f"--share:{100.0 * done / 256:.2f}%" in words
+    assert run.share == done / 256
+    assert "12</b> of 16" not in words
+    # Another study that is open meanwhile has its own.
+    assert "12</b> of 16" in head(drawing, replace(run, name="other"), None, "x")
+    assert pressed(acts(is_new=False, is_open=True, is_complete=False, run=run)) == {
+        "studies.cancel",
+        "studies.taller",
+    }
 
 
 def test_a_folder_that_is_named_and_holds_no_study_is_refused(home: Path) -> None:
