@@ -25,7 +25,6 @@ from explorer.app.features.listed import FEATURES
 from explorer.app.features.optimise.actions import Advance as ShowIterates, Compare, EndRun
 from explorer.app.features.paths.actions import (
     Advance as PlayOn,
-    ChooseModes,
     SetPathTime,
     TakePlan,
 )
@@ -68,7 +67,6 @@ OF_VALUES = {
     Jog: "sliders of one margin",
     SetVariable: "sliders of the design",
     SetName: "the name of a design",
-    ChooseModes: "lists of the path's ends",
     SetPathTime: "slider of the time",
     PickDesign: "points of a study's plots",
     BrushAxis: "brushes of a study's plots",
@@ -86,8 +84,8 @@ WHERE_IT_IS_SHOWN = {StartThere: "Workspace › Go there"}
 """Actions of commands that do nothing unless something is shown."""
 
 CHOSEN_IN_THE_PANEL = {
-    "From",
-    "To",
+    "Start",
+    "Goal",
     "Format",
     "Size (px)",
     "Pin another design",
