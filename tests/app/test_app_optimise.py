@@ -632,7 +632,7 @@ def test_a_required_box_beyond_single_precision_is_drawn_at_its_end(
 
 
 INITIAL = PRESETS["paper-initial"]
-HELD = "the box holds at most 2,499 of the 8,000 asked for"
+HELD = "the box holds at most 2,499 of the 8,000 units³ asked for"
 
 
 def test_limits_that_cannot_give_a_volume_say_so_before_a_press_and_refuse_one(

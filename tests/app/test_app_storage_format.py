@@ -95,7 +95,6 @@ def leaves(value: Any, path: str = "") -> dict[str, Any]:
 def test_rich_state_differs_from_a_new_one_in_every_saved_value() -> None:
     new, rich = leaves(opened(OPTIMAL)), leaves(RICH)
     transient = {"taken", "gesture", "paths.request", "paths.is_planning", "paths.problem"}
-    transient |= {"optimisation.refusal"}
     same = {path[1:] for path, value in new.items() if rich.get(path, ...) == value}
     assert same == transient
 
