@@ -9,6 +9,7 @@ from explorer.app.features.optimise.actions import StartRun
 from explorer.app.state.action import Action
 from explorer.app.state.actions import GoHome, Set, SetPosition, SetVariable
 from explorer.app.state.frame import Frame
+from explorer.app.state.state import State
 
 # What "Show me" does: the stride of the platform in reaches, the height over the base plane in
 # warning lengths, and the factor on a variable.
@@ -26,6 +27,7 @@ class Step:
         is_done: Whether the user did it, from the frame in which it began and the present one.
         show: Action that does it for the user.
         after: Action when the user goes on; None for none.
+        place: Words on where the tab is.
     """
 
     title: str
@@ -34,6 +36,7 @@ class Step:
     is_done: Callable[[Frame, Frame], bool]
     show: Callable[[Frame], Action]
     after: Action | None = None
+    place: str = "on the right"
 
 
 def _is_moved(before: Frame, now: Frame) -> bool:
@@ -108,11 +111,13 @@ STEPS = (
     ),
     Step(
         "Optimise, and take it with you",
-        "Press Optimise, and accept or revert what it finds. Files for CAD, simulation and print "
-        "are in Workspace, View and Share. Ctrl-Z undoes every step of this tour.",
+        "Press Optimise, and accept what it finds; what you do not accept is put back. Files for "
+        "CAD, simulation and print are in Workspace, View and Share. Ctrl-Z undoes every step of "
+        "this tour.",
         "Optimise",
         _is_optimised,
         lambda _: StartRun(),
+        place="below the scene",
     ),
 )
 
@@ -124,11 +129,13 @@ class Tour:
     Attributes:
         at: Index of the step.
         began: Frame in which the step began.
+        searches: Number of searches before the tour began.
         is_done: Whether the user has done the step.
     """
 
     at: int
     began: Frame
+    searches: int
     is_done: bool = False
 
     @property
@@ -147,12 +154,19 @@ class Tour:
             return self
         return replace(self, is_done=True)
 
+    def left_search(self, state: State) -> int | None:
+        """Return the number of a search that the tour led to and whose result is not accepted."""
+        run = state.optimisation.run
+        if run is None or run.accepted or run.number <= self.searches:
+            return None
+        return run.number
+
     def step_by(self, steps: int, frame: Frame) -> Tour:
         """Return the tour some steps on or back, within its first and last."""
         at = min(max(self.at + steps, 0), len(STEPS) - 1)
-        return Tour(at, frame)
+        return Tour(at, frame, self.searches)
 
 
 def start_tour(frame: Frame) -> Tour:
     """Return the tour at its first step."""
-    return Tour(0, frame)
+    return Tour(0, frame, frame.state.optimisation.count)

@@ -16,7 +16,7 @@ def limits_table(design: Design) -> str:
     """Return the limits in force as HTML, a row for each kind."""
     rows = "".join(row(dim(name), text) for name, text in limit_rows(design))
     return (
-        f'<div class="ex-after" title="{HINT}">{caption("Limits in force, in")}'
+        f'<div class="ex-after" title="{HINT}">{caption("Limits in force, in design units")}'
         f'<table class="ex-limits">{rows}</table></div>'
     )
 
@@ -28,7 +28,7 @@ def limit_rows(design: Design) -> Iterator[tuple[str, str]]:
     for name in LENGTHS:
         low, high = getattr(limits, name)
         least = f"{_number(low)} to " if low > 0.0 else "at most "
-        most = f"{_number(high)}" if high is not None else _reach(design)
+        most = _number(high) if high is not None else _reach(design)
         ranges.setdefault(f"{least}{most}", []).append(name)
     for text, names in ranges.items():
         yield ", ".join(names), text
@@ -37,7 +37,7 @@ def limit_rows(design: Design) -> Iterator[tuple[str, str]]:
             f"{axis} {_number(low)} to {_number(high)}"
             for axis, low, high in zip("xyz", *limits.box, strict=True)
         )
-        yield "b4", f"{', '.join(sides)}"
+        yield "b4", ", ".join(sides)
     if limits.guide is not None:
         yield "d1, d3", f"{_number(limits.guide[0])} to {_number(limits.guide[1])}"
     if limits.gap > 0.0:
@@ -54,7 +54,7 @@ def limit_rows(design: Design) -> Iterator[tuple[str, str]]:
         yield "swing", f"at most {', '.join(cones)}"
     if any(limits.leg_radii):
         ends = sorted({min(limits.leg_radii), max(limits.leg_radii)})
-        yield "leg radii", f"{' to '.join(map(_number, ends))}"
+        yield "leg radii", " to ".join(map(_number, ends))
 
 
 def _reach(design: Design) -> str:
