@@ -48,7 +48,7 @@ def saved(state: State) -> State:
     journey = None if paths.journey is None else replace(paths.journey, is_playing=False)
     paths = replace(paths, request=0, is_planning=False, problem=None, journey=journey)
     run = None if found.run is None else _saved_run(found.run)
-    found = replace(found, refusal=None, run=run)
+    found = replace(found, run=run)
     return replace(state, taken=None, gesture=None, paths=paths, optimisation=found)
 
 

@@ -157,7 +157,12 @@ def guide_at_last_step(server: viser.ViserServer, desk: Desk) -> tuple[Any, Any]
     client: Any = SimpleNamespace(client_id=3, gui=server.gui)
     guide: Any = TourGuide(services_for(server, desk.session, buttons=Buttons(server)))
     guide.begin(client)
-    guide._cards[3].change(lambda tour: tour.step_by(len(STEPS), Frame(desk.state)))
+    frame = Frame(desk.state)
+
+    def to_last(tour: Tour) -> Tour:
+        return tour.step_by(len(STEPS), frame)
+
+    guide._cards[3].change(to_last)
     assert guide._cards[3].tour.is_last
     return guide, client
 

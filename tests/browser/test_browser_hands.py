@@ -23,9 +23,9 @@ from explorer.mechanism.design_file import PRESETS
 # A small laptop's screen, and a tablet either way up.
 SIZES = ((1280, 720), (1024, 768), (768, 1024))
 LEAST_SHARE = 0.4
-RIGHT = ("Move", "Design", "Workspace", "Optimise", "View")
+RIGHT = ("Move", "Design", "Workspace", "View")
 LEFT = ("Singularity", "Workspace", "Legs", "Paths")
-DRAWER = ("Compare", "History", "Share")
+DRAWER = ("Optimise", "Compare", "History", "Share")
 
 # Controls that stick out of what holds them, or of the page, to the left or to the right.
 CUT_OFF = """() => {

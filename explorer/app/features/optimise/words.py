@@ -46,6 +46,7 @@ from explorer.numerics.number_text import set_true_minus
 from explorer.optimise.curves import CALLED, GOALS
 from explorer.optimise.outcome import Iterate
 from explorer.optimise.problem import YAW, Problem
+from explorer.optimise.refutation.lifting import MAXIMA, SWING_LIMIT
 from explorer.optimise.refutation.refutation import Refutation
 
 TITLES = {
@@ -55,6 +56,8 @@ TITLES = {
     "stalled": "Stalled",
     "cancelled": "Cancelled: the best so far",
 }
+# Limits of refusals without a problem that could be searched.
+NO_PROBLEM = ("", SWING_LIMIT, MAXIMA)
 # Significant digits of the larger of two compared numbers.
 DIGITS = 6
 
@@ -175,7 +178,9 @@ def refused_words(refusals: Sequence[Refutation], limits: Sequence[str] = ()) ->
     body = " ".join(sentence(refusal.message) for refusal in refusals)
     if any(refusal.limit not in limits for refusal in refusals):
         body += " Change the demands, or the limits in the tab Design."
-    return alert("No design can keep these demands", body)
+    is_problem = not any(refusal.limit in NO_PROBLEM for refusal in refusals)
+    title = "No design can keep these demands" if is_problem else "This cannot be optimised"
+    return alert(title, body)
 
 
 def _running(state: State) -> str:
@@ -188,6 +193,7 @@ def _running(state: State) -> str:
         f"{button(CANCEL, state)}</div>",
         f'<div class="ex-dim ex-cut">{escape(notice.text) or "&nbsp;"}</div>',
         "" if notice.share is None else meter(100.0 * notice.share),
+        limits_table(state.design),
     )
 
 
