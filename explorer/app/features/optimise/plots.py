@@ -90,7 +90,8 @@ def _name(problem: Problem, last: Iterate, curve: curves.Curve) -> str:
         target = "" if curve.level is None else f", required {curve.level:.6g}"
         return f"Volume (units³): {last.volume:.6g}{target}"
     if curve.powers:
-        return f"log10 of F = |1 − V / V′|; F = {last.objective:.2g}".replace("e-", "e−")
+        value = format_number(last.objective, 2, size=1.0)
+        return f"log10 of F = |1 − V / V′|; F = {value}"
     name = curves.CALLED[problem.objective].capitalize()
     return f"{name} (units): {format_number(last.objective, 6)}"
 
