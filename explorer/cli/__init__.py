@@ -25,7 +25,7 @@ COMMANDS: Mapping[str, str] = {
     "interference": "Measure the clearances of the legs, in a pose or over a move.",
     "path": "Plan a path between two poses within limits, margins and clearances.",
     "workspace": "Measure the workspace: exact volume and gradient, the paper's nodes, a mesh.",
-    "optimise": "Optimise a design by SQP: match a volume, minimise the reach, or others.",
+    "optimise": "Optimise a design by SQP: match a volume, shorten the longest leg, or others.",
     "sweep": "Measure the designs of a study, on every core or a cluster; list the Pareto front.",
     "export": "Write the workspace as a mesh, the mechanism as parts or simulation, or the scene.",
     "report": "Write a report of a design: drawings, slices, tables, and how to reproduce it.",

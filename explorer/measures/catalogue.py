@@ -17,8 +17,8 @@ from explorer.errors import InputError
 from explorer.legs.clearance import PAIRS
 from explorer.measures.case import Case
 from explorer.measures.measure import Measure, Place
-from explorer.measures.size import box_margin, longest_length, reach_of
-from explorer.mechanism.design import VARIABLES
+from explorer.measures.size import box_margin, longest_leg
+from explorer.mechanism.design import LENGTHS, VARIABLES
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import yaw_pitch_roll_from_rotation
 
@@ -58,8 +58,13 @@ MarginAtNodes = partial(AtNodes, power=1, sense="more")
 def _reach_gradient(case: Case) -> Mapping[str, float]:
     x, y = case.design.a3
     reach = case.design.reach
-    is_tied = reach >= longest_length(case.design)
-    return {"a3x": x / reach, "a3y": y / reach} if is_tied else {}
+    return {"a3x": x / reach, "a3y": y / reach}
+
+
+def _longest_leg_gradient(case: Case) -> Mapping[str, float]:
+    limits, longest = case.design.limits, longest_leg(case.design)
+    fixed = [most for name in LENGTHS if (most := getattr(limits, name)[1]) is not None]
+    return {} if longest in fixed else _reach_gradient(case)
 
 
 def _clearance_or_nan(clearance: tuple[float, tuple[int, int]] | tuple[None, None]) -> float:
@@ -100,10 +105,10 @@ def _sizes() -> Iterable[Measure]:
         gradient=lambda case: case.volume.gradient,
     )
     yield Measure(
-        "volume_per_reach",
-        "volume / reach³",
+        "volume_per_leg",
+        "volume / longest leg³",
         "Volume of the workspace for the size of the design",
-        lambda case: case.volume.volume / reach_of(case.design) ** 3,
+        lambda case: case.volume.volume / longest_leg(case.design) ** 3,
         sense="more",
         places=COMPARE,
     )
@@ -136,10 +141,19 @@ def _sizes() -> Iterable[Measure]:
     yield Length(
         "reach",
         "reach",
-        "|a3|, or the longest leg where that is longer",
-        lambda case: reach_of(case.design),
+        "The distance |a3| from a1 to a3",
+        lambda case: case.design.reach,
         sense="less",
         gradient=_reach_gradient,
+        places=COMPARE | STUDIES,
+    )
+    yield Length(
+        "longest_leg",
+        "longest leg",
+        "The largest maximum length of l1, d2, d4 and l4; the reach where all are tied to it",
+        lambda case: longest_leg(case.design),
+        sense="less",
+        gradient=_longest_leg_gradient,
         places=PAGE,
     )
     for axis, name in enumerate("xyz"):

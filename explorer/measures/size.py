@@ -1,4 +1,4 @@
-"""The size of a design and of its required box: reach, longest length, corners, margin."""
+"""The size of a design and of its required box: longest leg, corners, margin."""
 
 from __future__ import annotations
 
@@ -10,14 +10,12 @@ from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
 
 
-def longest_length(design: Design) -> float:
-    """Return the largest of the four maximum lengths, in design units."""
+def longest_leg(design: Design) -> float:
+    """Return the largest of the maximum lengths of l1, d2, d4 and l4, in design units.
+
+    It is the reach |a3| where all four are tied to it.
+    """
     return max(design.length_range(name)[1] for name in LENGTHS)
-
-
-def reach_of(design: Design) -> float:
-    """Return |a3|, or the largest maximum length where that is larger, in design units."""
-    return max(design.reach, longest_length(design))
 
 
 def corners_of(box: tuple[Triple, Triple] | FloatArray) -> FloatArray:

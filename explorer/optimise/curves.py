@@ -15,12 +15,21 @@ from explorer.optimise.outcome import Iterate
 from explorer.optimise.problem import ObjectiveName, Problem
 from explorer.optimise.record import Step
 
-_MEASURES: Mapping[ObjectiveName, str] = MappingProxyType(
-    {"smallest-reach": "reach", "largest-volume": "volume", "largest-margin": "box_margin"}
+GOALS: Mapping[ObjectiveName, str] = MappingProxyType(
+    {
+        "match-volume": "volume",
+        "smallest-reach": "longest_leg",
+        "largest-volume": "volume",
+        "largest-margin": "box_margin",
+    }
 )
+"""The name in the catalogue of the measure that each objective improves."""
 
 CALLED: Mapping[ObjectiveName, str] = MappingProxyType(
-    {"match-volume": "F", **{key: CATALOGUE[name].label for key, name in _MEASURES.items()}}
+    {
+        objective: "F" if objective == "match-volume" else CATALOGUE[name].label
+        for objective, name in GOALS.items()
+    }
 )
 """The name of the value of each objective: F, or the label of the measure in the catalogue."""
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 from explorer.errors import InputError
 from explorer.measures.clearance import MARGIN_OF_CLEARANCE
-from explorer.measures.size import longest_length
+from explorer.measures.size import longest_leg
 from explorer.mechanism.design import VARIABLES, Design
 from explorer.optimise.problem import (
     DISTANCES,
@@ -71,7 +71,7 @@ def make_problem(
     if volume is None and objective == "smallest-reach":
         volume = _own_volume(start)
     if reach is None and objective == "largest-volume":
-        reach = longest_length(start)
+        reach = longest_leg(start)
     if least is None:
         least = min(LEAST * size, 0.5 * min(abs(distance_of(start, name)) for name in DISTANCES))
     if clearance_margin is None:

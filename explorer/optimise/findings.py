@@ -95,7 +95,7 @@ def findings(tell: Callable[[str], None]) -> Iterator[Finding]:
 
     def measure(design: Design) -> Measurements:
         case = Case(design, demanded_margin=margin, box=BOX, node_step=STEP)
-        return measure_design(case, (*measures_in("optimise"), "node_step"))
+        return measure_design(case, (*measures_in("optimise"), "reach", "node_step"))
 
     optimal = measure(PRESETS["paper-optimal"])
     node_objective = abs(1.0 - (optimal["node_volume"] or 0.0) / PAPER_VOLUME)

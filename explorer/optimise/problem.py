@@ -13,7 +13,7 @@ from typing import Literal, get_args
 import msgspec
 
 from explorer.errors import InputError
-from explorer.measures.size import longest_length
+from explorer.measures.size import longest_leg
 from explorer.mechanism.design import DEGENERATE_RATIO, LENGTHS, VARIABLES, Design, Limits, Swing
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import Pose, Triple, yaw_pitch_roll_from_rotation
@@ -22,8 +22,8 @@ from explorer.numerics.checks import not_negative, number, numbers, ordered, pos
 ObjectiveName = Literal["match-volume", "smallest-reach", "largest-volume", "largest-margin"]
 
 OBJECTIVES: tuple[ObjectiveName, ...] = get_args(ObjectiveName)
-"""Objectives: to match the demanded volume (the paper's F = |1 − V/V′|), the smallest reach for
-it, the largest volume, the largest worst margin over the required box."""
+"""Objectives: to match the demanded volume (the paper's F = |1 − V/V′|), the shortest longest leg
+for it, the largest volume, the largest worst margin over the required box."""
 
 YAW = "yaw"
 REACH = "reach"
@@ -61,7 +61,7 @@ class Demands(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
 
     Attributes:
         volume: Exact volume of the workspace to match, or the least one, in cubed design units.
-        reach: Largest length allowed, in design units.
+        reach: Longest leg allowed, in design units.
         clearance: Smallest clearance of each pair of legs, radii taken off, wherever in the
             workspace every margin is at least `clearance_margin`. Nearer to a singularity
             legs may have to meet: with a level platform all four lie in the base at δ3 = 0.
@@ -258,7 +258,7 @@ def start_value(start: Design, name: str) -> float:
     if name == YAW:
         return float(yaw_pitch_roll_from_rotation(home_pose(start).rotation)[0])
     if name == REACH:
-        return longest_length(start)
+        return longest_leg(start)
     if name in SHIFTS:
         return 0.0
     raise InputError(f"no variable {name!r}; there are {', '.join((*VARIABLES, *OPTIONAL))}")

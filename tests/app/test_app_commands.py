@@ -22,7 +22,12 @@ import explorer.app
 from explorer.app.browser.viser_gaps import start_viser, stop_viser
 from explorer.app.features.designs.saved_designs import SavedDesigns
 from explorer.app.features.listed import FEATURES
-from explorer.app.features.optimise.actions import Advance as ShowIterates, Compare, EndRun
+from explorer.app.features.optimise.actions import (
+    Advance as ShowIterates,
+    Compare,
+    EndRun,
+    GiveUp,
+)
 from explorer.app.features.paths.actions import (
     Advance as PlayOn,
     SetPathTime,
@@ -74,7 +79,7 @@ OF_VALUES = {
 }
 """Actions that ask for a value, each with the control that gives it."""
 
-OF_NOBODY = (UserAction, MarkSaved, ShowIterates, PlayOn, EndRun, Compare, TakePlan)
+OF_NOBODY = (UserAction, MarkSaved, ShowIterates, PlayOn, EndRun, GiveUp, Compare, TakePlan)
 """Actions that nobody asks for: they tell of what goes on, or stand for another."""
 
 OF_BROWSERS = {f"View › {name}" for name in (*CAMERA_HINTS, "Reset layout")}

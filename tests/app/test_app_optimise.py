@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from html import unescape
+from types import SimpleNamespace
 from typing import Any
 
 import msgspec
@@ -14,6 +17,7 @@ import numpy as np
 import pytest
 import viser
 from desk import number, rows_of
+from limited_designs import limited
 from services import services_for
 
 from explorer.app.features.optimise import runner as optimiser
@@ -22,17 +26,30 @@ from explorer.app.features.optimise.actions import (
     Advance,
     CancelRun,
     EndRun,
-    LiftBox,
+    LiftLimit,
     Revert,
     SetRequest,
     StartRun,
     TakePaperBox,
 )
+from explorer.app.features.optimise.limits import limit_rows
 from explorer.app.features.optimise.panel import OptimisePanel
 from explorer.app.features.optimise.plots import curves_of, data_of
+from explorer.app.features.optimise.presses import (
+    ACCEPT,
+    CANCEL,
+    HULL,
+    LIFT,
+    PAPER,
+    PAPER_BOX,
+    REVERT,
+    START,
+)
 from explorer.app.features.optimise.problem import (
     box_within,
+    liftable,
     problem_of,
+    refuted,
     requested_box,
     requested_reach,
     requested_volume,
@@ -40,7 +57,12 @@ from explorer.app.features.optimise.problem import (
 from explorer.app.features.optimise.runner import Optimiser
 from explorer.app.features.optimise.scene import FARTHEST, box_shown, edges_of, single
 from explorer.app.features.optimise.tasks import compare, optimise
-from explorer.app.features.optimise.words import comparison_table, verdict_words
+from explorer.app.features.optimise.words import (
+    comparison_table,
+    result_words,
+    search_notice,
+    verdict_words,
+)
 from explorer.app.features.sharing.tasks import export_report
 from explorer.app.session.session import UNDO, Session
 from explorer.app.session.worker import Channel
@@ -58,24 +80,26 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.optimisation import PLACE, OptimisationRequest
 from explorer.app.state.state import Run, State, opened
 from explorer.app.widgets.assigning import Assigner
-from explorer.errors import InputError
+from explorer.app.widgets.buttons import Buttons
+from explorer.errors import InputError, NoAnswerError
 from explorer.measures.size import corners_of
-from explorer.mechanism.design import VARIABLES, Swing
+from explorer.mechanism.design import VARIABLES, Design, Swing
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import Pose
-from explorer.optimise.findings import paper_start
+from explorer.optimise.findings import paper_problem, paper_start
 from explorer.optimise.outcome import Iterate
-from explorer.optimise.problem import YAW
+from explorer.optimise.problem import OBJECTIVES, YAW
 from explorer.optimise.record import decode_record, encode_record, record_of
+from explorer.optimise.refutation.lifting import MAXIMA, SWING_LIMIT
 from explorer.optimise.search.trail import Trail
 from explorer.optimise.solver import optimise_design
-from explorer.workspace.limits.constraints import constraints, slacks
+from explorer.workspace.limits.constraints import GAP, constraints, slacks
 from explorer.workspace.slices.volume import workspace_volume
 
 pytestmark = pytest.mark.usefixtures("warm_kernels")
 
-OPTIMAL = PRESETS["paper-optimal"]
+INITIAL, OPTIMAL = PRESETS["paper-initial"], PRESETS["paper-optimal"]
 PATIENCE = 240.0
 SMALL = OptimisationRequest(volume=8000.0)
 # With so many starts a search goes on until it is ended.
@@ -93,7 +117,9 @@ class Bench:
         self.session = Session(
             state, self._draw, lambda message, _: self.complaints.append(message), self._fail
         )
-        services = services_for(server, self.session, tell=self.reports.append)
+        self.services = services = services_for(
+            server, self.session, buttons=Buttons(server), tell=self.reports.append
+        )
         self.optimiser = services.get(Optimiser)
         self.panel: Any = OptimisePanel(services)
 
@@ -142,7 +168,29 @@ class Bench:
         self.do(SetRequest("optimisation.request", request), StartRun())
         return self.wait_for_end()
 
+    @property
+    def result(self) -> str:
+        """The column of the search as HTML."""
+        assert self.session.wait_until_idle()
+        return unescape(self.panel._result.content)
+
+    @property
+    def buttons(self) -> dict[str, str]:
+        """How each button of the column stands, by its name."""
+        return buttons_in(self.result)
+
+    @property
+    def filled(self) -> list[str]:
+        """The names of the filled buttons."""
+        return [name for name, look in self.buttons.items() if look == "filled"]
+
+    def press(self, name: str, value: str = "") -> None:
+        """Press a button, wherever it stands."""
+        client: Any = SimpleNamespace(client_id=1)
+        self.services.buttons.press(name, value, client)
+
     def stop(self) -> None:
+        self.services.buttons.stop()
         self.session.stop()
         self.optimiser.stop()
 
@@ -166,6 +214,16 @@ def bench(server: viser.ViserServer, monkeypatch: pytest.MonkeyPatch) -> Iterato
         # Neither alive nor a zombie.
         with pytest.raises(ProcessLookupError):
             os.kill(process, 0)
+
+
+def buttons_in(markup: str) -> dict[str, str]:
+    """Return whether each button is filled, enabled or disabled, by its name, in their order."""
+    looks: dict[str, str] = {}
+    for tag in re.findall("<button[^>]*>", markup):
+        (name,) = re.findall('data-press="([^"]*)"', tag)
+        is_filled = "is-main" in tag
+        looks[name] = "disabled" if " disabled" in tag else "filled" if is_filled else "enabled"
+    return looks
 
 
 def run_of(state: State) -> Run:
@@ -294,9 +352,8 @@ def test_a_process_killed_in_mid_run_leaves_the_design_and_the_panel_says_so(
     assert stripped(bench.state) == before
     assert run.verdict is not None
     assert run.verdict.status == "failed"
-    assert "died" in bench.panel._words.content
-    assert bench.panel._words.visible
-    assert not bench.panel._decision.visible
+    assert "died" in bench.result
+    assert ACCEPT not in bench.buttons
     assert len(bench.reports) == 1
     assert bench.find(SMALL).best is not None
 
@@ -321,12 +378,12 @@ def test_accept_keeps_the_result_and_reset_still_returns_to_the_design_opened(
 ) -> None:
     best = bench.find().best
     assert best is not None
-    assert bench.panel._decision.visible
+    assert (bench.buttons[ACCEPT], bench.buttons[REVERT]) == ("filled", "enabled")
     after = bench.do(Accept())
     assert after.design.variables == best.design.variables
-    assert not bench.panel._decision.visible
-    assert bench.panel._files.visible
-    assert "accepted" in bench.panel._words.content
+    assert not {ACCEPT, REVERT} & {*bench.buttons}
+    assert bench.buttons[HULL] == "enabled"
+    assert "accepted" in bench.result
     assert bench.do(Revert()).design == after.design
     assert bench.do(Reset()).design == paper_start()
 
@@ -446,9 +503,11 @@ def test_wish_with_an_unusable_number_is_refused(values: dict[str, Any], words: 
 
 
 def test_a_design_whose_volume_has_no_gradient_is_told_of() -> None:
-    refusal = StartRun().apply(opened(SWINGING)).optimisation.refusal
-    assert refusal is not None
-    assert "swing" in refusal
+    state = opened(SWINGING)
+    with pytest.raises(NoAnswerError, match="swing"):
+        StartRun().apply(state)
+    assert liftable(state) == (SWING_LIMIT,)
+    assert StartRun().apply(LiftLimit(SWING_LIMIT).apply(state)).optimisation.is_on
 
 
 def test_what_the_process_refuses_leaves_the_design(bench: Bench) -> None:
@@ -561,8 +620,8 @@ def test_the_table_shows_old_and_new_and_their_difference(bench: Bench) -> None:
     old, new = (each["node_count"] or 0 for each in (found.before, found.after))
     assert [number(cell) for cell in rows["nodes"]] == [old, new, new - old]
     assert number(rows["clearance"][1]) >= 0.198
-    assert number(rows["reach"][1]) == pytest.approx(run.best.design.reach, abs=1e-4)
-    assert bench.panel._table.content == comparison_table(run)
+    assert number(rows["longest"][1]) == pytest.approx(run.best.design.reach, abs=1e-4)
+    assert unescape(comparison_table(run)) in bench.result
 
 
 def test_the_charts_are_of_one_start_and_of_what_was_asked() -> None:
@@ -614,9 +673,11 @@ def test_an_unreachable_volume_is_told_with_the_largest_found(bench: Bench) -> N
     run = bench.find(replace(SMALL, volume=1400.0, free=("b2", "b3")))
     assert run.verdict is not None
     assert run.verdict.status == "infeasible"
-    assert "largest found" in bench.panel._words.content
-    assert "No design keeps all demands" in bench.panel._words.content
-    assert bench.panel._decision.visible
+    assert "largest found" in bench.result
+    assert "No design keeps all demands" in bench.result
+    # Nothing that fell short is to be accepted by the first press that meets the eye.
+    assert bench.buttons[ACCEPT] == "enabled"
+    assert bench.filled == [START]
 
 
 @pytest.mark.parametrize("scale", [1.0, 1e-6, 50.0, 1e9])
@@ -631,38 +692,229 @@ def test_a_required_box_beyond_single_precision_is_drawn_at_its_end(
     )
 
 
-INITIAL = PRESETS["paper-initial"]
-HELD = "the box holds at most 2,499 of the 8,000 asked for"
+HELD = "the box holds at most 2,499 of the 8,000 units³ asked for"
 
 
 def test_limits_that_cannot_give_a_volume_say_so_before_a_press_and_refuse_one(
     bench: Bench,
 ) -> None:
-    panel = bench.panel
     bench.do(Open(INITIAL), SetRequest("optimisation.request", OptimisationRequest(volume=2400.0)))
-    assert not panel._notice.visible
+    assert bench.buttons[START] == "filled"
     bench.do(SetRequest("optimisation.request", SMALL))
-    assert panel._notice.visible
-    assert f"T{HELD[1:]}." in panel._notice.content
-    assert panel._lift.visible
-    assert panel._paper_box.visible
+    assert f"T{HELD[1:]}." in bench.result
+    assert bench.buttons[START] == "disabled"
+    assert bench.filled == [LIFT]
+    assert bench.buttons[PAPER_BOX] == "enabled"
     before = bench.state
     assert bench.do(StartRun()) == before
     assert bench.complaints == [HELD]
-    bench.do(LiftBox())
-    assert not panel._notice.visible
-    assert not panel._lift.visible
-    assert not panel._paper_box.visible
+    bench.do(LiftLimit("box"))
+    assert bench.filled == [START]
+    assert not {LIFT, PAPER_BOX} & {*bench.buttons}
     bench.session.travel(UNDO)
     assert bench.state.design == INITIAL
-    assert panel._notice.visible
+    assert bench.filled == [LIFT]
     # What no box of the paper's holds is not to be had by taking it.
     bench.do(SetRequest("optimisation.request", OptimisationRequest(volume=20_000.0)))
-    assert panel._lift.visible
-    assert not panel._paper_box.visible
+    assert bench.filled == [LIFT]
+    assert PAPER_BOX not in bench.buttons
 
 
-@pytest.mark.parametrize("remedy", [LiftBox(), TakePaperBox()])
+def refuting(**limits: Any) -> State:
+    """Return the paper's problem without a box, with limits that rule it out."""
+    return opened(limited(OPTIMAL, box=None, **limits))
+
+
+@pytest.mark.parametrize(
+    ("state", "request_", "limit", "title"),
+    [
+        (opened(INITIAL), SMALL, "box", "Lift the box"),
+        (refuting(guide=(0.0, 0.1)), SMALL, "guide", "Lift the guide"),
+        (refuting(gap=30.0), SMALL, GAP, "Lift the gap"),
+        (refuting(l1=(0.0, 9.0)), SMALL, "l1 maximum", "Tie the maximum of l1 to the reach"),
+        (refuting(d2=(0.0, 1.0)), SMALL, "d2 maximum", "Tie the maximum of d2 to the reach"),
+        (
+            refuting(l4=(0.0, 20.0)),
+            replace(SMALL, objective="smallest-reach"),
+            MAXIMA,
+            "Tie all maximum lengths to the reach",
+        ),
+        (
+            refuting(margin=9.0),
+            OptimisationRequest(
+                objective="largest-margin",
+                box=((8.0, 3.0, 7.0), (12.0, 7.0, 11.0)),
+                free=(YAW,),
+            ),
+            "margin",
+            "Lift the least margin",
+        ),
+        (opened(SWINGING), SMALL, SWING_LIMIT, "Lift the bounds of the swing"),
+    ],
+)
+def test_a_limit_that_rules_a_search_out_is_lifted_by_one_press_and_brought_back_by_undo(
+    bench: Bench, state: State, request_: OptimisationRequest, limit: str, title: str
+) -> None:
+    bench.do(Open(state.design), SetRequest("optimisation.request", request_))
+    before = bench.state
+    assert liftable(before) == (limit,)
+    assert bench.filled == [LIFT]
+    assert bench.buttons[START] == "disabled"
+    assert f">{title}<" in bench.result
+    bench.press(LIFT, limit)
+    after = bench.state
+    assert limit not in {refusal.limit for refusal in refuted(after)}
+    assert home_pose(after.design) == home_pose(before.design)
+    assert bench.session.history.step.words == title
+    bench.session.travel(UNDO)
+    assert bench.state == before
+    assert not bench.complaints
+
+
+def test_lifting_a_limit_that_is_not_there_is_refused() -> None:
+    for limit in ("", "guide", "l1 minimum", "longest leg"):
+        with pytest.raises(InputError, match="no limit named"):
+            LiftLimit(limit).apply(opened(OPTIMAL))
+
+
+@pytest.mark.parametrize("name", PRESETS)
+@pytest.mark.parametrize("objective", OBJECTIVES)
+def test_demands_by_default_can_be_kept_by_every_preset(name: str, objective: Any) -> None:
+    state = SetRequest("optimisation.request", OptimisationRequest(objective=objective)).apply(
+        opened(PRESETS[name])
+    )
+    assert refuted(state) == ()
+    assert liftable(state) == ()
+    assert StartRun().apply(state).optimisation.is_on
+
+
+@pytest.mark.parametrize(
+    ("start", "request_", "words"),
+    [
+        (
+            INITIAL,
+            OptimisationRequest(volume=2500.0),
+            "the box holds at most 2,499 of the 2,500 units³ asked for",
+        ),
+        (
+            INITIAL,
+            OptimisationRequest(objective="smallest-reach", volume=8000.0),
+            "the box holds at most 2,499 of the 8,000 units³ asked for",
+        ),
+        (
+            OPTIMAL,
+            OptimisationRequest(objective="smallest-reach", volume=13_000.0),
+            "the box holds at most 12,240 of the 13,000 units³ asked for",
+        ),
+        (
+            limited(OPTIMAL, l1=(0.0, 30.0)),
+            OptimisationRequest(objective="largest-volume", reach=25.0),
+            "the longest leg is at least 30 units within the bounds, and 25 units are asked for",
+        ),
+        (
+            OPTIMAL,
+            OptimisationRequest(
+                objective="largest-margin", box=((8.0, 3.0, 7.0), (12.0, 7.0, 30.0)), free=(YAW,)
+            ),
+            "the required box lies beyond the box along z: from 7 to 30 units",
+        ),
+    ],
+)
+def test_what_limits_rule_out_is_known_for_every_objective_with_the_most_they_allow(
+    start: Design, request_: OptimisationRequest, words: str
+) -> None:
+    state = SetRequest("optimisation.request", request_).apply(opened(start))
+    with pytest.raises(NoAnswerError, match=re.escape(words)):
+        StartRun().apply(state)
+
+
+def test_the_papers_problem_and_a_press_on_optimise_succeed_from_the_start_page(
+    bench: Bench,
+) -> None:
+    bench.do(Open(OPTIMAL), SetPosition(0, 9.0))
+    before = bench.state
+    bench.press(PAPER)
+    state = bench.state
+    assert problem_of(state) == paper_problem()
+    assert bench.session.history.step.words == "The paper's problem"
+    assert bench.filled == [START]
+    bench.press(START)
+    run = bench.wait_for_comparison()
+    assert run.has_converged
+    assert run.best is not None
+    assert abs(workspace_volume(run.best.design).volume / 8000.0 - 1.0) <= 1e-6
+    assert bench.state
+    assert bench.filled == [ACCEPT]
+    assert bench.buttons[REVERT] == bench.buttons[START] == bench.buttons[HULL] == "enabled"
+    assert not bench.complaints
+    # Each was one step.
+    bench.session.travel(UNDO)
+    assert bench.state.design == state.design
+    bench.session.travel(UNDO)
+    assert bench.state.design == before.design
+    assert bench.state.optimisation.request == before.optimisation.request
+
+
+def test_presses_elsewhere_do_what_those_of_the_tab_do(bench: Bench) -> None:
+    assert search_notice(bench.state) is None
+    bench.do(SetRequest("optimisation.request", ENDLESS))
+    bench.press(START)
+    bench.wait_for_iterates(3)
+    notice = search_notice(bench.session.state)
+    assert notice is not None
+    assert notice.presses == (CANCEL,)
+    assert notice.share is not None
+    bench.press(CANCEL)
+    bench.wait_for_end()
+    notice = search_notice(bench.state)
+    assert notice is not None
+    assert notice.presses == (ACCEPT, REVERT)
+    bench.press(REVERT)
+    assert bench.state.design == paper_start()
+    assert search_notice(bench.state) is None
+    bench.find()
+    notice = search_notice(bench.state)
+    assert notice is not None
+    assert (notice.title, notice.text) == ("Converged", "F 0")
+    bench.press(ACCEPT)
+    assert run_of(bench.state).accepted
+    assert search_notice(bench.state) is None
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_limits_in_force_are_told_and_no_others(name: str) -> None:
+    design = PRESETS[name]
+    assert [row for row, _ in limit_rows(design)] == [
+        "l1, d2, d4, l4",
+        "b4",
+        "carriages",
+        "δ1, δ2, δ3",
+    ]
+    held = limited(
+        design,
+        l1=(1.5, 12.0),
+        guide=(-3.0, 20.0),
+        gap=0.25,
+        box=None,
+        margin=0.5,
+        carriage_order="any",
+        swing=Swing(b4=40.0),
+        leg_radii=(0.1, 0.1, 0.3, 0.1),
+    )
+    assert dict(limit_rows(held)) == {
+        "l1": "1.5 to 12",
+        "d2, d4, l4": f"at most the reach |a3| = {design.reach:.5g}",
+        "d1, d3": "−3 to 20",
+        "|d1 − d3|": "at least 0.25",
+        "|δ1|, |δ2|, |δ3|": "at least 0.5, signs of home",
+        "swing": "at most b4 40°",
+        "leg radii": "0.1 to 0.3",
+    }
+    free = limited(design, box=None, carriage_order="any", margin=None)
+    assert [row for row, _ in limit_rows(free)] == ["l1, d2, d4, l4"]
+
+
+@pytest.mark.parametrize("remedy", [LiftLimit("box"), TakePaperBox()])
 def test_one_press_and_another_solve_the_papers_problem_from_its_initial_row(
     bench: Bench, remedy: Action
 ) -> None:
@@ -679,7 +931,7 @@ def test_one_press_and_another_solve_the_papers_problem_from_its_initial_row(
     assert run.best.objective <= 1e-9
     assert run.own.design.home == INITIAL.home
     assert not bench.complaints
-    assert not bench.panel._lift.visible
+    assert not {LIFT, PAPER_BOX} & {*bench.buttons}
     # Undone, it is the design as it was.
     assert remedy.describe(own(), own()) in ("Lift the box", "Take the paper's box")
 
@@ -687,7 +939,7 @@ def test_one_press_and_another_solve_the_papers_problem_from_its_initial_row(
 def test_a_design_without_a_home_of_its_own_keeps_its_pose_where_its_box_is_lifted() -> None:
     design = msgspec.structs.replace(INITIAL, home=None)
     state = opened(design)
-    for remedy in (LiftBox(), TakePaperBox()):
+    for remedy in (LiftLimit("box"), TakePaperBox()):
         after = remedy.apply(state)
         assert home_pose(after.design) == home_pose(design)
         assert after.pose == state.pose
@@ -704,7 +956,6 @@ def test_a_search_that_the_box_kept_from_its_volume_offers_to_lift_it(bench: Ben
     best = told_by(run.problem)[0]
     ended = replace(run, phase="ended", verdict=replace(verdict, best=best))
     shown = replace(state, optimisation=replace(state.optimisation, run=ended))
-    told = {(id(handle), name): value for handle, name, value in bench.panel.updates(Frame(shown))}
-    assert told[id(bench.panel._lift), "visible"]
-    assert told[id(bench.panel._paper_box), "visible"]
-    assert not told[id(bench.panel._notice), "visible"]
+    buttons = buttons_in(result_words(shown))
+    assert (buttons[LIFT], buttons[PAPER_BOX], buttons[START]) == ("filled", "enabled", "enabled")
+    assert "ex-alert" not in result_words(shown)

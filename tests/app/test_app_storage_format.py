@@ -49,7 +49,7 @@ def saved(state: State) -> State:
     journey = None if paths.journey is None else replace(paths.journey, is_playing=False)
     paths = replace(paths, request=0, planning=None, problem=None, journey=journey)
     run = None if found.run is None else _saved_run(found.run)
-    found = replace(found, refusal=None, run=run)
+    found = replace(found, run=run)
     return replace(state, taken=None, gesture=None, paths=paths, optimisation=found)
 
 
@@ -96,7 +96,6 @@ def leaves(value: Any, path: str = "") -> dict[str, Any]:
 def test_rich_state_differs_from_a_new_one_in_every_saved_value() -> None:
     new, rich = leaves(opened(OPTIMAL)), leaves(RICH)
     transient = {"taken", "gesture", "paths.request", "paths.planning", "paths.problem"}
-    transient |= {"optimisation.refusal"}
     same = {path[1:] for path, value in new.items() if rich.get(path, ...) == value}
     assert same == transient
 

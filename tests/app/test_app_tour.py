@@ -4,26 +4,33 @@ from __future__ import annotations
 
 import json
 import threading
+from dataclasses import dataclass
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 import viser
 from desk import Desk
+from services import services_for
 
 from explorer.app.browser.browser_facts import BrowserFacts, decode_facts
 from explorer.app.features.feature import Services
 from explorer.app.features.help.tour import STEPS, Tour, start_tour
 from explorer.app.features.help.tour_panel import TourGuide, card_words
-from explorer.app.features.optimise.actions import StartRun
+from explorer.app.features.optimise.actions import Accept, EndRun, StartRun
 from explorer.app.layout import is_narrow
+from explorer.app.state.action import Action
 from explorer.app.state.frame import Frame
+from explorer.app.state.optimisation import SearchResult
 from explorer.app.state.state import State, opened
 from explorer.app.storage.preferences import NAME, PreferenceFile, Preferences
+from explorer.app.widgets.buttons import Buttons
 from explorer.app.widgets.theme import BRAND, BRAND_ON_DARK, Theme
 from explorer.errors import StorageError
 from explorer.mechanism.design_file import PRESETS
+from explorer.optimise.outcome import Iterate
 
 OPENED = opened(PRESETS["paper-optimal"])
 
@@ -82,6 +89,89 @@ def test_a_search_for_the_best_design_ends_the_tour_only_if_it_is_new() -> None:
     assert not tour.after_frame(Frame(running)).is_done
 
 
+def ended(state: State) -> State:
+    """Return a state after its search has ended with a result, without a process."""
+    run = state.optimisation.run
+    assert run is not None
+    design = run.problem.start.with_variables([20.0, 7.0, 4.0, -4.0, 2.6, 4.9])
+    best = Iterate(0, 0, "solving", design, design.variables, 0.1, 7000.0, "", 0.0)
+    return EndRun(run.number, SearchResult("converged", "converged", best), (best,)).apply(state)
+
+
+@pytest.mark.parametrize("ends_first", [True, False])
+@pytest.mark.parametrize("press", ["Next", "Skip"])
+def test_what_the_search_of_a_tour_left_is_put_back_when_the_tour_is_over(
+    server: viser.ViserServer, desk: Desk, press: str, ends_first: bool
+) -> None:
+    guide, client = guide_at_last_step(server, desk)
+    before = desk.state
+    desk.session.do(StartRun())
+    if ends_first:
+        desk.session.do(_Becomes(ended(desk.state)))
+        assert desk.state.design != before.design
+    guide._press(press, client)
+    if not ends_first:
+        # The runner tells the end of a search that was cancelled.
+        assert phase_of(desk.state) == "cancelling"
+        desk.session.do(_Becomes(ended(desk.state)))
+        guide.follow(Frame(desk.state))
+    after = desk.state
+    assert after.optimisation.run is None
+    assert (after.design, after.pose, after.joints) == (before.design, before.pose, before.joints)
+
+
+@pytest.mark.parametrize("press", ["Next", "Skip"])
+def test_what_was_accepted_or_found_before_the_tour_stays_when_it_is_over(
+    server: viser.ViserServer, desk: Desk, press: str
+) -> None:
+    desk.session.do(StartRun())
+    desk.session.do(_Becomes(ended(desk.state)))
+    earlier = desk.state
+    guide, client = guide_at_last_step(server, desk)
+    guide._press(press, client)
+    assert desk.state == earlier
+    guide, client = guide_at_last_step(server, desk)
+    desk.session.do(StartRun())
+    desk.session.do(_Becomes(ended(desk.state)))
+    desk.session.do(Accept())
+    accepted = desk.state
+    guide._press(press, client)
+    guide.follow(Frame(desk.state))
+    assert desk.state == accepted
+
+
+@dataclass(frozen=True)
+class _Becomes(Action):
+    """Take another state, as a runner would lead to."""
+
+    state: State
+
+    def apply(self, state: State) -> State:
+        """Return the other state."""
+        del state
+        return self.state
+
+
+def guide_at_last_step(server: viser.ViserServer, desk: Desk) -> tuple[Any, Any]:
+    """Return the guide of a tour at its last step, and the browser that has it."""
+    client: Any = SimpleNamespace(client_id=3, gui=server.gui)
+    guide: Any = TourGuide(services_for(server, desk.session, buttons=Buttons(server)))
+    guide.begin(client)
+    frame = Frame(desk.state)
+
+    def to_last(tour: Tour) -> Tour:
+        return tour.step_by(len(STEPS), frame)
+
+    guide._cards[3].change(to_last)
+    assert guide._cards[3].tour.is_last
+    return guide, client
+
+
+def phase_of(state: State) -> str | None:
+    run = state.optimisation.run
+    return None if run is None else run.phase
+
+
 def test_the_card_offers_what_can_be_pressed() -> None:
     first = card_words(start_tour(Frame(OPENED)))
     assert "step 1 of 5" in first
@@ -89,7 +179,7 @@ def test_the_card_offers_what_can_be_pressed() -> None:
     assert 'data-value="Show me"' in first
     assert ">Next<" in first
     assert "Done" not in first
-    last = card_words(Tour(4, Frame(OPENED), is_done=True))
+    last = card_words(Tour(4, Frame(OPENED), 0, is_done=True))
     assert 'data-value="Back"' in last
     assert 'data-value="Show me"' not in last
     assert ">Finish<" in last

@@ -26,7 +26,7 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin, Subprotocol
 
 from explorer.app.browser.viser_gaps import ServerControls, start_viser, stop_viser
-from explorer.app.features.optimise.panel import DESIGN_FILE
+from explorer.app.features.optimise import presses
 from explorer.app.screenshot import PATIENCE_SECONDS
 from explorer.app.security import client_messages
 from explorer.app.security.access import Access
@@ -424,15 +424,8 @@ def test_a_file_goes_to_the_tab_that_asked_for_it_alone(running: Running) -> Non
     with client_of(running) as client, client_of(running) as other:
         client.read_until_quiet(0.3)
         other.read_until_quiet(0.3)
-        groups = [
-            (uuid, option)
-            for uuid, props in client.controls.items()
-            if props["type"] == "GuiButtonGroupMessage"
-            for option in props["options"]
-            if option == DESIGN_FILE
-        ]
-        ((uuid, option),) = groups
-        client.update(uuid, option)
+        press = msgspec.json.encode({"name": presses.DESIGN, "value": "", "count": 1})
+        client.update(client.find("Presses on markup"), press.decode())
         mine: list[dict[str, Any]] = []
         while not any(message["type"] == "FileTransferPart" for message in mine):
             mine += client.read()

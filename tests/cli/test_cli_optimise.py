@@ -99,8 +99,8 @@ def test_optimise_volume_beyond_the_box_is_refused_at_once(
     monkeypatch.setattr("explorer.optimise.solver.optimise_design", never)
     monkeypatch.setattr("explorer.numerics.compiled.warm", never)
     words = (
-        "the box holds at most 2,499 of the 8,000 asked for: lift the box with --box none, or "
-        "take the paper's with --box 0 -12 0 20 22 18"
+        "the box holds at most 2,499 of the 8,000 units³ asked for: lift the box with --box none, "
+        "or take the paper's with --box 0 -12 0 20 22 18"
     )
     argv = ["--design", "paper-initial", "--target-volume", "8000", "--clearance", "0.2"]
     if json_too:
@@ -198,7 +198,7 @@ def test_optimise_interrupt_leaves_files_unchanged(tmp_path: Path) -> None:
 
 def test_findings_table_has_a_row_per_finding() -> None:
     case = Case(explorer.PRESETS["paper-optimal"], box=((8.0, 3.0, 7.0), (12.0, 7.0, 11.0)))
-    measured = measure_design(case, measures_in("optimise"))
+    measured = measure_design(case, (*measures_in("optimise"), "reach"))
     found = [Finding("given", None, None, None, measured), Finding("ours", 5, 1e-13, 0.1, measured)]
     page = findings_table(found).splitlines()
     assert [line.split()[0] for line in page[1:3]] == ["given", "ours"]

@@ -21,6 +21,10 @@ from explorer.mechanism.home import home_pose
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
+from explorer.optimise.curves import GOALS
+from explorer.optimise.defaults import make_problem
+from explorer.optimise.problem import OBJECTIVES, YAW, ObjectiveName
+from explorer.optimise.search.model import Model, reported_objective
 from explorer.workspace.extremes import extent_of, farthest, least_margins
 from explorer.workspace.least_clearance import least_clearances
 from explorer.workspace.limits.constraints import constraints, slacks
@@ -205,7 +209,7 @@ def test_gradients_of_measures_equal_finite_differences(design: Design) -> None:
     for measure in CATALOGUE.values():
         if measure.gradient is None:
             continue
-        held = design if measure.name == "reach" else limited(design, **limits)
+        held = design if measure.name == "longest_leg" else limited(design, **limits)
         held = msgspec.structs.replace(held, home=home_pose(held))
         gradient = measure.gradient(Case(held))
         for name, value in zip(VARIABLES, held.variables, strict=True):
@@ -215,3 +219,37 @@ def test_gradients_of_measures_equal_finite_differences(design: Design) -> None:
             expected = (high - low) / (2.0 * step)
             size = design.reach ** (measure.power - 1)
             assert gradient.get(name, 0.0) == pytest.approx(expected, abs=1e-5 * size), name
+
+
+def test_labels_of_measures_are_all_different() -> None:
+    labels = [measure.label for measure in CATALOGUE.values()]
+    assert len({*labels}) == len(labels)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_reach_and_longest_leg_are_two_measures_where_lengths_are_fixed(seed: int) -> None:
+    design = ordinary_case(seed)[0]
+    reach, longest = CATALOGUE["reach"], CATALOGUE["longest_leg"]
+    fixed = [getattr(design.limits, name)[1] or 0.0 for name in LENGTHS]
+    assert reach.function(Case(design)) == np.hypot(*design.a3)
+    assert longest.function(Case(design)) == max(fixed) != reach.function(Case(design))
+    tied = limited(design, **dict.fromkeys(LENGTHS, (0.0, None)))
+    assert longest.function(Case(tied)) == reach.function(Case(tied)) == design.reach
+
+
+@pytest.mark.parametrize("objective", OBJECTIVES)
+@pytest.mark.parametrize("seed", range(4))
+def test_objective_of_a_search_is_the_measure_that_it_is_named_after(
+    seed: int, objective: ObjectiveName
+) -> None:
+    design = ordinary_case(seed)[0]
+    if objective == "smallest-reach":
+        design = limited(design, **dict.fromkeys(LENGTHS, (0.0, None)))
+    middle = np.array(home_pose(design).position)
+    box = (tuple((middle - 1e-3).tolist()), tuple((middle + 1e-3).tolist()))
+    problem = make_problem(design, objective, volume=5.0, required_box=box, free=(YAW,))
+    model = Model(problem, problem.start_values)
+    state = model.at(model.start).state
+    value = CATALOGUE[GOALS[objective]].function(Case(state.design, box=box))
+    expected = abs(1.0 - value / 5.0) if objective == "match-volume" else value
+    assert reported_objective(problem, state) == pytest.approx(expected, rel=1e-9)

@@ -9,8 +9,10 @@ import msgspec
 import pytest
 from command_line import CommandLine
 
+from explorer.app.features.compare.drawing import ComparedRequest, compared_drawing
 from explorer.app.features.optimise.tasks import compare
 from explorer.app.features.optimise.words import measure_rows
+from explorer.app.state.compared import unnamed
 from explorer.app.state.studies import label_of
 from explorer.cli.answers.optimisation import measure_rows as measure_rows_of_command
 from explorer.export.report.data import gather_report_data
@@ -49,13 +51,14 @@ def values_of_places(design: Design, folder: Path, capsys: pytest.CaptureFixture
     paper = problem()
     margin = paper.demands.clearance_margin
     both = compare(paper.start, design, margin, (BOX, BOX))
-    compared = measure_design(Case(design), measures_in("compare")).values
+    compared = compared_drawing(ComparedRequest(unnamed(design))).measurements
+    assert compared is not None
     studied = measure_design(Case(design), SWIFT).values
     path = folder / "design.json"
     path.write_bytes(encode_design(design))
     measured = CommandLine(capsys).answer("workspace", "--design", path)
     return {
-        "Compare": {CATALOGUE[name].label: value for name, value in compared.items()},
+        "Compare": {CATALOGUE[name].label: value for name, value in compared.values.items()},
         "Optimise": {
             row.name.removesuffix(", units³").removesuffix(", units"): row.after
             for row in measure_rows(paper, both.before, both.after)
@@ -89,7 +92,7 @@ def test_measures_of_one_label_have_one_value(
 ) -> None:
     by_name = values_by_name(values_of_places(design, tmp_path, capsys))
     shared = {name: values for name, values in by_name.items() if len(values) > 1}
-    assert {"volume", "reach", "nodes", "node volume", "clearance"} <= {*shared}
+    assert {"volume", "reach", "longest leg", "nodes", "node volume", "clearance"} <= {*shared}
     for name, values in shared.items():
         first, *others = values.values()
         assert others == pytest.approx([first] * len(others), rel=1e-9), (name, values)

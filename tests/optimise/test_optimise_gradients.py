@@ -125,7 +125,7 @@ def test_problems_with_all_demands_cover_every_kind() -> None:
     problem = next(problems("many limits"))
     model = Model(problem, problem.start_values)
     kinds = {name.split(" ")[0] for name in model.names}
-    assert kinds == {"volume", "reach", "distance", "gap", "required", "margin", "clearance"}
+    assert kinds == {"volume", "longest", "distance", "gap", "required", "margin", "clearance"}
 
 
 def test_slack_of_state_matches_its_limit() -> None:

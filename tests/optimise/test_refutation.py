@@ -8,19 +8,26 @@ from typing import Any
 import msgspec
 import numpy as np
 import pytest
-from limited_designs import limited
+from limited_designs import limited, ordinary_case
 from numpy.testing import assert_allclose
 
 from explorer import InputError, workspace_volume
 from explorer.measures.clearance import CERTAIN, clearance_beyond
-from explorer.mechanism.design import Design, DesignError, Limits
+from explorer.measures.size import longest_leg
+from explorer.mechanism.design import LENGTHS, Design, DesignError, Limits, Swing
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
 from explorer.optimise.defaults import make_problem
 from explorer.optimise.problem import Problem, Variable
 from explorer.optimise.refutation.binding import find_binding_limit
 from explorer.optimise.refutation.cut_box import cut_volume
-from explorer.optimise.refutation.most_volume import ball_above, ceilings, disc_above
+from explorer.optimise.refutation.lifting import MAXIMA, SWING_LIMIT, lift, without_one
+from explorer.optimise.refutation.most_volume import (
+    LONGEST_LEG,
+    ball_above,
+    ceilings,
+    disc_above,
+)
 from explorer.optimise.refutation.ranges import Ranges
 from explorer.optimise.refutation.refutation import (
     PAPER_BOX,
@@ -143,7 +150,7 @@ def test_refutations_of_random_problems_are_never_contradicted() -> None:
                 assert not meets(larger, values), (larger, values, refutations(larger))
     # The bounds are worth something, and every kind of limit had its turn.
     assert nearest > 0.99
-    kinds = {"box", "reach", "l1 maximum", "guide", "required box", "margin", "gap |d1 − d3|"}
+    kinds = {"box", LONGEST_LEG, "l1 maximum", "guide", "required box", "margin", "gap |d1 − d3|"}
     assert kinds <= {*refuted}
     assert any(each.startswith("clearance") for each in refuted)
 
@@ -165,7 +172,10 @@ def limits_of(problem: Problem) -> list[str]:
 
 def test_box_of_the_paper_start_is_too_small_and_the_paper_box_is_enough() -> None:
     problem = paper_problem(clearance=0.2)
-    assert words_of(refutations(problem)) == "the box holds at most 2,499 of the 8,000 asked for"
+    assert (
+        words_of(refutations(problem))
+        == "the box holds at most 2,499 of the 8,000 units³ asked for"
+    )
     assert paper_box(problem) == PAPER_BOX == OPTIMAL.limits.box
     for box in (None, PAPER_BOX):
         lifted = with_box(INITIAL, box)
@@ -183,37 +193,57 @@ def test_box_of_the_paper_start_is_too_small_and_the_paper_box_is_enough() -> No
 @pytest.mark.parametrize(
     ("start", "demands", "words"),
     [
-        (OPTIMAL, {"reach": 14.0}, "a reach of at most 14 leaves room for at most 5,747"),
-        (limited(OPTIMAL, l1=(0.0, 12.0)), {}, "l1 of at most 12 leaves room for at most 3,619"),
-        (limited(OPTIMAL, l4=(11.0, 12.0)), {}, "leaves room for at most 831.5 of the 8,000"),
-        (limited(OPTIMAL, guide=(0.0, 5.0)), {}, "the box holds at most 6,473 of the 8,000 asked"),
+        (
+            OPTIMAL,
+            {"reach": 14.0},
+            "a longest leg of at most 14 units leaves room for at most 5,747",
+        ),
+        (
+            limited(OPTIMAL, l1=(0.0, 12.0)),
+            {},
+            "l1 of at most 12 units leaves room for at most 3,619",
+        ),
+        (
+            limited(OPTIMAL, l4=(11.0, 12.0)),
+            {},
+            "leaves room for at most 831.5 of the 8,000 units³",
+        ),
+        (limited(OPTIMAL, guide=(0.0, 5.0)), {}, "the box holds at most 6,473 of the 8,000 units³"),
         (
             limited(OPTIMAL, guide=(0.0, 5.0), box=None),
             {"reach": 25.0},
-            "a guide from 0 to 5 leaves room for at most 4,909 of the 8,000 asked for",
+            "a guide from 0 to 5 units leaves room for at most 4,909 of the 8,000 units³ asked for",
         ),
         (
             limited(OPTIMAL, margin=9.0),
             {},
-            "the box holds at most 5,844 of the 8,000 asked for, wh",
+            "the box holds at most 5,844 of the 8,000 units³ asked for, wh",
         ),
-        (limited(OPTIMAL, margin=30.0), {}, "the box holds at most 0 of the 8,000 asked for, wh"),
-        (limited(OPTIMAL, gap=30.0), {}, "the carriages are at most 11.15 apart within the boun"),
+        (
+            limited(OPTIMAL, margin=30.0),
+            {},
+            "the box holds at most 0 of the 8,000 units³ asked for, wh",
+        ),
+        (
+            limited(OPTIMAL, gap=30.0),
+            {},
+            "the carriages are at most 11.15 units apart within the b",
+        ),
         (OPTIMAL, {"clearance": 12.0}, "legs 2 and 3 keep at most 11.15 of the clearance of 12"),
         (
             OPTIMAL,
             {"required_box": ((8.0, 3.0, 7.0), (12.0, 7.0, 19.0))},
-            "the required box lies beyond the box along z: from 7 to 19, and the box from 0 to 18",
+            "the required box lies beyond the box along z: from 7 to 19 units, and the box fr",
         ),
         (
             OPTIMAL,
             {"required_box": ((0.0, -11.0, 0.0), (20.0, 11.0, 18.5))},
-            "the required box has a volume of 8,140 and 8,000 is to be matched",
+            "the required box has a volume of 8,140 units³ and 8,000 units³ is to be matched",
         ),
         (
             limited(OPTIMAL, box=None),
             {"required_box": ((8.0, 3.0, -7.0), (12.0, 7.0, 9.0))},
-            "a margin of at most −7 on the home's side, and the limits demand 0",
+            "a margin of at most −7 units on the home's side, and the limits demand 0 units",
         ),
         (
             limited(OPTIMAL, l4=(0.0, 22.0)),
@@ -223,7 +253,7 @@ def test_box_of_the_paper_start_is_too_small_and_the_paper_box_is_enough() -> No
         (
             limited(OPTIMAL, l4=(0.0, 16.0)),
             {"required_box": ((0.0, -12.0, 0.0), (1.0, 22.0, 1.0))},
-            "l4 must be 17.01 at the least to get to all of the required box, and at most 16",
+            "l4 must be 17.01 units at the least to get to all of the required box, and at mos",
         ),
     ],
 )
@@ -242,7 +272,7 @@ def test_refutations_by_several_limits_are_all_listed() -> None:
 
 def test_refutation_of_nearly_equal_volumes_shows_the_digits_that_differ() -> None:
     (found,) = refutations(paper_problem(volume=2499.0))
-    assert found.message == "the box holds at most 2,498.7 of the 2,499.0 asked for"
+    assert found.message == "the box holds at most 2,498.7 of the 2,499.0 units³ asked for"
 
 
 def test_free_yaw_refutes_nothing_that_another_yaw_gives() -> None:
@@ -288,3 +318,45 @@ def test_binding_limit_lifted_gives_the_volume() -> None:
     most = find_binding_limit(held, 8000.0)
     assert most is not None
     assert most.limit == "l1 maximum"
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_lifted_limit_alone_is_gone_and_the_home_stays(seed: int) -> None:
+    design, _ = ordinary_case(seed)
+    design = limited(design, gap=1e-3, swing=Swing(b4=100.0))
+    limits = design.limits
+    names = [*without_one(limits), SWING_LIMIT, MAXIMA]
+    assert len(names) == len(without_one(limits)) + 2 == 4 + 2 * len(LENGTHS) + 2
+    for name in names:
+        lifted = lift(design, name)
+        assert lifted is not None
+        assert lifted.home == design.home
+        changed = [
+            field
+            for field in Limits.__struct_fields__
+            if getattr(limits, field) != getattr(lifted.limits, field)
+        ]
+        assert changed == ([*LENGTHS] if name == MAXIMA else [name.split(" ")[0]])
+        # It is lifted once.
+        assert lift(lifted, name) is None
+        assert name not in without_one(lifted.limits)
+    free = msgspec.structs.replace(design, limits=Limits())
+    assert without_one(free.limits) == {}
+    assert all(lift(free, name) is None for name in names)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_no_demand_on_the_longest_leg_is_refuted_that_the_start_keeps(seed: int) -> None:
+    design, _ = ordinary_case(seed)
+    for held in (design, limited(design, l1=(0.0, None)), limited(design, box=None)):
+        longest = longest_leg(held)
+        for share in (1.0, 1.5):
+            problem = make_problem(held, "largest-volume", reach=share * longest)
+            assert LONGEST_LEG not in limits_of(problem)
+            model = Model(problem, problem.start_values)
+            values = model.at(model.start).values
+            (index,) = [i for i, name in enumerate(model.names) if name.startswith(LONGEST_LEG)]
+            assert values[index] == pytest.approx(1.0 - 1.0 / share, abs=1e-12)
+        fixed = [getattr(held.limits, name)[1] or 0.0 for name in LENGTHS]
+        shorter = make_problem(held, "largest-volume", reach=0.99 * max(fixed))
+        assert LONGEST_LEG in limits_of(shorter)

@@ -142,6 +142,11 @@ class Run:
         return self.best is not None and not self.accepted
 
     @property
+    def has_converged(self) -> bool:
+        """Whether its result is an optimum that keeps all demands."""
+        return self.verdict is not None and self.verdict.status == "converged"
+
+    @property
     def best(self) -> Iterate | None:
         """The best iterate; None until the run has ended, or if there is none."""
         return None if self.verdict is None else self.verdict.best
@@ -155,13 +160,11 @@ class Optimisation:
         request: What the user requests.
         run: The last run; None if there is none of this design.
         count: Number of runs so far.
-        refusal: Why the last run could not start; None if it could.
     """
 
     request: OptimisationRequest = field(default_factory=OptimisationRequest)
     run: Run | None = None
     count: Count = 0
-    refusal: str | None = field(default=None, metadata=TRANSIENT)
 
     @property
     def is_on(self) -> bool:
@@ -170,7 +173,7 @@ class Optimisation:
 
     def without_run(self) -> Optimisation:
         """Return what stays when another design is opened: the request and the count of runs."""
-        return replace(self, run=None, refusal=None)
+        return replace(self, run=None)
 
     @property
     def record(self) -> Record | None:

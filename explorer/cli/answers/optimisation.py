@@ -12,7 +12,7 @@ from explorer.cli.output import attributes, figure, table
 from explorer.measures.case import Case
 from explorer.measures.catalogue import CATALOGUE, measures_in
 from explorer.measures.measurements import Measurements, measure_design
-from explorer.measures.size import reach_of
+from explorer.measures.size import longest_leg
 from explorer.mechanism.design import VARIABLES, Design
 
 if TYPE_CHECKING:
@@ -35,7 +35,8 @@ def outcome_json(outcome: Outcome, written: Sequence[Path]) -> dict[str, object]
         "objective": best.objective,
         "objective_name": problem.objective,
         "volume": best.volume,
-        "reach": reach_of(outcome.design),
+        "reach": outcome.design.reach,
+        "longest_leg": longest_leg(outcome.design),
         **attributes(run, "iterations evaluations"),
         **attributes(outcome, "seconds converged"),
         **attributes(run, "status holding message"),
@@ -65,7 +66,8 @@ def infeasible_json(problem: Problem, limit: str, message: str) -> dict[str, obj
         "objective": None,
         "objective_name": problem.objective,
         "volume": None,
-        "reach": reach_of(problem.start),
+        "reach": problem.start.reach,
+        "longest_leg": longest_leg(problem.start),
         "iterations": 0,
         "evaluations": 0,
         "seconds": 0.0,

@@ -48,7 +48,7 @@ _CORNERS = "x-low y-low z-low x-high y-high z-high"
 
 @dataclass(frozen=True, kw_only=True)
 class Optimise(JsonOptions, DesignOptions):
-    """Optimise a design by SQP: match a volume, minimise the reach, or others.
+    """Optimise a design by SQP: match a volume, shorten the longest leg, or others.
 
     The gradients are exact, and the search starts from a given design, whose limits hold
     throughout. The search converges if all demands hold at a local optimum; otherwise the exit
@@ -58,14 +58,14 @@ class Optimise(JsonOptions, DesignOptions):
     objective: Literal["match-volume", "smallest-reach", "largest-volume", "largest-margin"] = (
         "match-volume"
     )
-    """Objective: F = |1 − V/V′| of the exact volume, the reach, the volume, or the worst margin
-    over a box."""
+    """Objective: F = |1 − V/V′| of the exact volume, the longest leg, the volume, or the worst
+    margin over a box."""
 
     target_volume: Annotated[float | None, positive("--target-volume"), OPTIONAL] = None
-    """Volume to match, or least volume; for the smallest reach by default that of the design."""
+    """Volume to match, or least volume; for the shortest leg by default that of the design."""
 
     target_reach: Annotated[float | None, positive("--target-reach"), OPTIONAL] = None
-    """Largest reach; for the largest volume by default that of the design."""
+    """Longest leg allowed; for the largest volume by default that of the design."""
 
     box: Annotated[
         Six | tuple[()] | None,
@@ -94,7 +94,8 @@ class Optimise(JsonOptions, DesignOptions):
     """Smallest |a3y|, |b1y| and |b3 − b2|; a design with one of them zero is degenerate."""
 
     free: Annotated[tuple[str, ...], texts("--free", "yaw|reach|shift-x|…"), OPTIONAL] = ()
-    """Further free variables: yaw, reach, and shift-x, shift-y, shift-z of the required box."""
+    """Further free variables: yaw, reach (one maximum of all lengths), and shift-x, shift-y,
+    shift-z of the required box."""
 
     bounds: Annotated[tuple[str, ...], texts("--bounds", "NAME=LOW:HIGH …"), OPTIONAL] = ()
     """Bounds of variables, such as b1x=-10:10 yaw=-90:-45."""
@@ -189,12 +190,8 @@ class Optimise(JsonOptions, DesignOptions):
             NoAnswerError: No design within the bounds meets the demands; the message says what
                 would help.
         """
-        from explorer.optimise.refutation.refutation import (
-            BOX_LIMIT,
-            paper_box,
-            refutations,
-            words_of,
-        )
+        from explorer.optimise.refutation.lifting import BOX_LIMIT
+        from explorer.optimise.refutation.refutation import paper_box, refutations, words_of
 
         refuted = refutations(problem)
         if not refuted:

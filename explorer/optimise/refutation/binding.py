@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import NamedTuple
 
 import msgspec
 
-from explorer.mechanism.design import LENGTHS, Design, Limits
+from explorer.mechanism.design import Design
 from explorer.mechanism.home import home_pose
-from explorer.optimise.refutation.refutation import BOX_LIMIT
+from explorer.optimise.refutation.lifting import without_one
 from explorer.workspace.slices.volume import workspace_volume
 
 # Maximum length that bounds nothing, as a multiple of the reach.
@@ -39,26 +38,8 @@ def find_binding_limit(design: Design, volume: float) -> BindingLimit | None:
     """
     start = msgspec.structs.replace(design, home=home_pose(design))
     lifted: list[BindingLimit] = []
-    for name, limits in _without_one(design):
+    for name, limits in without_one(design.limits, UNBOUNDED * design.reach).items():
         freed = msgspec.structs.replace(start, limits=limits)
         lifted.append(BindingLimit(name, workspace_volume(freed, explain=False).volume))
     enough = [binding for binding in lifted if binding.volume >= volume]
     return max(enough, key=lambda binding: binding.volume, default=None)
-
-
-def _without_one(design: Design) -> Iterator[tuple[str, Limits]]:
-    """Yield the name of each limit that can be lifted, and the limits without it."""
-    limits = design.limits
-    if limits.box is not None:
-        yield BOX_LIMIT, msgspec.structs.replace(limits, box=None)
-    if limits.guide is not None:
-        yield "guide", msgspec.structs.replace(limits, guide=None)
-    if limits.margin:
-        yield "margin", msgspec.structs.replace(limits, margin=0.0)
-    for name in LENGTHS:
-        least, most = getattr(limits, name)
-        if least > 0.0:
-            yield f"{name} minimum", msgspec.structs.replace(limits, **{name: (0.0, most)})
-        if most is not None:
-            free = (least, UNBOUNDED * design.reach)
-            yield f"{name} maximum", msgspec.structs.replace(limits, **{name: free})

@@ -25,12 +25,15 @@ from explorer.singularity.ellipsoids import planes_of_singularity
 # Below this sine between the two lines they are parallel: δ2 is zero wherever b4 is.
 PARALLEL = 1e-12
 
+LONGEST_LEG = "longest leg"
+"""Name of the limit on all lengths that are tied to the reach."""
+
 
 class Ceiling(NamedTuple):
     """An upper bound of the volume.
 
     Attributes:
-        limit: Limit that it comes from: "box", "guide", "reach" or such as "l1 maximum".
+        limit: Limit that it comes from: "box", "guide", "longest leg" or such as "l1 maximum".
         words: Subject and verb of a sentence on it, such as "the box holds".
         volume: Bound, in cubed design units.
         place: Part of the limit whose volume is the bound, "" for all of it.
@@ -97,7 +100,7 @@ def _of_box(ranges: Ranges) -> Iterator[Ceiling]:
     if planes:
         least = limits.margin or 0.0
         places.append(
-            f"where every margin is at least {least:g}"
+            f"where every margin is at least {least:g} units"
             if least
             else "where the margins have the signs of home"
         )
@@ -130,16 +133,16 @@ def _of_lengths(ranges: Ranges) -> Iterator[Ceiling]:
         if ranges.is_tied(name):
             of_reach.append(volume)
         else:
-            yield Ceiling(f"{name} maximum", f"{name} of at most {most:.6g} leaves", volume)
+            yield Ceiling(f"{name} maximum", f"{name} of at most {most:.6g} units leaves", volume)
     if all(map(ranges.is_tied, ("l1", "l4"))):
         of_reach.append(_lens(ranges))
     elif not any(map(ranges.is_tied, ("l1", "l4"))):
         l1, l4 = (ranges.length(name)[1] for name in ("l1", "l4"))
-        words = f"l1 of at most {l1:.6g} together with l4 of at most {l4:.6g} leaves"
+        words = f"l1 of at most {l1:.6g} units together with l4 of at most {l4:.6g} units leaves"
         yield Ceiling("l1 maximum", words, _lens(ranges))
     if of_reach:
-        words = f"a reach of at most {ranges.most_reach:.6g} leaves"
-        yield Ceiling("reach", words, min(of_reach))
+        words = f"a longest leg of at most {ranges.most_reach:.6g} units leaves"
+        yield Ceiling(LONGEST_LEG, words, min(of_reach))
 
 
 def _lens(ranges: Ranges) -> float:
@@ -213,5 +216,5 @@ def _of_guide(ranges: Ranges) -> Iterator[Ceiling]:
     area = min(
         disc_above(ranges.length(name)[1], 0.0, _least_height(ranges, name)) for name in LENGTHS
     )
-    words = f"a guide from {guide[0]:.6g} to {guide[1]:.6g} leaves"
+    words = f"a guide from {guide[0]:.6g} to {guide[1]:.6g} units leaves"
     yield Ceiling("guide", words, free * area)

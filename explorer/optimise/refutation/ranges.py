@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from functools import cached_property
 
-from explorer.mechanism.design import VARIABLES, Pair
+from explorer.mechanism.design import LENGTHS, VARIABLES, Pair
 from explorer.mechanism.home import home_pose
 from explorer.optimise.problem import REACH, SHIFTS, YAW, Problem
 from explorer.workspace.limits.constraints import home_signs
@@ -116,6 +116,14 @@ class Ranges:
     def reach(self) -> Pair:
         """The interval of the reach, its own variable or |a3|, without what is demanded."""
         return self._bounds.get(REACH, self.distance_a3)
+
+    @property
+    def least_longest_leg(self) -> float:
+        """The least that the longest leg can be, without what is demanded."""
+        limits = self.problem.start.limits
+        return max(
+            self.reach[0] if self.is_tied(name) else getattr(limits, name)[1] for name in LENGTHS
+        )
 
     @cached_property
     def most_reach(self) -> float:

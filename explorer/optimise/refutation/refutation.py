@@ -17,7 +17,13 @@ from explorer.mechanism.design import Design, Pair
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.home import home_pose
 from explorer.optimise.problem import SHIFTS, Box, Problem
-from explorer.optimise.refutation.most_volume import ceilings, margin_planes, near_singular_volume
+from explorer.optimise.refutation.lifting import BOX_LIMIT
+from explorer.optimise.refutation.most_volume import (
+    LONGEST_LEG,
+    ceilings,
+    margin_planes,
+    near_singular_volume,
+)
 from explorer.optimise.refutation.ranges import Ranges, largest, smallest
 from explorer.workspace.limits.constraints import GAP
 
@@ -26,9 +32,6 @@ SPARE = 1e-6
 
 PAPER_BOX = PRESETS["paper-optimal"].limits.box
 """Box of the paper's optimum."""
-
-BOX_LIMIT = "box"
-"""Name of the limit that the commands and the page offer to lift."""
 
 
 class Refutation(NamedTuple):
@@ -91,7 +94,7 @@ def _volume(ranges: Ranges) -> Iterator[Refutation]:
         if ceiling.volume <= wanted * (1.0 - SPARE):
             room = "" if ceiling.limit == BOX_LIMIT else "room for "
             most, demanded = _amounts(ceiling.volume, wanted)
-            words = f"{ceiling.words} {room}at most {most} of the {demanded} asked for"
+            words = f"{ceiling.words} {room}at most {most} of the {demanded} units³ asked for"
             if wanted == 0.0:
                 words = f"{ceiling.words} {room}no volume"
             yield Refutation(ceiling.limit, f"{words}{ceiling.place and f', {ceiling.place}'}")
@@ -108,7 +111,7 @@ def _required_box(ranges: Ranges) -> Iterator[Refutation]:
         has, demanded = _amounts(volume, wanted)
         yield Refutation(
             "required box",
-            f"the required box has a volume of {has} and {demanded} is to be matched",
+            f"the required box has a volume of {has} units³ and {demanded} units³ is to be matched",
         )
     yield from _box_within_box(ranges, required)
     yield from _box_beyond_margins(ranges, required)
@@ -126,8 +129,8 @@ def _box_within_box(ranges: Ranges, required: Box) -> Iterator[Refutation]:
         # It may be shifted by what lies in both intervals, if anything does.
         if max(least - low, back) > min(most - high, on) + spare:
             words = (
-                f"the required box lies beyond the box along {name}: from {low:g} to {high:g}, "
-                f"and the box from {least:g} to {most:g}"
+                f"the required box lies beyond the box along {name}: from {low:g} to {high:g} "
+                f"units, and the box from {least:g} to {most:g} units"
             )
             yield Refutation(BOX_LIMIT, words)
 
@@ -141,8 +144,8 @@ def _box_beyond_margins(ranges: Ranges, required: Box) -> Iterator[Refutation]:
             best += max(slope * shift for shift in ranges.of(SHIFTS[axis]))
         if best < least - SPARE * ranges.problem.size:
             words = (
-                f"at its worst corner the required box has a margin of at most {best:.4g} on the "
-                f"home's side, and the limits demand {least:g}"
+                f"at its worst corner the required box has a margin of at most {best:.4g} units "
+                f"on the home's side, and the limits demand {least:g} units"
             ).replace("-", "−")
             yield Refutation("margin", words)
 
@@ -154,10 +157,10 @@ def _box_beyond_lengths(ranges: Ranges, required: Box) -> Iterator[Refutation]:
         half = 0.5 * math.hypot(*(highs[axis] - lows[axis] for axis in axes))
         farthest = max(half, _farthest_corner(ranges, name, axes, required))
         if farthest > most * (1.0 + SPARE):
-            limit = "reach" if ranges.is_tied(name) else f"{name} maximum"
+            limit = LONGEST_LEG if ranges.is_tied(name) else f"{name} maximum"
             words = (
-                f"{name} must be {farthest:.4g} at the least to get to all of the required box, "
-                f"and at most {most:.6g} is allowed"
+                f"{name} must be {farthest:.4g} units at the least to get to all of the required "
+                f"box, and at most {most:.6g} units are allowed"
             )
             yield Refutation(limit, words)
 
@@ -193,20 +196,21 @@ def _reach(ranges: Ranges) -> Iterator[Refutation]:
     demanded = ranges.problem.demands.reach
     if demanded is None or ranges.problem.objective == "smallest-reach":
         return
-    least = ranges.reach[0]
+    least = ranges.least_longest_leg
     if least > demanded * (1.0 + SPARE):
         words = (
-            f"the reach is at least {least:.6g} within the bounds, and {demanded:g} is asked for"
+            f"the longest leg is at least {least:.6g} units within the bounds, and {demanded:g} "
+            "units are asked for"
         )
-        yield Refutation("reach", words)
+        yield Refutation(LONGEST_LEG, words)
 
 
 def _gap(ranges: Ranges) -> Iterator[Refutation]:
     gap = ranges.problem.start.limits.gap
     if ranges.apart < gap * (1.0 - SPARE):
         words = (
-            f"the carriages are at most {ranges.apart:.4g} apart within the bounds, and the gap "
-            f"is to be {gap:g}"
+            f"the carriages are at most {ranges.apart:.4g} units apart within the bounds, and the "
+            f"gap is to be {gap:g} units"
         )
         yield Refutation(GAP, words)
 
@@ -226,7 +230,7 @@ def _clearance(ranges: Ranges) -> Iterator[Refutation]:
         if most < demanded * (1.0 - SPARE):
             words = (
                 f"legs {first} and {second} keep at most {most:.4g} of the clearance of "
-                f"{demanded:g} asked for, within the bounds"
+                f"{demanded:g} units asked for, within the bounds"
             ).replace("-", "−")
             yield Refutation(f"clearance of legs {first} and {second}", words)
 

@@ -10,6 +10,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from explorer.measures.catalogue import CATALOGUE
 from explorer.measures.size import corners_of
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.margins import margins
@@ -69,7 +70,7 @@ class VolumeDemand:
         self.volume = volume
         self.is_equality = is_equality
         self.is_limit = False
-        self.names = (f"volume {volume:.6g}",)
+        self.names = (f"{CATALOGUE['volume'].label} {volume:.6g}",)
 
     def measure(self, state: State) -> Measured:
         """Return (V / V′)^⅓ − 1."""
@@ -80,18 +81,18 @@ class VolumeDemand:
 
 
 class ReachDemand:
-    """A largest reach."""
+    """A longest leg of at most some length."""
 
     is_equality = False
     is_limit = False
 
     def __init__(self, reach: float) -> None:
         self.reach = reach
-        self.names = (f"reach {reach:.6g}",)
+        self.names = (f"{CATALOGUE['longest_leg'].label} {reach:.6g}",)
 
     def measure(self, state: State) -> Measured:
         """Return 1 − reach / largest."""
-        value, gradient = state.reach
+        value, gradient = state.longest_leg
         return Measured(np.array([1.0 - value / self.reach]), -gradient[None, :] / self.reach)
 
 

@@ -169,7 +169,7 @@ class Model:
                 # Each step is the smallest that meets the volume demand to first order.
                 return 0.0, np.zeros(len(u))
             case "smallest-reach":
-                value, gradient = state.reach
+                value, gradient = state.longest_leg
                 return value / self.problem.size, gradient / self.problem.size
             case "largest-volume":
                 root = (state.volume / self._volume) ** (1.0 / 3.0)
@@ -200,12 +200,12 @@ class Model:
 
 
 def reported_objective(problem: Problem, state: State) -> float:
-    """Return F, the reach, the volume or the worst margin, whichever a problem is about."""
+    """Return F, the longest leg, the volume or the worst margin, whichever a problem is about."""
     match problem.objective:
         case "match-volume":
             return abs(1.0 - state.volume / problem.wanted_volume)
         case "smallest-reach":
-            return state.reach[0]
+            return state.longest_leg[0]
         case "largest-volume":
             return state.volume
         case "largest-margin":

@@ -111,7 +111,7 @@ def open_workspace(
 
 def _least_broken(state: State) -> FloatArray:
     """Return the position on a grid that breaks its limits the least, shape (3,)."""
-    reach = state.reach[0]
+    reach = state.longest_leg[0]
     lows, highs = state.design.limits.box or ((-reach,) * 3, (reach,) * 3)
     # Not the ends themselves, where a limit is just met.
     shares = np.linspace(0.0, 1.0, SEARCHED + 2)[1:-1]

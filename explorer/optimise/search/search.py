@@ -18,6 +18,7 @@ import msgspec
 import numpy as np
 
 from explorer.numerics.arrays import FloatArray
+from explorer.numerics.number_text import format_ascii
 from explorer.optimise.curves import CALLED
 from explorer.optimise.outcome import Iterate, Phase, Run, Status
 from explorer.optimise.problem import Problem
@@ -336,7 +337,10 @@ class Search:
 def _default_message(problem: Problem, attempt: Attempt, steps: int) -> str:
     """Return the message of a run."""
     name = CALLED[problem.objective]
-    end = f"{name} = {attempt.best.objective:.6g} after {steps} iterations"
+    # F compares numbers of unit size.
+    size = 1.0 if problem.objective == "match-volume" else 0.0
+    value = format_ascii(attempt.best.objective, 6, size=size)
+    end = f"{name} = {value} after {steps} iterations"
     held = f", held by {attempt.holding}" if attempt.holding else ""
     match attempt.status:
         case "converged":

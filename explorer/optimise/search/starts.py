@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from explorer.errors import DesignError, InputError
-from explorer.measures.size import longest_length
+from explorer.measures.size import longest_leg
 from explorer.mechanism.design import Design
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.margins import margins
@@ -68,7 +68,7 @@ def first_positions(problem: Problem, design: Design) -> FloatArray:
     """
     if problem.demands.clearance is None:
         return np.zeros((0, 3))
-    reach = longest_length(design)
+    reach = longest_leg(design)
     lows, highs = design.limits.box or ((-reach,) * 3, (reach,) * 3)
 
     def grid(*counts: int) -> FloatArray:

@@ -120,12 +120,10 @@ class State:
         return _reach_slope(self.design, chain, len(self.u))
 
     @cached_property
-    def reach(self) -> tuple[float, FloatArray]:
-        """The reach as a variable of its own, else |a3|, and its derivatives, shape (n,)."""
-        if REACH in self.problem.names:
-            index = self.problem.names.index(REACH)
-            return float(self.values[index]), self.chain[f"{LENGTHS[0]} maximum"]
-        return self.design.reach, _reach_slope(self.design, self.chain, len(self.u))
+    def longest_leg(self) -> tuple[float, FloatArray]:
+        """The largest of the four maximum lengths, and its derivatives, shape (n,)."""
+        longest = max(LENGTHS, key=lambda name: self.design.length_range(name)[1])
+        return self.design.length_range(longest)[1], self._maximum_slope(longest, self.chain)
 
     def along(self, gradient: Mapping[str, float]) -> FloatArray:
         """Return derivatives by the scaled variables, shape (n,), from those by parameters."""

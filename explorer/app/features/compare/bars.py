@@ -18,7 +18,7 @@ from explorer.measures.catalogue import CATALOGUE, Measure
 
 DRAWN = (
     "volume",
-    "volume_per_reach",
+    "volume_per_leg",
     "node_volume",
     "reach",
     "exact_extent_x",

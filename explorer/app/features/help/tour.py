@@ -9,6 +9,7 @@ from explorer.app.features.optimise.actions import StartRun
 from explorer.app.state.action import Action
 from explorer.app.state.actions import GoHome, Set, SetPosition, SetVariable
 from explorer.app.state.frame import Frame
+from explorer.app.state.state import State
 
 # What "Show me" does: the stride of the platform in reaches, the height over the base plane in
 # warning lengths, and the factor on a variable.
@@ -108,8 +109,9 @@ STEPS = (
     ),
     Step(
         "Optimise, and take it with you",
-        "Press Optimise, and accept or revert what it finds. Export, on top of the page, has files "
-        "for CAD, simulation and print. Ctrl-Z undoes every step of this tour.",
+        "Press Optimise, and accept what it finds; what you do not accept is put back. Export, on "
+        "top of the page, has files for CAD, simulation and print. Ctrl-Z undoes every step of "
+        "this tour.",
         "Optimise",
         _is_optimised,
         lambda _: StartRun(),
@@ -124,11 +126,13 @@ class Tour:
     Attributes:
         at: Index of the step.
         began: Frame in which the step began.
+        searches: Number of searches before the tour began.
         is_done: Whether the user has done the step.
     """
 
     at: int
     began: Frame
+    searches: int
     is_done: bool = False
 
     @property
@@ -147,12 +151,19 @@ class Tour:
             return self
         return replace(self, is_done=True)
 
+    def left_search(self, state: State) -> int | None:
+        """Return the number of a search that the tour led to and whose result is not accepted."""
+        run = state.optimisation.run
+        if run is None or run.accepted or run.number <= self.searches:
+            return None
+        return run.number
+
     def step_by(self, steps: int, frame: Frame) -> Tour:
         """Return the tour some steps on or back, within its first and last."""
         at = min(max(self.at + steps, 0), len(STEPS) - 1)
-        return Tour(at, frame)
+        return Tour(at, frame, self.searches)
 
 
 def start_tour(frame: Frame) -> Tour:
     """Return the tour at its first step."""
-    return Tour(0, frame)
+    return Tour(0, frame, frame.state.optimisation.count)

@@ -10,6 +10,7 @@ import viser
 
 from explorer.app.features.feature import Runner, Services
 from explorer.app.features.help.tour import STEPS, Tour, start_tour
+from explorer.app.features.optimise.actions import GiveUp
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.buttons import open_button, press_button
 
@@ -34,6 +35,8 @@ class TourGuide(Runner):
         self._is_seen = preferences is None or preferences.chosen.tour_seen
         self._lock = threading.RLock()
         self._cards: dict[int, _Card] = {}
+        # Numbers of the searches whose results are given up once they end.
+        self._given_up: set[int] = set()
         services.buttons.on(PRESS, self._press, values=BUTTONS)
         services.server.on_client_connect(self._connected)
         services.server.on_client_disconnect(self._disconnected)
@@ -57,6 +60,10 @@ class TourGuide(Runner):
             cards = tuple(self._cards.values())
         for card in cards:
             card.change(lambda tour: tour.after_frame(frame))
+        run = frame.state.optimisation.run
+        if run is not None and run.phase == "ended" and run.number in self._given_up:
+            self._given_up.discard(run.number)
+            self._session.do(GiveUp(run.number))
 
     def _connected(self, client: viser.ClientHandle) -> None:
         if not self._is_seen:
@@ -79,6 +86,7 @@ class TourGuide(Runner):
             self._session.post(object(), lambda s: change(Frame(s)), who=client.client_id)
         elif name == "Skip" or (name == "Next" and tour.is_last):
             self.end(client)
+            self._give_up(tour)
             self._is_seen = True
             self._services.remember(None, tour_seen=True)
         else:
@@ -86,6 +94,14 @@ class TourGuide(Runner):
                 self._session.do(tour.step.after, who=client.client_id)
             frame = self._frame()
             card.change(lambda tour: tour.step_by(1 if name == "Next" else -1, frame))
+
+    def _give_up(self, tour: Tour) -> None:
+        """Put back what a search of the tour has left, unless its result was accepted."""
+        number = tour.left_search(self._session.state)
+        if number is not None:
+            # While the search goes on, the first request cancels it, and its end reverts it.
+            self._given_up.add(number)
+            self._session.do(GiveUp(number))
 
 
 class _Card:

@@ -14,19 +14,22 @@ import msgspec
 
 from explorer.app.features.optimise.problem import problem_of, refuted
 from explorer.app.state.action import Action
-from explorer.app.state.actions import Set, check_free, moved
-from explorer.app.state.optimisation import PLACE, Comparison, SearchResult
+from explorer.app.state.actions import Open, Set, check_free, moved
+from explorer.app.state.optimisation import PLACE, Comparison, OptimisationRequest, SearchResult
 from explorer.app.state.parts import kept_on_open
 from explorer.app.state.state import Optimisation, Run, State
 from explorer.app.state.values import with_value
 from explorer.app.storage.library import LONGEST_NAME
-from explorer.errors import ExplorerError, NoAnswerError
+from explorer.errors import InputError, NoAnswerError
 from explorer.mechanism.design import Design
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import Pose
+from explorer.optimise.findings import CLEARANCE, PAPER_VOLUME, paper_start
 from explorer.optimise.outcome import Iterate
-from explorer.optimise.problem import YAW, Box
+from explorer.optimise.problem import YAW
+from explorer.optimise.refutation.lifting import MAXIMA, SWING_LIMIT, lift
 from explorer.optimise.refutation.refutation import PAPER_BOX, with_box, words_of
+from explorer.workspace.limits.constraints import GAP
 
 SUFFIX = "-optimised"
 
@@ -41,9 +44,7 @@ class SetRequest(Set):
         if request.objective == "largest-margin" and not {YAW, PLACE} & {*request.free}:
             # Only these influence the margins over a box.
             request = replace(request, free=(*request.free, YAW, PLACE))
-        return replace(
-            state, optimisation=replace(state.optimisation, request=request, refusal=None)
-        )
+        return with_value(state, "optimisation.request", request)
 
 
 @dataclass(frozen=True)
@@ -60,18 +61,14 @@ class StartRun(Action):
     """Start the search for the best design."""
 
     def apply(self, state: State) -> State:
-        """Return the next state, with the reason if there is no problem to search.
+        """Return the next state.
 
         Raises:
-            NoAnswerError: the limits rule out the demands.
+            NoAnswerError: the limits rule out the demands, or there is no problem to search.
         """
         optimisation = state.optimisation
         if optimisation.is_on:
             return state
-        try:
-            problem = problem_of(state)
-        except ExplorerError as error:
-            return replace(state, optimisation=replace(optimisation, refusal=str(error)))
         impossible = refuted(state)
         if impossible:
             raise NoAnswerError(words_of(impossible))
@@ -80,7 +77,7 @@ class StartRun(Action):
         own = last.own if last is not None and last.is_undecided else state
         run = Run(
             number=optimisation.count + 1,
-            problem=problem,
+            problem=problem_of(state),
             starts=optimisation.request.starts,
             own=replace(own, optimisation=Optimisation()),
         )
@@ -93,10 +90,63 @@ class StartRun(Action):
         )
 
 
-class _ReplaceBox(Action):
-    """Replace the box in the design's limits; its home pose stays where it is."""
+@dataclass(frozen=True)
+class TakePaperProblem(Action):
+    """Open the paper's initial design with the box of its optimum, and request its volume."""
 
-    box: ClassVar[Box | None]
+    template: ClassVar[str] = "The paper's problem"
+
+    def apply(self, state: State) -> State:
+        """Return the next state.
+
+        Raises:
+            InputError: the design is being optimised.
+        """
+        request = OptimisationRequest(volume=PAPER_VOLUME, clearance=CLEARANCE)
+        return with_value(Open(paper_start()).apply(state), "optimisation.request", request)
+
+
+@dataclass(frozen=True)
+class LiftLimit(Action):
+    """Take a limit out of the design, or tie maximum lengths to the reach.
+
+    Attributes:
+        limit: Name of the limit, see `explorer.optimise.refutation.lifting.lift`.
+    """
+
+    template: ClassVar[str] = "{action.title}"
+
+    limit: str
+
+    @property
+    def title(self) -> str:
+        """What it does, such as "Lift the box"."""
+        if self.limit == MAXIMA:
+            return "Tie all maximum lengths to the reach"
+        name, _, end = self.limit.partition(" ")
+        if end == "maximum":
+            return f"Tie the maximum of {name} to the reach"
+        words = {SWING_LIMIT: "bounds of the swing", "margin": "least margin", GAP: "gap"}
+        return f"Lift the {words.get(self.limit, f'minimum of {name}' if end else name)}"
+
+    def apply(self, state: State) -> State:
+        """Return the next state.
+
+        Raises:
+            InputError: the design is being optimised, or has no such limit.
+        """
+        check_free(state)
+        design = lift(state.design, self.limit)
+        if design is None:
+            raise InputError(f"the design has no limit named {self.limit!r} to lift")
+        return replace(state, design=design)
+
+
+@dataclass(frozen=True)
+class TakePaperBox(Action):
+    """Bound the design by the box of the paper's optimum; its home pose stays where it is."""
+
+    template: ClassVar[str] = "Take the paper's box"
 
     def apply(self, state: State) -> State:
         """Return the next state.
@@ -105,23 +155,7 @@ class _ReplaceBox(Action):
             InputError: the design is being optimised.
         """
         check_free(state)
-        return replace(state, design=with_box(state.design, self.box))
-
-
-@dataclass(frozen=True)
-class LiftBox(_ReplaceBox):
-    """Take the box out of the design's limits."""
-
-    template: ClassVar[str] = "Lift the box"
-    box: ClassVar[Box | None] = None
-
-
-@dataclass(frozen=True)
-class TakePaperBox(_ReplaceBox):
-    """Bound the design by the box of the paper's optimum."""
-
-    template: ClassVar[str] = "Take the paper's box"
-    box: ClassVar[Box | None] = PAPER_BOX
+        return replace(state, design=with_box(state.design, PAPER_BOX))
 
 
 @dataclass(frozen=True)
@@ -216,6 +250,22 @@ class Revert(Action):
         if run is None or not run.is_undecided:
             return state
         return _restore_own(with_value(state, "optimisation.run", None), run.own)
+
+
+@dataclass(frozen=True)
+class GiveUp(Action):
+    """Cancel a run that goes on, or revert its result unless it was accepted."""
+
+    template: ClassVar[str] = "Revert to {design}"
+
+    number: int
+
+    def apply(self, state: State) -> State:
+        """Return the next state."""
+        run = state.optimisation.run
+        if run is None or run.number != self.number:
+            return state
+        return (CancelRun() if state.optimisation.is_on else Revert()).apply(state)
 
 
 def _with_run(state: State, change: Callable[[Run], Run]) -> State:

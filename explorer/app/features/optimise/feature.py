@@ -6,15 +6,15 @@ import viser
 
 from explorer.app.features.feature import Feature, Tab
 from explorer.app.features.optimise.panel import OptimisePanel
+from explorer.app.features.optimise.presses import PRESSES
 from explorer.app.features.optimise.runner import Optimiser
 from explorer.app.features.optimise.scene import RequiredBox
-from explorer.app.widgets.commands import Key, shift
 
 OPTIMISE = Feature(
     "optimise",
     tabs=(Tab("work", "Optimise", OptimisePanel, viser.Icon.SPARKLES),),
     scene=(RequiredBox,),
     runners=(Optimiser,),
-    keys={"Optimise › Optimise": (Key("O"),), "Optimise › Cancel": (shift("O"),)},
+    keys={f"Optimise › {press.label}": press.keys for press in PRESSES.values() if press.keys},
     lists=("Objective",),
 )

@@ -43,10 +43,12 @@ class Curve(NamedTuple):
 
 
 class OptimisePlots:
-    """Captions and charts; hidden until there is a run."""
+    """Captions and charts in a folder; hidden until there is a run."""
 
     def __init__(self, gui: viser.GuiApi) -> None:
-        self._charts = [self._add(gui) for _ in range(3)]
+        self._folder = gui.add_folder("Course of the search", visible=False)
+        with self._folder:
+            self._charts = [self._add(gui) for _ in range(3)]
 
     def _add(self, gui: viser.GuiApi) -> tuple[viser.GuiHtmlHandle, viser.GuiUplotHandle]:
         caption = gui.add_html("", visible=False)
@@ -55,6 +57,7 @@ class OptimisePlots:
     def updates(self, run: Run | None) -> Iterator[Update]:
         """Yield the updates that show a run."""
         shown = [] if run is None else curves_of(run)
+        yield self._folder, "visible", bool(shown)
         for index, (caption, chart) in enumerate(self._charts):
             curve = shown[index] if index < len(shown) else None
             yield caption, "visible", curve is not None
@@ -87,7 +90,8 @@ def _name(problem: Problem, last: Iterate, curve: curves.Curve) -> str:
         target = "" if curve.level is None else f", required {curve.level:.6g}"
         return f"Volume (units³): {last.volume:.6g}{target}"
     if curve.powers:
-        return f"log10 of F = |1 − V / V′|; F = {last.objective:.2g}".replace("e-", "e−")
+        value = format_number(last.objective, 2, size=1.0)
+        return f"log10 of F = |1 − V / V′|; F = {value}"
     name = curves.CALLED[problem.objective].capitalize()
     return f"{name} (units): {format_number(last.objective, 6)}"
 

@@ -11,8 +11,8 @@ import numpy as np
 from explorer.app.state.optimisation import PLACE, OptimisationRequest
 from explorer.app.state.state import State
 from explorer.errors import ExplorerError
-from explorer.measures.size import longest_length
-from explorer.mechanism.design import VARIABLES, Design
+from explorer.measures.size import longest_leg
+from explorer.mechanism.design import LENGTHS, VARIABLES, Design, Swing
 from explorer.mechanism.home import home_pose
 from explorer.optimise.defaults import make_problem
 from explorer.optimise.problem import (
@@ -21,6 +21,7 @@ from explorer.optimise.problem import (
     Box,
     Problem,
 )
+from explorer.optimise.refutation.lifting import BOX_LIMIT, MAXIMA, SWING_LIMIT, lift
 from explorer.optimise.refutation.refutation import Refutation, paper_box, refutations
 from explorer.workspace.limits.constraints import Never, constraints
 from explorer.workspace.slices.volume import workspace_volume
@@ -39,7 +40,7 @@ def requested_volume(state: State) -> float:
 
 
 def requested_reach(state: State) -> float:
-    """Return the largest reach allowed."""
+    """Return the longest leg allowed."""
     return _requested_reach(state.base, state.optimisation.request)
 
 
@@ -55,7 +56,7 @@ def _requested_volume(base: Design, request: OptimisationRequest) -> float:
 
 
 def _requested_reach(base: Design, request: OptimisationRequest) -> float:
-    return longest_length(base) if request.reach is None else request.reach
+    return longest_leg(base) if request.reach is None else request.reach
 
 
 def _requested_box(base: Design, request: OptimisationRequest) -> Box:
@@ -89,22 +90,60 @@ def _problem(design: Design, base: Design, request: OptimisationRequest) -> Prob
 
 
 def refuted(state: State) -> tuple[Refutation, ...]:
-    """Return the demands that the limits rule out.
-
-    Empty if a search may keep all, and if the values make no problem, which `StartRun` reports.
-    """
+    """Return why no search can start: demands that the limits rule out, or no problem at all."""
     return _refuted(state.design, state.base, state.optimisation.request)
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=16)
 def _refuted(design: Design, base: Design, request: OptimisationRequest) -> tuple[Refutation, ...]:
-    problem = _problem_or_none(design, base, request)
-    return () if problem is None else refutations(problem)
+    try:
+        problem = _problem(design, base, request)
+    except ExplorerError as error:
+        return (Refutation(_limit_against_problem(design, request), str(error)),)
+    return refutations(problem)
+
+
+def _limit_against_problem(design: Design, request: OptimisationRequest) -> str:
+    """Return the limit because of which values make no problem, "" if it is none."""
+    limits = design.limits
+    if limits.swing != Swing():
+        return SWING_LIMIT
+    has_fixed = any(getattr(limits, name)[1] is not None for name in LENGTHS)
+    return MAXIMA if request.objective == "smallest-reach" and has_fixed else ""
+
+
+def liftable(state: State) -> tuple[str, ...]:
+    """Return the limits that can be lifted of those that prevent a search or held the last one."""
+    if state.optimisation.is_on:
+        return ()
+    refusals = refuted(state)
+    found: list[str] = []
+    for limit in dict.fromkeys([refusal.limit for refusal in refusals] + _holding(state)):
+        lifted = lift(state.design, limit)
+        if lifted is None:
+            continue
+        after = _refuted(lifted, state.base, state.optimisation.request)
+        messages = {refusal.message for refusal in refusals if refusal.limit == limit}
+        if all(left.limit != limit and left.message not in messages for left in after):
+            found.append(limit)
+    return tuple(found)
+
+
+def _holding(state: State) -> list[str]:
+    """Return the limit that kept the last search from all demands, if it is still in force."""
+    run = state.optimisation.run
+    if run is None or run.accepted or run.verdict is None or run.verdict.status != "infeasible":
+        return []
+    is_same = run.problem.start.limits == state.design.limits
+    return [run.verdict.holding] if is_same else []
 
 
 def box_on_offer(state: State) -> Box | None:
-    """Return the box of the paper's optimum if it can hold what is required; else None."""
-    return _box_on_offer(state.design, state.base, state.optimisation.request)
+    """Return the box of the paper's optimum in place of one that is too small, if it may do."""
+    if BOX_LIMIT not in liftable(state):
+        return None
+    box = _box_on_offer(state.design, state.base, state.optimisation.request)
+    return None if box == state.design.limits.box else box
 
 
 @lru_cache(maxsize=8)

@@ -1,4 +1,4 @@
-"""The progress, the verdict and the comparison of an optimisation as HTML."""
+"""The search as HTML: what prevents it, its progress, its verdict and the comparison."""
 
 from __future__ import annotations
 
@@ -6,6 +6,22 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from html import escape
 
+from explorer.app.features.optimise.actions import LiftLimit
+from explorer.app.features.optimise.limits import limits_table
+from explorer.app.features.optimise.presses import (
+    ACCEPT,
+    CANCEL,
+    DESIGN,
+    HULL,
+    LIFT,
+    PAPER,
+    PAPER_BOX,
+    RECORD,
+    REVERT,
+    START,
+    button,
+)
+from explorer.app.features.optimise.problem import box_on_offer, liftable, refuted
 from explorer.app.state.optimisation import SearchResult
 from explorer.app.state.state import Run, State
 from explorer.app.widgets.markup import (
@@ -27,9 +43,11 @@ from explorer.measures.clearance import CERTAIN
 from explorer.measures.measurements import Measurements
 from explorer.mechanism.design import VARIABLES
 from explorer.numerics.number_text import set_true_minus
-from explorer.optimise.curves import CALLED
-from explorer.optimise.problem import YAW, ObjectiveName, Problem
-from explorer.optimise.refutation.refutation import BOX_LIMIT, Refutation
+from explorer.optimise.curves import CALLED, GOALS
+from explorer.optimise.outcome import Iterate
+from explorer.optimise.problem import YAW, Problem
+from explorer.optimise.refutation.lifting import MAXIMA, SWING_LIMIT
+from explorer.optimise.refutation.refutation import Refutation
 
 TITLES = {
     "converged": "Converged",
@@ -38,42 +56,152 @@ TITLES = {
     "stalled": "Stalled",
     "cancelled": "Cancelled: the best so far",
 }
+# Limits of refusals without a problem that could be searched.
+NO_PROBLEM = ("", SWING_LIMIT, MAXIMA)
 # Significant digits of the larger of two compared numbers.
 DIGITS = 6
-# The measure that each objective improves.
-GOALS: dict[ObjectiveName, str] = {
-    "match-volume": "volume",
-    "largest-volume": "volume",
-    "smallest-reach": "reach",
-    "largest-margin": "box_margin",
-}
 
 
-def refused_words(refusals: Sequence[Refutation]) -> str:
-    """Return the demands that the limits rule out, as HTML."""
-    title = "No design can keep these demands"
-    body = " ".join(sentence(refusal.message) for refusal in refusals)
-    if any(refusal.limit != BOX_LIMIT for refusal in refusals):
-        body += " Lower the demands, or change the limits in the tab Design."
-    return alert(title, body)
+@dataclass(frozen=True)
+class Notice:
+    """A search that is under way, or whose result waits for an answer, in words.
+
+    Attributes:
+        title: State of the search, such as "Solving 5" or "Converged".
+        text: Its value, with its unit.
+        share: Share of the starts that have ended, from 0 to 1; None where there is one start or
+            the search has ended.
+        presses: Names of the buttons that answer it, out of `PRESSES`, the main one first.
+    """
+
+    title: str
+    text: str
+    share: float | None
+    presses: tuple[str, ...]
 
 
-def progress_line(run: Run) -> str:
-    """Return the progress of a run, as HTML."""
+def search_notice(state: State) -> Notice | None:
+    """Return the search that is under way or waits for an answer; None if there is none."""
+    run = state.optimisation.run
+    if run is None:
+        return None
+    if not state.optimisation.is_on:
+        if run.verdict is None or run.best is None or run.accepted:
+            return None
+        value = value_text(run.problem, run.best)
+        return Notice(TITLES[run.verdict.status], value, None, (ACCEPT, REVERT))
     if run.phase == "cancelling":
-        return _running("Cancelling …", "", 0.0)
+        return Notice("Cancelling …", "", None, (CANCEL,))
     if not run.iterates:
-        return _running("Starting …", "the first start compiles kernels", 0.0)
+        return Notice("Starting …", "the first start compiles kernels", None, (CANCEL,))
     last = run.iterates[-1]
     step = sum(iterate.run == last.run for iterate in run.iterates) - 1
     start = f"start {last.run + 1} of {run.starts}, " if run.starts > 1 else ""
     broken = f", broken: {last.worst}" if last.spare < 0.0 else ""
-    name = CALLED[run.problem.objective]
-    return _running(
+    return Notice(
         f"{start}{last.phase} {step}".capitalize(),
-        f"{name} {format_number(last.objective, 5)}{broken}",
-        last.run / run.starts,
+        f"{value_text(run.problem, last)}{broken}",
+        last.run / run.starts if run.starts > 1 else None,
+        (CANCEL,),
     )
+
+
+def value_text(problem: Problem, iterate: Iterate) -> str:
+    """Return the name and the value of the objective of an iterate, with its unit."""
+    name = CALLED[problem.objective]
+    if problem.objective == "match-volume":
+        return f"{name} {format_number(iterate.objective, 3, size=1.0)}"
+    unit = CATALOGUE[GOALS[problem.objective]].unit_in("units")
+    return f"{name} {format_number(iterate.objective, 6)} {unit}"
+
+
+def result_words(state: State) -> str:
+    """Return the column of the search as HTML: what can be done, how it goes, what it found.
+
+    At most one of its buttons is filled: what prevents a search comes first, then the answer to
+    a search that succeeded, then the search itself.
+    """
+    run = state.optimisation.run
+    if state.optimisation.is_on:
+        return _running(state)
+    refusals, limits = refuted(state), liftable(state)
+    remedies = _remedies(state, limits)
+    is_success = run is not None and run.is_undecided and run.has_converged
+    verdict = "" if run is None or run.verdict is None else verdict_words(state, run, run.verdict)
+    why = " ".join(sentence(refusal.message) for refusal in refusals)
+    acts = [
+        button(
+            START,
+            state,
+            words="Search again" if run is not None and run.best is not None else "",
+            hint=f"No search can start: {why}" if refusals else "",
+            is_main=not (remedies or refusals or is_success),
+        ),
+    ]
+    if run is None or not run.is_undecided:
+        acts.append(button(PAPER, state))
+    else:
+        acts = [
+            button(ACCEPT, state, is_main=is_success and not remedies),
+            button(REVERT, state),
+            *acts,
+        ]
+    return box(
+        verdict,
+        refused_words(refusals, limits) if refusals else "",
+        f'<div class="ex-flow ex-before">{remedies}</div>' if remedies else "",
+        f'<div class="ex-flow ex-before">{"".join(acts)}</div>',
+        _downloads(state) if run is not None and run.best is not None else "",
+        comparison_table(run) if run is not None and run.best is not None else "",
+        limits_table(state.design),
+    )
+
+
+def _remedies(state: State, limits: Sequence[str]) -> str:
+    """Return the buttons that lift limits, the first one filled, as HTML; "" if none would help."""
+    lifts = [
+        button(LIFT, state, words=LiftLimit(limit).title, value=limit, is_main=index == 0)
+        for index, limit in enumerate(limits)
+    ]
+    if box_on_offer(state) is not None:
+        lifts.append(button(PAPER_BOX, state))
+    return "".join(lifts)
+
+
+def refused_words(refusals: Sequence[Refutation], limits: Sequence[str] = ()) -> str:
+    """Return why no search can start, as HTML.
+
+    Args:
+        refusals: The reasons.
+        limits: Limits that buttons below offer to lift.
+    """
+    body = " ".join(sentence(refusal.message) for refusal in refusals)
+    if any(refusal.limit not in limits for refusal in refusals):
+        body += " Change the demands, or the limits in the tab Design."
+    is_problem = not any(refusal.limit in NO_PROBLEM for refusal in refusals)
+    title = "No design can keep these demands" if is_problem else "This cannot be optimised"
+    return alert(title, body)
+
+
+def _running(state: State) -> str:
+    """Return the progress of the search that is under way, as HTML."""
+    notice = search_notice(state)
+    if notice is None:
+        return ""
+    return box(
+        f'<div class="ex-line"><div class="ex-strong">{escape(notice.title)}</div>'
+        f"{button(CANCEL, state)}</div>",
+        f'<div class="ex-dim ex-cut">{escape(notice.text) or "&nbsp;"}</div>',
+        "" if notice.share is None else meter(100.0 * notice.share),
+        limits_table(state.design),
+    )
+
+
+def _downloads(state: State) -> str:
+    """Return the buttons that download the result, as HTML."""
+    files = ((HULL, "Hull"), (DESIGN, "Design"), (RECORD, "Record"))
+    buttons = "".join(button(name, state, words=words) for name, words in files)
+    return f'<div class="ex-flow ex-before"><span class="ex-dim">Download</span>{buttons}</div>'
 
 
 def verdict_words(state: State, run: Run, verdict: SearchResult) -> str:
@@ -91,10 +219,10 @@ def verdict_words(state: State, run: Run, verdict: SearchResult) -> str:
         remarks.append("accepted")
     if verdict.best is not None and state.design.variables != verdict.best.design.variables:
         remarks.append("changed by hand since")
-    return box(
-        status(title, "within" if verdict.status == "converged" else "beyond"),
-        f"<div>{escape(message)}</div>",
-        f'<div class="ex-dim ex-small">{" · ".join(remarks)}</div>',
+    return (
+        f"{status(title, 'within' if verdict.status == 'converged' else 'beyond')}"
+        f'<div class="ex-before">{escape(message)} '
+        f'<span class="ex-dim">{" · ".join(remarks)}</span></div>'
     )
 
 
@@ -123,7 +251,7 @@ class Row:
 def comparison_table(run: Run) -> str:
     """Return the user's own design and the best one side by side, as HTML."""
     if run.comparison is None:
-        return box(dim("Comparing …"))
+        return dim("Comparing …")
     before, after = run.comparison.before, run.comparison.after
     measures = map(_row, measure_rows(run.problem, before, after))
     both = zip(VARIABLES, before.design.variables, after.design.variables, strict=True)
@@ -131,7 +259,7 @@ def comparison_table(run: Run) -> str:
         _row(Row(name, "Design variable, in design units", old, new), is_first=index == 0)
         for index, (name, old, new) in enumerate(both)
     )
-    return box(table((*measures, *variables), ("", "old", "new", "change")))
+    return table((*measures, *variables), ("", "old", "new", "change"))
 
 
 def measure_rows(problem: Problem, before: Measurements, after: Measurements) -> Iterator[Row]:
@@ -172,7 +300,7 @@ def _look(problem: Problem, name: str, before: Measurements, after: Measurements
     """Return whether a change is good or bad for the problem; None if neither."""
     old, new = before[name] or 0.0, after[name] or 0.0
     # Clearances are exact to this length.
-    accuracy = CERTAIN * (after["reach"] or 0.0)
+    accuracy = CERTAIN * after.design.reach
     if name == "least_clearance":
         return "beyond" if after[name] is not None and new <= accuracy else None
     if name == "demanded_clearance":
@@ -222,14 +350,6 @@ def _number(value: float | None, digits: int) -> str:
 def _change(value: float, digits: int) -> str:
     text = f"{value:+.{digits}f}"
     return "0" if float(text) == 0.0 else set_true_minus(text)
-
-
-def _running(title: str, text: str, share: float) -> str:
-    return box(
-        f'<div class="ex-strong">{escape(title)}</div>',
-        f'<div class="ex-dim ex-cut">{escape(text) or "&nbsp;"}</div>',
-        meter(100.0 * share),
-    )
 
 
 def _pair(legs: tuple[int, int] | None) -> str:

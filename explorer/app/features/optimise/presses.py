@@ -1,0 +1,211 @@
+"""The buttons of the optimiser by name: what they do, and when they can be pressed.
+
+They stand in the markup of its tab, in the palette, and wherever else the page shows them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+
+import viser
+
+from explorer.app.features.designs.files import DesignFile
+from explorer.app.features.feature import Services
+from explorer.app.features.optimise.actions import (
+    Accept,
+    CancelRun,
+    LiftLimit,
+    Revert,
+    StartRun,
+    TakePaperBox,
+    TakePaperProblem,
+)
+from explorer.app.features.optimise.problem import box_on_offer, liftable, refuted
+from explorer.app.features.workspace.files import WorkspaceFiles
+from explorer.app.session.session import Who
+from explorer.app.state.action import Action
+from explorer.app.state.state import State
+from explorer.app.widgets.buttons import press_button
+from explorer.app.widgets.commands import Key, shift, with_keys
+from explorer.optimise.record import encode_record
+
+START, CANCEL = "optimise.start", "optimise.cancel"
+ACCEPT, REVERT = "optimise.accept", "optimise.revert"
+PAPER, PAPER_BOX, LIFT = "optimise.paper", "optimise.box", "optimise.lift"
+HULL, DESIGN, RECORD = "optimise.hull", "optimise.design", "optimise.record"
+
+
+@dataclass(frozen=True)
+class Press:
+    """A button.
+
+    Attributes:
+        label: Words on the button, and its name in the palette.
+        hint: Sentence on what a press does.
+        is_ready: Function that tells whether it can be pressed.
+        action: Function that returns the action of a press from the state and the value of the
+            button; None where a press sends a file.
+        keys: Keys that do the same.
+    """
+
+    label: str
+    hint: str
+    is_ready: Callable[[State], bool]
+    action: Callable[[State, str], Action] | None = None
+    keys: tuple[Key, ...] = ()
+
+
+def _is_idle(state: State) -> bool:
+    return not state.optimisation.is_on
+
+
+def _is_running(state: State) -> bool:
+    run = state.optimisation.run
+    return run is not None and run.phase == "running"
+
+
+def _is_undecided(state: State) -> bool:
+    run = state.optimisation.run
+    return run is not None and run.is_undecided
+
+
+def _has_result(state: State) -> bool:
+    run = state.optimisation.run
+    return run is not None and run.best is not None
+
+
+def _lift(state: State, value: str) -> Action:
+    return LiftLimit(value or next(iter(liftable(state)), ""))
+
+
+PRESSES: Mapping[str, Press] = {
+    START: Press(
+        "Optimise",
+        "Search for the best design from the present one; its limits hold throughout.",
+        lambda state: _is_idle(state) and not refuted(state),
+        lambda _, __: StartRun(),
+        (Key("O"),),
+    ),
+    CANCEL: Press(
+        "Cancel",
+        "End the search, and keep the best so far.",
+        _is_running,
+        lambda _, __: CancelRun(),
+        (shift("O"),),
+    ),
+    ACCEPT: Press("Accept", "Keep the new design.", _is_undecided, lambda _, __: Accept()),
+    REVERT: Press(
+        "Revert",
+        "Return to your own design in its pose.",
+        _is_undecided,
+        lambda _, __: Revert(),
+    ),
+    PAPER: Press(
+        "The paper's problem",
+        "Open the paper's initial design within the box of its optimum, and ask for its volume of "
+        "8000 with a clearance of 0.2; one undo brings your design back.",
+        _is_idle,
+        lambda _, __: TakePaperProblem(),
+    ),
+    PAPER_BOX: Press(
+        "Take the paper's box",
+        "Bound b4 by the box of the paper's optimum; one undo brings yours back.",
+        lambda state: box_on_offer(state) is not None,
+        lambda _, __: TakePaperBox(),
+    ),
+    LIFT: Press(
+        "Lift the limit",
+        "Take the limit that prevents the search out of the design; one undo brings it back.",
+        lambda state: bool(liftable(state)),
+        _lift,
+    ),
+    HULL: Press(
+        "Download the hull",
+        "Download the convex hull of the workspace as 3MF; Export has other formats.",
+        _has_result,
+    ),
+    DESIGN: Press(
+        "Download the design", "Download the design as a file to open again.", _has_result
+    ),
+    RECORD: Press(
+        "Download the record", "Download the record to repeat the search from.", _has_result
+    ),
+}
+"""The buttons by their names."""
+
+
+class OptimisePresses:
+    """Registers the buttons of the optimiser, and offers them in the palette."""
+
+    def __init__(self, services: Services) -> None:
+        self._session = services.session
+        self._downloads = services.downloads
+        self._complain = services.complain
+        self._sends: Mapping[str, Callable[[Who], None]] = {
+            HULL: partial(services.get(WorkspaceFiles).send_hull_at_home, "3mf"),
+            DESIGN: services.get(DesignFile).send,
+            RECORD: self._send_record,
+        }
+        for name, press in PRESSES.items():
+            services.buttons.on(name, self._handler(name, press))
+            services.buttons.offer(
+                f"Optimise › {press.label}",
+                press.hint,
+                name,
+                is_ready=lambda press=press: press.is_ready(self._session.state),
+            )
+
+    def _handler(self, name: str, press: Press) -> Callable[[str, viser.ClientHandle], None]:
+        action = press.action
+
+        def send(_: str, client: viser.ClientHandle) -> None:
+            self._sends[name](client.client_id)
+
+        def do(value: str, client: viser.ClientHandle) -> None:
+            if action is not None:
+                change = action
+                self._session.post(
+                    object(), lambda state: change(state, value), who=client.client_id
+                )
+
+        return send if name in self._sends else do
+
+    def _send_record(self, who: Who) -> None:
+        state = self._session.state
+        record = state.optimisation.record
+        if record is None:
+            self._complain("a search that had to be ended leaves no record", who)
+            return
+        self._downloads.send(who, f"{state.design.name}.record.json", encode_record(record))
+
+
+def button(
+    name: str,
+    state: State,
+    *,
+    words: str = "",
+    value: str = "",
+    hint: str = "",
+    is_main: bool = False,
+) -> str:
+    """Return a button as HTML, disabled where it cannot be pressed.
+
+    Args:
+        name: Name of the button, out of `PRESSES`.
+        state: The present state.
+        words: Words on the button; its label if "".
+        value: Value that its handler receives.
+        hint: Sentence on what a press does; that of the button if "".
+        is_main: Whether it is the filled one of several.
+    """
+    press = PRESSES[name]
+    return press_button(
+        name,
+        value,
+        words or press.label,
+        hint=with_keys(hint or press.hint, press.keys),
+        class_name="ex-button is-main" if is_main else "ex-button",
+        is_disabled=not press.is_ready(state),
+    )
