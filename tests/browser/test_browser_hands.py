@@ -24,8 +24,8 @@ from explorer.mechanism.design_file import PRESETS
 SIZES = ((1280, 720), (1024, 768), (768, 1024))
 LEAST_SHARE = 0.4
 RIGHT = ("Move", "Design", "Workspace", "Optimise", "View")
-LEFT = ("Singularity", "Workspace", "Legs", "Paths")
-DRAWER = ("Compare", "History", "Share")
+LEFT = ("Singularity", "Workspace", "Legs")
+DRAWER = ("Paths", "Compare", "History", "Share")
 
 # Controls that stick out of what holds them, or of the page, to the left or to the right.
 CUT_OFF = """() => {
