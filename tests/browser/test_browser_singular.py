@@ -84,7 +84,7 @@ def test_paths_are_gone_along_planned_and_saved(tab: Tab, monkeypatch: pytest.Mo
     expect(tab.page.get_by_text("Both ends are in mode 1")).to_be_visible()
     tab.push("Go")
     tab.page.get_by_text("Planned path of").wait_for()
-    expect(tab.page.get_by_text("No singular pose on the path;")).to_be_visible()
+    expect(tab.page.get_by_text("No singular pose;")).to_be_visible()
     with tab.page.expect_download() as download:
         tab.push("Export CSV")
     assert download.value.suggested_filename == "paper-optimal-path.csv"

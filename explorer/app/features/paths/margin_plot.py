@@ -148,7 +148,7 @@ def crossing_words(journey: Journey) -> str:
         least = np.abs(along_path.margins).min(axis=0)
         index = int(least.argmin())
         return (
-            f'<div class="ex-within">No singular pose on the path; least |δ{index + 1}| = '
+            f'<div class="ex-within">No singular pose; least |δ{index + 1}| = '
             f"{format_number(float(least[index]), 3)} units</div>"
         )
     more = len(places) - MOST_LISTED
