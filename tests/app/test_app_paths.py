@@ -8,10 +8,11 @@ import signal
 import time
 from collections.abc import Callable, Generator
 from dataclasses import replace
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
 import numpy as np
 import pytest
+import viser
 from desk import Desk
 from hypothesis import given, strategies as st
 from services import StubDownloads, services_for
@@ -27,7 +28,12 @@ from explorer.app.features.paths.actions import (
     ends_of,
     goal_of,
 )
-from explorer.app.features.paths.margin_plot import columns_of, crossing_time, crossing_words
+from explorer.app.features.paths.margin_plot import (
+    MarginPlot,
+    columns_of,
+    crossing_time,
+    crossing_words,
+)
 from explorer.app.features.paths.panel import (
     ENDS,
     MODES,
@@ -272,6 +278,23 @@ def test_the_chart_shows_the_margins_over_time(first: int, last: int, at: float)
     assert x[np.isfinite(now)].tolist() == [journey.at, journey.at]
 
 
+def test_chart_is_there_and_empty_while_there_is_no_path(services: Services) -> None:
+    plot = MarginPlot(services.gui)
+    without, watched_one = (
+        {
+            name: value
+            for handle, name, value in plot.updates(Frame(state))
+            if isinstance(handle, viser.GuiUplotHandle)
+        }
+        for state in (opened(OPTIMAL), watched(1, 5))
+    )
+    for shown in (without, watched_one):
+        assert shown["visible"] is True
+    empty, full = (cast("tuple[Any, ...]", shown["data"]) for shown in (without, watched_one))
+    assert len(empty) == len(full)
+    assert all(np.isnan(column).all() for column in empty[1:])
+
+
 def test_the_path_and_its_crossings_are_drawn(services: Services) -> None:
     scene = PathScene(services)
     state = watched(1, 7)
@@ -305,7 +328,9 @@ def test_a_plan_is_made_in_a_process_of_its_own_and_keeps_everything(bench: Benc
     assert state.paths.problem is None
     journey = journey_of(state)
     assert journey.kind == "planned"
-    assert state.pose == journey.poses[0] == opened(OPTIMAL).pose
+    assert journey.poses[0] == opened(OPTIMAL).pose
+    # It is played at once, as a straight one.
+    assert bench.wait(lambda state: journey_of(state).at > 0.0).pose != GOAL
     assert journey.poses[-1] == GOAL
     assert not journey.margins.crossings
     least = np.abs(journey.margins.margins).min(axis=0)

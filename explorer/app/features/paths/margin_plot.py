@@ -36,12 +36,14 @@ COLOURS: tuple[Rgb, Rgb, Rgb] = (BLUE, TEAL, VIOLET)
 DASHES: tuple[tuple[float, ...], ...] = ((), (7.0, 3.0), (2.0, 3.0))
 STROKES = ("ex-stroke", "ex-stroke is-dashed", "ex-stroke is-dotted")
 HEIGHT = 112
+# Columns of the chart while there is no path: a second without values.
+EMPTY = (np.array([0.0, 1.0]), *(np.full(2, np.nan) for _ in range(6)))
 # Number of crossings that are listed; the others are counted.
 MOST_LISTED = 4
 
 
 class MarginPlot:
-    """The chart and its legend, hidden while there is no path."""
+    """The chart and its legend, empty while there is no path."""
 
     def __init__(self, gui: viser.GuiApi) -> None:
         # The slider above names the horizontal axis.
@@ -69,16 +71,17 @@ class MarginPlot:
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that make the chart and its legend show the frame."""
         journey = frame.state.journey
-        for handle in (self._chart, self._legend):
-            yield handle, "visible", journey is not None
-        if journey is None:
-            return
-        columns = columns_of(journey)
+        columns = EMPTY if journey is None else columns_of(journey)
         # The line at the present time goes from bottom to top.
-        top = float(np.nanmax(columns[-1]))
+        top = 1.0 if journey is None else float(np.nanmax(columns[-1]))
         yield self._chart, "scales", _scales(float(columns[0][-1]), top)
         yield self._chart, "data", columns
-        yield self._legend, "content", margin_legend(journey)
+        # viser's chart draws no numbers below it if it appears while it is given data time after
+        # time; so it does not wait for a path that is played at once.
+        yield self._chart, "visible", True
+        yield self._legend, "visible", journey is not None
+        if journey is not None:
+            yield self._legend, "content", margin_legend(journey)
 
 
 def columns_of(journey: Journey) -> tuple[NDArray[Any], ...]:
@@ -145,7 +148,7 @@ def crossing_words(journey: Journey) -> str:
         least = np.abs(along_path.margins).min(axis=0)
         index = int(least.argmin())
         return (
-            f'<div class="ex-within">No singular pose on the path; least |δ{index + 1}| = '
+            f'<div class="ex-within">No singular pose; least |δ{index + 1}| = '
             f"{format_number(float(least[index]), 3)} units</div>"
         )
     more = len(places) - MOST_LISTED

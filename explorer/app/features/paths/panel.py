@@ -80,6 +80,12 @@ class PathsPanel:
                 end: self._add_end(gui, end) for end in ENDS
             }
             self._kinds = gui.add_html("")
+            self.go = self._controls.button(
+                "Go",
+                "Make the path from the start to the goal, and play it.",
+                Go,
+                icon=viser.Icon.ROUTE,
+            )
             self._controls.number(
                 "Time limit (s)",
                 "Time after which the search for a path stops without one.",
@@ -88,13 +94,6 @@ class PathsPanel:
                 step=0.1,
                 visible=lambda state: state.paths.kind == "planned",
             )
-            self.go = self._controls.button(
-                "Go",
-                "Make the path from the start to the goal, and play it.",
-                Go,
-                icon=viser.Icon.ROUTE,
-            )
-            self._status = gui.add_html("", visible=False)
         with gui.add_folder("Playback"):
             self._title = gui.add_html("")
             self.time = self._controls.slider(
@@ -121,11 +120,7 @@ class PathsPanel:
                 yield handle, "content", end_numbers(state, end)
         yield self._kinds, "content", kind_words(state)
         yield self.go, "disabled", state.paths.is_planning
-        status = plan_words(state)
-        yield self._status, "visible", status is not None
-        if status is not None:
-            yield self._status, "content", status
-        yield self._title, "content", path_title(state)
+        yield self._title, "content", plan_words(state) or path_title(state)
         yield from self._plot.updates(frame)
         yield from self._controls.updates(frame)
 

@@ -70,7 +70,8 @@ class PathRunner(Runner):
         def take_path(path: PlannedPath) -> None:
             moves = len(path.poses) - 1
             title = f"Planned path of {moves} {'move' if moves == 1 else 'moves'}"
-            self._finish(request, Journey("planned", title, design, path.poses), None)
+            journey = Journey("planned", title, design, path.poses, is_playing=True)
+            self._finish(request, journey, None)
 
         self._order = self.worker.submit(
             "plan",

@@ -13,9 +13,9 @@ from explorer.app.features.studies.actions import (
     OpenStudy,
     PickDesign,
 )
-from explorer.app.features.studies.feed import StudyDrawing, StudyFeed
+from explorer.app.features.studies.feed import StudyDrawing
 from explorer.app.features.studies.plots import HINT, StudyPlots
-from explorer.app.features.studies.runner import Run, StudyRunner
+from explorer.app.features.studies.runner import Run, study_feed, study_runner
 from explorer.app.features.studies.words import ALONG, acts, chips, head, legend, table
 from explorer.app.session.session import Who
 from explorer.app.state.action import Action
@@ -51,8 +51,6 @@ class StudiesPanel:
     """The plots, legend and table of the open study, and the controls of a new one."""
 
     def __init__(self, services: Services) -> None:
-        if services.studies is None:
-            raise RuntimeError("a page without folders of studies has no panel for them")
         gui, session, none = services.gui, services.session, (NO_OPTION,)
         gui.add_html(beside(2))
         self._services = services
@@ -92,10 +90,7 @@ class StudiesPanel:
         points_after = gui.add_html(beside(2, wide=True))
         self.plots = StudyPlots(services, self.pick, (lines_after, points_after))
         self.table = gui.add_html("")
-        self.feed = StudyFeed(services.studies, session.redraw)
-        self.runner = StudyRunner(session, self.feed, services.complain, services.faults)
-        services.at_end(self.feed.stop)
-        services.at_end(self.runner.stop)
+        self.feed, self.runner = services.get(study_feed), services.get(study_runner)
         self._add_buttons(services.buttons)
         self._key: tuple[object, ...] = ()
 

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from explorer.app.features.feature import Services
 from explorer.app.features.studies import tasks
 from explorer.app.features.studies.actions import OpenStudy
 from explorer.app.features.studies.feed import StudyFeed
@@ -49,6 +50,31 @@ class Run:
     def share(self) -> float:
         """The share of the designs that are done, from 0 to 1."""
         return 0.0 if self.progress is None else self.progress.done / self.progress.total
+
+
+def study_feed(services: Services) -> StudyFeed:
+    """Return the drawings of the studies of a page; for `Services.get`.
+
+    Raises:
+        RuntimeError: the page offers no studies.
+    """
+    if services.studies is None:
+        raise RuntimeError("a page without folders of studies draws none")
+    feed = StudyFeed(services.studies, services.session.redraw)
+    services.at_end(feed.stop)
+    return feed
+
+
+def study_runner(services: Services) -> StudyRunner:
+    """Return the runner of the studies of a page; for `Services.get`.
+
+    Raises:
+        RuntimeError: the page offers no studies.
+    """
+    feed = services.get(study_feed)
+    runner = StudyRunner(services.session, feed, services.complain, services.faults)
+    services.at_end(runner.stop)
+    return runner
 
 
 class StudyRunner:
