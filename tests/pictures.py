@@ -254,7 +254,6 @@ def draw_studies(browser: Browser) -> bytes:
             page, client = open_page(browser, running, (1280, 1000))
             page.get_by_role("tab", name="Studies", exact=True).click()
             page.locator(".js-plotly-plot").nth(1).wait_for()
-            page.get_by_title("Make the drawer taller, or lower again").click()
             settle(page, client)
             running.page.point_cameras("isometric")
             settle(page, client)

@@ -8,7 +8,7 @@ import time
 import viser
 
 from explorer.app.browser.browser_facts import BrowserFacts, ask_browser
-from explorer.app.browser.viser_gaps import dock_below_in, run_script
+from explorer.app.browser.viser_gaps import dock_above_in, panel_in, run_script
 from explorer.app.features.feature import Place, Tab
 from explorer.app.look import read_script
 from explorer.app.scene.camera import Cameras
@@ -18,7 +18,7 @@ from explorer.app.widgets.theme import Theme
 SETTLE_SECONDS = 0.7
 # Number of times that a new browser's camera is placed again, and the longest pause in seconds.
 MOST_LOOKS, LONGEST_PAUSE_SECONDS = 12, 5.0
-# Width and height of a window in pixels: in a narrower one the left panel goes below the right
+# Width and height of a window in pixels: in a narrower one the left panel goes above the right
 # one, which leaves the scene room, if the window is high enough for both.
 NARROW, HIGH_ENOUGH = 1100, 700
 # Widths of the panels on the left and on the right, and height of the open drawer, in pixels.
@@ -59,19 +59,26 @@ class Panels:
         self._dialogs.append(dialog)
         return dialog
 
-    def lay_out(self) -> None:
-        """Put the panels into their places, as they are at first; dialogs are closed."""
-        self._gui.main_panel.float()
-        self.build.dock_left()
-        self.build.set_width(LEFT_WIDTH)
-        self.analyse.dock_right()
-        self.analyse.set_width(RIGHT_WIDTH)
-        self.work.float(x=0, y=-1, width=ANY_WIDTH, height=DRAWER_HEIGHT)
-        self.work.minimize()
+    def lay_out(self, client: viser.ClientHandle | None = None) -> None:
+        """Put the panels into their places, as they are at first.
+
+        Args:
+            client: The browser; None for all, also those to come.
+        """
+
+        def of(panel: viser.PanelHandle) -> viser.PanelHandle:
+            return panel if client is None else panel_in(client, panel)
+
+        of(self.build).dock_left()
+        of(self.build).set_width(LEFT_WIDTH)
+        of(self.analyse).dock_right()
+        of(self.analyse).set_width(RIGHT_WIDTH)
+        of(self.work).float(x=0, y=-1, width=ANY_WIDTH, height=DRAWER_HEIGHT)
+        of(self.work).minimize()
 
     def narrow(self, client: viser.ClientHandle) -> None:
-        """Put the left panel below the right one in a browser whose window is narrow."""
-        dock_below_in(client, self.build, self.analyse)
+        """Put the left panel above the right one in a browser whose window is narrow."""
+        dock_above_in(client, self.build, self.analyse)
 
 
 class Layout:
@@ -100,6 +107,16 @@ class Layout:
             run_script(server, read_script("places", titles))
         server.on_client_connect(self._connected)
 
+    def reset(self, client: viser.ClientHandle) -> None:
+        """Put the panels of a browser into the places that they have at first."""
+        if self._panels is not None:
+            self._panels.lay_out(client)
+            ask_browser(client, lambda facts: self._make_room(client, facts))
+
+    def _make_room(self, client: viser.ClientHandle, facts: BrowserFacts) -> None:
+        if self._panels is not None and is_narrow(facts):
+            self._panels.narrow(client)
+
     def _connected(self, client: viser.ClientHandle) -> None:
         ask_browser(client, lambda facts: self._answered(client, facts))
 
@@ -110,8 +127,7 @@ class Layout:
         ).start()
 
     def _suit(self, client: viser.ClientHandle, facts: BrowserFacts) -> None:
-        if self._panels is not None and is_narrow(facts):
-            self._panels.narrow(client)
+        self._make_room(client, facts)
         self._theme.follow_browser(dark=facts.dark)
         # Some browsers report the size of the scene before its panels are laid out, and not again
         # before the camera moves; slow ones miss where it is put. Each try makes them report.

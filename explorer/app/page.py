@@ -33,7 +33,7 @@ from explorer.app.storage.study_folders import StudyFolders
 from explorer.app.storage.user_data import UserData
 from explorer.app.widgets.assigning import QUIET_SECONDS, Assigner, Update
 from explorer.app.widgets.buttons import Buttons
-from explorer.app.widgets.palette import Palette
+from explorer.app.widgets.palette import Command, Palette
 from explorer.app.widgets.theme import Theme
 from explorer.numerics.arrays import FloatArray
 
@@ -140,8 +140,8 @@ class Page:
         ]
         self.services.cameras.frame_first()
         self._panels = self._add_panels()
-        self.palette = self._add_palette()
-        Layout(server, theme, self.services.cameras, self.panels if panels else None)
+        layout = Layout(server, theme, self.services.cameras, self.panels if panels else None)
+        self.palette = self._add_palette(layout)
         server.on_client_connect(self.services.cameras.connected)
         server.on_client_disconnect(self.services.cameras.disconnected)
         server.on_client_connect(lambda client: listen(client, presses))
@@ -196,11 +196,14 @@ class Page:
                 panels.append(self.services.get(tab.panel))
         return panels
 
-    def _add_palette(self) -> Palette:
+    def _add_palette(self, layout: Layout) -> Palette:
+        reset = Command(
+            "View › Reset layout", "Put the panels where they were at first.", layout.reset
+        )
         commands = [each.of(self.session) for one in self._features for each in one.commands]
         keys = {name: each for one in self._features for name, each in one.keys.items()}
         lists = {label for feature in self._features for label in feature.lists}
-        return Palette(self._server, (*self.buttons.commands, *commands), keys, lists)
+        return Palette(self._server, (*self.buttons.commands, reset, *commands), keys, lists)
 
     def _draw(self, frame: Frame) -> None:
         if not self._is_complete:

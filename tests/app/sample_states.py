@@ -19,7 +19,7 @@ from explorer.app.features.optimise.actions import (
     EndRun,
     StartRun,
 )
-from explorer.app.features.paths.actions import Plan, Play, SetPathTime, StoreEnd, WatchModes
+from explorer.app.features.paths.actions import Go, Play, SetPathTime
 from explorer.app.features.singularity.actions import Jog
 from explorer.app.features.studies.actions import BrushAxis
 from explorer.app.session.gestures import UserAction
@@ -47,6 +47,7 @@ from explorer.measures.catalogue import measures_in
 from explorer.measures.measurements import measure_design
 from explorer.mechanism.design import VARIABLES, Limits
 from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.pose import Pose
 from explorer.optimise.outcome import Iterate
 from explorer.optimise.problem import YAW
 from explorer.optimise.record import Record, RunRecord, Settings, step_of
@@ -165,12 +166,14 @@ MAKERS: tuple[Make, ...] = (
     _limited,
     _view,
     lambda state, i, share: Jog(i, _length(share)),
-    lambda state, i, share: WatchModes(),
+    lambda state, i, share: Go(),
     lambda state, i, share: SetPathTime(8.0 * share),
     lambda state, i, share: Play(on=i > 2),
-    lambda state, i, share: StoreEnd("start" if i > 2 else "goal"),
-    lambda state, i, share: Change("paths", {"modes": (i, 7 - i), "seconds": 1e-3 + share}),
-    lambda state, i, share: Plan(),
+    lambda state, i, share: Change("paths", {"start": (None, i, state.pose)[i % 3]}),
+    lambda state, i, share: Change("paths", {"goal": (None, 7 - i, state.pose)[i // 2]}),
+    lambda state, i, share: Change(
+        "paths", {"kind": "straight" if i > 2 else "planned", "seconds": 1e-3 + share}
+    ),
     _wish,
     lambda state, i, share: StartRun(),
     lambda state, i, share: Advance(state.optimisation.count, iterates_of(state, i)),
@@ -230,6 +233,7 @@ def rich_state() -> State:
     """Return a state in which every saved value differs from that of a new state."""
     limits = _limits(2, 1 / 3)
     home = opened(OPTIMAL).pose
+    beyond = Pose((11.1, *home.position[1:]), home.quaternion)
     state = opened(msgspec.structs.replace(OPTIMAL, name="é «one»", limits=limits, home=home))
     request = vars(varied(OptimisationRequest())) | {
         "volume": 1e4 / 3,
@@ -240,16 +244,16 @@ def rich_state() -> State:
         Change("optimisation.request", request),
         SetVariable("b2", 2.7),
         Change("", {"view": varied(View()), "hold": "legs"}),
-        StoreEnd("start"),
         SetPosition(0, 11.1),
-        StoreEnd("goal"),
-        Change("paths", {"modes": (3, 5), "seconds": 1 / 3}),
+        Change("paths", {"start": home, "goal": beyond, "seconds": 1 / 3}),
         StartRun(),
         lambda state: _end(state, 6),
         Accept(),
         Jog(2, 1 / 3),
-        WatchModes(),
+        Change("paths", {"start": 3, "goal": 5}),
+        Go(),
         SetPathTime(10 / 3),
+        Change("paths", {"start": home, "goal": beyond, "kind": "planned"}),
         Pin(OPTIMAL),
         Change("compared", {"look": varied(Look())}),
         Change("", {"studies": varied(Studies())}),

@@ -41,7 +41,7 @@ class Browser:
         look_at = np.zeros(3)
 
         def __init__(self) -> None:
-            self.updated: Any = lambda _: None
+            self.updated: Any = print
 
         def on_update(self, callback: Any) -> None:
             self.updated = callback

@@ -25,12 +25,12 @@ from explorer.app.features.listed import FEATURES
 from explorer.app.features.optimise.actions import Advance as ShowIterates, Compare, EndRun
 from explorer.app.features.paths.actions import (
     Advance as PlayOn,
-    ChooseModes,
     SetPathTime,
     TakePlan,
 )
 from explorer.app.features.singularity.actions import Jog
 from explorer.app.features.studies.actions import BrushAxis, BrushBox, PickDesign
+from explorer.app.features.view.camera_buttons import HINTS as CAMERA_HINTS
 from explorer.app.server import Running, start
 from explorer.app.session.gestures import UserAction
 from explorer.app.session.session import UNDO, Session
@@ -67,7 +67,6 @@ OF_VALUES = {
     Jog: "sliders of one margin",
     SetVariable: "sliders of the design",
     SetName: "the name of a design",
-    ChooseModes: "lists of the path's ends",
     SetPathTime: "slider of the time",
     PickDesign: "points of a study's plots",
     BrushAxis: "brushes of a study's plots",
@@ -78,15 +77,15 @@ OF_VALUES = {
 OF_NOBODY = (UserAction, MarkSaved, ShowIterates, PlayOn, EndRun, Compare, TakePlan)
 """Actions that nobody asks for: they tell of what goes on, or stand for another."""
 
-OF_BROWSERS = {f"View › {view}" for view in ("Isometric", "Front", "Side", "Top", "Fit")}
-"""Commands that change the camera of one browser, which there is none of."""
+OF_BROWSERS = {f"View › {name}" for name in (*CAMERA_HINTS, "Reset layout")}
+"""Commands that change the camera or the panels of one browser, which there is none of."""
 
 WHERE_IT_IS_SHOWN = {StartThere: "Workspace › Go there"}
 """Actions of commands that do nothing unless something is shown."""
 
 CHOSEN_IN_THE_PANEL = {
-    "From",
-    "To",
+    "Start",
+    "Goal",
     "Format",
     "Size (px)",
     "Pin another design",

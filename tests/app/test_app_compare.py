@@ -7,6 +7,7 @@ import time
 from dataclasses import fields, replace
 from html import unescape
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -21,7 +22,7 @@ from explorer.app.features.compare.bars import DRAWN, bars
 from explorer.app.features.compare.columns import Column, best_of, columns_of, notes, value_text
 from explorer.app.features.compare.drawing import ComparedRequest, compared_drawing
 from explorer.app.features.compare.feed import LIVE, CompareFeed
-from explorer.app.features.compare.panel import ComparePanel
+from explorer.app.features.compare.panel import MOST_BUTTONS, ComparePanel
 from explorer.app.features.compare.scene import APART, ComparedScene
 from explorer.app.features.compare.table import table
 from explorer.app.features.designs.saved_designs import SavedDesigns
@@ -88,7 +89,8 @@ def cells(html: str) -> dict[str, list[str]]:
         first, *rest = (
             unescape(re.sub("<.*?>", "", cell)) for cell in re.findall(r"<td.*?</td>", row)
         )
-        found[first] = rest[::2]
+        # Behind each value but that of the live design stands its difference to that.
+        found[first] = [rest[0], *rest[1::2]]
     return found
 
 
@@ -385,12 +387,13 @@ def test_panel_pins_opens_unpins_and_switches(
     desk.press(buttons, "compare.pin")
     assert desk.state.compared.pinned == (own, None, None)
     options = (NO_OPTION, "variant 7", *PRESETS)
-    given = [
-        value
+    given = {
+        name: value
         for handle, name, value in panel.updates(Frame(desk.state))
-        if handle is panel.another and name == "options"
-    ]
-    assert given == [options]
+        if handle is panel.another
+    }
+    # Few designs have a button each, and need no list.
+    assert (given["options"], given["visible"]) == (options, False)
     panel.another.options = options
     desk.use(panel.another, "variant 7")
     assert desk.state.compared.pinned == (own, variant(7), None)
@@ -409,6 +412,56 @@ def test_panel_pins_opens_unpins_and_switches(
     assert desk.state.compared.look == Look(shows="bars", overlay=True)
     desk.press(buttons, "compare.unpin", "A")
     assert desk.state.compared.pinned == (None, variant(7), None)
+
+
+def content_of(panel: ComparePanel, state: State) -> str:
+    contents: list[Any] = [
+        value for handle, _, value in panel.updates(Frame(state)) if handle is panel.html
+    ]
+    return contents[-1]
+
+
+def test_each_design_is_pinned_by_one_press(services: Services, desk: Desk) -> None:
+    panel = ComparePanel(services)
+    words = content_of(panel, desk.state)
+    assert "Pin this design, then change it" in words
+    assert re.findall('data-press="compare.pin" data-value="([^"]*)"', words) == ["paper-initial"]
+    desk.press(services.buttons, "compare.pin", "paper-initial")
+    assert desk.state.compared.pinned == (INITIAL, None, None)
+    # Nor is a design offered that is there already, under whatever name.
+    desk.session.do(Open(msgspec.structs.replace(OPTIMAL, name="other")))
+    assert 'data-value="paper' not in content_of(panel, desk.state)
+    desk.press(services.buttons, "compare.pin", "nothing of this name")
+    assert desk.state.compared.pinned == (INITIAL, None, None)
+    assert desk.complaints == []
+
+
+def test_many_designs_are_pinned_from_a_list(
+    server: viser.ViserServer, desk: Desk, buttons: Buttons, tmp_path: Path
+) -> None:
+    user_data = UserData(Library(tmp_path / "designs"), SessionFile())
+    for index in range(MOST_BUTTONS):
+        user_data.library.save(f"variant {index}", variant(index))
+    services = services_for(server, desk.session, buttons=buttons, user_data=user_data)
+    assert services.get(SavedDesigns).wait_until_idle()
+    panel = ComparePanel(services)
+    updates = [*panel.updates(Frame(desk.state))]
+    assert (panel.another, "visible", True) in updates
+    assert "variant" not in content_of(panel, desk.state)
+
+
+def test_progress_counts_the_designs_that_are_measured(
+    services: Services, feed: CompareFeed, worker: StubWorker
+) -> None:
+    state = compared(INITIAL, variant(2))
+    feed.follow(Frame(state))
+    panel = ComparePanel(services)
+    assert "measured: 0 of 3" in content_of(panel, state)
+    worker.work()
+    assert "measured:" not in content_of(panel, state)
+    changed = SetVariable("b2", 2.3).apply(state)
+    feed.follow(Frame(changed))
+    assert "measured: 2 of 3" in content_of(panel, changed)
 
 
 def test_the_worker_finds_the_columns() -> None:

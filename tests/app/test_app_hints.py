@@ -31,7 +31,7 @@ WITHOUT_UNIT = {
     "Starts": "a count of designs",
     "Exploded": "a share, from 0 to 1",
     "Go to step": "the number of a step",
-    "Designs": "a count of designs",
+    "Number of designs": "a count of designs",
     "Name": "a name",
 }
 """Controls of values that have no unit, and what they are."""

@@ -14,7 +14,7 @@ from hypothesis import given, strategies as st
 
 import explorer.app
 from explorer.app.features.optimise.actions import CancelRun, EndRun, StartRun
-from explorer.app.features.paths.actions import Advance, Play, SetPathTime, WatchModes
+from explorer.app.features.paths.actions import Advance, Go, Play, SetPathTime
 from explorer.app.features.singularity.actions import GoToSingularity, GoToStratum, Jog
 from explorer.app.features.studies.actions import BrushAxis, OpenStudy
 from explorer.app.session.gestures import PAUSE_SECONDS, UserAction
@@ -56,7 +56,7 @@ actions = st.one_of(
     st.builds(Jog, st.integers(0, 5), st.floats(-3.0, 3.0)),
     st.builds(GoToSingularity, st.sampled_from([None, 1, 2, 3])),
     st.sampled_from([GoHome(), Reset(), Play(on=True), Play(on=False), Advance(0.5)]),
-    st.builds(WatchModes),
+    st.builds(Go),
     st.builds(SetPathTime, st.floats(0.0, 9.0)),
 )
 
@@ -176,7 +176,7 @@ def test_oldest_steps_are_dropped_and_the_others_keep_their_numbers(recorder: Re
 
 
 def test_playing_path_belongs_to_the_step_that_began_it(recorder: Recorder) -> None:
-    recorder.do(WatchModes())
+    recorder.do(Go())
     for _ in range(5):
         recorder.do(Advance(0.3), "player", 1.0)
     assert len(recorder.words) == 1

@@ -1,4 +1,4 @@
-"""Paths on the page: between modes, planned, played, plotted and exported; no browser."""
+"""Paths on the page: straight, planned, played, plotted and exported; no browser."""
 
 from __future__ import annotations
 
@@ -7,28 +7,38 @@ import os
 import signal
 import time
 from collections.abc import Callable, Generator
-from typing import Any
+from dataclasses import replace
+from typing import Any, Literal
 
 import numpy as np
 import pytest
 from desk import Desk
+from hypothesis import given, strategies as st
 from services import StubDownloads, services_for
 
 from explorer.app.features.feature import Services
 from explorer.app.features.paths.actions import (
     Advance,
     CancelPlan,
-    ChooseModes,
-    Plan,
+    Go,
     Play,
     SetPathTime,
-    StoreEnd,
     TakePlan,
-    WatchModes,
-    chosen_modes,
+    ends_of,
+    goal_of,
 )
-from explorer.app.features.paths.margin_plot import columns_of, crossing_time, path_words
-from explorer.app.features.paths.panel import PathsPanel, ends_table, plan_words
+from explorer.app.features.paths.margin_plot import columns_of, crossing_time, crossing_words
+from explorer.app.features.paths.panel import (
+    ENDS,
+    MODES,
+    PRESENT,
+    TYPED,
+    PathsPanel,
+    end_numbers,
+    kind_words,
+    plan_words,
+    typed_numbers,
+)
 from explorer.app.features.paths.runner import DIED, PathRunner
 from explorer.app.features.paths.scene import PathScene
 from explorer.app.features.paths.tasks import plan
@@ -36,8 +46,11 @@ from explorer.app.scene.placing import Placed
 from explorer.app.session.session import Session
 from explorer.app.state.actions import Set, SetPose, SetPosition, SetVariable
 from explorer.app.state.frame import Frame
-from explorer.app.state.paths import MODES_SECONDS, Journey
-from explorer.app.state.state import State, joints_of, opened
+from explorer.app.state.paths import STRAIGHT_SECONDS, End, Journey
+from explorer.app.state.state import State, angles_of, joints_of, opened
+from explorer.app.state.values import value_at
+from explorer.app.widgets.assigning import Assigner
+from explorer.app.widgets.pieces import widgets
 from explorer.errors import ExplorerError, InputError
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.kinematics import forward
@@ -88,9 +101,12 @@ def bench() -> Generator[Bench]:
     made.runner.stop()
 
 
+def with_ends(state: State, start: End = None, goal: End = None) -> State:
+    return replace(state, paths=replace(state.paths, start=start, goal=goal))
+
+
 def watched(first: int, last: int, pose: Pose = TILTED) -> State:
-    state = ChooseModes(first, last).apply(opened(OPTIMAL, pose))
-    return WatchModes().apply(state)
+    return Go().apply(with_ends(opened(OPTIMAL, pose), first, last))
 
 
 def journey_of(state: State) -> Journey:
@@ -98,12 +114,12 @@ def journey_of(state: State) -> Journey:
     return state.journey
 
 
-def with_ends(goal: Pose = GOAL) -> State:
-    state = StoreEnd("start").apply(opened(OPTIMAL))
-    return StoreEnd("goal").apply(SetPose(goal).apply(state))
+def to_plan(goal: Pose = GOAL) -> State:
+    state = with_ends(opened(OPTIMAL), None, goal)
+    return Set("paths.kind", "planned").apply(state)
 
 
-# Between modes
+# Straight paths
 
 
 @pytest.mark.parametrize(("first", "last"), list(itertools.permutations(range(0, 8, 3), 2)))
@@ -127,27 +143,63 @@ def test_a_path_between_modes_leads_from_one_to_the_other_with_the_same_joints(
     # Every margin whose sign differs is crossed, and told.
     crossed = {c.incidence for c in journey.margins.crossings if c.changes_sign}
     assert {i for i, bit in enumerate((4, 2, 1), 1) if (first ^ last) & bit} <= crossed
-    words = path_words(journey)
+    words = crossing_words(journey)
     for incidence in crossed:
         assert f"δ{incidence} = 0" in words
 
 
-def test_the_modes_are_the_present_one_and_its_neighbour_until_they_are_chosen() -> None:
+@pytest.mark.parametrize(
+    ("start", "goal"), [(None, GOAL), (TILTED, GOAL), (GOAL, 5), (2, GOAL), (None, None), (None, 6)]
+)
+def test_straight_path_leads_between_any_two_ends(start: End, goal: End) -> None:
+    before = with_ends(opened(OPTIMAL, TILTED), start, goal)
+    expected = ends_of(before)
+    state = Go().apply(before)
+    journey = journey_of(state)
+    assert (journey.kind, journey.poses) == ("straight", expected)
+    assert journey.poses[0] == (TILTED if start is None else expected[0])
+    if isinstance(goal, Pose):
+        assert journey.poses[1] == goal
+    assert journey.trajectory.duration == pytest.approx(STRAIGHT_SECONDS)
+    assert state.pose == journey.poses[0]
+    # What differs in sign at the ends is crossed between them.
+    signs = [np.sign(margins(pose.position, pose.rotation)) for pose in expected]
+    crossed = {c.incidence for c in journey.margins.crossings if c.changes_sign}
+    assert set(np.flatnonzero(signs[0] != signs[1]) + 1) <= crossed
+
+
+def test_goal_is_the_neighbouring_mode_until_one_is_chosen_and_stays_once_it_is_gone_to() -> None:
     state = opened(OPTIMAL)
-    assert chosen_modes(state) == (1, 5)
-    assert chosen_modes(ChooseModes(3, 2).apply(state)) == (3, 2)
-    with pytest.raises(InputError, match=r"both are mode 4 \(\+ − −\)"):
-        WatchModes().apply(ChooseModes(4, 4).apply(state))
+    assert (state.mode, goal_of(state)) == (1, 5)
+    after = Go().apply(state)
+    assert after.paths.goal == 5
+    end = SetPathTime(STRAIGHT_SECONDS).apply(after)
+    assert (end.mode, goal_of(end)) == (5, 5)
 
 
-def test_to_watch_again_on_the_way_takes_the_joints_of_its_ends() -> None:
-    state = SetPathTime(0.3 * MODES_SECONDS).apply(watched(1, 4))
-    again = WatchModes().apply(ChooseModes(1, 4).apply(state))
+@pytest.mark.parametrize("kind", ["straight", "planned"])
+@pytest.mark.parametrize(
+    ("start", "goal"), [(None, TILTED), (GOAL, GOAL), (3, 3), (None, 1), (1, TILTED)]
+)
+def test_path_from_a_pose_to_itself_is_refused(kind: str, start: End, goal: End) -> None:
+    state = with_ends(opened(OPTIMAL, TILTED), start, goal)
+    assert state.mode == 1
+    with pytest.raises(InputError, match="are the same pose: choose another goal"):
+        Go().apply(Set("paths.kind", kind).apply(state))
+
+
+def test_modes_on_the_way_are_those_of_the_legs_at_the_ends() -> None:
+    state = SetPathTime(0.3 * STRAIGHT_SECONDS).apply(watched(1, 4))
+    again = Go().apply(state)
     for pose, before in zip(journey_of(again).poses, journey_of(state).poses, strict=True):
         np.testing.assert_allclose(pose.position, before.position, atol=1e-9)
     # But elsewhere those of the present pose.
-    elsewhere = WatchModes().apply(SetPosition(0, 9.0).apply(state))
+    elsewhere = Go().apply(SetPosition(0, 9.0).apply(state))
     assert journey_of(elsewhere).poses[0] != journey_of(state).poses[0]
+    # A path whose ends have other leg lengths gives its own place no other legs.
+    free = SetPathTime(4.0).apply(Go().apply(with_ends(opened(OPTIMAL, TILTED), None, GOAL)))
+    modes = forward(OPTIMAL, joints_of(OPTIMAL, free.pose))
+    assert ends_of(with_ends(free, None, 6))[1].position == pytest.approx(modes.position[6])
 
 
 def test_a_path_is_of_its_design() -> None:
@@ -167,7 +219,7 @@ def test_a_path_is_of_its_design() -> None:
 def test_time_goes_on_while_a_path_is_played_and_stops_at_its_end() -> None:
     state = watched(1, 5)
     duration = journey_of(state).trajectory.duration
-    assert duration == pytest.approx(MODES_SECONDS)
+    assert duration == pytest.approx(STRAIGHT_SECONDS)
     for _ in range(4):
         state = Advance(0.3 * duration).apply(state)
         assert state.pose == journey_of(state).pose
@@ -184,9 +236,8 @@ def test_time_goes_on_while_a_path_is_played_and_stops_at_its_end() -> None:
 
 
 def test_a_runner_plays_in_real_time_and_rests_when_it_is_paused(bench: Bench) -> None:
-    bench.session.do(ChooseModes(1, 5))
     began = time.monotonic()
-    bench.session.do(WatchModes())
+    bench.session.do(Go())
     state = bench.wait(lambda state: state.journey is not None and state.journey.at > 0.3)
     passed = time.monotonic() - began
     assert journey_of(state).at <= passed + 0.1
@@ -240,31 +291,26 @@ def test_the_path_and_its_crossings_are_drawn(services: Services) -> None:
 # Planning
 
 
-def test_planning_needs_both_ends_and_some_time() -> None:
-    with pytest.raises(InputError, match="store a start and a goal first"):
-        Plan().apply(opened(OPTIMAL))
-    with pytest.raises(InputError, match="store a goal first"):
-        Plan().apply(StoreEnd("start").apply(opened(OPTIMAL)))
-    for seconds in (0.0, -1.0, float("nan")):
-        with pytest.raises(InputError, match="above zero"):
-            Set("paths.seconds", seconds).apply(opened(OPTIMAL))
-    assert "14.0, −2.0, 6.0" in ends_table(with_ends())
+@pytest.mark.parametrize("seconds", [0.0, -1.0, float("nan")])
+def test_planning_needs_some_time(seconds: float) -> None:
+    with pytest.raises(InputError, match="above zero"):
+        Set("paths.seconds", seconds).apply(opened(OPTIMAL))
 
 
 def test_a_plan_is_made_in_a_process_of_its_own_and_keeps_everything(bench: Bench) -> None:
     bench.session.do(Set("design.limits", with_radius(OPTIMAL, 0.2).limits))
-    for action in (StoreEnd("start"), SetPose(GOAL), StoreEnd("goal"), Plan()):
+    for action in (Set("paths.goal", GOAL), Set("paths.kind", "planned"), Go()):
         bench.session.do(action)
     state = bench.wait(lambda state: state.paths.request == 1 and not state.paths.is_planning)
     assert state.paths.problem is None
     journey = journey_of(state)
-    assert journey.kind == "plan"
-    assert state.pose == journey.poses[0] == state.paths.start
+    assert journey.kind == "planned"
+    assert state.pose == journey.poses[0] == opened(OPTIMAL).pose
     assert journey.poses[-1] == GOAL
     assert not journey.margins.crossings
     least = np.abs(journey.margins.margins).min(axis=0)
     closest = int(least.argmin())
-    assert f"|δ{closest + 1}| = {least[closest]:.3g}" in path_words(journey)
+    assert f"|δ{closest + 1}| = {least[closest]:.3g}" in crossing_words(journey)
     inner = [journey.pose_at(float(t)) for t in np.linspace(0, journey.trajectory.duration, 50)]
     positions, rotations = ([p.position for p in inner], [p.rotation for p in inner])
     assert poses_are_valid(state.design, np.array(positions), np.array(rotations)).all()
@@ -273,7 +319,7 @@ def test_a_plan_is_made_in_a_process_of_its_own_and_keeps_everything(bench: Benc
 
 def test_why_there_is_no_path_is_told(bench: Bench) -> None:
     below = Pose((14.0, -2.0, -6.0), opened(OPTIMAL).pose.quaternion)
-    for action in (StoreEnd("start"), SetPose(below), StoreEnd("goal"), Plan()):
+    for action in (Set("paths.goal", below), Set("paths.kind", "planned"), Go()):
         bench.session.do(action)
     state = bench.wait(lambda state: state.paths.request == 1 and not state.paths.is_planning)
     with pytest.raises(ExplorerError) as expected:
@@ -286,14 +332,14 @@ def test_why_there_is_no_path_is_told(bench: Bench) -> None:
 
 
 def test_planning_is_cancelled_at_once_and_begun_again(bench: Bench) -> None:
-    for action in (StoreEnd("start"), SetPose(GOAL), StoreEnd("goal"), Plan()):
+    for action in (Set("paths.goal", GOAL), Set("paths.kind", "planned"), Go()):
         bench.session.do(action)
     bench.wait(lambda state: state.paths.request == 1 and not state.paths.is_planning)
     process = bench.runner.worker.process_id
     assert process is not None
     # One that would never be done.
     os.kill(process, signal.SIGSTOP)
-    bench.session.do(Plan())
+    bench.session.do(Go())
     state = bench.wait(lambda state: state.paths.request == 2)
     words = plan_words(state)
     assert words is not None
@@ -307,7 +353,7 @@ def test_planning_is_cancelled_at_once_and_begun_again(bench: Bench) -> None:
     assert bench.session.wait_until_idle()
     state = bench.session.state
     assert (state.paths.problem, state.journey) == (None, None)
-    bench.session.do(Plan())
+    bench.session.do(Go())
     state = bench.wait(lambda state: state.paths.request == 3 and not state.paths.is_planning)
     assert journey_of(state).poses[-1] == GOAL
     assert bench.runner.worker.process_id != process
@@ -315,9 +361,9 @@ def test_planning_is_cancelled_at_once_and_begun_again(bench: Bench) -> None:
 
 
 def test_an_answer_that_comes_late_or_for_another_design_is_not_taken() -> None:
-    state = Plan().apply(with_ends())
-    journey = Journey("plan", "", OPTIMAL, (opened(OPTIMAL).pose, GOAL))
-    for late in (CancelPlan().apply(state), Plan().apply(state)):
+    state = Go().apply(to_plan())
+    journey = Journey("planned", "", OPTIMAL, (opened(OPTIMAL).pose, GOAL))
+    for late in (CancelPlan().apply(state), Go().apply(state)):
         assert TakePlan(1, journey, None).apply(late) == late
     assert TakePlan(1, journey, None).apply(state).pose == journey.poses[0]
     changed = SetVariable("b2", 2.7).apply(state)
@@ -332,44 +378,112 @@ def test_an_answer_that_comes_late_or_for_another_design_is_not_taken() -> None:
 # The panel
 
 
-def test_the_panel_stores_plans_plays_and_exports(services: Services, desk: Desk) -> None:
-    panel = PathsPanel(services)
+def controls_of(services: Services, panel: PathsPanel, state: State) -> dict[str, Any]:
+    """Return the controls that are visible in a state, by their labels, set as in it."""
+    Assigner(services.server).assign(panel.updates(Frame(state)))
+    # Of panels of other tests on this server the last one counts.
+    last = {widget.label: widget.handle for widget in widgets(services.server)}
+    return {label: handle for label, handle in last.items() if handle.visible}
 
-    def shown() -> dict[str, bool]:
-        visible = {
-            id(handle): value
-            for handle, name, value in panel.updates(Frame(desk.state))
-            if name == "visible"
-        }
-        names = ("plan", "cancel", "play", "pause", "export")
-        return {name: bool(visible[id(getattr(panel, name))]) for name in names}
 
-    def only(*names: str) -> dict[str, bool]:
-        return {name: name in names for name in ("plan", "cancel", "play", "pause", "export")}
-
-    assert shown() == only("plan")
-    desk.use(panel.store, "start")
-    desk.session.do(SetPose(GOAL))
-    desk.use(panel.store, "goal")
-    assert (desk.state.paths.start, desk.state.paths.goal) == (opened(OPTIMAL).pose, GOAL)
-    desk.click(panel.plan)
-    assert shown() == only("cancel")
-    desk.click(panel.cancel)
-    assert shown() == only("plan")
-    desk.session.do(ChooseModes(1, 5))
-    desk.session.do(WatchModes())
-    assert shown() == only("plan", "pause", "export")
-    desk.click(panel.pause)
-    assert shown() == only("plan", "play", "export")
-    for handle, name, value in panel.updates(Frame(desk.state)):
-        if handle is panel.time.handle:
+def test_panel_goes_plays_cancels_and_exports(services: Services, desk: Desk) -> None:
+    paths, buttons = PathsPanel(services), services.buttons
+    desk.click(paths.go)
+    assert journey_of(desk.state).is_playing
+    desk.press(buttons, "paths.play", "off")
+    assert not journey_of(desk.state).is_playing
+    desk.press(buttons, "paths.play", "on")
+    assert journey_of(desk.state).is_playing
+    for handle, name, value in paths.updates(Frame(desk.state)):
+        if handle is paths.time.handle:
             setattr(handle, name, value)
-    desk.use(panel.time.handle, 2.5)
+    desk.use(paths.time.handle, 2.5)
     assert journey_of(desk.state).at == 2.5
     assert desk.state.pose == journey_of(desk.state).pose
-    desk.click(panel.export)
+    desk.press(buttons, "paths.export")
     assert isinstance(services.downloads, StubDownloads)
     assert services.downloads.sent == [(1, "paper-optimal-path.csv")]
+    desk.press(buttons, "paths.kind", "planned")
+    desk.session.do(Set("paths.goal", GOAL))
+    desk.click(paths.go)
+    planning = desk.state
+    assert planning.paths.is_planning
+    assert {n: v for h, n, v in paths.updates(Frame(planning)) if h is paths.go} == {
+        "disabled": True
+    }
+    desk.press(buttons, "paths.cancel")
+    assert not desk.state.paths.is_planning
+
+
+@pytest.mark.parametrize("end", ENDS)
+def test_end_is_the_present_pose_a_mode_or_six_numbers(
+    services: Services, desk: Desk, end: Literal["start", "goal"]
+) -> None:
+    paths = PathsPanel(services)
+    title, at = end.capitalize(), f"paths.{end}"
+    desk.session.do(SetPose(TILTED))
+
+    def shown() -> dict[str, Any]:
+        return controls_of(services, paths, desk.state)
+
+    def numbers() -> Pose:
+        return ends_of(desk.state)[ENDS.index(end)]
+
+    typed = (f"{title} x, y, z", f"{title} angles (°)")
+    assert not {*typed} & {*shown()}
+    for mode, option in enumerate(MODES):
+        desk.use(shown()[title], option)
+        assert value_at(desk.state, at) == mode
+        expected = forward(OPTIMAL, joints_of(OPTIMAL, TILTED)).position[mode]
+        assert numbers().position == pytest.approx(expected)
+        x = f"{numbers().position[0]:.2f}".replace("-", "−")
+        assert x in end_numbers(desk.state, end)
+    # Typed numbers begin as those that were shown, and each of the six can be set.
+    before = numbers()
+    desk.use(shown()[title], TYPED)
+    assert value_at(desk.state, at) == before
+    assert {*typed} <= {*shown()}
+    desk.use(shown()[typed[0]], (9.0, 4.0, 8.0))
+    desk.use(shown()[typed[1]], (-70.0, 10.0, 5.0))
+    assert numbers().position == (9.0, 4.0, 8.0)
+    assert angles_of(numbers()) == pytest.approx((-70.0, 10.0, 5.0))
+    assert shown()[typed[1]].value == (-70.0, 10.0, 5.0)
+    desk.use(shown()[title], PRESENT)
+    assert numbers() == TILTED
+    desk.session.do(SetPose(GOAL))
+    # The start goes with the platform, the goal stays behind.
+    assert numbers() == (GOAL if end == "start" else TILTED)
+
+
+@given(st.floats(-180, 180), st.floats(-89.9, 89.9), st.floats(-180, 180))
+def test_typed_angles_stay_as_typed(yaw: float, pitch: float, roll: float) -> None:
+    typed = tuple(round(angle, 1) for angle in (yaw, pitch, roll))
+    pose = Pose.of_yaw_pitch_roll(GOAL.position, typed)
+    shown = typed_numbers(with_ends(opened(OPTIMAL), pose), "start")[1]
+    # Half a turn has two signs.
+    turns = np.remainder(np.subtract(shown, typed) + 180.0, 360.0) - 180.0
+    assert np.abs(turns).max() < 1e-6
+
+
+def test_kind_says_whether_the_ends_allow_it() -> None:
+    state = Set("paths.kind", "planned").apply(opened(OPTIMAL))
+    assert "none from mode 1 to mode 5" in kind_words(state)
+    assert "Both ends are in mode 1" in kind_words(to_plan())
+    assert "May pass singular poses" in kind_words(opened(OPTIMAL))
+
+
+def test_mode_at_a_singular_pose_is_refused_in_words_or_a_pose_with_the_same_legs() -> None:
+    flat = Pose.of_yaw_pitch_roll((10.0, 5.0, 0.0), (-73.1, 12.0, 9.0))
+    for mode in range(8):
+        state = with_ends(opened(OPTIMAL, flat), None, mode)
+        if forward(OPTIMAL, joints_of(OPTIMAL, flat)).feasible:
+            goal = ends_of(state)[1]
+            expected = pytest.approx(joints_of(OPTIMAL, flat), abs=1e-6)
+            assert joints_of(OPTIMAL, goal) == expected
+        else:
+            with pytest.raises(InputError, match="edge of what closes"):
+                ends_of(state)
+            assert "ex-close" in end_numbers(state, "goal")
 
 
 def test_the_time_slider_ends_where_the_path_does(services: Services, desk: Desk) -> None:
@@ -378,4 +492,4 @@ def test_the_time_slider_ends_where_the_path_does(services: Services, desk: Desk
     assert disabled["disabled"] is True
     updates = {n: v for h, n, v in panel.updates(Frame(watched(1, 5))) if h is panel.time.handle}
     assert updates["disabled"] is False
-    assert updates["max"] == pytest.approx(MODES_SECONDS, abs=0.011)
+    assert updates["max"] == pytest.approx(STRAIGHT_SECONDS, abs=0.011)

@@ -47,7 +47,7 @@ def saved(state: State) -> State:
         state = replace(run.own, optimisation=replace(state.optimisation, run=None))
     paths, found = state.paths, state.optimisation
     journey = None if paths.journey is None else replace(paths.journey, is_playing=False)
-    paths = replace(paths, request=0, is_planning=False, problem=None, journey=journey)
+    paths = replace(paths, request=0, planning=None, problem=None, journey=journey)
     run = None if found.run is None else _saved_run(found.run)
     found = replace(found, refusal=None, run=run)
     return replace(state, taken=None, gesture=None, paths=paths, optimisation=found)
@@ -95,7 +95,7 @@ def leaves(value: Any, path: str = "") -> dict[str, Any]:
 
 def test_rich_state_differs_from_a_new_one_in_every_saved_value() -> None:
     new, rich = leaves(opened(OPTIMAL)), leaves(RICH)
-    transient = {"taken", "gesture", "paths.request", "paths.is_planning", "paths.problem"}
+    transient = {"taken", "gesture", "paths.request", "paths.planning", "paths.problem"}
     transient |= {"optimisation.refusal"}
     same = {path[1:] for path, value in new.items() if rich.get(path, ...) == value}
     assert same == transient
@@ -278,7 +278,16 @@ def test_file_of_an_earlier_schema_opens_to_the_state_it_was_written_from(schema
         # Fields that came later are as in a new state.
         for view in ("view", "optimisation.run.own.view"):
             expected = with_value(expected, f"{view}.workspace.flipped", False)
-        assert (first, state) == (opened(OPTIMAL), expected)
+        # There were no kinds of paths, and titles named the signs of modes.
+        paths = state.paths
+        assert paths.journey is not None
+        assert (paths.kind, paths.journey.title) == (
+            "straight",
+            "Mode 3 (− + +) to mode 5 (+ − +)",
+        )
+        journey = replace(paths.journey, title="Mode 3 to mode 5")
+        present = replace(state, paths=replace(paths, kind="planned", journey=journey))
+        assert (first, present) == (opened(OPTIMAL), expected)
         return
     assert state.optimisation.run is not None
     assert state.design.name == "é «one»-optimised"
@@ -287,6 +296,21 @@ def test_file_of_an_earlier_schema_opens_to_the_state_it_was_written_from(schema
     assert state.unclosed.asked == 99.1
     # It was written when a cut that nobody had moved stood at 0.
     assert first.view.workspace.level == 0.0
+    again = decode_session(encode_session(read, 3), "file")
+    assert repr(again) == repr(read)
+
+
+def test_paths_between_modes_or_stored_poses_have_the_same_ends_now() -> None:
+    read = decode_session((DATA / "session-3.json").read_bytes(), "file")
+    # Stored poses count for more than modes; modes that nobody had chosen are chosen by none.
+    home, beyond = RICH.paths.start, RICH.paths.goal
+    ends = [(None, None), (home, beyond), (3, 5), (None, 6)]
+    assert [(step.state.paths.start, step.state.paths.goal) for step in read.steps] == ends
+    assert RICH.paths.journey is not None
+    for step in read.steps[1:]:
+        journey = step.state.paths.journey
+        assert journey is not None
+        assert (journey.kind, journey.poses) == ("straight", RICH.paths.journey.poses)
     again = decode_session(encode_session(read, 3), "file")
     assert repr(again) == repr(read)
 

@@ -7,11 +7,13 @@ import itertools
 import json
 import math
 import os
+import re
 import signal
 import time
 from collections.abc import Generator
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import msgspec
@@ -20,6 +22,7 @@ import pytest
 from desk import Desk
 from hypothesis import given, strategies as st
 
+from explorer.app.features.feature import Services
 from explorer.app.features.studies.actions import (
     MOST_RANGES,
     BrushAxis,
@@ -29,17 +32,19 @@ from explorer.app.features.studies.actions import (
     PickDesign,
 )
 from explorer.app.features.studies.feed import Request, StudyDrawing, StudyFeed, reasons
-from explorer.app.features.studies.figures import PAPER, packed, parallel, scatter
+from explorer.app.features.studies.figures import PAPER, pack, parallel, scatter
+from explorer.app.features.studies.panel import StudiesPanel
 from explorer.app.features.studies.plot_events import Boxed, Brushed, Picked, event_of
-from explorer.app.features.studies.runner import StudyRunner
-from explorer.app.features.studies.shown import Shown, default_axes, shown, thinned
-from explorer.app.features.studies.words import legend, status
+from explorer.app.features.studies.plot_rows import PlotRows, default_axes, select_rows, thin_out
+from explorer.app.features.studies.runner import Run, StudyRunner
+from explorer.app.features.studies.words import acts, head, legend, status
 from explorer.app.session.session import UNDO
 from explorer.app.state.actions import Set, SetVariable
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, opened
 from explorer.app.state.studies import Brush, Studies, StudyPlan, range_around, study_around, within
 from explorer.app.storage.study_folders import StudyFolders, check_given, keep_study, study_in
+from explorer.app.widgets.buttons import Buttons
 from explorer.errors import InputError
 from explorer.measures.catalogue import measures_in
 from explorer.mechanism.design import VARIABLES, Design
@@ -47,6 +52,7 @@ from explorer.mechanism.design_file import PRESETS
 from explorer.sweep.parts import part_paths, write_part
 from explorer.sweep.results import Results, load_results
 from explorer.sweep.rows import evaluate
+from explorer.sweep.run import Progress
 from explorer.sweep.study import NAMES, Objective, Sampling, Study, encode_study
 
 OPTIMAL = PRESETS["paper-optimal"]
@@ -132,7 +138,7 @@ def test_another_study_begins_without_brushes_and_the_same_keeps_them() -> None:
 @given(st.lists(st.booleans(), min_size=1, max_size=80).map(np.array), st.integers(2, 30))
 def test_of_too_many_rows_those_to_keep_stay_first(keep: Any, most: int) -> None:
     rows = np.arange(len(keep)) * 3
-    found = thinned(rows, keep, most)
+    found = thin_out(rows, keep, most)
     assert len(found) == min(most, len(rows))
     assert np.all(np.diff(found) > 0)
     assert np.isin(found, rows).all()
@@ -362,8 +368,8 @@ def test_what_is_drawn_is_what_was_computed(feed: StudyFeed, home: Path) -> None
 @pytest.mark.parametrize("dark", [False, True])
 def test_greater_stands_out_more_on_either_page(feed: StudyFeed, dark: bool) -> None:
     drawing = drawn(feed, Studies(name="some"))
-    assert drawing.shown is not None
-    points: Any = scatter(drawing.shown, 1, dark=dark)
+    assert drawing.plotted is not None
+    points: Any = scatter(drawing.plotted, 1, dark=dark)
     scale = [colour for _, colour in points["data"][1]["marker"]["colorscale"]]
     paper = _light(PAPER[dark])
     apart = [abs(_light(colour) - paper) for colour in scale]
@@ -472,7 +478,7 @@ def results_of(columns: dict[str, list[Any]], **more: Any) -> Results:
 def test_what_is_the_same_in_all_designs_has_no_axis() -> None:
     columns = {"b2": [0.0, 1.0, 2.0], "volume": [1.0, 2.0, 3.0], "reach": [5.0, 5.0, 5.0]}
     results = results_of(columns, objectives=(Objective("reach", "min"),))
-    seen = shown(results, results.front(), Studies(name="s"))
+    seen = select_rows(results, results.front(), Studies(name="s"))
     assert seen is not None
     assert seen.axes == ("b2", "volume")
     assert (seen.across, seen.up) == ("volume", "b2")
@@ -483,7 +489,7 @@ def test_what_is_the_same_in_all_designs_has_no_axis() -> None:
 def test_too_few_designs_are_not_drawn(volumes: list[float]) -> None:
     columns = {"b2": [0.5, 1.5][: len(volumes)], "volume": volumes, "reach": [2.0] * len(volumes)}
     results = results_of(columns)
-    assert shown(results, results.front(), Studies(name="s")) is None
+    assert select_rows(results, results.front(), Studies(name="s")) is None
 
 
 def test_a_measure_that_some_designs_lack_hides_no_point_that_it_is_no_axis_of() -> None:
@@ -492,7 +498,7 @@ def test_a_measure_that_some_designs_lack_hides_no_point_that_it_is_no_axis_of()
     wanted = (Objective("volume", "max"),)
     results = results_of(columns, objectives=wanted)
     studies = Studies(name="s", across="volume", up="b2", colour="reach")
-    seen = shown(results, results.front(), studies)
+    seen = select_rows(results, results.front(), studies)
     assert seen is not None
     assert seen.axes == ("b2", "volume", "reach")
     assert points_of(scatter(seen, 1, dark=False)) == [0, 1, 2, 3]
@@ -503,7 +509,7 @@ def test_a_measure_that_some_designs_lack_hides_no_point_that_it_is_no_axis_of()
         assert unpacked(dimension["values"]) == [columns[dimension["name"]][k] for k in (0, 2)]
     assert "<b>2</b> without a line, which lack reach" in status_of(results, seen)
     # As an axis it places no design that lacks it, picked or not.
-    other = shown(results, results.front(), replace(studies, up="reach", picked=1))
+    other = select_rows(results, results.front(), replace(studies, up="reach", picked=1))
     assert other is not None
     assert points_of(scatter(other, 1, dark=False)) == [0, 2]
 
@@ -511,7 +517,7 @@ def test_a_measure_that_some_designs_lack_hides_no_point_that_it_is_no_axis_of()
 def test_a_measure_that_all_designs_lack_is_no_axis_and_hides_nothing() -> None:
     columns = {"b2": [0.0, 1.0, 2.0], "volume": [4.0, 2.0, 3.0], "reach": [math.nan] * 3}
     results = results_of(columns)
-    seen = shown(results, results.front(), Studies(name="s"))
+    seen = select_rows(results, results.front(), Studies(name="s"))
     assert seen is not None
     assert seen.axes == ("b2", "volume")
     assert points_of(scatter(seen, 1, dark=False)) == [0, 1, 2]
@@ -524,11 +530,11 @@ def test_where_no_design_has_all_axes_points_are_drawn_and_no_line() -> None:
     columns = {"b2": [0.0, 1.0, 2.0, 3.0], "volume": [4.0, 2.0, nan, nan]}
     columns["reach"] = [nan, nan, 3.0, 1.0]
     results = results_of(columns)
-    seen = shown(results, results.front(), Studies(name="s"))
+    seen = select_rows(results, results.front(), Studies(name="s"))
     assert seen is not None
     assert points_of(scatter(seen, 1, dark=False)) == []
     assert parallel(seen, 1, dark=True)["layout"]["meta"]["designs"] == []
-    other = shown(results, results.front(), Studies(name="s", across="b2", up="reach"))
+    other = select_rows(results, results.front(), Studies(name="s", across="b2", up="reach"))
     assert other is not None
     assert points_of(scatter(other, 1, dark=False)) == [2, 3]
     assert "<b>4</b> without a line, which lack volume or reach" in status_of(results, other)
@@ -540,7 +546,7 @@ def points_of(figure: dict[str, Any]) -> list[int]:
     return sorted({index for each in traces for index in unpacked(each["customdata"])})
 
 
-def status_of(results: Results, seen: Shown) -> str:
+def status_of(results: Results, seen: PlotRows) -> str:
     request = Request(seen.studies, 1, dark=False)
     return status(
         StudyDrawing(request, results, np.flatnonzero(seen.front), seen.inside, seen, None, ())
@@ -552,11 +558,11 @@ def test_the_front_of_the_two_objectives_shown_is_a_line() -> None:
     columns["reach"] = [4.0, 2.0, 3.0, 5.0]
     wanted = (Objective("volume", "max"), Objective("reach", "min"))
     results = results_of(columns, objectives=wanted)
-    seen = shown(results, results.front(), Studies(name="s"))
+    seen = select_rows(results, results.front(), Studies(name="s"))
     assert seen is not None
     (line,) = [t for t in scatter(seen, 1, dark=False)["data"] if t["mode"] == "lines"]
     assert unpacked(line["x"]) == [2.0, 3.0, 4.0]
-    other = shown(results, results.front(), Studies(name="s", across="b2"))
+    other = select_rows(results, results.front(), Studies(name="s", across="b2"))
     assert other is not None
     assert all(t["mode"] == "markers" for t in scatter(other, 1, dark=True)["data"])
     assert parallel(other, 2, dark=True)["data"][0]["uirevision"] == 2
@@ -564,8 +570,8 @@ def test_the_front_of_the_two_objectives_shown_is_a_line() -> None:
 
 def test_numbers_come_through_packed() -> None:
     numbers = np.array([0.0, -1.5, 3.25e7])
-    assert unpacked(packed(numbers)) == numbers.tolist()
-    assert unpacked(packed(np.array([1, 2**31 - 1]), "i4")) == [1, 2**31 - 1]
+    assert unpacked(pack(numbers)) == numbers.tolist()
+    assert unpacked(pack(np.array([1, 2**31 - 1]), "i4")) == [1, 2**31 - 1]
 
 
 def test_reasons_are_counted_the_most_frequent_first() -> None:
@@ -666,6 +672,88 @@ def test_a_process_that_dies_is_told_and_what_is_finished_is_kept(studio: Studio
     name = studio.desk.state.studies.name
     assert name is not None
     assert load_results(studio.folders.folder(name)).count > 0
+
+
+@pytest.fixture
+def panel(services: Services, home: Path) -> Generator[StudiesPanel]:
+    theme: Any = SimpleNamespace(is_dark=False)
+    used = replace(services, studies=StudyFolders(home), theme=theme)
+    yield StudiesPanel(used)
+    used.stop()
+
+
+def markup_of(panel: StudiesPanel, desk: Desk) -> tuple[bool, str]:
+    """Return whether the settings of a new study are shown, and all markup of the panel."""
+    assert panel.feed.wait_until_idle(PATIENCE)
+    updates = [*panel.updates(Frame(desk.state))]
+    assert panel.feed.wait_until_idle(PATIENCE)
+    updates += panel.updates(Frame(desk.state))
+    shown: list[Any] = [v for h, n, v in updates if h is panel.form and n == "visible"]
+    words = "".join(str(value) for _, name, value in updates if name == "content")
+    return shown[-1], words
+
+
+def test_settings_are_shown_while_no_study_is_open_and_when_they_are_asked_for(
+    panel: StudiesPanel, desk: Desk, buttons: Buttons
+) -> None:
+    is_form, words = markup_of(panel, desk)
+    assert is_form
+    assert "Start study" in words
+    assert "256</b> designs around <b>paper-optimal" in words
+    desk.session.do(OpenStudy("some"))
+    is_form, words = markup_of(panel, desk)
+    assert not is_form
+    assert "12</b> of 16 designs" in words
+    assert "objectives: volume ↑, reach ↓ · varied: a3x, b2 · 1 unit (u) = 10 mm" in words
+    assert {"studies.continue", "studies.new"} <= pressed(words)
+    desk.press(buttons, "studies.new", "on")
+    is_form, words = markup_of(panel, desk)
+    assert is_form
+    assert {"studies.start", "studies.new"} <= pressed(words)
+    assert "studies.continue" not in pressed(words)
+    desk.press(buttons, "studies.new", "off")
+    assert not markup_of(panel, desk)[0]
+    desk.session.do(OpenStudy(None))
+    assert markup_of(panel, desk)[0]
+
+
+def test_next_and_previous_go_along_the_front(
+    panel: StudiesPanel, desk: Desk, buttons: Buttons
+) -> None:
+    desk.session.do(OpenStudy("some"))
+    markup_of(panel, desk)
+    drawing = panel.feed.drawing
+    assert drawing is not None
+    front = drawing.results.columns["index"][drawing.front].tolist()
+    walked: list[int | None] = []
+    for step in [1] * len(front) + [-1]:
+        desk.press(buttons, "studies.along", step)
+        walked.append(desk.state.studies.picked)
+    # At the end it stays.
+    assert walked == [*front, front[-2]]
+
+
+def pressed(words: str) -> set[str]:
+    """Return the names of the buttons in some markup."""
+    return set(re.findall('data-press="([^"]*)"', words))
+
+
+@pytest.mark.parametrize("done", [0, 96, 256])
+def test_progress_of_a_study_is_told_with_a_bar_and_no_count_of_its_rows(
+    feed: StudyFeed, done: int
+) -> None:
+    drawing = drawn(feed, Studies(name="some"))
+    run = Run("some", drawing.study, Progress(256, done, 0, {}, 10.0))
+    words = head(drawing, run, None, "x")
+    assert f"some: <b>{done}</b> of 256 designs" in words
+    assert f"--share:{100.0 * done / 256:.2f}%" in words
+    assert run.share == done / 256
+    assert "12</b> of 16" not in words
+    # Another study that is open meanwhile has its own.
+    assert "12</b> of 16" in head(drawing, replace(run, name="other"), None, "x")
+    assert pressed(acts(is_new=False, is_open=True, is_complete=False, run=run)) == {
+        "studies.cancel",
+    }
 
 
 def test_a_folder_that_is_named_and_holds_no_study_is_refused(home: Path) -> None:

@@ -46,7 +46,7 @@ def purple_pixels(tab: Tab) -> int:
 def test_designs_are_pinned_told_overlaid_and_opened(tab: Tab) -> None:
     tab.running.page.session.do(Set("view", View(handle=False, tetrahedra=(False, False, False))))
     tab.turn_to("Compare")
-    press(tab, "Pin this design", lambda: tab.state.compared.pinned[0] is not None)
+    press(tab, "Keep a copy as it is now", lambda: tab.state.compared.pinned[0] is not None)
     pinned = tab.state.design
     assert tab.state.compared.pinned == (pinned, None, None)
     tab.turn_to("Design")

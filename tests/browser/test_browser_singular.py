@@ -10,7 +10,6 @@ import pytest
 from playwright.sync_api import expect
 from tab import Tab
 
-from explorer.app.features.paths.actions import StoreEnd
 from explorer.app.state.frame import Frame
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.margins import margins
@@ -49,39 +48,40 @@ def test_a_jog_moves_one_margin_by_mouse_and_by_keyboard(tab: Tab) -> None:
     tab.wait_until_shown("δ2: about z (°)", 0.0)
 
 
-def test_a_path_is_watched_planned_and_saved(tab: Tab, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_paths_are_gone_along_planned_and_saved(tab: Tab, monkeypatch: pytest.MonkeyPatch) -> None:
     # So long that even a slow browser can stop it on the way.
-    monkeypatch.setattr("explorer.app.state.paths.MODES_SECONDS", 60.0)
+    monkeypatch.setattr("explorer.app.state.paths.STRAIGHT_SECONDS", 60.0)
     tab.turn_to("Paths")
     chart = tab.page.locator(".uplot canvas")
     expect(chart).to_be_hidden()
-    tab.push("Watch")
+    # Three presses: the list of goals, a mode, and Go.
+    tab.choose("Goal", "Mode 7: + + +")
+    tab.push("Go")
     tab.wait_for(lambda: tab.state.journey is not None and tab.state.journey.at > 0.5, "playing")
     tab.push("Pause")
     chart.wait_for()
-    expect(tab.page.get_by_text("Singular once on the path")).to_be_visible()
-    session = tab.running.page.session
-    tab.push("start")
-    tab.wait_for(lambda: tab.state.paths.start is not None, "a start")
-    x, y, z = tab.state.pose.position
-    session.do(StoreEnd("goal"))
+    expect(tab.page.get_by_text("Singular 2 times")).to_be_visible()
     tab.push("Home pose")
-    tab.wait_for(lambda: tab.state.pose == home_pose(tab.state.design), "the home pose")
-    tab.push("start")
-    expect(tab.page.get_by_text(f"{x:.1f}, {y:.1f}, {z:.1f}").first).to_be_visible()
-    home: Pose = tab.state.pose
+    home = home_pose(tab.state.design)
+    tab.wait_for(lambda: tab.state.pose == home, "the home pose")
+    # The start is kept as numbers, and the goal a little way off in the same mode.
+    tab.choose("Start", "Typed numbers")
     tab.wait_for(lambda: tab.state.paths.start == home, "the home pose as start")
-    # A little way off in the same mode.
-    tab.drag("z", 0.7)
-    tab.wait_for(lambda: tab.state.pose != home, "another pose")
-    tab.push("goal")
-    tab.wait_for(lambda: tab.state.paths.goal == tab.state.pose, "a goal")
-    tab.push("Plan")
+    tab.choose("Goal", "Present pose")
+    z = tab.field("Goal x, y, z").nth(2)
+    z.fill("8")
+    z.press("Enter")
+    goal = Pose((*home.position[:2], 8.0), home.quaternion)
+    tab.wait_for(lambda: tab.state.paths.goal == goal, "a goal")
+    tab.push("Without singularity")
+    expect(tab.page.get_by_text("Both ends are in mode 1")).to_be_visible()
+    tab.push("Go")
     tab.page.get_by_text("Planned path of").wait_for()
-    expect(tab.page.get_by_text("No singularity on the path;")).to_be_visible()
+    expect(tab.page.get_by_text("No singular pose on the path;")).to_be_visible()
     with tab.page.expect_download() as download:
         tab.push("Export CSV")
     assert download.value.suggested_filename == "paper-optimal-path.csv"
     rows = list(csv.reader(Path(download.value.path()).read_text().splitlines()))
     assert rows[0][:7] == ["time_s", "l1", "d1", "d2", "d3", "d4", "l4"]
     assert [float(v) for v in rows[1][7:10]] == list(home.position)
+    assert [float(v) for v in rows[-1][7:10]] == list(goal.position)

@@ -11,7 +11,7 @@ from typing import Any
 import msgspec
 import numpy as np
 import pytest
-from playwright.sync_api import Browser
+from playwright.sync_api import Browser, expect
 from tab import Tab
 
 from explorer.app.features.studies.actions import OpenStudy
@@ -214,11 +214,20 @@ def test_a_small_study_is_started_and_cancelled(tab: Tab, home: Path) -> None:
     plan = StudyPlan(MOST, 20.0, ("a3x", "b2"), ("volume", "reachable_volume"), ())
     tab.running.page.session.do(Set("studies.plan", plan))
     looked_at(tab)
-    tab.page.get_by_text("New study", exact=True).click()
+    count = tab.slider("Number of designs")
+    count.wait_for()
     tab.push("Start study")
-    tab.push("Cancel study")
+    # The settings give their place to the progress.
+    expect(count).to_have_count(0)
     panel = panel_of(tab)
+    tab.wait_for(lambda: panel.runner.run is not None, "a study")
+    expect(tab.page.get_by_text(f"of {MOST} designs").first).to_be_visible()
+    tab.push("Cancel study")
     tab.wait_for(lambda: panel.runner.run is None, "the end of a cancelled study")
+    tab.push("New study")
+    count.wait_for()
+    tab.push("Back")
+    expect(count).to_have_count(0)
     name = studies_of(tab).name
     assert name is not None
     assert _count(home / name) < MOST

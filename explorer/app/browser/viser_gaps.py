@@ -346,13 +346,13 @@ def panel_in(client: viser.ClientHandle, panel: viser.PanelHandle) -> viser.Pane
     return own
 
 
-def dock_below_in(
+def dock_above_in(
     client: viser.ClientHandle, panel: viser.PanelHandle, anchor: viser.PanelHandle
 ) -> None:
-    """Dock a panel below another one in one browser alone; all browsers share both.
+    """Dock a panel above another one in one browser alone; all browsers share both.
 
     viser's own handle refuses an anchor that was not made for that browser.
     """
     internals: Any = anchor
     own: Any = panel_in(client, panel)
-    own._set_position({"kind": "split", "anchor_uuid": internals._impl.uuid, "side": "below"})
+    own._set_position({"kind": "split", "anchor_uuid": internals._impl.uuid, "side": "above"})

@@ -125,7 +125,7 @@ def settle(state: State) -> State:
     if journey is not None and journey.is_playing:
         journey = replace(journey, is_playing=False)
     if paths.is_planning or journey is not paths.journey:
-        paths = replace(paths, is_planning=False, journey=journey)
+        paths = replace(paths, planning=None, journey=journey)
     return replace(state, gesture=None, paths=paths)
 
 

@@ -1,7 +1,8 @@
-"""The path that is played on the page, and the settings from which one is planned.
+"""The path that is played on the page, and the settings of the next one.
 
-A path leads between two assembly modes, or was planned. It belongs to the design that it was made
-for; with another design there is none.
+A path is the straight move between two poses, which may be singular on the way, or was planned
+without a singularity. It belongs to the design that it was made for; with another design there is
+none.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import Annotated, Literal
+from typing import Annotated, Literal, TypeAlias
 
 import msgspec
 import numpy as np
@@ -26,10 +27,19 @@ from explorer.paths.trajectory import DEFAULT_SPEED, Trajectory, trajectory
 Mode = Annotated[int, msgspec.Meta(ge=0, le=7)]
 """Index of an assembly mode."""
 
+PathKind = Literal["straight", "planned"]
+"""The straight move between two poses, or a path without a singular pose."""
+
+End: TypeAlias = Pose | Mode | None
+"""An end of a path: a fixed pose, or an assembly mode of the present leg lengths.
+
+As the start None is the present pose, as the goal the mode beyond δ1 = 0 from the present one.
+"""
+
 # Number of paths whose margins and times are cached: the present one and the one before.
 MOST_CACHED = 2
-# Duration of a path between modes: its legs move too little for a speed to give one.
-MODES_SECONDS = 8.0
+# Duration of a straight path: between modes the legs move too little for a speed to give one.
+STRAIGHT_SECONDS = 8.0
 
 
 @dataclass(frozen=True)
@@ -37,7 +47,7 @@ class Journey:
     """A path and how far along it the platform is.
 
     Attributes:
-        kind: Whether it leads between two modes of the same joints, or was planned.
+        kind: Whether it is the straight move, or was planned.
         title: Title on the page.
         design: The design that it was made for.
         poses: The corners of the path.
@@ -48,7 +58,7 @@ class Journey:
         InputError: fewer than two corners.
     """
 
-    kind: Literal["modes", "plan"]
+    kind: PathKind
     title: str
     design: Design
     poses: tuple[Pose, ...]
@@ -61,8 +71,9 @@ class Journey:
 
     @property
     def trajectory(self) -> Trajectory:
-        """The path over time; between modes slow enough to watch."""
-        return _trajectory(self.design, self.poses, MODES_SECONDS if self.kind == "modes" else None)
+        """The path over time; a straight one is slow enough to watch."""
+        seconds = STRAIGHT_SECONDS if self.kind == "straight" else None
+        return _trajectory(self.design, self.poses, seconds)
 
     @property
     def margins(self) -> PathMargins:
@@ -89,31 +100,35 @@ class Paths:
     """The path of the page, and the settings of the next one.
 
     Attributes:
-        modes: First and last assembly mode of a path; None for the present mode, and for
-            the one beyond δ1 = 0 from the first.
-        start, goal: Poses between which to plan a path; None until they are stored.
+        start, goal: Ends of the next path.
+        kind: Kind of the next path.
         seconds: Longest time of planning, in seconds.
         request: Number of the last request to plan; 0 before the first.
-        is_planning: Whether that path is being planned.
-        problem: Why planning it failed; None if it did not.
+        planning: Start and goal of the path that is being planned; None if none is.
+        problem: Why planning failed; None if it did not.
         journey: The present path; None if there is none.
 
     Raises:
         InputError: a time for planning that is not above zero.
     """
 
-    modes: tuple[Mode | None, Mode | None] = (None, None)
-    start: Pose | None = None
-    goal: Pose | None = None
+    start: End = None
+    goal: End = None
+    kind: PathKind = "straight"
     seconds: float = DEFAULT_SECONDS
     request: int = field(default=0, metadata=TRANSIENT)
-    is_planning: bool = field(default=False, metadata=TRANSIENT)
+    planning: tuple[Pose, Pose] | None = field(default=None, metadata=TRANSIENT)
     problem: str | None = field(default=None, metadata=TRANSIENT)
     journey: Journey | None = None
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.seconds) and self.seconds > 0.0):
             raise InputError(f"planning needs a time above zero; got {self.seconds:g} seconds")
+
+    @property
+    def is_planning(self) -> bool:
+        """Whether a path is being planned."""
+        return self.planning is not None
 
 
 @lru_cache(maxsize=MOST_CACHED)

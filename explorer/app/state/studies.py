@@ -82,7 +82,7 @@ class StudyPlan:
 
     def with_variable_toggled(self, name: str) -> StudyPlan:
         """Return the plan in which a variable varies if it did not, and else stays fixed."""
-        return replace(self, variables=_toggled(NAMES, self.variables, name))
+        return replace(self, variables=_toggle(NAMES, self.variables, name))
 
     def with_measure_advanced(self, name: str) -> StudyPlan:
         """Return the plan with the next use of a measure.
@@ -92,14 +92,14 @@ class StudyPlan:
         senses = dict(self.objectives)
         measures = self.measures
         if name not in measures:
-            measures = _toggled(tuple(measures_in("studies")), measures, name)
+            measures = _toggle(tuple(measures_in("studies")), measures, name)
         elif name not in senses:
             senses[name] = "max"
         elif senses[name] == "max":
             senses[name] = "min"
         else:
             del senses[name]
-            measures = _toggled(tuple(measures_in("studies")), measures, name)
+            measures = _toggle(tuple(measures_in("studies")), measures, name)
         ordered = tuple((other, senses[other]) for other in CATALOGUE if other in senses)
         return replace(self, measures=measures, objectives=ordered)
 
@@ -243,7 +243,7 @@ def short_title_of(name: str) -> str:
     return f"{words} [{unit}]" if unit else words
 
 
-def _toggled(order: tuple[str, ...], chosen: tuple[str, ...], name: str) -> tuple[str, ...]:
+def _toggle(order: tuple[str, ...], chosen: tuple[str, ...], name: str) -> tuple[str, ...]:
     if name not in order:
         raise InputError(f"there is no {name!r}; there are {', '.join(order)}")
     toggled = {*chosen} ^ {name}

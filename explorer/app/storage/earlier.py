@@ -11,7 +11,7 @@ from typing import Annotated, Any, cast
 
 import msgspec
 
-from explorer.app.storage.packing import present_design
+from explorer.app.storage.packing import present_design, present_paths
 from explorer.errors import InputError
 from explorer.optimise.problem import Problem
 from explorer.optimise.record import Step, iterate_of
@@ -94,7 +94,8 @@ def _regroup(session: dict[str, Any]) -> dict[str, Any]:
         part, field = MOVED.get(name, ("", name))
         (state[part] if part else state)[field] = value
     if state["paths"].get("journey") is not None:
-        state["paths"]["journey"] = state["paths"]["journey"] | {"at": at}
+        state["paths"]["journey"] = present_paths(state["paths"]["journey"] | {"at": at})
+    state["paths"] = present_paths(state["paths"])
     if joint is not None:
         unclosed = {"joint": joint, "asked": session["joints"][joint], "nearest": None}
         state["unclosed"] = unclosed | {"failing": []}

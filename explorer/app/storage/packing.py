@@ -26,6 +26,10 @@ REFERENCE = "#"
 # Fields that a design of any schema has.
 _DESIGN_FIELDS = frozenset({"schema", "unit_mm"})
 
+# Fields of the paths of an older explorer, and what it called the kinds of a path.
+_FORMER_PATHS = frozenset({"modes", "seconds"})
+_FORMER_KINDS = {"modes": "straight", "plan": "planned"}
+
 
 class Packer:
     """A list of objects as JSON texts, to which states are added."""
@@ -118,7 +122,8 @@ class Unpacker:
 def resolve(objects: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Return objects with those that they refer to in place of the references.
 
-    Designs of an older schema become designs of the present one.
+    Designs of an older schema become designs of the present one, and paths of an older explorer
+    those of the present one.
 
     Raises:
         InputError: a reference to an object that does not come before.
@@ -139,7 +144,7 @@ def resolve(objects: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
     for each in objects:
         fields = {name: value_of(raw) for name, raw in each.items()}
-        resolved.append(present_design(fields))
+        resolved.append(present_paths(present_design(fields)))
     return resolved
 
 
@@ -148,6 +153,23 @@ def present_design(fields: dict[str, Any]) -> dict[str, Any]:
     if {*fields} >= _DESIGN_FIELDS and fields["schema"] in MIGRATIONS_OF_DESIGNS:
         return migrate(fields)
     return fields
+
+
+def present_paths(fields: dict[str, Any]) -> dict[str, Any]:
+    """Return an object; the paths of an older explorer as those of the present one.
+
+    Modes and poses were chosen apart from one another; where both were, the poses count.
+    """
+    kind = fields.get("kind")
+    if "poses" in fields and kind in _FORMER_KINDS:
+        return fields | {"kind": _FORMER_KINDS[kind]}
+    if not {*fields} >= _FORMER_PATHS:
+        return fields
+    present = {name: value for name, value in fields.items() if name != "modes"}
+    for end, mode in zip(("start", "goal"), fields["modes"], strict=True):
+        if present.get(end) is None:
+            present[end] = mode
+    return present
 
 
 def _with_unclosed(state: State) -> State:

@@ -78,6 +78,16 @@ def ticks(*places: tuple[float, str]) -> str:
     return f'<div class="ex-ticks">{texts}</div>'
 
 
+def beside(count: Literal[2, 3], *, wide: bool = False) -> str:
+    """Return a mark in a tab: so many controls after it stand side by side if there is room.
+
+    Args:
+        count: Number of controls.
+        wide: Whether each needs twice as much room as usual.
+    """
+    return f'<div class="ex-beside is-{count}{" is-wide" if wide else ""}"></div>'
+
+
 def note(content: str) -> str:
     """Return a line of less important content below a control."""
     return f'<div class="ex-note ex-dim">{content}</div>'

@@ -5,9 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from html import escape
 
-from explorer.app.features.compare.columns import Column, best_of, hint_of, unit_of
+from explorer.app.features.compare.columns import (
+    Column,
+    best_of,
+    hint_of,
+    size_of,
+    unit_of,
+    value_text,
+)
 from explorer.app.widgets.colours import css
-from explorer.app.widgets.markup import format_number
 from explorer.measures.catalogue import CATALOGUE, Measure
 
 DRAWN = (
@@ -62,12 +68,13 @@ def _drawing(measure: Measure, columns: Sequence[Column], *, millimetres: bool) 
     longest = WIDTH - LETTER - NUMBER - 8.0
     scale = longest / (high - low) if high > low else 0.0
     zero = LETTER - low * scale
-    best = best_of(measure, values)
+    best, size = best_of(measure, values), size_of(values)
     unit = unit_of(measure, millimetres=millimetres)
     arrow = {"more": " ↑", "less": " ↓", None: ""}[measure.sense]
     title = (
         f"<title>{escape(hint_of(measure))}</title>"
-        f'<text x="0" y="11" font-weight="600">{escape(measure.label)}'
+        # There is no room for how it was measured; the hint says so.
+        f'<text x="0" y="11" font-weight="600">{escape(measure.label.removesuffix(" at nodes"))}'
         f'<tspan font-weight="400" fill-opacity="0.6"> {unit}{arrow}</tspan></text>'
     )
     parts = [title]
@@ -84,6 +91,6 @@ def _drawing(measure: Measure, columns: Sequence[Column], *, millimetres: bool) 
             f'<rect x="{start:.2f}" y="{y:g}" width="{max(end - start, 0.8):.2f}" '
             f'height="{BAR:g}" rx="1.5" fill="{css(column.colour)}"/>'
             f'<text x="{end + 4.0:.1f}" y="{baseline:g}" font-weight="{weight}">'
-            f"{format_number(value)}</text>"
+            f"{value_text(measure, value, size)}</text>"
         )
     return "".join(parts)

@@ -12,12 +12,12 @@ from explorer.app.features.compare.actions import Pin, Unpin
 from explorer.app.features.compare.bars import bars
 from explorer.app.features.compare.columns import Column, columns_of, notes
 from explorer.app.features.compare.feed import CompareFeed
-from explorer.app.features.compare.table import table
+from explorer.app.features.compare.table import progress, table
 from explorer.app.features.designs.saved_designs import SavedDesigns
 from explorer.app.features.feature import Services
 from explorer.app.session.session import Change
 from explorer.app.state.actions import Open, Set
-from explorer.app.state.compared import SLOTS, Compared
+from explorer.app.state.compared import SLOTS, Compared, unnamed
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.state.values import value_at
@@ -30,6 +30,8 @@ from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
 
 PIN_LABEL = "Pin another design"
+# Number of designs that have a button of their own; if there are more, a list has them all.
+MOST_BUTTONS = 5
 
 
 @dataclass(frozen=True)
@@ -109,28 +111,30 @@ class ComparePanel:
             PIN_LABEL,
             (NO_OPTION, *PRESETS),
             hint="Keep a copy of a preset or of a design of yours beside the live one.",
+            visible=False,
         )
         self.another.on_update(self._pin_chosen)
         self.html = gui.add_html("")
         self._add_buttons(services.buttons)
-        self._shown: tuple[object, ...] = ()
+        self._key: tuple[object, ...] = ()
         self._content = ""
 
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that make the panel show the frame."""
         compared = frame.state.compared
-        options = (NO_OPTION, *self._choices())
-        yield self.another, "options", options
+        choices = self._choices()
+        yield self.another, "options", (NO_OPTION, *choices)
+        yield self.another, "visible", len(choices) > MOST_BUTTONS
         if not self._session.is_waiting(self):
             yield self.another, "value", NO_OPTION
         columns = columns_of(frame.state, self._feed)
-        shown = (columns, compared)
-        if shown != self._shown:
-            self._shown, self._content = shown, self._page(frame.state, columns)
+        key = (columns, compared, tuple(choices), frame.state.design.name)
+        if key != self._key:
+            self._key, self._content = key, self._page(frame.state, columns, choices)
         yield self.html, "content", self._content
 
     def _add_buttons(self, buttons: Buttons) -> None:
-        self._register(buttons, "compare.pin", {"": lambda state: Pin(state.design)})
+        buttons.on("compare.pin", self._pin)
         self._register(buttons, "compare.turn", {s.name: _turn(s) for s in SWITCHES})
         self._register(buttons, "compare.open", {place: _open(place) for place in SLOTS})
         self._register(buttons, "compare.unpin", {place: _unpin(place) for place in SLOTS})
@@ -172,14 +176,17 @@ class ComparePanel:
 
         buttons.on(name, press, values=changes)
 
-    def _page(self, state: State, columns: tuple[Column, ...]) -> str:
+    def _page(
+        self, state: State, columns: tuple[Column, ...], choices: Mapping[str, Design]
+    ) -> str:
         look = state.compared.look
+        pins = _pin_buttons(state, choices)
         if state.compared.is_empty:
             return box(
-                _pin_button(),
-                '<p class="ex-dim ex-after">Pin this design, then change it: the live '
-                "one stands beside its copy. Up to three can be pinned, presets and designs of "
-                "yours too; their workspaces can be drawn over one another.</p>",
+                '<div class="ex-before">Pin this design, then change it: the copy stays beside it. '
+                "Or pin another one to compare this design with it. Up to three can be pinned; "
+                "their workspaces can be drawn over one another.</div>",
+                f'<div class="ex-flow">{pins}</div>',
             )
         if look.shows == "table":
             body = table(columns, millimetres=look.millimetres)
@@ -190,7 +197,7 @@ class ComparePanel:
                 for column in columns
             )
             body = (
-                f'<div class="ex-flow ex-apart">{legend}</div>'
+                f'<div class="ex-flow ex-apart">{legend}{progress(columns)}</div>'
                 f"{bars(columns, millimetres=look.millimetres)}"
             )
         remarks = "".join(
@@ -209,14 +216,25 @@ class ComparePanel:
             for switch in SWITCHES
             if look.overlay or switch.at != "compared.look.at_pose"
         )
-        pin = _pin_button(is_full=None not in state.compared.pinned)
-        return box(f'<div class="ex-flow ex-before">{pin}{chips}</div>', body, remarks)
+        return box(
+            f'<div class="ex-flow ex-before">{pins}<span class="ex-bar"></span>{chips}</div>',
+            body,
+            remarks,
+        )
 
     def _choices(self) -> dict[str, Design]:
         """Return the designs to pin, by name; no saved design has the name of a preset."""
         entries = () if self._library is None else self._library.entries
         own = (entry.design for entry in entries if entry.design is not None)
         return {**{design.name: design for design in own}, **PRESETS}
+
+    def _pin(self, name: str, client: viser.ClientHandle) -> None:
+        """Pin the live design for "", or the one with a name."""
+        chosen = self._choices().get(name)
+        if chosen is not None or not name:
+            self._session.post(
+                object(), lambda state: Pin(chosen or state.design), who=client.client_id
+            )
 
     def _pin_chosen(self, event: viser.GuiEvent[viser.GuiDropdownHandle[str]]) -> None:
         design = self._choices().get(self.another.value)
@@ -246,9 +264,12 @@ def _unpin(place: str) -> Change:
     return lambda _: Unpin(SLOTS.index(place))
 
 
-def _pin_button(*, is_full: bool = False) -> str:
-    hint = "All three places are taken: unpin one first" if is_full else "Pin this design"
-    return press_button(
+def _pin_buttons(state: State, choices: Mapping[str, Design]) -> str:
+    """Return the buttons that pin the live design and others, as HTML."""
+    compared = state.compared
+    is_full = None not in compared.pinned
+    hint = "All three places are taken: unpin one first" if is_full else "Keep a copy as it is now"
+    live = press_button(
         "compare.pin",
         "",
         "Pin this design",
@@ -256,3 +277,18 @@ def _pin_button(*, is_full: bool = False) -> str:
         class_name="ex-chip is-main",
         is_disabled=is_full,
     )
+    if is_full or len(choices) > MOST_BUTTONS:
+        return live
+    others = (
+        press_button(
+            "compare.pin",
+            name,
+            f"+ {escape(name)}",
+            hint=f"Pin {name} beside the live design",
+            label=f"Pin {name}",
+            class_name="ex-chip ex-cut ex-pin",
+        )
+        for name, design in choices.items()
+        if compared.slot_of(design) is None and unnamed(design) != unnamed(state.design)
+    )
+    return live + "".join(others)

@@ -15,7 +15,7 @@ from explorer.app.features.compare.columns import (
 )
 from explorer.app.features.compare.feed import LIVE
 from explorer.app.widgets.buttons import press_button
-from explorer.app.widgets.markup import swatch
+from explorer.app.widgets.markup import meter, swatch
 from explorer.measures.catalogue import Measure, measures_in
 
 # The measures that begin a group of rows.
@@ -34,31 +34,40 @@ def table(columns: Sequence[Column], *, millimetres: bool) -> str:
         _row(measure, columns, millimetres=millimetres)
         for measure in measures_in("compare").values()
     )
-    return f'<table class="ex-compare"><tr><td></td>{head}</tr>{rows}</table>'
-
-
-def _head(column: Column) -> str:
-    name = column.design.name
-    beside = '<span class="ex-dim ex-small">as it is</span>'
-    if column.number != LIVE:
-        beside = _link(column, "open", f"Make {name} the live design")
-        beside += _link(column, "unpin", f"Unpin {name}")
-    wait = "" if column.is_current else ' <span class="ex-dim">…</span>'
     return (
-        f'<td colspan="2" class="ex-head"><div class="ex-cut">{swatch(column.colour)}'
-        f"<b>{column.letter}</b> {beside}</div>"
-        f'<div class="ex-cut" title="{escape(name)}">{escape(name)}{wait}</div></td>'
+        f'<table class="ex-compare"><tr><td class="ex-head">{progress(columns)}</td>{head}</tr>'
+        f"{rows}</table>"
     )
 
 
-def _link(column: Column, act: str, hint: str) -> str:
+def progress(columns: Sequence[Column]) -> str:
+    """Return how many of the designs are measured as HTML; "" once all are."""
+    done = sum(column.is_current or column.problem is not None for column in columns)
+    if done == len(columns):
+        return ""
+    share = meter(100.0 * done / len(columns), look="ex-meter is-thin")
+    return f'<div class="ex-dim">measured: {done} of {len(columns)}</div>{share}'
+
+
+def _head(column: Column) -> str:
+    name = escape(column.design.name)
+    beside = '<span class="ex-dim ex-small">as it is</span>'
+    if column.number != LIVE:
+        beside = _link(column, "open", "Open", f"Make {column.design.name} the live design")
+        beside += _link(column, "unpin", "×", f"Unpin {column.design.name}")
+    wait = "" if column.is_current else ' <span class="ex-dim">…</span>'
+    # The differences to the live design have a column of their own.
+    span = "" if column.number == LIVE else ' colspan="2"'
+    return (
+        f'<td{span} class="ex-head"><div class="ex-whole">{swatch(column.colour)}'
+        f"<b>{column.letter}</b> {beside}</div>"
+        f'<div class="ex-cut" title="{name}">{name}{wait}</div></td>'
+    )
+
+
+def _link(column: Column, act: str, words: str, hint: str) -> str:
     return press_button(
-        f"compare.{act}",
-        column.letter,
-        act.capitalize(),
-        hint=hint,
-        label=hint,
-        class_name="ex-link",
+        f"compare.{act}", column.letter, words, hint=hint, label=hint, class_name="ex-link"
     )
 
 
@@ -77,12 +86,14 @@ def _row(measure: Measure, columns: Sequence[Column], *, millimetres: bool) -> s
         look = "ex-number is-best" if index in best else "ex-number"
         cells.append(
             f'<td class="{look}" title="{_exact_text(measure, column)}">'
-            f'{_cell(measure, column, value, size)}</td><td class="ex-change">{change}</td>'
+            f"{_cell(measure, column, value, size)}</td>"
         )
+        if index:
+            cells.append(f'<td class="ex-change">{change}</td>')
     unit_html = f' <span class="ex-dim ex-small">{unit}</span>' if unit else ""
     return (
         f'<tr{first} title="{escape(hint_of(measure))}">'
-        f'<td class="ex-whole">{escape(measure.label)}{unit_html}</td>'
+        f"<td>{escape(measure.label)}{unit_html}</td>"
         f"{''.join(cells)}</tr>"
     )
 

@@ -1,72 +1,124 @@
-"""Actions on paths: to make, play and plan one, and to store its ends."""
+"""Actions on paths: to make one, straight or planned, and to play it."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import ClassVar, Literal
+from typing import ClassVar
+
+import numpy as np
 
 from explorer.app.state.action import Action
 from explorer.app.state.actions import moved
-from explorer.app.state.paths import Journey, Paths
-from explorer.app.state.state import State, joints_of
+from explorer.app.state.paths import End, Journey, Paths
+from explorer.app.state.state import Joints, State, joints_of
 from explorer.errors import InputError
+from explorer.mechanism.design import Design
 from explorer.mechanism.kinematics import forward
-from explorer.mechanism.margins import mode_name
 from explorer.mechanism.pose import Pose
 
-
-@dataclass(frozen=True)
-class ChooseModes(Action):
-    """Choose the assembly modes in which a path begins and ends."""
-
-    template: ClassVar[str] = "Path from mode {action.first} to {action.last}"
-
-    first: int
-    last: int
-
-    def apply(self, state: State) -> State:
-        """Return the next state."""
-        return _with(state, modes=(self.first, self.last))
+# Poses, and leg lengths over the reach, that differ by less are the same.
+SAME = 1e-9
 
 
 @dataclass(frozen=True)
-class WatchModes(Action):
-    """Play the straight path between the chosen assembly modes of the present joints."""
-
-    template: ClassVar[str] = "Watch the path between modes"
+class Go(Action):
+    """Play the straight path between the chosen ends, or request one without a singularity."""
 
     def apply(self, state: State) -> State:
-        """Return the next state, at the start of the path, playing.
+        """Return the next state: at the start of the path and playing, or planning it.
 
         Raises:
-            InputError: the path begins and ends in the same mode.
+            InputError: both ends are the same pose, or an end is a mode that the present leg
+                lengths do not have.
         """
-        first, last = chosen_modes(state)
-        if first == last:
+        start, goal = ends_of(state)
+        if is_same(state.design, start, goal):
             raise InputError(
-                f"a path between modes needs two of them; both are mode {last} ({mode_name(last)})"
+                "the start and the goal are the same pose: choose another goal, or press Play to "
+                "see the last path again"
             )
-        journey = state.journey
-        pose = state.pose
-        if journey is not None and journey.kind == "modes" and journey.pose == state.pose:
-            # The pose is on such a path: the joints are those of its ends.
-            pose = journey.poses[0]
-        solution = forward(state.design, joints_of(state.design, pose))
-        start, end = (
-            Pose.of(solution.position[mode], solution.rotation[mode]) for mode in (first, last)
+        # A goal that follows the present mode would be another one as soon as the platform moves.
+        chosen = goal_of(state)
+        if state.paths.kind == "planned":
+            return _with(
+                state,
+                goal=chosen,
+                request=state.paths.request + 1,
+                planning=(start, goal),
+                problem=None,
+                journey=None,
+            )
+        title = f"{_end_words(state.paths.start).capitalize()} to {_end_words(chosen)}"
+        path = Journey("straight", title, state.design, (start, goal), is_playing=True)
+        after = moved(_with(state, goal=chosen, problem=None, planning=None, journey=path), start)
+        mode = state.paths.start
+        return replace(after, mode=mode) if isinstance(mode, int) else after
+
+    def describe(self, before: State, after: State) -> str:
+        """Return which path was played or requested."""
+        del before
+        journey = after.journey
+        return "Plan a path" if journey is None else journey.title
+
+
+def goal_of(state: State) -> Pose | int:
+    """Return the goal of the next path; where none is chosen, the mode beyond δ1 = 0."""
+    return state.mode ^ 4 if state.paths.goal is None else state.paths.goal
+
+
+def ends_of(state: State) -> tuple[Pose, Pose]:
+    """Return the poses between which the next path leads.
+
+    Raises:
+        InputError: an end is a mode that the present leg lengths do not have.
+    """
+    start, goal = state.paths.start, goal_of(state)
+    return state.pose if start is None else pose_of_end(state, start), pose_of_end(state, goal)
+
+
+def pose_of_end(state: State, end: Pose | int) -> Pose:
+    """Return the pose of an end: itself, or a mode of the present leg lengths.
+
+    Raises:
+        InputError: the present leg lengths do not close in other modes, to rounding.
+    """
+    if isinstance(end, Pose):
+        return end
+    solution = forward(state.design, _legs(state))
+    if not solution.feasible:
+        raise InputError(
+            "the present leg lengths lie at the edge of what closes, where all modes are one; "
+            "move the platform away from the singular pose"
         )
-        title = f"Mode {first} ({mode_name(first)}) to mode {last} ({mode_name(last)})"
-        path = Journey("modes", title, state.design, (start, end), is_playing=True)
-        after = _with(state, journey=path, modes=(first, last))
-        return replace(moved(after, start), mode=first)
+    return Pose.of(solution.position[end], solution.rotation[end])
 
 
-def chosen_modes(state: State) -> tuple[int, int]:
-    """Return the assembly modes in which a path begins and ends."""
-    first, last = state.paths.modes
-    begin = state.mode if first is None else first
-    return begin, begin ^ 4 if last is None else last
+def _legs(state: State) -> Joints:
+    """Return the leg lengths whose modes are the ends of a path.
+
+    On a straight path between modes they are those of its ends, which all of it belongs to.
+    """
+    journey = state.journey
+    if journey is not None and journey.kind == "straight" and journey.pose == state.pose:
+        first, last = (joints_of(state.design, pose) for pose in journey.poses)
+        if np.abs(np.subtract(first, last)).max() <= SAME * state.design.reach:
+            return first
+    return joints_of(state.design, state.pose)
+
+
+def is_same(design: Design, start: Pose, goal: Pose) -> bool:
+    """Whether two poses are the same, to rounding."""
+    apart = np.abs(np.subtract(start.position, goal.position)).max() / design.reach
+    return bool(max(apart, np.abs(start.rotation - goal.rotation).max()) <= SAME)
+
+
+def _end_words(end: End) -> str:
+    if end is None:
+        return "present pose"
+    if isinstance(end, Pose):
+        return "typed pose"
+    return f"mode {end}"
 
 
 @dataclass(frozen=True)
@@ -132,44 +184,6 @@ class Advance(Action):
 
 
 @dataclass(frozen=True)
-class StoreEnd(Action):
-    """Store the present pose as the start or the goal of a path to plan."""
-
-    template: ClassVar[str] = "Store the {action.end} of a path"
-
-    end: Literal["start", "goal"]
-
-    def apply(self, state: State) -> State:
-        """Return the next state."""
-        if self.end == "start":
-            return _with(state, start=state.pose)
-        return _with(state, goal=state.pose)
-
-
-@dataclass(frozen=True)
-class Plan(Action):
-    """Request a path from the stored start to the stored goal."""
-
-    template: ClassVar[str] = "Plan a path"
-
-    def apply(self, state: State) -> State:
-        """Return the next state.
-
-        Raises:
-            InputError: no start or no goal has been stored.
-        """
-        missing = [name for name in ("start", "goal") if getattr(state.paths, name) is None]
-        if missing:
-            raise InputError(
-                f"store a {' and a '.join(missing)} first: move the platform there and press its "
-                "button"
-            )
-        return _with(
-            state, request=state.paths.request + 1, is_planning=True, problem=None, journey=None
-        )
-
-
-@dataclass(frozen=True)
 class CancelPlan(Action):
     """Stop planning."""
 
@@ -177,7 +191,7 @@ class CancelPlan(Action):
 
     def apply(self, state: State) -> State:
         """Return the next state."""
-        return _with(state, is_planning=False)
+        return _with(state, planning=None)
 
 
 @dataclass(frozen=True)
@@ -203,8 +217,8 @@ class TakePlan(Action):
             return state
         problem = self.problem
         if self.journey is not None and self.journey.design != state.design:
-            problem = "the design has changed meanwhile; plan again"
-        after = _with(state, is_planning=False, problem=problem, journey=self.journey)
+            problem = "the design has changed meanwhile; press Go again"
+        after = _with(state, planning=None, problem=problem, journey=self.journey)
         if after.journey is None:
             return after
         return moved(after, after.journey.pose)
@@ -213,7 +227,7 @@ class TakePlan(Action):
 def _journey(state: State) -> Journey:
     journey = state.journey
     if journey is None:
-        raise InputError("there is no path for this design; watch one between modes, or plan one")
+        raise InputError("there is no path for this design; press Go to make one")
     return journey
 
 

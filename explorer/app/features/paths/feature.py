@@ -1,4 +1,4 @@
-"""Paths: between assembly modes, and planned without a singularity."""
+"""Paths between two poses: straight, or planned without a singularity."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from explorer.app.features.paths.actions import Play
 from explorer.app.features.paths.panel import PathsPanel
 from explorer.app.features.paths.runner import PathRunner
 from explorer.app.features.paths.scene import PathScene
-from explorer.app.widgets.commands import Key, shift
+from explorer.app.widgets.commands import Key
 
 PATHS = Feature(
     "paths",
@@ -25,8 +25,7 @@ PATHS = Feature(
         ),
     ),
     keys={
-        "Paths › Watch": (shift("M"),),
-        "Paths › Plan": (Key("J"),),
+        "Paths › Go": (Key("J"),),
         "Paths › Play or pause": (Key("P"),),
     },
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from html import escape
 from typing import Any
 
 import numpy as np
@@ -25,7 +26,7 @@ from explorer.app.widgets.charts import (
     line,
 )
 from explorer.app.widgets.colours import Rgb
-from explorer.app.widgets.markup import box, dim, format_number, row, signed, swatch, table
+from explorer.app.widgets.markup import format_number, signed, swatch
 from explorer.mechanism.margins import INCIDENCES, margins
 from explorer.numerics.arrays import FloatArray
 
@@ -34,15 +35,17 @@ from explorer.numerics.arrays import FloatArray
 COLOURS: tuple[Rgb, Rgb, Rgb] = (BLUE, TEAL, VIOLET)
 DASHES: tuple[tuple[float, ...], ...] = ((), (7.0, 3.0), (2.0, 3.0))
 STROKES = ("ex-stroke", "ex-stroke is-dashed", "ex-stroke is-dotted")
-HEIGHT = 200
+HEIGHT = 112
 # Number of crossings that are listed; the others are counted.
-MOST_LISTED = 6
+MOST_LISTED = 4
 
 
 class MarginPlot:
     """The chart and its legend, hidden while there is no path."""
 
     def __init__(self, gui: viser.GuiApi) -> None:
+        # The slider above names the horizontal axis.
+        self._legend = gui.add_html("", visible=False)
         deltas = (
             line(f"δ{index}", colour, dash=dash)
             for index, (colour, dash) in enumerate(zip(COLOURS, DASHES, strict=True), start=1)
@@ -56,18 +59,17 @@ class MarginPlot:
                 line("now", NEUTRAL, width=1.5),
             ),
             (
-                axis("time (s)", label_size=20, size=28),
+                axis("", label_size=0, size=26),
                 axis("δ (units)", label_size=18, size=40, space=26),
             ),
             height=HEIGHT,
             padding=(8, 12, 0, 0),
         )
-        self._words = gui.add_html("", visible=False)
 
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that make the chart and its legend show the frame."""
         journey = frame.state.journey
-        for handle in (self._chart, self._words):
+        for handle in (self._chart, self._legend):
             yield handle, "visible", journey is not None
         if journey is None:
             return
@@ -76,7 +78,7 @@ class MarginPlot:
         top = float(np.nanmax(columns[-1]))
         yield self._chart, "scales", _scales(float(columns[0][-1]), top)
         yield self._chart, "data", columns
-        yield self._words, "content", path_words(journey)
+        yield self._legend, "content", margin_legend(journey)
 
 
 def columns_of(journey: Journey) -> tuple[NDArray[Any], ...]:
@@ -110,14 +112,12 @@ def _margins_at(journey: Journey, at: FloatArray) -> FloatArray:
     return np.stack([np.interp(at, samples.at, samples.margins[:, i]) for i in range(3)], axis=1)
 
 
-def path_words(journey: Journey) -> str:
-    """Return the legend with the present margins, and the crossings, as HTML."""
+def margin_legend(journey: Journey) -> str:
+    """Return the lines of the chart with the present margins, in one line of HTML."""
     pose = journey.pose
-    legend = (
-        row(
-            f'{swatch(colour, look)}δ{index} <span class="ex-dim ex-small">{incidence}</span>',
-            signed(value),
-        )
+    parts = (
+        f'<span class="ex-whole" title="{escape(incidence)}">{swatch(colour, look)}δ{index} '
+        f"<b>{signed(value, 2)}</b></span>"
         for index, (colour, look, incidence, value) in enumerate(
             zip(
                 COLOURS,
@@ -129,30 +129,30 @@ def path_words(journey: Journey) -> str:
             start=1,
         )
     )
-    return box(table(legend), f'<div class="ex-after">{_crossings(journey)}</div>')
+    return f'<div class="ex-note ex-thirds">{"".join(parts)}</div>'
 
 
-def _crossings(journey: Journey) -> str:
+def crossing_words(journey: Journey) -> str:
+    """Return where the path is singular, in one line of HTML."""
     along_path = journey.margins
-    lines = [
-        f"{crossing_time(journey, i):.2f} s: δ{c.incidence} = 0"
+    places = [
+        f"δ{c.incidence} = 0 at {crossing_time(journey, i):.2f} s"
         f"{'' if c.changes_sign else ', only touched'}"
         for i, c in enumerate(along_path.crossings)
     ]
-    lines += [f"along a whole move: δ{index} = 0" for index in along_path.lies_in]
-    if not lines:
+    places += [f"δ{index} = 0 along a whole move" for index in along_path.lies_in]
+    if not places:
         least = np.abs(along_path.margins).min(axis=0)
         index = int(least.argmin())
-        return dim(
-            f"No singularity on the path; the closest is δ{index + 1} = 0, with "
-            f"|δ{index + 1}| = {format_number(float(least[index]), 3)}."
+        return (
+            f'<div class="ex-within">No singular pose on the path; least |δ{index + 1}| = '
+            f"{format_number(float(least[index]), 3)} units</div>"
         )
+    more = len(places) - MOST_LISTED
+    listed = "; ".join(places[:MOST_LISTED]) + (f"; and {more} more" if more > 0 else "")
+    times = "once" if len(places) == 1 else f"{len(places)} times"
     dot = swatch(ORANGE, "ex-dot")
-    listed = "".join(f"<div>{dot}{line}</div>" for line in lines[:MOST_LISTED])
-    more = len(lines) - MOST_LISTED
-    rest = f'<div class="ex-dim">and {more} more</div>' if more > 0 else ""
-    headline = "Singular once" if len(lines) == 1 else f"Singular {len(lines)} times"
-    return f"<b>{headline} on the path</b>{listed}{rest}"
+    return f"<div>{dot}Singular {times}: {listed}</div>"
 
 
 def _scales(duration: float, top: float) -> dict[str, uplot.Scale]:

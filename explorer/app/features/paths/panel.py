@@ -1,4 +1,4 @@
-"""Paths between assembly modes and planned paths: to make, play, plot and export them."""
+"""Paths, straight or planned: their ends, and the controls that make, play and export them."""
 
 from __future__ import annotations
 
@@ -10,93 +10,97 @@ from typing import Literal
 import viser
 
 from explorer.app.features.feature import Services
-from explorer.app.features.mechanism.pose_panel import MODES
 from explorer.app.features.paths.actions import (
     CancelPlan,
-    ChooseModes,
-    Plan,
+    Go,
     Play,
     SetPathTime,
-    StoreEnd,
-    WatchModes,
-    chosen_modes,
+    ends_of,
+    goal_of,
+    pose_of_end,
 )
-from explorer.app.features.paths.margin_plot import MarginPlot
+from explorer.app.features.paths.margin_plot import MarginPlot, crossing_words
 from explorer.app.session.session import Who
+from explorer.app.state.action import Action
+from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
-from explorer.app.state.state import State
+from explorer.app.state.paths import End, PathKind
+from explorer.app.state.state import State, angles_of
 from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.buttons import Buttons, press_button
 from explorer.app.widgets.controls import Bound, Controls, Span
-from explorer.app.widgets.markup import alert, box, dim, row, sentence, signed, table
+from explorer.app.widgets.markup import alert, beside, box, dim, note, sentence, signed
+from explorer.errors import InputError
 from explorer.export.trajectory import trajectory_csv
-from explorer.mechanism.pose import Pose, yaw_pitch_roll_from_rotation
+from explorer.mechanism.margins import margins, mode_name, mode_of
+from explorer.mechanism.pose import Pose, Triple
 
-STORE: tuple[Literal["start", "goal"], ...] = ("start", "goal")
+EndName = Literal["start", "goal"]
+ENDS: tuple[EndName, ...] = ("start", "goal")
+HINTS: dict[EndName, str] = {
+    "start": (
+        "The pose in which the path begins: the present one, an assembly mode of the present leg "
+        "lengths by the signs of δ1 δ2 δ3, or typed numbers, which begin with those shown."
+    ),
+    "goal": (
+        "The pose in which the path ends: an assembly mode of the present leg lengths by the "
+        "signs of δ1 δ2 δ3, the present pose, which is kept as numbers, or typed numbers."
+    ),
+}
+PRESENT, TYPED = "Present pose", "Typed numbers"
+MODES = tuple(f"Mode {mode}:  {mode_name(mode)}" for mode in range(8))
+OPTIONS: dict[EndName, tuple[str, ...]] = {
+    "start": (PRESENT, *MODES, TYPED),
+    "goal": (*MODES, PRESENT, TYPED),
+}
+KINDS: dict[PathKind, tuple[str, str]] = {
+    "straight": (
+        "Straight",
+        "Move straight from start to goal; limits and collisions are not checked.",
+    ),
+    "planned": (
+        "Without singularity",
+        "Search for a path that keeps all limits, margins and clearances.",
+    ),
+}
+# Decimals at which typed angles stop: beyond them is rounding.
+ANGLE_DECIMALS = 9
 
 
 class PathsPanel:
-    """The controls that make a path, play it and export it, and the margins along it."""
+    """The ends and the kind of a path, and the path that was made, with its margins."""
 
     def __init__(self, services: Services) -> None:
         gui, self._session = services.gui, services.session
         self._downloads = services.downloads
-        self._controls = controls = Controls(gui, services.session)
-        with gui.add_folder("Between assembly modes"):
-            controls.dropdown(
-                "From",
-                "The assembly mode to start from, by the signs of δ1 δ2 δ3.",
-                MODES,
-                Bound(
-                    lambda frame: MODES[chosen_modes(frame.state)[0]],
-                    lambda state, chosen: ChooseModes(MODES.index(chosen), chosen_modes(state)[1]),
-                ),
-            )
-            controls.dropdown(
-                "To",
-                "The assembly mode to end in. Any path between modes of different signs is "
-                "singular at least once.",
-                MODES,
-                Bound(
-                    lambda frame: MODES[chosen_modes(frame.state)[1]],
-                    lambda state, chosen: ChooseModes(chosen_modes(state)[0], MODES.index(chosen)),
-                ),
-            )
-            controls.button(
-                "Watch",
-                "Play the straight path between these modes; its ends have the present leg "
-                "lengths.",
-                WatchModes,
-                icon=viser.Icon.PLAYER_PLAY,
-            )
-        with gui.add_folder("Without singularity"):
-            self._ends = gui.add_html("")
-            self.store = gui.add_button_group(
-                "Store as", STORE, hint="Store the present pose as the start or the goal."
-            )
-            self.store.on_click(self._store_end)
-            controls.number(
+        self._controls = Controls(gui, services.session)
+        gui.add_html(beside(2))
+        with gui.add_folder("Path"):
+            self._numbers: dict[EndName, viser.GuiHtmlHandle] = {
+                end: self._add_end(gui, end) for end in ENDS
+            }
+            self._kinds = gui.add_html("")
+            self._controls.number(
                 "Time limit (s)",
-                "Time after which planning stops without a path.",
+                "Time after which the search for a path stops without one.",
                 "paths.seconds",
                 least=0.1,
                 step=0.1,
+                visible=lambda state: state.paths.kind == "planned",
             )
-            self.plan = controls.button(
-                "Plan",
-                "Search for a path that keeps all limits, margins and clearances.",
-                Plan,
+            self.go = self._controls.button(
+                "Go",
+                "Make the path from the start to the goal, and play it.",
+                Go,
                 icon=viser.Icon.ROUTE,
-            )
-            self.cancel = controls.button(
-                "Cancel", "Stop planning.", CancelPlan, icon=viser.Icon.PLAYER_STOP
             )
             self._status = gui.add_html("", visible=False)
         with gui.add_folder("Playback"):
             self._title = gui.add_html("")
-            self.time = controls.slider(
+            self.time = self._controls.slider(
                 "Time (s)",
-                "Time on the path. On a planned path the fastest actuator moves a tenth of the "
-                "reach per second.",
+                "Time on the path. A straight path takes 8 s; on a planned one the fastest "
+                "actuator moves a tenth of the reach per second.",
                 Bound(
                     lambda frame: 0.0 if frame.state.journey is None else frame.state.journey.at,
                     lambda _, value: SetPathTime(value),
@@ -104,25 +108,88 @@ class PathsPanel:
                 _time_span,
                 disabled=lambda state: state.journey is None,
             )
-            self.play = controls.button(
-                "Play", "Move along the path.", lambda: Play(True), icon=viser.Icon.PLAYER_PLAY
-            )
-            self.pause = controls.button(
-                "Pause",
-                "Stop here.",
-                lambda: Play(False),
-                icon=viser.Icon.PLAYER_PAUSE,
-            )
             self._plot = MarginPlot(gui)
-            self.export = gui.add_button(
-                "Export CSV",
-                hint="Time, joints and pose, evenly spaced in time; lengths in design units.",
-                icon=viser.Icon.DOWNLOAD,
-            )
-            self.export.on_click(lambda event: self._export(event.client_id))
+        self._add_buttons(services.buttons)
 
-    def _store_end(self, event: viser.GuiEvent[viser.GuiButtonGroupHandle]) -> None:
-        self._session.do(StoreEnd(STORE[STORE.index(event.target.value)]), who=event.client_id)
+    def updates(self, frame: Frame) -> Iterator[Update]:
+        """Yield the updates that make the panel show the frame."""
+        state = frame.state
+        for end, handle in self._numbers.items():
+            is_typed = _is_typed(state, end)
+            yield handle, "visible", not is_typed
+            if not is_typed:
+                yield handle, "content", end_numbers(state, end)
+        yield self._kinds, "content", kind_words(state)
+        yield self.go, "disabled", state.paths.is_planning
+        status = plan_words(state)
+        yield self._status, "visible", status is not None
+        if status is not None:
+            yield self._status, "content", status
+        yield self._title, "content", path_title(state)
+        yield from self._plot.updates(frame)
+        yield from self._controls.updates(frame)
+
+    def _add_end(self, gui: viser.GuiApi, end: EndName) -> viser.GuiHtmlHandle:
+        title = end.capitalize()
+        self._controls.dropdown(
+            title,
+            HINTS[end],
+            OPTIONS[end],
+            Bound(
+                lambda frame: _option(frame.state, end),
+                lambda state, chosen: _choose(state, end, chosen),
+            ),
+        )
+        numbers = gui.add_html("")
+        self._controls.triple(
+            f"{title} x, y, z",
+            "Coordinates of b4 in the base frame, in design units.",
+            Bound(
+                lambda frame: typed_numbers(frame.state, end)[0],
+                lambda state, position: _set_typed(state, end, position, None),
+            ),
+            step=0.01,
+            visible=lambda state: _is_typed(state, end),
+        )
+        self._controls.triple(
+            f"{title} angles (°)",
+            "Yaw, pitch and roll of the platform, in degrees.",
+            Bound(
+                lambda frame: typed_numbers(frame.state, end)[1],
+                lambda state, angles: _set_typed(state, end, None, angles),
+            ),
+            step=0.1,
+            visible=lambda state: _is_typed(state, end),
+        )
+        return numbers
+
+    def _add_buttons(self, buttons: Buttons) -> None:
+        def change(value: str, client: viser.ClientHandle) -> None:
+            self._session.do(Set("paths.kind", value, "Path", value), who=client.client_id)
+
+        def play(value: str, client: viser.ClientHandle) -> None:
+            self._session.do(Play(value == "on"), who=client.client_id)
+
+        buttons.on("paths.kind", change, values=KINDS)
+        buttons.on("paths.play", play, values=("on", "off"))
+        buttons.on("paths.export", lambda _, client: self._export(client.client_id))
+        buttons.on(
+            "paths.cancel", lambda _, client: self._session.do(CancelPlan(), who=client.client_id)
+        )
+        for kind, (words, hint) in KINDS.items():
+            buttons.offer(f"Paths › {words}", hint, "paths.kind", kind)
+        buttons.offer(
+            "Paths › Cancel planning",
+            "Stop the search for a path.",
+            "paths.cancel",
+            is_ready=lambda: self._session.state.paths.is_planning,
+        )
+        buttons.offer(
+            "Paths › Export CSV",
+            "Save time, joints and pose along the path, evenly spaced in time.",
+            "paths.export",
+            is_ready=lambda: self._session.state.journey is not None,
+        )
 
     def _export(self, who: Who) -> None:
         journey = self._session.state.journey
@@ -130,62 +197,137 @@ class PathsPanel:
             data = trajectory_csv(journey.trajectory).encode()
             self._downloads.send(who, f"{journey.design.name}-path.csv", data)
 
-    def updates(self, frame: Frame) -> Iterator[Update]:
-        """Yield the updates that make the panel show the frame."""
-        state = frame.state
-        paths, journey = state.paths, state.journey
-        yield self._ends, "content", ends_table(state)
-        yield self.plan, "visible", not paths.is_planning
-        yield self.cancel, "visible", paths.is_planning
-        status = plan_words(state)
-        yield self._status, "visible", status is not None
-        if status is not None:
-            yield self._status, "content", status
-        playing = journey is not None and journey.is_playing
-        yield self.play, "visible", journey is not None and not playing
-        yield self.pause, "visible", playing
-        yield self.export, "visible", journey is not None
-        yield self._title, "content", _title(state)
-        yield from self._plot.updates(frame)
-        yield from self._controls.updates(frame)
+
+def end_numbers(state: State, end: EndName) -> str:
+    """Return the six numbers of an end that is not typed, as HTML."""
+    chosen = _end(state, end)
+    try:
+        pose = state.pose if chosen is None else pose_of_end(state, chosen)
+    except InputError as error:
+        return f'<div class="ex-note ex-close">{escape(sentence(str(error)))}</div>'
+    position = ", ".join(signed(coordinate, 2) for coordinate in pose.position)
+    angles = ", ".join(f"{signed(angle, 1)}°" for angle in angles_of(pose))
+    hint = "x, y, z of b4 in design units; yaw, pitch, roll"
+    return note(f'<span title="{hint}">{position} · {angles}</span>')
 
 
-def ends_table(state: State) -> str:
-    """Return the stored start and goal as HTML."""
-    ends = (("start", state.paths.start), ("goal", state.paths.goal))
-    rows = (row(dim(name), *_coordinates(pose)) for name, pose in ends)
-    return box(table(rows, ("", "x, y, z", "yaw, pitch, roll")))
+def kind_words(state: State) -> str:
+    """Return the two kinds of a path as switches, and what the chosen one means, as HTML."""
+    chips = "".join(
+        press_button(
+            "paths.kind",
+            kind,
+            words,
+            hint=hint,
+            class_name="ex-chip",
+            is_on=state.paths.kind == kind,
+        )
+        for kind, (words, hint) in KINDS.items()
+    )
+    return box(f'<div class="ex-flow">{chips}</div><div class="ex-small">{_kind_note(state)}</div>')
 
 
-def _coordinates(pose: Pose | None) -> tuple[str, str]:
-    if pose is None:
-        return "", dim("not stored")
-    position = ", ".join(signed(coordinate, 1) for coordinate in pose.position)
-    angles = yaw_pitch_roll_from_rotation(pose.rotation).tolist()
-    rotation = ", ".join(f"{signed(angle, 0)}°" for angle in angles)
-    return _on_one_line(position), _on_one_line(rotation)
-
-
-def _on_one_line(text: str) -> str:
-    return f'<span class="ex-whole">{text}</span>'
+def _kind_note(state: State) -> str:
+    if state.paths.kind == "straight":
+        return dim("May pass singular poses, which are marked.")
+    try:
+        start, goal = (int(mode_of(margins(e.position, e.rotation))) for e in ends_of(state))
+    except InputError:
+        return ""
+    if start == goal:
+        return dim(f"Both ends are in mode {start} ({mode_name(start)}).")
+    return (
+        f'<span class="ex-close" title="Every path between two modes is singular">'
+        f"There is none from mode {start} to mode {goal}.</span>"
+    )
 
 
 def plan_words(state: State) -> str | None:
     """Return the progress of planning, or why it led to no path, as HTML; None otherwise."""
     paths = state.paths
     if paths.is_planning:
-        return box(dim(f"Planning, for {paths.seconds:g} s at most …"))
+        cancel = press_button(
+            "paths.cancel", "", "Cancel", hint="Stop the search", class_name="ex-button"
+        )
+        words = dim(f"Planning, for {paths.seconds:g} s at most …")
+        return box(f'<div class="ex-line">{words}{cancel}</div>')
     if paths.problem is not None:
         return alert("No path", sentence(paths.problem))
     return None
 
 
-def _title(state: State) -> str:
+def path_title(state: State) -> str:
+    """Return the title of the path, its singular poses, and buttons to play and export it."""
     journey = state.journey
     if journey is None:
-        return box(dim("No path yet: watch one between modes, or plan one."))
-    duration = dim(f"{journey.trajectory.duration:.2f} s")
-    return box(f"<b>{escape(journey.title)}</b> {duration}")
+        return box(dim("No path yet. Choose a goal and press Go."))
+    on, words, hint = (
+        ("off", "Pause", "Stop here") if journey.is_playing else ("on", "Play", "Move along it")
+    )
+    play = press_button("paths.play", on, words, hint=hint, class_name="ex-button ex-play")
+    export = press_button(
+        "paths.export",
+        "",
+        "CSV",
+        hint="Save time, joints and pose, evenly spaced in time; lengths in design units",
+        label="Export CSV",
+        class_name="ex-button",
+    )
+    title = escape(journey.title)
+    return box(
+        f'<div class="ex-line">{play}<span class="ex-cut ex-fill" title="{title}">{title}</span>'
+        f"{export}</div>",
+        crossing_words(journey),
+    )
+
+
+def _end(state: State, end: EndName) -> End:
+    return state.paths.start if end == "start" else goal_of(state)
+
+
+def _option(state: State, end: EndName) -> str:
+    chosen = _end(state, end)
+    if chosen is None:
+        return PRESENT
+    return TYPED if isinstance(chosen, Pose) else MODES[chosen]
+
+
+def _choose(state: State, end: EndName, option: str) -> Action:
+    value: End = None
+    if option in MODES:
+        value = MODES.index(option)
+    elif option == TYPED:
+        chosen = _end(state, end)
+        value = state.pose if chosen is None else pose_of_end(state, chosen)
+    elif end == "goal":
+        # It is of use once the platform has moved away.
+        value = state.pose
+    return Set(f"paths.{end}", value, end.capitalize(), option)
+
+
+def _is_typed(state: State, end: EndName) -> bool:
+    return isinstance(_end(state, end), Pose)
+
+
+def typed_numbers(state: State, end: EndName) -> tuple[Triple, Triple]:
+    """Return position and angles in degrees of an end that is typed; zeros for another."""
+    chosen = _end(state, end)
+    if not isinstance(chosen, Pose):
+        return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    yaw, pitch, roll = (round(angle, ANGLE_DECIMALS) for angle in angles_of(chosen))
+    return chosen.position, (yaw, pitch, roll)
+
+
+def _set_typed(
+    state: State, end: EndName, position: Triple | None, angles: Triple | None
+) -> Action:
+    before = _end(state, end)
+    pose = before if isinstance(before, Pose) else state.pose
+    if angles is not None:
+        pose = Pose.of_yaw_pitch_roll(pose.position, angles)
+    elif position is not None:
+        pose = Pose(position, pose.quaternion)
+    return Set(f"paths.{end}", pose, end.capitalize(), "typed numbers")
 
 
 def _time_span(state: State) -> Span:

@@ -19,7 +19,7 @@ from explorer.paths.planning import PlannedPath
 FRAME_SECONDS = 0.04
 # Longest step of a path between two frames, in seconds, even if a frame takes longer.
 LONGEST_STEP = 0.25
-DIED = "the planner's process ended; Plan starts it again"
+DIED = "the planner's process ended; Go starts it again"
 
 
 class PathRunner(Runner):
@@ -63,16 +63,19 @@ class PathRunner(Runner):
 
     def _plan(self, state: State) -> None:
         request, design, paths = self._request, state.design, state.paths
+        if paths.planning is None:
+            return
+        start, goal = paths.planning
 
         def take_path(path: PlannedPath) -> None:
             moves = len(path.poses) - 1
             title = f"Planned path of {moves} {'move' if moves == 1 else 'moves'}"
-            self._finish(request, Journey("plan", title, design, path.poses), None)
+            self._finish(request, Journey("planned", title, design, path.poses), None)
 
         self._order = self.worker.submit(
             "plan",
             tasks.plan,
-            (design, paths.start, paths.goal, paths.seconds),
+            (design, start, goal, paths.seconds),
             take_path,
             lambda problem: self._finish(request, None, problem),
         )

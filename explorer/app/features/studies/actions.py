@@ -47,7 +47,7 @@ class BrushAxis(Action):
         Raises:
             InputError: too many ranges, or one without numbers.
         """
-        ranges = _checked(self.axis, self.ranges)
+        ranges = _check_ranges(self.axis, self.ranges)
         return replace(state, studies=state.studies.with_ranges(self.axis, ranges))
 
     def words(self) -> str:
@@ -79,7 +79,7 @@ class BrushBox(Action):
         studies = state.studies
         for index, axis in enumerate((self.across, self.up)):
             ranges = () if self.box is None else (self.box[index],)
-            studies = studies.with_ranges(axis, _checked(axis, ranges))
+            studies = studies.with_ranges(axis, _check_ranges(axis, ranges))
         return replace(state, studies=studies)
 
 
@@ -119,7 +119,7 @@ class PickDesign(Open):
         return with_value(super().apply(state), "studies.picked", self.index)
 
 
-def _checked(axis: str, ranges: tuple[Range, ...]) -> tuple[Range, ...]:
+def _check_ranges(axis: str, ranges: tuple[Range, ...]) -> tuple[Range, ...]:
     if len(ranges) > MOST_RANGES:
         raise InputError(f"an axis takes {MOST_RANGES} ranges; {axis} was given {len(ranges)}")
     for low, high in ranges:

@@ -15,8 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
-from explorer.app.features.studies.figures import encoded, parallel, scatter
-from explorer.app.features.studies.shown import Shown, ordered_front, shown
+from explorer.app.features.studies.figures import encode, parallel, scatter
+from explorer.app.features.studies.plot_rows import PlotRows, select_rows, sort_front
 from explorer.app.session.latest import LatestWins
 from explorer.app.state.frame import Frame
 from explorer.app.state.studies import Studies, StudyPlan
@@ -69,7 +69,7 @@ class StudyDrawing:
         results: All rows so far.
         front: Rows on the Pareto front, the best in the first objective first.
         inside: Whether each row lies within all brushes, shape (n,).
-        shown: Rows and axes of the plots; None while there is nothing to show.
+        plotted: Rows and axes of the plots; None while there is nothing to show.
         plots: Parallel lines and scatter plot.
         reasons: Counts of the rows that are not done, by status and reason, most frequent first.
     """
@@ -78,7 +78,7 @@ class StudyDrawing:
     results: Results
     front: IntArray
     inside: BoolArray
-    shown: Shown | None
+    plotted: PlotRows | None
     plots: tuple[PlotJson, PlotJson] | None
     reasons: tuple[tuple[str, str, int], ...]
 
@@ -215,19 +215,19 @@ class StudyFeed:
 
     def _draw(self, request: Request) -> StudyDrawing:
         results, front = self._results(str(request.studies.name), request.version)
-        seen = shown(results, front, request.studies)
+        seen = select_rows(results, front, request.studies)
         if seen is None:
             plots, inside = None, np.ones(results.count, dtype=np.bool_)
         else:
             revision = next(self._revision)
             plots, inside = (
                 (
-                    PlotJson(encoded(parallel(seen, revision, dark=request.dark))),
-                    PlotJson(encoded(scatter(seen, revision, dark=request.dark))),
+                    PlotJson(encode(parallel(seen, revision, dark=request.dark))),
+                    PlotJson(encode(scatter(seen, revision, dark=request.dark))),
                 ),
                 seen.inside,
             )
-        ordered = ordered_front(results, front)
+        ordered = sort_front(results, front)
         return StudyDrawing(request, results, ordered, inside, seen, plots, reasons(results))
 
     def _results(self, name: str, version: int) -> tuple[Results, BoolArray]:

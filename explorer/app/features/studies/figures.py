@@ -1,6 +1,6 @@
 """The two plots of a study as plain data for Plotly, made without Plotly itself.
 
-Numbers go as packed arrays (`bdata`), which is a tenth of the work of text.
+Numbers go as pack arrays (`bdata`), which is a tenth of the work of text.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from explorer.app.features.studies.shown import Shown
+from explorer.app.features.studies.plot_rows import PlotRows
 from explorer.app.state.studies import Range, label_of, short_title_of, title_of, unit_of
 from explorer.numerics.arrays import BoolArray, FloatArray
 
@@ -49,19 +49,19 @@ MOST_LEVEL, TILT = 7, 24
 CHARACTER, SCROLL_BAR = 6.2, 14
 
 
-def parallel(shown: Shown, revision: int, *, dark: bool) -> Figure:
+def parallel(plotted: PlotRows, revision: int, *, dark: bool) -> Figure:
     """Return the plot with an axis for each variable and measure, and a line for each design.
 
     Args:
-        shown: Rows and axes to draw.
+        plotted: Rows and axes to draw.
         revision: Number that differs from the last plot's, so that Plotly resets its brushes.
         dark: Whether the page is dark.
     """
-    level = OTHERS * _shares(shown.column(shown.colour)[shown.lines])
-    level[shown.front[shown.lines]] = ON_FRONT
-    level[np.isin(shown.lines, shown.picked)] = ON_PICKED
+    level = OTHERS * _shares(plotted.column(plotted.colour)[plotted.lines])
+    level[plotted.front[plotted.lines]] = ON_FRONT
+    level[np.isin(plotted.lines, plotted.picked)] = ON_PICKED
     line = {
-        "color": packed(level),
+        "color": pack(level),
         "cmin": 0.0,
         "cmax": 1.0,
         "showscale": False,
@@ -74,21 +74,21 @@ def parallel(shown: Shown, revision: int, *, dark: bool) -> Figure:
         ],
     }
     dimensions: list[dict[str, Any]] = []
-    for name in shown.axes:
-        column = shown.column(name)[shown.lines]
+    for name in plotted.axes:
+        column = plotted.column(name)[plotted.lines]
         dimension: dict[str, Any] = {
             "name": name,
             "label": short_title_of(name),
-            "values": packed(column),
-            "range": _padded(column),
+            "values": pack(column),
+            "range": _with_room(column),
             "tickformat": "~g",
             "multiselect": True,
         }
-        ranges = shown.studies.ranges_of(name)
+        ranges = plotted.studies.ranges_of(name)
         if ranges:
             dimension["constraintrange"] = [[*ends] for ends in ranges]
         dimensions.append(dimension)
-    is_tilted = len(shown.axes) > MOST_LEVEL
+    is_tilted = len(plotted.axes) > MOST_LEVEL
     trace = {
         "type": "parcoords",
         "dimensions": dimensions,
@@ -102,19 +102,19 @@ def parallel(shown: Shown, revision: int, *, dark: bool) -> Figure:
         "uirevision": revision,
     }
     # Titles have their middle above their axes; a scroll bar may cover the edge of the plot.
-    right = SCROLL_BAR + math.ceil(0.5 * CHARACTER * len(short_title_of(shown.axes[-1])))
+    right = SCROLL_BAR + math.ceil(0.5 * CHARACTER * len(short_title_of(plotted.axes[-1])))
     margin = {"l": 34, "r": max(44, right), "t": 64 if is_tilted else 34, "b": 12}
-    layout = _layout(shown, "parallel", margin, dark=dark)
+    layout = _layout(plotted, "parallel", margin, dark=dark)
     # Lines carry no data that could name their designs.
-    layout["meta"]["designs"] = shown.results.columns["index"][shown.lines].tolist()
+    layout["meta"]["designs"] = plotted.results.columns["index"][plotted.lines].tolist()
     return _figure([trace], layout)
 
 
-def scatter(shown: Shown, revision: int, *, dark: bool) -> Figure:
+def scatter(plotted: PlotRows, revision: int, *, dark: bool) -> Figure:
     """Return the plot of two measures with a point for each design; see `parallel`."""
-    front, inside = shown.front[shown.rows], shown.inside[shown.rows]
-    is_picked = np.isin(shown.rows, shown.picked)
-    colours = shown.column(shown.colour)[shown.rows]
+    front, inside = plotted.front[plotted.rows], plotted.inside[plotted.rows]
+    is_picked = np.isin(plotted.rows, plotted.picked)
+    colours = plotted.column(plotted.colour)[plotted.rows]
     is_coloured = np.isfinite(colours)
     low, high = _ends(colours[is_coloured])
     gradient = {
@@ -122,7 +122,7 @@ def scatter(shown: Shown, revision: int, *, dark: bool) -> Figure:
         "cmin": low,
         "cmax": high,
         "colorbar": {
-            "title": {"text": title_of(shown.colour), "side": "right", "font": {"size": 11}},
+            "title": {"text": title_of(plotted.colour), "side": "right", "font": {"size": 11}},
             "thickness": 9,
             "outlinewidth": 0,
             "tickfont": {"size": 10},
@@ -130,26 +130,26 @@ def scatter(shown: Shown, revision: int, *, dark: bool) -> Figure:
         },
     }
     traces = [
-        _points(shown, ~inside & ~front, {"size": 5, "color": LEFT_OUT}),
+        _points(plotted, ~inside & ~front, {"size": 5, "color": LEFT_OUT}),
         _points(
-            shown,
+            plotted,
             inside & ~front & is_coloured,
-            {"size": 6, "color": packed(colours[inside & ~front & is_coloured]), **gradient},
+            {"size": 6, "color": pack(colours[inside & ~front & is_coloured]), **gradient},
         ),
-        _points(shown, ~inside & front, {"size": 6, "color": FRONT, "opacity": 0.25}),
+        _points(plotted, ~inside & front, {"size": 6, "color": FRONT, "opacity": 0.25}),
     ]
     if not is_coloured.all():
-        traces.append(_points(shown, inside & ~front & ~is_coloured, {"size": 6, "color": PLAIN}))
-    if (line := _front_line(shown)) is not None:
+        traces.append(_points(plotted, inside & ~front & ~is_coloured, {"size": 6, "color": PLAIN}))
+    if (line := _front_line(plotted)) is not None:
         traces.append(line)
     traces += [
         _points(
-            shown,
+            plotted,
             inside & front,
             {"size": 8, "color": FRONT, "line": {"width": 1, "color": PAPER[dark]}},
         ),
         _points(
-            shown,
+            plotted,
             is_picked,
             {
                 "size": 15,
@@ -159,41 +159,41 @@ def scatter(shown: Shown, revision: int, *, dark: bool) -> Figure:
             },
         ),
     ]
-    layout = _layout(shown, "scatter", {"l": 62, "r": 10, "t": 12, "b": 42}, dark=dark)
+    layout = _layout(plotted, "scatter", {"l": 62, "r": 10, "t": 12, "b": 42}, dark=dark)
     layout |= {
-        "xaxis": _axis(shown.across),
-        "yaxis": _axis(shown.up),
+        "xaxis": _axis(plotted.across),
+        "yaxis": _axis(plotted.up),
         "showlegend": False,
         "dragmode": "select",
         "hovermode": "closest",
         "selections": [],
         "selectionrevision": revision,
-        "shapes": _boxes(shown),
+        "shapes": _boxes(plotted),
     }
     return _figure(traces, layout)
 
 
-def encoded(figure: Figure) -> str:
+def encode(figure: Figure) -> str:
     """Return a figure as JSON."""
     return msgspec.json.encode(figure).decode()
 
 
-def packed(values: NDArray[Any], kind: str = "f4") -> dict[str, str]:
+def pack(values: NDArray[Any], kind: str = "f4") -> dict[str, str]:
     """Return numbers as Plotly takes them in one piece: "f4" or "i4"."""
     data = np.ascontiguousarray(values, dtype=f"<{kind}").tobytes()
     return {"dtype": kind, "bdata": base64.b64encode(data).decode()}
 
 
-def _points(shown: Shown, which: BoolArray, marker: Mapping[str, Any]) -> Figure:
-    indices = shown.results.columns["index"][shown.rows[which]]
-    lines = [f"<b>design %{{customdata}}</b><br>{_hover_line(shown.across, 'x')}"]
-    lines.append(_hover_line(shown.up, "y"))
+def _points(plotted: PlotRows, which: BoolArray, marker: Mapping[str, Any]) -> Figure:
+    indices = plotted.results.columns["index"][plotted.rows[which]]
+    lines = [f"<b>design %{{customdata}}</b><br>{_hover_line(plotted.across, 'x')}"]
+    lines.append(_hover_line(plotted.up, "y"))
     return {
-        "type": "scatter" if len(shown.rows) <= MOST_AS_SVG else "scattergl",
+        "type": "scatter" if len(plotted.rows) <= MOST_AS_SVG else "scattergl",
         "mode": "markers",
-        "x": packed(shown.column(shown.across)[shown.rows][which]),
-        "y": packed(shown.column(shown.up)[shown.rows][which]),
-        "customdata": packed(indices, "i4"),
+        "x": pack(plotted.column(plotted.across)[plotted.rows][which]),
+        "y": pack(plotted.column(plotted.up)[plotted.rows][which]),
+        "customdata": pack(indices, "i4"),
         "hovertemplate": "<br>".join(lines) + "<extra></extra>",
         "marker": dict(marker),
         # The server draws the points outside the brushes.
@@ -201,28 +201,28 @@ def _points(shown: Shown, which: BoolArray, marker: Mapping[str, Any]) -> Figure
     }
 
 
-def _front_line(shown: Shown) -> Figure | None:
+def _front_line(plotted: PlotRows) -> Figure | None:
     """Return the line through the front; None unless the plot shows the two objectives."""
-    names = [objective.measure for objective in shown.results.study.objectives]
-    if sorted(names) != sorted((shown.across, shown.up)):
+    names = [objective.measure for objective in plotted.results.study.objectives]
+    if sorted(names) != sorted((plotted.across, plotted.up)):
         return None
-    on = shown.rows[shown.front[shown.rows]]
-    x, y = shown.column(shown.across)[on], shown.column(shown.up)[on]
+    on = plotted.rows[plotted.front[plotted.rows]]
+    x, y = plotted.column(plotted.across)[on], plotted.column(plotted.up)[on]
     order = np.argsort(x, kind="stable")
     return {
         "type": "scatter",
         "mode": "lines",
-        "x": packed(x[order]),
-        "y": packed(y[order]),
+        "x": pack(x[order]),
+        "y": pack(y[order]),
         "line": {"color": FRONT, "width": 1.5},
         "hoverinfo": "skip",
     }
 
 
-def _boxes(shown: Shown) -> list[dict[str, Any]]:
+def _boxes(plotted: PlotRows) -> list[dict[str, Any]]:
     """Return the brushes of the two axes as boxes, or as bands where one is free."""
-    across = shown.studies.ranges_of(shown.across)
-    up = shown.studies.ranges_of(shown.up)
+    across = plotted.studies.ranges_of(plotted.across)
+    up = plotted.studies.ranges_of(plotted.up)
     if not across and not up:
         return []
     free: tuple[tuple[Range, str], ...] = (((0.0, 1.0), " domain"),)
@@ -259,7 +259,9 @@ def _axis(name: str) -> dict[str, Any]:
     }
 
 
-def _layout(shown: Shown, plot: str, margin: Mapping[str, int], *, dark: bool) -> dict[str, Any]:
+def _layout(
+    plotted: PlotRows, plot: str, margin: Mapping[str, int], *, dark: bool
+) -> dict[str, Any]:
     return {
         "paper_bgcolor": PAPER[dark],
         "plot_bgcolor": "rgba(0,0,0,0)",
@@ -269,8 +271,8 @@ def _layout(shown: Shown, plot: str, margin: Mapping[str, int], *, dark: bool) -
         "separators": ". ",
         "meta": {
             "explorer": plot,
-            "study": shown.studies.name,
-            "axes": [shown.across, shown.up],
+            "study": plotted.studies.name,
+            "axes": [plotted.across, plotted.up],
         },
     }
 
@@ -292,7 +294,7 @@ def _ends(values: FloatArray) -> Range:
     return float(values.min()), float(values.max())
 
 
-def _padded(values: FloatArray) -> list[float]:
+def _with_room(values: FloatArray) -> list[float]:
     low, high = _ends(values)
     room = 0.02 * (high - low)
     return [low - room, high + room]

@@ -16,7 +16,7 @@ from explorer.app.features.studies.actions import (
 from explorer.app.features.studies.feed import StudyDrawing, StudyFeed
 from explorer.app.features.studies.plots import HINT, StudyPlots
 from explorer.app.features.studies.runner import Run, StudyRunner
-from explorer.app.features.studies.words import chips, legend, run_line, status, table
+from explorer.app.features.studies.words import ALONG, acts, chips, head, legend, table
 from explorer.app.session.session import Who
 from explorer.app.state.action import Action
 from explorer.app.state.actions import Set
@@ -27,14 +27,14 @@ from explorer.app.state.studies import (
     LEAST_PERCENT,
     MOST,
     MOST_PERCENT,
-    StudyPlan,
+    Studies,
     label_of,
 )
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import Buttons, Does
 from explorer.app.widgets.commands import NO_OPTION
 from explorer.app.widgets.controls import At, Bound, Control, Controls, Span
-from explorer.app.widgets.markup import alert, note
+from explorer.app.widgets.markup import alert, beside
 from explorer.errors import ExplorerError
 from explorer.measures.catalogue import measures_in
 from explorer.sweep.study import NAMES
@@ -45,7 +45,6 @@ AXES: dict[Axis, tuple[str, str]] = {
     "up": ("Up", "Measure or variable from bottom to top in the scatter plot."),
     "colour": ("Coloured by", "Measure or variable that colours the designs in both plots."),
 }
-ALONG = {"Previous": -1, "Next": 1}
 
 
 class StudiesPanel:
@@ -55,9 +54,12 @@ class StudiesPanel:
         if services.studies is None:
             raise RuntimeError("a page without folders of studies has no panel for them")
         gui, session, none = services.gui, services.session, (NO_OPTION,)
+        gui.add_html(beside(2))
         self._services = services
         self._session = session
         self._complain = services.complain
+        # Whether a new study was asked for while another is open.
+        self._is_new_asked = False
         self.choice = gui.add_dropdown(
             "Study",
             none,
@@ -71,39 +73,29 @@ class StudiesPanel:
                 lambda _, name: OpenStudy(None if name == NO_OPTION else name),
             ),
         )
-        self.running = gui.add_html("", visible=False)
-        self.cancel = gui.add_button(
-            "Cancel study",
-            color="red",
-            visible=False,
-            hint="End the study; finished designs are kept.",
-        )
-        self.go_on = gui.add_button(
-            "Continue the study", visible=False, hint="Compute the designs that are missing."
-        )
-        self.status = gui.add_html("")
-        self.plots = StudyPlots(services, self.pick, self.status)
-        self.feed = StudyFeed(services.studies, session.redraw)
-        self.runner = StudyRunner(session, self.feed, services.complain, services.faults)
-        services.at_end(self.feed.stop)
-        services.at_end(self.runner.stop)
-        self.legend = gui.add_html("")
-        self.along = gui.add_button_group(
-            "Along the front",
-            tuple(ALONG),
-            hint="Open the previous or the next design of the front.",
-        )
-        self.table = gui.add_html("")
+        self._acts = gui.add_html("")
+        self._head = gui.add_html("")
+        # viser's folders cannot be folded from here; one without a title is shown or hidden.
+        with gui.add_folder(None, visible=False) as self.form:
+            self._add_new_study(gui)
+        lines_after = gui.add_html("")
+        self._axes_mark = gui.add_html(beside(3), visible=False)
         self._places: dict[Axis, viser.GuiDropdownHandle[str]] = {
-            axis: gui.add_dropdown(label, none, hint=hint) for axis, (label, hint) in AXES.items()
+            axis: gui.add_dropdown(label, none, hint=hint, visible=False)
+            for axis, (label, hint) in AXES.items()
         }
         self._axes = [
             Control[str](session, handle, Bound(self._read_axis(axis), self._write_axis(axis)))
             for axis, handle in self._places.items()
         ]
-        with gui.add_folder("New study", expand_by_default=False) as self._new:
-            self._add_new_study(gui)
-        self._listen()
+        self.legend = gui.add_html("")
+        points_after = gui.add_html(beside(2, wide=True))
+        self.plots = StudyPlots(services, self.pick, (lines_after, points_after))
+        self.table = gui.add_html("")
+        self.feed = StudyFeed(services.studies, session.redraw)
+        self.runner = StudyRunner(session, self.feed, services.complain, services.faults)
+        services.at_end(self.feed.stop)
+        services.at_end(self.runner.stop)
         self._add_buttons(services.buttons)
         self._key: tuple[object, ...] = ()
 
@@ -114,19 +106,28 @@ class StudiesPanel:
         names = (NO_OPTION, *dict.fromkeys((*self.feed.names, *filter(None, (studies.name,)))))
         yield self.choice, "options", names
         yield from self._control.updates(frame)
-        axes = (NO_OPTION,) if drawing is None or drawing.shown is None else drawing.shown.axes
+        axes = (NO_OPTION,) if drawing is None or drawing.plotted is None else drawing.plotted.axes
+        has_axes = axes != (NO_OPTION,)
+        yield self._axes_mark, "visible", has_axes
         for handle in self._places.values():
             yield handle, "options", axes
-            yield handle, "visible", axes != (NO_OPTION,)
+            yield handle, "visible", has_axes
         for control in self._axes:
             yield from control.updates(frame)
+        is_new = self._is_new(studies, run)
+        yield self.form, "visible", is_new
         yield from self._controls.updates(frame)
         # The texts are made again only after a change.
-        key = (drawing, studies, run, self.feed.problem)
+        design = frame.state.design.name
+        key = (drawing, studies, run, self.feed.problem, is_new, design)
         if len(key) == len(self._key) and all(a is b for a, b in zip(key, self._key, strict=True)):
             return
         self._key = key
-        yield from self._texts(studies.plan, drawing, run)
+        yield from self._texts(studies, drawing, run, design, is_new=is_new)
+
+    def _is_new(self, studies: Studies, run: Run | None) -> bool:
+        """Return whether the settings of a new study are shown."""
+        return run is None and (self._is_new_asked or studies.name is None)
 
     def pick(self, index: int, who: Who) -> None:
         """Open the design with an index in the open study."""
@@ -142,41 +143,45 @@ class StudiesPanel:
         self._session.do(PickDesign(design, index=index, study=name), who=who)
 
     def _texts(
-        self, plan: StudyPlan, drawing: StudyDrawing | None, run: Run | None
+        self,
+        studies: Studies,
+        drawing: StudyDrawing | None,
+        run: Run | None,
+        design: str,
+        *,
+        is_new: bool,
     ) -> Iterator[Update]:
-        yield self.running, "visible", run is not None
-        yield self.running, "content", "" if run is None else run_line(run)
-        yield self.cancel, "visible", run is not None
-        yield self.cancel, "disabled", run is None or run.is_cancelled
-        is_open = drawing is not None and not drawing.is_complete
-        yield self.go_on, "visible", run is None and is_open
-        yield self.start, "disabled", run is not None
-        yield self.status, "content", self._status(drawing)
-        yield from self.plots.updates(drawing)
-        yield self.legend, "content", "" if drawing is None else legend(drawing)
-        has_front = drawing is not None and len(drawing.front_inside) > 0
-        yield self.along, "visible", has_front
-        yield self.table, "content", "" if drawing is None else table(drawing)
-        yield self.chips, "content", chips(plan)
+        yield (
+            self._acts,
+            "content",
+            acts(
+                is_new=is_new,
+                is_open=studies.name is not None,
+                is_complete=drawing is None or drawing.is_complete,
+                run=run,
+            ),
+        )
+        problem = None if is_new else self._problem()
+        lines = head(None if problem else drawing, run, studies.plan if is_new else None, design)
+        yield self._head, "content", lines + (problem or "")
+        # While a new study is set up, the open one waits.
+        seen = None if is_new else drawing
+        yield from self.plots.updates(seen)
+        yield self.legend, "content", "" if seen is None else legend(seen)
+        yield self.table, "content", "" if seen is None else table(seen)
+        yield self.chips, "content", chips(studies.plan)
 
-    def _status(self, drawing: StudyDrawing | None) -> str:
+    def _problem(self) -> str | None:
         if self.feed.problem is not None:
             return alert("This study cannot be shown", self.feed.problem)
-        if not self.plots.is_possible:
-            return alert("No plots", HINT)
-        if drawing is None:
-            return note(
-                "Open a study, or start a small one around the live design below; "
-                "explorer sweep runs large ones."
-            )
-        return status(drawing)
+        return None if self.plots.is_possible else alert("No plots", HINT)
 
     def _read_axis(self, axis: Axis) -> Callable[[Frame], str]:
         def read(_: Frame) -> str:
             drawing = self.feed.drawing
-            if drawing is None or drawing.shown is None:
+            if drawing is None or drawing.plotted is None:
                 return NO_OPTION
-            return str(getattr(drawing.shown, axis))
+            return str(getattr(drawing.plotted, axis))
 
         return read
 
@@ -188,41 +193,65 @@ class StudiesPanel:
 
     def _add_new_study(self, gui: viser.GuiApi) -> None:
         self._controls = controls = Controls(gui, self._session)
+        gui.add_html(beside(2))
         controls.slider(
-            "Designs",
-            "Number of designs, spread evenly by a Sobol sequence; powers of two spread best.",
+            "Number of designs",
+            "How many designs are computed, spread evenly over the ranges by a Sobol sequence; "
+            "powers of two spread best.",
             At("studies.plan.count", convert=round),
             Span(float(FEWEST), float(MOST), 1.0),
         )
         controls.slider(
-            "Around by ± %",
-            "Range of the variables around the live design: a share of their value, or of a "
-            "20th of the reach where that is more; for the yaw a share of 90°.",
+            "Range, ± %",
+            "How far each variable goes to both sides of its value in the live design: a share of "
+            "the value, or of a 20th of the reach where that is more; for the yaw a share of 90°.",
             "studies.plan.percent",
             Span(LEAST_PERCENT, MOST_PERCENT, 1.0),
         )
         self.chips = gui.add_html("")
-        self.start = gui.add_button(
-            "Start study",
-            icon=viser.Icon.PLAYER_PLAY,
-            hint="Compute the study in the background; its results go to the data folder.",
-        )
-
-    def _listen(self) -> None:
-        self.start.on_click(
-            lambda event: self.runner.start(
-                self._session.state.design, self._session.state.studies.plan, event.client_id
-            )
-        )
-        self.cancel.on_click(lambda _: self.runner.cancel())
-        self.go_on.on_click(lambda event: self._go_on(event.client_id))
-        self.along.on_click(lambda event: self._step(ALONG[self.along.value], event.client_id))
 
     def _add_buttons(self, buttons: Buttons) -> None:
+        buttons.on("studies.start", self._start)
+        buttons.on("studies.cancel", lambda _, _client: self.runner.cancel())
+        buttons.on("studies.continue", self._go_on)
+        buttons.on("studies.new", self._ask_for_new, values=("on", "off"))
+        buttons.on("studies.along", self._step, values=tuple(map(str, ALONG.values())))
         buttons.on("studies.pick", self._pick_row)
         buttons.on("studies.vary", self._switch("variable"), values=NAMES)
         buttons.on("studies.measure", self._switch("measure"), values=measures_in("studies"))
         buttons.on("studies.clear", self._clear)
+        buttons.offer(
+            "Studies › Start study",
+            "Compute a small study around the live design, as it is set up.",
+            "studies.start",
+            is_ready=lambda: self.runner.run is None,
+        )
+        buttons.offer(
+            "Studies › Cancel study",
+            "End the study; finished designs are kept.",
+            "studies.cancel",
+            is_ready=lambda: self.runner.run is not None,
+        )
+        buttons.offer(
+            "Studies › Continue the study",
+            "Compute the designs of the open study that are missing.",
+            "studies.continue",
+            is_ready=self._can_go_on,
+        )
+        buttons.offer(
+            "Studies › New study",
+            "Set up a small study around the live design.",
+            "studies.new",
+            "on",
+        )
+        for words, step in ALONG.items():
+            buttons.offer(
+                f"Studies › {words} design of the front",
+                f"Open the {words.lower()} design of the front of the open study.",
+                "studies.along",
+                str(step),
+                self._has_front,
+            )
         buttons.offer(
             "Studies › Clear brushes",
             "Free all axes.",
@@ -230,18 +259,36 @@ class StudiesPanel:
             is_ready=lambda: bool(self._session.state.studies.brushes),
         )
 
-    def _go_on(self, who: Who) -> None:
+    def _start(self, _: str, client: viser.ClientHandle) -> None:
+        self._is_new_asked = False
+        state = self._session.state
+        self.runner.start(state.design, state.studies.plan, client.client_id)
+
+    def _go_on(self, _: str, client: viser.ClientHandle) -> None:
         name = self._session.state.studies.name
         if name is not None:
-            self.runner.go_on(name, who)
+            self.runner.go_on(name, client.client_id)
 
-    def _step(self, step: int, who: Who) -> None:
+    def _can_go_on(self) -> bool:
+        drawing = self.feed.drawing
+        return self.runner.run is None and drawing is not None and not drawing.is_complete
+
+    def _ask_for_new(self, value: str, client: viser.ClientHandle) -> None:
+        del client
+        self._is_new_asked = value == "on"
+        self._session.redraw()
+
+    def _has_front(self) -> bool:
+        drawing = self.feed.drawing
+        return drawing is not None and len(drawing.front_inside) > 0
+
+    def _step(self, step: str, client: viser.ClientHandle) -> None:
         drawing = self.feed.drawing
         index = None
         if drawing is not None:
-            index = drawing.beside(self._session.state.studies.picked, step)
+            index = drawing.beside(self._session.state.studies.picked, int(step))
         if index is not None:
-            self.pick(index, who)
+            self.pick(index, client.client_id)
 
     def _pick_row(self, index: str, client: viser.ClientHandle) -> None:
         if index.isascii() and index.isdecimal():

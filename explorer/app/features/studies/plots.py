@@ -19,33 +19,33 @@ from explorer.app.session.session import Who
 from explorer.app.widgets.assigning import Update
 
 # Height over width.
-PARALLEL_ASPECT, SCATTER_ASPECT = 0.33, 0.4
+PARALLEL_ASPECT, SCATTER_ASPECT = 0.28, 0.42
 HINT = 'Plots of studies need the extra study: pip install "flagged-explorer[study]"'
 EMPTY = '{"data":[],"layout":{}}'
 
 
 class StudyPlots:
-    """Parallel lines above, a scatter plot below.
+    """Parallel lines and a scatter plot.
 
     They are added when first needed, since each browser then loads Plotly, some 5 MB.
 
     Args:
         services: Services of the page.
         pick: Function that opens the design with an index in the open study.
-        above: Element of the tab above the plots.
+        before: Elements of the tab after which the lines and the points come.
     """
 
     def __init__(
         self,
         services: Services,
         pick: Callable[[int, Who], None],
-        above: viser.GuiHtmlHandle,
+        before: tuple[viser.GuiHtmlHandle, viser.GuiHtmlHandle],
     ) -> None:
         self._server = services.server
         self._tab = services.tab
         self._session = services.session
         self._pick = pick
-        self._above = above
+        self._before = before
         services.buttons.on("studies.plot", self._receive)
         self.handles: tuple[viser.GuiPlotlyHandle, viser.GuiPlotlyHandle] | None = None
 
@@ -71,13 +71,13 @@ class StudyPlots:
         gui = self._server.gui
         # viser only calls `to_json` of a figure.
         empty = cast("Any", PlotJson(EMPTY))
-        # The plots come between the elements before and after them.
-        order = self._above.order
+        # Each plot comes between the elements before and after it.
+        after_lines, after_points = (handle.order + 0.5 for handle in self._before)
         with self._tab or contextlib.nullcontext():
-            above = gui.add_plotly(empty, aspect=PARALLEL_ASPECT, order=order + 0.1)
-            below = gui.add_plotly(empty, aspect=SCATTER_ASPECT, order=order + 0.2)
+            lines = gui.add_plotly(empty, aspect=PARALLEL_ASPECT, order=after_lines)
+            points = gui.add_plotly(empty, aspect=SCATTER_ASPECT, order=after_points)
         run_script(self._server, read_script("plots"))
-        return above, below
+        return lines, points
 
     def _receive(self, line: str, client: viser.ClientHandle) -> None:
         event = event_of(line)

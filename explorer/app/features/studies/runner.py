@@ -45,6 +45,11 @@ class Run:
     progress: Progress | None = None
     is_cancelled: bool = False
 
+    @property
+    def share(self) -> float:
+        """The share of the designs that are done, from 0 to 1."""
+        return 0.0 if self.progress is None else self.progress.done / self.progress.total
+
 
 class StudyRunner:
     """Starts, cancels and continues studies of the page.

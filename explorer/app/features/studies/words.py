@@ -9,8 +9,8 @@ import numpy as np
 
 from explorer.app.features.studies.feed import StudyDrawing
 from explorer.app.features.studies.figures import FRONT, PICKED, SCALE
+from explorer.app.features.studies.plot_rows import MOST_ROWS
 from explorer.app.features.studies.runner import Run
-from explorer.app.features.studies.shown import MOST_ROWS
 from explorer.app.state.studies import RADIUS, StudyPlan, label_of, title_of
 from explorer.app.widgets.buttons import press_button
 from explorer.app.widgets.markup import (
@@ -34,38 +34,57 @@ ROWS = 10
 MOST_REASONS = 4
 # Columns of the table besides the index.
 MOST_COLUMNS = 9
+ALONG = {"Previous": -1, "Next": 1}
+"""Steps along the front."""
 ARROWS: dict[Sense, str] = {"max": "↑", "min": "↓"}
 
 
-def status(drawing: StudyDrawing) -> str:
-    """Return the progress of a study and the parts of it that are shown, as HTML."""
+def status(drawing: StudyDrawing, *, is_running: bool = False) -> str:
+    """Return how far a study is and what its plots show, as HTML.
+
+    Args:
+        drawing: The study.
+        is_running: Whether it is being computed, so that its progress stands elsewhere.
+    """
     study, count = drawing.study, drawing.results.count
     total = "" if drawing.is_complete else f" of {study.count}"
-    words = f"<b>{count}</b>{total} designs"
+    parts = [] if is_running else [f"<b>{count}</b>{total} designs"]
     front, inside = len(drawing.front), int(drawing.inside.sum())
-    words += f" · {_dot(FRONT)}<b>{front}</b> on the front" if study.objectives else ""
+    if study.objectives:
+        parts.append(f"{_dot(FRONT)}<b>{front}</b> on the Pareto front")
     if drawing.request.studies.brushes:
         clear = press_button(
             "studies.clear", "", "clear", hint="Clear all brushes", class_name="ex-link"
         )
-        words += f" · <b>{inside}</b> within the brushes {clear}"
-    if drawing.shown is not None and drawing.shown.count > MOST_ROWS:
-        words += f" · {len(drawing.shown.rows)} of them drawn, the front first"
-    if drawing.shown is not None and drawing.shown.lacking[0]:
-        lacking, names = drawing.shown.lacking
-        words += f" · <b>{lacking}</b> without a line, which lack "
-        words += escape(" or ".join(map(label_of, names)))
-    if count and drawing.shown is None:
-        words += " · nothing to draw yet: the designs done so far differ in fewer than two values"
+        parts.append(f"<b>{inside}</b> within the brushes {clear}")
+    plotted = drawing.plotted
+    if plotted is not None and plotted.count > MOST_ROWS:
+        parts.append(f"{len(plotted.rows)} of them drawn, the front first")
+    if plotted is not None and plotted.lacking[0]:
+        lacking, names = plotted.lacking
+        lacks = escape(" or ".join(map(label_of, names)))
+        parts.append(f"<b>{lacking}</b> without a line, which lack {lacks}")
+    if count and plotted is None:
+        parts.append("nothing to draw yet: the designs so far differ in fewer than two values")
+    summary = _summary(study)
+    return (
+        f"<div>{' · '.join(parts)}</div>"
+        f'<div class="ex-dim ex-small ex-cut" title="{escape(summary)}">{escape(summary)}</div>'
+        f"{failures(drawing)}"
+    )
+
+
+def _summary(study: Study) -> str:
+    """Return what a study varies and what its objectives are, in one line."""
     objectives = ", ".join(
         f"{label_of(objective.measure)} {ARROWS[objective.sense]}" for objective in study.objectives
     )
-    unit = f"1 unit (u) = {format_number(study.base.unit_mm, 6)} mm"
-    note = f"{f'objectives: {escape(objectives)}' if objectives else 'no objectives'} · {unit}"
-    return box(
-        f"<div>{words}</div>",
-        f'<div class="ex-dim ex-small">{note}</div>',
-        failures(drawing),
+    return " · ".join(
+        (
+            f"objectives: {objectives}" if objectives else "no objectives",
+            f"varied: {', '.join(map(label_of, study.varied))}",
+            f"1 unit (u) = {format_number(study.base.unit_mm, 6)} mm",
+        )
     )
 
 
@@ -85,21 +104,85 @@ def _reason(status: str, reason: str, count: int) -> str:
     return f"{count} {status}{f' ({reason})' if reason else ''}"
 
 
-def run_line(run: Run) -> str:
-    """Return the progress of a study that is being computed, as HTML."""
+def run_words(run: Run) -> str:
+    """Return how far a study that is being computed is, as HTML."""
     progress = run.progress
     if progress is None:
-        words = f"{escape(run.name)}: its process is starting …"
+        words = "the process is starting …"
     else:
-        words = f"{escape(run.name)}: <b>{progress.done}</b> of {progress.total} designs"
+        words = f"<b>{progress.done}</b> of {progress.total} designs"
         if progress.rate > 0.0:
             words += f" · {format_number(progress.rate, 3)} a second"
         if left := progress.seconds_left:
             words += f" · {duration(left)} left"
-    if run.is_cancelled:
-        words += " · ending"
-    share = 0.0 if progress is None else progress.done / progress.total
-    return box(words, meter(100.0 * share))
+    return f"{escape(run.name)}: {words}{' · ending' if run.is_cancelled else ''}"
+
+
+def head(drawing: StudyDrawing | None, run: Run | None, plan: StudyPlan | None, design: str) -> str:
+    """Return the lines on top of the tab as HTML.
+
+    Args:
+        drawing: The open study; None if none is, or before its first drawing.
+        run: The study that is being computed; None if none is.
+        plan: The new study that is being set up; None if none is.
+        design: Name of the live design.
+    """
+    parts: list[str] = []
+    if run is not None:
+        parts.append(f"<div>{run_words(run)}</div>{meter(100.0 * run.share)}")
+    if plan is not None:
+        parts.append(
+            f"A new study: <b>{plan.count}</b> designs around <b>{escape(design)}</b>, the live "
+            f"design, with variables within ± {plan.percent:g} % of its values."
+        )
+    elif drawing is not None:
+        is_running = run is not None and run.name == drawing.request.studies.name
+        parts.append(status(drawing, is_running=is_running))
+    return box(*parts)
+
+
+def acts(*, is_new: bool, is_open: bool, is_complete: bool, run: Run | None) -> str:
+    """Return the buttons on top of the tab as HTML.
+
+    Args:
+        is_new: Whether a new study is being set up.
+        is_open: Whether a study is open.
+        is_complete: Whether all of its designs are computed.
+        run: The study that is being computed; None if none is.
+    """
+    buttons: list[str] = []
+    if run is not None:
+        buttons.append(
+            _button("cancel", "Cancel study", "End the study; finished designs are kept")
+        )
+    elif is_new:
+        if is_open:
+            buttons.append(_button("new", "Back", "Return to the open study", value="off"))
+        buttons.append(
+            _button(
+                "start",
+                "Start study",
+                "Compute the study in the background; its results go to the data folder",
+                is_main=True,
+            )
+        )
+    else:
+        if is_open and not is_complete:
+            hint = "Compute the designs that are missing"
+            buttons.append(_button("continue", "Continue the study", hint, is_main=True))
+        hint = "Set up another small study, around the live design"
+        buttons.append(_button("new", "New study", hint, value="on"))
+    return box(f'<div class="ex-ends ex-acts-line">{"".join(buttons)}</div>')
+
+
+def _button(name: str, words: str, hint: str, *, value: str = "", is_main: bool = False) -> str:
+    return press_button(
+        f"studies.{name}",
+        value,
+        words,
+        hint=hint,
+        class_name=f"ex-button{' is-main' if is_main else ''}",
+    )
 
 
 def duration(seconds: float) -> str:
@@ -110,17 +193,17 @@ def duration(seconds: float) -> str:
 
 def legend(drawing: StudyDrawing) -> str:
     """Return the legend of the plots and how to use them, as HTML."""
-    shown = drawing.shown
-    if shown is None:
+    plotted = drawing.plotted
+    if plotted is None:
         return ""
     colours = ",".join(map(by_theme, SCALE[False], SCALE[True]))
     bar = f'<span class="ex-legend is-inline" style="--colours:{colours}"></span>'
     return (
         f'<div class="ex-note ex-dim">{_dot(FRONT)}Pareto front &nbsp; '
-        f"{bar}other designs, by {escape(label_of(shown.colour))} &nbsp; "
+        f"{bar}other designs, by {escape(label_of(plotted.colour))} &nbsp; "
         f'<span class="ex-ring" style="--colour:{PICKED}"></span>'
-        "picked<br>Drag along an axis above, or a box below, to brush; "
-        "double-click frees it; click a design to make it the live one.</div>"
+        "picked<br>Drag along an axis, or a box over points, to brush; double-click frees it; "
+        "click a design to make it the live one.</div>"
     )
 
 
@@ -142,9 +225,9 @@ def table(drawing: StudyDrawing) -> str:
     """Return a part of the front as HTML; each row is a button that opens its design."""
     results, study = drawing.results, drawing.study
     rows = window(drawing.front_inside, drawing.request.studies.picked, results.columns["index"])
-    if not study.objectives:
+    if not len(rows):
         return ""
-    names = columns_shown(study)
+    names = table_columns(study)
     head = "".join(
         f'<span title="{escape(_hint(name))}">{escape(label_of(name))}{_arrow(study, name)}</span>'
         for name in names
@@ -156,12 +239,27 @@ def table(drawing: StudyDrawing) -> str:
     caption = f"Pareto front: {among}, from the best in {label_of(study.objectives[0].measure)}"
     return (
         f'<div class="ex-box ex-front" style="--columns:{len(names)}">'
-        f'<div class="ex-row ex-dim ex-small">{escape(caption)}</div>'
+        f'<div class="ex-row ex-dim ex-small"><span class="ex-line"><span>{escape(caption)}'
+        f"</span>{_steps()}</span></div>"
         f'<div class="ex-row ex-dim ex-small"><span>design</span>{head}</div>{lines}</div>'
     )
 
 
-def columns_shown(study: Study) -> tuple[str, ...]:
+def _steps() -> str:
+    buttons = (
+        press_button(
+            "studies.along",
+            step,
+            words,
+            hint=f"Open the {words.lower()} design of the front",
+            class_name="ex-link",
+        )
+        for words, step in ALONG.items()
+    )
+    return f'<span class="ex-ends">{"".join(buttons)}</span>'
+
+
+def table_columns(study: Study) -> tuple[str, ...]:
     """Return the columns of the table: the objectives, then the varied values."""
     objectives = [objective.measure for objective in study.objectives]
     return tuple(dict.fromkeys((*objectives, *study.varied)))[:MOST_COLUMNS]
@@ -208,16 +306,16 @@ def chips(plan: StudyPlan) -> str:
             "studies.measure",
             name,
             escape(label_of(name)) + _sense(plan.sense_of(name)),
-            hint=f"{_hint(name)}. Click: measure, maximise, minimise, leave out",
+            hint=_hint(name),
             class_name="ex-chip",
             is_on=name in plan.measures,
         )
         for name in measures_in("studies")
     )
     return box(
-        _title("Variables"),
+        _title("Variables that vary; press to choose"),
         f'<div class="ex-flow">{varying}</div>',
-        _title("Measures; ↑ maximise, ↓ minimise"),
+        _title("Measures; press to measure, again to maximise ↑, to minimise ↓, to leave out"),
         f'<div class="ex-flow">{measured}</div>',
     )
 

@@ -26,7 +26,7 @@ NO_SPREAD = 1e-9
 
 
 @dataclass(frozen=True)
-class Shown:
+class PlotRows:
     """Rows and axes of the plots of a study.
 
     Attributes:
@@ -76,8 +76,8 @@ class Shown:
         return np.flatnonzero(self.results.columns["index"] == _index(self.studies.picked))
 
 
-def shown(results: Results, front: BoolArray, studies: Studies) -> Shown | None:
-    """Return the rows and axes to draw; None while there is nothing to draw.
+def select_rows(results: Results, front: BoolArray, studies: Studies) -> PlotRows | None:
+    """Return the rows and axes of the plots; None while there is nothing to draw.
 
     Args:
         results: All rows.
@@ -98,14 +98,14 @@ def shown(results: Results, front: BoolArray, studies: Studies) -> Shown | None:
     on_lines = np.all([has_value[name] for name in axes], axis=0)
     points, lines = np.flatnonzero(has_value[across] & has_value[up]), np.flatnonzero(on_lines)
     keep = front | (columns["index"] == _index(studies.picked))
-    return Shown(
+    return PlotRows(
         results,
         front,
         within(columns, studies.brushes),
         studies,
         axes,
-        thinned(points, keep[points], MOST_ROWS),
-        thinned(lines, keep[lines], MOST_ROWS),
+        thin_out(points, keep[points], MOST_ROWS),
+        thin_out(lines, keep[lines], MOST_ROWS),
         len(points),
         (
             int((is_measured & ~on_lines).sum()),
@@ -114,12 +114,12 @@ def shown(results: Results, front: BoolArray, studies: Studies) -> Shown | None:
     )
 
 
-def thinned(rows: IntArray, keep: BoolArray, most: int) -> IntArray:
+def thin_out(rows: IntArray, keep: BoolArray, most: int) -> IntArray:
     """Return at most `most` rows, ascending, preferring those to keep.
 
     Args:
         rows: Rows, ascending, shape (n,).
-        keep: Whether each is to stay, shape (n,); more than `most` are thinned too.
+        keep: Whether each is to stay, shape (n,); more than `most` are thin_out too.
         most: Largest number of rows returned.
     """
     if len(rows) <= most:
@@ -143,7 +143,7 @@ def _chosen(study: Study, axes: Sequence[str], name: str | None, place: int) -> 
     return default_axes(study, axes)[place]
 
 
-def ordered_front(results: Results, front: BoolArray) -> IntArray:
+def sort_front(results: Results, front: BoolArray) -> IntArray:
     """Return the rows on the front, the best in the first objective first.
 
     Args:
