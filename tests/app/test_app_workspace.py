@@ -20,7 +20,7 @@ from explorer.app.features.workspace.feature import WORKSPACE
 from explorer.app.features.workspace.feed import WorkspaceFeed
 from explorer.app.features.workspace.files import FORMATS, WorkspaceFiles
 from explorer.app.features.workspace.orientation import workspace_rotation
-from explorer.app.features.workspace.panel import SHOWN, WorkspacePanel
+from explorer.app.features.workspace.panel import CUTS, KEYS, SHOWN, WorkspacePanel
 from explorer.app.features.workspace.slice_map import cut_loops, map_picture
 from explorer.app.features.workspace.tasks import WorkspaceDrawing
 from explorer.app.features.workspace.volume import VolumeFeed
@@ -161,6 +161,16 @@ def test_a_chip_switches_what_is_shown_on_and_off(
     assert any(re.search(pressed, each) for each in content) is is_on
     desk.press(services.buttons, "workspace.show", name)
     assert desk.state.view.workspace == before
+
+
+def test_the_hint_of_a_chip_tells_its_keys(services: Services, desk: Desk) -> None:
+    panel = WorkspacePanel(services)
+    told = [str(v) for _, n, v in panel.updates(Frame(desk.state)) if n == "content"]
+    titles = re.findall(r'class="ex-chip"[^>]*title="([^"]*)"', "".join(told))
+    assert len(titles) == len(SHOWN) + len(CUTS) + 1
+    for keys in KEYS.values():
+        for key in keys:
+            assert sum(hint.endswith(f"Key: {key}.") for hint in titles) == 1
 
 
 def test_region_holds_the_start_of_the_paths(services: Services, desk: Desk) -> None:

@@ -16,7 +16,9 @@ from explorer.app.screenshot import PATIENCE_SECONDS, SCENE_CANVAS, fixed_resolu
 from explorer.app.server import Running
 from explorer.app.session.history import start_history
 from explorer.app.session.session import HistoryMove
+from explorer.app.state.actions import Set
 from explorer.app.state.state import State, opened
+from explorer.app.state.view import View
 from explorer.mechanism.design_file import PRESETS
 from explorer.numerics.arrays import FloatArray
 
@@ -96,6 +98,8 @@ class Tab:
         self.page.mouse.move(0, 0)
         self.page.evaluate(FORGET)
         session.travel(HistoryMove(lambda _: start_history(opened(PRESETS["paper-optimal"]))))
+        # A move through the history leaves what is shown as it is.
+        session.do(Set("view", View()))
         assert page.wait_until_drawn(PATIENCE_SECONDS)
         for group in self.page.get_by_role("tablist").all():
             first = group.get_by_role("tab").first

@@ -217,7 +217,7 @@ class ComparePanel:
             if look.overlay or switch.at != "compared.look.at_pose"
         )
         return box(
-            f'<div class="ex-flow ex-before">{pins}<span class="ex-bar"></span>{chips}</div>',
+            f'<div class="ex-flow ex-before">{pins}<span class="ex-divider"></span>{chips}</div>',
             body,
             remarks,
         )
