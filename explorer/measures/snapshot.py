@@ -29,6 +29,7 @@ from explorer.singularity.jacobian import (
     determinant,
     inverse_condition,
     jacobian,
+    scaled_margins,
     tetrahedron_volumes,
 )
 from explorer.singularity.nearest import (
@@ -38,6 +39,7 @@ from explorer.singularity.nearest import (
     singularities_of,
 )
 from explorer.singularity.strata import inversions, stratum
+from explorer.singularity.turning import least_turns
 from explorer.workspace.limits.broken import Violation, violations
 
 
@@ -100,6 +102,17 @@ class Snapshot:
         """The inverse condition number of J, made homogeneous by the reach, 0 (singular) to 1."""
         matrix = jacobian(self.design, self.pose.position, self.rotation)
         return float(inverse_condition(matrix, self.design.reach))
+
+    @cached_property
+    def least_turns(self) -> tuple[float, float, float]:
+        """The least turns that lead to each incidence, in radians, in the order δ1, δ2, δ3."""
+        first, second, third = least_turns(self.pose.position, self.rotation).tolist()
+        return first, second, third
+
+    @property
+    def worst_conditioned(self) -> int:
+        """The number 1 to 3 of the margin that makes the conditioning of J what it is."""
+        return int(scaled_margins(self.design, self.joints, self.margins).argmin()) + 1
 
     @cached_property
     def stratum(self) -> tuple[int, ...]:

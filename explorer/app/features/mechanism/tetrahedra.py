@@ -43,7 +43,7 @@ class Tetrahedra(ScenePart):
         for index, names in enumerate(TETRAHEDRA):
             level = placed.frame.verdict.levels[index]
             fails = index in failing
-            colour = OUTLINE if fails else proximity_colour(level, 1.0)
+            colour = OUTLINE if fails else proximity_colour(level)
             corners = np.array([placed.points[name] for name in names])
             mesh, edges = self._meshes[index], self._edges[index]
             shown = state.view.tetrahedra[index]

@@ -54,7 +54,7 @@ def distance_table(frame: Frame) -> str:
     least = min(pose.distance for pose in poses)
     rows = (
         row(
-            f"{swatch(proximity_colour(levels[pose.incidence - 1], 1.0))}δ{pose.incidence} = 0",
+            f"{swatch(proximity_colour(levels[pose.incidence - 1]))}δ{pose.incidence} = 0",
             format_number(pose.distance, size=reach),
             format_number(pose.distance * unit, 3, size=reach * unit),
             look="ex-strong" if pose.distance == least else "",

@@ -123,7 +123,7 @@ def travel_table(frame: Frame, frame_name: str) -> str:
 def _row(frame: Frame, motion: UncoupledMotion) -> str:
     travel = in_shown_units(motion, frame.travels[UNCOUPLED.index(motion)])
     unit = "°" if motion.kind == "rotation" else ""
-    colour = proximity_colour(frame.verdict.levels[motion.incidence - 1], 1.0)
+    colour = proximity_colour(frame.verdict.levels[motion.incidence - 1])
     size = 180.0 if motion.kind == "rotation" else frame.state.design.reach
     back, ahead = (_travel_text(end, unit, size) for end in (travel.low, travel.high))
     if motion.incidence in incidences(frame.snapshot.stratum):

@@ -91,7 +91,7 @@ class JogScene(ScenePart):
         for index in shown:
             motion = UNCOUPLED[index]
             line = motion_line(placed, motion, placed.frame.travels[index])
-            colour = proximity_colour(placed.frame.verdict.levels[motion.incidence - 1], 1.0)
+            colour = proximity_colour(placed.frame.verdict.levels[motion.incidence - 1])
             segments = np.stack([line.points[:-1], line.points[1:]], axis=1)
             segments = np.concatenate([segments, line.spoke[None]])
             yield self._lines[index], "points", segments.astype(np.float32)

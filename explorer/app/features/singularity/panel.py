@@ -99,10 +99,9 @@ def summary(frame: Frame) -> str:
 def _verdict(frame: Frame) -> str:
     verdict = frame.verdict
     look = LOOKS[verdict.kind]
-    millimetres = f"{format_number(verdict.distance * frame.state.design.unit_mm, 3)} mm"
     return status(verdict.title, look) + (
         f'<div class="{"ex-dim" if look == "within" else f"ex-{look}"} ex-two-lines" '
-        f'title="{VERDICT_HINT}">{escape(verdict.reason(millimetres))}</div>'
+        f'title="{VERDICT_HINT}">{escape(verdict.reason(frame.state.design.unit_mm))}</div>'
     )
 
 
@@ -128,7 +127,7 @@ def _margin(frame: Frame, index: int) -> str:
     snapshot, level = frame.snapshot, frame.verdict.levels[index]
     value, volume = float(snapshot.margins[index]), float(snapshot.volumes[index])
     reach, unit_mm = snapshot.design.reach, snapshot.design.unit_mm
-    colour = proximity_colour(level, 1.0)
+    colour = proximity_colour(level)
     filled = min(100.0, 100.0 * level / FAR_WARNINGS)
     return (
         f'<div class="ex-after"><div class="ex-line"><span>{swatch(colour)}'

@@ -162,7 +162,7 @@ class BallScene(ScenePart):
             return
         ball = frame.free_ball
         centre, touch = placed.points["b4"], placed.scale * ball.touches
-        colour = proximity_colour(frame.verdict.levels[ball.incidence - 1], 1.0)
+        colour = proximity_colour(frame.verdict.levels[ball.incidence - 1])
         yield self._ball, "position", tuple(centre.tolist())
         yield self._ball, "scale", placed.scale * ball.radius
         yield self._ball, "color", colour

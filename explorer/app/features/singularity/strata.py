@@ -158,11 +158,11 @@ def _neighbour(stratum: Stratum, value: str) -> str:
 def _node(stratum: Stratum, below: str, level: float | None, *, is_here: bool) -> str:
     column, count = _place(stratum)
     left = 100.0 * (column + 0.5) / count
-    colour = "currentColor" if level is None else css(proximity_colour(level, 1.0))
+    colour = "currentColor" if level is None else css(proximity_colour(level))
     if is_here:
         below = "here"
         if stratum == GENERIC:
-            colour = css(proximity_colour(float("inf"), 1.0))
+            colour = css(proximity_colour(float("inf")))
     elif stratum == GENERIC:
         below = "any"
     place = f"--left:{left:.4g}%;--top:{_top(inversions(stratum))}px;--colour:{colour}"

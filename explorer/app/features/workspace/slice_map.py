@@ -91,7 +91,7 @@ def slice_map(
         pixels[blocked] = BLOCKED
     if inside.any():
         share = colouring.values(points[inside])
-        table = np.array([proximity_colour(s, 1.0) for s in np.linspace(0.0, FAR_WARNINGS, 201)])
+        table = np.array([proximity_colour(s) for s in np.linspace(0.0, FAR_WARNINGS, 201)])
         index = np.clip(np.rint(share / FAR_WARNINGS * 200.0), 0, 200).astype(np.int64)
         pixels[inside, :3] = table[index]
         pixels[inside, 3] = 255
