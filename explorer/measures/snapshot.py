@@ -21,7 +21,7 @@ from explorer.mechanism.kinematics import (
     forward,
     inverse,
 )
-from explorer.mechanism.margins import margins, mode_name, mode_of, signs_of
+from explorer.mechanism.margins import describe_modes, margins, mode_name, mode_of, signs_of
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.bruhat import incidences
@@ -148,6 +148,13 @@ class Snapshot:
         for incidence in incidences(self.stratum):
             signs[incidence - 1] = "0"
         return " ".join(signs)
+
+    @property
+    def mode_words(self) -> str:
+        """The mode in words, such as "mode 1 (− − +)" or "boundary of modes 1 and 3 (− 0 +)"."""
+        modes = self.bordering_modes
+        name = describe_modes(modes) if len(modes) > 1 else f"mode {self.mode}"
+        return f"{name} ({self.sign_words})"
 
     @property
     def proximity(self) -> float:

@@ -176,9 +176,7 @@ def verdict(snapshot: Snapshot, warn_below: float | None = None) -> Verdict:
         distance, turn = snapshot.nearest_distances[index], snapshot.least_turns[index]
         if kind == "singular":
             distance = turn = 0.0
-        return Verdict(
-            kind, levels, told, distance, turn, snapshot.inverse_condition, cause
-        )
+        return Verdict(kind, levels, told, distance, turn, snapshot.inverse_condition, cause)
 
     each = {incidence: measures(incidence) for incidence in (1, 2, 3)}
     first, second, third = (

@@ -45,7 +45,9 @@ def linear(colour: Rgb) -> FloatArray:
 
 def contrast(a: Rgb, b: Rgb) -> float:
     """Return the contrast of two colours by WCAG 2, 1 to 21."""
-    light, dark = sorted((float(linear(c) @ [0.2126, 0.7152, 0.0722]) for c in (a, b)), reverse=True)
+    light, dark = sorted(
+        (float(linear(c) @ [0.2126, 0.7152, 0.0722]) for c in (a, b)), reverse=True
+    )
     return (light + 0.05) / (dark + 0.05)
 
 

@@ -40,5 +40,5 @@ MECHANISM = Feature(
         "Move › Use the nearest length": (Key("U"),),
         "Move › Other modes as ghosts": (Key("M"),),
     },
-    lists=("δ1 δ2 δ3", "Preset", "On a change"),
+    lists=("Preset", "On a change"),
 )

@@ -14,24 +14,28 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.paths import Journey
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.charts import (
-    BLUE,
     NEUTRAL,
     ORANGE,
-    TEAL,
-    VIOLET,
     add_chart,
     axis,
     dots,
     line,
 )
-from explorer.app.widgets.colours import Rgb
-from explorer.app.widgets.markup import box, dim, format_number, row, signed, swatch, table
+from explorer.app.widgets.colours import MARGIN_COLOURS
+from explorer.app.widgets.markup import (
+    box,
+    dim,
+    format_number,
+    margin_name,
+    row,
+    signed,
+    swatch,
+    table,
+)
 from explorer.mechanism.margins import INCIDENCES, margins
 from explorer.numerics.arrays import FloatArray
 
-# Lines of the margins: colours that are distinct in every common colour-vision deficiency and
-# differ from those of warnings, dashes, and the marks of the legend.
-COLOURS: tuple[Rgb, Rgb, Rgb] = (BLUE, TEAL, VIOLET)
+# Dashes of the margins' lines beside their colours, and the marks of the legend.
 DASHES: tuple[tuple[float, ...], ...] = ((), (7.0, 3.0), (2.0, 3.0))
 STROKES = ("ex-stroke", "ex-stroke is-dashed", "ex-stroke is-dotted")
 HEIGHT = 200
@@ -45,7 +49,7 @@ class MarginPlot:
     def __init__(self, gui: viser.GuiApi) -> None:
         deltas = (
             line(f"δ{index}", colour, dash=dash)
-            for index, (colour, dash) in enumerate(zip(COLOURS, DASHES, strict=True), start=1)
+            for index, colour, dash in zip((1, 2, 3), MARGIN_COLOURS, DASHES, strict=True)
         )
         self._chart = add_chart(
             gui,
@@ -115,12 +119,13 @@ def path_words(journey: Journey) -> str:
     pose = journey.pose
     legend = (
         row(
-            f'{swatch(colour, look)}δ{index} <span class="ex-dim ex-small">{incidence}</span>',
+            f"{swatch(colour, look)}{margin_name(index)} "
+            f'<span class="ex-dim ex-small">{incidence}</span>',
             signed(value),
         )
         for index, (colour, look, incidence, value) in enumerate(
             zip(
-                COLOURS,
+                MARGIN_COLOURS,
                 STROKES,
                 INCIDENCES,
                 margins(pose.position, pose.rotation).tolist(),

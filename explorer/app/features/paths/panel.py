@@ -10,7 +10,7 @@ from typing import Literal
 import viser
 
 from explorer.app.features.feature import Services
-from explorer.app.features.mechanism.pose_panel import MODES
+from explorer.app.features.mechanism.modes import MODES
 from explorer.app.features.paths.actions import (
     CancelPlan,
     ChooseModes,

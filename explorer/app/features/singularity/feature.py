@@ -5,7 +5,6 @@ from __future__ import annotations
 from explorer.app.features.feature import Feature, StateCommand, Tab
 from explorer.app.features.singularity.actions import GoToSingularity
 from explorer.app.features.singularity.feed import StrataFeed
-from explorer.app.features.singularity.jog_panel import JogPanel
 from explorer.app.features.singularity.jog_scene import JogScene
 from explorer.app.features.singularity.panel import SingularityPanel
 from explorer.app.features.singularity.scene import BallScene, EllipsoidScene, NearestGhost
@@ -13,7 +12,7 @@ from explorer.app.widgets.commands import shift
 
 SINGULARITY = Feature(
     "singularity",
-    tabs=(Tab("main", "Move", JogPanel), Tab("side", "Singularity", SingularityPanel)),
+    tabs=(Tab("side", "Singularity", SingularityPanel),),
     scene=(NearestGhost, EllipsoidScene, BallScene, JogScene),
     feeds=(StrataFeed,),
     commands=(

@@ -111,8 +111,8 @@ def diagram(frame: Frame, distances: Mapping[Stratum, float]) -> str:
         f'<span style="--top:{_top(d) + 8}px" title="Dimension {d}">{d}</span>' for d in range(7)
     )
     return box(
-        '<div class="ex-dim ex-small">Dimensions on the left; distances in design units. '
-        "Click on a stratum to go to its nearest pose.</div>"
+        '<div class="ex-dim ex-small">Press one to go to its nearest pose. Dimensions on the left, '
+        "distances in design units.</div>"
         f'<div class="ex-strata" style="--height:{6 * ROW + NODE_HEIGHT + 4}px">'
         f'{_edges(here)}<div class="ex-ranks">{ranks}</div><div class="ex-nodes">{nodes}</div>'
         "</div>"
@@ -120,15 +120,21 @@ def diagram(frame: Frame, distances: Mapping[Stratum, float]) -> str:
 
 
 def neighbours(frame: Frame, distances: Mapping[Stratum, float]) -> str:
-    """Return the present stratum and those that one more incidence leads to, as HTML."""
+    """Return the present stratum and those that one more incidence leads to, as HTML.
+
+    The first incidence of a generic pose is that of a margin: the table of the margins has it.
+    """
     here = frame.snapshot.stratum
-    rows = "".join(_neighbour(w, _distance(distances.get(w), 4, frame)) for w in COVERED[here])
+    covered = COVERED[here] if here != GENERIC else ()
+    rows = "".join(_neighbour(w, _distance(distances.get(w), 4, frame)) for w in covered)
     rest = (
         '<div class="ex-line ex-dim ex-after"><span>With one more incidence</span>'
         f"<span>units</span></div>{rows}"
         if rows
-        else '<div class="ex-dim ex-after">Both flags coincide: nothing is more singular.</div>'
+        else ""
     )
+    if not COVERED[here]:
+        rest = '<div class="ex-dim ex-after">Both flags coincide: nothing is more singular.</div>'
     return box(
         f"<div><b>{stratum_name(here)}</b> {dim(f'dimension {inversions(here)}')}</div>",
         f"<div>{escape(_sentence(here))}</div>{rest}",
