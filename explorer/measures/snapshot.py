@@ -164,14 +164,23 @@ class Snapshot:
     @cached_property
     def violations(self) -> tuple[Violation, ...]:
         """The limits that the pose breaks."""
-        return violations(
-            self.design,
-            np.array(self.pose.position),
-            self.rotation,
-            self.joints,
-            self.margins,
-            _home_signs(home_pose(self.design)),
+        return self._violations(np.array(self.pose.position), self.rotation, self.margins)
+
+    @cached_property
+    def mode_violations(self) -> tuple[tuple[Violation, ...], ...]:
+        """The limits that each of the eight assembly modes breaks."""
+        positions, rotations = self.modes.position, self.modes.rotation
+        return tuple(
+            self._violations(*mode)
+            for mode in zip(positions, rotations, margins(positions, rotations), strict=True)
         )
+
+    def _violations(
+        self, position: FloatArray, rotation: FloatArray, margin: FloatArray
+    ) -> tuple[Violation, ...]:
+        """Return the limits that the joints break in a pose in which they are assembled."""
+        home_signs = _home_signs(home_pose(self.design))
+        return violations(self.design, position, rotation, self.joints, margin, home_signs)
 
     @cached_property
     def clearances(self) -> LegClearances:

@@ -13,9 +13,7 @@ from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import press_button
 from explorer.app.widgets.markup import box, fitted
-from explorer.measures.snapshot import evaluate
 from explorer.mechanism.margins import mode_name
-from explorer.mechanism.pose import Pose
 from explorer.workspace.limits.broken import Violation
 
 MODES = tuple(f"{mode}:  {mode_name(mode)}" for mode in range(8))
@@ -122,11 +120,10 @@ def _row(frame: Frame, mode: int) -> str:
     solution, reach = frame.snapshot.modes, frame.state.design.reach
     is_here = mode in frame.snapshot.bordering_modes
     if solution.feasible:
-        pose = Pose.of(solution.position[mode], solution.rotation[mode])
         place = "".join(
             f"<span>{fitted(value, reach, 4)}</span>" for value in solution.position[mode].tolist()
         )
-        limits, hint = _limits(evaluate(frame.state.design, pose).violations)
+        limits, hint = _limits(frame.snapshot.mode_violations[mode])
     else:
         place, hint = '<span class="ex-dim is-wide">does not close</span>', ""
         limits = ""

@@ -19,18 +19,19 @@ from explorer.app.state.state import State
 from explorer.app.state.view import Arrows
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.controls import Bound, Controls, Span
-from explorer.app.widgets.markup import box, dim, format_number
+from explorer.app.widgets.markup import box, dim, fitted
 from explorer.app.widgets.ranges import coordinate_span
-from explorer.mechanism.pose import Pose
 from explorer.singularity.uncoupled import UNCOUPLED, Travel, UncoupledMotion, travels
 
 FRAMES = {
-    "platform": "Along and about the platform’s axes x′, z′ through b4",
-    "base": "Along and about the base’s axes x, z through a1",
+    "platform": "Platform’s axes x′ and z′ through b4",
+    "base": "Base’s axes x and z through a1",
 }
 UNITS = {"translation": "design units", "rotation": "degrees"}
 ARROWS: tuple[Arrows, ...] = get_args(Arrows)
 TURN_SPAN = Span(-180.0, 180.0, 0.1)
+# Share of its size up to which a travel is rounding.
+ROUNDING = 1e-9
 NEVER, BEYOND, HERE = "never", "beyond", "singular"
 """Labels of the ends of a slider: there is no singular pose, it is farther away, it is here."""
 
@@ -84,20 +85,18 @@ def jog_amount(state: State, index: int) -> float:
     return jog.amount if jog is not None and jog.motion == index else 0.0
 
 
-@functools.lru_cache(16)
-def _travels_from(pose: Pose) -> tuple[Travel, ...]:
-    """Return the travels in design units and degrees."""
-    return tuple(
-        travel
-        if motion.kind == "translation"
-        else Travel(math.degrees(travel.low), math.degrees(travel.high))
-        for motion, travel in zip(UNCOUPLED, travels(pose), strict=True)
-    )
+_travels_from = functools.lru_cache(16)(travels)
 
 
 def shown_travel(state: State, index: int) -> Travel:
-    """Return the travel of a motion from its start to the singular poses, in shown units."""
-    return _travels_from(jog_start(state, index))[index]
+    """Return the travel of a motion from its start to the singular poses, in shown units.
+
+    Both are zero if the start is singular but for rounding.
+    """
+    travel, size = _travels_from(jog_start(state, index))[index], state.design.reach
+    if UNCOUPLED[index].kind == "rotation":
+        travel, size = Travel(math.degrees(travel.low), math.degrees(travel.high)), 180.0
+    return Travel(0.0, 0.0) if min(-travel.low, travel.high) <= ROUNDING * size else travel
 
 
 def jog_span(state: State, index: int) -> Span:
@@ -120,13 +119,13 @@ def travel_marks(frame: Frame, index: int) -> tuple[Mark, ...]:
     travel = shown_travel(frame.state, index)
     if travel.low == travel.high:
         return ((0.0, HERE),)
-    unit = "°" if motion.kind == "rotation" else ""
+    unit, size = ("°", 180.0) if motion.kind == "rotation" else ("", frame.state.design.reach)
 
     def mark(end: float, edge: float) -> Mark:
         if math.isinf(end):
             return edge, NEVER
         if abs(end) > abs(edge):
             return edge, BEYOND
-        return end, f"{format_number(end, 3, size=abs(span.high - span.low))}{unit}"
+        return end, f"{fitted(end, size, 4)}{unit}"
 
     return mark(travel.low, span.low), mark(travel.high, span.high)

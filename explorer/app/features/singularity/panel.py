@@ -106,7 +106,7 @@ def legend(frame: Frame) -> str:
         f"{format_number(math.degrees(warn.turn), 3)}° of turning, and "
         f"{format_number(warn.condition, 3)} of 1/cond J"
     )
-    places = ticks((0.0, "singular"), (edge, "warned"), (100.0, f"≥ {FAR_WARNINGS:g} × warned"))
+    places = ticks((0.0, "0"), (edge, "warned below"), (100.0, f"≥ {FAR_WARNINGS:g} times"))
     return (
         f'<div title="{escape(hint)}"><div class="ex-legend" style="--colours:{stops}"></div>'
         f"{places}</div>"
