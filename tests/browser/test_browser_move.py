@@ -105,7 +105,7 @@ def test_pointer_on_a_mode_shows_its_ghost_until_it_leaves_or_the_mode_is_chosen
     for mode in (6, 2):
         row_of_mode(tab, mode).hover()
         tab.wait_for(lambda mode=mode: hovered.mode == mode, f"the ghost of mode {mode}")
-    assert ghosts_shown(tab) == 1
+    tab.wait_for(lambda: ghosts_shown(tab) == 1, "one ghost in the scene")
     assert tab.state == before
     assert tab.running.page.session.history.step.number == number
     tab.page.mouse.move(SIZE[0] // 2, 4)
@@ -136,13 +136,9 @@ def row_of_mode(tab: Tab, mode: int) -> Locator:
 
 def ghosts_shown(tab: Tab) -> int:
     return tab.page.evaluate(
-        """() => {
-            let count = 0;
-            window.__viserMutable.scene.traverse((node) => {
-                if (/^\\/ghosts\\/platform\\/\\d$/.test(node.name) && node.visible) count += 1;
-            });
-            return count;
-        }"""
+        """() => Object.entries(window.__viserMutable.nodeRefFromName)
+            .filter(([name, node]) => /^\\/ghosts\\/platform\\/\\d$/.test(name) && node?.visible)
+            .length"""
     )
 
 

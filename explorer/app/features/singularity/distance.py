@@ -90,7 +90,7 @@ def _margin(frame: Frame, index: int) -> str:
         class_name="ex-link",
         is_disabled=nearest.distance == 0.0,
     )
-    distance = format_number(nearest.distance * unit_mm, 3, size=reach * unit_mm)
+    distance = fitted(nearest.distance * unit_mm, reach * unit_mm, 5)
     return (
         f"<div{' class=ex-strong' if is_least else ''}>{margin_name(index + 1)}"
         f"<span>{fitted(float(snapshot.margins[index]), reach, 4)}</span>"
