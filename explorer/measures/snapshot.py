@@ -21,7 +21,7 @@ from explorer.mechanism.kinematics import (
     forward,
     inverse,
 )
-from explorer.mechanism.margins import margins, mode_name, mode_of, signs_of
+from explorer.mechanism.margins import describe_modes, margins, mode_name, mode_of, signs_of
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.bruhat import incidences
@@ -29,6 +29,7 @@ from explorer.singularity.jacobian import (
     determinant,
     inverse_condition,
     jacobian,
+    scaled_margins,
     tetrahedron_volumes,
 )
 from explorer.singularity.nearest import (
@@ -38,6 +39,7 @@ from explorer.singularity.nearest import (
     singularities_of,
 )
 from explorer.singularity.strata import inversions, stratum
+from explorer.singularity.turning import least_turns
 from explorer.workspace.limits.broken import Violation, violations
 
 
@@ -102,6 +104,17 @@ class Snapshot:
         return float(inverse_condition(matrix, self.design.reach))
 
     @cached_property
+    def least_turns(self) -> tuple[float, float, float]:
+        """The least turns that lead to each incidence, in radians, in the order δ1, δ2, δ3."""
+        first, second, third = least_turns(self.pose.position, self.rotation).tolist()
+        return first, second, third
+
+    @property
+    def worst_conditioned(self) -> int:
+        """The number 1 to 3 of the margin that makes the conditioning of J what it is."""
+        return int(scaled_margins(self.design, self.joints, self.margins).argmin()) + 1
+
+    @cached_property
     def stratum(self) -> tuple[int, ...]:
         """The stratum: the permutation of the relative position of the two flags."""
         permutation = stratum(self.pose.position, self.rotation, self.design.reach)
@@ -137,6 +150,13 @@ class Snapshot:
         return " ".join(signs)
 
     @property
+    def mode_words(self) -> str:
+        """The mode in words, such as "mode 1 (− − +)" or "boundary of modes 1 and 3 (− 0 +)"."""
+        modes = self.bordering_modes
+        name = describe_modes(modes) if len(modes) > 1 else f"mode {self.mode}"
+        return f"{name} ({self.sign_words})"
+
+    @property
     def proximity(self) -> float:
         """The smallest |δ| over the reach."""
         return float(np.abs(self.margins).min()) / self.design.reach
@@ -144,14 +164,23 @@ class Snapshot:
     @cached_property
     def violations(self) -> tuple[Violation, ...]:
         """The limits that the pose breaks."""
-        return violations(
-            self.design,
-            np.array(self.pose.position),
-            self.rotation,
-            self.joints,
-            self.margins,
-            _home_signs(home_pose(self.design)),
+        return self._violations(np.array(self.pose.position), self.rotation, self.margins)
+
+    @cached_property
+    def mode_violations(self) -> tuple[tuple[Violation, ...], ...]:
+        """The limits that each of the eight assembly modes breaks."""
+        positions, rotations = self.modes.position, self.modes.rotation
+        return tuple(
+            self._violations(*mode)
+            for mode in zip(positions, rotations, margins(positions, rotations), strict=True)
         )
+
+    def _violations(
+        self, position: FloatArray, rotation: FloatArray, margin: FloatArray
+    ) -> tuple[Violation, ...]:
+        """Return the limits that the joints break in a pose in which they are assembled."""
+        home_signs = _home_signs(home_pose(self.design))
+        return violations(self.design, position, rotation, self.joints, margin, home_signs)
 
     @cached_property
     def clearances(self) -> LegClearances:

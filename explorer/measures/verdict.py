@@ -1,26 +1,48 @@
 """The verdict on a pose: singular, near a singularity, or clear, and by which incidence.
 
-An incidence is measured by its margin, and by the distance of the nearest pose that has it
-(`explorer.singularity.nearest`). Either may be small while the other is not: a small turn of the
-platform can remove a large margin, and the margin of two nearly parallel lines is small however
-far apart they are. So the smaller of the two counts, each over a warning length of its own. The
-warning length of distances is the shorter one: the platform can turn as well as shift, so its
-points move to the nearest singular pose by less than the margin.
+This is the one definition, for the page with its colours, the command line and the report. A pose
+is singular if its flags have an incidence, to rounding. Otherwise four measures count, each over a
+warning value of its own, and the pose is near a singularity if any is below:
+
+- the margin |δ| of an incidence, in design units. Its warning length is the user's, at first a
+  share of the reach (`WARN_SHARE`);
+- the distance of its nearest singular pose: the root-mean-square displacement of b1 to b4, with
+  any shift and turn (`explorer.singularity.nearest`). Its warning length is a third of that of
+  margins (`DISTANCE_SHARE`): the platform may turn as well as shift, so that its points move by
+  less than the margin;
+- the least turn that leads to it (`explorer.singularity.turning`), below 10° (`WARN_TURN`): the
+  sine of this angle is the share of a leg's force that acts, so that there the legs push six times
+  as hard as where lines and planes are at right angles. A small platform is displaced little by
+  such a turn, a large one much, so that the distance alone does not tell;
+- the inverse condition number of J, below 0.001 (`WARN_CONDITION`): a change of J by this share
+  makes it singular (Eckart and Young), and forces and errors grow a thousandfold. J is singular
+  only where a margin is zero, but margins and distances do not bound its conditioning: in a
+  nearly degenerate design, or far from the base, it is low in every pose. It counts for the
+  incidence with the least scaled margin (`explorer.singularity.jacobian.scaled_margins`).
+
+All warning values grow with the user's warning length.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
 from explorer.measures.snapshot import Snapshot
 from explorer.mechanism.margins import INCIDENCES
+from explorer.numerics.number_text import format_number
 from explorer.singularity.bruhat import incidences
+from explorer.singularity.colours import WARN_SHARE
 
 # Warning length of distances, as a share of that of margins.
 DISTANCE_SHARE = 1.0 / 3.0
+# Warning angle in radians, and warning value of 1/cond J, at a warning length of `WARN_SHARE`.
+WARN_TURN = math.radians(10.0)
+WARN_CONDITION = 1e-3
 
 Kind = Literal["singular", "near", "clear"]
+Cause = Literal["distance", "turn", "condition"]
 TITLES: dict[Kind, str] = {
     "singular": "Singular",
     "near": "Near a singularity",
@@ -29,66 +51,143 @@ TITLES: dict[Kind, str] = {
 
 
 @dataclass(frozen=True)
+class Warnings:
+    """The values below which a pose counts as near a singularity.
+
+    Attributes:
+        margin: Of a margin, in design units.
+        distance: Of the distance to a singular pose, in design units.
+        turn: Of the least turn to an incidence, in radians.
+        condition: Of the inverse condition number of J.
+    """
+
+    margin: float
+    distance: float
+    turn: float
+    condition: float
+
+
+@dataclass(frozen=True)
 class Verdict:
     """The nearness of a pose to a singularity.
 
     Attributes:
         kind: Whether the pose is singular, near a singularity, or clear of all.
-        levels: Level of each incidence: the smaller of |δ| and the distance to its nearest
-            singular pose, each over its warning length; 0 is singular, below 1 is near.
+        levels: Level of each incidence: the least of its measures, each over its warning value;
+            0 is singular, below 1 is near.
         incidences: Numbers 1 to 3 of the incidences that hold in a singular pose; of those
             that are near, the lowest level first; in a clear pose, of the nearest one.
         distance: Root-mean-square displacement of b1 to b4 to the nearest pose with the first
             of these incidences, in design units; 0 in a singular pose.
+        turn: Least turn to the first of these incidences, in radians.
+        condition: The inverse condition number of J, 0 to 1.
+        cause: Which of these is told: the first of them that is below its warning value if the
+            pose is near, otherwise the distance. A margin is told by the distance.
     """
 
     kind: Kind
     levels: tuple[float, float, float]
     incidences: tuple[int, ...]
     distance: float
+    turn: float
+    condition: float
+    cause: Cause = "distance"
 
     @property
     def title(self) -> str:
         """The verdict in words, such as "Near a singularity"."""
         return TITLES[self.kind]
 
-    def reason(self, length: str) -> str:
+    def reason(self, unit_mm: float) -> str:
         """Return the reason, such as "2.52 mm from δ2 = 0, lines a1a2 and b2b3 meeting".
 
         Args:
-            length: Text of the distance, with its unit.
+            unit_mm: Millimetres in one design unit.
         """
         if self.kind == "singular":
             return "; ".join(f"δ{index} = 0: {INCIDENCES[index - 1]}" for index in self.incidences)
         first = self.incidences[0]
-        return f"{length} from δ{first} = 0, {INCIDENCES[first - 1]}"
+        if self.cause == "condition":
+            return (
+                f"1/cond J is {format_number(self.condition, 2)}, most by δ{first}; δ{first} = 0 "
+                f"is {self._length(unit_mm)} away"
+            )
+        away = self._length(unit_mm) if self.cause == "distance" else f"{self._turn()} of turning"
+        return f"{away} from δ{first} = 0, {INCIDENCES[first - 1]}"
+
+    def brief(self, unit_mm: float) -> str:
+        """Return the verdict in a few words, such as "10.3 mm to δ1 = 0", "7° to δ2 = 0".
+
+        Args:
+            unit_mm: Millimetres in one design unit.
+        """
+        names = " and ".join(f"δ{index} = 0" for index in self.incidences)
+        if self.kind == "singular":
+            return f"Singular: {names}"
+        if self.cause == "condition":
+            return f"1/cond J {format_number(self.condition, 2)}"
+        away = self._length(unit_mm) if self.cause == "distance" else self._turn()
+        return f"{away} to δ{self.incidences[0]} = 0"
+
+    def _length(self, unit_mm: float) -> str:
+        return f"{format_number(self.distance * unit_mm, 3)} mm"
+
+    def _turn(self) -> str:
+        return f"{format_number(math.degrees(self.turn), 2)}°"
 
 
-def verdict(snapshot: Snapshot, warn_below: float) -> Verdict:
+def warnings(reach: float, warn_below: float | None = None) -> Warnings:
+    """Return the warning values.
+
+    Args:
+        reach: Reach of the design, in design units.
+        warn_below: Warning length of the margins, in design units; None for a share of the reach.
+    """
+    default = WARN_SHARE * reach
+    margin = default if warn_below is None else warn_below
+    share = margin / default
+    return Warnings(margin, DISTANCE_SHARE * margin, share * WARN_TURN, share * WARN_CONDITION)
+
+
+def verdict(snapshot: Snapshot, warn_below: float | None = None) -> Verdict:
     """Return the verdict on a pose.
 
     Args:
         snapshot: The design in the pose.
-        warn_below: Warning length of the margins, in design units.
+        warn_below: Warning length of the margins, in design units; None for a share of the reach.
     """
-    levels, distances = _levels(snapshot, warn_below), snapshot.nearest_distances
-    if holding := incidences(snapshot.stratum):
-        return Verdict("singular", levels, holding, 0.0)
+    warn = warnings(snapshot.design.reach, warn_below)
+    holding = incidences(snapshot.stratum)
+    worst = snapshot.worst_conditioned
+
+    def measures(incidence: int) -> dict[Cause, float]:
+        index = incidence - 1
+        size, distance = abs(float(snapshot.margins[index])), snapshot.nearest_distances[index]
+        levels: dict[Cause, float] = {
+            "distance": min(size / warn.margin, distance / warn.distance),
+            "turn": snapshot.least_turns[index] / warn.turn,
+        }
+        if incidence == worst:
+            levels["condition"] = snapshot.inverse_condition / warn.condition
+        return levels
+
+    def made(kind: Kind, told: tuple[int, ...], cause: Cause = "distance") -> Verdict:
+        index = told[0] - 1
+        distance, turn = snapshot.nearest_distances[index], snapshot.least_turns[index]
+        if kind == "singular":
+            distance = turn = 0.0
+        return Verdict(kind, levels, told, distance, turn, snapshot.inverse_condition, cause)
+
+    each = {incidence: measures(incidence) for incidence in (1, 2, 3)}
+    first, second, third = (
+        0.0 if incidence in holding else min(each[incidence].values()) for incidence in (1, 2, 3)
+    )
+    levels = first, second, third
+    if holding:
+        return made("singular", holding)
     order = sorted((1, 2, 3), key=lambda incidence: levels[incidence - 1])
     if near := tuple(incidence for incidence in order if levels[incidence - 1] < 1.0):
-        return Verdict("near", levels, near, distances[near[0] - 1])
-    nearest = min((1, 2, 3), key=lambda incidence: distances[incidence - 1])
-    return Verdict("clear", levels, (nearest,), distances[nearest - 1])
-
-
-def _levels(snapshot: Snapshot, warn_below: float) -> tuple[float, float, float]:
-    holding = incidences(snapshot.stratum)
-
-    def level(incidence: int) -> float:
-        if incidence in holding:
-            return 0.0
-        margin = abs(float(snapshot.margins[incidence - 1]))
-        distance = snapshot.nearest_distances[incidence - 1]
-        return min(margin, distance / DISTANCE_SHARE) / warn_below
-
-    return level(1), level(2), level(3)
+        of_first = each[near[0]]
+        return made("near", near, next(cause for cause in of_first if of_first[cause] < 1.0))
+    nearest = min((1, 2, 3), key=lambda incidence: snapshot.nearest_distances[incidence - 1])
+    return made("clear", (nearest,))

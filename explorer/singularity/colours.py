@@ -1,8 +1,12 @@
-"""The colour scale of the proximity to a singularity, for the page and the report.
+"""The colour scale of the proximity to a singularity, and the colours of the three margins.
 
-Colours are orange below the warning length and blue above it, a pair that is distinct in every
+The scale is orange below the warning value and blue above it, a pair that is distinct in every
 common colour-vision deficiency. Both ends darken, so that the scale is legible in grey as well:
 dark orange is singular, dark blue is far away.
+
+A margin has a hue of its own, which says which margin it is and nothing of danger. The three are
+distinct from each other, from the scale and from the colours of compared designs, and the name of
+the margin, δ1 to δ3, or a dash of its own stands beside them.
 """
 
 from __future__ import annotations
@@ -19,6 +23,12 @@ FAR: Rgb = (24, 74, 150)
 # Colour of colliding legs and bodies.
 OUTLINE: Rgb = (190, 24, 60)
 
+MARGIN_COLOURS: tuple[Rgb, Rgb, Rgb] = ((180, 0, 240), (255, 75, 150), (90, 135, 90))
+"""Colours of lines and marks of δ1, δ2 and δ3, visible on light and dark pages alike."""
+
+# Share of black, or of white, in a margin's colour as text on a light or on a dark page.
+TEXT_SHARE = 0.4
+
 # Default warning length as a share of the reach.
 WARN_SHARE = 0.05
 # An inverse condition number below this is coloured as a warning.
@@ -29,24 +39,33 @@ FAR_WARNINGS = 4.0
 BAND_EDGES = (0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 2.5, 3.0, FAR_WARNINGS)
 
 
-def proximity_colour(margin: float, warn_below: float) -> Rgb:
-    """Return the colour of a margin.
+def proximity_colour(level: float) -> Rgb:
+    """Return the colour of a level.
 
     Args:
-        margin: Margin in design units, of either sign; or a level of
+        level: Margin over the warning length, of either sign; or a level of
             `explorer.measures.verdict`.
-        warn_below: Warning length in design units; 1 for a level.
     """
-    share = abs(margin) / warn_below
+    share = abs(level)
     if share < 1.0:
         return mix(SINGULAR, WARNED, share)
     return mix(CLEAR, FAR, min(1.0, (share - 1.0) / (FAR_WARNINGS - 1.0)))
 
 
+def margin_text(incidence: int) -> tuple[Rgb, Rgb]:
+    """Return the colour of a margin's name on light pages and on dark ones.
+
+    Args:
+        incidence: Number 1, 2 or 3 of the margin.
+    """
+    colour = MARGIN_COLOURS[incidence - 1]
+    return mix(colour, (0, 0, 0), TEXT_SHARE), mix(colour, (255, 255, 255), TEXT_SHARE)
+
+
 def band_colours() -> tuple[Rgb, ...]:
     """Return the colour of each band of `BAND_EDGES` and of the one beyond."""
     edges = (*BAND_EDGES, 1.5 * BAND_EDGES[-1])
-    return tuple(proximity_colour(0.5 * (a + b), 1.0) for a, b in itertools.pairwise(edges))
+    return tuple(proximity_colour(0.5 * (a + b)) for a, b in itertools.pairwise(edges))
 
 
 def css(colour: Rgb) -> str:

@@ -77,6 +77,27 @@ def determinant(design: Design, joints: FloatArray, margin: FloatArray) -> Float
     return np.divide(numerator, product, out=np.zeros_like(product), where=product > 0.0)
 
 
+def scaled_margins(design: Design, joints: FloatArray, margin: FloatArray) -> FloatArray:
+    """Return the sizes of the margins as they enter the Jacobian, shape (..., 3), dimensionless.
+
+    Their product is |det J| over the cubed reach. The first and the third are the moment arms of
+    legs 1 and 4 about the lines b2b3 and a1a2, over the reach. Where J is badly conditioned, the
+    least of them names the incidence that makes it so; this may be far away if the design itself
+    is nearly degenerate.
+
+    Args:
+        design: The manipulator.
+        joints: Joints of the pose, shape (..., 6), in design units.
+        margin: Margins (δ1, δ2, δ3) of the pose, shape (..., 3), in design units.
+    """
+    span, reach = design.b3 - design.b2, design.reach
+    l1, d2, d4, l4 = (joints[..., index] for index in (0, 2, 4, 5))
+    factors = np.array([design.b1[1] / reach, (span / reach) * span, design.a3[1] / reach])
+    lengths = np.stack([l1, d2 * d4, l4], axis=-1)
+    sizes = np.abs(margin * factors)
+    return np.divide(sizes, lengths, out=np.zeros(sizes.shape), where=lengths > 0.0)
+
+
 def inverse_condition(jacobian: FloatArray, length: float) -> FloatArray:
     """Return the inverse condition number of the homogeneous J, from 0 to 1, shape (...).
 

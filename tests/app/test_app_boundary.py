@@ -3,24 +3,21 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
 
 import pytest
-import viser
-from desk import Desk
 from hypothesis import given
 from services import services_for
 from strategies import Case, all_cases
 
-from explorer.app.features.mechanism.pose_panel import MODES, MovePanel, mode_options
+from explorer.app.features.mechanism.modes import modes_table
 from explorer.app.features.singularity.actions import GoToSingularity, GoToStratum
 from explorer.app.features.singularity.feed import StrataFeed
 from explorer.app.features.singularity.panel import summary
 from explorer.app.features.singularity.strata import distances_of, neighbours
 from explorer.app.session.jobs import Worker
+from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, opened
-from explorer.app.widgets.assigning import Update
 from explorer.measures.snapshot import evaluate
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.margins import describe_modes
@@ -54,53 +51,41 @@ def test_singular_pose_is_named_as_the_boundary_of_two_modes(incidence: int) -> 
     first, second = frame.snapshot.bordering_modes
     assert second - first == 4 >> (incidence - 1)
     text = re.sub("<[^>]*>", " ", summary(frame))
-    assert f"boundary of modes {first} and {second}" in text
-    assert f"({frame.state.mode})" not in text
+    assert f"Boundary of modes {first} and {second}" in text
+    assert f"ode {frame.state.mode}" not in text
 
 
 def test_deeper_pose_is_named_as_the_boundary_of_four_or_eight_modes() -> None:
     assert describe_modes((1, 3, 5, 7)) == "boundary of modes 1, 3, 5 and 7"
     coinciding = GoToStratum((1, 2, 3, 4)).apply(opened(OPTIMAL))
-    assert "boundary of all eight modes" in summary(Frame(coinciding))
+    assert "Boundary of all eight modes" in summary(Frame(coinciding))
 
 
-def test_list_of_modes_has_the_boundary_only_at_a_singular_pose(
-    server: viser.ViserServer,
-) -> None:
-    desk = Desk(at(2))
-    panel = MovePanel(services_for(server, desk.session))
-    first = list(panel.updates(Frame(desk.state)))
-    (shown,) = (
-        handle
-        for handle, name, value in first
-        if name == "options" and value == mode_options(Frame(desk.state))
-    )
+def test_table_of_modes_marks_all_that_meet_in_a_singular_pose() -> None:
+    for frame, marked, words in (
+        (Frame(at(2)), ["1", "3"], "Boundary of modes 1 and 3 (− 0 +)"),
+        (Frame(opened(OPTIMAL)), ["1"], "Mode 1 (− − +)"),
+        (Frame(at(1)), ["1", "5"], "Boundary of modes 1 and 5 (0 − +)"),
+    ):
+        html = modes_table(frame)
+        rows = re.findall(r'data-press="modes.go" data-value="(\d)"[^>]*aria-pressed="true"', html)
+        assert rows == marked
+        assert words in html
 
-    def show(updates: Iterable[Update]) -> None:
-        for handle, name, value in updates:
-            if handle is shown:
-                setattr(handle, name, value)
 
-    show(first)
-    assert len(shown.options) == 9
-    assert shown.value == "− 0 +:  boundary of modes 1 and 3"
-    show(panel.updates(Frame(opened(OPTIMAL))))
-    assert shown.options == MODES
-    assert shown.value == MODES[1]
-    show(panel.updates(Frame(at(1))))
-    assert shown.value == "0 − +:  boundary of modes 1 and 5"
-    # To choose the boundary itself changes nothing; to choose a mode leaves it.
-    before = desk.state
-    desk.use(shown, mode_options(Frame(before))[-1])
-    assert desk.state.pose == before.pose
-    desk.use(shown, MODES[0])
-    assert desk.state.mode == 0
-    desk.session.stop()
+@given(all_cases())
+def test_a_singular_pose_is_the_boundary_of_its_modes_in_all_words(case: Case) -> None:
+    frame = Frame(opened(case.design, Pose.of(case.position, case.rotation)))
+    snapshot = frame.snapshot
+    modes = snapshot.bordering_modes
+    expected = describe_modes(modes) if len(modes) > 1 else f"mode {snapshot.mode}"
+    assert snapshot.mode_words == f"{expected} ({snapshot.sign_words})"
+    for html in (summary(frame), modes_table(frame)):
+        assert snapshot.mode_words.capitalize() in html
 
 
 def test_distances_of_deeper_strata_arrive_at_a_singular_pose_without_the_diagram() -> None:
-    frame = Frame(at(2))
-    assert not frame.state.view.singular.strata
+    frame = Frame(Set("view.singular.strata", value=False).apply(at(2)))
     worker = Worker(pytest.fail)
     feed = StrataFeed(services_for(worker=worker))
     try:
@@ -110,7 +95,7 @@ def test_distances_of_deeper_strata_arrive_at_a_singular_pose_without_the_diagra
         assert set(COVERED[OF_INCIDENCES[1]]) <= set(distances)
         assert "…" not in neighbours(frame, distances)
         # Nothing is computed where nothing of it is shown.
-        feed.follow(Frame(opened(OPTIMAL)))
+        feed.follow(Frame(Set("view.singular.strata", value=False).apply(opened(OPTIMAL))))
         assert feed.request is None
     finally:
         worker.stop()

@@ -45,28 +45,25 @@ def as_deuteranope(colour: Rgb) -> FloatArray:
 
 
 def test_a_margin_of_zero_is_singular_and_a_large_one_is_far() -> None:
-    assert proximity_colour(0.0, 1.0) == SINGULAR
-    assert proximity_colour(FAR_WARNINGS, 1.0) == proximity_colour(1e9, 1.0) == FAR
+    assert proximity_colour(0.0) == SINGULAR
+    assert proximity_colour(FAR_WARNINGS) == proximity_colour(1e9) == FAR
 
 
-@given(st.floats(0.0, 1e3), st.floats(1e-6, 1e3))
-def test_colour_depends_on_the_size_of_the_margin_over_the_warning_length(
-    margin: float, warn: float
-) -> None:
-    assert proximity_colour(margin, warn) == proximity_colour(-margin, warn)
-    assert proximity_colour(margin * 8, warn * 8) == proximity_colour(margin, warn)
+@given(st.floats(0.0, 1e3))
+def test_colour_depends_on_the_size_of_the_level(level: float) -> None:
+    assert proximity_colour(level) == proximity_colour(-level)
 
 
 def test_luminance_grows_on_either_side_towards_the_warning_length() -> None:
-    below = [luminance(proximity_colour(x, 1.0)) for x in np.linspace(0.0, 0.999, 30)]
-    above = [luminance(proximity_colour(x, 1.0)) for x in np.linspace(1.0, FAR_WARNINGS, 30)]
+    below = [luminance(proximity_colour(x)) for x in np.linspace(0.0, 0.999, 30)]
+    above = [luminance(proximity_colour(x)) for x in np.linspace(1.0, FAR_WARNINGS, 30)]
     assert below == sorted(below)
     assert above == sorted(above, reverse=True)
 
 
 def test_warned_and_clear_are_told_apart_without_green_cones() -> None:
-    warned = [as_deuteranope(proximity_colour(x, 1.0)) for x in np.linspace(0.0, 0.99, 20)]
-    clear = [as_deuteranope(proximity_colour(x, 1.0)) for x in np.linspace(1.0, FAR_WARNINGS, 20)]
+    warned = [as_deuteranope(proximity_colour(x)) for x in np.linspace(0.0, 0.99, 20)]
+    clear = [as_deuteranope(proximity_colour(x)) for x in np.linspace(1.0, FAR_WARNINGS, 20)]
     assert min(float(np.linalg.norm(a - b)) for a in warned for b in clear) > 60.0
 
 
@@ -213,6 +210,6 @@ def test_what_is_small_is_not_told_as_nothing() -> None:
     assert share(0.0) == "0.0000"
     thin = msgspec.structs.replace(OPTIMAL, b3=OPTIMAL.b2 + 1e-6)
     text = re.sub(r"<[^>]+>", " ", summary(Frame(opened(thin))))
-    conditioning = re.search(r"1/cond J\s+(\S+)", text)
+    conditioning = re.search(r"1/cond J\s+(\d\S*)", text)
     assert conditioning is not None
     assert 0.0 < float(conditioning[1].replace("−", "-")) < 1e-6

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import viser
 from desk import Desk, by_name, number, rows_of
+from scipy.spatial.transform import Rotation, Slerp
 from services import StubWorker, services_for
 
 from explorer.app.features.feature import Services
@@ -23,12 +24,15 @@ from explorer.app.features.singularity.actions import (
 from explorer.app.features.singularity.distance import DistancePanel, distance_table
 from explorer.app.features.singularity.feed import StrataFeed
 from explorer.app.features.singularity.jog_panel import (
+    BEYOND,
+    HERE,
+    NEVER,
     JogPanel,
-    in_shown_units,
     jog_amount,
     jog_label,
+    jog_span,
+    shown_travel,
     travel_marks,
-    travel_table,
 )
 from explorer.app.features.singularity.jog_scene import JogScene, motion_line, shown_motions
 from explorer.app.features.singularity.panel import SingularityPanel, summary
@@ -53,6 +57,7 @@ from explorer.singularity.jacobian import jacobian
 from explorer.singularity.nearest import nearest_singularities
 from explorer.singularity.nearest_stratum import nearest_in_stratum
 from explorer.singularity.strata import GENERIC, STRATA
+from explorer.singularity.turning import least_turns
 from explorer.singularity.uncoupled import UNCOUPLED
 
 OPTIMAL = PRESETS["paper-optimal"]
@@ -142,10 +147,11 @@ def test_each_node_of_the_diagram_leads_to_its_stratum(services: Services, desk:
     assert "borders on" in desk.complaints[-1]
 
 
-def test_no_diagram_is_made_until_it_is_asked_for(
+def test_no_diagram_is_made_while_it_is_closed(
     services: Services, desk: Desk, worker: StubWorker
 ) -> None:
     panel = StrataPanel(services)
+    desk.session.do(Set("view.singular.strata", value=False))
     services.get(StrataFeed).follow(Frame(desk.state))
     assert worker.orders == []
     contents = [v for _, n, v in panel.updates(Frame(desk.state)) if n == "content"]
@@ -158,17 +164,11 @@ def test_the_panel_says_where_one_more_incidence_leads(state: State) -> None:
     here = frame.snapshot.stratum
     words = plain(neighbours(frame, strata_distances(_request(state)).distances))
     assert stratum_name(here) in words
-    for lower in COVERED[here]:
+    # Those of a generic pose stand in the table of the margins.
+    for lower in COVERED[here] if here != GENERIC else ():
         zero = ", ".join(f"δ{i}" for i in incidences(lower))
         assert f"{zero} = 0: {', '.join(WORDS[c] for c in conditions(lower))}" in words
     assert ("Both flags coincide" in words) is (here == (1, 2, 3, 4))
-
-
-def test_the_three_incidences_stand_beside_the_generic_stratum() -> None:
-    state = opened(OPTIMAL)
-    words = plain(neighbours(Frame(state), strata_distances(_request(state)).distances))
-    for index, nearest in enumerate(nearest_singularities(OPTIMAL, state.pose)):
-        assert f"δ{index + 1} = 0: {INCIDENCES[index]} {nearest.distance:.4g}" in words
 
 
 def test_distances_come_from_the_worker_but_those_of_one_incidence_at_once() -> None:
@@ -226,22 +226,49 @@ def test_anything_else_that_moves_the_platform_ends_a_jog() -> None:
 
 
 @pytest.mark.parametrize("state", random_states(6))
-def test_the_travel_in_the_table_ends_where_the_margin_vanishes(state: State) -> None:
+def test_the_ends_of_a_slider_say_where_the_margin_vanishes(state: State) -> None:
     frame = Frame(state)
-    for name in ("platform", "base"):
-        own = [i for i, motion in enumerate(UNCOUPLED) if motion.frame == name]
-        for index, row in zip(own, rows_of(travel_table(frame, name)), strict=True):
-            motion = UNCOUPLED[index]
-            travel = in_shown_units(motion, motion.travel(state.pose))
-            assert row[0].startswith(f"δ{motion.incidence}: ")
-            for shown, end in zip(row[1:], (travel.low, travel.high), strict=True):
-                if math.isinf(end):
-                    assert shown == "never"
-                    continue
-                assert number(shown.rstrip("°")) == pytest.approx(end, rel=1e-2)
-                after = Jog(index, end).apply(state)
-                size = float(np.linalg.norm(after.pose.position)) + 1.0
-                assert abs(deltas(after.pose)[motion.incidence - 1]) < 1e-12 * size
+    for index, motion in enumerate(UNCOUPLED):
+        travel, span = shown_travel(state, index), jog_span(state, index)
+        marks = travel_marks(frame, index)
+        for (at, shown), end in zip(marks, (travel.low, travel.high), strict=True):
+            assert span.low <= at <= span.high
+            if math.isinf(end):
+                assert shown == NEVER
+                continue
+            if shown == BEYOND:
+                assert abs(end) > abs(at)
+            else:
+                assert at == end
+                assert number(shown.rstrip("°")) == pytest.approx(end, abs=0.06)
+            after = Jog(index, end).apply(state)
+            size = float(np.linalg.norm(after.pose.position)) + 1.0
+            assert abs(deltas(after.pose)[motion.incidence - 1]) < 1e-12 * size
+
+
+def test_no_number_of_a_motion_is_larger_than_its_slider_on_any_path() -> None:
+    # On the way from mode 1 to mode 5 here, b4 passes where the motion along x does nothing.
+    paper = Pose.of_yaw_pitch_roll((14.0, -2.0, 6.0), (-40.0, 0.0, 0.0))
+    states = [opened(OPTIMAL, paper), *random_states(12, seed=8), *singular_states()]
+    for state in states:
+        here = Frame(state)
+        modes = here.snapshot.modes
+        first, last = modes.position[1], modes.position[5]
+        turns = Rotation.from_matrix(modes.rotation[[1, 5]])
+        between = Slerp([0.0, 1.0], turns)
+        for share in (0.0, 0.25, 0.5 - 1e-9, 0.5, 0.5 + 1e-13, 0.75, 1.0):
+            there = opened(
+                OPTIMAL,
+                Pose.of((1.0 - share) * first + share * last, between(share).as_matrix()),
+            )
+            edge = coordinate_span(there).high
+            for index, motion in enumerate(UNCOUPLED):
+                most = edge if motion.kind == "translation" else 180.0
+                for at, shown in travel_marks(Frame(there), index):
+                    assert abs(at) <= most
+                    if shown not in (NEVER, BEYOND, HERE):
+                        assert abs(number(shown.rstrip("°"))) <= most
+                    assert "e" not in shown or shown in (NEVER, BEYOND, HERE)
 
 
 @pytest.mark.parametrize("state", random_states(4))
@@ -257,7 +284,7 @@ def test_the_marks_of_a_motion_stay_where_it_is_singular_while_it_goes(
         found: list[Any] = [v for _, n, v in panel.updates(Frame(desk.state)) if n == "marks"]
         marks.append(list(found[index]))
     assert marks[0] == marks[1] == marks[2]
-    travel = in_shown_units(UNCOUPLED[index], UNCOUPLED[index].travel(state.pose))
+    travel = shown_travel(state, index)
     assert [value for value, _ in marks[0]] == pytest.approx([travel.low, travel.high])
 
 
@@ -282,9 +309,7 @@ def test_at_a_singular_pose_motions_say_so_and_lead_away() -> None:
         # A margin that is zero but for rounding is zero.
         travel = motion.travel(state.pose)
         assert min(abs(travel.low), abs(travel.high)) < 1e-9
-        own = [i for i, each in enumerate(UNCOUPLED) if each.frame == motion.frame]
-        row = rows_of(travel_table(Frame(state), motion.frame))[own.index(index)]
-        assert row[1:] == ["singular", "here"]
+        assert travel_marks(Frame(state), index) == ((0.0, HERE),)
         assert f"δ{motion.incidence} = 0: {INCIDENCES[motion.incidence - 1]}" in plain(
             summary(Frame(state))
         )
@@ -295,14 +320,16 @@ def test_at_a_singular_pose_motions_say_so_and_lead_away() -> None:
             assert Frame(after).snapshot.stratum == GENERIC
 
 
-def test_marks_are_only_where_the_slider_goes() -> None:
-    state = random_states(1)[0]
-    span = coordinate_span(state)
-    for motion in UNCOUPLED:
-        if motion.kind == "translation":
-            marks = travel_marks(motion.travel(state.pose), span)
-            assert all(span.low <= value <= span.high for value, _ in marks)
-            assert len(marks) <= 1
+@pytest.mark.parametrize("state", [*random_states(3), *singular_states()])
+def test_sliders_of_motions_hold_their_start_and_their_marks(state: State) -> None:
+    for index in MOTIONS:
+        span = jog_span(state, index)
+        assert span.low <= 0.0 <= span.high
+        assert span.low < span.high
+        # The start is among the values of the slider.
+        assert abs(span.low / span.step - round(span.low / span.step)) < 1e-6
+        for at, _ in travel_marks(Frame(state), index):
+            assert span.low <= at <= span.high
 
 
 @pytest.mark.parametrize("state", random_states(5))
@@ -358,13 +385,15 @@ def test_motions_are_drawn_at_singular_poses_too(services: Services, state: Stat
 @pytest.mark.parametrize("state", random_states(4))
 def test_the_distances_and_their_ghosts(services: Services, state: State) -> None:
     nearest = nearest_singularities(OPTIMAL, state.pose)
-    rows = rows_of(distance_table(Frame(state)))
-    assert [row[0] for row in rows] == ["δ1 = 0", "δ2 = 0", "δ3 = 0"]
+    words = plain(distance_table(Frame(state)))
     distances = [each.distance for each in nearest]
-    assert [number(row[1]) for row in rows] == pytest.approx(distances, rel=1e-3)
-    assert [number(row[2]) for row in rows] == pytest.approx(
-        [OPTIMAL.unit_mm * d for d in distances], rel=1e-2
-    )
+    turns = np.degrees(least_turns(state.pose.position, state.pose.rotation))
+    for index, margin in enumerate(deltas(state.pose).tolist()):
+        row = re.search(rf"δ{index + 1} (\S+) (\S+) mm (\S+)° Go {INCIDENCES[index]}", words)
+        assert row is not None
+        assert number(row[1]) == pytest.approx(margin, abs=5e-3)
+        assert number(row[2]) == pytest.approx(OPTIMAL.unit_mm * distances[index], rel=1e-2)
+        assert number(row[3]) == pytest.approx(turns[index], abs=0.06)
     scene = NearestGhost(services)
     least = int(np.argmin(distances))
     for ghost, index in (("δ1 = 0", 0), ("δ2 = 0", 1), ("δ3 = 0", 2), ("nearest", least)):
@@ -386,9 +415,9 @@ def test_the_distances_and_their_ghosts(services: Services, state: State) -> Non
 def test_the_buttons_go_to_the_nearest_pose_and_say_where_it_is_reached(
     services: Services, desk: Desk
 ) -> None:
-    panel = DistancePanel(services)
+    DistancePanel(services)
     expected = nearest_singularities(OPTIMAL, desk.state.pose)[1].pose
-    desk.use(panel.go, "δ2 = 0")
+    desk.press(services.buttons, "singular.go", "2")
     assert desk.state.pose == expected
     assert Frame(desk.state).snapshot.stratum == (4, 2, 3, 1)
     drawn = by_name(

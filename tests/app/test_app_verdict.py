@@ -1,4 +1,4 @@
-"""The verdict on a pose: the worse of margins and distances, on the page, on paper and in text."""
+"""The verdict on a pose: the worst of its measures, on the page, on paper and in text."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hypothesis import given
+from scipy.spatial.transform import Rotation
 from strategies import Case, all_cases
 
 from explorer.app.features.singularity.actions import GoToSingularity, Jog
@@ -17,11 +18,12 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.state import opened
 from explorer.app.widgets.colours import SINGULAR, WARNED, proximity_colour
 from explorer.measures.snapshot import evaluate
-from explorer.measures.verdict import DISTANCE_SHARE, TITLES, verdict
+from explorer.measures.verdict import DISTANCE_SHARE, TITLES, verdict, warnings
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
-from explorer.singularity.colours import WARN_SHARE, css
+from explorer.singularity.colours import css
+from explorer.singularity.jacobian import scaled_margins
 from explorer.singularity.uncoupled import UNCOUPLED
 
 OPTIMAL = PRESETS["paper-optimal"]
@@ -50,7 +52,7 @@ def test_summary_colours_the_incidence_that_the_verdict_names() -> None:
     frame = nearly_meeting_lines()
     colours = re.findall(r'class="ex-swatch" style="--colour:(#\w+)"', summary(frame))
     levels = frame.verdict.levels
-    assert colours == [css(proximity_colour(level, 1.0)) for level in levels]
+    assert colours == [css(proximity_colour(level)) for level in levels]
     assert [level < 1.0 for level in levels] == [False, True, False]
 
 
@@ -80,20 +82,26 @@ def test_verdict_of_poses_with_an_ill_conditioned_jacobian_is_never_clear() -> N
         snapshot = evaluate(OPTIMAL, Pose((x, y, z), state.pose.quaternion))
         if snapshot.inverse_condition < 5e-4:
             ill += 1
-            assert verdict(snapshot, WARN_SHARE * OPTIMAL.reach).kind != "clear"
+            assert verdict(snapshot).kind != "clear"
     assert ill > 50
 
 
 @given(all_cases())
-def test_verdict_is_the_worse_of_margins_and_distances(case: Case) -> None:
+def test_verdict_is_the_worst_of_margins_distances_turns_and_conditioning(case: Case) -> None:
     design, pose = case.design, Pose.of(case.position, case.rotation)
-    snapshot, warn = evaluate(design, pose), WARN_SHARE * design.reach
-    found = verdict(snapshot, warn)
+    snapshot = evaluate(design, pose)
+    found, warn = verdict(snapshot), warnings(design.reach)
+    worst = int(scaled_margins(design, snapshot.joints, snapshot.margins).argmin())
     for index, level in enumerate(found.levels):
         if level > 0.0:
-            by_margin = abs(float(snapshot.margins[index])) / warn
-            by_distance = snapshot.nearest[index].distance / (DISTANCE_SHARE * warn)
-            assert level == pytest.approx(min(by_margin, by_distance))
+            measures = [
+                abs(float(snapshot.margins[index])) / warn.margin,
+                snapshot.nearest[index].distance / warn.distance,
+                snapshot.least_turns[index] / warn.turn,
+            ]
+            if index == worst:
+                measures.append(snapshot.inverse_condition / warn.condition)
+            assert level == pytest.approx(min(measures))
     if found.kind != "singular":
         assert (found.kind == "near") == (min(found.levels) < 1.0)
     first = found.incidences[0] - 1
@@ -102,6 +110,112 @@ def test_verdict_is_the_worse_of_margins_and_distances(case: Case) -> None:
     if found.kind == "clear":
         assert found.distance == snapshot.nearest[first].distance
         assert found.distance == min(each.distance for each in snapshot.nearest)
+        assert found.distance >= warn.distance
+        assert snapshot.inverse_condition >= warn.condition
+
+
+def random_pose(design: Design, rng: np.random.Generator) -> Pose:
+    reach = design.reach
+    place = rng.uniform([-reach, -reach, 0.0], [reach, reach, reach])
+    return Pose.of_yaw_pitch_roll(place.tolist(), rng.uniform(-90.0, 90.0, 3).tolist())
+
+
+def shifted(pose: Pose, length: float, rng: np.random.Generator) -> Pose:
+    """Return a pose moved by a length in a random direction."""
+    way = rng.normal(size=3)
+    x, y, z = (np.array(pose.position) + length * way / np.linalg.norm(way)).tolist()
+    return Pose((x, y, z), pose.quaternion)
+
+
+def turned(pose: Pose, angle: float, rng: np.random.Generator, *, about_a1: bool) -> Pose:
+    """Return a pose turned by an angle in radians about a random axis through b4 or a1."""
+    axis = rng.normal(size=3)
+    turn = Rotation.from_rotvec(angle * axis / np.linalg.norm(axis)).as_matrix()
+    position = np.array(pose.position)
+    return Pose.of(turn @ position if about_a1 else position, turn @ pose.rotation)
+
+
+@pytest.mark.parametrize("design", PRESETS.values(), ids=lambda design: design.name)
+@pytest.mark.parametrize("incidence", [1, 2, 3])
+def test_verdict_within_the_warning_distance_or_angle_of_an_incidence_is_never_clear(
+    design: Design, incidence: int
+) -> None:
+    rng, warn = np.random.default_rng(incidence), warnings(design.reach)
+    for _ in range(25):
+        singular = GoToSingularity(incidence).apply(opened(design, random_pose(design, rng))).pose
+        share = float(rng.uniform(0.0, 0.999))
+        for pose in (
+            shifted(singular, share * warn.distance, rng),
+            turned(singular, share * warn.turn, rng, about_a1=False),
+            turned(singular, share * warn.turn, rng, about_a1=True),
+        ):
+            found = verdict(evaluate(design, pose))
+            assert found.kind != "clear"
+            assert found.levels[incidence - 1] < 1.0
+
+
+@pytest.mark.parametrize("design", PRESETS.values(), ids=lambda design: design.name)
+def test_verdict_far_from_all_incidences_is_clear(design: Design) -> None:
+    rng, warn, far = np.random.default_rng(5), warnings(design.reach), 0
+    for _ in range(400):
+        snapshot = evaluate(design, random_pose(design, rng))
+        if (
+            min(snapshot.nearest_distances) > warn.distance
+            and min(snapshot.least_turns) > warn.turn
+            and np.abs(snapshot.margins).min() > warn.margin
+            and snapshot.inverse_condition > warn.condition
+        ):
+            far += 1
+            assert verdict(snapshot).kind == "clear"
+    assert far > 50
+
+
+def test_verdict_on_a_nearly_degenerate_design_tells_the_conditioning_and_its_margin() -> None:
+    design = OPTIMAL.with_variable("b3", OPTIMAL.b2 + 0.02)
+    pose = opened(OPTIMAL).pose
+    snapshot = evaluate(design, pose)
+    found = verdict(snapshot)
+    assert snapshot.inverse_condition < 1e-3
+    assert found.kind == "near"
+    assert found.cause == "condition"
+    # The line b2b3 has hardly a length.
+    assert found.incidences[0] == 2
+    assert re.match(r"1/cond J is \S+, most by δ2; δ2 = 0 is \S+ mm away", found.reason(10.0))
+    assert found.brief(10.0).startswith("1/cond J ")
+
+
+def test_verdict_tells_a_measure_that_is_below_its_warning_value() -> None:
+    # Of a platform as large as the base, which a small turn displaces much.
+    design = OPTIMAL.with_variables([19.0, 7.0, 14.0, -13.0, 12.0, 18.0])
+    rng, warn = np.random.default_rng(0), warnings(design.reach)
+    patterns = {
+        "distance": r"\S+ mm from δ{0} = 0, .*",
+        "turn": r"\d\S*° of turning from δ{0} = 0, .*",
+        "condition": r"1/cond J is \S+, most by δ{0}; δ{0} = 0 is \S+ mm away",
+    }
+    told = set[str]()
+    for _ in range(1200):
+        snapshot = evaluate(design, random_pose(design, rng))
+        found = verdict(snapshot)
+        if found.kind == "near":
+            first = found.incidences[0]
+            told.add(found.cause)
+            assert re.fullmatch(patterns[found.cause].format(first), found.reason(10.0))
+            distance = min(found.distance, abs(snapshot.margins[first - 1]) * DISTANCE_SHARE)
+            assert {
+                "distance": distance < warn.distance,
+                "turn": found.turn < warn.turn,
+                "condition": found.condition < warn.condition,
+            }[found.cause]
+    assert told == set(patterns)
+
+
+@pytest.mark.parametrize("incidence", [1, 2, 3])
+def test_brief_verdict_names_distance_and_incidence(incidence: int) -> None:
+    state = GoToSingularity(incidence).apply(opened(OPTIMAL))
+    assert Frame(state).verdict.brief(10.0) == f"Singular: δ{incidence} = 0"
+    home = Frame(opened(OPTIMAL)).verdict
+    assert home.brief(10.0) == f"{home.distance * 10.0:.3g} mm to δ1 = 0"
 
 
 def test_verdict_scales_with_the_warning_length() -> None:
@@ -115,5 +229,5 @@ def test_verdict_scales_with_the_warning_length() -> None:
 
 
 def test_warned_levels_are_orange() -> None:
-    assert proximity_colour(0.0, 1.0) == SINGULAR
-    assert proximity_colour(math.nextafter(1.0, 0.0), 1.0) == WARNED
+    assert proximity_colour(0.0) == SINGULAR
+    assert proximity_colour(math.nextafter(1.0, 0.0)) == WARNED

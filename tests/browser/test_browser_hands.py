@@ -94,8 +94,8 @@ def test_keys_act_on_the_page_and_not_while_one_types(tab: Tab) -> None:
     field.click()
     field.press_sequentially("glb")
     # Whatever is done by the next key is done after it would have been by these.
-    tab.switch("Other modes as ghosts", on=True)
-    tab.wait_for(lambda: tab.state.view.ghosts, "the ghosts")
+    tab.switch("Singularity-free ball", on=True)
+    tab.wait_for(lambda: tab.state.view.singular.ball, "the ball")
     assert tab.state.view.grid == before.grid
     assert tab.state.view.labels == before.labels
 
@@ -103,10 +103,10 @@ def test_keys_act_on_the_page_and_not_while_one_types(tab: Tab) -> None:
 def test_a_ticked_box_or_a_chosen_option_leaves_the_keys_free(tab: Tab) -> None:
     # Else the drawer lies over the end of the right panel.
     tab.page.set_viewport_size({"width": SIZES[0][0], "height": SIZES[0][1]})
-    ghosts = tab.row("Other modes as ghosts").locator("input[type=checkbox]")
-    ghosts.click()
-    tab.wait_for(lambda: tab.state.view.ghosts, "the ghosts")
-    tab.wait_for(lambda: not ghosts.evaluate("e => e === document.activeElement"), "let go")
+    ball = tab.row("Singularity-free ball").locator("input[type=checkbox]")
+    ball.click()
+    tab.wait_for(lambda: tab.state.view.singular.ball, "the ball")
+    tab.wait_for(lambda: not ball.evaluate("e => e === document.activeElement"), "let go")
     press(tab, "g")
     tab.wait_for(lambda: not tab.state.view.grid, "no grid")
     tab.choose("Arrows", "all six")

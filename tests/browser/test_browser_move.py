@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-import re
 from contextlib import closing
 from typing import cast
 
 import numpy as np
 import pytest
 from conftest import OpenTab
-from playwright.sync_api import Browser, expect
-from tab import Tab
+from playwright.sync_api import Browser, Locator, expect
+from tab import SIZE, Tab
 
 from explorer.app.features.mechanism.marks import ARROW_LENGTH
-from explorer.app.features.mechanism.pose_panel import JOINT_LABELS, MODES
+from explorer.app.features.mechanism.modes import HoveredMode
+from explorer.app.features.mechanism.pose_panel import JOINT_LABELS
 from explorer.app.scene.placing import Placed
 from explorer.app.server import Running
+from explorer.app.state.actions import SetPosition
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, joints_of
 from explorer.mechanism.design import JOINTS
@@ -23,7 +24,6 @@ from explorer.mechanism.home import home_pose
 from explorer.mechanism.kinematics import forward
 
 LABELS = [JOINT_LABELS[name] for name in JOINTS]
-MODE_LABEL = "δ1 δ2 δ3"
 
 
 def assert_page_shows_state(tab: Tab) -> None:
@@ -90,12 +90,56 @@ def test_a_pose_slider_moves_the_legs(tab: Tab) -> None:
 def test_choosing_a_mode_keeps_the_legs_and_takes_that_assembly(tab: Tab) -> None:
     before = tab.state
     other = before.mode ^ 0b101
-    tab.choose(MODE_LABEL, re.sub(r"\s+", " ", MODES[other]))
+    row_of_mode(tab, other).click()
     tab.wait_for(lambda: tab.state.mode == other, "the mode that was chosen")
     solution = forward(before.design, before.joints)
     np.testing.assert_allclose(tab.state.pose.position, solution.position[other], atol=1e-9)
     np.testing.assert_allclose(tab.state.joints, before.joints, atol=1e-9)
     assert_page_shows_state(tab)
+
+
+def test_pointer_on_a_mode_shows_its_ghost_until_it_leaves_or_the_mode_is_chosen(tab: Tab) -> None:
+    hovered = tab.running.page.services.get(HoveredMode)
+    before, number = tab.state, tab.running.page.session.history.step.number
+    row_of_mode(tab, 6).scroll_into_view_if_needed()
+    for mode in (6, 2):
+        row_of_mode(tab, mode).hover()
+        tab.wait_for(lambda mode=mode: hovered.mode == mode, f"the ghost of mode {mode}")
+    tab.wait_for(lambda: ghosts_shown(tab) == 1, "one ghost in the scene")
+    assert tab.state == before
+    assert tab.running.page.session.history.step.number == number
+    tab.page.mouse.move(SIZE[0] // 2, 4)
+    tab.wait_for(lambda: hovered.mode is None, "no ghost")
+    tab.wait_for(lambda: ghosts_shown(tab) == 0, "no ghost in the scene")
+    # A row that is replaced under the pointer, since its numbers change, is left later too.
+    row_of_mode(tab, 2).hover()
+    tab.wait_for(lambda: hovered.mode == 2, "the ghost")
+    tab.running.page.session.do(SetPosition(0, 11.0))
+    expect(row_of_mode(tab, 2)).to_contain_text("11.00")
+    tab.page.mouse.move(SIZE[0] // 2, 4)
+    tab.wait_for(lambda: hovered.mode is None, "no ghost any more")
+
+
+def test_keyboard_on_a_mode_shows_its_ghost_and_chooses_it(tab: Tab) -> None:
+    hovered = tab.running.page.services.get(HoveredMode)
+    tab.page.get_by_role("button", name="Other modes as ghosts").focus()
+    for _ in range(3):
+        tab.page.keyboard.press("Tab")
+    tab.wait_for(lambda: hovered.mode == 2, "the ghost of the row with the focus")
+    tab.page.keyboard.press("Enter")
+    tab.wait_for(lambda: tab.state.mode == 2, "that mode")
+
+
+def row_of_mode(tab: Tab, mode: int) -> Locator:
+    return tab.page.get_by_role("button", name=f"Mode {mode}, ")
+
+
+def ghosts_shown(tab: Tab) -> int:
+    return tab.page.evaluate(
+        """() => Object.entries(window.__viserMutable.nodeRefFromName)
+            .filter(([name, node]) => /^\\/ghosts\\/platform\\/\\d$/.test(name) && node?.visible)
+            .length"""
+    )
 
 
 def test_lengths_that_cannot_close_leave_the_pose_and_offer_the_nearest(tab: Tab) -> None:

@@ -30,6 +30,9 @@ def deltas(tab: Tab) -> FloatArray:
 
 def test_a_click_on_the_diagram_moves_to_the_stratum(tab: Tab) -> None:
     nodes = tab.page.locator("button[title^='(']")
+    # It is open from the start.
+    expect(nodes).to_have_count(23)
+    tab.switch("Diagram", on=False)
     expect(nodes).to_have_count(0)
     tab.switch("Diagram", on=True)
     expect(nodes).to_have_count(23)

@@ -41,7 +41,7 @@ def test_every_switch_of_the_view_switches_its_part_and_no_other(tab: Tab) -> No
 
 def test_ghosts_are_switched_beside_the_modes(tab: Tab) -> None:
     before = tab.picture()
-    tab.switch("Other modes as ghosts", on=True)
+    tab.page.get_by_role("button", name="Other modes as ghosts").click()
     tab.wait_for(lambda: tab.state.view.ghosts, "the ghosts")
     # They hang below the base too, where there was nothing.
     spot = likeness(decoded(before), decoded(tab.picture())).spot

@@ -9,8 +9,8 @@ from hypothesis import given, strategies as st
 
 from explorer.app.features.singularity.actions import GoToSingularity
 from explorer.app.features.singularity.distance import distance_table
-from explorer.app.features.singularity.jog_panel import travel_table
-from explorer.app.features.singularity.panel import summary
+from explorer.app.features.singularity.jog_panel import travel_marks
+from explorer.app.features.singularity.panel import measures_table, summary
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import opened
 from explorer.app.widgets.markup import fitted, share, signed
@@ -58,7 +58,8 @@ def test_panels_at_a_singular_pose_show_no_rounding(incidence: int) -> None:
     start = Pose.of_yaw_pitch_roll((14.0, -2.0, 6.0), (-40.0, 10.0, 20.0))
     state = GoToSingularity(incidence).apply(opened(PRESETS["paper-optimal"], start))
     frame = Frame(state)
-    for html in (summary(frame), distance_table(frame), travel_table(frame, "platform")):
+    marks = " ".join(text for index in range(6) for _, text in travel_marks(frame, index))
+    for html in (summary(frame), distance_table(frame), measures_table(frame), marks):
         shown = re.sub("<[^>]*>", " ", html)
         assert not re.search(r"e[-−](1[3-9]|[2-9]\d)", shown)
         assert not NEGATIVE_ZERO.search(shown)

@@ -1,4 +1,6 @@
 // Sends presses on markup, [data-press=name] with an optional data-value, to the server's inbox.
+// What the pointer or the focus of the keyboard rests on, [data-hover=name], is sent as a press of
+// that name with the same value, and without a value once it is left.
 window.explorer.buttons ??= (() => {
   let inbox = null;
   // The same press twice in a row is two messages.
@@ -39,12 +41,51 @@ window.explorer.buttons ??= (() => {
   addEventListener("focusin", ({ target }) => {
     focused = buttonAt(target);
   });
+  // Milliseconds between two reports of what is rested on.
+  const HOVER_PAUSE = 80;
+  const isThere = ({ name, value }) =>
+    [...document.querySelectorAll(`[data-hover="${name}"]`)].some(
+      (element) => element.dataset.value === value,
+    );
+  let hovered = null;
+  let told = null;
+  let timer = null;
+  const tellHovered = () => {
+    timer = null;
+    if (hovered?.name === told?.name && hovered?.value === told?.value) return;
+    if (told && told.name !== hovered?.name) window.explorer.press(told.name, "");
+    if (hovered) window.explorer.press(hovered.name, hovered.value);
+    told = hovered;
+  };
+  const hover = (element) => {
+    hovered = element ? { name: element.dataset.hover, value: element.dataset.value ?? "" } : null;
+    timer ??= setTimeout(tellHovered, HOVER_PAUSE);
+  };
+  const hoverAt = (target) => hover(target?.closest?.("[data-hover]"));
+  addEventListener("pointerover", ({ target }) => hoverAt(target));
+  // The pointer has left the window, or a finger the screen.
+  addEventListener("pointerout", ({ relatedTarget }) => {
+    if (!relatedTarget) hover(null);
+  });
+  addEventListener("focusin", ({ target }) => {
+    if (target.matches?.("[data-hover]:focus-visible")) hover(target);
+  });
+  addEventListener("focusout", ({ target }) => {
+    if (target.matches?.("[data-hover]")) hover(null);
+  });
+  const dropHovered = () => {
+    if (hovered && !isThere(hovered)) hover(null);
+  };
   const keepFocus = () => {
     if (!focused || focused.isConnected || document.activeElement !== document.body) return;
     const buttons = [...document.querySelectorAll("[data-press]")];
     buttons.find((button) => isSame(button, focused))?.focus({ preventScroll: true });
   };
-  new MutationObserver(keepFocus).observe(document.body, { childList: true, subtree: true });
+  const followMarkup = () => {
+    keepFocus();
+    dropHovered();
+  };
+  new MutationObserver(followMarkup).observe(document.body, { childList: true, subtree: true });
   return (uuid) => {
     inbox = uuid;
   };

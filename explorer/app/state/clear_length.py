@@ -13,7 +13,7 @@ import numpy as np
 
 from explorer.app.state.state import State
 from explorer.measures.snapshot import evaluate
-from explorer.measures.verdict import verdict
+from explorer.measures.verdict import Verdict, verdict
 from explorer.mechanism.design import JOINTS
 from explorer.mechanism.feasible_intervals import feasible_intervals
 from explorer.mechanism.kinematics import forward
@@ -37,7 +37,7 @@ def clear_length(state: State) -> tuple[float, str] | None:
     unclosed = state.unclosed
     if unclosed is None or unclosed.nearest is None:
         return None
-    joint, end = unclosed.joint, unclosed.nearest
+    joint, end, unit_mm = unclosed.joint, unclosed.nearest, state.design.unit_mm
     intervals = feasible_intervals(state.design, np.array(state.joints))[joint]
     low, high = min(intervals, key=lambda ends: min(abs(ends[0] - end), abs(ends[1] - end)))
     far = high if abs(end - low) < abs(high - end) else low
@@ -45,16 +45,18 @@ def clear_length(state: State) -> tuple[float, str] | None:
     def length(share: float) -> float:
         return end + share * (far - end)
 
-    best, is_clear = _first_clear(lambda share: _level(state, joint, length(share)))
-    if best == 0.0:
-        return None
+    best, is_clear = _first_clear(lambda share: _level(_verdict(state, joint, length(share))))
     value = length(best)
+    there = _verdict(state, joint, value)
+    if there is None or there.kind == "singular":
+        return None
     taken, singular = format_number(value), format_number(end)
     instead = f"{JOINTS[joint]} = {taken} instead of {format_number(unclosed.asked, 6)}. "
     why = f"{instead}The nearest value that closes, {singular}, is singular; "
+    short = f"{format_number(abs(value - end), 3)} short of it: {there.reason(unit_mm)}."
     if is_clear:
-        return value, f"{why}this is the nearest that stays clear."
-    return value, f"{why}none stays clear, and this is the farthest from singular."
+        return value, f"{why}this is the nearest that stays clear, {short}"
+    return value, f"{why}none stays clear, and this is the farthest from singular, {short}"
 
 
 def _first_clear(level: Callable[[float], float]) -> tuple[float, bool]:
@@ -77,12 +79,17 @@ def _first_clear(level: Callable[[float], float]) -> tuple[float, bool]:
     return best, False
 
 
-def _level(state: State, joint: int, value: float) -> float:
-    """Return the lowest level of the verdict on the pose; 0 where the joints do not close."""
+def _level(found: Verdict | None) -> float:
+    """Return the lowest level of a verdict; 0 where the joints do not close."""
+    return 0.0 if found is None else min(found.levels)
+
+
+def _verdict(state: State, joint: int, value: float) -> Verdict | None:
+    """Return the verdict on the pose; None where the joints do not close."""
     trial = np.array(state.joints)
     trial[joint] = value
     solution = forward(state.design, trial)
     if not solution.feasible:
-        return 0.0
+        return None
     pose = Pose.of(solution.position[state.mode], solution.rotation[state.mode])
-    return min(verdict(evaluate(state.design, pose), state.warn_below).levels)
+    return verdict(evaluate(state.design, pose), state.warn_below)

@@ -89,7 +89,7 @@ class SingularView:
     """
 
     ghost: Ghost = "none"
-    strata: bool = False
+    strata: bool = True
     arrows: Arrows = "one in use"
     ellipsoid: Gain = "none"
     ball: bool = False

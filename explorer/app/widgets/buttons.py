@@ -1,8 +1,9 @@
 """Buttons in the page's own markup: HTML, and functions that handle presses, by name.
 
 viser's HTML reports no clicks. A script of the page sends each press on an element with
-`data-press` to one hidden text control, through the guard for all messages of clients. It is
-decoded strictly here; presses on names that are not registered are dropped.
+`data-press` to one hidden text control, through the guard for all messages of clients; of an
+element with `data-hover` it sends, as a press of that name, that the pointer rests on it or has
+left it. It is decoded strictly here; presses on names that are not registered are dropped.
 """
 
 from __future__ import annotations
@@ -148,6 +149,7 @@ def press_button(
     hint: str = "",
     label: str = "",
     class_name: str = "",
+    hover: str = "",
     is_on: bool | None = None,
     is_disabled: bool = False,
 ) -> str:
@@ -160,6 +162,8 @@ def press_button(
         hint: Words on what a press does, shown when a pointer rests on the button.
         label: The name for screen readers; the content if "".
         class_name: The classes of the stylesheet.
+        hover: The name under which a function is registered that receives the value while the
+            pointer rests on the button, and "" once it has left; none if "".
         is_on: Whether a switch is on; None if the button is no switch.
         is_disabled: Whether the button cannot be pressed.
     """
@@ -167,6 +171,7 @@ def press_button(
         "class": class_name,
         "data-press": name,
         "data-value": str(value),
+        "data-hover": hover,
         "title": hint,
         "aria-label": label,
         "aria-pressed": "" if is_on is None else str(is_on).lower(),

@@ -6,11 +6,13 @@ from explorer.singularity.colours import (
     CLEAR,
     FAR,
     FAR_WARNINGS,
+    MARGIN_COLOURS,
     OUTLINE,
     SINGULAR,
     WARNED,
     Rgb,
     css,
+    margin_text,
     proximity_colour,
 )
 
@@ -24,6 +26,7 @@ __all__ = [
     "FAR_WARNINGS",
     "GHOST",
     "JOINT",
+    "MARGIN_COLOURS",
     "OUTLINE",
     "PLATFORM_BODY",
     "RAIL",
@@ -34,6 +37,7 @@ __all__ = [
     "WARNED",
     "Rgb",
     "css",
+    "margin_text",
     "proximity_colour",
 ]
 

@@ -51,9 +51,6 @@ def shift(key: str) -> Key:
     return Key(key, "shift")
 
 
-NAMES = {"δ1 δ2 δ3": "Assembly mode"}
-"""Names of commands by the label of their control, where nobody would search for the label."""
-
 PAGE = "Page"
 """First part of the names of commands of the whole page."""
 
@@ -97,7 +94,7 @@ def offers(control: Offering, lists: Container[str] = ()) -> dict[str, str | Non
     """
     if control.kind in ("value", "upload"):
         return {}
-    label = NAMES.get(control.label, " ".join(control.label.split()))
+    label = " ".join(control.label.split())
     folders = [title for title in control.path[1:] if title in NAMED_WITH_FOLDER]
     tab = control.path[0] if control.path else PAGE
     # The label of a row of buttons above the tabs takes the place of a tab.

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from html import escape
 from typing import Literal
 
-from explorer.app.widgets.colours import Rgb, css
+from explorer.app.widgets.colours import MARGIN_COLOURS, Rgb, css, margin_text
 from explorer.numerics.number_text import drop_rounding, format_fixed, format_number, set_true_minus
 
 
@@ -43,6 +43,13 @@ def dim(content: str) -> str:
 def swatch(colour: Rgb, look: str = "ex-swatch") -> str:
     """Return a mark in a colour: a square, or what another class of the stylesheet draws."""
     return f'<span class="{look}" style="--colour:{css(colour)}"></span>'
+
+
+def margin_name(incidence: int) -> str:
+    """Return the name of the margin with a number, 1 to 3, in its colour."""
+    on_light, on_dark = margin_text(incidence)
+    text, mark = by_theme(css(on_light), css(on_dark)), css(MARGIN_COLOURS[incidence - 1])
+    return f'<b class="ex-margin" style="--colour:{mark};--text:{text}">δ{incidence}</b>'
 
 
 def table(rows: Iterable[str], head: Sequence[str] = ()) -> str:

@@ -21,7 +21,6 @@ from explorer.measures.verdict import verdict
 from explorer.mechanism.margins import INCIDENCES, TETRAHEDRA, describe_modes
 from explorer.mechanism.pose import yaw_pitch_roll_from_rotation
 from explorer.singularity.bruhat import describe_stratum, incidences
-from explorer.singularity.colours import WARN_SHARE
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,11 +76,10 @@ def _measures(snapshot: Snapshot) -> str:
     numbers = " ".join(map(str, snapshot.stratum))
     stratum = f"{numbers}, dimension {snapshot.stratum_dimension}"
     names = [INCIDENCES[index - 1] for index in incidences(snapshot.stratum)]
-    here = verdict(snapshot, WARN_SHARE * snapshot.design.reach)
-    away = f"{lengths(snapshot.design, here.distance)[1]} mm"
+    here = verdict(snapshot)
     condition = figure(snapshot.inverse_condition, 1.0)
     rows = [
-        ("verdict", f"{here.title.lower()}: {here.reason(away)}"),
+        ("verdict", f"{here.title.lower()}: {here.reason(snapshot.design.unit_mm)}"),
         ("singular", " and ".join(names) or "no"),
         ("assembly mode", f"{describe_modes(snapshot.bordering_modes)} ({snapshot.sign_words})"),
         ("stratum", f"{stratum}: {describe_stratum(snapshot.stratum)}"),

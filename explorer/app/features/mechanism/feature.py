@@ -47,5 +47,5 @@ MECHANISM = Feature(
         "Pose › Use the nearest length": (Key("U"),),
         "Pose › Other modes as ghosts": (Key("M"),),
     },
-    lists=("δ1 δ2 δ3", "Preset", "On a change"),
+    lists=("Preset", "On a change"),
 )

@@ -45,7 +45,7 @@ class Flag:
         state = placed.frame.state
         levels = placed.frame.verdict.levels
         point_colour, line_colour, plane_colour = (
-            proximity_colour(levels[index], 1.0) for index in self._deltas
+            proximity_colour(levels[index]) for index in self._deltas
         )
         low, high = corners[:2, 0].tolist()
         for handle in (self._point, self._line):

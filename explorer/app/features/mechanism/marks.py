@@ -10,6 +10,7 @@ import viser
 
 from explorer.app.features.feature import Services
 from explorer.app.features.mechanism.bodies import platform_plate
+from explorer.app.features.mechanism.modes import MODES, HoveredMode, ghost_modes
 from explorer.app.scene.part import NO_POINTS, ScenePart, around
 from explorer.app.scene.placing import Placed, scene_scale
 from explorer.app.scene.shapes import NO_MESH, add_lines, add_translucent
@@ -18,7 +19,6 @@ from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.colours import GHOST
 from explorer.errors import InputError
-from explorer.mechanism.margins import mode_name
 from explorer.mechanism.pose import Pose, quaternion_from_rotation
 from explorer.numerics.arrays import FloatArray
 
@@ -56,10 +56,13 @@ class Labels(ScenePart):
 
 
 class Ghosts(ScenePart):
-    """The seven other assembly modes of the same joints, each with its sign triple."""
+    """The other assembly modes of the same joints, each with its number and sign triple.
+
+    All seven are drawn, or the one on whose row in the table a pointer rests.
+    """
 
     def __init__(self, services: Services) -> None:
-        scene = services.scene
+        scene, self._hovered = services.scene, services.get(HoveredMode)
         # Instanced meshes cannot change their shape, and these follow the design.
         self._plates = [
             add_translucent(scene, f"/ghosts/platform/{i}", NO_MESH, 0.35, colour=GHOST)
@@ -67,40 +70,42 @@ class Ghosts(ScenePart):
         ]
         self._legs = add_lines(scene, "/ghosts/legs", 28, GHOST, 1.2)
         self._names = [
-            scene.add_label(f"/ghosts/name/{i}", mode_name(i), font_screen_scale=0.75)
+            scene.add_label(f"/ghosts/name/{i}", MODES[i], font_screen_scale=0.85, visible=False)
             for i in range(7)
         ]
 
     def updates(self, placed: Placed) -> Iterator[Update]:
         """Yield the updates that draw the ghosts of this frame."""
-        state = placed.frame.state
-        visible = state.view.ghosts
-        for handle in (*self._plates, self._legs, *self._names):
-            yield handle, "visible", visible
-        if not visible:
+        modes = ghost_modes(placed.frame, self._hovered.mode)
+        for index, (plate, label) in enumerate(zip(self._plates, self._names, strict=True)):
+            for handle in (plate, label):
+                yield handle, "visible", index < len(modes)
+        yield self._legs, "visible", bool(modes)
+        if not modes:
             return
-        others = _other_modes(placed)
         solution = placed.frame.snapshot.modes
-        positions = placed.scale * solution.position[others]
-        rotations = solution.rotation[others]
+        positions = placed.scale * solution.position[modes]
         vertices, faces = platform_plate(placed)
-        wxyzs = quaternion_from_rotation(rotations)
-        for plate, position, wxyz in zip(self._plates, positions, wxyzs, strict=True):
+        wxyzs = quaternion_from_rotation(solution.rotation[modes])
+        for plate, position, wxyz in zip(self._plates, positions, wxyzs, strict=False):
             yield plate, "vertices", vertices.astype(np.float32)
             yield plate, "faces", faces.astype(np.uint32)
             yield plate, "position", tuple(position.tolist())
             yield plate, "wxyz", tuple(wxyz.tolist())
-        tips = ghost_points(placed)
-        yield self._legs, "points", self._leg_lines(placed, tips).astype(np.float32)
-        for label, mode, tip in zip(self._names, others, tips[:, 0], strict=True):
-            yield label, "text", mode_name(mode)
+        tips = ghost_points(placed, modes)
+        # Legs that are not shown have no length.
+        lines = np.zeros((len(self._plates) * 4, 2, 3))
+        lines[: 4 * len(modes)] = self._leg_lines(placed, tips)
+        yield self._legs, "points", lines.astype(np.float32)
+        for label, mode, tip in zip(self._names, modes, tips[:, 0], strict=False):
+            yield label, "text", MODES[mode]
             yield label, "position", tuple(tip.tolist())
 
     def corners(self, placed: Placed) -> FloatArray:
         """Return the corners of cubes about the joints of the ghosts."""
-        if not placed.frame.state.view.ghosts:
-            return NO_POINTS
-        return around(ghost_points(placed).reshape(-1, 3))
+        # A ghost that a pointer brings up does not move the camera.
+        modes = ghost_modes(placed.frame, None)
+        return around(ghost_points(placed, modes).reshape(-1, 3)) if modes else NO_POINTS
 
     @staticmethod
     def _leg_lines(placed: Placed, tips: FloatArray) -> FloatArray:
@@ -110,17 +115,12 @@ class Ghosts(ScenePart):
         return np.stack([bases, tips], axis=2).reshape(-1, 2, 3)
 
 
-def ghost_points(placed: Placed) -> FloatArray:
-    """Return b1 … b4 of the seven other assembly modes in the scene, shape (7, 4, 3)."""
-    others = _other_modes(placed)
+def ghost_points(placed: Placed, modes: list[int]) -> FloatArray:
+    """Return b1 … b4 of n assembly modes in the scene, shape (n, 4, 3)."""
     solution = placed.frame.snapshot.modes
     local = np.array(list(placed.platform_points.values()))
-    turned = np.einsum("mij,nj->mni", solution.rotation[others], local)
-    return placed.scale * solution.position[others][:, None] + turned
-
-
-def _other_modes(placed: Placed) -> list[int]:
-    return [mode for mode in range(8) if mode != placed.frame.state.mode]
+    turned = np.einsum("mij,nj->mni", solution.rotation[modes], local)
+    return placed.scale * solution.position[modes][:, None] + turned
 
 
 class DragHandle(ScenePart):

@@ -8,12 +8,11 @@ import viser
 
 from explorer.app.browser.viser_gaps import Mark
 from explorer.app.features.feature import Services
+from explorer.app.features.mechanism.modes import ModesPanel
 from explorer.app.state.actions import (
     GoHome,
     SetAngle,
     SetJoint,
-    SetMode,
-    SetPose,
     SetPosition,
     UseNearest,
 )
@@ -24,7 +23,6 @@ from explorer.app.widgets.markup import alert, format_number, remark
 from explorer.app.widgets.ranges import coordinate_span, length_span
 from explorer.mechanism.design import JOINTS, LENGTHS
 from explorer.mechanism.feasible_intervals import Interval
-from explorer.mechanism.margins import describe_modes, mode_name
 
 JOINT_HINTS = {
     "l1": "Leg 1: length of the actuator from a1 to b1 (U joint, actuator, ball joint).",
@@ -49,11 +47,10 @@ ANGLES = (
 )
 # Room for a label, as a share of the slider.
 LABEL_ROOM = 0.24
-MODES = tuple(f"{mode}:  {mode_name(mode)}" for mode in range(8))
 
 
 class MovePanel:
-    """Sliders for joints and pose, the list of modes, and messages on lengths."""
+    """Sliders for joints and pose, the table of modes, and messages on lengths."""
 
     def __init__(self, services: Services) -> None:
         gui = services.gui
@@ -81,27 +78,8 @@ class MovePanel:
                 GoHome,
                 icon=viser.Icon.HOME,
             )
-        with gui.add_folder("Assembly mode"):
-            controls.dropdown(
-                "δ1 δ2 δ3",
-                "The eight ways to assemble these leg lengths, by the signs of the margins.",
-                MODES,
-                Bound(
-                    lambda frame: mode_options(frame)[
-                        -1 if is_singular(frame) else frame.state.mode
-                    ],
-                    # The last option is the present singular pose, which lies in no mode.
-                    lambda state, chosen: (
-                        SetMode(MODES.index(chosen)) if chosen in MODES else SetPose(state.pose)
-                    ),
-                ),
-                options_of=mode_options,
-            )
-            controls.checkbox(
-                "Other modes as ghosts",
-                "Draw the seven other ways to assemble the same leg lengths.",
-                "view.ghosts",
-            )
+        with gui.add_folder("Assembly modes: b4 (design units)"):
+            self._modes = ModesPanel(services)
 
     def _add_joint(self, joint: int, name: str) -> None:
         span = length_span if name in LENGTHS else coordinate_span
@@ -152,19 +130,7 @@ class MovePanel:
         if words is not None:
             yield self._remark, "content", remark("The length was adjusted", words)
         yield from self._controls.updates(frame)
-
-
-def is_singular(frame: Frame) -> bool:
-    """Whether the pose is singular, and so on the boundary of several modes."""
-    return len(frame.snapshot.bordering_modes) > 1
-
-
-def mode_options(frame: Frame) -> tuple[str, ...]:
-    """Return the options of the list of modes; the last one is the present pose if singular."""
-    if not is_singular(frame):
-        return MODES
-    snapshot = frame.snapshot
-    return (*MODES, f"{snapshot.sign_words}:  {describe_modes(snapshot.bordering_modes)}")
+        yield from self._modes.updates(frame)
 
 
 def interval_marks(intervals: tuple[Interval, ...], span: Span) -> tuple[Mark, ...]:

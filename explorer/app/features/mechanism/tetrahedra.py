@@ -12,7 +12,7 @@ from explorer.app.scene.part import ScenePart
 from explorer.app.scene.placing import Placed
 from explorer.app.scene.shapes import TETRAHEDRON_FACES, add_lines, add_translucent, of_one_colour
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.colours import OUTLINE, proximity_colour
+from explorer.app.widgets.colours import MARGIN_COLOURS, OUTLINE, proximity_colour
 from explorer.mechanism.margins import TETRAHEDRA
 
 EDGES = np.array(list(itertools.combinations(range(4), 2)))
@@ -20,7 +20,7 @@ OPACITY = 0.1
 
 
 class Tetrahedra(ScenePart):
-    """Three translucent tetrahedra in the colours of their incidences.
+    """Three translucent tetrahedra: faces in the colour of danger, edges in that of the margin.
 
     One that the present lengths cannot close has thick edges in the colour of an alarm.
     """
@@ -43,7 +43,8 @@ class Tetrahedra(ScenePart):
         for index, names in enumerate(TETRAHEDRA):
             level = placed.frame.verdict.levels[index]
             fails = index in failing
-            colour = OUTLINE if fails else proximity_colour(level, 1.0)
+            colour = OUTLINE if fails else proximity_colour(level)
+            edge_colour = OUTLINE if fails else MARGIN_COLOURS[index]
             corners = np.array([placed.points[name] for name in names])
             mesh, edges = self._meshes[index], self._edges[index]
             shown = state.view.tetrahedra[index]
@@ -52,5 +53,5 @@ class Tetrahedra(ScenePart):
             yield mesh, "vertices", corners.astype(np.float32)
             yield mesh, "color", colour
             yield edges, "points", corners[EDGES].astype(np.float32)
-            yield edges, "colors", of_one_colour(colour, len(EDGES))
-            yield edges, "thickness", 5.0 if fails else 1.5
+            yield edges, "colors", of_one_colour(edge_colour, len(EDGES))
+            yield edges, "thickness", 5.0 if fails else 2.0

@@ -15,24 +15,19 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.paths import Journey
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.charts import (
-    BLUE,
     NEUTRAL,
     ORANGE,
-    TEAL,
-    VIOLET,
     add_chart,
     axis,
     dots,
     line,
 )
-from explorer.app.widgets.colours import Rgb
-from explorer.app.widgets.markup import format_number, signed, swatch
+from explorer.app.widgets.colours import MARGIN_COLOURS
+from explorer.app.widgets.markup import format_number, margin_name, signed, swatch
 from explorer.mechanism.margins import INCIDENCES, margins
 from explorer.numerics.arrays import FloatArray
 
-# Lines of the margins: colours that are distinct in every common colour-vision deficiency and
-# differ from those of warnings, dashes, and the marks of the legend.
-COLOURS: tuple[Rgb, Rgb, Rgb] = (BLUE, TEAL, VIOLET)
+# Dashes of the margins' lines beside their colours, and the marks of the legend.
 DASHES: tuple[tuple[float, ...], ...] = ((), (7.0, 3.0), (2.0, 3.0))
 STROKES = ("ex-stroke", "ex-stroke is-dashed", "ex-stroke is-dotted")
 HEIGHT = 112
@@ -50,7 +45,7 @@ class MarginPlot:
         self._legend = gui.add_html("", visible=False)
         deltas = (
             line(f"δ{index}", colour, dash=dash)
-            for index, (colour, dash) in enumerate(zip(COLOURS, DASHES, strict=True), start=1)
+            for index, colour, dash in zip((1, 2, 3), MARGIN_COLOURS, DASHES, strict=True)
         )
         self._chart = add_chart(
             gui,
@@ -119,11 +114,11 @@ def margin_legend(journey: Journey) -> str:
     """Return the lines of the chart with the present margins, in one line of HTML."""
     pose = journey.pose
     parts = (
-        f'<span class="ex-whole" title="{escape(incidence)}">{swatch(colour, look)}δ{index} '
-        f"<b>{signed(value, 2)}</b></span>"
+        f'<span class="ex-whole" title="{escape(incidence)}">{swatch(colour, look)}'
+        f"{margin_name(index)} <b>{signed(value, 2)}</b></span>"
         for index, (colour, look, incidence, value) in enumerate(
             zip(
-                COLOURS,
+                MARGIN_COLOURS,
                 STROKES,
                 INCIDENCES,
                 margins(pose.position, pose.rotation).tolist(),

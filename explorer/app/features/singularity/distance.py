@@ -1,8 +1,10 @@
-"""The nearest singular pose of each incidence: its distance, its ghost, and a button to it."""
+"""The three margins with their danger: value, nearest singular pose, least turn, a button to it."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
+from html import escape
 from typing import get_args
 
 import viser
@@ -12,57 +14,88 @@ from explorer.app.features.singularity.actions import GoToSingularity
 from explorer.app.state.frame import Frame
 from explorer.app.state.view import Ghost
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.colours import proximity_colour
+from explorer.app.widgets.buttons import press_button
+from explorer.app.widgets.colours import FAR_WARNINGS, proximity_colour
 from explorer.app.widgets.controls import Controls
-from explorer.app.widgets.markup import box, caption, format_number, row, swatch, table
+from explorer.app.widgets.markup import box, fitted, format_number, margin_name, meter, swatch
+from explorer.mechanism.margins import INCIDENCES, TETRAHEDRA
 
 GHOSTS: tuple[Ghost, ...] = get_args(Ghost)
-GO = ("δ1 = 0", "δ2 = 0", "δ3 = 0")
+GO = "singular.go"
+GO_HINT = "Move the mechanism to the nearest pose with this incidence."
+COLUMNS = (
+    ("", ""),
+    ("δ units", "The margin: zero where the mechanism is singular. Its sign is that of the mode."),
+    (
+        "distance",
+        "To the nearest pose with δ = 0: the root-mean-square displacement of b1 to b4, in mm.",
+    ),
+    ("turn", "The least turn about b4 or a1 that leads to δ = 0."),
+    ("", ""),
+)
 
 
 class DistancePanel:
-    """The three distances, the ghost, and buttons that move the mechanism to the nearest poses."""
+    """The table of the three margins, and the ghost of the nearest singular pose."""
 
     def __init__(self, services: Services) -> None:
-        gui, session = services.gui, services.session
+        gui, buttons = services.gui, services.buttons
+        self._session = services.session
         self._table = gui.add_html("")
-        self._controls = Controls(gui, session)
+        self._controls = Controls(gui, services.session)
         self._controls.dropdown(
             "Ghost",
             "Draw the nearest pose with an incidence, and the displacements of b1 to b4 to it.",
             GHOSTS,
             "view.singular.ghost",
         )
-        self.go = gui.add_button_group(
-            "Go to", GO, hint="Move the mechanism to the nearest pose with this incidence."
-        )
-
-        @self.go.on_click
-        def _(event: viser.GuiEvent[viser.GuiButtonGroupHandle]) -> None:
-            session.do(GoToSingularity(GO.index(event.target.value) + 1), who=event.client_id)
+        buttons.on(GO, self._go, values={"1", "2", "3"})
+        for incidence in (1, 2, 3):
+            buttons.offer(f"Singularity › Go to δ{incidence} = 0", GO_HINT, GO, str(incidence))
 
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that make the panel show the frame."""
         yield self._table, "content", distance_table(frame)
         yield from self._controls.updates(frame)
 
+    def _go(self, value: str, client: viser.ClientHandle) -> None:
+        self._session.do(GoToSingularity(int(value)), who=client.client_id)
+
 
 def distance_table(frame: Frame) -> str:
-    """Return the three distances as HTML, the least of them in bold."""
-    unit, levels = frame.state.design.unit_mm, frame.verdict.levels
-    poses, reach = frame.snapshot.nearest, frame.state.design.reach
-    least = min(pose.distance for pose in poses)
-    rows = (
-        row(
-            f"{swatch(proximity_colour(levels[pose.incidence - 1], 1.0))}δ{pose.incidence} = 0",
-            format_number(pose.distance, size=reach),
-            format_number(pose.distance * unit, 3, size=reach * unit),
-            look="ex-strong" if pose.distance == least else "",
-            hint=pose.name,
-        )
-        for pose in poses
+    """Return the margins with their nearest singular poses as HTML, the nearest one in bold."""
+    head = "".join(f'<span title="{escape(hint)}">{name}</span>' for name, hint in COLUMNS)
+    rows = "".join(_margin(frame, index) for index in range(3))
+    table = f'<div class="ex-margins"><div class="ex-dim ex-small">{head}</div>{rows}</div>'
+    return box(table)
+
+
+def _margin(frame: Frame, index: int) -> str:
+    snapshot, level = frame.snapshot, frame.verdict.levels[index]
+    reach, unit_mm = snapshot.design.reach, snapshot.design.unit_mm
+    nearest, colour = snapshot.nearest[index], proximity_colour(level)
+    turn = math.degrees(snapshot.least_turns[index]) if nearest.distance > 0.0 else 0.0
+    volume = format_number(float(snapshot.volumes[index]), size=float(snapshot.volume_sizes[index]))
+    hint = (
+        f"{INCIDENCES[index]}, where the tetrahedron {' '.join(TETRAHEDRA[index])} is flat; its "
+        f"volume is {volume} units³"
     )
-    return box(
-        caption("Root-mean-square displacement of b1 to b4, for any position and orientation"),
-        table(rows, ("to", "units", "mm")),
+    is_least = nearest.distance == min(snapshot.nearest_distances)
+    go = press_button(
+        GO,
+        index + 1,
+        "Go",
+        hint=GO_HINT,
+        label=f"Go to δ{index + 1} = 0",
+        class_name="ex-link",
+        is_disabled=nearest.distance == 0.0,
+    )
+    distance = fitted(nearest.distance * unit_mm, reach * unit_mm, 5)
+    return (
+        f"<div{' class=ex-strong' if is_least else ''}>{margin_name(index + 1)}"
+        f"<span>{fitted(float(snapshot.margins[index]), reach, 4)}</span>"
+        f"<span>{distance} mm</span><span>{turn:.1f}°</span>{go}</div>"
+        f'<div class="ex-danger" title="{escape(hint)}">{swatch(colour)}'
+        f'<span class="ex-dim ex-small ex-fill">{INCIDENCES[index]}</span>'
+        f"{meter(min(100.0, 100.0 * level / FAR_WARNINGS), colour, look='ex-meter is-thin')}</div>"
     )

@@ -6,7 +6,6 @@ from explorer.app.features.feature import Services
 from explorer.app.features.singularity.panel import LOOKS
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.buttons import figure
-from explorer.app.widgets.markup import format_number
 
 
 class DistanceFigure:
@@ -18,8 +17,8 @@ class DistanceFigure:
     def markup(self, frame: Frame) -> str:
         """Return the figure for a frame, as HTML."""
         verdict = frame.verdict
-        length = f"{format_number(verdict.distance * frame.state.design.unit_mm, 3)} mm"
-        words = f"{length} to δ{verdict.incidences[0]} = 0" if verdict.distance else "here"
-        hint = f"{verdict.title}: {verdict.reason(length)}."
+        unit_mm = frame.state.design.unit_mm
+        hint = f"{verdict.title}: {verdict.reason(unit_mm)}."
         look = f"ex-{LOOKS[verdict.kind]}"
+        words = verdict.brief(unit_mm)
         return figure("Singularity", "Nearest singular pose", words, hint=hint, look=look)

@@ -8,7 +8,6 @@ from explorer.app.features.feature import Feature, InBar, StateCommand, Tab
 from explorer.app.features.singularity.actions import GoToSingularity
 from explorer.app.features.singularity.distance_figure import DistanceFigure
 from explorer.app.features.singularity.feed import StrataFeed
-from explorer.app.features.singularity.jog_panel import JogPanel
 from explorer.app.features.singularity.jog_scene import JogScene
 from explorer.app.features.singularity.panel import SingularityPanel
 from explorer.app.features.singularity.scene import BallScene, EllipsoidScene, NearestGhost
@@ -16,10 +15,7 @@ from explorer.app.widgets.commands import shift
 
 SINGULARITY = Feature(
     "singularity",
-    tabs=(
-        Tab("analyse", "Singularity", SingularityPanel, viser.Icon.ALERT_TRIANGLE),
-        Tab("analyse", "Singularity", JogPanel),
-    ),
+    tabs=(Tab("analyse", "Singularity", SingularityPanel, viser.Icon.ALERT_TRIANGLE),),
     bar=(InBar("middle", DistanceFigure),),
     scene=(NearestGhost, EllipsoidScene, BallScene, JogScene),
     feeds=(StrataFeed,),

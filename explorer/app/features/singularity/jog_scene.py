@@ -1,7 +1,8 @@
 """The uncoupled motions as arrows and arcs between their singular poses.
 
-A motion is drawn as the path of b4; a rotation about a platform axis, which leaves b4 in place, as
-an arc about b4. An end has a disc if the margin is zero there, an arrowhead if the motion goes on.
+A motion has the colour of the margin that it changes. It is drawn as the path of b4; a rotation
+about a platform axis, which leaves b4 in place, as an arc about b4. An end has a disc if the margin
+is zero there, an arrowhead if the motion goes on.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from explorer.app.scene.shapes import (
     turned_to,
 )
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.colours import SINGULAR, Rgb, proximity_colour
+from explorer.app.widgets.colours import MARGIN_COLOURS, SINGULAR, Rgb
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.uncoupled import UNCOUPLED, Travel, UncoupledMotion
 
@@ -91,7 +92,7 @@ class JogScene(ScenePart):
         for index in shown:
             motion = UNCOUPLED[index]
             line = motion_line(placed, motion, placed.frame.travels[index])
-            colour = proximity_colour(placed.frame.verdict.levels[motion.incidence - 1], 1.0)
+            colour = MARGIN_COLOURS[motion.incidence - 1]
             segments = np.stack([line.points[:-1], line.points[1:]], axis=1)
             segments = np.concatenate([segments, line.spoke[None]])
             yield self._lines[index], "points", segments.astype(np.float32)

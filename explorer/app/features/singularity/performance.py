@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from typing import get_args
 
@@ -15,6 +14,8 @@ from explorer.app.widgets.markup import box, dim, format_number, row, table
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.strata import GENERIC
 
+# Gain beyond which a pose counts as singular in a direction: J is known to fewer digits.
+LARGEST_GAIN = 1e9
 GAINS: tuple[Gain, ...] = get_args(Gain)
 
 
@@ -77,8 +78,9 @@ def performance_table(frame: Frame) -> str:
 
 
 def _range(semi_axes: FloatArray) -> tuple[str, str]:
-    return _gain(float(semi_axes.min())), _gain(float(semi_axes.max()))
+    return gain_text(float(semi_axes.min())), gain_text(float(semi_axes.max()))
 
 
-def _gain(value: float) -> str:
-    return "∞" if math.isinf(value) else format_number(value, 3)
+def gain_text(value: float) -> str:
+    """Return a gain as text; one that only rounding keeps finite is infinite."""
+    return "∞" if value > LARGEST_GAIN else format_number(value, 3)

@@ -8,6 +8,7 @@ import numpy as np
 
 from explorer.app.features.feature import Services
 from explorer.app.features.mechanism.bodies import platform_plate
+from explorer.app.features.singularity.performance import gain_text
 from explorer.app.scene.part import ScenePart
 from explorer.app.scene.placing import Placed
 from explorer.app.scene.shapes import NO_MESH, add_lines, add_translucent, sphere
@@ -127,7 +128,7 @@ class EllipsoidScene(ScenePart):
             np.stack([centre - semi_axes, centre + semi_axes], axis=1).astype(np.float32),
         )
         longest = int(gain.argmax())
-        value = "∞" if np.isinf(gain[longest]) else format_number(float(gain[longest]), 3)
+        value = gain_text(float(gain[longest]))
         yield self._label, "text", f"{kind} ≤ {value} per unit"
         upward = semi_axes[longest] * (1.0 if semi_axes[longest, 2] >= 0.0 else -1.0)
         yield self._label, "position", tuple((centre + upward).tolist())
@@ -162,7 +163,7 @@ class BallScene(ScenePart):
             return
         ball = frame.free_ball
         centre, touch = placed.points["b4"], placed.scale * ball.touches
-        colour = proximity_colour(frame.verdict.levels[ball.incidence - 1], 1.0)
+        colour = proximity_colour(frame.verdict.levels[ball.incidence - 1])
         yield self._ball, "position", tuple(centre.tolist())
         yield self._ball, "scale", placed.scale * ball.radius
         yield self._ball, "color", colour

@@ -16,7 +16,7 @@ from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import press_button
 from explorer.app.widgets.colours import css, proximity_colour
 from explorer.app.widgets.controls import Controls
-from explorer.app.widgets.markup import box, dim, format_number
+from explorer.app.widgets.markup import box, dim, fitted
 from explorer.measures.verdict import DISTANCE_SHARE
 from explorer.singularity.bruhat import (
     COVERED,
@@ -102,7 +102,7 @@ def diagram(frame: Frame, distances: Mapping[Stratum, float]) -> str:
     levels = {w: distance / warn for w, distance in distances.items()}
 
     def distance_text(stratum: Stratum) -> str:
-        return _distance(distances.get(stratum), 3, frame)
+        return _distance(distances.get(stratum), frame)
 
     # One incidence has one colour all over the page.
     levels.update(zip(OF_INCIDENCES, frame.verdict.levels, strict=True))
@@ -111,8 +111,8 @@ def diagram(frame: Frame, distances: Mapping[Stratum, float]) -> str:
         f'<span style="--top:{_top(d) + 8}px" title="Dimension {d}">{d}</span>' for d in range(7)
     )
     return box(
-        '<div class="ex-dim ex-small">Dimensions on the left; distances in design units. '
-        "Click on a stratum to go to its nearest pose.</div>"
+        '<div class="ex-dim ex-small">Press one to go to its nearest pose. Dimensions on the left, '
+        "distances in mm.</div>"
         f'<div class="ex-strata" style="--height:{6 * ROW + NODE_HEIGHT + 4}px">'
         f'{_edges(here)}<div class="ex-ranks">{ranks}</div><div class="ex-nodes">{nodes}</div>'
         "</div>"
@@ -120,15 +120,21 @@ def diagram(frame: Frame, distances: Mapping[Stratum, float]) -> str:
 
 
 def neighbours(frame: Frame, distances: Mapping[Stratum, float]) -> str:
-    """Return the present stratum and those that one more incidence leads to, as HTML."""
+    """Return the present stratum and those that one more incidence leads to, as HTML.
+
+    The first incidence of a generic pose is that of a margin: the table of the margins has it.
+    """
     here = frame.snapshot.stratum
-    rows = "".join(_neighbour(w, _distance(distances.get(w), 4, frame)) for w in COVERED[here])
+    covered = COVERED[here] if here != GENERIC else ()
+    rows = "".join(_neighbour(w, _distance(distances.get(w), frame)) for w in covered)
     rest = (
         '<div class="ex-line ex-dim ex-after"><span>With one more incidence</span>'
-        f"<span>units</span></div>{rows}"
+        f"<span>mm</span></div>{rows}"
         if rows
-        else '<div class="ex-dim ex-after">Both flags coincide: nothing is more singular.</div>'
+        else ""
     )
+    if not COVERED[here]:
+        rest = '<div class="ex-dim ex-after">Both flags coincide: nothing is more singular.</div>'
     return box(
         f"<div><b>{stratum_name(here)}</b> {dim(f'dimension {inversions(here)}')}</div>",
         f"<div>{escape(_sentence(here))}</div>{rest}",
@@ -143,10 +149,12 @@ def _sentence(stratum: Stratum) -> str:
     return f"{zero} = 0: {describe_stratum(stratum)}"
 
 
-def _distance(distance: float | None, digits: int, frame: Frame) -> str:
+def _distance(distance: float | None, frame: Frame) -> str:
+    """Return a distance in mm as text."""
     if distance is None:
         return "…"
-    return format_number(distance, digits, size=frame.state.design.reach)
+    design = frame.state.design
+    return fitted(distance * design.unit_mm, design.reach * design.unit_mm, 4)
 
 
 def _neighbour(stratum: Stratum, value: str) -> str:
@@ -158,11 +166,11 @@ def _neighbour(stratum: Stratum, value: str) -> str:
 def _node(stratum: Stratum, below: str, level: float | None, *, is_here: bool) -> str:
     column, count = _place(stratum)
     left = 100.0 * (column + 0.5) / count
-    colour = "currentColor" if level is None else css(proximity_colour(level, 1.0))
+    colour = "currentColor" if level is None else css(proximity_colour(level))
     if is_here:
         below = "here"
         if stratum == GENERIC:
-            colour = css(proximity_colour(float("inf"), 1.0))
+            colour = css(proximity_colour(float("inf")))
     elif stratum == GENERIC:
         below = "any"
     place = f"--left:{left:.4g}%;--top:{_top(inversions(stratum))}px;--colour:{colour}"

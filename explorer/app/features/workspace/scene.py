@@ -155,7 +155,7 @@ class _SingularPlane:
         yield self._label, "visible", normal is not None
         if normal is None:
             return
-        colour = proximity_colour(placed.frame.verdict.levels[self._index], 1.0)
+        colour = proximity_colour(placed.frame.verdict.levels[self._index])
         along = np.cross(normal, [0.0, 1.0, 0.0])
         if np.linalg.norm(along) < 0.1:
             along = np.array([1.0, 0.0, 0.0])

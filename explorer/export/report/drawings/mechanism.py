@@ -19,7 +19,7 @@ from explorer.legs.clearance import leg_axes
 from explorer.measures.snapshot import Snapshot
 from explorer.measures.verdict import verdict
 from explorer.numerics.arrays import FloatArray
-from explorer.singularity.colours import WARN_SHARE, css, proximity_colour
+from explorer.singularity.colours import css, proximity_colour
 
 WIDTH = 720.0
 # The share of a leg that is cylinder.
@@ -111,8 +111,8 @@ def mechanism(
     """Yield the elements of a mechanism, with labels within a box, or without labels if None."""
     points = snapshot.points
     legs = leg_axes(snapshot.design, snapshot.pose.position, snapshot.rotation)
-    here = verdict(snapshot, WARN_SHARE * snapshot.design.reach)
-    tints = [css(proximity_colour(level, 1.0)) for level in here.levels]
+    here = verdict(snapshot)
+    tints = [css(proximity_colour(level)) for level in here.levels]
     low, high = _guide(snapshot)
     yield _area(view, [low, high, points.a3], tints[2])
     yield _line(view, low, high, "rail")

@@ -20,7 +20,6 @@ from explorer.measures.verdict import verdict
 from explorer.mechanism.margins import INCIDENCES, TETRAHEDRA, describe_modes
 from explorer.mechanism.pose import yaw_pitch_roll_from_rotation
 from explorer.singularity.bruhat import describe_stratum
-from explorer.singularity.colours import WARN_SHARE
 from explorer.singularity.ellipsoids import Ellipsoid
 
 
@@ -28,14 +27,13 @@ def singularity_section(data: ReportData) -> Iterator[Element]:
     """Yield the section on singularities."""
     snapshot, unit = data.snapshot, data.design.unit_mm
     yield element("h2", "Singularities")
-    here = verdict(snapshot, WARN_SHARE * data.design.reach)
+    here = verdict(snapshot)
     if here.kind == "singular":
         names = " and ".join(INCIDENCES[index - 1] for index in here.incidences)
         yield paragraph(f"The pose is singular: {names}.", class_="note")
     else:
-        away = f"{format_number(here.distance * unit, 3)} mm"
         note = None if here.kind == "clear" else "note"
-        yield paragraph(f"{here.title}: {here.reason(away)}.", class_=note)
+        yield paragraph(f"{here.title}: {here.reason(unit)}.", class_=note)
     yield paragraph(
         "The mechanism is singular exactly where one of three margins is zero: there a "
         "tetrahedron is flat. The signs of the three name the assembly mode."

@@ -1,0 +1,165 @@
+"""The eight assembly modes as a table: a press on a row goes there, a pointer on it shows it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from html import escape
+
+import viser
+
+from explorer.app.features.feature import Services
+from explorer.app.state.actions import Set, SetMode
+from explorer.app.state.frame import Frame
+from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.buttons import press_button
+from explorer.app.widgets.markup import box, fitted
+from explorer.mechanism.margins import mode_name
+from explorer.workspace.limits.broken import Violation
+
+MODES = tuple(f"{mode}:  {mode_name(mode)}" for mode in range(8))
+"""The modes by number and sign triple, as in lists and beside ghosts."""
+
+VALUES = frozenset(str(mode) for mode in range(len(MODES)))
+GO, HOVER, GHOSTS = "modes.go", "modes.hover", "modes.ghosts"
+GHOSTS_LABEL = "Other modes as ghosts"
+GHOSTS_HINT = "Draw the seven other ways to assemble the same leg lengths."
+# First words of limits whose whole names are too long for a row.
+SHORT = {"gap |d1 − d3|": "gap", "carriage order": "order"}
+
+
+class HoveredMode:
+    """The mode on whose row a pointer rests, which the scene shows as a ghost.
+
+    It is no part of the state: it is neither saved nor undone.
+
+    Attributes:
+        mode: The mode; None if there is none.
+    """
+
+    def __init__(self, services: Services) -> None:
+        self.mode: int | None = None
+        self._session = services.session
+        self._client: int | None = None
+        services.buttons.on(HOVER, self._hover, values={"", *VALUES})
+        services.server.on_client_disconnect(self._forget)
+
+    def _hover(self, value: str, client: viser.ClientHandle) -> None:
+        self._client = client.client_id
+        self._show(int(value) if value else None)
+
+    def _forget(self, client: viser.ClientHandle) -> None:
+        # A browser that is closed does not report that the pointer has left.
+        if client.client_id == self._client:
+            self._show(None)
+
+    def _show(self, mode: int | None) -> None:
+        if mode != self.mode:
+            self.mode = mode
+            self._session.redraw()
+
+
+class ModesPanel:
+    """The table of the modes, with the switch for the ghosts of all in its head."""
+
+    def __init__(self, services: Services) -> None:
+        self._session, buttons = services.session, services.buttons
+        services.get(HoveredMode)
+        self._table = services.gui.add_html("")
+        buttons.on(GO, self._go, values=VALUES)
+        buttons.on(GHOSTS, self._switch_ghosts)
+        for mode, name in enumerate(MODES):
+            hint = f"Assemble the same leg lengths with the signs {mode_name(mode)} of δ1, δ2, δ3."
+            words = " ".join(name.split())
+            buttons.offer(f"Pose › Assembly mode › {words}", hint, GO, str(mode))
+        buttons.offer(f"Pose › {GHOSTS_LABEL}", GHOSTS_HINT, GHOSTS)
+
+    def updates(self, frame: Frame) -> Iterator[Update]:
+        """Yield the updates that make the panel show the frame."""
+        yield self._table, "content", modes_table(frame)
+
+    def _go(self, value: str, client: viser.ClientHandle) -> None:
+        self._session.do(SetMode(int(value)), who=client.client_id)
+
+    def _switch_ghosts(self, _: str, client: viser.ClientHandle) -> None:
+        self._session.post(
+            object(),
+            lambda state: Set("view.ghosts", not state.view.ghosts, GHOSTS_LABEL),
+            who=client.client_id,
+        )
+
+
+def modes_table(frame: Frame) -> str:
+    """Return the table as HTML."""
+    state, snapshot = frame.state, frame.snapshot
+    names = "".join(f"<span>{name}</span>" for name in ("", "δ1 δ2 δ3", "x", "y", "z", "limits"))
+    switch = press_button(
+        GHOSTS,
+        "",
+        "Ghosts",
+        hint=GHOSTS_HINT,
+        label=GHOSTS_LABEL,
+        class_name="ex-chip",
+        is_on=state.view.ghosts,
+    )
+    of_last = (
+        '<div class="ex-close">These lengths close in no mode; the modes below are those of the '
+        "last lengths that did.</div>"
+        if state.unclosed is not None
+        else ""
+    )
+    return box(
+        f'<div class="ex-line"><b>{snapshot.mode_words.capitalize()}</b>{switch}</div>',
+        of_last,
+        f'<div class="ex-modes"><div class="ex-mode ex-dim">{names}</div>',
+        *(_row(frame, mode) for mode in range(len(MODES))),
+        "</div>",
+    )
+
+
+def _row(frame: Frame, mode: int) -> str:
+    solution, reach = frame.snapshot.modes, frame.state.design.reach
+    is_here = mode in frame.snapshot.bordering_modes
+    if solution.feasible:
+        place = "".join(
+            f"<span>{fitted(value, reach, 4)}</span>" for value in solution.position[mode].tolist()
+        )
+        limits, hint = _limits(frame.snapshot.mode_violations[mode])
+    else:
+        place, hint = '<span class="ex-dim is-wide">does not close</span>', ""
+        limits = ""
+    name = f"Mode {mode}, {mode_name(mode)}"
+    return press_button(
+        GO,
+        mode,
+        f"<b>{mode}</b><span>{mode_name(mode)}</span>{place}{limits}",
+        hint=f"{name}. {hint}",
+        label=name,
+        class_name="ex-mode",
+        hover=HOVER,
+        is_on=is_here,
+        is_disabled=not solution.feasible,
+    )
+
+
+def _limits(broken: tuple[Violation, ...]) -> tuple[str, str]:
+    """Return the cell that says which limits are broken, and the sentence on them."""
+    if not broken:
+        return '<span class="ex-within">within</span>', "It is within all limits."
+    first = broken[0].limit
+    words = SHORT.get(first, first.removeprefix("margin ").removeprefix("swing "))
+    more = f" +{len(broken) - 1}" if len(broken) > 1 else ""
+    sentences = "; ".join(map(str, broken))
+    return f'<span class="ex-beyond">{escape(words)}{more}</span>', f"{sentences}."
+
+
+def ghost_modes(frame: Frame, hovered: int | None) -> list[int]:
+    """Return the modes that are drawn as ghosts: all others, the one that is pointed at, or none.
+
+    Args:
+        frame: The frame that is shown.
+        hovered: The mode on whose row a pointer rests, if any.
+    """
+    here = frame.state.mode
+    if frame.state.view.ghosts:
+        return [mode for mode in range(len(MODES)) if mode != here]
+    return [] if hovered is None or hovered == here else [hovered]
