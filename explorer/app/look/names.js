@@ -8,7 +8,8 @@ window.explorer.names ??= (() => {
     adjustments: "Settings of the page",
     "arrow-back": "Back to the controls",
   };
-  const AXES = ["x", "y", "z"];
+  // Names of fields side by side, by their number.
+  const PARTS = { 2: ["least", "most"], 3: ["x", "y", "z"] };
   const name = (it, words) => {
     if (words && it.getAttribute("aria-label") !== words) it.setAttribute("aria-label", words);
   };
@@ -19,14 +20,16 @@ window.explorer.names ??= (() => {
     }
     return null;
   };
+  const wordsOf = (label) => label.textContent.replace(/\s+/g, " ").trim();
   const nameControl = (control) => {
     const row = rowOf(control);
     const labels = row ? row.querySelectorAll("label[for]") : [];
     // Several labels belong to several controls: this one has no words of its own.
     if (labels.length !== 1) return;
-    const words = labels[0].textContent.replace(/\s+/g, " ").trim();
+    const words = wordsOf(labels[0]);
     const fields = [...row.querySelectorAll("input[inputmode=decimal]")];
-    name(control, fields.length === 3 ? `${words} ${AXES[fields.indexOf(control)]}` : words);
+    const part = PARTS[fields.length]?.[fields.indexOf(control)];
+    name(control, part ? `${words.replace(/ ends$/, "")} ${part}` : words);
   };
   const nameButton = (button) => {
     if (button.matches(".mantine-Notification-closeButton")) name(button, "Close");
@@ -47,5 +50,12 @@ window.explorer.names ??= (() => {
   const changes = { childList: true, characterData: true, subtree: true };
   new MutationObserver(nameSoon).observe(document.body, changes);
   nameAll();
+  // What has the focus, or else the pointer, is named on the root: the stylesheet may point at it.
+  const mark = ({ target }) => {
+    const row = rowOf(document.activeElement) ?? (target.closest ? rowOf(target) : null);
+    const labels = row ? row.querySelectorAll("label[for]") : [];
+    document.documentElement.dataset.at = labels.length === 1 ? wordsOf(labels[0]) : "";
+  };
+  for (const event of ["pointerover", "focusin", "focusout"]) addEventListener(event, mark, true);
   return true;
 })();

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 
 import viser
 
-from explorer.app.browser.viser_gaps import Mark
 from explorer.app.features.feature import Services
 from explorer.app.state.actions import (
     GoHome,
@@ -20,10 +19,9 @@ from explorer.app.state.actions import (
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.controls import Bound, Controls, Span
-from explorer.app.widgets.markup import alert, format_number, remark
-from explorer.app.widgets.ranges import coordinate_span, length_span
-from explorer.mechanism.design import JOINTS, LENGTHS
-from explorer.mechanism.feasible_intervals import Interval
+from explorer.app.widgets.markup import alert, remark
+from explorer.app.widgets.ranges import joint_span, position_span
+from explorer.mechanism.design import JOINTS
 from explorer.mechanism.margins import describe_modes, mode_name
 
 JOINT_HINTS = {
@@ -47,8 +45,6 @@ ANGLES = (
     ("pitch", "about the y that yaw turned, the second of three", 90.0),
     ("roll", "about the platform's x, the third of three", 180.0),
 )
-# Room for a label, as a share of the slider.
-LABEL_ROOM = 0.24
 MODES = tuple(f"{mode}:  {mode_name(mode)}" for mode in range(8))
 
 
@@ -104,18 +100,12 @@ class MovePanel:
             )
 
     def _add_joint(self, joint: int, name: str) -> None:
-        span = length_span if name in LENGTHS else coordinate_span
-
-        def marks(frame: Frame) -> tuple[Mark, ...]:
-            return interval_marks(frame.snapshot.intervals[joint], span(frame.state))
-
         self._controls.slider(
             JOINT_LABELS[name],
-            f"{JOINT_HINTS[name]} The marks bound the values that close with the other joints as "
-            "they are.",
+            JOINT_HINTS[name],
             Bound(lambda frame: frame.state.joints[joint], lambda _, value: SetJoint(joint, value)),
-            span,
-            marks=marks,
+            lambda state: joint_span(state, joint),
+            tinted=lambda frame: frame.snapshot.intervals[joint],
         )
 
     def _add_position(self, axis: int, name: str) -> None:
@@ -126,7 +116,7 @@ class MovePanel:
                 lambda frame: frame.state.pose.position[axis],
                 lambda _, value: SetPosition(axis, value),
             ),
-            coordinate_span,
+            lambda state: position_span(state, axis),
         )
 
     def _add_angle(self, axis: int, name: str, order: str, edge: float) -> None:
@@ -165,29 +155,3 @@ def mode_options(frame: Frame) -> tuple[str, ...]:
         return MODES
     snapshot = frame.snapshot
     return (*MODES, f"{snapshot.sign_words}:  {describe_modes(snapshot.bordering_modes)}")
-
-
-def interval_marks(intervals: tuple[Interval, ...], span: Span) -> tuple[Mark, ...]:
-    """Return marks at the ends of the intervals, with labels that do not overlap.
-
-    Args:
-        intervals: Intervals in which the lengths close.
-        span: Range of the slider.
-    """
-    marks: list[Mark] = []
-    label_end = -1.0
-    for low, high in intervals:
-        start, end = (min(max(v, span.low), span.high) for v in (low, high))
-        first, last = ((v - span.low) / (span.high - span.low) for v in (start, end))
-        size = max(abs(span.low), abs(span.high))
-        texts = (format_number(low, 3, size=size), format_number(high, 3, size=size))
-        if first - label_end < LABEL_ROOM:
-            texts = ("", "")
-        elif last - first < LABEL_ROOM:
-            # There is no room for two labels: the end with more room beside it has both.
-            both = f"{texts[0]} … {texts[1]}"
-            texts = ("", both) if first < 0.5 else (both, "")
-        if any(texts):
-            label_end = last
-        marks += [(start, texts[0]), (end, texts[1])]
-    return tuple(marks)

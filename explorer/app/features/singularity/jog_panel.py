@@ -8,17 +8,15 @@ from typing import get_args
 
 import viser
 
-from explorer.app.browser.viser_gaps import Mark
 from explorer.app.features.feature import Services
-from explorer.app.features.mechanism.pose_panel import interval_marks
 from explorer.app.features.singularity.actions import Jog, jog_start
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.state.view import Arrows
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.colours import proximity_colour
-from explorer.app.widgets.controls import Bound, Controls, Span
-from explorer.app.widgets.markup import box, dim, format_number, row, signed, swatch, table
+from explorer.app.widgets.controls import Bound, Controls, Intervals, Span
+from explorer.app.widgets.markup import box, dim, format_number, row, swatch, table
 from explorer.app.widgets.ranges import coordinate_span
 from explorer.singularity.bruhat import incidences
 from explorer.singularity.uncoupled import UNCOUPLED, Travel, UncoupledMotion
@@ -34,7 +32,7 @@ TURN_SPAN = Span(-180.0, 180.0, 0.1)
 
 
 class JogPanel:
-    """Six sliders for amounts from the start of each motion, with marks at singular poses."""
+    """Six sliders for amounts from the start of each motion, tinted up to singular poses."""
 
     def __init__(self, services: Services) -> None:
         gui = services.gui
@@ -58,20 +56,21 @@ class JogPanel:
         def span(state: State) -> Span:
             return TURN_SPAN if motion.kind == "rotation" else coordinate_span(state)
 
-        def marks(frame: Frame) -> tuple[Mark, ...]:
+        def tinted(frame: Frame) -> Intervals:
             start, here = jog_start(frame.state, index), frame.state.pose
             travel = frame.travels[index] if start == here else motion.travel(start)
-            return travel_marks(in_shown_units(motion, travel), span(frame.state))
+            shown = in_shown_units(motion, travel)
+            return ((shown.low, shown.high),)
 
         self._controls.slider(
             jog_label(motion),
             f"Change δ{motion.incidence} alone: "
             f"{'move' if motion.kind == 'translation' else 'turn'} the platform {motion.name} "
             f"through {THROUGH[motion.frame]}, in {UNITS[motion.kind]} from the start of the "
-            "motion. The marks are singular poses.",
+            "motion; the tinted part ends at singular poses.",
             Bound(lambda frame: jog_amount(frame.state, index), lambda _, value: Jog(index, value)),
             span,
-            marks=marks,
+            tinted=tinted,
         )
 
     def updates(self, frame: Frame) -> Iterator[Update]:
@@ -104,14 +103,6 @@ def in_shown_units(motion: UncoupledMotion, travel: Travel) -> Travel:
     if motion.kind == "translation":
         return travel
     return Travel(math.degrees(travel.low), math.degrees(travel.high))
-
-
-def travel_marks(travel: Travel, span: Span) -> tuple[Mark, ...]:
-    """Return marks at the singular poses of a motion within the range of its slider."""
-    ends = [end for end in (travel.low, travel.high) if span.low <= end <= span.high]
-    if len(ends) == 2 and ends[0] != ends[1]:
-        return interval_marks(((ends[0], ends[1]),), span)
-    return tuple((end, signed(end, 1)) for end in dict.fromkeys(ends))
 
 
 def travel_table(frame: Frame, frame_name: str) -> str:
