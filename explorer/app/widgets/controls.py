@@ -7,6 +7,7 @@ slider never moves under the pointer.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Generic, Literal, TypeAlias, TypeVar, cast
@@ -171,33 +172,46 @@ class Control(Generic[Value]):
         return self._is_set_here and (value == self._last_value or self._session.is_waiting(self))
 
 
+Intervals: TypeAlias = tuple[Interval, ...]
+"""Disjoint ascending intervals, in the unit of a slider's value; an end may be infinite."""
+
+
 class _Track:
     """The range of a slider, which follows the state and holds every value of its thumbs.
 
     Args:
         handle: The slider.
         span: Range, or the function that returns it.
+        closes_up: Whether it shows only the surroundings of the tinted parts.
     """
 
     def __init__(
         self,
         handle: viser.GuiSliderHandle[float] | viser.GuiMultiSliderHandle[float],
         span: Span | Callable[[State], Span],
+        *,
+        closes_up: bool = False,
     ) -> None:
         self._handle = handle
         self._span = span
+        self._closes_up = closes_up
         self._shown: Span | None = None
 
-    def span(self, state: State, values: tuple[float, ...], *, is_own: bool) -> Span:
+    def span(
+        self, state: State, values: tuple[float, ...], tinted: Intervals = (), *, is_own: bool
+    ) -> Span:
         """Return the range in a state.
 
         Args:
             state: The state.
             values: Values of the thumbs.
+            tinted: The tinted parts.
             is_own: Whether the slider itself was changed last: then its range may only grow, so
                 that it holds still under the pointer.
         """
         span = self._span if isinstance(self._span, Span) else self._span(state)
+        if self._closes_up:
+            span = close_up(span, tinted, self._shown)
         low, high = min(span.low, *values), max(span.high, *values)
         if is_own and self._shown is not None:
             low, high = min(low, self._shown.low), max(high, self._shown.high)
@@ -214,10 +228,6 @@ class _Track:
         yield self._handle, "precision", decimals(span.step)
 
 
-Intervals: TypeAlias = tuple[Interval, ...]
-"""Disjoint ascending intervals, in the unit of a slider's value; an end may be infinite."""
-
-
 class Slider(Control[float]):
     """A slider with a number field, whose range and tinted parts follow the state."""
 
@@ -229,22 +239,25 @@ class Slider(Control[float]):
         span: Span | Callable[[State], Span],
         disabled: Condition | None,
         tinted: Callable[[Frame], Intervals] | None,
+        *,
+        closes_up: bool = False,
     ) -> None:
         super().__init__(session, handle, bound, disabled=disabled)
-        self._track = _Track(handle, span)
+        self._track = _Track(handle, span, closes_up=closes_up)
         self._tinted = tinted
         self._marks = SliderMarks(handle)
 
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that make the slider show the frame, its range first."""
         value = self._bound.read(frame)
+        tinted = () if self._tinted is None else self._tinted(frame)
         is_own = self._is_own(value)
-        span = self._track.span(frame.state, (value,), is_own=is_own)
+        span = self._track.span(frame.state, (value,), tinted, is_own=is_own)
         # A field would show rounding as −0.00.
         value = drop_rounding(value, max(abs(span.low), abs(span.high)))
         yield from self._track.updates(span)
         if self._tinted is not None:
-            yield self._marks, "marks", tint_marks(self._tinted(frame), span)
+            yield self._marks, "marks", tint_marks(tinted, span)
         yield from self._show(frame.state, value)
 
 
@@ -347,6 +360,7 @@ class Controls:
         *,
         disabled: Condition | None = None,
         tinted: Callable[[Frame], Intervals] | None = None,
+        closes_up: bool = False,
     ) -> Slider:
         """Add a slider with a number field.
 
@@ -357,6 +371,7 @@ class Controls:
             span: Range of its track, which may follow the state; values beyond can be typed.
             disabled: Condition in which it is disabled; None for never.
             tinted: Function that returns the feasible parts of the track; None to tint none.
+            closes_up: Whether the track shows only the surroundings of its tinted parts.
         """
         handle = self._gui.add_slider(
             label,
@@ -367,7 +382,8 @@ class Controls:
             hint=hint,
             marks=(),
         )
-        slider = Slider(self._session, handle, bound_to(at, label), span, disabled, tinted)
+        bound = bound_to(at, label)
+        slider = Slider(self._session, handle, bound, span, disabled, tinted, closes_up=closes_up)
         self._controls.append(slider)
         return slider
 
@@ -527,6 +543,50 @@ def tint_marks(intervals: Intervals, span: Span) -> tuple[Mark, ...]:
         if low < span.high and high > span.low
         for end in (low, high)
     )
+
+
+# Least width of a close-up over the whole range, and least part of the track that is tinted before
+# the close-up is made anew.
+LEAST_CLOSE_UP, LEAST_TINTED = 0.1, 0.25
+
+
+def close_up(whole: Span, intervals: Intervals, before: Span | None) -> Span:
+    """Return the part of a range around intervals, as wide again as they are.
+
+    Args:
+        whole: The range.
+        intervals: The intervals, disjoint and ascending.
+        before: The part that was shown before, which stays as long as it serves; None if none was.
+    """
+    inside = [(low, high) for low, high in intervals if low < whole.high and high > whole.low]
+    if not inside:
+        return whole
+    low, high = max(inside[0][0], whole.low), min(inside[-1][1], whole.high)
+    width = max(high - low, LEAST_CLOSE_UP * (whole.high - whole.low))
+    if before is not None and before.step == whole.step:
+        is_inside = whole.low <= before.low <= low and high <= before.high <= whole.high
+        if is_inside and width >= LEAST_TINTED * (before.high - before.low):
+            return before
+    middle = 0.5 * (low + high)
+    part = round_span(middle - width, middle + width, whole.step)
+    return Span(max(part.low, whole.low), min(part.high, whole.high), whole.step)
+
+
+def round_span(low: float, high: float, step: float) -> Span:
+    """Return a range whose ends are whole multiples of ten steps, no narrower than asked for.
+
+    A slider's values are whole steps from its lower end.
+
+    Args:
+        low: Lower end.
+        high: Upper end.
+        step: Step of the slider, a power of ten.
+    """
+    unit = 10.0 * step
+    digits = -round(math.log10(unit))
+    ends = (math.floor(low / unit), math.ceil(high / unit))
+    lowest, highest = (round(end * unit, digits) for end in ends)
+    return Span(lowest, highest, step)
 
 
 def decimals(step: float) -> int:

@@ -10,7 +10,7 @@ import functools
 import math
 
 from explorer.app.state.state import State
-from explorer.app.widgets.controls import Span
+from explorer.app.widgets.controls import Span, round_span
 from explorer.mechanism.design import JOINTS, LENGTHS, Design, Pair
 from explorer.mechanism.possible_ranges import possible_ranges, without_box, without_guide
 
@@ -138,15 +138,8 @@ def _around(ends: Pair, reach: float, least: float = -math.inf) -> Span:
     """Return a range with round ends around what is possible, also if that is nothing."""
     low, high = sorted(ends)
     room = max(ROOM * (high - low), 1e-3 * reach)
-    step = fine_step(reach, 2e3)
-    # A slider's values are whole steps from its lower end.
-    rounded = 10.0 * step
-    digits = -round(math.log10(rounded))
-    lowest, highest = (
-        round(whole(end / rounded) * rounded, digits)
-        for whole, end in ((math.floor, low - room), (math.ceil, high + room))
-    )
-    return Span(max(least, lowest), highest, step)
+    span = round_span(low - room, high + room, fine_step(reach, 2e3))
+    return Span(max(least, span.low), span.high, span.step)
 
 
 def round_up(value: float) -> float:

@@ -106,6 +106,7 @@ class MovePanel:
             Bound(lambda frame: frame.state.joints[joint], lambda _, value: SetJoint(joint, value)),
             lambda state: joint_span(state, joint),
             tinted=lambda frame: frame.snapshot.intervals[joint],
+            closes_up=True,
         )
 
     def _add_position(self, axis: int, name: str) -> None:
