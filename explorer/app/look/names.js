@@ -1,4 +1,5 @@
-// Gives each control the words beside it as its name for screen readers.
+// Gives each control the words beside it as its name for screen readers, and puts hints beside the
+// panel, where they cover no control.
 window.explorer.names ??= (() => {
   const CONTROLS =
     "[role=slider], input:not([type=hidden]):not([type=file]):not([type=checkbox]), textarea";
@@ -15,7 +16,7 @@ window.explorer.names ??= (() => {
   };
   // The smallest part of the page that holds a control and the words beside it.
   const rowOf = (control) => {
-    for (let row = control.parentElement; row; row = row.parentElement) {
+    for (let row = control?.parentElement; row; row = row.parentElement) {
       if (row.querySelector("label[for]")) return row;
     }
     return null;
@@ -43,9 +44,28 @@ window.explorer.names ??= (() => {
     document.querySelectorAll(CONTROLS).forEach(nameControl);
     document.querySelectorAll("button").forEach(nameButton);
   };
+  // Width of the widest panel at a side of the window, and room beside a hint, in pixels.
+  const WIDEST = 420,
+    ROOM = 24;
+  const placeHint = (hint) => {
+    const row = rowOf(document.querySelector(`[aria-describedby="${hint.id}"]`));
+    if (!row) return;
+    const at = row.getBoundingClientRect(),
+      { width, height } = hint.getBoundingClientRect();
+    const left = at.x > innerWidth / 2 ? at.left - ROOM - width : at.right + ROOM;
+    if (at.width > WIDEST || left < 0 || left + width > innerWidth) return;
+    const top = Math.min(Math.max(0, at.y + (at.height - height) / 2), innerHeight - height);
+    hint.dataset.beside = "";
+    hint.style.setProperty("--left", `${left}px`);
+    hint.style.setProperty("--top", `${top}px`);
+  };
+  const placeHints = () => {
+    document.querySelectorAll(".mantine-Tooltip-tooltip:not([data-beside])").forEach(placeHint);
+  };
   const nameSoon = () => {
     if (!isDue) setTimeout(nameAll, 100);
     isDue = true;
+    placeHints();
   };
   const changes = { childList: true, characterData: true, subtree: true };
   new MutationObserver(nameSoon).observe(document.body, changes);

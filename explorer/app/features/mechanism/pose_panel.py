@@ -65,6 +65,7 @@ class MovePanel:
                 "singularities; the other legs stay as they are.",
                 UseNearest,
                 icon=viser.Icon.MAGNET,
+                main=True,
             )
         with gui.add_folder("Pose of b4 (design units, degrees)"):
             for axis, name in enumerate("xyz"):
