@@ -27,7 +27,6 @@ from explorer.app.features.singularity.jog_panel import (
     in_shown_units,
     jog_amount,
     jog_label,
-    travel_marks,
     travel_table,
 )
 from explorer.app.features.singularity.jog_scene import JogScene, motion_line, shown_motions
@@ -41,6 +40,7 @@ from explorer.app.state.actions import GoHome, Open, Set, SetPose, SetPosition
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, opened
 from explorer.app.state.view import SingularView
+from explorer.app.widgets.controls import tint_marks
 from explorer.app.widgets.ranges import coordinate_span
 from explorer.errors import InputError
 from explorer.mechanism.design_file import PRESETS
@@ -295,14 +295,17 @@ def test_at_a_singular_pose_motions_say_so_and_lead_away() -> None:
             assert Frame(after).snapshot.stratum == GENERIC
 
 
-def test_marks_are_only_where_the_slider_goes() -> None:
+def test_the_track_of_a_motion_is_tinted_between_its_singular_poses() -> None:
     state = random_states(1)[0]
     span = coordinate_span(state)
     for motion in UNCOUPLED:
+        travel = motion.travel(state.pose)
         if motion.kind == "translation":
-            marks = travel_marks(motion.travel(state.pose), span)
-            assert all(span.low <= value <= span.high for value, _ in marks)
-            assert len(marks) <= 1
+            # One singular pose on one side, none on the other.
+            marks = tint_marks(((travel.low, travel.high),), span)
+            ends = [value for value, _ in marks]
+            assert ends == [max(travel.low, span.low), min(travel.high, span.high)]
+            assert ends[0] < 0.0 < ends[1]
 
 
 @pytest.mark.parametrize("state", random_states(5))

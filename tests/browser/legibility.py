@@ -58,7 +58,7 @@ READ = """() => {
         return element.checkVisibility({ opacityProperty: true, visibilityProperty: true });
     };
     const texts = [];
-    const note = (element, text, rect, isDisabled) => {
+    const note = (element, text, isDisabled) => {
         const style = getComputedStyle(element);
         const isDrawn = element instanceof SVGElement;
         const scale = isDrawn ? element.getScreenCTM().a : 1;
@@ -80,15 +80,16 @@ READ = """() => {
     for (let node = nodes.nextNode(); node; node = nodes.nextNode()) {
         const text = node.data.trim(),
             element = node.parentElement;
-        if (!text || element.closest("script, style, [data-room=scene], #webgl-software-rendering")) continue;
+        if (!text || element.closest("script, style, #webgl-software-rendering")) continue;
         const range = document.createRange();
         range.selectNodeContents(node);
         const isDisabled = !!element.closest(":disabled, [data-disabled], [aria-disabled=true]");
-        if (isSeen(element, range.getBoundingClientRect())) note(element, text, null, isDisabled);
+        if (isSeen(element, range.getBoundingClientRect())) note(element, text, isDisabled);
     }
     for (const field of document.querySelectorAll("input:not([type=hidden]), textarea")) {
-        if (field.value && isSeen(field, field.getBoundingClientRect()) && field.type !== "checkbox")
-            note(field, field.value, null, field.disabled);
+        if (!field.value || field.type === "checkbox") continue;
+        if (isSeen(field, field.getBoundingClientRect()))
+            note(field, field.value, field.disabled);
     }
     return texts;
 }"""

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import msgspec
 import numpy as np
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from strategies import Case, cases
 
 from explorer.mechanism.design import JOINTS, LENGTHS, Limits
 from explorer.mechanism.design_file import PRESETS
-from explorer.mechanism.possible_ranges import possible_ranges, without_box, without_guide
 from explorer.mechanism.pose import Pose
+from explorer.mechanism.possible_ranges import possible_ranges, without_box, without_guide
 
 shares = st.floats(0.0, 1.0) | st.just(0.0)
 
@@ -29,11 +29,11 @@ def allowed(draw: st.DrawFn) -> Case:
         return max(least, value - low), value + high
 
     joints = dict(zip(JOINTS, case.joints.tolist(), strict=True))
-    lengths = {name: around(joints[name], 0.0) for name in LENGTHS}
+    lengths: dict[str, Any] = {name: around(joints[name], 0.0) for name in LENGTHS}
     ends = around(0.0)
     guide = (min(joints["d1"], joints["d3"]) + ends[0], max(joints["d1"], joints["d3"]) + ends[1])
-    faces = [around(value) for value in case.position.tolist()]
-    box = tuple(f[0] for f in faces), tuple(f[1] for f in faces)
+    x, y, z = (around(value) for value in case.position.tolist())
+    box = (x[0], y[0], z[0]), (x[1], y[1], z[1])
     limits = Limits(
         **lengths,
         guide=draw(st.sampled_from((None, guide))),

@@ -22,12 +22,15 @@ window.explorer.names ??= (() => {
     return null;
   };
   const wordsOf = (label) => label.textContent.replace(/\s+/g, " ").trim();
+  // The words beside a control; none if several labels are beside it, of other controls.
+  const labelOf = (control) => {
+    const labels = rowOf(control)?.querySelectorAll("label[for]") ?? [];
+    return labels.length === 1 ? wordsOf(labels[0]) : "";
+  };
   const nameControl = (control) => {
+    const words = labelOf(control);
+    if (!words) return;
     const row = rowOf(control);
-    const labels = row ? row.querySelectorAll("label[for]") : [];
-    // Several labels belong to several controls: this one has no words of its own.
-    if (labels.length !== 1) return;
-    const words = wordsOf(labels[0]);
     const fields = [...row.querySelectorAll("input[inputmode=decimal]")];
     const part = PARTS[fields.length]?.[fields.indexOf(control)];
     name(control, part ? `${words.replace(/ ends$/, "")} ${part}` : words);
@@ -72,9 +75,8 @@ window.explorer.names ??= (() => {
   nameAll();
   // What has the focus, or else the pointer, is named on the root: the stylesheet may point at it.
   const mark = ({ target }) => {
-    const row = rowOf(document.activeElement) ?? (target.closest ? rowOf(target) : null);
-    const labels = row ? row.querySelectorAll("label[for]") : [];
-    document.documentElement.dataset.at = labels.length === 1 ? wordsOf(labels[0]) : "";
+    const words = [document.activeElement, target].map(labelOf);
+    document.documentElement.dataset.at = words.find((each) => each) ?? "";
   };
   for (const event of ["pointerover", "focusin", "focusout"]) addEventListener(event, mark, true);
   return true;

@@ -56,8 +56,7 @@ class Unclosed:
         tetrahedra = " and ".join(" ".join(TETRAHEDRA[i]) for i in self.failing)
         kind = "tetrahedron" if len(self.failing) == 1 else "tetrahedra"
         advice = (
-            f"the nearest value that closes is {self.nearest:.6g}, where the pose is singular; "
-            "“Use the nearest length” stops short of it"
+            f"the nearest value that closes is {self.nearest:.6g}, at a singular pose"
             if self.nearest is not None
             else "with the other legs as they are, no value works"
         )

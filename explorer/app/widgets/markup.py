@@ -108,17 +108,18 @@ def _title(hint: str) -> str:
 
 
 def alert(title: str, body: str) -> str:
-    """Return a box that says what is wrong and what would work."""
+    """Return a box that says what is wrong and what would work, below a title unless it is ""."""
     return _message("alert", "ex-alert", title, body)
 
 
 def remark(title: str, body: str) -> str:
-    """Return a box that says what was done instead of exactly what was requested."""
+    """Return a box that says what was done instead of what was requested, titled like `alert`."""
     return _message("status", "ex-remark", title, body)
 
 
 def _message(role: str, look: str, title: str, body: str) -> str:
-    return f'<div role="{role}" class="{look}"><b>{escape(title)}</b><br>{escape(body)}</div>'
+    head = f"<b>{escape(title)}</b><br>" if title else ""
+    return f'<div role="{role}" class="{look}">{head}{escape(body)}</div>'
 
 
 def sentence(message: str) -> str:

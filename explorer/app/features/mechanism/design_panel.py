@@ -195,7 +195,7 @@ class DesignPanel:
             return _set_limit("box", (tuple(lows), tuple(highs)))
 
         self._controls.ends(
-            name,
+            f"b4 {name}",
             f"The faces of the box across {name}.",
             Bound(lambda frame: read(frame.state), write),
             lambda state: box_span(state, axis),

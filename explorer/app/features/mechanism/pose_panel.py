@@ -17,9 +17,10 @@ from explorer.app.state.actions import (
     UseNearest,
 )
 from explorer.app.state.frame import Frame
+from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.controls import Bound, Controls, Span
-from explorer.app.widgets.markup import alert, remark
+from explorer.app.widgets.markup import alert, note, remark
 from explorer.app.widgets.ranges import joint_span, position_span
 from explorer.mechanism.design import JOINTS
 from explorer.mechanism.margins import describe_modes, mode_name
@@ -57,8 +58,7 @@ class MovePanel:
         with gui.add_folder("Legs (design units)"):
             for joint, name in enumerate(JOINTS):
                 self._add_joint(joint, name)
-            self._alert = gui.add_html("", visible=False)
-            self._remark = gui.add_html("", visible=False)
+            self._message = gui.add_html("")
             self._nearest = controls.button(
                 "Use the nearest length",
                 "Move this leg to the nearest length that closes and stays clear of "
@@ -135,15 +135,20 @@ class MovePanel:
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that make the panel show the frame."""
         unclosed = frame.state.unclosed
-        yield self._alert, "visible", unclosed is not None
-        yield self._nearest, "visible", unclosed is not None and unclosed.nearest is not None
-        if unclosed is not None:
-            yield self._alert, "content", alert("These lengths cannot close", str(unclosed))
-        words = None if unclosed is not None else frame.state.remark
-        yield self._remark, "visible", words is not None
-        if words is not None:
-            yield self._remark, "content", remark("The length was adjusted", words)
+        yield self._message, "content", message(frame.state)
+        yield self._nearest, "disabled", unclosed is None or unclosed.nearest is None
         yield from self._controls.updates(frame)
+
+
+def message(state: State) -> str:
+    """Return what there is to say of the lengths, in room that it always has, as HTML."""
+    if state.unclosed is not None:
+        text = alert("", str(state.unclosed))
+    elif state.remark is not None:
+        text = remark("", state.remark)
+    else:
+        text = note("Tinted: values at which the lengths close, the other joints as they are.")
+    return f'<div class="ex-message">{text}</div>'
 
 
 def is_singular(frame: Frame) -> bool:
