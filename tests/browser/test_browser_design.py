@@ -86,7 +86,9 @@ def test_a_degenerate_value_is_refused_with_a_reason_and_the_old_one_returns(tab
 @pytest.fixture
 def limits(tab: Tab) -> Tab:
     """A tab turned to the limits of the design."""
-    tab.page.get_by_text("Limits (design units)", exact=True).click()
+    # The test before may have left them open.
+    if not tab.label("l1").is_visible():
+        tab.page.get_by_text("Limits (design units)", exact=True).click()
     tab.label("l1").wait_for()
     return tab
 
@@ -146,11 +148,6 @@ def test_a_thumb_stops_at_the_other_and_a_typed_end_pushes_it(limits: Tab) -> No
     drag_thumb(limits, "b4 x", 1, 10.0)
     limits.wait_for(lambda: x_range()[1] > 5.0, "the upper thumb dragged")
     assert x_range()[0] == -40.0
-    assert len(words_of_steps(limits)) == 1 + 4
-
-
-def words_of_steps(tab: Tab) -> list[str]:
-    return [step.words for step in tab.running.page.session.history.steps]
 
 
 def test_ends_of_what_is_unbounded_are_disabled_until_it_is(limits: Tab) -> None:

@@ -26,9 +26,10 @@ from explorer.export.report.data import Missing, gather_report_data
 from explorer.export.report.document import report_html
 from explorer.export.report.drawings.projection import ViewName, fit_view
 from explorer.export.report.drawings.slices import Slices
-from explorer.export.report.markup import as_html, element, format_number, number
+from explorer.export.report.markup import as_html, element, number
 from explorer.mechanism.design import JOINTS, VARIABLES, Swing
 from explorer.mechanism.design_file import decode_design, encode_design
+from explorer.numerics.number_text import format_number
 from explorer.optimise.findings import paper_problem
 from explorer.optimise.record import Record, Settings, record_of
 from explorer.optimise.solver import optimise_design

@@ -11,7 +11,16 @@ from explorer.app.features.legs.radius_plot import RadiusPlot
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.controls import Controls
-from explorer.app.widgets.markup import box, caption, dim, format_number, row, status, table
+from explorer.app.widgets.markup import (
+    box,
+    caption,
+    dim,
+    format_decimals,
+    format_number,
+    row,
+    status,
+    table,
+)
 from explorer.legs.clearance import PAIRS, pair_name
 
 
@@ -89,7 +98,11 @@ def move_table(frame: Frame) -> str:
         cells = ("", "joined", "")
         if not math.isinf(clearance):
             swept = '<span class="ex-beyond">overlap</span>' if move.overlaps[index] else "free"
-            cells = swept, format_number(clearance), f"{100.0 * float(move.share[index]):.0f} %"
+            cells = (
+                swept,
+                format_number(clearance),
+                f"{format_decimals(100.0 * float(move.share[index]), 0)} %",
+            )
         rows.append(_row(index, clearance, *cells, is_closest=move.closest == index))
     return box(
         result,
