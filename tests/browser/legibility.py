@@ -130,3 +130,12 @@ def texts_of(page: Page) -> list[Text]:
         )
         for each in found
     ]
+
+
+def open_folders(page: Page) -> None:
+    """Open the folders that are seen and closed."""
+    closed = page.locator(
+        ".mantine-Paper-root > .mantine-Paper-root:has(.tabler-icon-chevron-down)"
+    )
+    while folder := next((each for each in closed.all() if each.is_visible()), None):
+        folder.click()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import closing
 
 import pytest
-from legibility import Text, texts_of
+from legibility import Text, open_folders, texts_of
 from monkey import explorer_with_data
 from playwright.sync_api import Browser
 from tab import Tab
@@ -29,15 +29,6 @@ def problems(texts: list[Text]) -> list[Text]:
     ]
 
 
-def open_folders(tab: Tab) -> None:
-    """Open the folders that are seen and closed."""
-    closed = tab.page.locator(
-        ".mantine-Paper-root > .mantine-Paper-root:has(.tabler-icon-chevron-down)"
-    )
-    while folder := next((each for each in closed.all() if each.is_visible()), None):
-        folder.click()
-
-
 @pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
 def test_all_text_of_all_tabs_is_legible(browser: Browser, dark: bool) -> None:
     with explorer_with_data() as running:
@@ -48,7 +39,7 @@ def test_all_text_of_all_tabs_is_legible(browser: Browser, dark: bool) -> None:
             tabs = tab.page.get_by_role("tab")
             for index, name in enumerate(tabs.all_inner_texts()):
                 tabs.nth(index).click()
-                open_folders(tab)
+                open_folders(tab.page)
                 # A tab may be laid out and named a moment later.
                 tab.wait_for(
                     lambda: not problems(texts_of(tab.page)),
