@@ -15,6 +15,9 @@ from explorer.app.widgets.markup import box, caption, dim, row, status, table
 from explorer.legs.clearance import PAIRS, pair_name
 from explorer.numerics.number_text import format_column, format_decimals
 
+# Digits of the largest clearance: the least one, of fewer digits, is what matters.
+DIGITS = 5
+
 
 class LegsPanel:
     """The table of clearances, that of the last move, and the radius curve."""
@@ -56,8 +59,8 @@ def clearance_table(frame: Frame) -> str:
     collides = bool(clearances.clearance.min() < 0.0)
     unit_mm = frame.state.design.unit_mm
     values = clearances.clearance.tolist()
-    units = format_column(values, infinite="joined")
-    millimetres = format_column([unit_mm * value for value in values], infinite="")
+    units = format_column(values, DIGITS, infinite="joined")
+    millimetres = format_column([unit_mm * value for value in values], DIGITS, infinite="")
     rows = (
         _row(
             index,
@@ -91,7 +94,7 @@ def move_table(frame: Frame) -> str:
     paper = f"overlap of {pairs}" if pairs else "no overlap"
     rows: list[str] = []
     values = move.clearance.tolist()
-    units = format_column(values, infinite="joined")
+    units = format_column(values, DIGITS, infinite="joined")
     for index, clearance in enumerate(values):
         cells = ("", units[index], "")
         if not math.isinf(clearance):
