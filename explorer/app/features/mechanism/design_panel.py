@@ -128,7 +128,7 @@ class DesignPanel:
             low, high = pushed(before, ends)
             # A maximum at the reach stays there while only the minimum is moved.
             keeps = high == before[1] and _maximum(state, name) is None
-            return _set_limit(name, (max(0.0, low), None if keeps else high))
+            return _set_limit(name, (low, None if keeps else high))
 
         self._controls.ends(
             name,
