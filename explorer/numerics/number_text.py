@@ -1,11 +1,19 @@
 """Numbers as text, in which rounding errors read 0 and no zero has a minus sign.
 
 Whether a value is a rounding error follows from the size of the numbers from which it was
-computed: a design may have any unit, so no length is small in itself.
+computed: a design may have any unit, so no length is small in itself. Files and the command line
+have ASCII text, see `format_ascii` and `format_fixed`; pages and reports have `format_number`,
+`format_decimals` and `format_column`.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+
+# Powers of ten from which on, and below which, a number for people is written without one.
+LEAST_POWER, MOST_POWER = -4, 9
+_SUPERSCRIPTS = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 # Share of its size up to which a number is a rounding error.
 ROUNDING = 1e-12
 
@@ -45,6 +53,83 @@ def set_true_minus(text: str) -> str:
     return text.replace("-", "−")
 
 
-def format_number(value: float, digits: int = 4, *, size: float = 0.0) -> str:
-    """Return the text of `format_ascii` with true minus signs (U+2212)."""
-    return set_true_minus(format_ascii(value, digits, size=size))
+def format_number(
+    value: float, digits: int = 4, *, size: float = 0.0, infinite: str = "infinite"
+) -> str:
+    """Return a number for people, with at least `digits` significant digits.
+
+    Trailing zeros are left out, thousands are separated by commas, and only a number that is tiny
+    or huge has a power of ten: 0.0001, 12,346, and 1.235 × 10⁻⁵ to four digits.
+
+    Args:
+        value: The number; "–" stands for one that is not a number.
+        digits: Number of significant digits; a whole number has all of its own.
+        size: Magnitude of the numbers from which it was computed, see `drop_rounding`.
+        infinite: Word for infinity.
+    """
+    value = drop_rounding(value, size)
+    if not math.isfinite(value):
+        return format_decimals(value, 0, infinite=infinite)
+    mantissa, _, exponent = f"{value:.{digits - 1}e}".partition("e")
+    power = int(exponent)
+    if value != 0.0 and not LEAST_POWER <= power < MOST_POWER:
+        return set_true_minus(f"{_without_zeros(mantissa)} × {power_of_ten(power)}")
+    return _without_zeros(format_decimals(value, max(0, digits - 1 - power)))
+
+
+def format_decimals(
+    value: float, decimals: int, *, signed: bool = False, infinite: str = "infinite"
+) -> str:
+    """Return a number for people with a fixed number of decimals, as for a column of numbers.
+
+    Thousands are separated by commas, and a number that rounds to zero has no sign.
+
+    Args:
+        value: The number; "–" stands for one that is not a number.
+        decimals: Number of decimals.
+        signed: Whether a positive number has a plus sign.
+        infinite: Word for infinity.
+    """
+    if math.isnan(value):
+        return "–"
+    if math.isinf(value):
+        return infinite if value > 0.0 else f"−{infinite}"
+    text = f"{value:z,.{decimals}f}"
+    plus = "+" if signed and value > 0.0 and text.strip("0.,") else ""
+    return plus + set_true_minus(text)
+
+
+def format_column(
+    values: Sequence[float], digits: int = 4, *, size: float = 0.0, infinite: str = "infinite"
+) -> list[str]:
+    """Return numbers for people with equal decimals, which give the largest so many digits.
+
+    Args:
+        values: The numbers.
+        digits: Number of significant digits of the largest one.
+        size: Magnitude of the numbers from which they were computed, see `drop_rounding`.
+        infinite: Word for infinity.
+    """
+    finite = [abs(value) for value in values if math.isfinite(value)]
+    largest = max(finite, default=0.0)
+    if largest > 0.0 and not 10.0**LEAST_POWER <= largest < 10.0**MOST_POWER:
+        return [format_number(value, digits, size=size, infinite=infinite) for value in values]
+    decimals = decimals_for(largest, digits)
+    return [
+        format_decimals(drop_rounding(value, size), decimals, infinite=infinite) for value in values
+    ]
+
+
+def decimals_for(size: float, digits: int) -> int:
+    """Return the decimals that give a number of a size so many digits."""
+    return max(0, digits - 1 - math.floor(math.log10(size))) if size > 0.0 else digits - 1
+
+
+def power_of_ten(exponent: int) -> str:
+    """Return a power of ten, such as 10⁻³."""
+    return f"10{str(exponent).translate(_SUPERSCRIPTS)}"
+
+
+def _without_zeros(text: str) -> str:
+    """Return the text of a number without zeros at the end of its decimals."""
+    return text.rstrip("0").rstrip(".") if "." in text else text

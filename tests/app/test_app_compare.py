@@ -183,7 +183,7 @@ def test_the_table_tells_what_the_functions_tell(millimetres: bool) -> None:
 def test_what_is_small_beside_the_others_is_not_told_as_nothing() -> None:
     volume = CATALOGUE["volume"]
     assert value_text(volume, 0.000999998, 8000.0) == "0.001"
-    assert value_text(volume, -8.574e-9, 8000.0) == "−8.57e−09"
+    assert value_text(volume, -8.574e-9, 8000.0) == "−8.57 × 10⁻⁹"
     assert value_text(volume, 0.0, 8000.0) == "0"
     assert value_text(volume, 7992.0, 8000.0) == "7992.00"
     # A difference by rounding is none.

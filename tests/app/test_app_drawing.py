@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import re
 
 import msgspec
@@ -10,7 +9,6 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from explorer.app.features.mechanism.pose_panel import interval_marks
 from explorer.app.features.singularity.panel import summary
 from explorer.app.scene.bands import COLLIDING, PLAIN
 from explorer.app.scene.camera import FIELD_OF_VIEW, VIEWS, ViewName, framing
@@ -20,9 +18,8 @@ from explorer.app.scene.shapes import cylinder, plate, sphere, turned_to
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import opened
 from explorer.app.widgets.colours import FAR, FAR_WARNINGS, SINGULAR, Rgb, proximity_colour
-from explorer.app.widgets.controls import Span, decimals
+from explorer.app.widgets.controls import decimals
 from explorer.app.widgets.markup import share
-from explorer.app.widgets.ranges import coordinate_span, length_span, round_up, variable_span
 from explorer.mechanism.design import Design, Limits
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
@@ -102,33 +99,6 @@ def test_scenes_are_about_ten_units_large_whatever_the_design(reach: float) -> N
     step = round_step(reach / 10.0)
     assert 6.3 <= reach / step <= 15.9
     assert float(f"{step:.0e}"[0]) in (1.0, 2.0, 5.0)
-
-
-@given(st.lists(st.floats(-28, 28), min_size=2, max_size=6).filter(lambda v: len(v) % 2 == 0))
-def test_marks_stand_at_the_ends_of_the_intervals_and_their_labels_apart(
-    ends: list[float],
-) -> None:
-    ordered = sorted(ends)
-    intervals = tuple(zip(ordered[::2], ordered[1::2], strict=True))
-    span = Span(-30.0, 30.0, 0.01)
-    marks = interval_marks(intervals, span)
-    assert [position for position, _ in marks] == ordered
-    assert any(text for _, text in marks)
-    labelled = [position for position, text in marks if text]
-    assert all(b - a >= 0.2 * 60.0 for a, b in itertools.pairwise(labelled))
-
-
-@given(st.floats(1e-9, 1e9))
-def test_slider_ranges_are_round_and_hold_the_design(size: float) -> None:
-    design = Design(
-        a3=(size, 0.4 * size), b1=(0.4 * size, -0.1 * size), b2=0.3 * size, b3=0.1 * size
-    )
-    state = opened(design)
-    for span in (length_span(state), coordinate_span(state), variable_span(state)):
-        assert span.low < span.high
-        assert span.high >= 1.5 * size * (1.0 - 1e-12)
-        assert span.step < size / 100.0
-    assert round_up(31.0) == 31.0
 
 
 @pytest.mark.parametrize(("step", "digits"), [(1.0, 0), (0.1, 1), (0.001, 3), (10.0, 0), (0.25, 2)])

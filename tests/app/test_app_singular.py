@@ -309,7 +309,7 @@ def test_at_a_singular_pose_motions_say_so_and_lead_away() -> None:
         # A margin that is zero but for rounding is zero.
         travel = motion.travel(state.pose)
         assert min(abs(travel.low), abs(travel.high)) < 1e-9
-        assert travel_marks(Frame(state), index) == ((0.0, HERE),)
+        assert travel_marks(Frame(state), index) == ((0.0, HERE), (0.0, ""))
         assert f"δ{motion.incidence} = 0: {INCIDENCES[motion.incidence - 1]}" in plain(
             summary(Frame(state))
         )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from playwright.sync_api import expect
-from tab import Tab
+from tab import TRACK, Tab
 
 from explorer.app.state.state import joints_of, opened
 from explorer.mechanism.design import VARIABLES
@@ -83,10 +83,113 @@ def test_a_degenerate_value_is_refused_with_a_reason_and_the_old_one_returns(tab
     tab.wait_until_shown("a3y", 7.0062)
 
 
-def test_limits_follow_their_switches(tab: Tab) -> None:
-    tab.page.get_by_text("Limits (design units)", exact=True).click()
-    tab.switch("Maxima at the reach", on=False)
-    tab.wait_for(lambda: tab.state.design.limits.l1[1] is not None, "a maximum of its own")
-    tab.type("l1 most", "11")
-    tab.wait_for(lambda: tab.state.design.limits.l1[1] == 11.0, "the maximum that was typed")
-    expect(tab.page.get_by_text("Outside the limits")).to_be_visible()
+@pytest.fixture
+def limits(tab: Tab) -> Tab:
+    """A tab turned to the limits of the design."""
+    # The test before may have left them open.
+    if not tab.label("l1").is_visible():
+        tab.page.get_by_text("Limits (design units)", exact=True).click()
+    tab.label("l1").wait_for()
+    return tab
+
+
+def type_end(tab: Tab, words: str, end: int, text: str) -> None:
+    """Type the lower end (0) or the upper end (1) of a range."""
+    tab.field(f"{words} ends").nth(end).fill(text)
+    tab.page.keyboard.press("Tab")
+
+
+def thumbs(tab: Tab, words: str) -> list[tuple[float, float]]:
+    """Return the middles of the thumbs of a range, in pixels."""
+    # The sliders' own label names no input, so that their row is found by its parts.
+    row = tab.label(words).locator("xpath=ancestor::*[.//*[contains(@class, 'multi-slider')]][1]")
+    boxes = [thumb.bounding_box() for thumb in row.locator(".multi-slider-thumb").all()]
+    return [(b["x"] + 0.5 * b["width"], b["y"] + 0.5 * b["height"]) for b in boxes if b]
+
+
+def drag_thumb(tab: Tab, words: str, end: int, by: float) -> None:
+    """Drag a thumb of a range by pixels."""
+    tab.label(words).scroll_into_view_if_needed()
+    x, y = thumbs(tab, words)[end]
+    tab.page.mouse.move(x, y)
+    tab.page.mouse.down()
+    tab.page.mouse.move(x + by, y, steps=12)
+    tab.page.mouse.up()
+
+
+def test_an_end_that_is_typed_is_a_limit_and_the_other_end_stays(limits: Tab) -> None:
+    type_end(limits, "l1", 1, "11")
+    limits.wait_for(lambda: limits.state.design.limits.l1 == (0.0, 11.0), "the maximum")
+    expect(limits.page.get_by_text("Outside the limits")).to_be_visible()
+    # The others are the reach still, and so is that of a leg whose minimum alone changes.
+    type_end(limits, "d2", 0, "2.5")
+    limits.wait_for(lambda: limits.state.design.limits.d2 == (2.5, None), "the minimum")
+    assert limits.state.design.limits.l4 == (0.0, None)
+    limits.switch("Maxima at the reach", on=True)
+    limits.wait_for(lambda: limits.state.design.limits.l1 == (0.0, None), "at the reach")
+
+
+def test_a_thumb_stops_at_the_other_and_a_typed_end_pushes_it(limits: Tab) -> None:
+    def x_range() -> tuple[float, float]:
+        box = limits.state.design.limits.box
+        assert box is not None
+        return box[0][0], box[1][0]
+
+    assert x_range() == (0.0, 20.0)
+    drag_thumb(limits, "b4 x", 0, 400.0)
+    limits.wait_for(lambda: x_range()[0] > 19.0, "a thumb at the other")
+    assert x_range()[0] <= 20.0
+    assert x_range()[1] == 20.0
+    type_end(limits, "b4 x", 1, "5")
+    limits.wait_for(lambda: x_range() == (5.0, 5.0), "both ends at the typed one")
+    type_end(limits, "b4 x", 0, "-40")
+    limits.wait_for(lambda: x_range() == (-40.0, 5.0), "an end beyond the track")
+    # The track has become longer, and the thumbs stand in it.
+    drag_thumb(limits, "b4 x", 1, 10.0)
+    limits.wait_for(lambda: x_range()[1] > 5.0, "the upper thumb dragged")
+    assert x_range()[0] == -40.0
+
+
+def test_ends_of_what_is_unbounded_are_disabled_until_it_is(limits: Tab) -> None:
+    field = limits.field("d1, d3 ends").first
+    expect(field).to_be_disabled()
+    limits.switch("Bounded guide", on=True)
+    limits.wait_for(lambda: limits.state.design.limits.guide is not None, "a guide")
+    expect(field).to_be_enabled()
+    type_end(limits, "d1, d3", 0, "2")
+    limits.wait_for(lambda: (limits.state.design.limits.guide or (0, 0))[0] == 2.0, "its end")
+    # The names of what is side by side tell which is which.
+    expect(limits.page.get_by_role("textbox", name="d1, d3 least", exact=True)).to_have_value("2")
+
+
+def test_the_sketch_points_at_the_variable_of_the_row_in_use(tab: Tab) -> None:
+    dimension = tab.page.locator(".ex-sketch [data-variable=b1x] text")
+    plain = dimension.evaluate("each => getComputedStyle(each).fill")
+
+    def is_marked() -> bool:
+        return bool(dimension.evaluate("each => getComputedStyle(each).fill") != plain)
+
+    assert not is_marked()
+    tab.row("b1x").locator(TRACK).hover()
+    tab.wait_for(is_marked, "the variable under the pointer")
+    tab.field("b1y").focus()
+    tab.wait_for(lambda: not is_marked(), "the variable with the focus")
+    tab.field("b1x").focus()
+    tab.wait_for(is_marked, "this one with the focus")
+    # Drawn anew as the design changes, it still is.
+    tab.field("b1x").fill("3")
+    tab.page.keyboard.press("ArrowUp")
+    tab.wait_for(lambda: tab.state.design.b1[0] > 3.0, "another design")
+    assert is_marked()
+
+
+def test_a_hint_stands_beside_its_panel(tab: Tab) -> None:
+    tab.row("b2").locator(TRACK).hover()
+    hint = tab.page.get_by_role("tooltip")
+    hint.wait_for()
+    row, box = tab.row("b2").bounding_box(), hint.bounding_box()
+    assert row is not None
+    assert box is not None
+    assert box["x"] + box["width"] < row["x"]
+    assert box["y"] < row["y"] + row["height"]
+    assert row["y"] < box["y"] + box["height"]

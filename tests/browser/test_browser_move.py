@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 from conftest import OpenTab
 from playwright.sync_api import Browser, Locator, expect
-from tab import SIZE, Tab
+from tab import SIZE, TRACK, Tab
 
 from explorer.app.features.mechanism.marks import ARROW_LENGTH
 from explorer.app.features.mechanism.modes import HoveredMode
 from explorer.app.features.mechanism.pose_panel import JOINT_LABELS
 from explorer.app.scene.placing import Placed
+from explorer.app.screenshot import settle
 from explorer.app.server import Running
 from explorer.app.state.actions import SetPosition
 from explorer.app.state.frame import Frame
@@ -143,10 +144,11 @@ def ghosts_shown(tab: Tab) -> int:
 
 
 def test_lengths_that_cannot_close_leave_the_pose_and_offer_the_nearest(tab: Tab) -> None:
-    alert = tab.page.get_by_role("alert").filter(has_text="These lengths cannot close")
+    alert = tab.page.get_by_role("alert").filter(has_text="cannot close")
     button = tab.page.get_by_role("button", name="Use the nearest length")
     expect(alert).to_be_hidden()
-    expect(button).to_be_hidden()
+    expect(button).to_be_disabled()
+    places = [tab.slider(words).bounding_box() for words in (LABELS[5], "x", "roll (°)")]
 
     before = tab.state
     tab.type(LABELS[0], "25")
@@ -158,12 +160,15 @@ def test_lengths_that_cannot_close_leave_the_pose_and_offer_the_nearest(tab: Tab
     assert tab.state.pose == before.pose
     nearest = cast("float", unclosed.nearest)
     expect(alert).to_contain_text(f"{nearest:.6g}")
+    # The message has room that was kept for it.
+    after = [tab.slider(words).bounding_box() for words in (LABELS[5], "x", "roll (°)")]
+    assert after == places
     # What was asked for stays in its field; all else is as it was.
     assert_page_shows_state(tab)
 
     button.click()
     expect(alert).to_be_hidden()
-    expect(button).to_be_hidden()
+    expect(button).to_be_disabled()
     assert tab.state.unclosed is None
     # The nearest length that closes is singular: the one taken stops short of it, and says so.
     assert tab.state.joints[0] < nearest
@@ -173,6 +178,51 @@ def test_lengths_that_cannot_close_leave_the_pose_and_offer_the_nearest(tab: Tab
         joints_of(tab.state.design, tab.state.pose), tab.state.joints, atol=1e-6
     )
     assert_page_shows_state(tab)
+
+
+def test_a_track_holds_still_while_its_slider_is_dragged(tab: Tab) -> None:
+    # Beyond what is possible, so that the track is longer than it would be of itself.
+    tab.field("x").fill("60")
+    tab.page.keyboard.press("Enter")
+    tab.wait_until_shown("x", 60.0)
+    thumb = tab.slider("x")
+    ends: list[tuple[str | None, str | None]] = []
+    at, track = thumb.bounding_box(), tab.row("x").locator(TRACK).bounding_box()
+    assert at is not None
+    assert track is not None
+    y = at["y"] + 0.5 * at["height"]
+    tab.page.mouse.move(at["x"] + 0.5 * at["width"], y)
+    tab.page.mouse.down()
+    for share in (0.8, 0.5, 0.3, 0.4):
+        tab.page.mouse.move(track["x"] + share * track["width"], y, steps=4)
+        settle(tab.page, tab.client)
+        ends.append((thumb.get_attribute("aria-valuemin"), thumb.get_attribute("aria-valuemax")))
+    tab.page.mouse.up()
+    assert ends == [ends[0]] * len(ends)
+    assert float(ends[0][1] or "") == 60.0
+    # Once something else moves it, the track is what is possible again.
+    tab.push("Home pose")
+    tab.wait_for(lambda: thumb.get_attribute("aria-valuemax") == "21", "the track of before")
+
+
+def test_the_tint_of_a_track_covers_what_closes(tab: Tab) -> None:
+    """Where the track is tinted is read from the places of the marks, as the stylesheet does."""
+    for joint, words in enumerate(LABELS):
+        row = tab.row(words)
+        track = row.locator(".mantine-Slider-track").bounding_box()
+        assert track is not None
+        low, high = (
+            float(tab.slider(words).get_attribute(f"aria-value{end}") or "")
+            for end in ("min", "max")
+        )
+        marks = [mark.bounding_box() for mark in row.locator(".mantine-Slider-markWrapper").all()]
+        places = [
+            low + (high - low) * (mark["x"] - track["x"]) / track["width"] for mark in marks if mark
+        ]
+        intervals = Frame(tab.state).snapshot.intervals[joint]
+        expected = [min(max(end, low), high) for interval in intervals for end in interval]
+        # A pixel is a hundredth of the track.
+        assert places == pytest.approx(expected, abs=0.01 * (high - low))
 
 
 def test_home_brings_back_the_home_pose(tab: Tab) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from contextlib import closing
 from typing import Any
 
+from legibility import open_folders
 from monkey import explorer_with_data
 from playwright.sync_api import Browser
 from tab import Tab
@@ -31,6 +32,7 @@ def test_every_control_has_a_name_in_every_tab(browser: Browser) -> None:
     with explorer_with_data() as running, closing(Tab(browser, running, size=SIZE)) as tab:
         for name in tab.page.get_by_role("tab").all_inner_texts():
             tab.turn_to(name.strip())
+            open_folders(tab.page)
             tab.wait_for(
                 lambda: all(named for _, named in controls(tab)), f"names of all controls in {name}"
             )
@@ -46,6 +48,13 @@ def test_every_control_has_a_name_in_every_tab(browser: Browser) -> None:
         for words in ("x", "yaw (°)"):
             assert ("slider", words) in controls(tab)
             assert ("textbox", words) in controls(tab)
+        # Both ends of a range have names of their own.
+        tab.turn_to("Design")
+        tab.wait_for(lambda: ("textbox", "l1 most") in controls(tab), "the first range")
+        found = controls(tab)
+        for words in ("l1", "d1, d3", "b4 x"):
+            for end in ("least", "most"):
+                assert found.count(("textbox", f"{words} {end}")) == 1
         # What comes later has one too.
         tab.page.keyboard.press("k")
         tab.page.get_by_role("dialog").wait_for()

@@ -26,9 +26,10 @@ from explorer.export.report.data import Missing, gather_report_data
 from explorer.export.report.document import report_html
 from explorer.export.report.drawings.projection import ViewName, fit_view
 from explorer.export.report.drawings.slices import Slices
-from explorer.export.report.markup import as_html, element, format_number, number
+from explorer.export.report.markup import as_html, element, number
 from explorer.mechanism.design import JOINTS, VARIABLES, Swing
 from explorer.mechanism.design_file import decode_design, encode_design
+from explorer.numerics.number_text import format_number
 from explorer.optimise.findings import paper_problem
 from explorer.optimise.record import Record, Settings, record_of
 from explorer.optimise.solver import optimise_design
@@ -329,10 +330,10 @@ def test_number_any_value_reads_back_rounded_and_in_full(value: float) -> None:
 
 
 def test_format_number_special_values_are_readable() -> None:
-    assert format_number(math.inf) == "∞"
-    assert format_number(-math.inf) == "−∞"
+    assert format_number(math.inf) == "infinite"
+    assert format_number(-math.inf) == "−infinite"
     assert format_number(-0.0) == "0"
-    assert format_number(1234567.0) == "1234570"
+    assert format_number(1234567.0) == "1,234,567"
     assert format_number(-1.5e-7) == "−1.5 × 10⁻⁷"
 
 
@@ -341,7 +342,7 @@ def test_report_empty_workspace_gives_reason() -> None:
     page = page_of(OPTIMAL, level)
     assert "The workspace is empty at this orientation because of margin δ2" in page.text
     assert "The pose is singular: lines a1a2 and b2b3 meeting" in page.text
-    assert "∞" in page.text
+    assert "infinite" in page.text
     commands = page.one(id="commands").text
     assert "--position 10.0 5.0 9.0 --quaternion 1.0 0.0 0.0 0.0" in commands
 

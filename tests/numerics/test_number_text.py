@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 
 import pytest
@@ -18,7 +19,14 @@ from explorer.cli.commands.singularity import Singularity
 from explorer.cli.output import degrees, figures
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
-from explorer.numerics.number_text import drop_rounding, format_ascii, format_fixed, format_number
+from explorer.numerics.number_text import (
+    drop_rounding,
+    format_ascii,
+    format_column,
+    format_decimals,
+    format_fixed,
+    format_number,
+)
 
 NEGATIVE_ZERO = re.compile(r"(?<![\d.])[-−]0(\.0*)?(?![\d.e])")
 
@@ -43,14 +51,14 @@ def test_number_text_of_rounding_reads_zero_in_every_unit(size: float, share: fl
     assert format_number(rounding, size=size) == "0"
     assert drop_rounding(rounding, size) == 0.0
     assert float(figures([size, rounding])[1]) == 0.0
-    assert float(fitted(rounding, size, 5)) == 0.0
+    assert read(fitted(rounding, size, 5)) == 0.0
 
 
 @given(st.floats(1e-20, 1e20))
 def test_number_text_of_small_number_above_rounding_is_kept(size: float) -> None:
     assert format_number(1e-9 * size, size=size) != "0"
     assert format_number(1e-30 * size) != "0"
-    assert share(1.651e-9) == "1.65e−09"
+    assert share(1.651e-9) == "1.65 × 10⁻⁹"
 
 
 @pytest.mark.parametrize("incidence", [1, 2, 3])
@@ -71,3 +79,70 @@ def test_command_at_a_singular_pose_shows_no_rounding(capsys: pytest.CaptureFixt
     text = capsys.readouterr().out
     assert not re.search(r"e-(1[3-9]|[2-9]\d)", text)
     assert not NEGATIVE_ZERO.search(text)
+
+
+numbers = st.tuples(st.floats(-10.0, 10.0), st.integers(-15, 15)).map(
+    lambda parts: parts[0] * 10.0 ** parts[1]
+)
+"""Numbers of thirty decades, and zeros of both signs."""
+
+SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
+
+
+def read(text: str) -> float:
+    """Return the number that a text for people stands for."""
+    mantissa, _, power = text.replace(",", "").replace("−", "-").partition(" × 10")
+    return float(mantissa) * 10.0 ** int(power.translate(SUPERSCRIPTS) or 0)
+
+
+@given(numbers, st.integers(1, 8))
+def test_number_text_for_people_is_the_number_to_its_digits(value: float, digits: int) -> None:
+    text = format_number(value, digits)
+    assert abs(read(text) - value) <= 0.5001 * 10.0 ** (1 - digits) * abs(value)
+    assert not NEGATIVE_ZERO.fullmatch(text)
+    assert "e" not in text
+    assert "-" not in text
+    # Thousands are separated, and there are no zeros at the end of decimals.
+    whole, _, decimals = text.partition(" ×")[0].lstrip("−").partition(".")
+    assert re.fullmatch(r"\d{1,3}(,\d{3})*", whole)
+    assert not decimals.endswith("0")
+
+
+@given(numbers, st.integers(0, 8), st.booleans())
+def test_decimals_for_people_are_as_many_as_asked_for(
+    value: float, decimals: int, plus: bool
+) -> None:
+    text = format_decimals(value, decimals, signed=plus)
+    assert abs(read(text) - value) <= 0.5001 * 10.0**-decimals + 1e-12 * abs(value)
+    assert len(text.partition(".")[2]) == decimals
+    assert not NEGATIVE_ZERO.fullmatch(text)
+    assert text.startswith("+") == (plus and read(text) > 0.0)
+    assert text.startswith("−") == (read(text) < 0.0)
+
+
+@given(st.lists(numbers, min_size=1, max_size=8), st.integers(1, 6))
+def test_a_column_has_equal_decimals_and_the_digits_of_its_largest_number(
+    values: list[float], digits: int
+) -> None:
+    largest = max(map(abs, values))
+    texts = format_column([*values, math.inf], digits)
+    assert texts.pop() == "infinite"
+    for value, text in zip(values, texts, strict=True):
+        assert abs(read(text) - value) <= 0.5001 * 10.0 ** (1 - digits) * largest
+    if largest == 0.0 or 1e-4 <= largest < 1e9:
+        assert len({len(text.partition(".")[2]) for text in texts}) == 1
+
+
+@given(st.floats(1e-20, 1e20), st.floats(-1.0, 1.0), st.integers(1, 6))
+def test_a_column_shows_no_rounding(size: float, share: float, digits: int) -> None:
+    rounding = 1e-14 * share * size
+    text = format_column([size, rounding], digits, size=size)[1]
+    assert read(text) == 0.0
+    assert not NEGATIVE_ZERO.fullmatch(text)
+
+
+def test_what_is_no_finite_number_is_a_word() -> None:
+    for value, word in ((math.inf, "infinite"), (-math.inf, "−infinite"), (math.nan, "–")):
+        assert format_number(value) == word
+        assert format_decimals(value, 3) == word
+    assert format_number(math.inf, infinite="never") == "never"

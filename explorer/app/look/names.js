@@ -1,4 +1,5 @@
-// Gives each control the words beside it as its name for screen readers.
+// Gives each control the words beside it as its name for screen readers, and puts hints beside the
+// panel, where they cover no control.
 window.explorer.names ??= (() => {
   const CONTROLS =
     "[role=slider], input:not([type=hidden]):not([type=file]):not([type=checkbox]), textarea";
@@ -8,25 +9,31 @@ window.explorer.names ??= (() => {
     adjustments: "Settings of the page",
     "arrow-back": "Back to the controls",
   };
-  const AXES = ["x", "y", "z"];
+  // Names of fields side by side, by their number.
+  const PARTS = { 2: ["least", "most"], 3: ["x", "y", "z"] };
   const name = (it, words) => {
     if (words && it.getAttribute("aria-label") !== words) it.setAttribute("aria-label", words);
   };
   // The smallest part of the page that holds a control and the words beside it.
   const rowOf = (control) => {
-    for (let row = control.parentElement; row; row = row.parentElement) {
+    for (let row = control?.parentElement; row; row = row.parentElement) {
       if (row.querySelector("label[for]")) return row;
     }
     return null;
   };
+  const wordsOf = (label) => label.textContent.replace(/\s+/g, " ").trim();
+  // The words beside a control; none if several labels are beside it, of other controls.
+  const labelOf = (control) => {
+    const labels = rowOf(control)?.querySelectorAll("label[for]") ?? [];
+    return labels.length === 1 ? wordsOf(labels[0]) : "";
+  };
   const nameControl = (control) => {
+    const words = labelOf(control);
+    if (!words) return;
     const row = rowOf(control);
-    const labels = row ? row.querySelectorAll("label[for]") : [];
-    // Several labels belong to several controls: this one has no words of its own.
-    if (labels.length !== 1) return;
-    const words = labels[0].textContent.replace(/\s+/g, " ").trim();
     const fields = [...row.querySelectorAll("input[inputmode=decimal]")];
-    name(control, fields.length === 3 ? `${words} ${AXES[fields.indexOf(control)]}` : words);
+    const part = PARTS[fields.length]?.[fields.indexOf(control)];
+    name(control, part ? `${words.replace(/ ends$/, "")} ${part}` : words);
   };
   const nameButton = (button) => {
     if (button.matches(".mantine-Notification-closeButton")) name(button, "Close");
@@ -40,12 +47,37 @@ window.explorer.names ??= (() => {
     document.querySelectorAll(CONTROLS).forEach(nameControl);
     document.querySelectorAll("button").forEach(nameButton);
   };
+  // Width of the widest panel at a side of the window, and room beside a hint, in pixels.
+  const WIDEST = 420,
+    ROOM = 24;
+  const placeHint = (hint) => {
+    const row = rowOf(document.querySelector(`[aria-describedby="${hint.id}"]`));
+    if (!row) return;
+    const at = row.getBoundingClientRect(),
+      { width, height } = hint.getBoundingClientRect();
+    const left = at.x > innerWidth / 2 ? at.left - ROOM - width : at.right + ROOM;
+    if (at.width > WIDEST || left < 0 || left + width > innerWidth) return;
+    const top = Math.min(Math.max(0, at.y + (at.height - height) / 2), innerHeight - height);
+    hint.dataset.beside = "";
+    hint.style.setProperty("--left", `${left}px`);
+    hint.style.setProperty("--top", `${top}px`);
+  };
+  const placeHints = () => {
+    document.querySelectorAll(".mantine-Tooltip-tooltip:not([data-beside])").forEach(placeHint);
+  };
   const nameSoon = () => {
     if (!isDue) setTimeout(nameAll, 100);
     isDue = true;
+    placeHints();
   };
   const changes = { childList: true, characterData: true, subtree: true };
   new MutationObserver(nameSoon).observe(document.body, changes);
   nameAll();
+  // What has the focus, or else the pointer, is named on the root: the stylesheet may point at it.
+  const mark = ({ target }) => {
+    const words = [document.activeElement, target].map(labelOf);
+    document.documentElement.dataset.at = words.find((each) => each) ?? "";
+  };
+  for (const event of ["pointerover", "focusin", "focusout"]) addEventListener(event, mark, true);
   return true;
 })();

@@ -31,7 +31,7 @@ from explorer.mechanism.feasible_intervals import feasible_intervals, nearest_fe
 from explorer.mechanism.kinematics import discriminants, forward
 from explorer.mechanism.margins import mode_name
 from explorer.mechanism.pose import Pose, Triple
-from explorer.numerics.number_text import format_ascii
+from explorer.numerics.number_text import format_ascii, format_number
 
 
 @dataclass(frozen=True)
@@ -238,8 +238,8 @@ class SetVariable(Action):
         if not solution.feasible:
             present = state.design.variables[VARIABLES.index(self.name)]
             raise InputError(
-                f"{self.name} = {self.value:.6g} cannot be assembled while the legs are held; "
-                f"it stays {present:.6g}. Hold the pose to go further."
+                f"{self.name} = {format_number(self.value, 6)} cannot be assembled while the legs "
+                f"are held; it stays {format_number(present, 6)}. Hold the pose to go further."
             )
         pose = Pose.of(solution.position[state.mode], solution.rotation[state.mode])
         return replace(

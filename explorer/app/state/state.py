@@ -26,6 +26,7 @@ from explorer.mechanism.home import home_pose
 from explorer.mechanism.kinematics import inverse
 from explorer.mechanism.margins import TETRAHEDRA, margins, mode_of
 from explorer.mechanism.pose import Pose, Triple, yaw_pitch_roll_from_rotation
+from explorer.numerics.number_text import format_number
 from explorer.optimise.outcome import Iterate
 from explorer.optimise.problem import Problem
 from explorer.optimise.record import Record
@@ -56,13 +57,13 @@ class Unclosed:
         tetrahedra = " and ".join(" ".join(TETRAHEDRA[i]) for i in self.failing)
         kind = "tetrahedron" if len(self.failing) == 1 else "tetrahedra"
         advice = (
-            f"the nearest value that closes is {self.nearest:.6g}, where the pose is singular; "
-            "“Use the nearest length” stops short of it"
+            f"the nearest value that closes is {format_number(self.nearest, 6)}, at a singular pose"
             if self.nearest is not None
             else "with the other legs as they are, no value works"
         )
         name = JOINTS[self.joint]
-        return f"{name} = {self.asked:.6g} cannot close the {kind} {tetrahedra}; {advice}."
+        asked = format_number(self.asked, 6)
+        return f"{name} = {asked} cannot close the {kind} {tetrahedra}; {advice}."
 
 
 @dataclass(frozen=True)

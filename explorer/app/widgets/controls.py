@@ -7,9 +7,10 @@ slider never moves under the pointer.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Generic, TypeAlias, TypeVar
+from typing import Any, Generic, Literal, TypeAlias, TypeVar, cast
 
 import viser
 
@@ -21,10 +22,14 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.state.values import value_at
 from explorer.app.widgets.assigning import Update
+from explorer.mechanism.design import Pair
+from explorer.mechanism.feasible_intervals import Interval
 from explorer.mechanism.pose import Triple
 from explorer.numerics.number_text import drop_rounding
 
-Value = TypeVar("Value", float, bool, str, Triple)
+Value = TypeVar("Value", float, bool, str, Pair, Triple)
+# Colour of viser by which the stylesheet tells the main button of a tab from the others.
+MAIN: Literal["blue"] = "blue"
 Condition = Callable[[State], bool]
 """A function that tells whether a condition holds in a state."""
 
@@ -130,6 +135,8 @@ class Control(Generic[Value]):
         self._disabled = disabled
         self._visible = visible
         self._last_value: Value | None = None
+        # Whether the last value came from the control itself.
+        self._is_set_here = False
         handle.on_update(self._post_change)
 
     def _post_change(self, event: viser.GuiEvent[Any]) -> None:
@@ -142,6 +149,7 @@ class Control(Generic[Value]):
 
     def _change(self, state: State) -> Action:
         self._last_value = self.handle.value
+        self._is_set_here = True
         return self._bound.write(state, self._last_value)
 
     def updates(self, frame: Frame) -> Iterator[Update]:
@@ -156,11 +164,72 @@ class Control(Generic[Value]):
         # While a newer change waits, its value counts.
         if value != self._last_value and not self._session.is_waiting(self):
             self._last_value = value
+            self._is_set_here = False
             yield self.handle, "value", value
+
+    def _is_own(self, value: Value) -> bool:
+        """Whether a value is the one that was last set with the control itself."""
+        return self._is_set_here and (value == self._last_value or self._session.is_waiting(self))
+
+
+Intervals: TypeAlias = tuple[Interval, ...]
+"""Disjoint ascending intervals, in the unit of a slider's value; an end may be infinite."""
+
+
+class _Track:
+    """The range of a slider, which follows the state and holds every value of its thumbs.
+
+    Args:
+        handle: The slider.
+        span: Range, or the function that returns it.
+        closes_up: Whether it shows only the surroundings of the tinted parts.
+    """
+
+    def __init__(
+        self,
+        handle: viser.GuiSliderHandle[float] | viser.GuiMultiSliderHandle[float],
+        span: Span | Callable[[State], Span],
+        *,
+        closes_up: bool = False,
+    ) -> None:
+        self._handle = handle
+        self._span = span
+        self._closes_up = closes_up
+        self._shown: Span | None = None
+
+    def span(
+        self, state: State, values: tuple[float, ...], tinted: Intervals = (), *, is_own: bool
+    ) -> Span:
+        """Return the range in a state.
+
+        Args:
+            state: The state.
+            values: Values of the thumbs.
+            tinted: The tinted parts.
+            is_own: Whether the slider itself was changed last: then its range may only grow, so
+                that it holds still under the pointer.
+        """
+        span = self._span if isinstance(self._span, Span) else self._span(state)
+        if self._closes_up:
+            span = close_up(span, tinted, self._shown)
+        low, high = min(span.low, *values), max(span.high, *values)
+        if is_own and self._shown is not None:
+            low, high = min(low, self._shown.low), max(high, self._shown.high)
+        return Span(low, high, span.step)
+
+    def updates(self, span: Span) -> Iterator[Update]:
+        """Yield the updates that give the slider its range."""
+        if span == self._shown:
+            return
+        self._shown = span
+        yield self._handle, "min", span.low
+        yield self._handle, "max", span.high
+        yield self._handle, "step", span.step
+        yield self._handle, "precision", decimals(span.step)
 
 
 class Slider(Control[float]):
-    """A slider with a number field, whose range follows the state."""
+    """A slider with a number field, whose range and tinted parts follow the state."""
 
     def __init__(
         self,
@@ -169,30 +238,61 @@ class Slider(Control[float]):
         bound: Bound[float],
         span: Span | Callable[[State], Span],
         disabled: Condition | None,
-        marks: Callable[[Frame], tuple[Mark, ...]] | None,
+        tinted: Callable[[Frame], Intervals] | None,
+        ends: Callable[[Frame], tuple[Mark, ...]] | None = None,
+        *,
+        closes_up: bool = False,
     ) -> None:
         super().__init__(session, handle, bound, disabled=disabled)
-        self._slider = handle
-        self._span = span
-        self._marks = marks
-        self._marks_of = SliderMarks(handle)
-        self._range: tuple[float, float, float] | None = None
+        self._track = _Track(handle, span, closes_up=closes_up)
+        self._tinted = tinted
+        self._ends = ends
+        self._marks = SliderMarks(handle)
 
     def updates(self, frame: Frame) -> Iterator[Update]:
-        """Yield the updates that make the slider show the frame, its range and marks first."""
-        span = self._span if isinstance(self._span, Span) else self._span(frame.state)
+        """Yield the updates that make the slider show the frame, its range first."""
+        value = self._bound.read(frame)
+        tinted = () if self._tinted is None else self._tinted(frame)
+        is_own = self._is_own(value)
+        span = self._track.span(frame.state, (value,), tinted, is_own=is_own)
         # A field would show rounding as −0.00.
-        value = drop_rounding(self._bound.read(frame), max(abs(span.low), abs(span.high)))
-        low, high = min(span.low, value), max(span.high, value)
-        if (low, high, span.step) != self._range:
-            self._range = (low, high, span.step)
-            yield self._slider, "min", low
-            yield self._slider, "max", high
-            yield self._slider, "step", span.step
-            yield self._slider, "precision", decimals(span.step)
-        if self._marks is not None:
-            yield self._marks_of, "marks", self._marks(frame)
+        value = drop_rounding(value, max(abs(span.low), abs(span.high)))
+        yield from self._track.updates(span)
+        if self._tinted is not None:
+            yield self._marks, "marks", tint_marks(tinted, span)
+        elif self._ends is not None:
+            yield self._marks, "marks", self._ends(frame)
         yield from self._show(frame.state, value)
+
+
+class Ends(Control[Pair]):
+    """The two thumbs of a range, or its two number fields."""
+
+    def __init__(
+        self,
+        session: Session,
+        handle: viser.GuiMultiSliderHandle[float] | viser.GuiVector2Handle,
+        bound: Bound[Pair],
+        span: Callable[[State], Span],
+        disabled: Condition | None,
+    ) -> None:
+        super().__init__(session, cast("Any", handle), bound, disabled=disabled)
+        self._thumbs = None
+        if isinstance(handle, viser.GuiMultiSliderHandle):
+            self._thumbs = _Track(handle, span)
+        self._span = span
+
+    def updates(self, frame: Frame) -> Iterator[Update]:
+        """Yield the updates that make the thumbs or fields show the frame, their range first."""
+        ends = self._bound.read(frame)
+        if self._thumbs is not None:
+            is_own = self._is_own(ends)
+            yield from self._thumbs.updates(self._thumbs.span(frame.state, ends, is_own=is_own))
+        else:
+            step = self._span(frame.state).step
+            yield self.handle, "step", step
+            yield self.handle, "precision", decimals(step)
+        yield from self._show(frame.state, ends)
 
 
 class Number(Control[float]):
@@ -263,9 +363,23 @@ class Controls:
         span: Span | Callable[[State], Span],
         *,
         disabled: Condition | None = None,
-        marks: Callable[[Frame], tuple[Mark, ...]] | None = None,
+        tinted: Callable[[Frame], Intervals] | None = None,
+        ends: Callable[[Frame], tuple[Mark, ...]] | None = None,
+        closes_up: bool = False,
     ) -> Slider:
-        """Add a slider with a number field; its range may follow the state."""
+        """Add a slider with a number field.
+
+        Args:
+            label: Words beside it.
+            hint: Sentence on what it sets.
+            at: Source of its value.
+            span: Range of its track, which may follow the state; values beyond can be typed.
+            disabled: Condition in which it is disabled; None for never.
+            tinted: Function that returns the feasible parts of the track; None to tint none.
+            ends: Function that returns the ends of these parts with words below them, in place
+                of `tinted`; None for no words.
+            closes_up: Whether the track shows only the surroundings of its tinted parts.
+        """
         handle = self._gui.add_slider(
             label,
             min=0.0,
@@ -273,11 +387,39 @@ class Controls:
             step=0.01,
             initial_value=0.0,
             hint=hint,
-            marks=() if marks is not None else None,
+            marks=(),
         )
-        slider = Slider(self._session, handle, bound_to(at, label), span, disabled, marks)
+        bound = bound_to(at, label)
+        slider = Slider(
+            self._session, handle, bound, span, disabled, tinted, ends, closes_up=closes_up
+        )
         self._controls.append(slider)
         return slider
+
+    def ends(
+        self,
+        label: str,
+        hint: str,
+        at: Bound[Pair],
+        span: Callable[[State], Span],
+        *,
+        disabled: Condition | None = None,
+    ) -> None:
+        """Add a range in one row: a slider with two thumbs, and a number field for each end.
+
+        Args:
+            label: Words beside it, short.
+            hint: Sentence on what it sets.
+            at: Binding of its ends, the lower one first; the fields may be given them in any order.
+            span: Function that returns the range of its track; values beyond can be typed.
+            disabled: Condition in which it is disabled; None for never.
+        """
+        thumbs = self._gui.add_multi_slider(label, 0.0, 1.0, 0.01, (0.0, 1.0), marks=(), hint=hint)
+        # The stylesheet puts the fields into the row of the thumbs, and a script names them.
+        fields = self._gui.add_vector2(f"{label} ends", (0.0, 1.0), step=0.01, hint=hint)
+        self._controls += [
+            Ends(self._session, handle, at, span, disabled) for handle in (thumbs, fields)
+        ]
 
     def number(
         self,
@@ -370,9 +512,18 @@ class Controls:
         action: Callable[[], Action],
         *,
         icon: viser.IconName | None = None,
+        main: bool = False,
     ) -> viser.GuiButtonHandle:
-        """Add a button that does an action."""
-        handle = self._gui.add_button(label, hint=hint, icon=icon)
+        """Add a button that does an action.
+
+        Args:
+            label: Words on it.
+            hint: Sentence on what it does.
+            action: Function that returns the action.
+            icon: Icon before the words.
+            main: Whether it is the one filled button of its tab.
+        """
+        handle = self._gui.add_button(label, hint=hint, icon=icon, color=MAIN if main else None)
 
         @handle.on_click
         def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
@@ -384,6 +535,67 @@ class Controls:
         """Yield the updates that make every control show the frame."""
         for control in self._controls:
             yield from control.updates(frame)
+
+
+def tint_marks(intervals: Intervals, span: Span) -> tuple[Mark, ...]:
+    """Return the ends of intervals within a range as marks, from which a stylesheet tints a track.
+
+    The track is tinted from each mark of odd number to the next one.
+
+    Args:
+        intervals: The intervals.
+        span: Range of the slider.
+    """
+    return tuple(
+        (min(max(end, span.low), span.high), "")
+        for low, high in intervals
+        if low < span.high and high > span.low
+        for end in (low, high)
+    )
+
+
+# Least width of a close-up over the whole range, and least part of the track that is tinted before
+# the close-up is made anew.
+LEAST_CLOSE_UP, LEAST_TINTED = 0.1, 0.25
+
+
+def close_up(whole: Span, intervals: Intervals, before: Span | None) -> Span:
+    """Return the part of a range around intervals, as wide again as they are.
+
+    Args:
+        whole: The range.
+        intervals: The intervals, disjoint and ascending.
+        before: The part that was shown before, which stays as long as it serves; None if none was.
+    """
+    inside = [(low, high) for low, high in intervals if low < whole.high and high > whole.low]
+    if not inside:
+        return whole
+    low, high = max(inside[0][0], whole.low), min(inside[-1][1], whole.high)
+    width = max(high - low, LEAST_CLOSE_UP * (whole.high - whole.low))
+    if before is not None and before.step == whole.step:
+        is_inside = whole.low <= before.low <= low and high <= before.high <= whole.high
+        if is_inside and width >= LEAST_TINTED * (before.high - before.low):
+            return before
+    middle = 0.5 * (low + high)
+    part = round_span(middle - width, middle + width, whole.step)
+    return Span(max(part.low, whole.low), min(part.high, whole.high), whole.step)
+
+
+def round_span(low: float, high: float, step: float) -> Span:
+    """Return a range whose ends are whole multiples of ten steps, no narrower than asked for.
+
+    A slider's values are whole steps from its lower end.
+
+    Args:
+        low: Lower end.
+        high: Upper end.
+        step: Step of the slider, a power of ten.
+    """
+    unit = 10.0 * step
+    digits = -round(math.log10(unit))
+    ends = (math.floor(low / unit), math.ceil(high / unit))
+    lowest, highest = (round(end * unit, digits) for end in ends)
+    return Span(lowest, highest, step)
 
 
 def decimals(step: float) -> int:

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 from html import escape
 from typing import Literal
 
 from explorer.app.widgets.colours import MARGIN_COLOURS, Rgb, css, margin_text
-from explorer.numerics.number_text import drop_rounding, format_fixed, format_number, set_true_minus
+from explorer.numerics.number_text import (
+    decimals_for,
+    drop_rounding,
+    format_decimals,
+    format_number,
+)
 
 
 def by_theme(light: str, dark: str) -> str:
@@ -125,17 +129,18 @@ def _title(hint: str) -> str:
 
 
 def alert(title: str, body: str) -> str:
-    """Return a box that says what is wrong and what would work."""
+    """Return a box that says what is wrong and what would work, below a title unless it is ""."""
     return _message("alert", "ex-alert", title, body)
 
 
 def remark(title: str, body: str) -> str:
-    """Return a box that says what was done instead of exactly what was requested."""
+    """Return a box that says what was done instead of what was requested, titled like `alert`."""
     return _message("status", "ex-remark", title, body)
 
 
 def _message(role: str, look: str, title: str, body: str) -> str:
-    return f'<div role="{role}" class="{look}"><b>{escape(title)}</b><br>{escape(body)}</div>'
+    head = f"<b>{escape(title)}</b><br>" if title else ""
+    return f'<div role="{role}" class="{look}">{head}{escape(body)}</div>'
 
 
 def sentence(message: str) -> str:
@@ -144,17 +149,12 @@ def sentence(message: str) -> str:
 
 
 def signed(value: float, digits: int = 3) -> str:
-    """Return a number with a true minus sign."""
-    return set_true_minus(format_fixed(value, digits))
+    """Return a number with a fixed number of decimals, see `format_decimals`."""
+    return format_decimals(value, digits)
 
 
 # Numbers beyond these sizes have a power of ten.
 LEAST, MOST = 1e-3, 1e7
-
-
-def decimals_for(size: float, digits: int) -> int:
-    """Return the decimals that give a number of a size so many digits."""
-    return max(0, digits - 1 - math.floor(math.log10(size))) if size > 0.0 else digits - 1
 
 
 def fitted(value: float, size: float, digits: int) -> str:
@@ -173,4 +173,4 @@ def fitted(value: float, size: float, digits: int) -> str:
 def share(value: float) -> str:
     """Return a number from 0 to 1 with four decimals, or more where it would look like 0."""
     value = drop_rounding(value, 1.0)
-    return format_number(value, 3) if 0.0 < value < LEAST else format_fixed(value, 4)
+    return format_number(value, 3) if 0.0 < value < LEAST else format_decimals(value, 4)

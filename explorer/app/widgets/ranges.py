@@ -1,4 +1,8 @@
-"""The ranges of the sliders, from the design as it was opened, so that they hold still."""
+"""The ranges of the sliders: what the limits of the design leave possible, and a little more.
+
+Sliders that change the design have ranges that follow the design as it was opened, and so hold
+still while they are dragged.
+"""
 
 from __future__ import annotations
 
@@ -6,10 +10,14 @@ import functools
 import math
 
 from explorer.app.state.state import State
-from explorer.app.widgets.controls import Span
+from explorer.app.widgets.controls import Span, round_span
+from explorer.mechanism.design import JOINTS, LENGTHS, Design, Pair
+from explorer.mechanism.possible_ranges import possible_ranges, without_box, without_guide
 
-# Ends of sliders over the size of the design: beyond usual limits, so that users run into them.
+# Ends of sliders over the size of what they change, so that users run into limits.
 BEYOND = 1.5
+# Room beyond each end of what is possible, as a share of the range.
+ROOM = 0.05
 
 
 def fine_step(size: float, parts: float) -> float:
@@ -17,8 +25,71 @@ def fine_step(size: float, parts: float) -> float:
     return 10.0 ** math.floor(math.log10(size / parts))
 
 
+def joint_span(state: State, joint: int) -> Span:
+    """Return the range of a joint, by its index in `JOINTS`."""
+    return _joint_spans(state.design)[joint]
+
+
+@functools.lru_cache(64)
+def _joint_spans(design: Design) -> tuple[Span, ...]:
+    ranges = possible_ranges(design).joints
+    return tuple(
+        _around(ends, design.reach, least=0.0 if name in LENGTHS else -math.inf)
+        for name, ends in zip(JOINTS, ranges, strict=True)
+    )
+
+
+def position_span(state: State, axis: int) -> Span:
+    """Return the range of a coordinate of b4."""
+    return _position_spans(state.design)[axis]
+
+
+@functools.lru_cache(64)
+def _position_spans(design: Design) -> tuple[Span, ...]:
+    return tuple(_around(ends, design.reach) for ends in possible_ranges(design).position)
+
+
+def length_limit_span(state: State) -> Span:
+    """Return the range for the limits of a length."""
+    longest = max(state.base.length_range(name)[1] for name in LENGTHS)
+    return _around((0.0, max(longest, state.base.reach)), state.base.reach, least=0.0)
+
+
+def guide_span(state: State) -> Span:
+    """Return the range for the ends of the guide."""
+    return _guide_span(state.base)
+
+
+@functools.lru_cache(64)
+def _guide_span(base: Design) -> Span:
+    joints = possible_ranges(without_guide(base)).joints
+    own = () if base.limits.guide is None else (base.limits.guide,)
+    return _around(_hull(joints[1], joints[3], *own), base.reach)
+
+
+def box_span(state: State, axis: int) -> Span:
+    """Return the range for the faces of the box across an axis."""
+    return _box_spans(state.base)[axis]
+
+
+@functools.lru_cache(64)
+def _box_spans(base: Design) -> tuple[Span, ...]:
+    own = base.limits.box
+    free = possible_ranges(without_box(base)).position
+    faces = [() if own is None else ((own[0][axis], own[1][axis]),) for axis in range(3)]
+    return tuple(
+        _around(_hull(ends, *more), base.reach) for ends, more in zip(free, faces, strict=True)
+    )
+
+
+def gap_span(state: State) -> Span:
+    """Return the range of the gap; the carriages are never farther apart than b2 and b3."""
+    base = state.base
+    return _around((0.0, max(abs(base.b3 - base.b2), base.limits.gap)), base.reach, least=0.0)
+
+
 def length_span(state: State) -> Span:
-    """Return the range of a length."""
+    """Return the range of a length, such as a margin."""
     return _length_span(state.base.reach)
 
 
@@ -34,7 +105,7 @@ def radius_span(state: State) -> Span:
 
 
 def coordinate_span(state: State) -> Span:
-    """Return the range of a coordinate."""
+    """Return the range of a coordinate, or of a displacement."""
     return _coordinate_span(state.base.reach)
 
 
@@ -44,15 +115,31 @@ def _coordinate_span(reach: float) -> Span:
     return Span(-edge, edge, fine_step(reach, 2e3))
 
 
-def variable_span(state: State) -> Span:
-    """Return the range of a design variable, in steps as fine as designs are published with."""
-    return _variable_span(max(map(abs, state.base.variables)))
+def variable_span(state: State, index: int) -> Span:
+    """Return the range of a design variable, by its index in `VARIABLES`.
+
+    The base and the platform have a size each, and steps are as fine as designs are published with.
+    """
+    return _variable_span(state.base.variables, in_base=index < 2)
 
 
 @functools.lru_cache(64)
-def _variable_span(size: float) -> Span:
-    edge = round_up(BEYOND * size)
-    return Span(-edge, edge, fine_step(size, 1e5))
+def _variable_span(variables: tuple[float, ...], *, in_base: bool) -> Span:
+    sizes = [abs(value) for value in variables]
+    edge = round_up(BEYOND * max(sizes[:2] if in_base else sizes[2:]))
+    return Span(-edge, edge, fine_step(max(sizes), 1e5))
+
+
+def _hull(*ranges: Pair) -> Pair:
+    return min(low for low, _ in ranges), max(high for _, high in ranges)
+
+
+def _around(ends: Pair, reach: float, least: float = -math.inf) -> Span:
+    """Return a range with round ends around what is possible, also if that is nothing."""
+    low, high = sorted(ends)
+    room = max(ROOM * (high - low), 1e-3 * reach)
+    span = round_span(low - room, high + room, fine_step(reach, 2e3))
+    return Span(max(least, span.low), span.high, span.step)
 
 
 def round_up(value: float) -> float:

@@ -15,7 +15,6 @@ from explorer.export.report.markup import (
     Piece,
     as_html,
     element,
-    format_number,
     illustration,
     number,
     paragraph,
@@ -32,6 +31,7 @@ from explorer.files.packaged import packaged_file
 from explorer.files.versions import versions
 from explorer.measures.catalogue import CATALOGUE
 from explorer.mechanism.design_file import PRESETS, encode_design
+from explorer.numerics.number_text import format_number
 from explorer.workspace.accessible.workspace import ReachableWorkspace
 
 # The page may fetch nothing.
@@ -78,7 +78,7 @@ def _title_block(data: ReportData, date: dt.date) -> Iterator[Element]:
     particulars = (
         ("Date", element("time", date.isoformat(), datetime=date.isoformat())),
         ("Made by", f"Flagged 4-4 explorer {__version__}"),
-        ("Unit", f"1 unit = {format_number(data.unit_mm)} mm"),
+        ("Unit", f"1 unit = {format_number(data.unit_mm, 6)} mm"),
         ("Design file, SHA-256", element("span", f"{code[:16]}…", title=code)),
     )
     yield element("dl", *(_entry(*each) for each in particulars), class_="particulars")

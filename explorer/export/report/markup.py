@@ -6,19 +6,16 @@ markup. Looks are classes of `style.css`.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 from typing import TypeAlias
 from unicodedata import category
 from xml.etree.ElementTree import Element, tostring
 
+from explorer.numerics.number_text import format_number
+
 Piece: TypeAlias = "Element | str | float | None"
 Cell: TypeAlias = "Piece | Sequence[Piece]"
 Row: TypeAlias = tuple[Cell, ...]
-
-_SUPERSCRIPTS = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
-# A number below the first, or from the second on, is written with a power of ten.
-_LEAST, _MOST = 1e-4, 1e9
 
 
 def element(tag: str, *pieces: Piece, **attributes: str | float | None) -> Element:
@@ -63,31 +60,10 @@ def as_html(root: Element) -> str:
     return tostring(root, encoding="unicode", method="html")
 
 
-def power_of_ten(exponent: int) -> str:
-    """Return a power of ten, such as 10⁻³."""
-    return f"10{str(exponent).translate(_SUPERSCRIPTS)}"
-
-
 def coordinate(value: float) -> str:
     """Return a number rounded to a hundredth, in the fewest characters."""
     text = f"{value:.2f}".rstrip("0").rstrip(".")
     return "0" if text == "-0" else text
-
-
-def format_number(value: float, digits: int = 6) -> str:
-    """Return a number with a true minus, and with a power of ten where it is tiny or huge."""
-    if math.isnan(value):
-        return "–"
-    if math.isinf(value):
-        return "∞" if value > 0.0 else "−∞"
-    shown = float(f"{value:.{digits - 1}e}")
-    if value != 0.0 and not _LEAST <= abs(shown) < _MOST:
-        mantissa, _, exponent = f"{value:.{digits - 1}e}".partition("e")
-        mantissa = mantissa.rstrip("0").rstrip(".")
-        return f"{mantissa} × {power_of_ten(int(exponent))}".replace("-", "−")
-    if abs(shown) >= 10.0**digits:
-        return f"{shown:.0f}".replace("-", "−")
-    return f"{value + 0.0:.{digits}g}".replace("-", "−")
 
 
 def number(value: float, digits: int = 6) -> Element:

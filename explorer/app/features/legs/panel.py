@@ -11,8 +11,12 @@ from explorer.app.features.legs.radius_plot import RadiusPlot
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.controls import Controls
-from explorer.app.widgets.markup import box, caption, dim, format_number, row, status, table
+from explorer.app.widgets.markup import box, caption, dim, row, status, table
 from explorer.legs.clearance import PAIRS, pair_name
+from explorer.numerics.number_text import format_column, format_decimals
+
+# Digits of the largest clearance: the least one, of fewer digits, is what matters.
+DIGITS = 5
 
 
 class LegsPanel:
@@ -54,14 +58,18 @@ def clearance_table(frame: Frame) -> str:
     clearances = frame.snapshot.clearances
     collides = bool(clearances.clearance.min() < 0.0)
     unit_mm = frame.state.design.unit_mm
+    values = clearances.clearance.tolist()
+    units = format_column(values, DIGITS, infinite="joined")
+    millimetres = format_column([unit_mm * value for value in values], DIGITS, infinite="")
     rows = (
         _row(
             index,
-            clearance,
-            *_lengths(clearance, unit_mm),
+            values[index],
+            units[index],
+            millimetres[index],
             is_closest=index == int(clearances.closest),
         )
-        for index, clearance in enumerate(clearances.clearance.tolist())
+        for index in range(len(values))
     )
     return box(
         status("Legs collide", "beyond") if collides else status("Legs are clear", "within"),
@@ -85,11 +93,17 @@ def move_table(frame: Frame) -> str:
     )
     paper = f"overlap of {pairs}" if pairs else "no overlap"
     rows: list[str] = []
-    for index, clearance in enumerate(move.clearance.tolist()):
-        cells = ("", "joined", "")
+    values = move.clearance.tolist()
+    units = format_column(values, DIGITS, infinite="joined")
+    for index, clearance in enumerate(values):
+        cells = ("", units[index], "")
         if not math.isinf(clearance):
             swept = '<span class="ex-beyond">overlap</span>' if move.overlaps[index] else "free"
-            cells = swept, format_number(clearance), f"{100.0 * float(move.share[index]):.0f} %"
+            cells = (
+                swept,
+                units[index],
+                f"{format_decimals(100.0 * float(move.share[index]), 0)} %",
+            )
         rows.append(_row(index, clearance, *cells, is_closest=move.closest == index))
     return box(
         result,
@@ -97,12 +111,6 @@ def move_table(frame: Frame) -> str:
         caption("Minimum clearance on the straight path, and where on the path"),
         table(rows, ("legs", "swept", "units", "at")),
     )
-
-
-def _lengths(clearance: float, unit_mm: float) -> tuple[str, str]:
-    if math.isinf(clearance):
-        return "joined", ""
-    return format_number(clearance), format_number(clearance * unit_mm)
 
 
 def _row(index: int, clearance: float, *cells: str, is_closest: bool) -> str:

@@ -197,7 +197,8 @@ def _row(mark: RadiusMark, curve: RadiusCurve, unit_mm: float) -> str:
     else:
         value, note = format_number(mark.radius, 3), f"{format_number(mark.radius * unit_mm, 3)} mm"
         if mark.label == "present radius":
-            note = f"{100.0 * volume_at(curve, mark.radius) / float(curve.volumes[0]):.3g} %"
+            share = volume_at(curve, mark.radius) / float(curve.volumes[0])
+            note = f"{format_number(100.0 * share, 3)} %"
     return row(f"{swatch(mark.colour, 'ex-dot')}{mark.label}", value, dim(note))
 
 

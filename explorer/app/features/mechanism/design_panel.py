@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import cast
 
 import msgspec
 import viser
 
 from explorer.app.features.feature import Services
+from explorer.app.features.mechanism.sketch import sketch
 from explorer.app.session.field_words import SWINGS
 from explorer.app.state.action import Action
 from explorer.app.state.actions import Open, Reset, Set, SetVariable
@@ -17,7 +18,15 @@ from explorer.app.state.state import Hold, State
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.commands import NO_OPTION
 from explorer.app.widgets.controls import At, Bound, Controls, Span
-from explorer.app.widgets.ranges import coordinate_span, length_span, radius_span, variable_span
+from explorer.app.widgets.ranges import (
+    box_span,
+    gap_span,
+    guide_span,
+    length_limit_span,
+    length_span,
+    radius_span,
+    variable_span,
+)
 from explorer.mechanism.design import LENGTHS, VARIABLES, Design, Limits, Pair, Range
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Triple
@@ -58,6 +67,7 @@ class DesignPanel:
                 "Reset", "Return to the design as it was opened.", Reset, icon=viser.Icon.RESTORE
             )
         with gui.add_folder("Design variables (design units)"):
+            self._sketch = gui.add_html("")
             for index, name in enumerate(VARIABLES):
                 self._add_variable(index, name)
             controls.number(
@@ -81,6 +91,7 @@ class DesignPanel:
 
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that make the panel show the frame."""
+        yield self._sketch, "content", sketch(frame.state.design)
         yield from self._controls.updates(frame)
 
     def _add_variable(self, index: int, name: str) -> None:
@@ -91,7 +102,7 @@ class DesignPanel:
                 lambda frame: frame.state.design.variables[index],
                 lambda _, value: SetVariable(name, value),
             ),
-            variable_span,
+            lambda state: variable_span(state, index),
         )
 
     def _add_lengths(self) -> None:
@@ -112,26 +123,18 @@ class DesignPanel:
             self._add_length(name)
 
     def _add_length(self, name: str) -> None:
-        def minimum(state: State, value: float) -> Action:
-            low = min(value, state.design.length_range(name)[1])
-            return _set_limit(name, (low, _maximum(state, name)))
+        def write(state: State, ends: Pair) -> Action:
+            before = state.design.length_range(name)
+            low, high = pushed(before, ends)
+            # A maximum at the reach stays there while only the minimum is moved.
+            keeps = high == before[1] and _maximum(state, name) is None
+            return _set_limit(name, (low, None if keeps else high))
 
-        def maximum(state: State, value: float) -> Action:
-            low = state.design.length_range(name)[0]
-            return _set_limit(name, (low, max(value, low)))
-
-        self._controls.slider(
-            f"{name} least",
-            f"Minimum of {name}.",
-            Bound(lambda frame: frame.state.design.length_range(name)[0], minimum),
-            length_span,
-        )
-        self._controls.slider(
-            f"{name} most",
-            f"Maximum of {name}.",
-            Bound(lambda frame: frame.state.design.length_range(name)[1], maximum),
-            length_span,
-            disabled=_are_maxima_at_reach,
+        self._controls.ends(
+            name,
+            f"Minimum and maximum of {name}.",
+            Bound(lambda frame: frame.state.design.length_range(name), write),
+            length_limit_span,
         )
 
     def _add_guide(self) -> None:
@@ -143,41 +146,30 @@ class DesignPanel:
                 lambda state, on: _set_limit("guide", _guide(state) if on else None),
             ),
         )
-
-        def low_end(state: State, value: float) -> Action:
-            return _set_limit("guide", (value, max(value, _guide(state)[1])))
-
-        def high_end(state: State, value: float) -> Action:
-            return _set_limit("guide", (min(value, _guide(state)[0]), value))
-
-        for index, (label, write) in enumerate((("d least", low_end), ("d most", high_end))):
-            self._add_guide_end(label, index, write)
+        self._controls.ends(
+            "d1, d3",
+            "The ends of the guide, for both carriages.",
+            Bound(
+                lambda frame: _guide(frame.state),
+                lambda state, ends: _set_limit("guide", pushed(_guide(state), ends)),
+            ),
+            guide_span,
+            disabled=lambda state: state.design.limits.guide is None,
+        )
         self._controls.slider(
             "gap",
             "Minimum distance |d1 − d3| between the carriages.",
             "design.limits.gap",
-            length_span,
+            gap_span,
         )
         self._controls.checkbox(
             "Carriages keep their order",
-            "Require that d3 − d1 keeps the sign that it has in the home pose. At d1 = d3 legs 2 "
-            "and 3 share a point, so the carriages cannot pass each other. Without this both "
-            "orders are allowed.",
+            "Require that d3 − d1 keeps its sign of the home pose: at d1 = d3 legs 2 and 3 share a "
+            "point.",
             Bound(
                 lambda frame: frame.state.design.limits.carriage_order == "home",
                 lambda _, on: _set_limit("carriage_order", "home" if on else "any"),
             ),
-        )
-
-    def _add_guide_end(
-        self, label: str, index: int, write: Callable[[State, float], Action]
-    ) -> None:
-        self._controls.slider(
-            label,
-            "An end of the guide, for both carriages.",
-            Bound(lambda frame: _guide(frame.state)[index], write),
-            coordinate_span,
-            disabled=lambda state: state.design.limits.guide is None,
         )
 
     def _add_box(self) -> None:
@@ -193,28 +185,20 @@ class DesignPanel:
             self._add_box_axis(axis, name)
 
     def _add_box_axis(self, axis: int, name: str) -> None:
-        def write(end: int) -> Callable[[State, float], Action]:
-            def action(state: State, value: float) -> Action:
-                ends = [list(corner) for corner in _box(state)]
-                ends[end][axis] = value
-                # A slider that passes the other one moves it along.
-                ends[0][axis] = min(ends[0][axis], value)
-                ends[1][axis] = max(ends[1][axis], value)
-                return _set_limit("box", (tuple(ends[0]), tuple(ends[1])))
+        def read(state: State) -> Pair:
+            lows, highs = _box(state)
+            return lows[axis], highs[axis]
 
-            return action
+        def write(state: State, ends: Pair) -> Action:
+            lows, highs = map(list, _box(state))
+            lows[axis], highs[axis] = pushed(read(state), ends)
+            return _set_limit("box", (tuple(lows), tuple(highs)))
 
-        for end, word in enumerate(("least", "most")):
-            self._add_box_face(f"{name} {word}", axis, end, write(end))
-
-    def _add_box_face(
-        self, label: str, axis: int, end: int, write: Callable[[State, float], Action]
-    ) -> None:
-        self._controls.slider(
-            label,
-            "Position of a face of the box.",
-            Bound(lambda frame: _box(frame.state)[end][axis], write),
-            coordinate_span,
+        self._controls.ends(
+            f"b4 {name}",
+            f"The faces of the box across {name}.",
+            Bound(lambda frame: read(frame.state), write),
+            lambda state: box_span(state, axis),
             disabled=lambda state: state.design.limits.box is None,
         )
 
@@ -238,7 +222,7 @@ class DesignPanel:
     def _add_radius(self, leg: int) -> None:
         self._controls.slider(
             f"leg {leg + 1}",
-            f"Radius of leg {leg + 1}, a capsule about its axis; clearances decrease by it.",
+            f"Radius of leg {leg + 1}, a capsule about its axis.",
             f"design.limits.leg_radii.{leg}",
             radius_span,
         )
@@ -283,12 +267,21 @@ def _with_maxima(design: Design, *, at_reach: bool) -> Limits:
     return msgspec.structs.replace(design.limits, **ranges)
 
 
+def pushed(before: Pair, after: Pair) -> Pair:
+    """Return the ends of a range after a change of one of them, which pushes the other along."""
+    low, high = after
+    if low <= high:
+        return after
+    return (high, high) if low == before[0] else (low, low)
+
+
 def _guide(state: State) -> Pair:
-    """Return the ends of the guide; while it has none, those to begin with."""
-    return state.design.limits.guide or (-state.base.reach, 2.0 * state.base.reach)
+    """Return the ends of the guide; while it has none, wide ones to begin with."""
+    span = guide_span(state)
+    return state.design.limits.guide or (span.low, span.high)
 
 
 def _box(state: State) -> tuple[Triple, Triple]:
-    """Return the box for b4; while there is none, the one to begin with."""
-    reach = state.base.reach
-    return state.design.limits.box or ((-reach, -reach, -reach), (reach, reach, reach))
+    """Return the box for b4; while there is none, a wide one to begin with."""
+    x, y, z = (box_span(state, axis) for axis in range(3))
+    return state.design.limits.box or ((x.low, y.low, z.low), (x.high, y.high, z.high))

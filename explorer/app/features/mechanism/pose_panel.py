@@ -6,7 +6,6 @@ from collections.abc import Iterator
 
 import viser
 
-from explorer.app.browser.viser_gaps import Mark
 from explorer.app.features.feature import Services
 from explorer.app.features.mechanism.modes import ModesPanel
 from explorer.app.state.actions import (
@@ -17,12 +16,12 @@ from explorer.app.state.actions import (
     UseNearest,
 )
 from explorer.app.state.frame import Frame
+from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.controls import Bound, Controls, Span
-from explorer.app.widgets.markup import alert, format_number, remark
-from explorer.app.widgets.ranges import coordinate_span, length_span
-from explorer.mechanism.design import JOINTS, LENGTHS
-from explorer.mechanism.feasible_intervals import Interval
+from explorer.app.widgets.markup import alert, note, remark
+from explorer.app.widgets.ranges import joint_span, position_span
+from explorer.mechanism.design import JOINTS
 
 JOINT_HINTS = {
     "l1": "Leg 1: length of the actuator from a1 to b1 (U joint, actuator, ball joint).",
@@ -45,8 +44,6 @@ ANGLES = (
     ("pitch", "about the y that yaw turned, the second of three", 90.0),
     ("roll", "about the platform's x, the third of three", 180.0),
 )
-# Room for a label, as a share of the slider.
-LABEL_ROOM = 0.24
 
 
 class MovePanel:
@@ -58,14 +55,14 @@ class MovePanel:
         with gui.add_folder("Legs (design units)"):
             for joint, name in enumerate(JOINTS):
                 self._add_joint(joint, name)
-            self._alert = gui.add_html("", visible=False)
-            self._remark = gui.add_html("", visible=False)
+            self._message = gui.add_html("")
             self._nearest = controls.button(
                 "Use the nearest length",
                 "Move this leg to the nearest length that closes and stays clear of "
                 "singularities; the other legs stay as they are.",
                 UseNearest,
                 icon=viser.Icon.MAGNET,
+                main=True,
             )
         with gui.add_folder("Pose of b4 (design units, degrees)"):
             for axis, name in enumerate("xyz"):
@@ -82,18 +79,13 @@ class MovePanel:
             self._modes = ModesPanel(services)
 
     def _add_joint(self, joint: int, name: str) -> None:
-        span = length_span if name in LENGTHS else coordinate_span
-
-        def marks(frame: Frame) -> tuple[Mark, ...]:
-            return interval_marks(frame.snapshot.intervals[joint], span(frame.state))
-
         self._controls.slider(
             JOINT_LABELS[name],
-            f"{JOINT_HINTS[name]} The marks bound the values that close with the other joints as "
-            "they are.",
+            JOINT_HINTS[name],
             Bound(lambda frame: frame.state.joints[joint], lambda _, value: SetJoint(joint, value)),
-            span,
-            marks=marks,
+            lambda state: joint_span(state, joint),
+            tinted=lambda frame: frame.snapshot.intervals[joint],
+            closes_up=True,
         )
 
     def _add_position(self, axis: int, name: str) -> None:
@@ -104,7 +96,7 @@ class MovePanel:
                 lambda frame: frame.state.pose.position[axis],
                 lambda _, value: SetPosition(axis, value),
             ),
-            coordinate_span,
+            lambda state: position_span(state, axis),
         )
 
     def _add_angle(self, axis: int, name: str, order: str, edge: float) -> None:
@@ -121,39 +113,18 @@ class MovePanel:
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that make the panel show the frame."""
         unclosed = frame.state.unclosed
-        yield self._alert, "visible", unclosed is not None
-        yield self._nearest, "visible", unclosed is not None and unclosed.nearest is not None
-        if unclosed is not None:
-            yield self._alert, "content", alert("These lengths cannot close", str(unclosed))
-        words = None if unclosed is not None else frame.state.remark
-        yield self._remark, "visible", words is not None
-        if words is not None:
-            yield self._remark, "content", remark("The length was adjusted", words)
+        yield self._message, "content", message(frame.state)
+        yield self._nearest, "disabled", unclosed is None or unclosed.nearest is None
         yield from self._controls.updates(frame)
         yield from self._modes.updates(frame)
 
 
-def interval_marks(intervals: tuple[Interval, ...], span: Span) -> tuple[Mark, ...]:
-    """Return marks at the ends of the intervals, with labels that do not overlap.
-
-    Args:
-        intervals: Intervals in which the lengths close.
-        span: Range of the slider.
-    """
-    marks: list[Mark] = []
-    label_end = -1.0
-    for low, high in intervals:
-        start, end = (min(max(v, span.low), span.high) for v in (low, high))
-        first, last = ((v - span.low) / (span.high - span.low) for v in (start, end))
-        size = max(abs(span.low), abs(span.high))
-        texts = (format_number(low, 3, size=size), format_number(high, 3, size=size))
-        if first - label_end < LABEL_ROOM:
-            texts = ("", "")
-        elif last - first < LABEL_ROOM:
-            # There is no room for two labels: the end with more room beside it has both.
-            both = f"{texts[0]} … {texts[1]}"
-            texts = ("", both) if first < 0.5 else (both, "")
-        if any(texts):
-            label_end = last
-        marks += [(start, texts[0]), (end, texts[1])]
-    return tuple(marks)
+def message(state: State) -> str:
+    """Return what there is to say of the lengths, in room that it always has, as HTML."""
+    if state.unclosed is not None:
+        text = alert("", str(state.unclosed))
+    elif state.remark is not None:
+        text = remark("", state.remark)
+    else:
+        text = note("Tinted: values at which the lengths close, the other joints as they are.")
+    return f'<div class="ex-message">{text}</div>'

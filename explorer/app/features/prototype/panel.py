@@ -13,6 +13,7 @@ from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.controls import Controls, Span
 from explorer.app.widgets.markup import alert, box, caption, note, row, sentence, table
 from explorer.mechanism.design import LENGTHS
+from explorer.numerics.number_text import format_decimals, format_number
 from explorer.prototype.bill import Actuator
 
 
@@ -129,12 +130,14 @@ def _is_enough(actuator: Actuator) -> bool:
 
 
 def _mm(value: float) -> str:
-    return f"{value:.1f}"
+    return format_decimals(value, 1)
 
 
 def _grams(value: float) -> str:
-    return f"{value:,.1f}" if value < 1000.0 else f"{value:,.0f}"
+    return format_decimals(value, 1 if value < 1000.0 else 0)
 
 
 def _mass(grams: float) -> str:
-    return f"{grams:.1f} g" if grams < 1000.0 else f"{grams / 1000.0:.4g} kg"
+    if grams < 1000.0:
+        return f"{format_decimals(grams, 1)} g"
+    return f"{format_number(grams / 1000.0)} kg"

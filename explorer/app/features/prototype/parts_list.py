@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from explorer.numerics.number_text import format_decimals
 from explorer.prototype.assembly import Prototype
 from explorer.prototype.bill import Actuator, bill_of_materials
 from explorer.prototype.part import Part
@@ -31,7 +32,7 @@ class Bar:
     length: float
 
     def __str__(self) -> str:
-        return f"Ø {self.diameter:.1f} × {self.length:.1f}"
+        return f"Ø {format_decimals(self.diameter, 1)} × {format_decimals(self.length, 1)}"
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,7 @@ class Block:
     z: float
 
     def __str__(self) -> str:
-        return f"{self.x:.1f} × {self.y:.1f} × {self.z:.1f}"
+        return " × ".join(format_decimals(side, 1) for side in (self.x, self.y, self.z))
 
 
 Stock = Bar | Block

@@ -59,11 +59,11 @@ class JogPanel:
             jog_label(motion),
             f"Change δ{motion.incidence} alone: "
             f"{'move' if motion.kind == 'translation' else 'turn'} the platform {motion.name}, "
-            f"in {UNITS[motion.kind]} from the start of the motion. The marks are singular poses; "
+            f"in {UNITS[motion.kind]} from the start of the motion. Singular poses are at its ends; "
             f"“{NEVER}” stands where there is none, “{BEYOND}” where it is farther away.",
             Bound(lambda frame: jog_amount(frame.state, index), lambda _, value: Jog(index, value)),
             lambda state: jog_span(state, index),
-            marks=lambda frame: travel_marks(frame, index),
+            ends=lambda frame: travel_marks(frame, index),
         )
 
     def updates(self, frame: Frame) -> Iterator[Update]:
@@ -118,7 +118,7 @@ def travel_marks(frame: Frame, index: int) -> tuple[Mark, ...]:
     motion, span = UNCOUPLED[index], jog_span(frame.state, index)
     travel = shown_travel(frame.state, index)
     if travel.low == travel.high:
-        return ((0.0, HERE),)
+        return ((0.0, HERE), (0.0, ""))
     unit, size = ("°", 180.0) if motion.kind == "rotation" else ("", frame.state.design.reach)
 
     def mark(end: float, edge: float) -> Mark:

@@ -95,8 +95,8 @@ def parallel(plotted: PlotRows, revision: int, *, dark: bool) -> Figure:
         "line": line,
         "unselected": {"line": {"color": LEFT_OUT, "opacity": 0.25}},
         "labelangle": -TILT if is_tilted else 0,
-        "labelfont": {"size": 11.5},
-        "tickfont": {"size": 9.5},
+        "labelfont": {"size": 11},
+        "tickfont": {"size": 11},
         # The ends are ticks like others; their own digits would run into one another.
         "rangefont": {"size": 1, "color": "rgba(0,0,0,0)"},
         "uirevision": revision,
@@ -125,7 +125,7 @@ def scatter(plotted: PlotRows, revision: int, *, dark: bool) -> Figure:
             "title": {"text": title_of(plotted.colour), "side": "right", "font": {"size": 11}},
             "thickness": 9,
             "outlinewidth": 0,
-            "tickfont": {"size": 10},
+            "tickfont": {"size": 11},
             "nticks": 5,
         },
     }
@@ -248,7 +248,7 @@ def _boxes(plotted: PlotRows) -> list[dict[str, Any]]:
 
 def _axis(name: str) -> dict[str, Any]:
     return {
-        "title": {"text": title_of(name), "standoff": 6, "font": {"size": 12}},
+        "title": {"text": title_of(name), "standoff": 6, "font": {"size": 11}},
         "gridcolor": GRID,
         "zeroline": False,
         "nticks": 7,
@@ -267,7 +267,7 @@ def _layout(
         "plot_bgcolor": "rgba(0,0,0,0)",
         "font": {"color": TEXT if not dark else "#aeb6c0", "family": "inherit", "size": 11},
         "margin": dict(margin),
-        "hoverlabel": {"font": {"size": 12}},
+        "hoverlabel": {"font": {"size": 11}},
         "separators": ". ",
         "meta": {
             "explorer": plot,

@@ -8,13 +8,8 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from explorer.export.report.drawings.mechanism import WIDTH, round_length, svg_drawing
-from explorer.export.report.markup import (
-    coordinate,
-    drawing_text,
-    element,
-    format_number,
-    power_of_ten,
-)
+from explorer.export.report.markup import coordinate, drawing_text, element
+from explorer.numerics.number_text import format_number, power_of_ten
 from explorer.optimise.curves import CALLED, Curve, curves_of
 from explorer.optimise.record import Record, Step
 
@@ -77,7 +72,7 @@ def _chart(curve: Curve, left: float, width: float) -> list[Element]:
     for tick in _ticks(0.0, float(last), whole=True):
         x, _ = place(tick, low)
         axes.append(element("line", x1=x, y1=TOP + tall, x2=x, y2=TOP + tall + 4.0))
-        axes.append(drawing_text(format_number(tick), x, TOP + tall + 15.0))
+        axes.append(drawing_text(format_number(tick, 6), x, TOP + tall + 15.0))
     axes.append(drawing_text("iteration", left + 0.5 * width, HEIGHT - 6.0, class_="axis"))
     pieces = [axes]
     if curve.level is not None:

@@ -14,11 +14,12 @@ import numpy as np
 
 from explorer.export.report.drawings.labels import labels
 from explorer.export.report.drawings.projection import Projection, ViewName, fit_view
-from explorer.export.report.markup import coordinate, drawing_text, element, format_number
+from explorer.export.report.markup import coordinate, drawing_text, element
 from explorer.legs.clearance import leg_axes
 from explorer.measures.snapshot import Snapshot
 from explorer.measures.verdict import verdict
 from explorer.numerics.arrays import FloatArray
+from explorer.numerics.number_text import format_number
 from explorer.singularity.colours import css, proximity_colour
 
 WIDTH = 720.0
@@ -156,7 +157,7 @@ def scale_bar(view: Projection, unit_mm: float, x: float, y: float) -> Element:
         f"M{coordinate(x)},{coordinate(y - 4.0)}v8M{coordinate(x)},{coordinate(y)}"
         f"H{coordinate(end)}m0,-4v8"
     )
-    words = f"{format_number(length)} units = {format_number(length * unit_mm)} mm"
+    words = f"{format_number(length, 6)} units = {format_number(length * unit_mm, 6)} mm"
     return element(
         "g",
         element("path", d=path, class_="bar"),

@@ -8,7 +8,8 @@ from xml.etree.ElementTree import Element
 
 from explorer.export.report.drawings.mechanism import WIDTH, round_length, svg_drawing
 from explorer.export.report.drawings.slices import Slices, in_plane
-from explorer.export.report.markup import coordinate, drawing_text, element, format_number
+from explorer.export.report.markup import coordinate, drawing_text, element
+from explorer.numerics.number_text import format_number
 from explorer.singularity.colours import BAND_EDGES, OUTLINE, band_colours, css
 from explorer.workspace.slices.axes import AXES
 

@@ -14,7 +14,6 @@ from explorer.export.report.markup import (
     Row,
     element,
     ends,
-    format_number,
     illustration,
     number,
     paragraph,
@@ -22,6 +21,7 @@ from explorer.export.report.markup import (
 )
 from explorer.mechanism.design import JOINTS, LENGTHS
 from explorer.mechanism.pose import yaw_pitch_roll_from_rotation
+from explorer.numerics.number_text import format_number
 from explorer.singularity.colours import WARN_SHARE
 
 _MEANINGS = {
@@ -130,5 +130,5 @@ def _limits(data: ReportData) -> Element:
         rows.append(_lengths(data, f"radius of leg {leg}", radius))
     for name, angle in msgspec.structs.asdict(limits.swing).items():
         if angle is not None:
-            rows.append((f"swing at {name}, at most", f"{format_number(angle)}°", ""))
+            rows.append((f"swing at {name}, at most", f"{format_number(angle, 6)}°", ""))
     return table(("limit", "units", "mm"), rows, align="<>>", caption="Further limits")

@@ -6,8 +6,9 @@ from collections.abc import Iterator
 from xml.etree.ElementTree import Element
 
 from explorer.export.report.data import Missing, ReportData
-from explorer.export.report.markup import element, format_number, number, paragraph, table
+from explorer.export.report.markup import element, number, paragraph, table
 from explorer.export.simulation import DENSITY
+from explorer.numerics.number_text import format_number
 
 
 def parts_section(data: ReportData) -> Iterator[Element]:
@@ -18,7 +19,7 @@ def parts_section(data: ReportData) -> Iterator[Element]:
         yield paragraph(f"Its parts cannot be made: {bill.reason}.", class_="note")
         return
     yield paragraph(
-        f"Parts sized from the design, of {format_number(DENSITY)} kg/m³ (printed PLA): ",
+        f"Parts sized from the design, of {format_number(DENSITY, 6)} kg/m³ (printed PLA): ",
         number(bill.mass * 1000.0, 4),
         " g in all.",
     )

@@ -6,19 +6,11 @@ from collections.abc import Iterator
 from xml.etree.ElementTree import Element
 
 from explorer.export.report.data import ReportData
-from explorer.export.report.markup import (
-    Cell,
-    Piece,
-    element,
-    format_number,
-    number,
-    paragraph,
-    table,
-    whole,
-)
+from explorer.export.report.markup import Cell, Piece, element, number, paragraph, table, whole
 from explorer.measures.verdict import verdict
 from explorer.mechanism.margins import INCIDENCES, TETRAHEDRA, describe_modes
 from explorer.mechanism.pose import yaw_pitch_roll_from_rotation
+from explorer.numerics.number_text import format_number
 from explorer.singularity.bruhat import describe_stratum
 from explorer.singularity.ellipsoids import Ellipsoid
 

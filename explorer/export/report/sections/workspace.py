@@ -17,7 +17,6 @@ from explorer.export.report.markup import (
     Row,
     element,
     ends,
-    format_number,
     illustration,
     number,
     paragraph,
@@ -25,6 +24,7 @@ from explorer.export.report.markup import (
     whole,
 )
 from explorer.measures.catalogue import CATALOGUE
+from explorer.numerics.number_text import format_number
 from explorer.workspace.solids.solid import Solid
 
 

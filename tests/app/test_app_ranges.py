@@ -1,0 +1,230 @@
+"""Ranges of sliders: what is possible, held still, tinted where it is feasible."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+import viser
+from desk import Desk
+from hypothesis import given, strategies as st
+
+from explorer.app.features.feature import Services
+from explorer.app.features.mechanism.design_panel import DesignPanel, pushed
+from explorer.app.features.mechanism.pose_panel import MovePanel
+from explorer.app.state.actions import Set, SetJoint, SetPosition
+from explorer.app.state.frame import Frame
+from explorer.app.state.state import opened
+from explorer.app.widgets.controls import Span, close_up, round_span, tint_marks
+from explorer.app.widgets.ranges import (
+    box_span,
+    coordinate_span,
+    gap_span,
+    guide_span,
+    joint_span,
+    length_limit_span,
+    length_span,
+    position_span,
+    round_up,
+    variable_span,
+)
+from explorer.mechanism.design import JOINTS, LENGTHS, VARIABLES, Design
+from explorer.mechanism.design_file import PRESETS
+
+OPTIMAL = PRESETS["paper-optimal"]
+
+
+@given(st.floats(1e-9, 1e9))
+def test_ranges_are_round_and_hold_the_design_whatever_its_size(size: float) -> None:
+    design = Design(
+        a3=(size, 0.4 * size), b1=(0.4 * size, -0.1 * size), b2=0.3 * size, b3=0.1 * size
+    )
+    state = opened(design)
+    spans = {
+        **{name: joint_span(state, i) for i, name in enumerate(JOINTS)},
+        **{name: position_span(state, i) for i, name in enumerate("xyz")},
+        **{f"box {name}": box_span(state, i) for i, name in enumerate("xyz")},
+        **{f"variable {name}": variable_span(state, i) for i, name in enumerate(VARIABLES)},
+        "guide": guide_span(state),
+        "gap": gap_span(state),
+        "length limit": length_limit_span(state),
+        "length": length_span(state),
+        "coordinate": coordinate_span(state),
+    }
+    for name, span in spans.items():
+        assert span.low < span.high, name
+        assert span.step < size / 100.0, name
+        if not name.startswith(("variable", "length", "coordinate")):
+            # A slider's values are whole steps from its lower end.
+            steps = span.low / span.step
+            assert steps == pytest.approx(round(steps), abs=1e-6), name
+    values = {
+        **dict(zip(JOINTS, state.joints, strict=True)),
+        **{
+            f"variable {name}": value
+            for name, value in zip(VARIABLES, design.variables, strict=True)
+        },
+    }
+    for name, value in values.items():
+        assert spans[name].low <= value <= spans[name].high, name
+    assert round_up(31.0) == 31.0
+
+
+def test_ranges_are_no_wider_than_what_is_possible_and_some_room() -> None:
+    state = opened(OPTIMAL)
+    # The box of the paper is 20, 34 and 18 units wide; before, each slider was 62 wide.
+    for axis, width in enumerate((20.0, 34.0, 18.0)):
+        span = position_span(state, axis)
+        assert width < span.high - span.low < 1.2 * width
+    for joint, name in enumerate(JOINTS):
+        span = joint_span(state, joint)
+        assert span.high - span.low < 35.0
+        assert (span.low >= 0.0) or name not in LENGTHS
+
+
+intervals = st.lists(st.floats(-40.0, 40.0), min_size=2, max_size=6, unique=True).map(
+    lambda ends: tuple(zip(sorted(ends)[::2], sorted(ends)[1::2], strict=False))
+)
+WHOLE = Span(-30.0, 30.0, 0.01)
+
+
+@given(intervals)
+def test_marks_tint_what_lies_within_intervals_and_nothing_else(
+    given_intervals: tuple[tuple[float, float], ...],
+) -> None:
+    marks = [value for value, _ in tint_marks(given_intervals, WHOLE)]
+    assert marks == sorted(marks)
+    assert len(marks) % 2 == 0
+    for value in (-29.99 + 0.37 * k for k in range(162)):
+        is_tinted = sum(mark < value for mark in marks) % 2 == 1
+        is_inside = any(low < value < high for low, high in given_intervals)
+        is_at_an_end = any(abs(value - end) < 1e-9 for pair in given_intervals for end in pair)
+        assert is_tinted == is_inside or is_at_an_end
+
+
+def test_marks_of_endless_intervals_are_the_ends_of_the_track() -> None:
+    assert tint_marks(((-math.inf, math.inf),), WHOLE) == ((-30.0, ""), (30.0, ""))
+    assert tint_marks(((31.0, math.inf),), WHOLE) == ()
+
+
+@given(intervals, st.floats(-30.0, 30.0), st.floats(0.5, 60.0))
+def test_a_close_up_shows_the_intervals_and_stays_while_it_serves(
+    given_intervals: tuple[tuple[float, float], ...], low: float, width: float
+) -> None:
+    inside = [(max(a, -30.0), min(b, 30.0)) for a, b in given_intervals if a < 30.0 and b > -30.0]
+    fresh = close_up(WHOLE, given_intervals, None)
+    assert WHOLE.low <= fresh.low < fresh.high <= WHOLE.high
+    if not inside:
+        assert fresh == WHOLE
+        return
+    first, last = inside[0][0], inside[-1][1]
+    assert fresh.low <= first <= last <= fresh.high
+    # At least a third is tinted, or the intervals are small beside the whole range.
+    assert fresh.high - fresh.low <= 3.0 * max(last - first, 0.1 * 60.0)
+    # A close-up that was made serves its own intervals.
+    assert close_up(WHOLE, given_intervals, fresh) == fresh
+    before = round_span(low, low + width, WHOLE.step)
+    kept = close_up(WHOLE, given_intervals, before)
+    assert kept in (before, fresh)
+    if kept == before != fresh:
+        assert before.low <= first <= last <= before.high
+
+
+@given(st.floats(-1e9, 1e9), st.floats(0.0, 1e9), st.integers(-12, 6))
+def test_round_spans_hold_what_they_are_made_for(low: float, width: float, power: int) -> None:
+    step = 10.0**power
+    span = round_span(low, low + width, step)
+    slack = 1e-9 * max(1.0, abs(low) + width)
+    assert low - 11.0 * step - slack <= span.low <= low + slack
+    assert low + width - slack <= span.high <= low + width + 11.0 * step + slack
+
+
+@given(st.tuples(st.floats(-9, 9), st.floats(0, 9)), st.booleans(), st.floats(-20, 20))
+def test_an_end_that_passes_the_other_pushes_it_along(
+    place: tuple[float, float], is_high: bool, value: float
+) -> None:
+    before = (place[0], place[0] + place[1])
+    after = (before[0], value) if is_high else (value, before[1])
+    low, high = pushed(before, after)
+    assert low <= high
+    assert (high if is_high else low) == value
+    if after[0] <= after[1]:
+        assert (low, high) == after
+
+
+def handles(panel: Any, desk: Desk, kind: type) -> dict[str, Any]:
+    """Return the handles of a kind by their labels, after a panel has shown the state."""
+    found: dict[str, Any] = {}
+    for handle, name, value in panel.updates(Frame(desk.state)):
+        setattr(handle, name, value)
+        if isinstance(handle, kind):
+            found[handle.label] = handle
+    return found
+
+
+def test_a_track_only_grows_while_its_own_slider_moves(services: Services, desk: Desk) -> None:
+    panel = MovePanel(services)
+    slider = handles(panel, desk, viser.GuiSliderHandle)["x"]
+    usual = (slider.min, slider.max)
+    desk.use(slider, 60.0)
+    handles(panel, desk, viser.GuiSliderHandle)
+    assert (slider.min, slider.max) == (usual[0], 60.0)
+    for value in (40.0, 10.0, 12.0):
+        desk.use(slider, value)
+        handles(panel, desk, viser.GuiSliderHandle)
+        assert (slider.min, slider.max) == (usual[0], 60.0)
+    desk.session.do(SetPosition(0, 11.0))
+    handles(panel, desk, viser.GuiSliderHandle)
+    assert (slider.min, slider.max) == usual
+
+
+def test_a_leg_that_is_typed_beyond_its_track_is_on_it(services: Services, desk: Desk) -> None:
+    panel = MovePanel(services)
+    sliders = list(handles(panel, desk, viser.GuiSliderHandle).values())
+    for joint, value in enumerate((40.0, -30.0, 45.0, 60.0, 50.0, 41.0)):
+        desk.session.do(SetJoint(joint, value))
+        handles(panel, desk, viser.GuiSliderHandle)
+        assert sliders[joint].value == value
+        for slider in sliders:
+            assert slider.min <= slider.value <= slider.max
+
+
+def test_both_inputs_of_a_range_set_it_and_show_it(services: Services, desk: Desk) -> None:
+    panel = DesignPanel(services)
+    thumbs = handles(panel, desk, viser.GuiMultiSliderHandle)
+    fields = handles(panel, desk, viser.GuiVector2Handle)
+    assert [f"{name} ends" for name in thumbs] == list(fields)
+    assert thumbs["l1"].value == (0.0, OPTIMAL.reach)
+    desk.use(thumbs["l1"], (2.0, OPTIMAL.reach))
+    # The maximum is the reach still, whatever the reach will be.
+    assert desk.state.design.limits.l1 == (2.0, None)
+    handles(panel, desk, viser.GuiVector2Handle)
+    assert fields["l1 ends"].value == (2.0, OPTIMAL.reach)
+    desk.use(fields["l1 ends"], (2.0, 9.0))
+    assert desk.state.design.limits.l1 == (2.0, 9.0)
+    handles(panel, desk, viser.GuiVector2Handle)
+    assert thumbs["l1"].value == (2.0, 9.0)
+    desk.use(fields["b4 y ends"], (30.0, 22.0))
+    assert desk.state.design.limits.box == ((0.0, 30.0, 0.0), (20.0, 30.0, 18.0))
+    assert desk.complaints == []
+
+
+def test_a_limit_that_is_switched_on_excludes_nothing_at_first(
+    services: Services, desk: Desk
+) -> None:
+    desk.session.do(Set("design.limits.box", None))
+    panel = DesignPanel(services)
+    boxes = handles(panel, desk, viser.GuiCheckboxHandle)
+    desk.use(boxes["Box for b4"], True)
+    desk.use(boxes["Bounded guide"], True)
+    limits = desk.state.design.limits
+    free = Set("design.limits.box", None).apply(Set("design.limits.guide", None).apply(desk.state))
+    assert limits.box is not None
+    assert limits.guide is not None
+    for axis in range(3):
+        span = position_span(free, axis)
+        assert limits.box[0][axis] <= span.low + 0.1 * (span.high - span.low)
+        assert limits.box[1][axis] >= span.high - 0.1 * (span.high - span.low)
+    assert limits.guide[0] < 0.0
+    assert limits.guide[1] > 20.0
