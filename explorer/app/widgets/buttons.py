@@ -20,6 +20,7 @@ import viser
 from explorer.app.browser.viser_gaps import element_id, run_script
 from explorer.app.look import read_script
 from explorer.app.security.client_messages import decode_text
+from explorer.app.widgets.markup import meter
 from explorer.app.widgets.palette import Command
 
 LONGEST_VALUE = 4000
@@ -182,18 +183,31 @@ def press_button(
 
 
 def open_button(
-    title: str, content: str, *, hint: str = "", label: str = "", class_name: str = ""
+    title: str,
+    content: str,
+    *,
+    press: str = "",
+    hint: str = "",
+    label: str = "",
+    class_name: str = "",
 ) -> str:
     """Return a button as HTML that opens a tab or a dialog; "commands" opens the palette.
 
     Args:
         title: Title of the tab.
         content: The visible content, HTML.
+        press: Name of the function of `Buttons.on` that handles the press too; none if "".
         hint: Words on what it opens, shown when a pointer rests on the button.
         label: The name for screen readers; the content if "".
         class_name: The classes of the stylesheet.
     """
-    values = {"class": class_name, "data-opens": title, "title": hint, "aria-label": label}
+    values = {
+        "class": class_name,
+        "data-opens": title,
+        "data-press": press,
+        "title": hint,
+        "aria-label": label,
+    }
     attributes = "".join(f' {key}="{escape(text)}"' for key, text in values.items() if text)
     return f'<button type="button"{attributes}>{content}</button>'
 
@@ -210,3 +224,21 @@ def figure(opens: str, name: str, value: str, *, hint: str, look: str = "") -> s
     """
     content = f'<span class="ex-dim">{escape(name)}</span><b class="{look}">{value}</b>'
     return open_button(opens, content, hint=hint, class_name="ex-figure")
+
+
+def running(opens: str, title: str, words: str, share: float | None, buttons: str) -> str:
+    """Return what runs or waits for an answer as HTML, for the bar.
+
+    Args:
+        opens: Title of the tab that shows more of it.
+        title: What it is.
+        words: How far it is.
+        share: Share that is done, from 0 to 1; None if it is not known.
+        buttons: The buttons that end or answer it, HTML.
+    """
+    bar = "" if share is None else meter(100.0 * share, look="ex-meter is-thin")
+    content = (
+        f'<b class="ex-cut">{escape(title)}</b><span class="ex-dim">{escape(words)}</span>{bar}'
+    )
+    told = open_button(opens, content, hint=f"Open the tab {opens}.", class_name="ex-name")
+    return f'<span class="ex-running">{told}{buttons}</span>'

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import viser
 
-from explorer.app.features.feature import Feature, StateCommand, Tab
+from explorer.app.features.feature import Feature, InBar, StateCommand, Tab
 from explorer.app.features.paths.actions import Play
+from explorer.app.features.paths.chip import PathChip
 from explorer.app.features.paths.panel import PathsPanel
 from explorer.app.features.paths.runner import PathRunner
 from explorer.app.features.paths.scene import PathScene
@@ -14,6 +15,7 @@ from explorer.app.widgets.commands import Key
 PATHS = Feature(
     "paths",
     tabs=(Tab("work", "Paths", PathsPanel, viser.Icon.ROUTE),),
+    bar=(InBar("right", PathChip),),
     scene=(PathScene,),
     runners=(PathRunner,),
     commands=(

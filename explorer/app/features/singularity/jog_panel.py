@@ -59,7 +59,7 @@ class JogPanel:
             jog_label(motion),
             f"Change δ{motion.incidence} alone: "
             f"{'move' if motion.kind == 'translation' else 'turn'} the platform {motion.name}, "
-            f"in {UNITS[motion.kind]} from the start of the motion. Singular poses are at its ends; "
+            f"in {UNITS[motion.kind]} from the start of the motion. It ends at singular poses; "
             f"“{NEVER}” stands where there is none, “{BEYOND}” where it is farther away.",
             Bound(lambda frame: jog_amount(frame.state, index), lambda _, value: Jog(index, value)),
             lambda state: jog_span(state, index),

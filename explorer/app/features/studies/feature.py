@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import viser
 
-from explorer.app.features.feature import Feature, Tab
+from explorer.app.features.feature import Feature, InBar, Tab
+from explorer.app.features.studies.chip import StudyChip
 from explorer.app.features.studies.panel import StudiesPanel
 
 STUDIES = Feature(
     "studies",
     tabs=(Tab("work", "Studies", StudiesPanel, viser.Icon.CHART_DOTS),),
+    bar=(InBar("right", StudyChip),),
     is_offered=lambda services: services.studies is not None,
 )

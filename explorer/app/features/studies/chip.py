@@ -1,0 +1,31 @@
+"""The study that is being computed, in the bar."""
+
+from __future__ import annotations
+
+from explorer.app.features.feature import Services
+from explorer.app.features.studies.runner import study_runner
+from explorer.app.state.frame import Frame
+from explorer.app.widgets.buttons import press_button, running
+
+
+class StudyChip:
+    """How far the study is, and the button that ends it."""
+
+    def __init__(self, services: Services) -> None:
+        self._runner = services.get(study_runner)
+
+    def markup(self, _: Frame) -> str:
+        """Return the chip, as HTML; "" while no study is computed."""
+        run = self._runner.run
+        if run is None:
+            return ""
+        cancel = press_button(
+            "studies.cancel",
+            "",
+            "Cancel",
+            hint="End the study; finished designs are kept.",
+            class_name="ex-button",
+            is_disabled=run.is_cancelled,
+        )
+        done = 0 if run.progress is None else run.progress.done
+        return running("Studies", run.name, f"{done} designs", run.share, cancel)
