@@ -16,7 +16,7 @@ from tempfile import TemporaryDirectory
 
 import msgspec
 import numpy as np
-from playwright.sync_api import Browser, FloatRect
+from playwright.sync_api import Browser, FloatRect, Page
 
 from explorer.app.browser.headless import headless_browser
 from explorer.app.features.compare.actions import Pin
@@ -107,7 +107,7 @@ SCENES = {
         size=(900, 800),
     ),
     "unclosed": Scene(actions=(SetJoint(JOINTS.index("l1"), 20.0),), panels=True),
-    # Tall, so that the whole diagram is in it.
+    # Tall, so that the whole diagram is in it, and the motions below.
     "strata": Scene(
         pose=Pose.of_yaw_pitch_roll((10, 5, 9), (-73.1, 12, 0)),
         actions=(
@@ -115,7 +115,7 @@ SCENES = {
             Jog(0, 20.0),
         ),
         panels=True,
-        size=(1280, 1330),
+        size=(1280, 1200),
     ),
     "twin": Scene(actions=(Set("view", View(handle=False, twin=True)),)),
     "workspace": Scene(
@@ -153,7 +153,7 @@ SCENES = {
             ),
         ),
         panels=True,
-        tab="View",
+        tab="Prototype",
         size=(1280, 1000),
     ),
     # What is left of the paper's optimum when a3 comes nearer, beside both rows of Table 1.
@@ -182,7 +182,6 @@ SCENES = {
         ),
         panels=True,
         tab="Optimise",
-        size=(1280, 1230),
     ),
 }
 
@@ -227,6 +226,17 @@ def draw_report(browser: Browser) -> bytes:
     return data
 
 
+def pull_drawer(page: Page, pixels: int) -> None:
+    """Drag the upper edge of the drawer up."""
+    edge = page.locator("[data-ex=drawer] > [data-dock-resize=top]").bounding_box()
+    assert edge is not None
+    x, y = edge["x"] + 0.5 * edge["width"], edge["y"] + 0.5 * edge["height"]
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x, y - pixels, steps=5)
+    page.mouse.up()
+
+
 def draw_studies(browser: Browser) -> bytes:
     """Return a picture of a study: a brush, and a design of the front that was picked."""
     study = STUDIES["trade-off"]
@@ -254,6 +264,7 @@ def draw_studies(browser: Browser) -> bytes:
             page, client = open_page(browser, running, (1280, 1000))
             page.get_by_role("tab", name="Studies", exact=True).click()
             page.locator(".js-plotly-plot").nth(1).wait_for()
+            pull_drawer(page, 300)
             settle(page, client)
             running.page.point_cameras("isometric")
             settle(page, client)

@@ -36,9 +36,9 @@ SCENE_LIMIT = Likeness(structure=0.05, colour=0.8, spot=5.5)
 # appears (0.24, 3.3). What the panels say is tested in words.
 PANELS_LIMIT = Likeness(structure=0.3, colour=2.5, spot=100.0)
 # The scene alone, between the docked panels, and above the drawer where that is open.
-BETWEEN_PANELS = (slice(None), slice(280, 920))
-ABOVE_DRAWER = (slice(0, 480), slice(280, 920))
-DRAWN_OUT = {"compare"}
+BETWEEN_PANELS = (slice(90, 750), slice(310, 910))
+ABOVE_DRAWER = (slice(90, 490), slice(310, 910))
+DRAWN_OUT = {"compare", "optimise"}
 
 Alteration = Callable[["Stage"], None]
 

@@ -30,6 +30,7 @@ class PrototypePanel:
             "view.prototype.shown",
             disabled=lambda state: state.view.twin,
         )
+        gui.add_html(note("Sized from the design; Export has them for printers and CAD."))
         self._trouble = gui.add_html("", visible=False)
         self._folder = gui.add_folder("Prototype", visible=False)
         with self._folder:
