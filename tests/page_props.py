@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
+import viser
 
 from explorer.app.server import Running
 
@@ -15,9 +16,12 @@ from explorer.app.server import Running
 PASSING = {"order", "_order", "_tab_container_ids"}
 
 # Choices for the next file; they are no part of the state and kept nowhere.
-OF_THE_MOMENT = {"Format", "Size (px)", "Width (px)", "Height (px)", "Transparent"}
-# What is told of the way here: how long it took, and how much was logged on it.
-OF_THE_WAY = re.compile(r"(?<=Computed in<).*?ms|(?<=The session has )[0-9,]+ poses?")
+OF_THE_MOMENT = {"Width (px)", "Height (px)", "Transparent"}
+# The track of a slider holds still while it is moved, so that it depends on what was done.
+OF_TRACKS = {"min", "max", "_marks"}
+ROUNDING = 1e-9
+# What is told of the way here: how long it took.
+OF_THE_WAY = re.compile(r"(?<=Computed in<).*?ms")
 
 
 def shown_by(running: Running) -> dict[str, object]:
@@ -82,11 +86,17 @@ def _properties(place: str, handle: Any) -> dict[str, object]:
     if getattr(state.props, "label", None) in OF_THE_MOMENT:
         return found
     props = state.props
+    is_slider = isinstance(handle, viser.GuiSliderHandle | viser.GuiMultiSliderHandle)
     if dataclasses.is_dataclass(props):
         for each in dataclasses.fields(props):
-            if each.name not in PASSING:
+            if each.name not in PASSING and not (is_slider and each.name in OF_TRACKS):
                 found[f"{place} {each.name}"] = getattr(props, each.name)
     value = getattr(state, "value", None)
+    if is_slider:
+        low, high = handle.min - ROUNDING, handle.max + ROUNDING
+        found[f"{place} is within its track"] = bool(
+            ((low <= np.array(value)) & (np.array(value) <= high)).all()
+        )
     if value is not None and not getattr(state, "is_button", False):
         found[f"{place} value"] = value
     return found

@@ -183,6 +183,11 @@ class Page:
             idle = idle and self.worker.wait_until_idle(deadline - time.monotonic())
         return idle and self.session.wait_until_idle(deadline - time.monotonic())
 
+    @property
+    def may_follow(self) -> bool:
+        """Whether cameras may still follow what was drawn last."""
+        return self._camera_timer is not None
+
     def point_cameras(self, view: ViewName) -> None:
         """Point the camera of every open browser."""
         for client in self._server.get_clients().values():

@@ -25,6 +25,8 @@ class Browser:
 
 CLIENT: Any = Browser()
 
+SUPERSCRIPTS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
+
 
 class Desk:
     """A session whose complaints are kept, and ways to use the controls of a page."""
@@ -91,4 +93,7 @@ def rows_of(html: str) -> list[list[str]]:
 
 
 def number(text: str) -> float:
-    return float(text.replace("−", "-").rstrip(" %"))
+    """Return the number that a text of the page stands for."""
+    plain = text.replace(",", "").replace("−", "-").rstrip(" %")
+    mantissa, _, power = plain.partition(" × 10")
+    return float(mantissa) * 10.0 ** int(power.translate(SUPERSCRIPTS) or 0)

@@ -6,6 +6,7 @@ import re
 
 import numpy as np
 import pytest
+from desk import number
 from hypothesis import given, settings, strategies as st
 from strategies import designs
 
@@ -46,13 +47,13 @@ def check(stuck: State) -> None:
     assert frame.snapshot.mode == stuck.mode
     assert after.remark is not None
     assert after.taken is not None
-    said = re.search(r"([\d.e+−]+) short of it: (.*)\.$", after.remark)
+    said = re.search(r"([\d.,−]+(?: × 10[⁻⁰¹²³⁴-⁹]+)?) short of it: (.*)\.$", after.remark)
     assert said is not None
     unclosed = stuck.unclosed
     assert unclosed is not None
     assert unclosed.nearest is not None
     short = abs(after.joints[unclosed.joint] - unclosed.nearest)
-    assert float(said[1].replace("−", "-")) == pytest.approx(short, rel=6e-3)
+    assert number(said[1]) == pytest.approx(short, rel=6e-3)
     assert said[2] == frame.verdict.reason(after.design.unit_mm)
     assert ("nearest that stays clear," in after.remark) == (frame.verdict.kind == "clear")
 

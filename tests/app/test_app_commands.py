@@ -288,7 +288,8 @@ def test_a_hint_tells_the_keys_that_do_the_same(running: Running) -> None:
             for key in ALL_KEYS.get(label, ()):
                 assert f" {key}" in widget.hint
                 told += 1
-    assert told > 15
+    # Other keys are those of buttons in markup, whose hints tell them too.
+    assert told > 10
 
 
 def test_keys_are_told_behind_the_hint() -> None:

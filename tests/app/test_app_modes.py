@@ -90,7 +90,7 @@ def test_press_on_a_row_goes_to_its_mode_and_one_in_the_head_switches_the_ghosts
         desk.press(services.buttons, "modes.ghosts")
         assert desk.state.view.ghosts is on
     labels = [command.label for command in services.buttons.commands]
-    assert "Move › Assembly mode › 3: − + +" in labels
+    assert "Pose › Assembly mode › 3: − + +" in labels
     assert len(labels) == len(MODES) + 1
 
 

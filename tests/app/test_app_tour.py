@@ -106,6 +106,7 @@ def test_what_the_search_of_a_tour_left_is_put_back_when_the_tour_is_over(
     guide, client = guide_at_last_step(server, desk)
     before = desk.state
     desk.session.do(StartRun())
+    assert phase_of(desk.state) == "running"
     if ends_first:
         desk.session.do(_Becomes(ended(desk.state)))
         assert desk.state.design != before.design

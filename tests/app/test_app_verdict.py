@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from strategies import Case, all_cases
 
 from explorer.app.features.singularity.actions import GoToSingularity, Jog
+from explorer.app.features.singularity.distance import distance_table
 from explorer.app.features.singularity.panel import summary
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import opened
@@ -48,9 +49,9 @@ def test_verdict_seven_degrees_from_an_incidence_is_near() -> None:
     assert "2.52 mm from δ2 = 0, lines a1a2 and b2b3 meeting" in text
 
 
-def test_summary_colours_the_incidence_that_the_verdict_names() -> None:
+def test_table_of_margins_colours_the_incidence_that_the_verdict_names() -> None:
     frame = nearly_meeting_lines()
-    colours = re.findall(r'class="ex-swatch" style="--colour:(#\w+)"', summary(frame))
+    colours = re.findall(r'class="ex-swatch" style="--colour:(#\w+)"', distance_table(frame))
     levels = frame.verdict.levels
     assert colours == [css(proximity_colour(level)) for level in levels]
     assert [level < 1.0 for level in levels] == [False, True, False]

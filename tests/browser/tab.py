@@ -64,6 +64,7 @@ class Tab:
         dark: bool = False,
     ) -> None:
         self.running = running
+        self._size = size
         # A software renderer draws three times faster without reflections and shadows.
         running.viser.scene.configure_environment_map(hdri=None)
         running.viser.scene.configure_default_lights(cast_shadow=False)
@@ -95,6 +96,7 @@ class Tab:
         """
         page, session = self.running.page, self.running.page.session
         self.page.keyboard.press("Escape")
+        self.page.set_viewport_size({"width": self._size[0], "height": self._size[1]})
         self.page.mouse.move(0, 0)
         self.page.evaluate(FORGET)
         session.travel(HistoryMove(lambda _: start_history(opened(PRESETS["paper-optimal"]))))
@@ -186,7 +188,8 @@ class Tab:
 
     def push(self, words: str) -> None:
         """Click a button."""
-        self.page.get_by_role("button", name=words, exact=True).click()
+        # What runs stands in the bar too, with the buttons that it has in its tab.
+        self.page.get_by_role("button", name=words, exact=True).first.click()
 
     def turn_to(self, name: str) -> None:
         """Turn to another tab of the panels."""
@@ -247,6 +250,7 @@ class Tab:
     def picture(self) -> bytes:
         """Return a picture of the scene, drawn after all that has been asked for."""
         assert self.running.page.session.wait_until_idle()
+        self.wait_for(lambda: not self.running.page.may_follow, "cameras that follow no more")
         settle(self.page, self.client)
         return self.page.locator(SCENE_CANVAS).screenshot()
 

@@ -236,6 +236,8 @@ def test_home_brings_back_the_home_pose(tab: Tab) -> None:
 
 @pytest.mark.parametrize("axis", [1, 2])
 def test_dragging_an_arrow_of_the_gizmo_moves_the_platform_along_it(tab: Tab, axis: int) -> None:
+    # Large enough for the hand to be as exact as asked for below.
+    tab.page.set_viewport_size({"width": 1280, "height": 720})
     tab.look_from("isometric")
     before = tab.state
     placed = Placed(Frame(before))
