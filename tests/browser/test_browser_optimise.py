@@ -71,7 +71,7 @@ def test_the_papers_problem_is_solved_by_two_presses_and_its_hull_lies_beside_th
     tab.push("Optimise")
     tab.page.get_by_text("Converged", exact=True).first.wait_for()
     expect(filled).to_have_text(["Accept"])
-    volume = tab.page.get_by_role("cell", name="8000.00", exact=True)
+    volume = tab.page.get_by_role("cell", name="8,000.00", exact=True)
     for each in (filled, tab.page.get_by_role("button", name="Hull", exact=True), volume):
         expect(each).to_be_in_viewport(ratio=1.0)
     assert abs(workspace_volume(tab.state.design).volume / 8000.0 - 1.0) <= 1e-6
