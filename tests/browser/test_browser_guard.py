@@ -302,6 +302,8 @@ POISON: dict[str, Any] = {
 
 def test_a_client_changes_no_property_of_a_control_but_its_value(running: Running) -> None:
     with client_of(running) as client, client_of(running) as other:
+        # What the worker draws of the first frame comes late.
+        assert running.page.wait_until_drawn(60.0)
         client.read_until_quiet()
         other.read_until_quiet()
         uuid = client.find("x")

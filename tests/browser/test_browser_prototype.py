@@ -78,6 +78,9 @@ def test_a_design_too_tight_is_told_and_stays_schematic(tab: Tab) -> None:
     expect(alert).to_contain_text("carriages 2 and 3 at home are 6.69 mm apart and need 8.2 mm")
     expect(tab.label("Exploded")).to_be_hidden()
     wait_until_drawn(tab)
+    # The hint of the switch stands over the scene.
+    tab.page.mouse.move(0, 0)
+    tab.page.get_by_role("tooltip").wait_for(state="hidden")
     assert difference(schematic, tab.picture()) < ALIKE
     tab.running.page.session.do(Set("design.limits", with_radius(tab.state.design, 0.3).limits))
     tab.label("Exploded").wait_for()

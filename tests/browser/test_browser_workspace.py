@@ -95,14 +95,19 @@ def test_workspace_is_seen_cut_read_and_left_as_a_file(tab: Tab) -> None:
         lambda: bool(np.allclose(tab.state.pose.position, goal, atol=0.006)), "the position read"
     )
     # Its type is legible in a panel as narrow as this.
-    sizes_of_type = map_in(tab).evaluate(
-        """map => {
-            const scale = map.getScreenCTM().a;
-            return [...map.querySelectorAll("text")].map(
-                (text) => scale * parseFloat(getComputedStyle(text).fontSize));
-        }"""
-    )
-    assert min(sizes_of_type) >= 11.0 - 1e-3
+
+    def sizes_of_type() -> list[float]:
+        return map_in(tab).evaluate(
+            """map => {
+                const scale = map.getScreenCTM().a;
+                return [...map.querySelectorAll("text")].map(
+                    (text) => scale * parseFloat(getComputedStyle(text).fontSize));
+            }"""
+        )
+
+    # A map that is replaced meanwhile has no sizes.
+    tab.wait_for(lambda: bool(np.isfinite(sizes_of_type()).all()), "the map at rest")
+    assert min(sizes_of_type()) >= 11.0 - 1e-3
     download = tab.export("Workspace", "STEP")
     assert download.suggested_filename.endswith("-workspace.step")
 
