@@ -221,7 +221,7 @@ def verdict_words(state: State, run: Run, verdict: SearchResult) -> str:
     if verdict.starts > 1:
         remarks.append(f"{verdict.starts} starts, {verdict.converged} converged")
     if verdict.seconds is not None:
-        remarks.append(f"{verdict.seconds:.2g} s")
+        remarks.append(f"{format_number(verdict.seconds, 2)} s")
     if run.accepted:
         remarks.append("accepted")
     if verdict.best is not None and state.design.variables != verdict.best.design.variables:
