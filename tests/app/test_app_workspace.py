@@ -91,7 +91,8 @@ def test_volume_is_known_while_the_solid_is_not_shown() -> None:
         words = volume_headline(Frame(state), feed)
         assert feed.text.words in words
         # One unit of the design is a centimetre.
-        assert f"{expected.volume:.4g} cm³ ({0.001 * expected.volume:.4g} l)" in words
+        litres = format_number(expected.volume, 4), format_number(0.001 * expected.volume, 4)
+        assert f"{litres[0]} cm³ ({litres[1]} l)" in words
         assert "±" in words
 
 
