@@ -51,6 +51,7 @@ from explorer.export.step import workspace_step
 from explorer.legs.clearance import PAIRS, leg_clearances
 from explorer.mechanism.design_file import PRESETS
 from explorer.numerics.arrays import BoolArray, FloatArray
+from explorer.numerics.number_text import format_number
 from explorer.workspace.accessible.radii import RadiusCurve, radius_curve
 from explorer.workspace.accessible.start import StartError, check_start
 from explorer.workspace.accessible.workspace import reachable_workspace
@@ -349,7 +350,10 @@ def test_the_numbers_are_those_of_the_library() -> None:
     assert reached is not None
     html = summary(THICK)
     percent = 100.0 * reached.volume / expected.volume
-    assert f"{reached.volume:.6g} units³ accessible, {percent:.4g} %" in html
+    assert (
+        f"{format_number(reached.volume, 6)} units³ accessible, {format_number(percent, 4)} %"
+        in html
+    )
     assert f"{reached.node_count} of 999" in html
     assert "Legs 1 – 4, 2 – 4, 3 – 4 collide" in html
     rows = [row for row in rows_of(html) if len(row) == 3]

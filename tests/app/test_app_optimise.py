@@ -875,7 +875,7 @@ def test_presses_elsewhere_do_what_those_of_the_tab_do(bench: Bench) -> None:
     bench.find()
     notice = search_notice(bench.state)
     assert notice is not None
-    assert (notice.title, notice.text) == ("Converged", "F 0")
+    assert (notice.title, notice.text) == ("Converged", "volume 8,000 units³")
     bench.press(ACCEPT)
     assert run_of(bench.state).accepted
     assert search_notice(bench.state) is None

@@ -35,6 +35,7 @@ from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose, rotation_from_yaw_pitch_roll
 from explorer.numerics.arrays import FloatArray
+from explorer.numerics.number_text import format_number
 from explorer.singularity.colours import WARN_CONDITION
 from explorer.singularity.jacobian import inverse_condition, jacobian
 from explorer.workspace.limits.constraints import HalfSpace
@@ -86,11 +87,12 @@ def test_volume_is_known_while_the_solid_is_not_shown() -> None:
         expected = workspace_volume(state.design, state.pose.rotation)
         assert services.get(WorkspaceFeed).drawing is None
         assert feed.text.is_current
-        assert feed.text.words == f"{expected.volume:.6g} units³"
+        assert feed.text.words == f"{format_number(expected.volume, 6)} units³"
         words = volume_headline(Frame(state), feed)
         assert feed.text.words in words
         # One unit of the design is a centimetre.
-        assert f"{expected.volume:.4g} cm³ ({0.001 * expected.volume:.4g} l)" in words
+        litres = format_number(expected.volume, 4), format_number(0.001 * expected.volume, 4)
+        assert f"{litres[0]} cm³ ({litres[1]} l)" in words
         assert "±" in words
 
 
@@ -102,7 +104,7 @@ def test_volume_is_that_of_the_orientation_that_is_chosen() -> None:
         follow(services, chosen)
         expected = workspace_volume(OPTIMAL, workspace_rotation(Frame(chosen))).volume
         texts.append(services.get(VolumeFeed).text.words)
-        assert texts[-1] == f"{expected:.6g} units³"
+        assert texts[-1] == f"{format_number(expected, 6)} units³"
         assert f"in the {'present' if orientation == 'pose' else 'home'} orientation" in (
             volume_headline(Frame(chosen), services.get(VolumeFeed))
         )

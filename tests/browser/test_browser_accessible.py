@@ -15,6 +15,7 @@ from explorer.app.features.mechanism.pose_panel import JOINT_LABELS
 from explorer.app.features.workspace.feed import WorkspaceFeed
 from explorer.app.screenshot import PATIENCE_SECONDS
 from explorer.app.state.actions import Set
+from explorer.numerics.number_text import format_number
 from explorer.workspace.accessible.radii import with_radius
 
 # Pixels that tell a surface from the edges that a moved leg brings.
@@ -74,7 +75,7 @@ def test_the_accessible_solid_takes_the_place_of_the_other_and_the_page_stays_al
     drawing = page.services.get(WorkspaceFeed).drawing
     assert drawing is not None
     assert drawing.reached is not None
-    expect(accessible).to_contain_text(f"{drawing.reached.volume:.6g} units³")
+    expect(accessible).to_contain_text(f"{format_number(drawing.reached.volume, 6)} units³")
     assert red_pixels(tab) > without + MANY
 
     download = tab.export("Workspace", "3MF")

@@ -17,6 +17,7 @@ from explorer.app.state.actions import Set, SetVariable
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import rotation_from_yaw_pitch_roll
+from explorer.numerics.number_text import format_number
 from explorer.singularity.ellipsoids import planes_of_singularity
 from explorer.singularity.jacobian import inverse_condition, jacobian
 from explorer.workspace.slices.volume import workspace_volume
@@ -54,7 +55,7 @@ def test_workspace_is_seen_cut_read_and_left_as_a_file(tab: Tab) -> None:
     page.session.do(SetVariable("a3x", 17.0))
     assert page.wait_until_drawn(PATIENCE_SECONDS)
     # Its volume is in sight without any press, and its solid after two.
-    volume = f"{workspace_volume(tab.state.design).volume:.6g} units³"
+    volume = f"{format_number(workspace_volume(tab.state.design).volume, 6)} units³"
     expect(tab.page.get_by_text(volume).first).to_be_visible()
     tab.turn_to("Workspace")
     expect(tab.page.get_by_text(volume).last).to_be_visible()

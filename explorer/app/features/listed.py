@@ -20,8 +20,8 @@ from explorer.app.features.workspace.feature import WORKSPACE
 
 FEATURES: tuple[Feature, ...] = (
     DESIGNS,
-    HISTORY,
     MECHANISM,
+    HISTORY,
     VIEW,
     SINGULARITY,
     WORKSPACE,

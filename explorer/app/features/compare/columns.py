@@ -15,7 +15,7 @@ from explorer.app.widgets.markup import LEAST, MOST, format_number
 from explorer.measures.catalogue import Measure
 from explorer.measures.measurements import Measurements
 from explorer.mechanism.design import Design
-from explorer.numerics.number_text import set_true_minus
+from explorer.numerics.number_text import format_decimals, set_true_minus
 
 # Values that differ by a smaller share are equally good.
 SAME = 1e-9
@@ -108,7 +108,7 @@ def best_of(measure: Measure, values: list[float | None]) -> set[int]:
 def value_text(measure: Measure, value: float, size: float, *, signed: bool = False) -> str:
     """Return a value with the decimals that suit a size, the largest value of its row."""
     if measure.is_whole:
-        text = f"{value:+,.0f}" if signed else f"{value:,.0f}"
+        text = format_decimals(value, 0, signed=signed)
         return set_true_minus(text.replace(",", "\N{NARROW NO-BREAK SPACE}"))
     if size != 0.0 and not LEAST <= size < MOST:
         return ("+" if signed and value >= 0.0 else "") + format_number(value)
@@ -140,11 +140,11 @@ def notes(state: State, columns: tuple[Column, ...]) -> list[str]:
     others = [other for other in columns if not math.isclose(other.design.unit_mm, live.unit_mm)]
     if others:
         others_units = ", ".join(
-            f"{other.letter} has {other.design.unit_mm:.6g} mm" for other in others
+            f"{other.letter} has {format_number(other.design.unit_mm, 6)} mm" for other in others
         )
         unit = "millimetres" if state.compared.look.millimetres else "units of the live design"
         remarks.append(
-            f"One unit of the live design is {live.unit_mm:.6g} mm; {others_units}. Lengths are in "
-            f"{unit}, and workspaces are drawn to true size."
+            f"One unit of the live design is {format_number(live.unit_mm, 6)} mm; {others_units}. "
+            f"Lengths are in {unit}, and workspaces are drawn to true size."
         )
     return remarks

@@ -17,6 +17,7 @@ from explorer.app.features.compare.feed import LIVE
 from explorer.app.widgets.buttons import press_button
 from explorer.app.widgets.markup import meter, swatch
 from explorer.measures.catalogue import Measure, measures_in
+from explorer.numerics.number_text import format_number
 
 # The measures that begin a group of rows.
 FIRSTS = ("volume", "reach", "least_margin", "least_clearance", "inverse_condition", "yaw")
@@ -111,8 +112,8 @@ def _exact_text(measure: Measure, column: Column) -> str:
     value = column.own_value(measure)
     if value is None:
         return ""
-    own = f"{value:.12g} {unit_of(measure, millimetres=False)}".strip()
+    own = f"{format_number(value, 12)} {unit_of(measure, millimetres=False)}".strip()
     if measure.power == 0:
         return own
     scaled = value * column.design.unit_mm**measure.power
-    return f"{own} = {scaled:.12g} {unit_of(measure, millimetres=True)}"
+    return f"{own} = {format_number(scaled, 12)} {unit_of(measure, millimetres=True)}"

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from explorer.app.features.designs.files import DesignFile
-from explorer.app.features.designs.name import DesignName
 from explorer.app.features.designs.panel import DesignsPanel
 from explorer.app.features.designs.saved_designs import SavedDesigns
-from explorer.app.features.feature import Export, Feature, InBar, Tab
+from explorer.app.features.feature import Export, Feature, Tab
 
 DESIGNS = Feature(
     "designs",
     tabs=(Tab("dialog", "Designs", DesignsPanel),),
-    bar=(InBar("left", DesignName),),
     exports=(
         Export(
             "Design",

@@ -13,16 +13,19 @@ from explorer.mechanism.design_file import PRESETS
 
 
 class DesignName:
-    """The name, a button that opens the dialog Designs."""
+    """The name, a button that opens the dialog Designs where designs are saved."""
 
     def __init__(self, services: Services) -> None:
-        self._saved = services.get(SavedDesigns)
+        self._saved = None if services.user_data is None else services.get(SavedDesigns)
 
     def markup(self, frame: Frame) -> str:
         """Return the name for a frame, as HTML."""
         live = frame.state.design
+        name = f'<b class="ex-cut">{escape(live.name)}</b>'
+        if self._saved is None:
+            return f'<span class="ex-name">{name}</span>'
         mark, words = saved_words(live, self._saved.find(live.name))
-        content = f'<b class="ex-cut">{escape(live.name)}</b><span class="ex-dim">{mark}</span>'
+        content = f'{name}<span class="ex-dim">{mark}</span>'
         hint = f"{words} Save, rename, open or upload designs."
         return open_button("Designs", content, hint=hint, class_name="ex-name")
 

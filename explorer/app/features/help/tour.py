@@ -101,7 +101,7 @@ STEPS = (
     ),
     Step(
         "See the workspace",
-        "Tick Solid in Workspace: all positions of b4 within the limits. Cut it open, or colour "
+        "Press Solid in Workspace: all positions of b4 within the limits. Cut it open, or colour "
         "it by the distance to the nearest singularity.",
         "Workspace",
         _is_solid,
@@ -110,8 +110,8 @@ STEPS = (
     Step(
         "Optimise, and take it with you",
         "Press Optimise, and accept what it finds; what you do not accept is put back. Export, on "
-        "top of the page, has files for CAD, simulation and print. Ctrl-Z undoes every step of "
-        "this tour.",
+        "top of the page, has files for CAD, simulation and print. Ctrl-Z undoes what you "
+        "changed.",
         "Optimise",
         _is_optimised,
         lambda _: StartRun(),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import viser
 
+from explorer.app.features.designs.name import DesignName
 from explorer.app.features.feature import Feature, InBar, StateCommand, Tab
 from explorer.app.features.mechanism.bodies import Bodies
 from explorer.app.features.mechanism.design_panel import DesignPanel
@@ -25,7 +26,7 @@ MECHANISM = Feature(
         Tab("build", "Pose", MovePanel, viser.Icon.ARROWS_MOVE),
         Tab("build", "Design", DesignPanel, viser.Icon.RULER_2),
     ),
-    bar=(InBar("middle", LimitsFigure),),
+    bar=(InBar("left", DesignName), InBar("middle", LimitsFigure)),
     # Bodies come first: they make the platform's frame, to which others attach.
     scene=(Bodies, Flags, Legs, TwinLegs, Tetrahedra, Labels, Ghosts, DragHandle),
     commands=(

@@ -87,8 +87,8 @@ def _name(problem: Problem, last: Iterate, curve: curves.Curve) -> str:
     if curve.kind == "spare":
         return f"Worst constraint, broken below 0: {last.worst or 'none'}"
     if curve.kind == "volume":
-        target = "" if curve.level is None else f", required {curve.level:.6g}"
-        return f"Volume (units³): {last.volume:.6g}{target}"
+        target = "" if curve.level is None else f", required {format_number(curve.level, 6)}"
+        return f"Volume (units³): {format_number(last.volume, 6)}{target}"
     if curve.powers:
         value = format_number(last.objective, 2, size=1.0)
         return f"log10 of F = |1 − V / V′|; F = {value}"

@@ -88,7 +88,7 @@ def search_notice(state: State) -> Notice | None:
     if not state.optimisation.is_on:
         if run.verdict is None or run.best is None or run.accepted:
             return None
-        value = value_text(run.problem, run.best)
+        value = _reached_text(run.problem, run.best)
         return Notice(TITLES[run.verdict.status], value, None, (ACCEPT, REVERT))
     if run.phase == "cancelling":
         return Notice("Cancelling …", "", None, (CANCEL,))
@@ -100,10 +100,17 @@ def search_notice(state: State) -> Notice | None:
     broken = f", broken: {last.worst}" if last.spare < 0.0 else ""
     return Notice(
         f"{start}{last.phase} {step}".capitalize(),
-        f"{value_text(run.problem, last)}{broken}",
+        f"{_reached_text(run.problem, last)}{broken}",
         last.run / run.starts if run.starts > 1 else None,
         (CANCEL,),
     )
+
+
+def _reached_text(problem: Problem, iterate: Iterate) -> str:
+    """Return what a search has reached: the volume that it matches, or the objective."""
+    if problem.objective == "match-volume":
+        return f"volume {format_number(iterate.volume, 5)} units³"
+    return value_text(problem, iterate)
 
 
 def value_text(problem: Problem, iterate: Iterate) -> str:
@@ -214,7 +221,7 @@ def verdict_words(state: State, run: Run, verdict: SearchResult) -> str:
     if verdict.starts > 1:
         remarks.append(f"{verdict.starts} starts, {verdict.converged} converged")
     if verdict.seconds is not None:
-        remarks.append(f"{verdict.seconds:.2g} s")
+        remarks.append(f"{format_number(verdict.seconds, 2)} s")
     if run.accepted:
         remarks.append("accepted")
     if verdict.best is not None and state.design.variables != verdict.best.design.variables:

@@ -85,6 +85,7 @@ class PathsPanel:
                 "Make the path from the start to the goal, and play it.",
                 Go,
                 icon=viser.Icon.ROUTE,
+                main=True,
             )
             self._controls.number(
                 "Time limit (s)",

@@ -19,6 +19,7 @@ from explorer.app.widgets.colours import FAR_WARNINGS, proximity_colour
 from explorer.app.widgets.controls import Controls
 from explorer.app.widgets.markup import box, fitted, format_number, margin_name, meter, swatch
 from explorer.mechanism.margins import INCIDENCES, TETRAHEDRA
+from explorer.numerics.number_text import format_decimals
 
 GHOSTS: tuple[Ghost, ...] = get_args(Ghost)
 GO = "singular.go"
@@ -94,7 +95,7 @@ def _margin(frame: Frame, index: int) -> str:
     return (
         f"<div{' class=ex-strong' if is_least else ''}>{margin_name(index + 1)}"
         f"<span>{fitted(float(snapshot.margins[index]), reach, 4)}</span>"
-        f"<span>{distance} mm</span><span>{turn:.1f}°</span>{go}</div>"
+        f"<span>{distance} mm</span><span>{format_decimals(turn, 1)}°</span>{go}</div>"
         f'<div class="ex-danger" title="{escape(hint)}">{swatch(colour)}'
         f'<span class="ex-dim ex-small ex-fill">{INCIDENCES[index]}</span>'
         f"{meter(min(100.0, 100.0 * level / FAR_WARNINGS), colour, look='ex-meter is-thin')}</div>"

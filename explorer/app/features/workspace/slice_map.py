@@ -21,6 +21,7 @@ from explorer.export.report.drawings.slices import Slices, in_plane
 from explorer.export.report.markup import as_html, coordinate, element
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray, IntArray
+from explorer.numerics.number_text import format_number
 from explorer.singularity.ellipsoids import planes_of_singularity
 from explorer.workspace.solids.solid import Solid
 
@@ -198,7 +199,7 @@ def map_picture(mapped: SliceMap, pose: Pose, reach: float) -> str:
         class_="frame",
     )
     size = placing(scale / mapped.own_scale, left, bottom)
-    words = f"Map of the slice at {mapped.axis} = {mapped.level:.4g}"
+    words = f"Map of the slice at {mapped.axis} = {format_number(mapped.level, 4)}"
     return (
         f'<svg class="ex-map" viewBox="0 0 {coordinate(WIDTH)} {coordinate(height)}" role="img" '
         f'aria-label="{words}" data-map="{escape(msgspec.json.encode(facts).decode())}">'

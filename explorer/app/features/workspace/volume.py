@@ -13,6 +13,7 @@ from explorer.app.features.workspace.reached import Rows
 from explorer.app.session.feed import Feed
 from explorer.app.state.frame import Frame
 from explorer.mechanism.design import Design
+from explorer.numerics.number_text import format_number
 from explorer.workspace.slices.volume import Volume, workspace_volume
 
 
@@ -69,7 +70,7 @@ class VolumeFeed(Feed[VolumeRequest, MeasuredVolume]):
     def text(self) -> VolumeText:
         """The newest volume in words."""
         drawing = self.drawing
-        words = "–" if drawing is None else f"{drawing.measured.volume:.6g} units³"
+        words = "–" if drawing is None else f"{format_number(drawing.measured.volume, 6)} units³"
         return VolumeText(words, self.is_current)
 
 

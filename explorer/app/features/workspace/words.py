@@ -26,7 +26,6 @@ from explorer.app.widgets.markup import (
 )
 from explorer.app.widgets.under_way import problem, progress
 from explorer.export.report.drawings.slices import NOT_ACCESSIBLE, NOT_ACCESSIBLE_OPACITY
-from explorer.export.report.markup import format_number as format_power
 from explorer.legs.clearance import pair_name
 from explorer.singularity.colours import BAND_EDGES, WARN_CONDITION, band_colours
 from explorer.workspace.accessible.workspace import PairCost
@@ -67,8 +66,9 @@ def drawing_words(frame: Frame, feed: WorkspaceFeed) -> str:
         return ""
     percent = 100.0 * reached.volume / drawing.volume
     return (
-        f'<div class="ex-line"><span>{reached.volume:.6g} units³ accessible, '
-        f"{percent:.4g} %</span>{dim(waiting)}</div>" + meter(percent, PLAIN, COLLIDING)
+        f'<div class="ex-line"><span>{format_number(reached.volume, 6)} units³ accessible, '
+        f"{format_number(percent, 4)} %</span>{dim(waiting)}</div>"
+        + meter(percent, PLAIN, COLLIDING)
     )
 
 
@@ -78,9 +78,10 @@ def _volume(newest: MeasuredVolume, frame: Frame) -> str:
         causes = ", ".join(measured.empty_because)
         return alert("The workspace is empty", f"Emptied by: {causes}.")
     which = "present" if frame.state.view.workspace.orientation == "pose" else "home"
+    volume = format_number(measured.volume, 6)
     return (
-        f'<div class="ex-line"><span class="ex-large">{measured.volume:.6g} units³</span>'
-        f"{dim(f'± {format_power(measured.error, 1)}')}</div>"
+        f'<div class="ex-line"><span class="ex-large">{volume} units³</span>'
+        f"{dim(f'± {format_number(measured.error, 1)}')}</div>"
         + caption(
             f"{_litres(measured.volume, unit_mm)} within the limits, in the {which} orientation"
         )
@@ -88,8 +89,8 @@ def _volume(newest: MeasuredVolume, frame: Frame) -> str:
 
 
 def _litres(volume: float, unit_mm: float) -> str:
-    cubic_centimetres = volume * (0.1 * unit_mm) ** 3
-    return f"{cubic_centimetres:.4g} cm³ ({0.001 * cubic_centimetres:.4g} l)"
+    litres = volume * (0.01 * unit_mm) ** 3
+    return f"{format_number(1e3 * litres, 4)} cm³ ({format_number(litres, 4)} l)"
 
 
 def workspace_details(frame: Frame, feed: WorkspaceFeed) -> str:
@@ -112,7 +113,8 @@ def workspace_details(frame: Frame, feed: WorkspaceFeed) -> str:
     if drawing.coarse_edge is not None:
         parts.append(
             '<div class="ex-dim ex-after">The workspace is large beside the reach: its condition '
-            f"number is computed at corners up to {drawing.coarse_edge:.3g} units apart.</div>"
+            f"number is computed at corners up to {format_number(drawing.coarse_edge, 3)} units "
+            "apart.</div>"
         )
     return box(*parts)
 
@@ -133,8 +135,8 @@ def _numbers(drawing: WorkspaceDrawing) -> str:
             hint += "; too many to check each step between them"
         rows += [
             ("Nodes", count, hint),
-            ("Node volume", f"{volume:.6g}", volume_hint),
-            ("Node step", f"{nodes.step:.4g}", "Step of the grid, in design units"),
+            ("Node volume", format_number(volume, 6), volume_hint),
+            ("Node step", format_number(nodes.step, 4), "Step of the grid, in design units"),
         ]
     if drawing.extent is not None:
         size = drawing.request.design.reach
@@ -142,7 +144,9 @@ def _numbers(drawing: WorkspaceDrawing) -> str:
             text = f"{format_number(low, size=size)} … {format_number(high, size=size)}"
             rows.append((f"Extent {axis}", text, "Extent of the workspace, in design units"))
     if drawing.hull_volume is not None:
-        rows.append(("Hull volume", f"{drawing.hull_volume:.6g}", "Volume of the convex hull"))
+        rows.append(
+            ("Hull volume", format_number(drawing.hull_volume, 6), "Volume of the convex hull")
+        )
     volume = drawing.volume if reached is None else reached.volume
     if volume > 0.0:
         rows.append(
@@ -159,7 +163,11 @@ def deviation_text(deviation: float) -> str:
     """Return a bound of a relative deviation in words, such as "off by less than 0.01 %"."""
     percent = 100.0 * abs(deviation)
     bound = next((bound for bound in DEVIATIONS if percent < bound), None)
-    return f"off by {percent:.2g} %" if bound is None else f"off by less than {bound:g} %"
+    return (
+        f"off by {format_number(percent, 2)} %"
+        if bound is None
+        else f"off by less than {bound:g} %"
+    )
 
 
 def _pairs(reached: Reached, *, is_coloured: bool) -> str:
@@ -204,7 +212,9 @@ def legend(measure: str, warn_below: float, drawing: WorkspaceDrawing | None) ->
     colours = ",".join(
         f"{css(band)} 0 {width * (index + 1):g}%" for index, band in enumerate(band_colours())
     )
-    edges = ((width * index, f"{BAND_EDGES[index] * unit:.2g}") for index in (0, 2, 4, 6, 9))
+    edges = (
+        (width * index, format_number(BAND_EDGES[index] * unit, 2)) for index in (0, 2, 4, 6, 9)
+    )
     marks = ""
     if drawing is not None and drawing.slice_map is not None:
         if any(drawing.request.design.limits.leg_radii):
