@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import re
 from collections.abc import Iterator, Mapping
+from html import unescape
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,10 @@ OF_THE_MOMENT = {"Width (px)", "Height (px)", "Transparent"}
 # The track of a slider holds still while it is moved, so that it depends on what was done.
 OF_TRACKS = {"min", "max", "_marks"}
 ROUNDING = 1e-9
+# Properties that hold text or markup, and the texts of markup.
+TEXTS = (" content", " label", " hint", " text", " value")
+TAG = re.compile("<[^>]*>")
+ATTRIBUTE = re.compile(' (?:title|aria-label)="([^"]*)"')
 # What is told of the way here: how long it took.
 OF_THE_WAY = re.compile(r"(?<=Computed in<).*?ms")
 
@@ -47,6 +52,15 @@ def shown_by(running: Running) -> dict[str, object]:
         found[f"{name} wxyz"] = tuple(np.asarray(handle.wxyz).tolist())
         found.update(_properties(name, handle))
     return {key: _named(value, ids) for key, value in found.items()}
+
+
+def shown_texts(running: Running) -> Iterator[tuple[str, str]]:
+    """Yield the texts of all controls and scene nodes, with where they are; markup has several."""
+    for place, value in shown_by(running).items():
+        if isinstance(value, str) and place.endswith(TEXTS):
+            for text in (*TAG.split(value), *ATTRIBUTE.findall(value)):
+                if text.strip():
+                    yield place, unescape(text)
 
 
 def differences(one: Mapping[str, object], other: Mapping[str, object]) -> list[str]:
@@ -94,9 +108,8 @@ def _properties(place: str, handle: Any) -> dict[str, object]:
     value = getattr(state, "value", None)
     if is_slider:
         low, high = handle.min - ROUNDING, handle.max + ROUNDING
-        found[f"{place} is within its track"] = bool(
-            ((low <= np.array(value)) & (np.array(value) <= high)).all()
-        )
+        is_within = (low <= np.array(value)) & (np.array(value) <= high)
+        assert is_within.all(), f"{place}: {value} lies beyond its track"
     if value is not None and not getattr(state, "is_button", False):
         found[f"{place} value"] = value
     return found

@@ -117,7 +117,7 @@ SCENES = {
         panels=True,
         size=(1280, 1200),
     ),
-    "twin": Scene(actions=(Set("view", View(handle=False, twin=True)),)),
+    "twin": Scene(actions=(Set("view", View(handle=False, drawn_as="6-4 twin")),)),
     "workspace": Scene(
         actions=(Set("view", replace(BARE, workspace=WorkspaceView(solid=True))),),
     ),
@@ -148,7 +148,8 @@ SCENES = {
                     BARE,
                     flags=False,
                     labels=False,
-                    prototype=PrototypeView(shown=True, exploded=0.5),
+                    drawn_as="prototype",
+                    prototype=PrototypeView(exploded=0.5),
                 ),
             ),
         ),

@@ -22,7 +22,7 @@ class Bar:
 
     def __init__(self, services: Services, features: Sequence[Feature]) -> None:
         declared = [part for feature in features for part in feature.bar]
-        self._parts = [(each.side, services.get(each.part)) for each in declared]
+        self._parts = [(each.side, each.part(services)) for each in declared]
         self._html = services.gui.add_html("")
 
     def updates(self, frame: Frame) -> Iterator[Update]:
@@ -31,4 +31,4 @@ class Bar:
         yield self._html, "content", f'<div class="ex-bar">{sides}</div>'
 
     def _markup(self, side: Side, frame: Frame) -> str:
-        return "".join(part.markup(frame) for each, part in self._parts if each == side)
+        return "".join(part(frame) for each, part in self._parts if each == side)

@@ -16,14 +16,14 @@ from explorer.app.widgets.theme import Theme
 
 # Seconds until the panels of a new page are laid out.
 SETTLE_SECONDS = 0.7
-# Number of times that a new browser's camera is placed again, and the longest pause in seconds.
-MOST_LOOKS, LONGEST_PAUSE_SECONDS = 12, 5.0
+# Most attempts to place a new browser's camera, and the longest pause between two in seconds.
+MOST_ATTEMPTS, LONGEST_PAUSE_SECONDS = 12, 5.0
 # Width and height of a window in pixels: in a narrower one the left panel goes above the right
 # one, which leaves the scene room, if the window is high enough for both.
 NARROW, HIGH_ENOUGH = 1100, 700
 # Widths of the panels on the left and on the right, and height of the open drawer, in pixels.
 LEFT_WIDTH, RIGHT_WIDTH, DRAWER_HEIGHT = 300, 360, 300
-# Width and height that a window of the page has before the stylesheet gives it its place.
+# Width, and place from the left and from the top, of a window before the stylesheet places it.
 ANY_WIDTH, ANY_PLACE = 640, 80
 
 
@@ -37,7 +37,6 @@ class Panels:
     def __init__(self, gui: viser.GuiApi) -> None:
         self._gui = gui
         self.build, self.analyse, self.work = (gui.add_panel() for _ in range(3))
-        self._dialogs: list[viser.PanelHandle] = []
         self._tabs: dict[tuple[Place, str], viser.GuiTabHandle] = {}
 
     def tab(self, tab: Tab) -> viser.GuiTabHandle:
@@ -56,7 +55,6 @@ class Panels:
             return getattr(self, place)
         dialog = self._gui.add_panel()
         dialog.float(x=ANY_PLACE, y=ANY_PLACE, width=ANY_WIDTH)
-        self._dialogs.append(dialog)
         return dialog
 
     def lay_out(self, client: viser.ClientHandle | None = None) -> None:
@@ -82,7 +80,7 @@ class Panels:
 
 
 class Layout:
-    """Lays out the panels, and suits the page to each new browser.
+    """Lays out the panels, and adapts the page to each new browser.
 
     Args:
         server: Server of the page.
@@ -123,22 +121,22 @@ class Layout:
     def _answered(self, client: viser.ClientHandle, facts: BrowserFacts) -> None:
         # A thread of its own waits until the page is laid out.
         threading.Thread(
-            target=self._suit, args=(client, facts), name="layout", daemon=True
+            target=self._adapt, args=(client, facts), name="layout", daemon=True
         ).start()
 
-    def _suit(self, client: viser.ClientHandle, facts: BrowserFacts) -> None:
+    def _adapt(self, client: viser.ClientHandle, facts: BrowserFacts) -> None:
         self._make_room(client, facts)
         self._theme.follow_browser(dark=facts.dark)
         # Some browsers report the size of the scene before its panels are laid out, and not again
-        # before the camera moves; slow ones miss where it is put. Each try makes them report.
+        # before the camera moves; slow ones miss where it is put. Each attempt makes them report.
         pause = SETTLE_SECONDS
-        for look in range(MOST_LOOKS):
+        for attempt in range(MOST_ATTEMPTS):
             time.sleep(pause)
             # The camera of a browser that has disconnected counts as placed too.
-            if look > 0 and self._cameras.stands(client):
+            if attempt > 0 and self._cameras.stands(client):
                 return
             self._cameras.look_again(client)
-            pause = min((1.0 + look) * SETTLE_SECONDS, LONGEST_PAUSE_SECONDS)
+            pause = min((1.0 + attempt) * SETTLE_SECONDS, LONGEST_PAUSE_SECONDS)
 
 
 def is_narrow(facts: BrowserFacts) -> bool:

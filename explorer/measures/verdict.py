@@ -76,13 +76,15 @@ class Verdict:
         levels: Level of each incidence: the least of its measures, each over its warning value;
             0 is singular, below 1 is near.
         incidences: Numbers 1 to 3 of the incidences that hold in a singular pose; of those
-            that are near, the lowest level first; in a clear pose, of the nearest one.
+            that are near, first the nearest of those with the cause; in a clear pose, of the
+            nearest one.
         distance: Root-mean-square displacement of b1 to b4 to the nearest pose with the first
             of these incidences, in design units; 0 in a singular pose.
         turn: Least turn to the first of these incidences, in radians.
         condition: The inverse condition number of J, 0 to 1.
-        cause: Which of these is told: the first of them that is below its warning value if the
-            pose is near, otherwise the distance. A margin is told by the distance.
+        cause: Which of these is told: if the pose is near, the first of them that is below its
+            warning value for the incidence of the lowest level; otherwise the distance. A margin
+            is told by the distance.
     """
 
     kind: Kind
@@ -158,7 +160,7 @@ def verdict(snapshot: Snapshot, warn_below: float | None = None) -> Verdict:
     """
     warn = warnings(snapshot.design.reach, warn_below)
     holding = incidences(snapshot.stratum)
-    worst = snapshot.worst_conditioned
+    worst_conditioned = snapshot.worst_conditioned
 
     def measures(incidence: int) -> dict[Cause, float]:
         index = incidence - 1
@@ -167,7 +169,7 @@ def verdict(snapshot: Snapshot, warn_below: float | None = None) -> Verdict:
             "distance": min(size / warn.margin, distance / warn.distance),
             "turn": snapshot.least_turns[index] / warn.turn,
         }
-        if incidence == worst:
+        if incidence == worst_conditioned:
             levels["condition"] = snapshot.inverse_condition / warn.condition
         return levels
 
@@ -179,15 +181,22 @@ def verdict(snapshot: Snapshot, warn_below: float | None = None) -> Verdict:
         return Verdict(kind, levels, told, distance, turn, snapshot.inverse_condition, cause)
 
     each = {incidence: measures(incidence) for incidence in (1, 2, 3)}
-    first, second, third = (
+    level_1, level_2, level_3 = (
         0.0 if incidence in holding else min(each[incidence].values()) for incidence in (1, 2, 3)
     )
-    levels = first, second, third
+    levels = level_1, level_2, level_3
     if holding:
         return made("singular", holding)
-    order = sorted((1, 2, 3), key=lambda incidence: levels[incidence - 1])
-    if near := tuple(incidence for incidence in order if levels[incidence - 1] < 1.0):
-        of_first = each[near[0]]
-        return made("near", near, next(cause for cause in of_first if of_first[cause] < 1.0))
-    nearest = min((1, 2, 3), key=lambda incidence: snapshot.nearest_distances[incidence - 1])
-    return made("clear", (nearest,))
+    by_distance = sorted(each, key=lambda incidence: snapshot.nearest_distances[incidence - 1])
+    near = [incidence for incidence in by_distance if levels[incidence - 1] < 1.0]
+    if not near:
+        return made("clear", (by_distance[0],))
+    cause = _cause(each[min(near, key=lambda incidence: levels[incidence - 1])])
+    # The nearest of those with the cause first; sorting keeps the order of the others.
+    near.sort(key=lambda incidence: _cause(each[incidence]) != cause)
+    return made("near", tuple(near), cause)
+
+
+def _cause(levels: dict[Cause, float]) -> Cause:
+    """Return the first measure that is below its warning value."""
+    return next(cause for cause, level in levels.items() if level < 1.0)

@@ -11,7 +11,7 @@ import math
 import msgspec
 import numpy as np
 
-from explorer.errors import InputError
+from explorer.errors import InputError, TooTightError
 from explorer.mechanism.design import Design
 from explorer.mechanism.home import home_pose
 from explorer.numerics.arrays import FloatArray
@@ -32,14 +32,15 @@ def sizes_of(design: Design) -> Sizes:
     Legs without a radius in the design get the largest that fits, up to a share of the reach.
 
     Raises:
-        InputError: the design is too tight for its parts, or its home breaks the limits of a
-            leg; the message names the parts, their distance and what would fit.
+        TooTightError: the design is too tight for its parts; the message names the parts, their
+            distance and what would fit.
+        InputError: the home pose breaks the limits of a leg.
     """
     design = msgspec.structs.replace(design, home=home_pose(design))
     share = 1.0 if all(design.limits.leg_radii) else _fitting_factors(design, 1.0)[0]
     sizes = _sizes(design, 1.0, share or 1.0)
     if sizes.worst is not None:
-        raise InputError(_refusal(design, sizes.worst))
+        raise _refusal(design, sizes.worst)
     for leg in LEGS:
         low, high = sizes.required_stroke(leg)
         # A home pose on a limit is within it, whatever its rounding.
@@ -78,28 +79,30 @@ def _fitting_factors(
     return first_fitting(np.geomspace(1.0, 1e-2, 100)), first_fitting(np.geomspace(1.0, 1e2, 100))
 
 
-def _refusal(design: Design, worst: tuple[str, float, float]) -> str:
+def _refusal(design: Design, worst: tuple[str, float, float]) -> TooTightError:
     parts, distance, needed = worst
     if parts.startswith("the radius"):
         text = f"too thin: {parts} is {_mm(distance)} and must be at least {_mm(needed)}"
     else:
         text = f"too tight for the parts: {parts} are {_mm(distance)} apart and need {_mm(needed)}"
     ways: list[str] = []
-    unit = _least_unit(design)
+    factor = _least_unit(design)
+    unit = None if factor is None else _round(factor * design.unit_mm, up=True)
     if unit is not None:
-        ways.append(f"with a unit of at least {_round(unit * design.unit_mm, up=True)} mm")
+        ways.append(f"with a unit of at least {unit:.6g} mm")
     largest_radius = max(design.limits.leg_radii)
     smaller, larger = _fitting_factors(design, 1.0, all_of=True) if largest_radius else (None, None)
     if smaller is not None:
-        ways.append(f"with legs of radius at most {_round(smaller * largest_radius, up=False)}")
+        ways.append(f"with legs of radius at most {_round(smaller * largest_radius, up=False):.6g}")
     elif larger is not None:
-        ways.append(f"with legs of radius at least {_round(larger * largest_radius, up=True)}")
+        ways.append(f"with legs of radius at least {_round(larger * largest_radius, up=True):.6g}")
     if not ways:
-        return (
-            f"{text}; no unit makes that fit: take thinner legs, another home, or points that "
-            "are farther apart"
+        text += (
+            "; no unit makes that fit: take thinner legs, another home, or points that are farther "
+            "apart"
         )
-    return f"{text}; it fits {' or '.join(ways)}"
+        return TooTightError(text, None)
+    return TooTightError(f"{text}; it fits {' or '.join(ways)}", unit)
 
 
 def _least_unit(design: Design) -> float | None:
@@ -125,8 +128,8 @@ def _mm(value: float) -> str:
     return f"{value:.3g} mm"
 
 
-def _round(value: float, up: bool) -> str:
+def _round(value: float, up: bool) -> float:
     """Return a value to three digits, rounded up or down."""
     step = 10.0 ** (math.floor(math.log10(value)) - 2)
     whole = math.ceil(value / step) if up else math.floor(value / step)
-    return f"{whole * step:.6g}"
+    return float(f"{whole * step:.6g}")

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.numerics.arrays import FloatArray
+from explorer.numerics.number_text import format_number
 from explorer.prototype.chains import BODIES, LEGS, ON_GUIDE, joints_of_leg
 from explorer.prototype.dimensions import FIRST_SWING, SECOND_SWING
 from explorer.prototype.sizes import Sizes
@@ -51,16 +52,20 @@ def _strokes(sizes: Sizes, joints: FloatArray) -> Iterator[str]:
     for leg, (low, high) in zip(LEGS, sizes.strokes, strict=True):
         length = float(joints_of_leg(joints, leg)[-1]) * unit
         if not low * (1.0 - _SLACK) <= length <= high * (1.0 + _SLACK):
-            yield f"leg {leg} is {length:.4g} mm long, its stroke is {low:.4g} to {high:.4g} mm"
+            stroke = f"{format_number(low)} to {format_number(high)} mm"
+            yield f"leg {leg} is {format_number(length, size=high)} mm long, its stroke is {stroke}"
     places = [float(joints_of_leg(joints, leg)[0]) * unit for leg in ON_GUIDE]
     for leg, place in zip(ON_GUIDE, places, strict=True):
         low, high = sizes.carriage_range(leg)
         if not low - _SLACK * abs(low) <= place <= high + _SLACK * abs(high):
-            yield f"carriage {leg} is at {place:.4g} mm, its rail is {low:.4g} to {high:.4g} mm"
+            rail = f"{format_number(low)} to {format_number(high)} mm"
+            at = format_number(place, size=high - low)
+            yield f"carriage {leg} is at {at} mm, its rail is {rail}"
     distance, needed = places[0] - places[1], sizes.between_carriages
     at_home = sizes.carriage_at_home(2) - sizes.carriage_at_home(3)
     if math.copysign(1.0, at_home) * distance < needed * (1.0 - _SLACK):
-        yield f"carriages 2 and 3 are {abs(distance):.4g} mm apart and need {needed:.4g} mm"
+        apart = format_number(abs(distance), size=needed)
+        yield f"carriages 2 and 3 are {apart} mm apart and need {format_number(needed)} mm"
 
 
 def _swings(joints: FloatArray) -> Iterator[str]:

@@ -4,7 +4,8 @@ The conditions of a stratum leave three, two, one or no angles of the rotation f
 lie on a plane or a line through a1, or on a1 itself. The best position is then a projection,
 and the squared distance a smooth function of the angles: Newton's method, with derivatives by
 complex steps, refines its local minima on a grid. The three strata of codimension one have an
-exact solution in `explorer.singularity.nearest`.
+exact solution in `explorer.singularity.nearest`; where the rotation alone is free, it is that of
+the orthogonal Procrustes problem (Schönemann 1966; for rotations, Kabsch 1976).
 """
 
 from __future__ import annotations
@@ -75,13 +76,14 @@ _FREE = ("zxz", ("",))
 _GUIDE_ALONG, _LINE_ALONG = ("xz", ("",)), ("zx", ("",))
 _PARALLEL_PLANES, _PARALLEL_LINES = ("z", ("", "x")), ("x", ("", "z"))
 _PARALLEL_FLAGS = ("", ("", "x", "y", "z"))
+_TURNED_ABOUT_A1 = _Closure(*_FREE, "a1")
 
 _CLOSURES: Mapping[Stratum, _Closure] = MappingProxyType(
     {
         (3, 4, 1, 2): _Closure(*_FREE, "node"),
         (2, 4, 3, 1): _Closure(*_FREE, "u"),
         (4, 1, 3, 2): _Closure(*_FREE, "guide"),
-        (1, 4, 3, 2): _Closure(*_FREE, "a1"),
+        (1, 4, 3, 2): _TURNED_ABOUT_A1,
         (3, 2, 4, 1): _Closure(*_GUIDE_ALONG, "platform"),
         (2, 3, 4, 1): _Closure(*_GUIDE_ALONG, "u"),
         (3, 1, 4, 2): _Closure(*_GUIDE_ALONG, "guide"),
@@ -254,6 +256,9 @@ def _nearest(design: Design, pose: Pose, closure: _Closure) -> Pose:
     centroid = platform.centroid / unit
     goal = np.array(pose.position) / unit + rotation @ centroid
     rotated_scatter = rotation @ platform.scatter / unit**2
+    if closure == _TURNED_ABOUT_A1:
+        turn = _nearest_rotation(rotated_scatter + np.outer(goal, centroid))
+        return Pose.of(np.zeros(3), turn)
     best, nearest = math.inf, pose
     for flip in closure.flips:
         half_turn = _turn(flip, np.array(math.pi)) if flip else np.eye(3)
@@ -263,6 +268,13 @@ def _nearest(design: Design, pose: Pose, closure: _Closure) -> Pose:
             turn = problem.rotation(angles)
             best, nearest = value, Pose.of(unit * problem.position(angles, turn), turn)
     return nearest
+
+
+def _nearest_rotation(matrix: FloatArray) -> FloatArray:
+    """Return the rotation R (3, 3) with the largest trace of Rᵀ A for a matrix A (3, 3)."""
+    left, _, right = np.linalg.svd(matrix)
+    side = np.sign(np.linalg.det(left @ right))
+    return left @ np.diag([1.0, 1.0, side]) @ right
 
 
 @functools.cache

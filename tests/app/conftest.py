@@ -11,8 +11,11 @@ from services import StubWorker, services_for
 
 from explorer.app.browser.viser_gaps import start_viser, stop_viser
 from explorer.app.features.feature import Services
+from explorer.app.server import Running, start
 from explorer.app.session.jobs import Worker
 from explorer.app.state.state import opened
+from explorer.app.storage.study_folders import StudyFolders
+from explorer.app.storage.user_data import open_user_data
 from explorer.app.widgets.buttons import Buttons
 from explorer.mechanism.design_file import PRESETS
 
@@ -41,6 +44,17 @@ def desk() -> Generator[Desk]:
 @pytest.fixture
 def worker() -> Generator[StubWorker]:
     made = StubWorker()
+    yield made
+    made.stop()
+
+
+@pytest.fixture(scope="module")
+def running(tmp_path_factory: pytest.TempPathFactory) -> Generator[Running]:
+    """An explorer with every feature: its page offers saved designs and studies."""
+    studies = StudyFolders(tmp_path_factory.mktemp("studies"))
+    made = start(
+        PRESETS["paper-optimal"], port=0, user_data=open_user_data(resume=False), studies=studies
+    )
     yield made
     made.stop()
 

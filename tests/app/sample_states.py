@@ -82,7 +82,8 @@ def _view(_: State, i: int, share: float) -> Action:
         "view",
         {
             "workspace": WorkspaceView(solid=i > 2, cut=("x", "y", None)[i % 3], level=share),
-            "prototype": PrototypeView(shown=i > 1, exploded=share),
+            "prototype": PrototypeView(exploded=share),
+            "drawn_as": ("schematic", "prototype", "6-4 twin")[i % 3],
             "singular": SingularView(ghost="δ2 = 0", strata=i > 2),
             "tetrahedra": (i > 1, i > 2, i > 3),
             "warn_below": None if i == 0 else 1.0 + share,

@@ -433,7 +433,7 @@ def test_the_button_goes_where_ways_can_start(services: Services, desk: Desk) ->
             button, visible = handle, value
         if name == "content":
             contents.append(str(value))
-    assert any("The home position is no start" in content for content in contents)
+    assert any("Nothing is accessible from the home position" in content for content in contents)
     assert visible is True
     drawing = feed.drawing
     assert drawing is not None

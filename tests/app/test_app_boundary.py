@@ -67,7 +67,7 @@ def test_table_of_modes_marks_all_that_meet_in_a_singular_pose() -> None:
         (Frame(opened(OPTIMAL)), ["1"], "Mode 1 (− − +)"),
         (Frame(at(1)), ["1", "5"], "Boundary of modes 1 and 5 (0 − +)"),
     ):
-        html = modes_table(frame)
+        html = modes_table(frame, "")
         rows = re.findall(r'data-press="modes.go" data-value="(\d)"[^>]*aria-pressed="true"', html)
         assert rows == marked
         assert words in html
@@ -80,7 +80,7 @@ def test_a_singular_pose_is_the_boundary_of_its_modes_in_all_words(case: Case) -
     modes = snapshot.bordering_modes
     expected = describe_modes(modes) if len(modes) > 1 else f"mode {snapshot.mode}"
     assert snapshot.mode_words == f"{expected} ({snapshot.sign_words})"
-    for html in (summary(frame), modes_table(frame)):
+    for html in (summary(frame), modes_table(frame, "")):
         assert snapshot.mode_words.capitalize() in html
 
 

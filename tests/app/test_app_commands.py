@@ -17,6 +17,7 @@ from typing import Any
 import msgspec
 import pytest
 import viser
+from page_props import shown_by
 
 import explorer.app
 from explorer.app.browser.viser_gaps import start_viser, stop_viser
@@ -36,7 +37,8 @@ from explorer.app.features.paths.actions import (
 from explorer.app.features.singularity.actions import Jog
 from explorer.app.features.studies.actions import BrushAxis, BrushBox, PickDesign
 from explorer.app.features.view.camera_buttons import HINTS as CAMERA_HINTS
-from explorer.app.server import Running, start
+from explorer.app.features.workspace.panel import KEYS as CHIP_KEYS
+from explorer.app.server import Running
 from explorer.app.session.gestures import UserAction
 from explorer.app.session.session import UNDO, Session
 from explorer.app.state.actions import (
@@ -50,11 +52,10 @@ from explorer.app.state.actions import (
     StartThere,
 )
 from explorer.app.state.state import State
-from explorer.app.storage.study_folders import StudyFolders
-from explorer.app.storage.user_data import open_user_data
 from explorer.app.widgets.commands import (
     CAMERA_KEYS,
     PALETTE_KEY,
+    Key,
     offers,
     with_keys,
 )
@@ -101,7 +102,7 @@ CHOSEN_IN_THE_PANEL = {
 }
 """Lists of which an option alone does nothing, or whose options come and go."""
 
-ALL_KEYS = {label: keys for feature in FEATURES for label, keys in feature.keys.items()}
+CONTROL_KEYS = {label: keys for feature in FEATURES for label, keys in feature.keys.items()}
 OPEN_LISTS = {label for feature in FEATURES for label in feature.lists}
 
 # What browsers do with keys; undo and redo are theirs too, and meant for pages.
@@ -117,16 +118,6 @@ class Browser:
 
 
 CLIENT: Any = Browser()
-
-
-@pytest.fixture(scope="module")
-def running(tmp_path_factory: pytest.TempPathFactory) -> Generator[Running]:
-    studies = StudyFolders(tmp_path_factory.mktemp("studies"))
-    made = start(
-        PRESETS["paper-optimal"], port=0, user_data=open_user_data(resume=False), studies=studies
-    )
-    yield made
-    made.stop()
 
 
 @pytest.fixture(scope="module")
@@ -249,25 +240,32 @@ def test_names_and_keys_are_told_apart(palette: Palette) -> None:
     assert len(set(keys)) == len(keys)
 
 
+def keys_of(palette: Palette) -> dict[str, tuple[Key, ...]]:
+    """Return the keys of the commands that have any."""
+    return {command.label: command.keys for command in palette.commands if command.keys}
+
+
 def test_every_key_belongs_to_a_command_and_to_one_owner(palette: Palette) -> None:
-    assert len(ALL_KEYS) == sum(len(feature.keys) for feature in FEATURES)
-    assert set(ALL_KEYS) <= set(labelled(palette))
+    assert len(CONTROL_KEYS) == sum(len(feature.keys) for feature in FEATURES)
+    assert CONTROL_KEYS.items() <= keys_of(palette).items()
+    assert set(CHIP_KEYS) <= set(keys_of(palette))
 
 
-def test_no_key_is_taken_from_the_browser_the_camera_or_the_palette() -> None:
-    for key in itertools.chain.from_iterable(ALL_KEYS.values()):
+def test_no_key_is_taken_from_the_browser_the_camera_or_the_palette(palette: Palette) -> None:
+    for key in itertools.chain.from_iterable(keys_of(palette).values()):
         assert str(key) not in BROWSER_KEYS
         # viser's camera looks at the letter, whatever else is held down.
         assert key.key not in CAMERA_KEYS
         assert key != PALETTE_KEY
 
 
-def test_manual_lists_every_key_and_no_other() -> None:
+def test_manual_lists_every_key_and_no_other(palette: Palette) -> None:
     section = read_page("page.md").partition("## Keys")[2].partition("\n## ")[0]
     _, *rows = re.findall(r"^\|.*\| (.+) \|$", section, flags=re.MULTILINE)
     told = {key for row in rows for key in re.split(r", | or ", row)}
-    card = {str(key) for key in ALL_KEYS["Page › Keys"]}
-    assert told | card == {str(key) for key in itertools.chain.from_iterable(ALL_KEYS.values())}
+    keys = keys_of(palette)
+    card = {str(key) for key in keys["Page › Keys"]}
+    assert told | card == {str(key) for key in itertools.chain.from_iterable(keys.values())}
 
 
 def test_two_commands_of_one_name_are_refused(palette: Palette) -> None:
@@ -281,21 +279,28 @@ def test_every_list_is_offered_or_chosen_in_its_panel(running: Running) -> None:
     assert lists - OPEN_LISTS - CHOSEN_IN_THE_PANEL == set()
 
 
-def test_a_hint_tells_the_keys_that_do_the_same(running: Running) -> None:
+def test_a_hint_tells_the_keys_that_do_the_same(running: Running, palette: Palette) -> None:
     told = 0
     for widget in widgets(running.viser):
         for label in offers(widget, OPEN_LISTS):
-            for key in ALL_KEYS.get(label, ()):
+            for key in CONTROL_KEYS.get(label, ()):
                 assert f" {key}" in widget.hint
                 told += 1
-    # Other keys are those of buttons in markup, whose hints tell them too.
-    assert told > 10
+    # The keys of buttons in markup stand in hints there.
+    markup = " ".join(
+        str(value) for name, value in shown_by(running).items() if name.endswith(" content")
+    )
+    for label, keys in keys_of(palette).items():
+        if label.startswith(("View ›", "Edit ›", "Optimise ›", "Show › Dr")) or label in CHIP_KEYS:
+            told += sum(f" {key}" in markup for key in keys)
+    assert told > 20
 
 
 def test_keys_are_told_behind_the_hint() -> None:
     assert with_keys("Go.", ()) == "Go."
-    assert with_keys("Go.", ALL_KEYS["Edit › Undo"]) == "Go. Key: Ctrl+Z."
-    assert with_keys("Go.", ALL_KEYS["Edit › Redo"]) == "Go. Keys: Ctrl+Shift+Z, Ctrl+Y."
+    assert with_keys("Go.", (Key("Z", "cmd/ctrl"),)) == "Go. Key: Ctrl+Z."
+    redo = (Key("Z", "cmd/ctrl+shift"), Key("Y", "cmd/ctrl"))
+    assert with_keys("Go.", redo) == "Go. Keys: Ctrl+Shift+Z, Ctrl+Y."
 
 
 def test_only_what_can_be_done_can_be_chosen(running: Running, palette: Palette) -> None:
@@ -317,7 +322,7 @@ def test_only_what_can_be_done_can_be_chosen(running: Running, palette: Palette)
 
 SWITCHES: dict[str, Callable[[State], bool]] = {
     "Show › Grid": lambda state: state.view.grid,
-    "Prototype › Show the parts": lambda state: state.view.prototype.shown,
+    "Prototype › Show the parts": lambda state: state.view.drawn_as == "prototype",
     "Show › All tetrahedra": lambda state: state.view.tetrahedra == (True, True, True),
     "Workspace › Convex hull": lambda state: state.view.workspace.hull,
 }

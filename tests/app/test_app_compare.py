@@ -13,7 +13,7 @@ import msgspec
 import numpy as np
 import pytest
 import viser
-from desk import Desk
+from desk import Desk, number
 from hypothesis import given, strategies as st
 from services import StubWorker, services_for
 
@@ -92,10 +92,6 @@ def cells(html: str) -> dict[str, list[str]]:
         # Behind each value but that of the live design stands its difference to that.
         found[first] = [rest[0], *rest[1::2]]
     return found
-
-
-def number(text: str) -> float:
-    return float(text.replace("−", "-").replace("\N{NARROW NO-BREAK SPACE}", ""))
 
 
 @given(st.lists(st.tuples(st.sampled_from(["pin", "unpin", "live"]), st.integers(0, 4))))
@@ -185,7 +181,7 @@ def test_what_is_small_beside_the_others_is_not_told_as_nothing() -> None:
     assert value_text(volume, 0.000999998, 8000.0) == "0.001"
     assert value_text(volume, -8.574e-9, 8000.0) == "−8.57 × 10⁻⁹"
     assert value_text(volume, 0.0, 8000.0) == "0"
-    assert value_text(volume, 7992.0, 8000.0) == "7992.00"
+    assert value_text(volume, 7992.0, 8000.0) == "7,992.00"
     # A difference by rounding is none.
     assert value_text(CATALOGUE["exact_extent_x"], -7.1e-15, 20.0, signed=True) == "0"
 
@@ -196,7 +192,7 @@ def test_the_best_of_a_row_is_bold_and_only_where_better_means_something() -> No
     (volume,) = (
         row for name, row in rows.items() if name.endswith("volume units³") and "node" not in name
     )
-    assert re.findall(r'is-best"[^>]*>([^<]*)', volume) == ["7053.04"]
+    assert re.findall(r'is-best"[^>]*>([^<]*)', volume) == ["7,053.04"]
     (extent,) = (row for name, row in rows.items() if name.endswith("extent x units"))
     assert "is-best" not in extent
 

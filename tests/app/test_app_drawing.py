@@ -19,8 +19,8 @@ from explorer.app.scene.shapes import cylinder, plate, sphere, turned_to
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import opened
 from explorer.app.widgets.colours import FAR, FAR_WARNINGS, SINGULAR, Rgb, proximity_colour
-from explorer.app.widgets.controls import decimals
 from explorer.app.widgets.markup import share
+from explorer.app.widgets.tracks import decimals
 from explorer.mechanism.design import Design, Limits
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose

@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Generator
 
 import pytest
 
 from explorer.app.features.mechanism.bodies import GRID
 from explorer.app.look import read_stylesheet
-from explorer.app.server import Running, start
-from explorer.app.storage.study_folders import StudyFolders
-from explorer.app.storage.user_data import open_user_data
+from explorer.app.server import Running
 from explorer.app.widgets import charts
 from explorer.app.widgets.colours import OUTLINE, Rgb
 from explorer.app.widgets.pieces import Widget, widgets
 from explorer.app.widgets.theme import BRAND, BRAND_ON_DARK
-from explorer.mechanism.design_file import PRESETS
 
 # Of panels, of the scene, and of fields within panels, as viser draws them.
 LIGHT = {"panel": "#ffffff", "scene": "#ffffff", "field": "#ffffff"}
@@ -38,16 +34,6 @@ WITHOUT_UNIT = {
 
 OUT_OF_SIGHT = {"Presses on markup"}
 """What the page writes to and nobody reads."""
-
-
-@pytest.fixture(scope="module")
-def running(tmp_path_factory: pytest.TempPathFactory) -> Generator[Running]:
-    studies = StudyFolders(tmp_path_factory.mktemp("studies"))
-    made = start(
-        PRESETS["paper-optimal"], port=0, user_data=open_user_data(resume=False), studies=studies
-    )
-    yield made
-    made.stop()
 
 
 def name(widget: Widget) -> str:

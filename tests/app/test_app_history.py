@@ -14,7 +14,7 @@ from hypothesis import given, strategies as st
 
 import explorer.app
 from explorer.app.features.optimise.actions import CancelRun, EndRun, StartRun
-from explorer.app.features.paths.actions import Advance, Go, Play, SetPathTime
+from explorer.app.features.paths.actions import Advance, CancelPlan, Go, Play, SetPathTime
 from explorer.app.features.singularity.actions import GoToSingularity, GoToStratum, Jog
 from explorer.app.features.studies.actions import BrushAxis, OpenStudy
 from explorer.app.session.gestures import PAUSE_SECONDS, UserAction
@@ -207,6 +207,19 @@ def test_search_is_one_step_and_no_step_is_undone_meanwhile() -> None:
     assert again.optimisation.run.number == 2
 
 
+def test_page_drawn_again_after_undo_leaves_what_can_be_redone(recorder: Recorder) -> None:
+    recorder.do(Set("paths.kind", "planned"))
+    recorder.do(Go())
+    recorder.do(CancelPlan())
+    recorder.do(StartRun())
+    recorder.do(EndRun(1, SearchResult("cancelled", "cancelled before the first iterate")))
+    words = recorder.words
+    recorder.move(-len(words))
+    recorder.do(Set("hold", recorder.state.hold))
+    assert recorder.words == words
+    recorder.move(len(words))
+
+
 def test_session_undoes_and_redoes_exactly(desk: Desk) -> None:
     first = desk.state
     # Each press is a step, also several in one frame.
@@ -263,7 +276,7 @@ def test_what_is_shown_is_no_step_and_undo_leaves_it(done: list[Action | str]) -
 WORDED = [
     (SetJoint(0, 12.5), "l1 = 12.5"),
     (SetPosition(2, 9.25), "z = 9.25"),
-    (SetAngle(0, -70.0), "yaw = -70°"),
+    (SetAngle(0, -70.0), "yaw = −70°"),
     (SetPose(Pose((1.0, 2.0, 3.0), (1.0, 0.0, 0.0, 0.0))), "Move b4 to 1, 2, 3"),
     (SetMode(1), "Assembly mode 1 (− − +)"),
     (SetVariable("b3", 5.0), "b3 = 5"),

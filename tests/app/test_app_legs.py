@@ -196,9 +196,9 @@ def test_the_closest_pair_is_marked_wherever_the_platform_goes(services: Service
     assert len(marked) > 1
 
 
-@pytest.mark.parametrize("view", [{}, {"clearance": True, "twin": True}])
+@pytest.mark.parametrize("view", [{}, {"clearance": True, "drawn_as": "6-4 twin"}])
 def test_the_closest_pair_is_marked_on_request_and_not_on_the_twin(
-    services: Services, view: dict[str, bool]
+    services: Services, view: dict[str, Any]
 ) -> None:
     state = opened(OPTIMAL)
     shown = viewed(state, **view)
@@ -223,10 +223,10 @@ def test_legs_with_radii_are_drawn_as_capsules(services: Services, state: State)
 
 
 @pytest.mark.parametrize(
-    ("radius", "view"), [(0.0, {}), (0.3, {"twin": True}), (0.3, {"legs": False})]
+    ("radius", "view"), [(0.0, {}), (0.3, {"drawn_as": "6-4 twin"}), (0.3, {"legs": False})]
 )
 def test_there_are_no_capsules_without_radii_or_without_legs(
-    services: Services, radius: float, view: dict[str, bool]
+    services: Services, radius: float, view: dict[str, Any]
 ) -> None:
     state = thick(opened(OPTIMAL), radius)
     shown = viewed(state, **view)
@@ -285,8 +285,8 @@ def test_each_face_of_a_swept_body_is_drawn_once(services: Services) -> None:
             assert len(corners) == 4
 
 
-@pytest.mark.parametrize("view", [{"swept": False}, {"swept": True, "twin": True}])
-def test_what_is_not_shown_costs_nothing(services: Services, view: dict[str, bool]) -> None:
+@pytest.mark.parametrize("view", [{"swept": False}, {"swept": True, "drawn_as": "6-4 twin"}])
+def test_what_is_not_shown_costs_nothing(services: Services, view: dict[str, Any]) -> None:
     state = swept()
     frame = Frame(viewed(state, **view))
     drawn = by_name(SweptTetrahedra(services).updates(Placed(frame)))

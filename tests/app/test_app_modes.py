@@ -34,7 +34,7 @@ OPTIMAL = PRESETS["paper-optimal"]
 
 def rows_of_modes(frame: Frame) -> list[list[str]]:
     """Return the cells of each row of the table."""
-    buttons = re.findall(r"<button[^>]*modes\.go.*?</button>", modes_table(frame))
+    buttons = re.findall(r"<button[^>]*modes\.go.*?</button>", modes_table(frame, ""))
     cells = [re.findall(r"<(?:b|span)(?: [^>]*)?>([^<]*)", button) for button in buttons]
     return [[cell for cell in row if cell] for row in cells]
 
@@ -55,7 +55,7 @@ def test_table_has_the_eight_modes_with_b4_and_the_limits_that_each_breaks() -> 
         assert (row[5] == "within") == (not broken)
         if broken:
             assert row[5].split(" +")[0] in broken[0].limit
-            assert str(broken[0]) in modes_table(frame).replace("&#x27;", "'")
+            assert str(broken[0]) in modes_table(frame, "").replace("&#x27;", "'")
             assert row[5].endswith(f" +{len(broken) - 1}") == (len(broken) > 1)
 
 
@@ -74,8 +74,8 @@ def test_table_of_any_pose_has_eight_rows_or_says_that_they_do_not_close(case: C
 
 def test_table_says_that_lengths_do_not_close_and_whose_modes_it_shows() -> None:
     state = SetJoint(0, 40.0).apply(opened(OPTIMAL))
-    assert "close in no mode" in modes_table(Frame(state))
-    assert "close in no mode" not in modes_table(Frame(opened(OPTIMAL)))
+    assert "close in no mode" in modes_table(Frame(state), "")
+    assert "close in no mode" not in modes_table(Frame(opened(OPTIMAL)), "")
 
 
 def test_press_on_a_row_goes_to_its_mode_and_one_in_the_head_switches_the_ghosts(

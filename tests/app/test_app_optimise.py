@@ -32,10 +32,7 @@ from explorer.app.features.optimise.actions import (
     StartRun,
     TakePaperBox,
 )
-from explorer.app.features.optimise.limits import limit_rows
-from explorer.app.features.optimise.panel import OptimisePanel
-from explorer.app.features.optimise.plots import curves_of, data_of
-from explorer.app.features.optimise.presses import (
+from explorer.app.features.optimise.buttons import (
     ACCEPT,
     CANCEL,
     HULL,
@@ -45,6 +42,9 @@ from explorer.app.features.optimise.presses import (
     REVERT,
     START,
 )
+from explorer.app.features.optimise.limits import limit_rows
+from explorer.app.features.optimise.panel import OptimisePanel
+from explorer.app.features.optimise.plots import curves_of, data_of
 from explorer.app.features.optimise.problem import (
     box_within,
     liftable,
@@ -862,13 +862,13 @@ def test_presses_elsewhere_do_what_those_of_the_tab_do(bench: Bench) -> None:
     bench.wait_for_iterates(3)
     notice = search_notice(bench.session.state)
     assert notice is not None
-    assert notice.presses == (CANCEL,)
+    assert notice.buttons == (CANCEL,)
     assert notice.share is not None
     bench.press(CANCEL)
     bench.wait_for_end()
     notice = search_notice(bench.state)
     assert notice is not None
-    assert notice.presses == (ACCEPT, REVERT)
+    assert notice.buttons == (ACCEPT, REVERT)
     bench.press(REVERT)
     assert bench.state.design == paper_start()
     assert search_notice(bench.state) is None

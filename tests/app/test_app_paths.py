@@ -41,7 +41,7 @@ from explorer.app.features.paths.panel import (
     TYPED,
     PathsPanel,
     end_numbers,
-    kind_words,
+    kind_note,
     plan_words,
     typed_numbers,
 )
@@ -492,9 +492,9 @@ def test_typed_angles_stay_as_typed(yaw: float, pitch: float, roll: float) -> No
 
 def test_kind_says_whether_the_ends_allow_it() -> None:
     state = Set("paths.kind", "planned").apply(opened(OPTIMAL))
-    assert "none from mode 1 to mode 5" in kind_words(state)
-    assert "Both ends are in mode 1" in kind_words(to_plan())
-    assert "May pass singular poses" in kind_words(opened(OPTIMAL))
+    assert "none from mode 1 to mode 5" in kind_note(state)
+    assert "Both ends are in mode 1" in kind_note(to_plan())
+    assert "May pass singular poses" in kind_note(opened(OPTIMAL))
 
 
 def test_mode_at_a_singular_pose_is_refused_in_words_or_a_pose_with_the_same_legs() -> None:

@@ -7,6 +7,7 @@ from collections.abc import Generator
 from dataclasses import replace
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 from desk import Desk, by_name, number, rows_of, thick, viewed
@@ -20,6 +21,7 @@ from explorer.app.features.mechanism.legs import Legs
 from explorer.app.features.prototype.feed import PartsFeed
 from explorer.app.features.prototype.files import ASSEMBLIES
 from explorer.app.features.prototype.panel import (
+    FIT,
     PrototypePanel,
     parts_table,
     trouble_of,
@@ -31,7 +33,7 @@ from explorer.app.features.prototype.tasks import export_assembly
 from explorer.app.scene.creases import creased
 from explorer.app.scene.placing import Placed
 from explorer.app.scene.shapes import cylinder
-from explorer.app.state.actions import Set, SetPose, SetPosition, SetVariable
+from explorer.app.state.actions import Open, Set, SetPose, SetPosition, SetVariable, draw_as
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, opened
 from explorer.app.state.view import ALUMINIUM, PrototypeView
@@ -72,7 +74,7 @@ def parts() -> Parts:
 def shown(state: State | None = None, **changes: Any) -> State:
     """Return the state with the prototype drawn."""
     begin = opened(OPTIMAL) if state is None else state
-    return viewed(begin, prototype=PrototypeView(shown=True, **changes))
+    return viewed(begin, drawn_as="prototype", prototype=PrototypeView(**changes))
 
 
 def states(count: int, **changes: Any) -> list[State]:
@@ -268,7 +270,7 @@ def test_parts_are_made_anew_when_the_design_changes_and_not_else(
         assert made is not None
         assert made.prototype.sizes.radii == expected.sizes.radii
         assert np.array_equal(made.prototype.parts[0].vertices, expected.parts[0].vertices)
-    feed.follow(Frame(viewed(shown(), twin=True)))
+    feed.follow(Frame(viewed(shown(), drawn_as="6-4 twin")))
     assert feed.parts is None
 
 
@@ -287,6 +289,36 @@ def test_a_design_too_tight_is_told_in_the_words_of_the_library(feed: PartsFeed)
     assert feed.parts is not None
     assert trouble_of(Frame(shown()), feed) is None
     assert trouble_of(Frame(opened(OPTIMAL)), feed) is None
+
+
+def test_one_press_takes_the_unit_with_which_the_parts_fit(
+    desk: Desk, services: Services, feed: PartsFeed
+) -> None:
+    panel = PrototypePanel(services)
+    desk.session.do(draw_as("prototype"))
+    tight = msgspec.structs.replace(OPTIMAL, unit_mm=3.0)
+    desk.session.do(Open(tight))
+    feed.follow(Frame(desk.state))
+    assert feed.parts is None
+    words = " ".join(str(value) for _, _, value in panel.updates(Frame(desk.state)))
+    desk.press(services.buttons, FIT)
+    unit = desk.state.design.unit_mm
+    assert unit > tight.unit_mm
+    assert f"Set the unit to {unit:g} mm" in words
+    feed.follow(Frame(desk.state))
+    assert feed.parts is not None
+    # Without a refusal a late press does nothing.
+    before = desk.state
+    desk.press(services.buttons, FIT)
+    assert desk.state == before
+
+
+def test_a_design_that_no_unit_helps_has_no_such_press(feed: PartsFeed) -> None:
+    home = Pose.of_yaw_pitch_roll((10, 5, 9), (90, 0, 0))
+    state = shown(opened(msgspec.structs.replace(OPTIMAL, home=home)))
+    feed.follow(Frame(state))
+    assert feed.parts is None
+    assert FIT not in (trouble_of(Frame(state), feed) or "")
 
 
 def test_a_pose_that_the_parts_do_not_take_is_told(feed: PartsFeed) -> None:
@@ -371,7 +403,8 @@ def test_the_panel_shows_and_changes_how_the_prototype_is_drawn(
     desk.use(drawn, True)
     desk.use(apart, 0.25)
     desk.use(density, 7850.0)
-    assert desk.state.view.prototype == PrototypeView(True, 0.25, 7850.0)
+    assert desk.state.view.drawn_as == "prototype"
+    assert desk.state.view.prototype == PrototypeView(0.25, 7850.0)
     desk.use(density, -1.0)
     assert desk.state.view.prototype.density == 7850.0
     assert len(desk.complaints) == 1
@@ -383,7 +416,7 @@ def test_the_panel_shows_and_changes_how_the_prototype_is_drawn(
     assert table in [value for _, name, value in updates if name == "content"]
     assert [value for _, name, value in updates if name == "visible"] == [False, True]
     desk.use(drawn, False)
-    assert not desk.state.view.prototype.shown
+    assert desk.state.view.drawn_as == "schematic"
 
 
 def test_files_of_the_assembly_are_those_of_the_library() -> None:

@@ -16,7 +16,6 @@ from explorer.app.features.mechanism.pose_panel import MovePanel
 from explorer.app.state.actions import Set, SetJoint, SetPosition
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import opened
-from explorer.app.widgets.controls import Span, close_up, round_span, tint_marks
 from explorer.app.widgets.ranges import (
     box_span,
     coordinate_span,
@@ -29,6 +28,7 @@ from explorer.app.widgets.ranges import (
     round_up,
     variable_span,
 )
+from explorer.app.widgets.tracks import Span, close_up, round_span, tint_marks
 from explorer.mechanism.design import JOINTS, LENGTHS, VARIABLES, Design
 from explorer.mechanism.design_file import PRESETS
 
@@ -188,6 +188,23 @@ def test_a_leg_that_is_typed_beyond_its_track_is_on_it(services: Services, desk:
         assert sliders[joint].value == value
         for slider in sliders:
             assert slider.min <= slider.value <= slider.max
+
+
+@pytest.mark.parametrize(
+    ("held", "shown"),
+    [(5.0 + 1e-15, 5.0), (-7.5e-16, 0.0), (math.nextafter(4.25, 0.0), 4.25), (1 / 3, 1 / 3)],
+)
+def test_a_field_shows_no_rounding_error(
+    services: Services, desk: Desk, held: float, shown: float
+) -> None:
+    x = handles(panel := MovePanel(services), desk, viser.GuiSliderHandle)["x"]
+    desk.session.do(SetPosition(0, held))
+    values = [
+        value
+        for handle, name, value in panel.updates(Frame(desk.state))
+        if handle is x and name == "value"
+    ]
+    assert list(map(repr, values)) == [repr(shown)]
 
 
 def test_both_inputs_of_a_range_set_it_and_show_it(services: Services, desk: Desk) -> None:

@@ -185,7 +185,7 @@ def test_a_degenerate_design_is_refused(state: State, name: str, value: float) -
 
 
 def test_reset_returns_to_the_design_as_opened_and_keeps_the_view(state: State) -> None:
-    changed = Set("view", replace(state.view, twin=True)).apply(
+    changed = Set("view", replace(state.view, drawn_as="6-4 twin")).apply(
         Set("design.unit_mm", 1.0).apply(
             SetVariable("b2", 1.0).apply(SetPosition(0, 3.0).apply(state))
         )
@@ -193,7 +193,7 @@ def test_reset_returns_to_the_design_as_opened_and_keeps_the_view(state: State) 
     back = Reset().apply(changed)
     assert back.design == OPTIMAL
     assert back.pose == OPTIMAL.home
-    assert back.view.twin
+    assert back.view.drawn_as == "6-4 twin"
 
 
 def test_opening_another_design_changes_what_reset_returns_to(state: State) -> None:

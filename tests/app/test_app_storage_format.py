@@ -21,6 +21,7 @@ from explorer.app.state.compared import Compared
 from explorer.app.state.state import Run, State, opened
 from explorer.app.state.studies import Studies
 from explorer.app.state.values import with_value
+from explorer.app.storage.packing import present_view
 from explorer.app.storage.session_format import (
     MOST_BYTES,
     MOST_STEPS,
@@ -283,9 +284,11 @@ def test_file_of_an_earlier_schema_opens_to_the_state_it_was_written_from(schema
     first, state = (step.state for step in read.steps)
     if schema == 2:
         expected = saved(RICH)
-        # Fields that came later are as in a new state.
         for view in ("view", "optimisation.run.own.view"):
+            # Fields that came later are as in a new state.
             expected = with_value(expected, f"{view}.workspace.flipped", False)
+            # Twin and prototype were both switched on.
+            expected = with_value(expected, f"{view}.drawn_as", "6-4 twin")
         # There were no kinds of paths, and titles named the signs of modes.
         paths = state.paths
         assert paths.journey is not None
@@ -309,6 +312,19 @@ def test_file_of_an_earlier_schema_opens_to_the_state_it_was_written_from(schema
     assert first.view.workspace.level == 0.0
     again = decode_session(encode_session(read, 3), "file")
     assert repr(again) == repr(read)
+
+
+def test_forms_that_were_switched_apart_are_one_choice_now() -> None:
+    read = decode_session((DATA / "session-3.json").read_bytes(), "file")
+    forms = [step.state.view.drawn_as for step in read.steps]
+    assert forms == ["schematic", *["6-4 twin"] * (len(forms) - 1)]
+    for twin, shown, form in (
+        (False, False, "schematic"),
+        (False, True, "prototype"),
+        (True, True, "6-4 twin"),
+    ):
+        former = {"twin": twin, "prototype": {"shown": shown, "exploded": 0.5}}
+        assert present_view(former) == {"drawn_as": form, "prototype": {"exploded": 0.5}}
 
 
 def test_paths_between_modes_or_stored_poses_have_the_same_ends_now() -> None:

@@ -106,8 +106,13 @@ def test_verdict_is_the_worst_of_margins_distances_turns_and_conditioning(case: 
     if found.kind != "singular":
         assert (found.kind == "near") == (min(found.levels) < 1.0)
     first = found.incidences[0] - 1
-    if found.kind == "near":
-        assert found.levels[first] == min(found.levels)
+    if found.kind == "near" and found.cause == "distance":
+        sizes = np.abs(snapshot.margins)
+        assert found.distance == min(
+            each.distance
+            for size, each in zip(sizes, snapshot.nearest, strict=True)
+            if size < warn.margin or each.distance < warn.distance
+        )
     if found.kind == "clear":
         assert found.distance == snapshot.nearest[first].distance
         assert found.distance == min(each.distance for each in snapshot.nearest)

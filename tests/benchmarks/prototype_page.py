@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 
@@ -15,9 +14,8 @@ from explorer.app.features.prototype.feed import PartsFeed
 from explorer.app.features.prototype.scene import PrototypeScene
 from explorer.app.scene.placing import Placed
 from explorer.app.server import Running
-from explorer.app.state.actions import Set, SetPosition
+from explorer.app.state.actions import SetPosition, draw_as
 from explorer.app.state.frame import Frame
-from explorer.app.state.view import PrototypeView
 from explorer.app.widgets.assigning import Assigner
 
 CHANGES, MOVES, WARM_UP = 60, 300, 10
@@ -27,8 +25,7 @@ def run() -> Iterator[Row]:
     """Yield the rows."""
     with ready_page() as running:
         session = running.page.session
-        view = replace(session.state.view, prototype=PrototypeView(shown=True))
-        session.do(Set("view", view))
+        session.do(draw_as("prototype"))
         running.page.wait_until_drawn()
         rebuilt, moved = timed_changes(running, CHANGES, WARM_UP), Spread.of(_moved(running))
     yield Row("design slider to the new parts of the prototype", _words(rebuilt), "300 ms")

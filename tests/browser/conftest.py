@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator
 
 import pytest
 from graphics import quick_browser
+from kept_tab import KeptTab, OpenTab
 from playwright.sync_api import Browser, expect
 from tab import Tab
 
@@ -14,35 +14,7 @@ from explorer.app.screenshot import PATIENCE_SECONDS
 from explorer.app.server import Running, start
 from explorer.mechanism.design_file import PRESETS
 
-OpenTab = Callable[[], Tab]
-
 expect.set_options(timeout=1000 * PATIENCE_SECONDS)
-
-
-@dataclass
-class KeptTab:
-    """The tab that goes from test to test, since an explorer and a page take seconds to start.
-
-    Attributes:
-        tab: The tab; None before it is opened, and after a test that failed in it.
-    """
-
-    tab: Tab | None = None
-
-    def begin(self, browser: Browser) -> Tab:
-        """Return the tab as if it was opened now."""
-        if self.tab is None:
-            self.tab = Tab(browser, start(PRESETS["paper-optimal"], port=0))
-        else:
-            self.tab.begin_anew()
-        return self.tab
-
-    def close(self) -> None:
-        """Close the tab and stop its explorer; the next test starts others."""
-        if self.tab is not None:
-            self.tab.close()
-            self.tab.running.stop()
-            self.tab = None
 
 
 @pytest.fixture(scope="session")
@@ -55,8 +27,7 @@ def browser() -> Iterator[Browser]:
 @pytest.fixture(scope="session")
 def kept_tab(browser: Browser) -> Iterator[KeptTab]:
     """The tab that tests hand on."""
-    del browser  # It is closed later.
-    kept = KeptTab()
+    kept = KeptTab(lambda: Tab(browser, start(PRESETS["paper-optimal"], port=0)))
     yield kept
     kept.close()
 
@@ -77,24 +48,15 @@ def open_tab(
     kept_tab: KeptTab,
     capfd: pytest.CaptureFixture[str],
 ) -> Iterator[OpenTab]:
-    """Open tabs of one explorer, the kept one first; at the end none may have complained."""
-    tabs: list[Tab] = []
-    failures = request.session.testsfailed
+    """Open tabs of one explorer, the kept one first."""
+    with kept_tab.watch(request, capfd) as tabs:
 
-    def opened() -> Tab:
-        tab = Tab(browser, tabs[0].running) if tabs else kept_tab.begin(browser)
-        tabs.append(tab)
-        return tab
+        def opened() -> Tab:
+            tab = Tab(browser, tabs[0].running) if tabs else kept_tab.begin()
+            tabs.append(tab)
+            return tab
 
-    yield opened
-    complaints = [complaint for tab in tabs for complaint in tab.complaints()]
-    for tab in tabs[1:]:
-        tab.close()
-    error = capfd.readouterr().err
-    if complaints or error or request.session.testsfailed > failures:
-        kept_tab.close()
-    assert complaints == []
-    assert error == ""
+        yield opened
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from playwright.sync_api import Page
 
 # Goes through the text nodes of the page. Colours behind a text are put over one another from the
 # outside in; a text over a picture, a canvas or the scene has no colour behind it that is known.
-READ = """() => {
+READ = """(within) => {
     const probe = Object.assign(document.createElement("canvas"), { width: 1, height: 1 });
     const pen = probe.getContext("2d", { willReadFrequently: true });
     const parsed = new Map();
@@ -80,6 +80,7 @@ READ = """() => {
     for (let node = nodes.nextNode(); node; node = nodes.nextNode()) {
         const text = node.data.trim(),
             element = node.parentElement;
+        if (within && !element.closest(within)) continue;
         if (!text || element.closest("script, style, #webgl-software-rendering")) continue;
         const range = document.createRange();
         range.selectNodeContents(node);
@@ -87,6 +88,7 @@ READ = """() => {
         if (isSeen(element, range.getBoundingClientRect())) note(element, text, isDisabled);
     }
     for (const field of document.querySelectorAll("input:not([type=hidden]), textarea")) {
+        if (within && !field.closest(within)) continue;
         if (!field.value || field.type === "checkbox") continue;
         if (isSeen(field, field.getBoundingClientRect()))
             note(field, field.value, field.disabled);
@@ -116,9 +118,14 @@ class Text:
     place: str
 
 
-def texts_of(page: Page) -> list[Text]:
-    """Return the texts that are seen on a page."""
-    found: list[dict[str, Any]] = page.evaluate(READ)
+def texts_of(page: Page, within: str = "") -> list[Text]:
+    """Return the texts that are seen on a page.
+
+    Args:
+        page: The page.
+        within: Selector of the elements whose texts are meant; "" for all of the page.
+    """
+    found: list[dict[str, Any]] = page.evaluate(READ, within)
     return [
         Text(
             each["text"],

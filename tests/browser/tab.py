@@ -99,9 +99,9 @@ class Tab:
         self.page.set_viewport_size({"width": self._size[0], "height": self._size[1]})
         self.page.mouse.move(0, 0)
         self.page.evaluate(FORGET)
-        session.travel(HistoryMove(lambda _: start_history(opened(PRESETS["paper-optimal"]))))
         # A move through the history leaves what is shown as it is.
         session.do(Set("view", View()))
+        session.travel(HistoryMove(lambda _: start_history(opened(PRESETS["paper-optimal"]))))
         assert page.wait_until_drawn(PATIENCE_SECONDS)
         for group in self.page.get_by_role("tablist").all():
             first = group.get_by_role("tab").first

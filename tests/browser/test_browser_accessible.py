@@ -87,7 +87,9 @@ def test_a_home_that_is_no_start_is_told_and_the_button_goes_to_one(tab: Tab) ->
     tab.running.page.session.do(Set("design.limits", limits))
     tab.push("Solid")
     tab.choose("Region", "accessible from home")
-    alert = tab.page.get_by_role("alert").filter(has_text="The home position is no start")
+    alert = tab.page.get_by_role("alert").filter(
+        has_text="Nothing is accessible from the home position"
+    )
     alert.wait_for()
     expect(alert).to_contain_text(
         "l4 = 13.01 is above its maximum 12.5; the nearest valid position"

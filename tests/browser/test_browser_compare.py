@@ -55,7 +55,7 @@ def test_designs_are_pinned_told_overlaid_and_opened(tab: Tab) -> None:
     page = tab.running.page
     assert page.wait_until_drawn(PATIENCE_SECONDS)
     for design in PRESETS.values():
-        text = f"{workspace_volume(design).volume:.2f}"
+        text = f"{workspace_volume(design).volume:,.2f}"
         expect(tab.page.get_by_role("cell", name=text).first).to_be_attached(
             timeout=1000 * PATIENCE_SECONDS
         )

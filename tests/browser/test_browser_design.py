@@ -142,9 +142,12 @@ def test_a_thumb_stops_at_the_other_and_a_typed_end_pushes_it(limits: Tab) -> No
     assert x_range()[1] == 20.0
     type_end(limits, "b4 x", 1, "5")
     limits.wait_for(lambda: x_range() == (5.0, 5.0), "both ends at the typed one")
+    # An end that is typed before the page shows the answer would cross with it.
+    expect(limits.field("b4 x ends").nth(0)).to_have_value("5")
     type_end(limits, "b4 x", 0, "-40")
     limits.wait_for(lambda: x_range() == (-40.0, 5.0), "an end beyond the track")
     # The track has become longer, and the thumbs stand in it.
+    limits.wait_for(lambda: np.ptp(thumbs(limits, "b4 x"), axis=0)[0] > 5.0, "thumbs apart")
     drag_thumb(limits, "b4 x", 1, 10.0)
     limits.wait_for(lambda: x_range()[1] > 5.0, "the upper thumb dragged")
     assert x_range()[0] == -40.0

@@ -26,7 +26,7 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin, Subprotocol
 
 from explorer.app.browser.viser_gaps import ServerControls, start_viser, stop_viser
-from explorer.app.features.optimise import presses
+from explorer.app.features.optimise import buttons
 from explorer.app.screenshot import PATIENCE_SECONDS
 from explorer.app.security import client_messages
 from explorer.app.security.access import Access
@@ -426,7 +426,7 @@ def test_a_file_goes_to_the_tab_that_asked_for_it_alone(running: Running) -> Non
     with client_of(running) as client, client_of(running) as other:
         client.read_until_quiet(0.3)
         other.read_until_quiet(0.3)
-        press = msgspec.json.encode({"name": presses.DESIGN, "value": "", "count": 1})
+        press = msgspec.json.encode({"name": buttons.DESIGN, "value": "", "count": 1})
         client.update(client.find("Presses on markup"), press.decode())
         mine: list[dict[str, Any]] = []
         while not any(message["type"] == "FileTransferPart" for message in mine):

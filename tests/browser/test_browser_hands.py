@@ -74,7 +74,7 @@ def test_the_palette_finds_a_command_and_does_it(tab: Tab) -> None:
     press(tab, "ControlOrMeta+k")
     search.fill("show the parts")
     tab.page.get_by_text("Prototype › Show the parts").first.click()
-    tab.wait_for(lambda: tab.state.view.prototype.shown, "the prototype")
+    tab.wait_for(lambda: tab.state.view.drawn_as == "prototype", "the prototype")
 
 
 def test_keys_act_on_the_page_and_not_while_one_types(tab: Tab) -> None:

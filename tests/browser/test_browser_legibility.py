@@ -7,7 +7,7 @@ from contextlib import closing
 import pytest
 from legibility import Text, open_folders, texts_of
 from monkey import explorer_with_data
-from playwright.sync_api import Browser
+from playwright.sync_api import Browser, expect
 from tab import Tab
 
 SIZE = (1280, 720)
@@ -50,6 +50,31 @@ def test_all_text_of_all_tabs_is_legible(browser: Browser, dark: bool) -> None:
                 sizes |= {round(text.size, 1): text.text for text in texts}
             assert found > 500
             assert set(sizes) <= SIZES, sizes
+
+
+@pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
+def test_all_text_of_the_bar_and_of_the_dialogs_is_legible(browser: Browser, dark: bool) -> None:
+    with explorer_with_data() as running:
+        running.page.services.theme.choose(dark=dark)
+        with closing(Tab(browser, running, size=SIZE, dark=dark)) as tab:
+            bar = texts_of(tab.page, ".ex-bar")
+            assert len(bar) > 8
+            places = {"bar": bar}
+            for name in running.page.panels.titles("dialog"):
+                tab.open_dialog(name)
+                open_folders(tab.page)
+                tab.wait_for(
+                    lambda: not problems(texts_of(tab.page, "[role=dialog]")),
+                    f"legible text in {name}: {problems(texts_of(tab.page, '[role=dialog]'))}",
+                )
+                places[name] = texts_of(tab.page, "[role=dialog]")
+                assert places[name], name
+                tab.page.keyboard.press("Escape")
+                expect(tab.page.get_by_role("dialog", name=name)).to_have_count(0)
+            assert {"Designs", "History", "Export", "Help"} <= places.keys()
+            for name, texts in places.items():
+                assert not problems(texts), name
+                assert {round(text.size, 1) for text in texts} <= SIZES, name
 
 
 def test_what_is_not_legible_is_found(tab: Tab) -> None:

@@ -7,7 +7,7 @@ from typing import cast
 
 import numpy as np
 import pytest
-from conftest import OpenTab
+from kept_tab import OpenTab
 from playwright.sync_api import Browser, Locator, expect
 from tab import SIZE, TRACK, Tab
 

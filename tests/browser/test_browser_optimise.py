@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from conftest import OpenTab
+from kept_tab import OpenTab
 from playwright.sync_api import expect
 
 from explorer.mechanism.design_file import PRESETS, decode_design

@@ -221,7 +221,7 @@ def test_a_small_study_is_started_and_cancelled(tab: Tab, home: Path) -> None:
     expect(count).to_have_count(0)
     panel = panel_of(tab)
     tab.wait_for(lambda: panel.runner.run is not None, "a study")
-    expect(tab.page.get_by_text(f"of {MOST} designs").first).to_be_visible()
+    expect(tab.page.get_by_text(f"of {MOST:,} designs").first).to_be_visible()
     tab.push("Cancel study")
     tab.wait_for(lambda: panel.runner.run is None, "the end of a cancelled study")
     tab.push("New study")

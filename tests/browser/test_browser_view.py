@@ -6,9 +6,10 @@ import itertools
 from collections.abc import Callable
 
 from likeness import decoded, likeness
+from playwright.sync_api import expect
 from tab import Tab
 
-from explorer.app.features.view.panel import SWITCHES
+from explorer.app.features.view.panel import FORMS, LAYERS
 from explorer.app.scene.camera import VIEWS
 from explorer.app.state.view import View
 from explorer.mechanism.margins import TETRAHEDRA
@@ -24,10 +25,9 @@ def shows_tetrahedron(index: int) -> Callable[[View], bool]:
 
 def test_every_switch_of_the_view_switches_its_part_and_no_other(tab: Tab) -> None:
     tab.turn_to("Show")
-    switches = {label: shows(name) for name, label, _ in SWITCHES}
+    switches = {label: shows(name) for name, label, _ in LAYERS}
     for index, points in enumerate(TETRAHEDRA):
         switches[f"δ{index + 1}: {' '.join(points)}"] = shows_tetrahedron(index)
-    switches["6-4 twin"] = shows("twin")
     before = tab.state.view
     for label, part in switches.items():
         was = part(before)
@@ -37,6 +37,18 @@ def test_every_switch_of_the_view_switches_its_part_and_no_other(tab: Tab) -> No
         assert changed == [label]
         tab.switch(label, on=was)
         tab.wait_for(lambda: tab.state.view == before, f"{label} as before")
+
+
+def test_the_mechanism_is_drawn_in_one_form_at_a_time(tab: Tab) -> None:
+    tab.turn_to("Show")
+    for form in (*FORMS, "schematic"):
+        tab.push(form.capitalize())
+        tab.wait_for(lambda form=form: tab.state.view.drawn_as == form, form)
+        on = tab.page.get_by_role("group", name="Drawn as").locator("[aria-pressed=true]")
+        expect(on).to_have_text(form.capitalize())
+    tab.push("6-4 twin")
+    tab.push("6-4 twin")
+    tab.wait_for(lambda: tab.state.view.drawn_as == "schematic", "the schematic again")
 
 
 def test_ghosts_are_switched_beside_the_modes(tab: Tab) -> None:

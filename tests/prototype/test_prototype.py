@@ -17,6 +17,7 @@ from part_gaps import least_gap, overlaps
 from scipy.spatial.transform import Rotation
 
 from explorer import PRESETS, Design, InputError, Pose, home_pose, leg_clearances
+from explorer.errors import TooTightError
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.assembly import Prototype, make_prototype
 from explorer.prototype.bill import bill_of_materials
@@ -349,6 +350,8 @@ def test_design_too_tight_for_parts_names_what_would_fit(design: Design, words: 
         if phrase in message
     }
     assert offered or "no unit makes that fit" in message
+    assert isinstance(refusal.value, TooTightError)
+    assert refusal.value.fitting_unit_mm == offered.get(unit)
     if unit in offered:
         make_prototype(msgspec.structs.replace(design, unit_mm=offered[unit]))
         with pytest.raises(InputError):

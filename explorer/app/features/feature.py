@@ -170,12 +170,8 @@ class Tab:
     icon: viser.IconName | None = None
 
 
-class BarPart(Protocol):
-    """A part of the bar on top of the page."""
-
-    def markup(self, frame: Frame, /) -> str:
-        """Return the part for a frame, as HTML."""
-        ...
+BarPart = Callable[[Frame], str]
+"""A part of the bar on top of the page: its HTML for a frame."""
 
 
 @dataclass(frozen=True)
@@ -184,7 +180,7 @@ class InBar:
 
     Attributes:
         side: Where in the bar it stands; parts of one side keep the order of the features.
-        part: Function that makes the part.
+        part: Function that makes the part, such as the class of one that needs services.
     """
 
     side: Side
@@ -217,20 +213,24 @@ class StateCommand:
         does: Sentence on what it does.
         change: Function from the state to the action.
         is_ready: Function that tells whether a state allows it.
+        keys: Keys that run it.
     """
 
     label: str
     does: str
     change: Callable[[State], Action]
     is_ready: Callable[[State], bool] = lambda _: True
+    keys: tuple[Key, ...] = ()
 
     def of(self, session: Session) -> Command:
         """Return the command for a session."""
 
         def run(client: viser.ClientHandle) -> None:
-            session.post(object(), self.change, who=client.client_id)
+            session.do(self.change, who=client.client_id)
 
-        return Command(self.label, self.does, run, lambda: self.is_ready(session.state))
+        return Command(
+            self.label, self.does, run, lambda: self.is_ready(session.state), keys=self.keys
+        )
 
 
 def _always(_: Services) -> bool:
@@ -256,7 +256,8 @@ class Feature:
         commands: Commands that have no control.
         passing: Function that returns the commands that come and go, such as those that open a
             saved design; the same object while they stay.
-        keys: Keys by the names of commands.
+        keys: Keys of its controls, by the names of their commands; buttons in markup and `commands`
+            have theirs.
         lists: Labels of the lists whose every option is a command.
         floor: Function that returns the lowest height, in design units, of what is drawn in place
             of the schematic mechanism; None while that is drawn itself.

@@ -48,18 +48,18 @@ window.explorer.buttons ??= (() => {
       (element) => element.dataset.value === value,
     );
   let hovered = null;
-  let told = null;
+  let reported = null;
   let timer = null;
-  const tellHovered = () => {
+  const reportHovered = () => {
     timer = null;
-    if (hovered?.name === told?.name && hovered?.value === told?.value) return;
-    if (told && told.name !== hovered?.name) window.explorer.press(told.name, "");
+    if (hovered?.name === reported?.name && hovered?.value === reported?.value) return;
+    if (reported && reported.name !== hovered?.name) window.explorer.press(reported.name, "");
     if (hovered) window.explorer.press(hovered.name, hovered.value);
-    told = hovered;
+    reported = hovered;
   };
   const hover = (element) => {
     hovered = element ? { name: element.dataset.hover, value: element.dataset.value ?? "" } : null;
-    timer ??= setTimeout(tellHovered, HOVER_PAUSE);
+    timer ??= setTimeout(reportHovered, HOVER_PAUSE);
   };
   const hoverAt = (target) => hover(target?.closest?.("[data-hover]"));
   addEventListener("pointerover", ({ target }) => hoverAt(target));

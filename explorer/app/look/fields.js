@@ -17,10 +17,14 @@ window.explorer.fields ??= (() => {
     return Math.abs(value) <= Number.MAX_SAFE_INTEGER ? value : null;
   };
   // The page's number fields take no exponents.
-  const written = (value) =>
-    value.toLocaleString("en", { useGrouping: false, maximumFractionDigits: 20 });
+  const plainText = (value) =>
+    value.toLocaleString("en", {
+      useGrouping: false,
+      maximumFractionDigits: 20,
+      signDisplay: "negative",
+    });
   // The page's fields infer the typed text from the caret: here, all of it was replaced.
-  const tell = (field, from, to) => {
+  const replaceText = (field, from, to) => {
     write.call(field, from);
     field.setSelectionRange(0, from.length);
     field.dispatchEvent(new KeyboardEvent("keydown", { key: "Unidentified", bubbles: true }));
@@ -37,10 +41,10 @@ window.explorer.fields ??= (() => {
     }
     clearTimeout(typing.pause);
     typing.isPending = false;
-    typing.before = written(value);
-    typing.isTelling = true;
-    tell(field, before, typing.before);
-    typing.isTelling = false;
+    typing.before = plainText(value);
+    typing.isReplacing = true;
+    replaceText(field, before, typing.before);
+    typing.isReplacing = false;
   };
   // The page writes its own number whenever it redraws the field, even while a user types.
   const hold = () => {
@@ -67,7 +71,7 @@ window.explorer.fields ??= (() => {
     hold();
     // A number that may be unfinished, such as 0.0 on the way to 0.05, is not entered.
     const value = numberIn(typing.field.value);
-    if (value !== null && written(value) === typing.field.value) enter();
+    if (value !== null && plainText(value) === typing.field.value) enter();
   };
   const wait = () => {
     clearTimeout(typing.pause);
@@ -79,24 +83,24 @@ window.explorer.fields ??= (() => {
     write.call(typing.field, typing.before);
   };
   // viser ignores keys pressed in fields.
-  const tellAll = ({ key, code, ctrlKey, metaKey, shiftKey }) => {
+  const passToPage = ({ key, code, ctrlKey, metaKey, shiftKey }) => {
     const init = { key, code, ctrlKey, metaKey, shiftKey, bubbles: true };
     document.documentElement.dispatchEvent(new KeyboardEvent("keydown", init));
   };
   // A field takes the focus back with its next number if its page is not told of the focusout.
-  const leave = (field) => {
+  const refuseFocus = (field) => {
     field.focus = field.setSelectionRange = () => {};
   };
-  const comeBack = (field) => {
+  const acceptFocus = (field) => {
     delete field.focus;
     delete field.setSelectionRange;
   };
-  const begun = (field) => ({ field, first: field.value, before: field.value });
+  const startTyping = (field) => ({ field, first: field.value, before: field.value });
   addEventListener(
     "focusin",
     ({ target }) => {
-      if (isField(target)) comeBack(target);
-      typing = isField(target) ? begun(target) : null;
+      if (isField(target)) acceptFocus(target);
+      typing = isField(target) ? startTyping(target) : null;
     },
     true,
   );
@@ -105,9 +109,9 @@ window.explorer.fields ??= (() => {
     (event) => {
       if (!isField(event.target)) return;
       if (!typing || typing.field !== event.target) {
-        typing = begun(event.target);
+        typing = startTyping(event.target);
       }
-      if (typing.isTelling) return;
+      if (typing.isReplacing) return;
       event.stopPropagation();
       wait();
       // Nothing may be written into the field while an input method composes text.
@@ -153,13 +157,13 @@ window.explorer.fields ??= (() => {
     "keydown",
     (event) => {
       const { target, key } = event;
-      if (!typing || typing.field !== target || typing.isTelling || event.isComposing) return;
+      if (!typing || typing.field !== target || typing.isReplacing || event.isComposing) return;
       if (typing.isPending) hold();
       if ((event.ctrlKey || event.metaKey) && /^[zy]$/i.test(key)) {
         event.preventDefault();
         event.stopPropagation();
         if (typing.isPending) giveUp();
-        else tellAll(event);
+        else passToPage(event);
         return;
       }
       if (typing.isEdited && key === "Escape") {
@@ -187,7 +191,7 @@ window.explorer.fields ??= (() => {
       if (typing && typing.isPending && typing.field !== target) finish();
       // The arrows of a field need its focus.
       const field = target.closest?.(".mantine-NumberInput-root")?.querySelector("input");
-      if (field) comeBack(field);
+      if (field) acceptFocus(field);
     },
     true,
   );
@@ -208,7 +212,7 @@ window.explorer.fields ??= (() => {
       // The page would clamp the number to the range, although the range is about to follow it.
       if (typing.isEdited) {
         event.stopPropagation();
-        leave(typing.field);
+        refuseFocus(typing.field);
       }
       typing = null;
     },

@@ -6,22 +6,22 @@ window.explorer.holds ??= (() => {
   const LATE_MILLISECONDS = 100;
   // Id of the number field of this tab, which a new connection replaces.
   let inbox = null;
-  // Number of the press, whether the pointer is held, whether the explorer was told so, and how
-  // often something was to be told.
+  // Number of the press, whether the pointer is held, whether the server knows so, and how often
+  // there was something to report.
   let number = 0,
     isHeld = false,
-    isTold = false,
+    isReported = false,
     changes = 0;
-  const tell = (value) => window.explorer.send(inbox, value);
+  const report = (value) => window.explorer.send(inbox, value);
   const goOn = () => {
     changes += 1;
-    if (!isTold) tell(number);
-    isTold = true;
+    if (!isReported) report(number);
+    isReported = true;
   };
   const end = () => {
     changes += 1;
-    if (isTold) tell(-number);
-    isTold = false;
+    if (isReported) report(-number);
+    isReported = false;
   };
   const pause = () => {
     const before = changes;

@@ -62,8 +62,11 @@ window.explorer.map ??= (() => {
 
   const number = (value, decimals) =>
     value
-      .toFixed(decimals)
-      .replace(/^-(0\.?0*)$/, "$1")
+      .toLocaleString("en", {
+        minimumFractionDigits: decimals,
+        maximumFractionDigits: decimals,
+        signDisplay: "negative",
+      })
       .replace("-", "\u2212");
   const measure = (facts, p) => {
     if (facts.arms) {

@@ -8,6 +8,7 @@ window.explorer.names ??= (() => {
     "list-search": "Commands",
     adjustments: "Settings of the page",
     "arrow-back": "Back to the controls",
+    maximize: "Expand plot",
   };
   // Names of fields side by side, by their number.
   const PARTS = { 2: ["least", "most"], 3: ["x", "y", "z"] };

@@ -47,10 +47,7 @@ def framing(
     """
     centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
     towards = np.array(DIRECTIONS[view]) if isinstance(view, str) else view
-    forward = -towards / np.linalg.norm(towards)
-    right = np.cross(forward, [0.0, 0.0, 1.0])
-    right /= np.linalg.norm(right)
-    up = np.cross(right, forward)
+    forward, right, up = _axes(-towards)
     half = math.tan(0.5 * FIELD_OF_VIEW)
     depth = (points - centre) @ forward
     distance, target = 0.0, centre
@@ -70,19 +67,28 @@ def are_in_picture(
 
     Args:
         points: Points, shape (n, 3).
-        eye: Position of the camera.
-        target: Point that it looks at.
+        eye: Position of the camera, shape (3,).
+        target: Point that it looks at, shape (3,).
         field_of_view: Vertical angle of view, in radians.
         aspect: Width over height of the picture.
     """
-    forward = (target - eye) / np.linalg.norm(target - eye)
-    right = np.cross(forward, [0.0, 0.0, 1.0])
-    right /= np.linalg.norm(right)
-    up = np.cross(right, forward)
+    forward, right, up = _axes(target - eye)
     away = points - eye
     half = (1.0 + EDGE) * math.tan(0.5 * field_of_view) * (away @ forward)
     # Behind the camera the half height is negative.
     return bool((np.abs(away @ up) <= half).all() and (np.abs(away @ right) <= aspect * half).all())
+
+
+def _axes(direction: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the unit vectors forward, right and up of an upright camera, shape (3,) each.
+
+    Args:
+        direction: Direction in which it looks, of any length, not along z.
+    """
+    forward = direction / np.linalg.norm(direction)
+    right = np.cross(forward, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    return forward, right, np.cross(right, forward)
 
 
 @dataclass(frozen=True)
@@ -165,7 +171,7 @@ class Cameras:
     def connected(self, client: viser.ClientHandle) -> None:
         """Point a new browser's camera, and keep it framed until its user moves it."""
         self.point(client, "isometric")
-        client.camera.on_update(lambda _: self._follow(client))
+        client.camera.on_update(lambda _: self._on_report(client))
 
     def disconnected(self, client: viser.ClientHandle) -> None:
         """Forget a browser."""
@@ -182,8 +188,8 @@ class Cameras:
         points = self._points()
         for client in clients:
             with self._lock:
-                is_left = client.client_id in self._showing and not _shows(client, points)
-            if is_left:
+                have_left = client.client_id in self._showing and not _shows(client, points)
+            if have_left:
                 self.fit(client)
         self._followed = points
 
@@ -208,8 +214,8 @@ class Cameras:
             return True
         return placement.is_at(client, placement.eyes[-1]) or not placement.has(client)
 
-    def _follow(self, client: viser.ClientHandle) -> None:
-        """Put a browser's camera again if its report calls for that."""
+    def _on_report(self, client: viser.ClientHandle) -> None:
+        """Note what a browser's camera shows, and put it again if its report calls for that."""
         with self._lock:
             if self._followed is None or _shows(client, self._followed):
                 self._showing.add(client.client_id)

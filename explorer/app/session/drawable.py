@@ -5,6 +5,7 @@ from __future__ import annotations
 from explorer.app.state.state import State
 from explorer.errors import InputError
 from explorer.mechanism.design import JOINTS, VARIABLES
+from explorer.numerics.number_text import format_number
 
 # Largest length over the reach of the design as it was opened: browsers draw in single precision.
 LARGEST_SHARE = 1e6
@@ -26,7 +27,8 @@ def check_drawable(state: State) -> None:
     ):
         for name, value in zip(names, values, strict=True):
             if abs(value) > LARGEST_SHARE * reach:
+                most = format_number(LARGEST_SHARE * reach)
                 raise InputError(
-                    f"{name} = {value:g} is too far to be drawn; "
-                    f"{LARGEST_SHARE * reach:g}, a million times the reach, is the most"
+                    f"{name} = {format_number(value)} is too far to be drawn; "
+                    f"{most}, a million times the reach, is the most"
                 )

@@ -141,14 +141,13 @@ def restore(history: History, present: State) -> tuple[State, History]:
         raise InputError(
             "the design is being optimised: cancel that first, then undo what led to it"
         )
-    state = history.step.state
+    state = replace(history.step.state, view=present.view)
     # No number of a request is used twice.
     request = max(state.paths.request, present.paths.request)
     count = max(state.optimisation.count, present.optimisation.count)
     restored = replace(
         state,
-        view=present.view,
         paths=replace(state.paths, request=request),
         optimisation=replace(state.optimisation, count=count),
     )
-    return restored, history.with_state(replace(state, view=present.view))
+    return restored, history.with_state(restored)

@@ -108,9 +108,13 @@ class Session:
         at = time.time() if stamp is None else stamp
         self._jobs.post(key, at, _Posted(change, key, at, who))
 
-    def do(self, action: Action, *, who: Who = None) -> None:
-        """Queue an action that no other may replace."""
-        self.post(object(), lambda _: action, who=who)
+    def do(self, action: Action | Change, *, who: Who = None) -> None:
+        """Queue an action, or the function that makes it, which no other may replace."""
+
+        def change(state: State) -> Action:
+            return action if isinstance(action, Action) else action(state)
+
+        self.post(object(), change, who=who)
 
     def travel(self, travel: HistoryMove, *, who: Who = None) -> None:
         """Queue a move through the history that no other may replace."""

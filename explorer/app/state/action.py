@@ -10,7 +10,7 @@ from abc import ABC, abstractmethod
 from typing import ClassVar, cast
 
 from explorer.app.state.state import State
-from explorer.numerics.number_text import format_ascii
+from explorer.numerics.number_text import format_number
 
 DESIGN = "{design}"
 
@@ -56,7 +56,7 @@ def value_text(value: object) -> str:
     if isinstance(value, bool):
         return "on" if value else "off"
     if isinstance(value, float):
-        return format_ascii(value, 6)
+        return format_number(value, 6)
     if isinstance(value, tuple):
         return " ".join(value_text(entry) for entry in cast("tuple[object, ...]", value))
     return str(value)

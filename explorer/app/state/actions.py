@@ -25,13 +25,17 @@ from explorer.app.state.state import (
     opened,
 )
 from explorer.app.state.values import with_value
+from explorer.app.state.view import DrawnAs
 from explorer.errors import InputError
 from explorer.mechanism.design import JOINTS, VARIABLES, Design
 from explorer.mechanism.feasible_intervals import feasible_intervals, nearest_feasible
 from explorer.mechanism.kinematics import discriminants, forward
 from explorer.mechanism.margins import mode_name
 from explorer.mechanism.pose import Pose, Triple
-from explorer.numerics.number_text import format_ascii, format_number
+from explorer.numerics.number_text import format_number
+
+# Degrees, beside which an angle may be a rounding error.
+FULL_TURN = 360.0
 
 
 @dataclass(frozen=True)
@@ -94,9 +98,10 @@ class SetJoint(Action):
             state, pose=pose, yaw_pitch_roll=angles_of(pose), joints=joints, unclosed=None
         )
 
-    def words(self) -> str:
-        """Return what the action does."""
-        return f"{JOINTS[self.joint]} = {format_ascii(self.value, 6)}"
+    def describe(self, before: State, after: State) -> str:
+        """Return which joint has which value."""
+        del before
+        return f"{JOINTS[self.joint]} = {format_number(self.value, 6, size=after.design.reach)}"
 
 
 @dataclass(frozen=True)
@@ -132,9 +137,10 @@ class SetPosition(Action):
         x, y, z = position
         return moved(state, Pose((x, y, z), state.pose.quaternion), state.yaw_pitch_roll)
 
-    def words(self) -> str:
-        """Return what the action does."""
-        return f"{'xyz'[self.axis]} = {format_ascii(self.value, 6)}"
+    def describe(self, before: State, after: State) -> str:
+        """Return which coordinate has which value."""
+        del before
+        return f"{'xyz'[self.axis]} = {format_number(self.value, 6, size=after.design.reach)}"
 
 
 @dataclass(frozen=True)
@@ -154,7 +160,8 @@ class SetAngle(Action):
 
     def words(self) -> str:
         """Return what the action does."""
-        return f"{('yaw', 'pitch', 'roll')[self.axis]} = {format_ascii(self.value, 6)}°"
+        angle = format_number(self.value, 6, size=FULL_TURN)
+        return f"{('yaw', 'pitch', 'roll')[self.axis]} = {angle}°"
 
 
 @dataclass(frozen=True)
@@ -167,11 +174,11 @@ class SetPose(Action):
         """Return the next state."""
         return moved(state, self.pose)
 
-    def words(self) -> str:
-        """Return what the action does."""
-        p = self.pose.position
-        size = max(map(abs, p))
-        return f"Move b4 to {', '.join(format_ascii(x, 4, size=size) for x in p)}"
+    def describe(self, before: State, after: State) -> str:
+        """Return where the platform is."""
+        del before
+        p, size = self.pose.position, after.design.reach
+        return f"Move b4 to {', '.join(format_number(x, 4, size=size) for x in p)}"
 
 
 @dataclass(frozen=True)
@@ -217,8 +224,6 @@ class SetMode(Action):
 class SetVariable(Action):
     """Set one design variable, named as in `VARIABLES`; `State.hold` says what stays."""
 
-    template: ClassVar[str] = "{action.name} = {action.value:.6g}"
-
     name: str
     value: float
 
@@ -245,6 +250,10 @@ class SetVariable(Action):
         return replace(
             state, design=design, pose=pose, yaw_pitch_roll=angles_of(pose), unclosed=None
         )
+
+    def words(self) -> str:
+        """Return what the action does."""
+        return f"{self.name} = {format_number(self.value, 6)}"
 
 
 @dataclass(frozen=True)
@@ -320,6 +329,11 @@ class Set(Action):
             return f"{name}: {self.text}"
         text = value_text(self.value)
         return f"{name} {text}" if isinstance(self.value, bool) else f"{name} = {text}"
+
+
+def draw_as(form: DrawnAs) -> Set:
+    """Return the action that draws another form of the mechanism."""
+    return Set("view.drawn_as", form, "Drawn as", form)
 
 
 def moved(state: State, pose: Pose, yaw_pitch_roll: Triple | None = None) -> State:

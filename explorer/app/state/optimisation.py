@@ -12,6 +12,7 @@ from typing import Literal
 from explorer.errors import InputError
 from explorer.measures.measurements import Measurements
 from explorer.mechanism.design import VARIABLES
+from explorer.numerics.number_text import format_number
 from explorer.optimise.outcome import Iterate, Outcome, Status
 from explorer.optimise.problem import YAW, Box, Demands, ObjectiveName, Problem
 from explorer.optimise.record import Record, Settings, record_of
@@ -131,7 +132,7 @@ def killed_result(problem: Problem, iterates: tuple[Iterate, ...]) -> SearchResu
     best = min(iterates, key=Trail(problem, None, None).rank)
     return SearchResult(
         "cancelled",
-        f"cancelled: {best.objective:.6g} is the best of {len(iterates)} iterates",
+        f"cancelled: {format_number(best.objective, 6)} is the best of {len(iterates)} iterates",
         best,
         starts=iterates[-1].run + 1,
         iterations=sum(iterate.run == best.run for iterate in iterates) - 1,

@@ -20,6 +20,7 @@ from explorer.errors import InputError
 from explorer.legs.moves import poses_between
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose
+from explorer.numerics.number_text import format_number
 from explorer.paths.crossings import PathMargins, path_margins
 from explorer.paths.planning import DEFAULT_SECONDS
 from explorer.paths.trajectory import DEFAULT_SPEED, Trajectory, trajectory
@@ -123,7 +124,9 @@ class Paths:
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.seconds) and self.seconds > 0.0):
-            raise InputError(f"planning needs a time above zero; got {self.seconds:g} seconds")
+            raise InputError(
+                f"planning needs a time above zero; got {format_number(self.seconds)} seconds"
+            )
 
     @property
     def is_planning(self) -> bool:

@@ -15,6 +15,7 @@ from explorer.errors import InputError
 from explorer.measures.catalogue import CATALOGUE, measures_in
 from explorer.mechanism.design import VARIABLES, Design
 from explorer.numerics.arrays import BoolArray
+from explorer.numerics.number_text import format_number
 from explorer.optimise.problem import REACH, YAW, longest_minimum, start_value
 from explorer.sweep.study import (
     DEFAULT_MEASURES,
@@ -195,10 +196,14 @@ def study_around(design: Design, plan: StudyPlan, name: str) -> Study:
         InputError: no variable or no measure, or a number that is out of its range.
     """
     if not FEWEST <= plan.count <= MOST:
-        raise InputError(f"a study from the page has {FEWEST} to {MOST} designs; got {plan.count}")
+        raise InputError(
+            f"a study from the page has {FEWEST} to {format_number(MOST)} designs; "
+            f"got {format_number(plan.count)}"
+        )
     if not LEAST_PERCENT <= plan.percent <= MOST_PERCENT:
         raise InputError(
-            f"variables vary by {LEAST_PERCENT:g} to {MOST_PERCENT:g} %; got {plan.percent:g} %"
+            f"variables vary by {format_number(LEAST_PERCENT)} to {format_number(MOST_PERCENT)} %; "
+            f"got {format_number(plan.percent)} %"
         )
     if not plan.variables:
         raise InputError("choose at least one variable that varies")

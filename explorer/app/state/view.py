@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from explorer.errors import InputError
+from explorer.numerics.number_text import format_number
 
 ALUMINIUM = 2700.0
 """Density of aluminium, in kg/m³."""
@@ -50,7 +51,6 @@ class PrototypeView:
     """How the prototype is shown.
 
     Attributes:
-        shown: Whether its parts replace the schematic legs and bodies.
         exploded: How far the exploded view moves the parts apart, 0 to 1.
         density: Density of all parts, in kg/m³.
 
@@ -58,19 +58,20 @@ class PrototypeView:
         InputError: a share beyond 0 to 1, or a density that is not positive.
     """
 
-    shown: bool = False
     exploded: float = 0.0
     density: float = ALUMINIUM
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.exploded <= 1.0:
-            raise InputError(f"the exploded view takes 0 to 1; got {self.exploded:g}")
+            raise InputError(f"the exploded view takes 0 to 1; got {format_number(self.exploded)}")
         if not (math.isfinite(self.density) and self.density > 0.0):
             raise InputError(
-                f"the density must be positive; got {self.density:g} (aluminium: 2700 kg/m³)"
+                f"the density must be positive; got {format_number(self.density)} (aluminium: "
+                f"{format_number(ALUMINIUM)} kg/m³)"
             )
 
 
+DrawnAs = Literal["schematic", "prototype", "6-4 twin"]
 Ghost = Literal["none", "δ1 = 0", "δ2 = 0", "δ3 = 0", "nearest"]
 Arrows = Literal["one in use", "all six", "none"]
 Gain = Literal["none", "speed", "force"]
@@ -100,13 +101,14 @@ class View:
     """What is shown, and how.
 
     Attributes:
+        drawn_as: What is drawn: the schematic mechanism, the parts of its prototype in place of
+            legs and bodies, or its 6-4 twin, with six legs in place of the four.
         flags, bodies, legs, labels, grid, handle: Whether each is drawn.
         tetrahedra: Whether each of the three is drawn.
         clearance: Whether the closest pair of legs is marked.
         swept: Whether the tetrahedra are drawn that the legs swept in the last move.
         radius_curve: Whether the accessible volume is drawn against the radius of the legs.
         ghosts: Whether the seven other assembly modes are drawn.
-        twin: Whether the 6-4 twin's six legs replace the four.
         warn_below: The length below which margins are warned of, in design units; distances
             are warned of below a share of it, see `explorer.measures.verdict`. None for a share of
             the reach.
@@ -118,6 +120,7 @@ class View:
         InputError: the warning length is not positive.
     """
 
+    drawn_as: DrawnAs = "schematic"
     flags: bool = True
     bodies: bool = True
     legs: bool = True
@@ -129,13 +132,17 @@ class View:
     swept: bool = False
     radius_curve: bool = False
     ghosts: bool = False
-    twin: bool = False
     warn_below: float | None = None
     prototype: PrototypeView = field(default_factory=PrototypeView)
     workspace: WorkspaceView = field(default_factory=WorkspaceView)
     singular: SingularView = field(default_factory=SingularView)
 
+    @property
+    def is_twin(self) -> bool:
+        """Whether the 6-4 twin is drawn, whose legs have neither clearances nor a prototype."""
+        return self.drawn_as == "6-4 twin"
+
     def __post_init__(self) -> None:
         warn = self.warn_below
         if warn is not None and not (math.isfinite(warn) and warn > 0.0):
-            raise InputError(f"the warning length must be positive; got {warn:g}")
+            raise InputError(f"the warning length must be positive; got {format_number(warn)}")

@@ -67,11 +67,6 @@ class Autosaver:
         self._thread = threading.Thread(target=self._run, name="autosave", daemon=True)
         self._thread.start()
 
-    @property
-    def is_failing(self) -> bool:
-        """Whether the last attempt to save failed."""
-        return self._is_failing
-
     def follow(self, state: State, history: History) -> None:
         """Post a history that has changed.
 

@@ -11,7 +11,7 @@ from typing import Annotated, Any, cast
 
 import msgspec
 
-from explorer.app.storage.packing import present_design, present_paths
+from explorer.app.storage.packing import present_design, present_paths, present_view
 from explorer.errors import InputError
 from explorer.optimise.problem import Problem
 from explorer.optimise.record import Step, iterate_of
@@ -69,9 +69,11 @@ def states_of(body: Body, schema: int) -> list[dict[str, Any]]:
 def _upgrade(name: str, value: Any, schema: int) -> Any:
     """Return the value of a field as it is in the present schema."""
     value = _upgrade_designs(value)
-    if name == "view" and schema == 1 and "ghost" in value.get("singular", {}):
-        ghost = value["singular"]["ghost"].replace("κ", "δ")
-        return {**value, "singular": {**value["singular"], "ghost": ghost}}
+    if name == "view":
+        value = present_view(value)
+        if schema == 1 and "ghost" in value.get("singular", {}):
+            ghost = value["singular"]["ghost"].replace("κ", "δ")
+            return {**value, "singular": {**value["singular"], "ghost": ghost}}
     if name == "studies":
         return {"plan" if field == "wish" else field: old for field, old in value.items()}
     if name == "run" and value is not None:

@@ -30,6 +30,9 @@ _DESIGN_FIELDS = frozenset({"schema", "unit_mm"})
 _FORMER_PATHS = frozenset({"modes", "seconds"})
 _FORMER_KINDS = {"modes": "straight", "plan": "planned"}
 
+# Fields of the view of an older explorer.
+_FORMER_VIEW = frozenset({"twin", "prototype"})
+
 
 class Packer:
     """A list of objects as JSON texts, to which states are added."""
@@ -122,8 +125,8 @@ class Unpacker:
 def resolve(objects: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Return objects with those that they refer to in place of the references.
 
-    Designs of an older schema become designs of the present one, and paths of an older explorer
-    those of the present one.
+    Designs of an older schema become designs of the present one, paths and views of an older
+    explorer those of the present one.
 
     Raises:
         InputError: a reference to an object that does not come before.
@@ -144,7 +147,7 @@ def resolve(objects: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
     for each in objects:
         fields = {name: value_of(raw) for name, raw in each.items()}
-        resolved.append(present_paths(present_design(fields)))
+        resolved.append(present_view(present_paths(present_design(fields))))
     return resolved
 
 
@@ -170,6 +173,20 @@ def present_paths(fields: dict[str, Any]) -> dict[str, Any]:
         if present.get(end) is None:
             present[end] = mode
     return present
+
+
+def present_view(fields: dict[str, Any]) -> dict[str, Any]:
+    """Return an object; the view of an older explorer as that of the present one.
+
+    The twin and the parts were switched apart from one another; the twin came first.
+    """
+    if not {*fields} >= _FORMER_VIEW:
+        return fields
+    present = {name: value for name, value in fields.items() if name != "twin"}
+    prototype = dict(fields["prototype"])
+    is_prototype = prototype.pop("shown", False)
+    drawn_as = "6-4 twin" if fields["twin"] else "prototype" if is_prototype else "schematic"
+    return present | {"prototype": prototype, "drawn_as": drawn_as}
 
 
 def _with_unclosed(state: State) -> State:

@@ -9,7 +9,7 @@ left it. It is decoded strictly here; presses on names that are not registered a
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Container
+from collections.abc import Callable, Container, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from html import escape
 from typing import Annotated
@@ -20,6 +20,7 @@ import viser
 from explorer.app.browser.viser_gaps import element_id, run_script
 from explorer.app.look import read_script
 from explorer.app.security.client_messages import decode_text
+from explorer.app.widgets.commands import Key
 from explorer.app.widgets.markup import meter
 from explorer.app.widgets.palette import Command
 
@@ -97,6 +98,8 @@ class Buttons:
         name: str,
         value: str = "",
         is_ready: Callable[[], bool] = lambda: True,
+        *,
+        keys: tuple[Key, ...] = (),
     ) -> None:
         """Offer a press in the palette.
 
@@ -106,10 +109,13 @@ class Buttons:
             name: The name of the button.
             value: The value of the button.
             is_ready: Function that tells whether it can be pressed now.
+            keys: Keys that press it.
         """
-        self._commands.append(
-            Command(label, hint, lambda client: self.press(name, value, client), is_ready)
-        )
+
+        def run(client: viser.ClientHandle) -> None:
+            self.press(name, value, client)
+
+        self._commands.append(Command(label, hint, run, is_ready, keys=keys))
 
     def receive(self, text: str, client: viser.ClientHandle) -> None:
         """Queue a press that a page sent; drop a text that describes none."""
@@ -168,7 +174,7 @@ def press_button(
         is_on: Whether a switch is on; None if the button is no switch.
         is_disabled: Whether the button cannot be pressed.
     """
-    values = {
+    attributes = {
         "class": class_name,
         "data-press": name,
         "data-value": str(value),
@@ -177,9 +183,7 @@ def press_button(
         "aria-label": label,
         "aria-pressed": "" if is_on is None else str(is_on).lower(),
     }
-    attributes = "".join(f' {key}="{escape(text)}"' for key, text in values.items() if text)
-    disabled = " disabled" if is_disabled else ""
-    return f'<button type="button"{attributes}{disabled}>{content}</button>'
+    return _button(attributes, content, is_disabled=is_disabled)
 
 
 def open_button(
@@ -201,15 +205,20 @@ def open_button(
         label: The name for screen readers; the content if "".
         class_name: The classes of the stylesheet.
     """
-    values = {
+    attributes = {
         "class": class_name,
         "data-opens": title,
         "data-press": press,
         "title": hint,
         "aria-label": label,
     }
-    attributes = "".join(f' {key}="{escape(text)}"' for key, text in values.items() if text)
-    return f'<button type="button"{attributes}>{content}</button>'
+    return _button(attributes, content)
+
+
+def _button(attributes: Mapping[str, str], content: str, *, is_disabled: bool = False) -> str:
+    given = "".join(f' {key}="{escape(text)}"' for key, text in attributes.items() if text)
+    disabled = " disabled" if is_disabled else ""
+    return f'<button type="button"{given}{disabled}>{content}</button>'
 
 
 def figure(opens: str, name: str, value: str, *, hint: str, look: str = "") -> str:
@@ -240,5 +249,5 @@ def running(opens: str, title: str, words: str, share: float | None, buttons: st
     content = (
         f'<b class="ex-cut">{escape(title)}</b><span class="ex-dim">{escape(words)}</span>{bar}'
     )
-    told = open_button(opens, content, hint=f"Open the tab {opens}.", class_name="ex-name")
-    return f'<span class="ex-running">{told}{buttons}</span>'
+    title_button = open_button(opens, content, hint=f"Open the tab {opens}.", class_name="ex-name")
+    return f'<span class="ex-running">{title_button}{buttons}</span>'

@@ -11,13 +11,51 @@ from html import escape
 
 from explorer.app.session.session import Session
 from explorer.app.state.action import Action
+from explorer.app.state.actions import Set
 from explorer.app.state.state import State
+from explorer.app.state.values import value_at
 from explorer.app.widgets.buttons import Buttons, press_button
 from explorer.app.widgets.commands import Key, with_keys
 
 
 def _always(_: State) -> bool:
     return True
+
+
+@dataclass(frozen=True)
+class Effect:
+    """The effect of a chip on the state.
+
+    Attributes:
+        change: Function from the state to the action of a press.
+        is_on: Function that tells whether the chip is on.
+    """
+
+    change: Callable[[State], Action]
+    is_on: Callable[[State], bool]
+
+
+def turn(at: str, name: str) -> Effect:
+    """Return the effect of a switch: a press turns a value of the state on or off.
+
+    Args:
+        at: Path of the value, such as "view.workspace.solid".
+        name: Name of the value in the history.
+    """
+    return Effect(
+        lambda state: Set(at, not value_at(state, at), name), lambda state: value_at(state, at)
+    )
+
+
+def choose(at: str, value: str, name: str) -> Effect:
+    """Return the effect of an option: a press sets a value of the state.
+
+    Args:
+        at: Path of the value, such as "paths.kind".
+        value: The option, which the history shows too.
+        name: Name of the value in the history.
+    """
+    return Effect(lambda _: Set(at, value, name, value), lambda state: value_at(state, at) == value)
 
 
 @dataclass(frozen=True)
@@ -28,19 +66,21 @@ class Chip:
         words: The words on it.
         command: Its name in the palette, from the tab to the option.
         hint: Sentence on what a press does.
-        change: Function from the state to the action of a press.
-        is_on: Function that tells whether it is on.
+        effect: What a press changes, and whether the chip is on.
         is_ready: Function that tells whether it can be pressed.
+        is_visible: Function that tells whether it stands in the row.
         keys: Keys that press it, told in its hint.
+        label: Name for screen readers; the words if "".
     """
 
     words: str
     command: str
     hint: str
-    change: Callable[[State], Action]
-    is_on: Callable[[State], bool]
+    effect: Effect
     is_ready: Callable[[State], bool] = _always
+    is_visible: Callable[[State], bool] = _always
     keys: tuple[Key, ...] = ()
+    label: str = ""
 
 
 class Chips:
@@ -50,7 +90,7 @@ class Chips:
         buttons: Buttons of the page, among which the chips are registered.
         session: Session to which they post.
         name: Name of the row among the buttons, such as "workspace.show".
-        title: Words before the row.
+        title: Words before the row; "" for chips that stand in other markup.
         chips: The chips by the values that their presses send.
     """
 
@@ -67,7 +107,7 @@ class Chips:
         self._chips = chips
         buttons.on(
             name,
-            lambda value, client: session.post(object(), chips[value].change, who=client.client_id),
+            lambda value, client: session.do(chips[value].effect.change, who=client.client_id),
             values=chips,
         )
         for value, chip in chips.items():
@@ -79,23 +119,29 @@ class Chips:
                 value,
                 # A default binds the chip of this round.
                 lambda is_ready=is_ready: is_ready(session.state),
+                keys=chip.keys,
             )
 
     def html(self, state: State) -> str:
-        """Return the row as HTML."""
-        chips = "".join(
+        """Return the row with its title as HTML."""
+        return (
+            f'<div class="ex-chips" role="group" aria-label="{escape(self._title)}">'
+            f'<span class="ex-dim">{escape(self._title)}</span>{self.buttons(state)}</div>'
+        )
+
+    def buttons(self, state: State) -> str:
+        """Return the chips alone as HTML."""
+        return "".join(
             press_button(
                 self._name,
                 value,
                 escape(chip.words),
                 hint=with_keys(chip.hint, chip.keys),
+                label=chip.label,
                 class_name="ex-chip",
-                is_on=chip.is_on(state),
+                is_on=chip.effect.is_on(state),
                 is_disabled=not chip.is_ready(state),
             )
             for value, chip in self._chips.items()
-        )
-        return (
-            f'<div class="ex-chips" role="group" aria-label="{escape(self._title)}">'
-            f'<span class="ex-dim">{escape(self._title)}</span>{chips}</div>'
+            if chip.is_visible(state)
         )

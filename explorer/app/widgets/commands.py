@@ -15,8 +15,6 @@ from typing import Protocol
 # Separator of the parts of a command's name, from the tab to the option.
 STEP = " › "
 
-Modifier = str
-
 
 @dataclass(frozen=True)
 class Key:
@@ -28,7 +26,7 @@ class Key:
     """
 
     key: str
-    modifier: Modifier | None = None
+    modifier: str | None = None
 
     def __str__(self) -> str:
         parts = [] if self.modifier is None else self.modifier.split("+")

@@ -7,106 +7,27 @@ slider never moves under the pointer.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
-from typing import Any, Generic, Literal, TypeAlias, TypeVar, cast
+from typing import Any, Generic, Literal, cast
 
 import viser
 
 from explorer.app.browser.viser_gaps import Mark, SliderMarks
 from explorer.app.session.session import Session
 from explorer.app.state.action import Action
-from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
-from explorer.app.state.values import value_at
 from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.bindings import Bound, Source, Value, bound_to
+from explorer.app.widgets.tracks import Intervals, Span, Track, decimals, tint_marks
 from explorer.mechanism.design import Pair
-from explorer.mechanism.feasible_intervals import Interval
 from explorer.mechanism.pose import Triple
 from explorer.numerics.number_text import drop_rounding
 
-Value = TypeVar("Value", float, bool, str, Pair, Triple)
 # Colour of viser by which the stylesheet tells the main button of a tab from the others.
 MAIN: Literal["blue"] = "blue"
 Condition = Callable[[State], bool]
 """A function that tells whether a condition holds in a state."""
-
-
-@dataclass(frozen=True)
-class Span:
-    """The range of a slider, in the unit of its value."""
-
-    low: float
-    high: float
-    step: float
-
-
-@dataclass(frozen=True)
-class Bound(Generic[Value]):
-    """The binding of a control to the state.
-
-    Attributes:
-        read: Function that returns the control's value in a frame.
-        write: Function that returns the action for a new value.
-    """
-
-    read: Callable[[Frame], Value]
-    write: Callable[[State, Value], Action]
-
-
-def _unchanged(value: Any) -> Any:
-    return value
-
-
-@dataclass(frozen=True)
-class At:
-    """A plain value of the state, shown and set by a control.
-
-    Attributes:
-        path: Path of the value, such as "view.warn_below".
-        default: Function that returns the control's value where the state has None.
-        convert: Function from the control's value to that of the state.
-        action: Class of the action that sets the value.
-    """
-
-    path: str
-    default: Callable[[State], Any] | None = None
-    convert: Callable[[Any], Any] = _unchanged
-    action: type[Set] = Set
-
-    def bound(self, name: str, options: Mapping[str, object] | None = None) -> Bound[Any]:
-        """Return the binding.
-
-        Args:
-            name: Name of the value in the history, such as the label of its control.
-            options: Values by the words of a list; None if the control holds the value itself.
-        """
-        if options is not None:
-            texts = {value: text for text, value in options.items()}
-            return Bound(
-                lambda frame: texts[self._read(frame)],
-                lambda _, text: self.action(self.path, options[text], name, text),
-            )
-        return Bound(self._read, lambda _, value: self.action(self.path, self.convert(value), name))
-
-    def _read(self, frame: Frame) -> Any:
-        value = value_at(frame.state, self.path)
-        return self.default(frame.state) if value is None and self.default else value
-
-
-Source: TypeAlias = str | At | Bound[Value]
-"""The source of a control's value; a text is the path of a plain value."""
-
-
-def bound_to(
-    at: Source[Value], name: str, options: Mapping[str, object] | None = None
-) -> Bound[Value]:
-    """Return a binding itself, or the binding to the value at a path."""
-    if isinstance(at, Bound):
-        return at
-    return (At(at) if isinstance(at, str) else at).bound(name, options)
 
 
 class Control(Generic[Value]):
@@ -172,62 +93,6 @@ class Control(Generic[Value]):
         return self._is_set_here and (value == self._last_value or self._session.is_waiting(self))
 
 
-Intervals: TypeAlias = tuple[Interval, ...]
-"""Disjoint ascending intervals, in the unit of a slider's value; an end may be infinite."""
-
-
-class _Track:
-    """The range of a slider, which follows the state and holds every value of its thumbs.
-
-    Args:
-        handle: The slider.
-        span: Range, or the function that returns it.
-        closes_up: Whether it shows only the surroundings of the tinted parts.
-    """
-
-    def __init__(
-        self,
-        handle: viser.GuiSliderHandle[float] | viser.GuiMultiSliderHandle[float],
-        span: Span | Callable[[State], Span],
-        *,
-        closes_up: bool = False,
-    ) -> None:
-        self._handle = handle
-        self._span = span
-        self._closes_up = closes_up
-        self._shown: Span | None = None
-
-    def span(
-        self, state: State, values: tuple[float, ...], tinted: Intervals = (), *, is_own: bool
-    ) -> Span:
-        """Return the range in a state.
-
-        Args:
-            state: The state.
-            values: Values of the thumbs.
-            tinted: The tinted parts.
-            is_own: Whether the slider itself was changed last: then its range may only grow, so
-                that it holds still under the pointer.
-        """
-        span = self._span if isinstance(self._span, Span) else self._span(state)
-        if self._closes_up:
-            span = close_up(span, tinted, self._shown)
-        low, high = min(span.low, *values), max(span.high, *values)
-        if is_own and self._shown is not None:
-            low, high = min(low, self._shown.low), max(high, self._shown.high)
-        return Span(low, high, span.step)
-
-    def updates(self, span: Span) -> Iterator[Update]:
-        """Yield the updates that give the slider its range."""
-        if span == self._shown:
-            return
-        self._shown = span
-        yield self._handle, "min", span.low
-        yield self._handle, "max", span.high
-        yield self._handle, "step", span.step
-        yield self._handle, "precision", decimals(span.step)
-
-
 class Slider(Control[float]):
     """A slider with a number field, whose range and tinted parts follow the state."""
 
@@ -244,7 +109,7 @@ class Slider(Control[float]):
         closes_up: bool = False,
     ) -> None:
         super().__init__(session, handle, bound, disabled=disabled)
-        self._track = _Track(handle, span, closes_up=closes_up)
+        self._track = Track(handle, span, closes_up=closes_up)
         self._tinted = tinted
         self._ends = ends
         self._marks = SliderMarks(handle)
@@ -255,8 +120,9 @@ class Slider(Control[float]):
         tinted = () if self._tinted is None else self._tinted(frame)
         is_own = self._is_own(value)
         span = self._track.span(frame.state, (value,), tinted, is_own=is_own)
-        # A field would show rounding as −0.00.
-        value = drop_rounding(value, max(abs(span.low), abs(span.high)))
+        # A field would show rounding as −0.00, or as 5.00 where 5 was meant.
+        shown = round(value, decimals(span.step))
+        value = shown + drop_rounding(value - shown, max(abs(span.low), abs(span.high)))
         yield from self._track.updates(span)
         if self._tinted is not None:
             yield self._marks, "marks", tint_marks(tinted, span)
@@ -279,7 +145,7 @@ class Ends(Control[Pair]):
         super().__init__(session, cast("Any", handle), bound, disabled=disabled)
         self._thumbs = None
         if isinstance(handle, viser.GuiMultiSliderHandle):
-            self._thumbs = _Track(handle, span)
+            self._thumbs = Track(handle, span)
         self._span = span
 
     def updates(self, frame: Frame) -> Iterator[Update]:
@@ -315,26 +181,6 @@ class Number(Control[float]):
         step = self._step(frame.state)
         yield self._number, "step", step
         yield self._number, "precision", decimals(step)
-        yield from super().updates(frame)
-
-
-class Choice(Control[str]):
-    """A list to choose from, whose options follow the frame."""
-
-    def __init__(
-        self,
-        session: Session,
-        handle: viser.GuiDropdownHandle[str],
-        bound: Bound[str],
-        options: Callable[[Frame], tuple[str, ...]],
-        disabled: Condition | None,
-    ) -> None:
-        super().__init__(session, handle, bound, disabled=disabled)
-        self._options = options
-
-    def updates(self, frame: Frame) -> Iterator[Update]:
-        """Yield the updates that make the list show the frame, its options first."""
-        yield self.handle, "options", self._options(frame)
         yield from super().updates(frame)
 
 
@@ -476,7 +322,6 @@ class Controls:
         at: Source[str],
         *,
         disabled: Condition | None = None,
-        options_of: Callable[[Frame], tuple[str, ...]] | None = None,
     ) -> None:
         """Add a list to choose from.
 
@@ -486,16 +331,11 @@ class Controls:
             options: Words of the options, with their values if `at` is a path.
             at: Source of its value.
             disabled: Condition in which it is disabled; None for never.
-            options_of: Function that returns the options of a frame; None if they never vary.
         """
         handle = self._gui.add_dropdown(label, tuple(options), hint=hint)
         values = options if isinstance(options, Mapping) else {text: text for text in options}
         bound: Bound[str] = bound_to(at, label, values)
-        if options_of is not None:
-            control: Control[str] = Choice(self._session, handle, bound, options_of, disabled)
-        else:
-            control = Control[str](self._session, handle, bound, disabled=disabled)
-        self._controls.append(control)
+        self._controls.append(Control[str](self._session, handle, bound, disabled=disabled))
 
     def text(
         self, label: str, hint: str, at: Source[str], *, disabled: Condition | None = None
@@ -535,72 +375,3 @@ class Controls:
         """Yield the updates that make every control show the frame."""
         for control in self._controls:
             yield from control.updates(frame)
-
-
-def tint_marks(intervals: Intervals, span: Span) -> tuple[Mark, ...]:
-    """Return the ends of intervals within a range as marks, from which a stylesheet tints a track.
-
-    The track is tinted from each mark of odd number to the next one.
-
-    Args:
-        intervals: The intervals.
-        span: Range of the slider.
-    """
-    return tuple(
-        (min(max(end, span.low), span.high), "")
-        for low, high in intervals
-        if low < span.high and high > span.low
-        for end in (low, high)
-    )
-
-
-# Least width of a close-up over the whole range, and least part of the track that is tinted before
-# the close-up is made anew.
-LEAST_CLOSE_UP, LEAST_TINTED = 0.1, 0.25
-
-
-def close_up(whole: Span, intervals: Intervals, before: Span | None) -> Span:
-    """Return the part of a range around intervals, as wide again as they are.
-
-    Args:
-        whole: The range.
-        intervals: The intervals, disjoint and ascending.
-        before: The part that was shown before, which stays as long as it serves; None if none was.
-    """
-    inside = [(low, high) for low, high in intervals if low < whole.high and high > whole.low]
-    if not inside:
-        return whole
-    low, high = max(inside[0][0], whole.low), min(inside[-1][1], whole.high)
-    width = max(high - low, LEAST_CLOSE_UP * (whole.high - whole.low))
-    if before is not None and before.step == whole.step:
-        is_inside = whole.low <= before.low <= low and high <= before.high <= whole.high
-        if is_inside and width >= LEAST_TINTED * (before.high - before.low):
-            return before
-    middle = 0.5 * (low + high)
-    part = round_span(middle - width, middle + width, whole.step)
-    return Span(max(part.low, whole.low), min(part.high, whole.high), whole.step)
-
-
-def round_span(low: float, high: float, step: float) -> Span:
-    """Return a range whose ends are whole multiples of ten steps, no narrower than asked for.
-
-    A slider's values are whole steps from its lower end.
-
-    Args:
-        low: Lower end.
-        high: Upper end.
-        step: Step of the slider, a power of ten.
-    """
-    unit = 10.0 * step
-    digits = -round(math.log10(unit))
-    ends = (math.floor(low / unit), math.ceil(high / unit))
-    lowest, highest = (round(end * unit, digits) for end in ends)
-    return Span(lowest, highest, step)
-
-
-def decimals(step: float) -> int:
-    """Return the number of decimals of a step."""
-    digits = 0
-    while digits < 12 and round(step, digits) != step:
-        digits += 1
-    return digits

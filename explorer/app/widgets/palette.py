@@ -53,7 +53,7 @@ class Palette:
     Args:
         server: Server whose browsers have the palette.
         more: Commands without a control.
-        keys: Keys by the names of commands.
+        keys: Keys of controls, by the names of their commands.
         lists: Labels of the lists whose every option is a command.
     """
 
@@ -65,17 +65,18 @@ class Palette:
         lists: Container[str] = (),
     ) -> None:
         self._gui = server.gui
-        self._keys = keys or dict[str, tuple[Key, ...]]()
+        keys = keys or dict[str, tuple[Key, ...]]()
         self._registered: list[tuple[Command, viser.CommandHandle]] = []
         for widget in widgets(server):
-            commands = tuple(map(self._with_keys, commands_of(widget, lists)))
-            for command in commands:
-                self.add(command)
-            widget_keys = tuple(key for command in commands for key in command.keys)
+            widget_keys: tuple[Key, ...] = ()
+            for command in commands_of(widget, lists):
+                own = keys.get(command.label, ())
+                self.add(replace(command, keys=own))
+                widget_keys += own
             if widget_keys:
                 widget.handle.hint = with_keys(widget.hint, widget_keys)
         for command in more:
-            self.add(self._with_keys(command))
+            self.add(command)
         self._passing: dict[str, _Passing] = {}
 
     @property
@@ -96,9 +97,6 @@ class Palette:
             # viser's commands have one key each.
             label = command.label if index == 0 else f"{command.label}  ({key})"
             self._register(command, label, key)
-
-    def _with_keys(self, command: Command) -> Command:
-        return replace(command, keys=self._keys.get(command.label, ()))
 
     def offer(self, group: str, passing: tuple[Command, ...]) -> None:
         """Offer these commands besides those that stay; remove the others of the group.

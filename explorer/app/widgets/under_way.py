@@ -10,6 +10,7 @@ import viser
 from explorer.app.session.feed import Feed
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.markup import alert
+from explorer.numerics.number_text import format_decimals
 
 AnyFeed = Feed[Any, Any]
 
@@ -51,7 +52,7 @@ def progress(feed: AnyFeed) -> str:
     stage = feed.stage
     if stage is None:
         return "computing …"
-    return f"computing the {stage.words}, {100.0 * stage.share:.0f} % done …"
+    return f"computing the {stage.words}, {format_decimals(100.0 * stage.share, 0)} % done …"
 
 
 def problem(feed: AnyFeed, title: str, button: str) -> str:

@@ -17,6 +17,7 @@ import numpy as np
 from explorer.mechanism.design import LENGTHS, Pair
 from explorer.mechanism.home import home_pose
 from explorer.numerics.arrays import FloatArray
+from explorer.numerics.number_text import format_number
 from explorer.optimise.problem import REACH, Box
 from explorer.optimise.refutation.cut_box import cut_volume
 from explorer.optimise.refutation.ranges import Ranges, product, smallest
@@ -100,7 +101,7 @@ def _of_box(ranges: Ranges) -> Iterator[Ceiling]:
     if planes:
         least = limits.margin or 0.0
         places.append(
-            f"where every margin is at least {least:g} units"
+            f"where every margin is at least {format_number(least, 6)} units"
             if least
             else "where the margins have the signs of home"
         )
@@ -133,15 +134,22 @@ def _of_lengths(ranges: Ranges) -> Iterator[Ceiling]:
         if ranges.is_tied(name):
             of_reach.append(volume)
         else:
-            yield Ceiling(f"{name} maximum", f"{name} of at most {most:.6g} units leaves", volume)
+            yield Ceiling(
+                f"{name} maximum",
+                f"{name} of at most {format_number(most, 6)} units leaves",
+                volume,
+            )
     if all(map(ranges.is_tied, ("l1", "l4"))):
         of_reach.append(_lens(ranges))
     elif not any(map(ranges.is_tied, ("l1", "l4"))):
         l1, l4 = (ranges.length(name)[1] for name in ("l1", "l4"))
-        words = f"l1 of at most {l1:.6g} units together with l4 of at most {l4:.6g} units leaves"
+        words = (
+            f"l1 of at most {format_number(l1, 6)} units together with l4 of at most "
+            f"{format_number(l4, 6)} units leaves"
+        )
         yield Ceiling("l1 maximum", words, _lens(ranges))
     if of_reach:
-        words = f"a longest leg of at most {ranges.most_reach:.6g} units leaves"
+        words = f"a longest leg of at most {format_number(ranges.most_reach, 6)} units leaves"
         yield Ceiling(LONGEST_LEG, words, min(of_reach))
 
 
@@ -216,5 +224,7 @@ def _of_guide(ranges: Ranges) -> Iterator[Ceiling]:
     area = min(
         disc_above(ranges.length(name)[1], 0.0, _least_height(ranges, name)) for name in LENGTHS
     )
-    words = f"a guide from {guide[0]:.6g} to {guide[1]:.6g} units leaves"
+    words = (
+        f"a guide from {format_number(guide[0], 6)} to {format_number(guide[1], 6)} units leaves"
+    )
     yield Ceiling("guide", words, free * area)

@@ -16,6 +16,7 @@ from explorer.legs.clearance import PAIRS
 from explorer.mechanism.design import Design, Pair
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.home import home_pose
+from explorer.numerics.number_text import format_number
 from explorer.optimise.problem import SHIFTS, Box, Problem
 from explorer.optimise.refutation.lifting import BOX_LIMIT
 from explorer.optimise.refutation.most_volume import (
@@ -129,8 +130,9 @@ def _box_within_box(ranges: Ranges, required: Box) -> Iterator[Refutation]:
         # It may be shifted by what lies in both intervals, if anything does.
         if max(least - low, back) > min(most - high, on) + spare:
             words = (
-                f"the required box lies beyond the box along {name}: from {low:g} to {high:g} "
-                f"units, and the box from {least:g} to {most:g} units"
+                f"the required box lies beyond the box along {name}: from "
+                f"{format_number(low, 6)} to {format_number(high, 6)} units, and the box from "
+                f"{format_number(least, 6)} to {format_number(most, 6)} units"
             )
             yield Refutation(BOX_LIMIT, words)
 
@@ -144,9 +146,10 @@ def _box_beyond_margins(ranges: Ranges, required: Box) -> Iterator[Refutation]:
             best += max(slope * shift for shift in ranges.of(SHIFTS[axis]))
         if best < least - SPARE * ranges.problem.size:
             words = (
-                f"at its worst corner the required box has a margin of at most {best:.4g} units "
-                f"on the home's side, and the limits demand {least:g} units"
-            ).replace("-", "−")
+                "at its worst corner the required box has a margin of at most "
+                f"{format_number(best)} units on the home's side, and the limits demand "
+                f"{format_number(least, 6)} units"
+            )
             yield Refutation("margin", words)
 
 
@@ -159,8 +162,8 @@ def _box_beyond_lengths(ranges: Ranges, required: Box) -> Iterator[Refutation]:
         if farthest > most * (1.0 + SPARE):
             limit = LONGEST_LEG if ranges.is_tied(name) else f"{name} maximum"
             words = (
-                f"{name} must be {farthest:.4g} units at the least to get to all of the required "
-                f"box, and at most {most:.6g} units are allowed"
+                f"{name} must be {format_number(farthest)} units at the least to get to all of the "
+                f"required box, and at most {format_number(most, 6)} units are allowed"
             )
             yield Refutation(limit, words)
 
@@ -199,8 +202,8 @@ def _reach(ranges: Ranges) -> Iterator[Refutation]:
     least = ranges.least_longest_leg
     if least > demanded * (1.0 + SPARE):
         words = (
-            f"the longest leg is at least {least:.6g} units within the bounds, and {demanded:g} "
-            "units are asked for"
+            f"the longest leg is at least {format_number(least, 6)} units within the bounds, and "
+            f"{format_number(demanded, 6)} units are asked for"
         )
         yield Refutation(LONGEST_LEG, words)
 
@@ -209,8 +212,8 @@ def _gap(ranges: Ranges) -> Iterator[Refutation]:
     gap = ranges.problem.start.limits.gap
     if ranges.apart < gap * (1.0 - SPARE):
         words = (
-            f"the carriages are at most {ranges.apart:.4g} units apart within the bounds, and the "
-            f"gap is to be {gap:g} units"
+            f"the carriages are at most {format_number(ranges.apart)} units apart within the "
+            f"bounds, and the gap is to be {format_number(gap, 6)} units"
         )
         yield Refutation(GAP, words)
 
@@ -229,9 +232,9 @@ def _clearance(ranges: Ranges) -> Iterator[Refutation]:
         most = _ends_apart(ranges, first, second) - radii[first - 1] - radii[second - 1]
         if most < demanded * (1.0 - SPARE):
             words = (
-                f"legs {first} and {second} keep at most {most:.4g} of the clearance of "
-                f"{demanded:g} units asked for, within the bounds"
-            ).replace("-", "−")
+                f"legs {first} and {second} keep at most {format_number(most)} of the clearance of "
+                f"{format_number(demanded, 6)} units asked for, within the bounds"
+            )
             yield Refutation(f"clearance of legs {first} and {second}", words)
 
 

@@ -18,7 +18,7 @@ import msgspec
 import numpy as np
 
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.number_text import format_ascii
+from explorer.numerics.number_text import format_ascii, format_number
 from explorer.optimise.curves import CALLED
 from explorer.optimise.outcome import Iterate, Phase, Run, Status
 from explorer.optimise.problem import Problem
@@ -131,10 +131,12 @@ class Search:
         if missed is not None:
             without = ""
             if limit is not None:
-                without = f" (the best so far has {limit.volume:.6g} without its {limit.limit})"
+                best = format_number(limit.volume, 6)
+                without = f" (the best so far has {best} without its {limit.limit})"
             return (
-                f"no design within the bounds was found with a volume of {missed:g}{without}; the "
-                f"largest found is {self.largest_volume:.6g}"
+                f"no design within the bounds was found with a volume of "
+                f"{format_number(missed, 6)}{without}; the largest found is "
+                f"{format_number(self.largest_volume, 6)}"
             )
         return chosen.message or _default_message(self.problem, chosen, self.steps)
 
@@ -316,8 +318,9 @@ class Search:
         spare, worst = model.worst(at)
         holding, best = optimality(model, at).holding, self.trail.best
         if is_done and len(missed):
+            demanded = format_number(self.problem.demands.clearance or 0.0, 6)
             words = (
-                f"a clearance of {self.problem.demands.clearance:g} is not kept everywhere, "
+                f"a clearance of {demanded} is not kept everywhere, "
                 f"such as at {_coordinates(missed[0])}"
             )
             return Attempt("not converged", "clearance", words, best)
@@ -356,4 +359,4 @@ def _default_message(problem: Problem, attempt: Attempt, steps: int) -> str:
 
 
 def _coordinates(p: FloatArray) -> str:
-    return f"({', '.join(f'{value:.4g}' for value in p.tolist())})"
+    return f"({', '.join(map(format_number, p.tolist()))})"

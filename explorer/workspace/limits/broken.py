@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from explorer.mechanism.design import JOINTS, LENGTHS, TOLERANCE, Design
 from explorer.numerics.arrays import FloatArray
+from explorer.numerics.number_text import format_number
 from explorer.workspace.limits.constraints import CARRIAGE_ORDER, GAP, demanded_order
 from explorer.workspace.limits.joint_cones import angle_between, joint_cones, legs
 
@@ -29,18 +30,16 @@ class Violation:
     above: bool
 
     def __str__(self) -> str:
+        value = format_number(self.value, size=abs(self.bound))
         if self.limit == CARRIAGE_ORDER:
             sign = "negative" if self.above else "positive"
-            text = f"{self.limit}: d3 − d1 = {self.value:.4g}, but it is {sign} in the home pose"
-            return text.replace("-", "−")
+            return f"{self.limit}: d3 − d1 = {value}, but it is {sign} in the home pose"
         if self.limit.startswith("margin") and self.bound == 0.0:
             sign = "negative" if self.above else "positive"
-            text = f"{self.limit} = {self.value:.4g}, but it is {sign} in the home mode"
-            return text.replace("-", "−")
+            return f"{self.limit} = {value}, but it is {sign} in the home mode"
         relation = "above its maximum" if self.above else "below its minimum"
         unit = "°" if self.limit.startswith("swing") else ""
-        text = f"{self.limit} = {self.value:.4g}{unit} is {relation} {self.bound:.4g}{unit}"
-        return text.replace("-", "−")
+        return f"{self.limit} = {value}{unit} is {relation} {format_number(self.bound)}{unit}"
 
 
 def violations(

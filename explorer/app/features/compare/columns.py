@@ -15,7 +15,7 @@ from explorer.app.widgets.markup import LEAST, MOST, format_number
 from explorer.measures.catalogue import Measure
 from explorer.measures.measurements import Measurements
 from explorer.mechanism.design import Design
-from explorer.numerics.number_text import format_decimals, set_true_minus
+from explorer.numerics.number_text import format_decimals
 
 # Values that differ by a smaller share are equally good.
 SAME = 1e-9
@@ -108,17 +108,15 @@ def best_of(measure: Measure, values: list[float | None]) -> set[int]:
 def value_text(measure: Measure, value: float, size: float, *, signed: bool = False) -> str:
     """Return a value with the decimals that suit a size, the largest value of its row."""
     if measure.is_whole:
-        text = format_decimals(value, 0, signed=signed)
-        return set_true_minus(text.replace(",", "\N{NARROW NO-BREAK SPACE}"))
+        return format_decimals(value, 0, signed=signed)
     if size != 0.0 and not LEAST <= size < MOST:
         return ("+" if signed and value >= 0.0 else "") + format_number(value)
-    digits = decimals_of(size)
-    text = f"{value:+.{digits}f}" if signed else f"{value:.{digits}f}"
-    if float(text) == 0.0:
+    text = format_decimals(value, decimals_of(size), signed=signed)
+    if not text.strip("0."):
         # A difference within rounding counts as none.
         least = SAME * size if signed else 0.0
         return "0" if abs(value) <= least else format_number(value, 3)
-    return set_true_minus(text)
+    return text
 
 
 def size_of(values: list[float | None]) -> float:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from html import escape
 
 import viser
@@ -16,13 +15,13 @@ from explorer.app.features.compare.table import progress, table
 from explorer.app.features.designs.saved_designs import SavedDesigns
 from explorer.app.features.feature import Services
 from explorer.app.session.session import Change
-from explorer.app.state.actions import Open, Set
+from explorer.app.state.actions import Open
 from explorer.app.state.compared import SLOTS, Compared, unnamed
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
-from explorer.app.state.values import value_at
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import Buttons, press_button
+from explorer.app.widgets.chips import Chip, Chips, choose, turn
 from explorer.app.widgets.commands import NO_OPTION
 from explorer.app.widgets.markup import box, swatch
 from explorer.errors import InputError
@@ -34,70 +33,57 @@ PIN_LABEL = "Pin another design"
 MOST_BUTTONS = 5
 
 
-@dataclass(frozen=True)
-class _Switch:
-    """A button that turns a way to look at the comparison on or off.
-
-    Attributes:
-        name: Name of the button.
-        words: Words on the page.
-        hint: Sentence on what it does.
-        at: Path of its value in the state.
-        value: Value that it sets; None if it turns a value on and off.
-    """
-
-    name: str
-    words: str
-    hint: str
-    at: str
-    value: str | None = None
-
-    def is_on(self, state: State) -> bool:
-        """Whether the comparison is looked at in this way."""
-        return value_at(state, self.at) == (True if self.value is None else self.value)
+def _has_pinned(state: State) -> bool:
+    return not state.compared.is_empty
 
 
-SWITCHES = (
-    _Switch(
+LOOKS = {
+    "Table": Chip(
         "Table",
-        "Table",
+        "Compare › Table",
         "Show every measure of the designs side by side.",
-        "compared.look.shows",
-        "table",
+        choose("compared.look.shows", "table", "Compared as"),
+        _has_pinned,
     ),
-    _Switch(
+    "Bars": Chip(
         "Bars",
-        "Bars",
+        "Compare › Bars",
         "Draw the measures of the designs as bars.",
-        "compared.look.shows",
-        "bars",
+        choose("compared.look.shows", "bars", "Compared as"),
+        _has_pinned,
     ),
-    _Switch(
-        "Millimetres",
+    "Millimetres": Chip(
         "mm",
+        "Compare › Millimetres",
         "Give lengths in millimetres, rather than in units of the live design.",
-        "compared.look.millimetres",
+        turn("compared.look.millimetres", "Millimetres"),
+        _has_pinned,
     ),
-    _Switch(
+    "Overlay workspaces": Chip(
         "Overlay workspaces",
-        "Overlay workspaces",
+        "Compare › Overlay workspaces",
         "Draw the workspaces over one another in the colours of the designs, to true size, each "
         "at the orientation of its home.",
-        "compared.look.overlay",
+        turn("compared.look.overlay", "Overlay workspaces"),
+        _has_pinned,
     ),
-    _Switch(
-        "Live one as it is turned",
+    "Live one as it is turned": Chip(
         "live as turned",
+        "Compare › Live one as it is turned",
         "Draw the workspace of the live design at its present orientation, rather than at home.",
-        "compared.look.at_pose",
+        turn("compared.look.at_pose", "Live one as it is turned"),
+        _has_pinned,
+        lambda state: state.compared.look.overlay,
     ),
-    _Switch(
+    "Outlines": Chip(
         "Outlines",
-        "Outlines",
+        "Compare › Outlines",
         "Outline base, legs and platform of the pinned designs in their home poses.",
-        "compared.look.outlines",
+        turn("compared.look.outlines", "Outlines"),
+        _has_pinned,
     ),
-)
+}
+"""Chips of the ways to look at the comparison, by the values of their buttons."""
 
 
 class ComparePanel:
@@ -116,6 +102,7 @@ class ComparePanel:
         self.another.on_update(self._pin_chosen)
         self.html = gui.add_html("")
         self._add_buttons(services.buttons)
+        self._looks = Chips(services.buttons, services.session, "compare.turn", "", LOOKS)
         self._key: tuple[object, ...] = ()
         self._content = ""
 
@@ -135,7 +122,6 @@ class ComparePanel:
 
     def _add_buttons(self, buttons: Buttons) -> None:
         buttons.on("compare.pin", self._pin)
-        self._register(buttons, "compare.turn", {s.name: _turn(s) for s in SWITCHES})
         self._register(buttons, "compare.open", {place: _open(place) for place in SLOTS})
         self._register(buttons, "compare.unpin", {place: _unpin(place) for place in SLOTS})
         buttons.offer(
@@ -144,14 +130,6 @@ class ComparePanel:
             "compare.pin",
             is_ready=lambda: None in self._compared.pinned,
         )
-        for switch in SWITCHES:
-            buttons.offer(
-                f"Compare › {switch.name}",
-                switch.hint,
-                "compare.turn",
-                switch.name,
-                lambda: not self._compared.is_empty,
-            )
         for verb, words, hint in (
             ("open", "Open pinned", "Make it the live design; undo brings back the present one."),
             ("unpin", "Unpin", "Remove it from the comparison; undo brings it back."),
@@ -171,8 +149,7 @@ class ComparePanel:
 
     def _register(self, buttons: Buttons, name: str, changes: Mapping[str, Change]) -> None:
         def press(value: str, client: viser.ClientHandle) -> None:
-            # Each press counts, so none is merged with another.
-            self._session.post(object(), changes[value], who=client.client_id)
+            self._session.do(changes[value], who=client.client_id)
 
         buttons.on(name, press, values=changes)
 
@@ -203,21 +180,9 @@ class ComparePanel:
         remarks = "".join(
             f'<div class="ex-dim ex-after">{note}</div>' for note in notes(state, columns)
         )
-        # Table and Bars exclude each other; the other switches are independent.
-        chips = "".join(
-            press_button(
-                "compare.turn",
-                switch.name,
-                switch.words,
-                hint=switch.hint,
-                class_name="ex-chip",
-                is_on=switch.is_on(state),
-            )
-            for switch in SWITCHES
-            if look.overlay or switch.at != "compared.look.at_pose"
-        )
         return box(
-            f'<div class="ex-flow ex-before">{pins}<span class="ex-divider"></span>{chips}</div>',
+            f'<div class="ex-flow ex-before">{pins}<span class="ex-divider"></span>'
+            f"{self._looks.buttons(state)}</div>",
             body,
             remarks,
         )
@@ -232,22 +197,12 @@ class ComparePanel:
         """Pin the live design for "", or the one with a name."""
         chosen = self._choices().get(name)
         if chosen is not None or not name:
-            self._session.post(
-                object(), lambda state: Pin(chosen or state.design), who=client.client_id
-            )
+            self._session.do(lambda state: Pin(chosen or state.design), who=client.client_id)
 
     def _pin_chosen(self, event: viser.GuiEvent[viser.GuiDropdownHandle[str]]) -> None:
         design = self._choices().get(self.another.value)
         if event.client_id is not None and design is not None:
             self._session.post(self, lambda _: Pin(design), who=event.client_id)
-
-
-def _turn(switch: _Switch) -> Change:
-    def change(state: State) -> Set:
-        value = not switch.is_on(state) if switch.value is None else switch.value
-        return Set(switch.at, value, switch.name)
-
-    return change
 
 
 def _open(place: str) -> Change:

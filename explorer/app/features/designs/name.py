@@ -18,7 +18,7 @@ class DesignName:
     def __init__(self, services: Services) -> None:
         self._saved = None if services.user_data is None else services.get(SavedDesigns)
 
-    def markup(self, frame: Frame) -> str:
+    def __call__(self, frame: Frame) -> str:
         """Return the name for a frame, as HTML."""
         live = frame.state.design
         name = f'<b class="ex-cut">{escape(live.name)}</b>'

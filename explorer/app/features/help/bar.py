@@ -17,10 +17,7 @@ from explorer.app.widgets.commands import PAGE, PALETTE_KEY, STEP, Key, shift, w
 from explorer.app.widgets.markup import box, dim
 
 PRESS = "page"
-HELP_KEYS = {
-    f"{PAGE}{STEP}Theme": (shift("L"),),
-    f"{PAGE}{STEP}Keys": (Key("K"),),
-}
+KEYS = {"Theme": (shift("L"),), "Keys": (Key("K"),)}
 HINTS = {
     "Tour": "Do five steps, from the first move to an optimised design.",
     "Manual": "Read the manual beside the scene.",
@@ -47,7 +44,8 @@ class HelpButtons:
         buttons = services.buttons
         buttons.on(PRESS, lambda name, client: presses[name](client), values=presses)
         for name in presses:
-            buttons.offer(f"{PAGE}{STEP}{name}", HINTS[name], PRESS, name)
+            label = f"{PAGE}{STEP}{name}"
+            buttons.offer(label, HINTS[name], PRESS, name, keys=KEYS.get(name, ()))
         commands = open_button(
             "commands",
             f"Commands {keycap(str(PALETTE_KEY))}",
@@ -60,7 +58,7 @@ class HelpButtons:
         help_ = open_button("Help", "Help", hint="Tour, manual and keys.", class_name="ex-tool")
         self._markup = f"{commands}{theme}{help_}"
 
-    def markup(self, _: Frame) -> str:
+    def __call__(self, _: Frame) -> str:
         """Return the buttons as HTML."""
         return self._markup
 
@@ -91,4 +89,4 @@ class HelpDialog:
 
 def hint_of(name: str) -> str:
     """Return what a button does, with its keys."""
-    return with_keys(HINTS[name], HELP_KEYS.get(f"{PAGE}{STEP}{name}", ()))
+    return with_keys(HINTS[name], KEYS.get(name, ()))

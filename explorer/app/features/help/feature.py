@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from explorer.app.features.feature import Feature, InBar, Tab
-from explorer.app.features.help.bar import HELP_KEYS, HelpButtons, HelpDialog
+from explorer.app.features.help.bar import HelpButtons, HelpDialog
 from explorer.app.features.help.tour_panel import TourGuide
 
 HELP = Feature(
@@ -11,5 +11,4 @@ HELP = Feature(
     tabs=(Tab("dialog", "Help", HelpDialog),),
     bar=(InBar("right", HelpButtons),),
     runners=(TourGuide,),
-    keys=HELP_KEYS,
 )

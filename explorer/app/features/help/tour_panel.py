@@ -83,7 +83,7 @@ class TourGuide(Runner):
         tour = card.tour
         if name == "Show me":
             change = tour.step.show
-            self._session.post(object(), lambda s: change(Frame(s)), who=client.client_id)
+            self._session.do(lambda state: change(Frame(state)), who=client.client_id)
         elif name == "Skip" or (name == "Next" and tour.is_last):
             self.end(client)
             self._give_up(tour)

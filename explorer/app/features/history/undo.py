@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from html import escape
-
 import viser
 
 from explorer.app.features.feature import Services
@@ -14,9 +12,9 @@ from explorer.app.widgets.buttons import open_button, press_button
 from explorer.app.widgets.commands import Key, with_keys
 
 PRESS = "history.move"
-UNDO_KEYS = {
-    "Edit › Undo": (Key("Z", "cmd/ctrl"),),
-    "Edit › Redo": (Key("Z", "cmd/ctrl+shift"), Key("Y", "cmd/ctrl")),
+KEYS = {
+    "Undo": (Key("Z", "cmd/ctrl"),),
+    "Redo": (Key("Z", "cmd/ctrl+shift"), Key("Y", "cmd/ctrl")),
 }
 MOVES = {"Undo": UNDO, "Redo": REDO}
 ARROWS = {"Undo": "↶", "Redo": "↷"}
@@ -30,9 +28,10 @@ class UndoButtons:
         services.buttons.on(PRESS, self._move, values=MOVES)
         for name in MOVES:
             # Always ready: a key that is pressed before the page knows of the last step counts.
-            services.buttons.offer(f"Edit › {name}", f"{name} the last step.", PRESS, name)
+            hint = f"{name} the last step."
+            services.buttons.offer(f"Edit › {name}", hint, PRESS, name, keys=KEYS[name])
 
-    def markup(self, frame: Frame) -> str:
+    def __call__(self, frame: Frame) -> str:
         """Return the buttons for a frame, as HTML."""
         history, is_busy = self._session.history, frame.state.optimisation.is_on
         buttons = "".join(self._button(name, history, is_busy=is_busy) for name in MOVES)
@@ -51,8 +50,8 @@ class UndoButtons:
             PRESS,
             name,
             ARROWS[name],
-            hint=with_keys(hint, UNDO_KEYS[f"Edit › {name}"]),
-            label=name if words is None else f"{name} {escape(words)}",
+            hint=with_keys(hint, KEYS[name]),
+            label=name if words is None else f"{name} {words}",
             class_name="ex-tool ex-arrow",
             is_disabled=words is None or is_busy,
         )

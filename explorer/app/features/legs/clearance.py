@@ -32,7 +32,7 @@ class ClearanceScene(ScenePart):
         """Yield the updates that draw the closest pair and the capsules of this frame."""
         state, snapshot = placed.frame.state, placed.frame.snapshot
         radii = placed.scale * np.array(state.design.limits.leg_radii)
-        has_radii = state.view.legs and not state.view.twin and bool(radii.any())
+        has_radii = state.view.legs and not state.view.is_twin and bool(radii.any())
         for part in (self._rods, self._ends):
             yield from part.show(has_radii)
         if has_radii:
@@ -41,7 +41,7 @@ class ClearanceScene(ScenePart):
             )
             yield from self._rods.between(axes[:, 0], axes[:, 1], radii)
             yield from self._ends.at(axes.reshape(-1, 3), np.repeat(radii, 2))
-        shown = state.view.clearance and not state.view.twin
+        shown = state.view.clearance and not state.view.is_twin
         yield self._line, "visible", shown
         yield self._label, "visible", shown
         if shown:
@@ -51,5 +51,5 @@ class ClearanceScene(ScenePart):
             first, second = PAIRS[pair]
             yield self._line, "points", ends[None].astype(np.float32)
             yield self._label, "position", tuple(ends.mean(axis=0).tolist())
-            clearance = format_number(float(clearances.clearance[pair]), 3)
+            clearance = format_number(float(clearances.clearance[pair]), 3, size=state.design.reach)
             yield self._label, "text", f"legs {first}–{second}: {clearance}"

@@ -6,7 +6,7 @@ import viser
 
 from explorer.app.features.feature import Feature, InBar, Tab
 from explorer.app.features.legs.clearance import ClearanceScene
-from explorer.app.features.legs.clearance_figure import ClearanceFigure
+from explorer.app.features.legs.clearance_figure import clearance_figure
 from explorer.app.features.legs.feed import RadiusFeed
 from explorer.app.features.legs.panel import LegsPanel
 from explorer.app.features.legs.swept import SweptTetrahedra
@@ -15,7 +15,7 @@ from explorer.app.features.legs.tasks import draw_radius_curve
 LEGS = Feature(
     "legs",
     tabs=(Tab("analyse", "Legs", LegsPanel, viser.Icon.LINE),),
-    bar=(InBar("middle", ClearanceFigure),),
+    bar=(InBar("middle", lambda _: clearance_figure),),
     scene=(ClearanceScene, SweptTetrahedra),
     feeds=(RadiusFeed,),
     tasks=(draw_radius_curve,),

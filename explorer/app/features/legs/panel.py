@@ -57,10 +57,12 @@ def clearance_table(frame: Frame) -> str:
     """Return the clearances of the six pairs as HTML."""
     clearances = frame.snapshot.clearances
     collides = bool(clearances.clearance.min() < 0.0)
-    unit_mm = frame.state.design.unit_mm
+    unit_mm, reach = frame.state.design.unit_mm, frame.state.design.reach
     values = clearances.clearance.tolist()
-    units = format_column(values, DIGITS, infinite="joined")
-    millimetres = format_column([unit_mm * value for value in values], DIGITS, infinite="")
+    units = format_column(values, DIGITS, size=reach, infinite="joined")
+    millimetres = format_column(
+        [unit_mm * value for value in values], DIGITS, size=unit_mm * reach, infinite=""
+    )
     rows = (
         _row(
             index,
@@ -73,7 +75,7 @@ def clearance_table(frame: Frame) -> str:
     )
     return box(
         status("Legs collide", "beyond") if collides else status("Legs are clear", "within"),
-        caption("Clearance: distance of the axes less the radii"),
+        caption("Clearance here: distance of the axes less the radii"),
         table(rows, ("legs", "units", "mm")),
     )
 
@@ -94,7 +96,7 @@ def move_table(frame: Frame) -> str:
     paper = f"overlap of {pairs}" if pairs else "no overlap"
     rows: list[str] = []
     values = move.clearance.tolist()
-    units = format_column(values, DIGITS, infinite="joined")
+    units = format_column(values, DIGITS, size=frame.state.design.reach, infinite="joined")
     for index, clearance in enumerate(values):
         cells = ("", units[index], "")
         if not math.isinf(clearance):

@@ -49,7 +49,7 @@ class SweptTetrahedra(ScenePart):
     def updates(self, placed: Placed) -> Iterator[Update]:
         """Yield the updates that draw the tetrahedra of this frame's last move."""
         view = placed.frame.state.view
-        move = placed.frame.last_move if view.swept and not view.twin else None
+        move = placed.frame.last_move if view.swept and not view.is_twin else None
         for handle in (*self._meshes, self._edges.handle, self._starts.handle):
             yield handle, "visible", move is not None
         if move is None:

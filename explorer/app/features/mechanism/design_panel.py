@@ -16,8 +16,9 @@ from explorer.app.state.actions import Open, Reset, Set, SetVariable
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import Hold, State
 from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.bindings import At, Bound
 from explorer.app.widgets.commands import NO_OPTION
-from explorer.app.widgets.controls import At, Bound, Controls, Span
+from explorer.app.widgets.controls import Controls
 from explorer.app.widgets.ranges import (
     box_span,
     gap_span,
@@ -27,6 +28,7 @@ from explorer.app.widgets.ranges import (
     radius_span,
     variable_span,
 )
+from explorer.app.widgets.tracks import Span
 from explorer.mechanism.design import LENGTHS, VARIABLES, Design, Limits, Pair, Range
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Triple

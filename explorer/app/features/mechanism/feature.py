@@ -8,17 +8,15 @@ from explorer.app.features.designs.name import DesignName
 from explorer.app.features.feature import Feature, InBar, StateCommand, Tab
 from explorer.app.features.mechanism.bodies import Bodies
 from explorer.app.features.mechanism.design_panel import DesignPanel
-from explorer.app.features.mechanism.figures import LimitsFigure
+from explorer.app.features.mechanism.figures import limits_figure
 from explorer.app.features.mechanism.flags import Flags
 from explorer.app.features.mechanism.legs import Legs, TwinLegs
 from explorer.app.features.mechanism.marks import DragHandle, Ghosts, Labels
+from explorer.app.features.mechanism.modes import MODES
 from explorer.app.features.mechanism.pose_panel import MovePanel
 from explorer.app.features.mechanism.tetrahedra import Tetrahedra
 from explorer.app.state.actions import SetMode
 from explorer.app.widgets.commands import Key, shift
-
-# Number of sign triples of the three margins.
-MODE_COUNT = 8
 
 MECHANISM = Feature(
     "mechanism",
@@ -26,27 +24,26 @@ MECHANISM = Feature(
         Tab("build", "Pose", MovePanel, viser.Icon.ARROWS_MOVE),
         Tab("build", "Design", DesignPanel, viser.Icon.RULER_2),
     ),
-    bar=(InBar("left", DesignName), InBar("middle", LimitsFigure)),
+    bar=(InBar("left", DesignName), InBar("middle", lambda _: limits_figure)),
     # Bodies come first: they make the platform's frame, to which others attach.
     scene=(Bodies, Flags, Legs, TwinLegs, Tetrahedra, Labels, Ghosts, DragHandle),
     commands=(
         StateCommand(
             "Pose › Next assembly mode",
             "Assemble the same leg lengths in the next of the eight ways.",
-            lambda state: SetMode((state.mode + 1) % MODE_COUNT),
+            lambda state: SetMode((state.mode + 1) % len(MODES)),
+            keys=(Key("N"),),
         ),
         StateCommand(
             "Pose › Previous assembly mode",
             "Assemble the same leg lengths in the previous of the eight ways.",
-            lambda state: SetMode((state.mode - 1) % MODE_COUNT),
+            lambda state: SetMode((state.mode - 1) % len(MODES)),
+            keys=(shift("N"),),
         ),
     ),
     keys={
         "Pose › Home pose": (Key("H"),),
-        "Pose › Next assembly mode": (Key("N"),),
-        "Pose › Previous assembly mode": (shift("N"),),
         "Pose › Use the nearest length": (Key("U"),),
-        "Pose › Other modes as ghosts": (Key("M"),),
     },
     lists=("Preset", "On a change"),
 )

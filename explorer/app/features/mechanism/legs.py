@@ -81,7 +81,7 @@ class Legs(ScenePart):
     def updates(self, placed: Placed) -> Iterator[Update]:
         """Yield the updates that draw the legs of this frame."""
         view = placed.frame.state.view
-        visible = view.legs and not view.twin and placed.is_schematic
+        visible = view.legs and not view.is_twin and placed.is_schematic
         for part in (self._actuators, self._joints, self._balls, self._guide):
             yield from part.show(visible)
         if not visible:
@@ -149,7 +149,7 @@ class TwinLegs(ScenePart):
     def updates(self, placed: Placed) -> Iterator[Update]:
         """Yield the updates that draw the twin's legs of this frame."""
         view = placed.frame.state.view
-        visible = view.legs and view.twin
+        visible = view.legs and view.is_twin
         for part in (self._actuators, self._balls, self._posts):
             yield from part.show(visible)
         if not visible:

@@ -8,10 +8,12 @@ from html import escape
 import viser
 
 from explorer.app.features.feature import Services
-from explorer.app.state.actions import Set, SetMode
+from explorer.app.state.actions import SetMode
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import press_button
+from explorer.app.widgets.chips import Chip, Chips, turn
+from explorer.app.widgets.commands import Key
 from explorer.app.widgets.markup import box, fitted
 from explorer.mechanism.margins import mode_name
 from explorer.workspace.limits.broken import Violation
@@ -20,9 +22,8 @@ MODES = tuple(f"{mode}:  {mode_name(mode)}" for mode in range(8))
 """The modes by number and sign triple, as in lists and beside ghosts."""
 
 VALUES = frozenset(str(mode) for mode in range(len(MODES)))
-GO, HOVER, GHOSTS = "modes.go", "modes.hover", "modes.ghosts"
+GO, HOVER = "modes.go", "modes.hover"
 GHOSTS_LABEL = "Other modes as ghosts"
-GHOSTS_HINT = "Draw the seven other ways to assemble the same leg lengths."
 # First words of limits whose whole names are too long for a row.
 SHORT = {"gap |d1 − d3|": "gap", "carriage order": "order"}
 
@@ -66,41 +67,37 @@ class ModesPanel:
         services.get(HoveredMode)
         self._table = services.gui.add_html("")
         buttons.on(GO, self._go, values=VALUES)
-        buttons.on(GHOSTS, self._switch_ghosts)
+        ghosts = Chip(
+            "Ghosts",
+            f"Pose › {GHOSTS_LABEL}",
+            "Draw the seven other ways to assemble the same leg lengths.",
+            turn("view.ghosts", GHOSTS_LABEL),
+            keys=(Key("M"),),
+            label=GHOSTS_LABEL,
+        )
+        self._ghosts = Chips(buttons, services.session, "modes.ghosts", "", {"": ghosts})
         for mode, name in enumerate(MODES):
             hint = f"Assemble the same leg lengths with the signs {mode_name(mode)} of δ1, δ2, δ3."
             words = " ".join(name.split())
             buttons.offer(f"Pose › Assembly mode › {words}", hint, GO, str(mode))
-        buttons.offer(f"Pose › {GHOSTS_LABEL}", GHOSTS_HINT, GHOSTS)
 
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that make the panel show the frame."""
-        yield self._table, "content", modes_table(frame)
+        yield self._table, "content", modes_table(frame, self._ghosts.buttons(frame.state))
 
     def _go(self, value: str, client: viser.ClientHandle) -> None:
         self._session.do(SetMode(int(value)), who=client.client_id)
 
-    def _switch_ghosts(self, _: str, client: viser.ClientHandle) -> None:
-        self._session.post(
-            object(),
-            lambda state: Set("view.ghosts", not state.view.ghosts, GHOSTS_LABEL),
-            who=client.client_id,
-        )
 
+def modes_table(frame: Frame, switch: str) -> str:
+    """Return the table as HTML.
 
-def modes_table(frame: Frame) -> str:
-    """Return the table as HTML."""
+    Args:
+        frame: The frame that is shown.
+        switch: The switch for the ghosts, HTML.
+    """
     state, snapshot = frame.state, frame.snapshot
     names = "".join(f"<span>{name}</span>" for name in ("", "δ1 δ2 δ3", "x", "y", "z", "limits"))
-    switch = press_button(
-        GHOSTS,
-        "",
-        "Ghosts",
-        hint=GHOSTS_HINT,
-        label=GHOSTS_LABEL,
-        class_name="ex-chip",
-        is_on=state.view.ghosts,
-    )
     of_last = (
         '<div class="ex-close">These lengths close in no mode; the modes below are those of the '
         "last lengths that did.</div>"

@@ -18,9 +18,11 @@ from explorer.app.state.actions import (
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.controls import Bound, Controls, Span
+from explorer.app.widgets.bindings import Bound
+from explorer.app.widgets.controls import Controls
 from explorer.app.widgets.markup import alert, note, remark
 from explorer.app.widgets.ranges import joint_span, position_span
+from explorer.app.widgets.tracks import Span
 from explorer.mechanism.design import JOINTS
 
 JOINT_HINTS = {

@@ -249,7 +249,7 @@ def _drawn(figure: Figure) -> str:
         f'<polygon points="{corners}"/>{_line("is-axis", *figure.axis)}{dots}'
         + "".join(map(_dimension, figure.dimensions))
         + "".join(_text(word, "is-point") for word in figure.names)
-        + _text(figure.caption, "is-caption")
+        + _text(figure.caption)
     )
 
 
@@ -262,7 +262,7 @@ def _dimension(dimension: Dimension) -> str:
     extensions = "".join(_line("is-thin", *each) for each in dimension.extensions)
     line = _line("", *dimension.line)
     name = dimension.word.variable
-    return f'<g data-variable="{name}">{extensions}{line}{ticks}{_text(dimension.word, "")}</g>'
+    return f'<g data-variable="{name}">{extensions}{line}{ticks}{_text(dimension.word)}</g>'
 
 
 def _line(look: str, start: Xy, end: Xy) -> str:
@@ -271,7 +271,7 @@ def _line(look: str, start: Xy, end: Xy) -> str:
     return f'<line{classes} x1="{x1:.1f}" y1="{y1:.1f}" x2="{x2:.1f}" y2="{y2:.1f}"/>'
 
 
-def _text(word: Word, look: str) -> str:
+def _text(word: Word, look: str = "") -> str:
     x, y = word.at
     classes = f' class="{look}"' if look else ""
     return (

@@ -9,8 +9,8 @@ from collections.abc import Iterator
 
 from explorer.app.features.feature import Services
 from explorer.app.features.optimise.actions import SetObjective, SetRequest
+from explorer.app.features.optimise.buttons import OptimiseButtons
 from explorer.app.features.optimise.plots import OptimisePlots
-from explorer.app.features.optimise.presses import OptimisePresses
 from explorer.app.features.optimise.problem import (
     requested_box,
     requested_reach,
@@ -22,7 +22,8 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.optimisation import PLACE
 from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.controls import At, Bound, Controls
+from explorer.app.widgets.bindings import At, Bound
+from explorer.app.widgets.controls import Controls
 from explorer.measures.catalogue import CATALOGUE
 from explorer.mechanism.design import VARIABLES
 from explorer.mechanism.pose import Triple
@@ -50,7 +51,7 @@ class OptimisePanel:
 
     def __init__(self, services: Services) -> None:
         gui = services.gui
-        services.get(OptimisePresses)
+        services.get(OptimiseButtons)
         self._controls = Controls(gui, services.session)
         gui.add_html(COLUMNS)
         with gui.add_folder("Problem, in design units"):

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from html import escape
 
 from explorer.app.features.optimise.actions import LiftLimit
-from explorer.app.features.optimise.limits import limits_table
-from explorer.app.features.optimise.presses import (
+from explorer.app.features.optimise.buttons import (
     ACCEPT,
     CANCEL,
     DESIGN,
@@ -21,6 +20,7 @@ from explorer.app.features.optimise.presses import (
     START,
     button,
 )
+from explorer.app.features.optimise.limits import limits_table
 from explorer.app.features.optimise.problem import box_on_offer, liftable, refuted
 from explorer.app.state.optimisation import SearchResult
 from explorer.app.state.state import Run, State
@@ -42,7 +42,7 @@ from explorer.measures.catalogue import CATALOGUE
 from explorer.measures.clearance import CERTAIN
 from explorer.measures.measurements import Measurements
 from explorer.mechanism.design import VARIABLES
-from explorer.numerics.number_text import set_true_minus
+from explorer.numerics.number_text import format_decimals
 from explorer.optimise.curves import CALLED, GOALS
 from explorer.optimise.outcome import Iterate
 from explorer.optimise.problem import YAW, Problem
@@ -71,13 +71,13 @@ class Notice:
         text: Its value, with its unit.
         share: Share of the starts that have ended, from 0 to 1; None where there is one start or
             the search has ended.
-        presses: Names of the buttons that answer it, out of `PRESSES`, the main one first.
+        buttons: Names of the buttons that answer it, out of `BUTTONS`, the main one first.
     """
 
     title: str
     text: str
     share: float | None
-    presses: tuple[str, ...]
+    buttons: tuple[str, ...]
 
 
 def search_notice(state: State) -> Notice | None:
@@ -286,7 +286,7 @@ def measure_rows(problem: Problem, before: Measurements, after: Measurements) ->
         measure = CATALOGUE[name]
         label, hint = measure.label, measure.hint
         if name == "demanded_clearance":
-            label += f", |δ| ≥ {after.demanded_margin:.3g}"
+            label += f", |δ| ≥ {format_number(after.demanded_margin or 0.0, 3)}"
             hint += _pair(after.demanded_nearest)
         elif unit := measure.unit_in("units"):
             label += f", {unit}"
@@ -355,8 +355,8 @@ def _number(value: float | None, digits: int) -> str:
 
 
 def _change(value: float, digits: int) -> str:
-    text = f"{value:+.{digits}f}"
-    return "0" if float(text) == 0.0 else set_true_minus(text)
+    text = format_decimals(value, digits, signed=True)
+    return text if text.strip("0.") else "0"
 
 
 def _pair(legs: tuple[int, int] | None) -> str:

@@ -16,6 +16,7 @@ from explorer.errors import InputError
 from explorer.mechanism.design import Design
 from explorer.mechanism.kinematics import forward
 from explorer.mechanism.pose import Pose
+from explorer.numerics.number_text import format_number
 
 # Poses, and leg lengths over the reach, that differ by less are the same.
 SAME = 1e-9
@@ -125,8 +126,6 @@ def _end_words(end: End) -> str:
 class SetPathTime(Action):
     """Go to a time on the path, in seconds."""
 
-    template: ClassVar[str] = "Path at {action.seconds:.3g} s"
-
     seconds: float
 
     def apply(self, state: State) -> State:
@@ -141,6 +140,10 @@ class SetPathTime(Action):
         at = min(max(self.seconds, 0.0), journey.trajectory.duration)
         after = replace(journey, at=at)
         return moved(_with(state, journey=after), after.pose)
+
+    def words(self) -> str:
+        """Return what the action does."""
+        return f"Path at {format_number(self.seconds, 3)} s"
 
 
 @dataclass(frozen=True)

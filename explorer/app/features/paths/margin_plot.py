@@ -26,6 +26,7 @@ from explorer.app.widgets.colours import MARGIN_COLOURS
 from explorer.app.widgets.markup import format_number, margin_name, signed, swatch
 from explorer.mechanism.margins import INCIDENCES, margins
 from explorer.numerics.arrays import FloatArray
+from explorer.numerics.number_text import format_decimals
 
 # Dashes of the margins' lines beside their colours, and the marks of the legend.
 DASHES: tuple[tuple[float, ...], ...] = ((), (7.0, 3.0), (2.0, 3.0))
@@ -134,7 +135,7 @@ def crossing_words(journey: Journey) -> str:
     """Return where the path is singular, in one line of HTML."""
     along_path = journey.margins
     places = [
-        f"δ{c.incidence} = 0 at {crossing_time(journey, i):.2f} s"
+        f"δ{c.incidence} = 0 at {format_decimals(crossing_time(journey, i), 2)} s"
         f"{'' if c.changes_sign else ', only touched'}"
         for i, c in enumerate(along_path.crossings)
     ]

@@ -27,13 +27,17 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.paths import End, PathKind
 from explorer.app.state.state import State, angles_of
 from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.bindings import Bound
 from explorer.app.widgets.buttons import Buttons, press_button
-from explorer.app.widgets.controls import Bound, Controls, Span
+from explorer.app.widgets.chips import Chip, Chips, choose
+from explorer.app.widgets.controls import Controls
 from explorer.app.widgets.markup import alert, beside, box, dim, note, sentence, signed
+from explorer.app.widgets.tracks import Span
 from explorer.errors import InputError
 from explorer.export.trajectory import trajectory_csv
 from explorer.mechanism.margins import margins, mode_name, mode_of
 from explorer.mechanism.pose import Pose, Triple
+from explorer.numerics.number_text import format_number
 
 EndName = Literal["start", "goal"]
 ENDS: tuple[EndName, ...] = ("start", "goal")
@@ -74,6 +78,11 @@ class PathsPanel:
         gui, self._session = services.gui, services.session
         self._downloads = services.downloads
         self._controls = Controls(gui, services.session)
+        kinds = {
+            kind: Chip(words, f"Paths › {words}", hint, choose("paths.kind", kind, "Path"))
+            for kind, (words, hint) in KINDS.items()
+        }
+        self._kind_chips = Chips(services.buttons, services.session, "paths.kind", "", kinds)
         gui.add_html(beside(2))
         with gui.add_folder("Path"):
             self._numbers: dict[EndName, viser.GuiHtmlHandle] = {
@@ -119,7 +128,8 @@ class PathsPanel:
             yield handle, "visible", not is_typed
             if not is_typed:
                 yield handle, "content", end_numbers(state, end)
-        yield self._kinds, "content", kind_words(state)
+        chips = f'<div class="ex-flow">{self._kind_chips.buttons(state)}</div>'
+        yield self._kinds, "content", box(chips, f'<div class="ex-small">{kind_note(state)}</div>')
         yield self.go, "disabled", state.paths.is_planning
         yield self._title, "content", plan_words(state) or path_title(state)
         yield from self._plot.updates(frame)
@@ -160,20 +170,14 @@ class PathsPanel:
         return numbers
 
     def _add_buttons(self, buttons: Buttons) -> None:
-        def change(value: str, client: viser.ClientHandle) -> None:
-            self._session.do(Set("paths.kind", value, "Path", value), who=client.client_id)
-
         def play(value: str, client: viser.ClientHandle) -> None:
             self._session.do(Play(value == "on"), who=client.client_id)
 
-        buttons.on("paths.kind", change, values=KINDS)
         buttons.on("paths.play", play, values=("on", "off"))
         buttons.on("paths.export", lambda _, client: self._export(client.client_id))
         buttons.on(
             "paths.cancel", lambda _, client: self._session.do(CancelPlan(), who=client.client_id)
         )
-        for kind, (words, hint) in KINDS.items():
-            buttons.offer(f"Paths › {words}", hint, "paths.kind", kind)
         buttons.offer(
             "Paths › Cancel planning",
             "Stop the search for a path.",
@@ -207,23 +211,8 @@ def end_numbers(state: State, end: EndName) -> str:
     return note(f'<span title="{hint}">{position} · {angles}</span>')
 
 
-def kind_words(state: State) -> str:
-    """Return the two kinds of a path as switches, and what the chosen one means, as HTML."""
-    chips = "".join(
-        press_button(
-            "paths.kind",
-            kind,
-            words,
-            hint=hint,
-            class_name="ex-chip",
-            is_on=state.paths.kind == kind,
-        )
-        for kind, (words, hint) in KINDS.items()
-    )
-    return box(f'<div class="ex-flow">{chips}</div><div class="ex-small">{_kind_note(state)}</div>')
-
-
-def _kind_note(state: State) -> str:
+def kind_note(state: State) -> str:
+    """Return what the chosen kind of a path means for its ends, as HTML."""
     if state.paths.kind == "straight":
         return dim("May pass singular poses, which are marked.")
     try:
@@ -245,7 +234,7 @@ def plan_words(state: State) -> str | None:
         cancel = press_button(
             "paths.cancel", "", "Cancel", hint="Stop the search", class_name="ex-button"
         )
-        words = dim(f"Planning, for {paths.seconds:g} s at most …")
+        words = dim(f"Planning, for {format_number(paths.seconds)} s at most …")
         return box(f'<div class="ex-line">{words}{cancel}</div>')
     if paths.problem is not None:
         return alert("No path", sentence(paths.problem))

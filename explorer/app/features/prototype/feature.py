@@ -9,7 +9,6 @@ from explorer.app.features.prototype.feed import PartsFeed
 from explorer.app.features.prototype.files import ASSEMBLIES, MechanismFiles
 from explorer.app.features.prototype.panel import PrototypePanel
 from explorer.app.features.prototype.scene import PrototypeScene
-from explorer.app.widgets.commands import Key
 
 
 def _floor(services: Services) -> float | None:
@@ -35,6 +34,5 @@ PROTOTYPE = Feature(
     ),
     scene=(PrototypeScene,),
     feeds=(PartsFeed,),
-    keys={"Prototype › Show the parts": (Key("R"),)},
     floor=_floor,
 )

@@ -30,8 +30,6 @@ class PartsFeed(Feed[PartsRequest, PartsDrawing]):
 
 
 def _request(frame: Frame) -> PartsRequest | None:
-    view, design = frame.state.view, frame.state.design
-    # The twin has no prototype.
-    if not view.prototype.shown or view.twin:
+    if frame.state.view.drawn_as != "prototype":
         return None
-    return PartsRequest(msgspec.structs.replace(design, name=""))
+    return PartsRequest(msgspec.structs.replace(frame.state.design, name=""))

@@ -5,16 +5,24 @@ from __future__ import annotations
 from collections.abc import Iterator
 from html import escape
 
+import viser
+
 from explorer.app.features.feature import Services
 from explorer.app.features.prototype.feed import PartsFeed
 from explorer.app.features.prototype.parts_list import PartsList
+from explorer.app.state.actions import Set, draw_as
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.controls import Controls, Span
+from explorer.app.widgets.bindings import Bound
+from explorer.app.widgets.buttons import press_button
+from explorer.app.widgets.controls import Controls
 from explorer.app.widgets.markup import alert, box, caption, note, row, sentence, table
+from explorer.app.widgets.tracks import Span
 from explorer.mechanism.design import LENGTHS
 from explorer.numerics.number_text import format_decimals, format_number
 from explorer.prototype.bill import Actuator
+
+FIT = "prototype.fit"
 
 
 class PrototypePanel:
@@ -27,12 +35,16 @@ class PrototypePanel:
             "Show the parts",
             "Draw the mechanism as parts that can be made: sized from the design, the radii of "
             "its legs and its unit.",
-            "view.prototype.shown",
-            disabled=lambda state: state.view.twin,
+            Bound(
+                lambda frame: frame.state.view.drawn_as == "prototype",
+                lambda _, on: draw_as("prototype" if on else "schematic"),
+            ),
         )
         gui.add_html(note("Sized from the design; Export has them for printers and CAD."))
         self._trouble = gui.add_html("", visible=False)
-        self._folder = gui.add_folder("Prototype", visible=False)
+        self._session = services.session
+        services.buttons.on(FIT, self._fit)
+        self._folder = gui.add_folder("Parts", visible=False)
         with self._folder:
             controls.slider(
                 "Exploded",
@@ -48,6 +60,12 @@ class PrototypePanel:
                 step=1.0,
             )
             self._bill = gui.add_html("")
+
+    def _fit(self, _: str, client: viser.ClientHandle) -> None:
+        drawing = self._feed.drawing
+        if drawing is not None and drawing.fitting_unit_mm is not None:
+            unit = Set("design.unit_mm", drawing.fitting_unit_mm, "1 unit (mm)")
+            self._session.do(unit, who=client.client_id)
 
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that show a frame."""
@@ -67,15 +85,24 @@ class PrototypePanel:
 
 def trouble_of(frame: Frame, feed: PartsFeed) -> str | None:
     """Return as HTML why there are no parts or why they cannot take the pose; None if they can."""
-    if not frame.state.view.prototype.shown:
+    if frame.state.view.drawn_as != "prototype":
         return None
-    if frame.state.view.twin:
-        return alert("No prototype of the 6-4 twin", "Switch the twin off to see the parts.")
     if feed.problem is not None:
         return alert("The parts could not be made", feed.problem)
     drawing = feed.drawing
     if drawing is not None and drawing.refusal is not None:
-        return alert("No prototype of this design", sentence(drawing.refusal))
+        refusal = alert("No prototype of this design", sentence(str(drawing.refusal)))
+        unit = drawing.fitting_unit_mm
+        if unit is None:
+            return refusal
+        fit = press_button(
+            FIT,
+            "",
+            f"Set the unit to {format_number(unit)} mm",
+            hint="The least size at which there is room for the parts.",
+            class_name="ex-button",
+        )
+        return refusal + box(fit)
     if drawing is None or drawing.parts is None:
         return note("Making the parts …")
     broken = drawing.parts.prototype.broken_joint_limits(

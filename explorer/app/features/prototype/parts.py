@@ -7,7 +7,7 @@ from functools import cached_property
 
 from explorer.app.features.prototype.parts_list import PartsList, parts_list
 from explorer.app.scene.creases import Drawn, creased
-from explorer.errors import ExplorerError
+from explorer.errors import ExplorerError, TooTightError
 from explorer.mechanism.design import Design
 from explorer.prototype.assembly import Prototype, make_prototype
 
@@ -46,12 +46,17 @@ class PartsDrawing:
     Attributes:
         request: Request that it answers.
         parts: Parts; None if the design is too tight for them.
-        refusal: Why there are none, and what would fit.
+        refusal: Why there are none, and what would fit; None if there are parts.
     """
 
     request: PartsRequest
     parts: Parts | None
-    refusal: str | None
+    refusal: ExplorerError | None
+
+    @property
+    def fitting_unit_mm(self) -> float | None:
+        """Millimetres in one design unit with which the parts fit; None if no unit helps."""
+        return self.refusal.fitting_unit_mm if isinstance(self.refusal, TooTightError) else None
 
 
 def parts_drawing(request: PartsRequest) -> PartsDrawing:
@@ -59,6 +64,6 @@ def parts_drawing(request: PartsRequest) -> PartsDrawing:
     try:
         prototype = make_prototype(request.design)
     except ExplorerError as error:
-        return PartsDrawing(request, None, str(error))
+        return PartsDrawing(request, None, error)
     meshes = tuple(creased(part.vertices, part.faces) for part in prototype.parts)
     return PartsDrawing(request, Parts(prototype, meshes, parts_list(prototype)), None)

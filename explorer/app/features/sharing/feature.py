@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from explorer.app.features.feature import Export, Feature, InBar, Tab
 from explorer.app.features.sharing.files import SessionRecorder, SharedFiles
-from explorer.app.features.sharing.panel import ExportButton, ExportDialog
+from explorer.app.features.sharing.panel import ExportDialog, export_button
 from explorer.app.features.sharing.reporting import ReportFormat
 
 PICTURES: dict[str, tuple[int, int] | float] = {
@@ -18,7 +18,7 @@ REPORTS: dict[str, ReportFormat] = {"HTML": "html", "PDF": "pdf"}
 SHARING = Feature(
     "sharing",
     tabs=(Tab("dialog", "Export", ExportDialog),),
-    bar=(InBar("right", ExportButton),),
+    bar=(InBar("right", lambda _: export_button),),
     exports=(
         Export(
             "Report",

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
 from html import escape
 
 import viser
@@ -10,26 +11,19 @@ import viser
 from explorer.app.features.feature import Export, Services
 from explorer.app.features.sharing.files import SharedFiles
 from explorer.app.features.sharing.view_picture import LEAST, MOST
+from explorer.app.session.session import Who
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import open_button, press_button
 from explorer.app.widgets.markup import box
 
 PRESS = "export"
-# Separator of the title and the format in the value of a button.
-STEP = " as "
 
 
-class ExportButton:
-    """The button of the bar that opens the dialog."""
-
-    def __init__(self, services: Services) -> None:
-        del services
-
-    def markup(self, _: Frame) -> str:
-        """Return the button as HTML."""
-        hint = "Download the workspace, the mechanism, pictures, reports and more."
-        return open_button("Export", "Export", hint=hint, class_name="ex-tool ex-outlined")
+def export_button(_: Frame) -> str:
+    """Return the button of the bar that opens the dialog, as HTML."""
+    hint = "Download the workspace, the mechanism, pictures, reports and more."
+    return open_button("Export", "Export", hint=hint, class_name="ex-tool ex-outlined")
 
 
 class ExportDialog:
@@ -37,13 +31,14 @@ class ExportDialog:
 
     def __init__(self, services: Services) -> None:
         gui, buttons = services.gui, services.buttons
-        self._sends = {each.title: each.sender(services) for each in services.exports}
-        values = {f"{each.title}{STEP}{name}" for each in services.exports for name in each.formats}
-        buttons.on(PRESS, self._send, values=values)
+        sends: dict[str, Callable[[Who], None]] = {}
         for each in services.exports:
+            send = each.sender(services)
             for name in each.formats:
-                label = f"Export › {each.title} › {name}"
-                buttons.offer(label, each.hint, PRESS, f"{each.title}{STEP}{name}")
+                value = _value(each, name)
+                sends[value] = partial(send, name)
+                buttons.offer(f"Export › {each.title} › {name}", each.hint, PRESS, value)
+        buttons.on(PRESS, lambda value, client: sends[value](client.client_id), values=sends)
         gui.add_html(box("".join(_row(each) for each in services.exports)))
         with gui.add_folder("Picture of another size", expand_by_default=False):
             _add_picture(gui, services.get(SharedFiles))
@@ -52,18 +47,19 @@ class ExportDialog:
         """Yield nothing: the dialog stays as it is."""
         return iter(())
 
-    def _send(self, value: str, client: viser.ClientHandle) -> None:
-        title, _, name = value.partition(STEP)
-        self._sends[title](name, client.client_id)
+
+def _value(export: Export, name: str) -> str:
+    """Return the value of the button for a format."""
+    return f"{export.title} as {name}"
 
 
 def _row(export: Export) -> str:
     buttons = "".join(
         press_button(
             PRESS,
-            f"{export.title}{STEP}{name}",
+            _value(export, name),
             escape(name),
-            label=f"Export {export.title} as {name}",
+            label=f"Export {_value(export, name)}",
             class_name="ex-button",
         )
         for name in export.formats

@@ -16,7 +16,7 @@ import viser
 from explorer.app.browser.viser_gaps import SceneMessage, scene_as_html
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
-from explorer.app.widgets.markup import signed
+from explorer.app.widgets.markup import format_number, signed
 from explorer.numerics.arrays import FloatArray
 
 # Messages outside the tree of the scene that go into the file.
@@ -125,7 +125,7 @@ def caption_of(state: State, date: dt.date) -> str:
     return (
         f'<b style="font-size:14px">{escape(state.design.name)}</b><br>'
         f"b4 at ({x}, {y}, {z}) · {angles} · mode {Frame(state).snapshot.sign_words}<br>"
-        f"1 unit = {state.design.unit_mm:.6g} mm · {date.isoformat()}"
+        f"1 unit = {format_number(state.design.unit_mm, 6)} mm · {date.isoformat()}"
     )
 
 

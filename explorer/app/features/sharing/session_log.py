@@ -45,11 +45,6 @@ class SessionLog:
         # Time of the last row that stays.
         self._kept_at = -np.inf
 
-    @property
-    def start_time(self) -> float:
-        """The time of the start of the session, by `time.monotonic`."""
-        return self._start_time
-
     def __len__(self) -> int:
         """Return the number of poses."""
         return len(self._moved_by)
@@ -61,13 +56,13 @@ class SessionLog:
             state: State of the page.
             drag: Value shared by all poses of one drag of one control; None without a drag.
             moved_by: Words of the action that moved the platform.
-            at: Time, by `time.monotonic`; now if None.
+            at: Time since the start of the log, in seconds; now if None.
         """
         pose, design = state.pose, state.design
         last = self._last
         if last is not None and (last[0] is pose or last[0] == pose) and _alike(last[1], design):
             return
-        now = time.monotonic() if at is None else at
+        now = time.monotonic() - self._start_time if at is None else at
         with self._lock:
             self._last = (pose, design)
             continues = drag is not None and drag == self._drag
@@ -80,7 +75,7 @@ class SessionLog:
                 self._count += 1
             index = (self._count - 1) % len(self._rows)
             self._rows[index] = (
-                now - self._start_time,
+                now,
                 *pose.position,
                 *pose.quaternion,
                 state.mode,

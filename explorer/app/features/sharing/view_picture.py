@@ -1,6 +1,6 @@
 """Pictures of the scene at any size, drawn by the browser that downloads one.
 
-The browser draws the scene alone, with its labels, its camera and the settings of the tab View;
+The browser draws the scene alone, with its labels, its camera and the settings of the tab Show;
 lines and labels grow with the picture. Some browsers fill a picture too large for their graphics
 with a part of it, without an error; so a large picture is compared with a small one.
 """
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from explorer.errors import InputError, NoAnswerError
 from explorer.numerics.arrays import FloatArray
+from explorer.numerics.number_text import format_number
 
 LEAST, MOST = 16, 8192
 """The bounds of width and height, in pixels."""
@@ -61,7 +62,9 @@ def check_size(width: float, height: float) -> tuple[int, int]:
     """
     for name, value in (("width", width), ("height", height)):
         if not (math.isfinite(value) and LEAST <= value <= MOST):
-            raise InputError(f"the {name} of a picture is {LEAST} to {MOST} pixels; got {value:g}")
+            raise InputError(
+                f"the {name} of a picture is {LEAST} to {MOST} pixels; got {format_number(value)}"
+            )
     return round(width), round(height)
 
 

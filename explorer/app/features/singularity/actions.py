@@ -11,7 +11,7 @@ from explorer.app.state.state import State
 from explorer.errors import InputError
 from explorer.mechanism.margins import INCIDENCES
 from explorer.mechanism.pose import Pose
-from explorer.numerics.number_text import format_ascii
+from explorer.numerics.number_text import format_number
 from explorer.singularity.bruhat import Stratum, codimension, describe_stratum
 from explorer.singularity.nearest import nearest_singularities
 from explorer.singularity.nearest_stratum import nearest_in_stratum, seen_stratum
@@ -43,7 +43,7 @@ class Jog(Action):
         """Return what the action does."""
         motion = UNCOUPLED[self.motion]
         unit = "°" if motion.kind == "rotation" else ""
-        return f"δ{motion.incidence} alone, by {format_ascii(self.amount, 4)}{unit}"
+        return f"δ{motion.incidence} alone, by {format_number(self.amount, 4)}{unit}"
 
 
 def jog_start(state: State, motion: int) -> Pose:

@@ -6,7 +6,7 @@ import viser
 
 from explorer.app.features.feature import Feature, InBar, StateCommand, Tab
 from explorer.app.features.singularity.actions import GoToSingularity
-from explorer.app.features.singularity.distance_figure import DistanceFigure
+from explorer.app.features.singularity.distance_figure import distance_figure
 from explorer.app.features.singularity.feed import StrataFeed
 from explorer.app.features.singularity.jog_scene import JogScene
 from explorer.app.features.singularity.panel import SingularityPanel
@@ -16,7 +16,7 @@ from explorer.app.widgets.commands import shift
 SINGULARITY = Feature(
     "singularity",
     tabs=(Tab("analyse", "Singularity", SingularityPanel, viser.Icon.ALERT_TRIANGLE),),
-    bar=(InBar("middle", DistanceFigure),),
+    bar=(InBar("middle", lambda _: distance_figure),),
     scene=(NearestGhost, EllipsoidScene, BallScene, JogScene),
     feeds=(StrataFeed,),
     commands=(
@@ -24,8 +24,8 @@ SINGULARITY = Feature(
             "Singularity › Go to the nearest one",
             "Move the mechanism to the closest of the nearest poses of δ1, δ2 and δ3.",
             lambda _: GoToSingularity(None),
+            keys=(shift("G"),),
         ),
     ),
-    keys={"Singularity › Go to the nearest one": (shift("G"),)},
     lists=("Arrows", "Ghost", "Ellipsoid"),
 )

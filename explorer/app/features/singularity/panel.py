@@ -13,8 +13,9 @@ from explorer.app.features.singularity.performance import PerformancePanel
 from explorer.app.features.singularity.strata import StrataPanel
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.bindings import At
 from explorer.app.widgets.colours import CLEAR, FAR, FAR_WARNINGS, SINGULAR, WARNED, css
-from explorer.app.widgets.controls import At, Controls
+from explorer.app.widgets.controls import Controls
 from explorer.app.widgets.markup import (
     Look,
     box,

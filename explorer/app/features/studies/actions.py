@@ -12,6 +12,7 @@ from explorer.app.state.state import State
 from explorer.app.state.studies import Range, Studies, label_of
 from explorer.app.state.values import with_value
 from explorer.errors import InputError
+from explorer.numerics.number_text import format_number
 
 # Ranges of one axis.
 MOST_RANGES = 16
@@ -124,5 +125,8 @@ def _check_ranges(axis: str, ranges: tuple[Range, ...]) -> tuple[Range, ...]:
         raise InputError(f"an axis takes {MOST_RANGES} ranges; {axis} was given {len(ranges)}")
     for low, high in ranges:
         if not (math.isfinite(low) and math.isfinite(high) and low <= high):
-            raise InputError(f"a range of {axis} goes from low to high; got {low:g} to {high:g}")
+            raise InputError(
+                f"a range of {axis} goes from low to high; "
+                f"got {format_number(low)} to {format_number(high)}"
+            )
     return ranges

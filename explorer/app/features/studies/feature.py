@@ -5,7 +5,7 @@ from __future__ import annotations
 import viser
 
 from explorer.app.features.feature import Feature, InBar, Tab
-from explorer.app.features.studies.chip import StudyChip
+from explorer.app.features.studies.bar import StudyChip
 from explorer.app.features.studies.panel import StudiesPanel
 
 STUDIES = Feature(

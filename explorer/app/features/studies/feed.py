@@ -23,6 +23,7 @@ from explorer.app.state.studies import Studies, StudyPlan
 from explorer.app.storage.study_folders import StudyFolders, study_in
 from explorer.errors import ExplorerError, InputError
 from explorer.numerics.arrays import BoolArray, IntArray
+from explorer.numerics.number_text import format_number
 from explorer.sweep.parts import pyarrow
 from explorer.sweep.results import Results, load_results
 from explorer.sweep.rows import columns_of
@@ -249,8 +250,8 @@ def results_in(folder: Path) -> Results:
     study = study_in(folder)
     if study.count > MOST_ON_PAGE:
         raise InputError(
-            f"{study.name} has {study.count} designs and the page shows studies of up to "
-            f"{MOST_ON_PAGE}; explorer sweep --summary prints its front"
+            f"{study.name} has {format_number(study.count)} designs and the page shows studies of "
+            f"up to {format_number(MOST_ON_PAGE)}; explorer sweep --summary prints its front"
         )
     try:
         return load_results(folder)

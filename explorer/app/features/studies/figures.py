@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from explorer.app.features.studies.plot_rows import PlotRows
 from explorer.app.state.studies import Range, label_of, short_title_of, title_of, unit_of
 from explorer.numerics.arrays import BoolArray, FloatArray
+from explorer.numerics.number_text import format_number
 
 Figure: TypeAlias = dict[str, Any]
 
@@ -81,7 +82,7 @@ def parallel(plotted: PlotRows, revision: int, *, dark: bool) -> Figure:
             "label": short_title_of(name),
             "values": pack(column),
             "range": _with_room(column),
-            "tickformat": "~g",
+            "tickformat": ",~g",
             "multiselect": True,
         }
         ranges = plotted.studies.ranges_of(name)
@@ -186,15 +187,18 @@ def pack(values: NDArray[Any], kind: str = "f4") -> dict[str, str]:
 
 def _points(plotted: PlotRows, which: BoolArray, marker: Mapping[str, Any]) -> Figure:
     indices = plotted.results.columns["index"][plotted.rows[which]]
-    lines = [f"<b>design %{{customdata}}</b><br>{_hover_line(plotted.across, 'x')}"]
-    lines.append(_hover_line(plotted.up, "y"))
+    x, y = (plotted.column(name)[plotted.rows][which] for name in (plotted.across, plotted.up))
     return {
         "type": "scatter" if len(plotted.rows) <= MOST_AS_SVG else "scattergl",
         "mode": "markers",
-        "x": pack(plotted.column(plotted.across)[plotted.rows][which]),
-        "y": pack(plotted.column(plotted.up)[plotted.rows][which]),
+        "x": pack(x),
+        "y": pack(y),
         "customdata": pack(indices, "i4"),
-        "hovertemplate": "<br>".join(lines) + "<extra></extra>",
+        "text": [
+            f"{_hover_line(plotted.across, across)}<br>{_hover_line(plotted.up, up)}"
+            for across, up in zip(x.tolist(), y.tolist(), strict=True)
+        ],
+        "hovertemplate": "<b>design %{customdata}</b><br>%{text}<extra></extra>",
         "marker": dict(marker),
         # The server draws the points outside the brushes.
         "unselected": {"marker": {"opacity": marker.get("opacity", 1.0)}},
@@ -268,7 +272,7 @@ def _layout(
         "font": {"color": TEXT if not dark else "#aeb6c0", "family": "inherit", "size": 11},
         "margin": dict(margin),
         "hoverlabel": {"font": {"size": 11}},
-        "separators": ". ",
+        "separators": ".,",
         "meta": {
             "explorer": plot,
             "study": plotted.studies.name,
@@ -282,10 +286,10 @@ def _figure(data: list[Figure], layout: Figure) -> Figure:
     return {"data": data, "layout": layout, "config": config}
 
 
-def _hover_line(name: str, axis: str) -> str:
+def _hover_line(name: str, value: float) -> str:
     unit = unit_of(name)
     gap = "" if unit == "°" else " "
-    return f"{label_of(name)} %{{{axis}:.5~g}}{gap}{unit}".rstrip()
+    return f"{label_of(name)} {format_number(value, 5)}{gap}{unit}".rstrip()
 
 
 def _ends(values: FloatArray) -> Range:

@@ -31,10 +31,12 @@ from explorer.app.state.studies import (
     label_of,
 )
 from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.bindings import At, Bound
 from explorer.app.widgets.buttons import Buttons, Does
 from explorer.app.widgets.commands import NO_OPTION
-from explorer.app.widgets.controls import At, Bound, Control, Controls, Span
+from explorer.app.widgets.controls import Control, Controls
 from explorer.app.widgets.markup import alert, beside
+from explorer.app.widgets.tracks import Span
 from explorer.errors import ExplorerError
 from explorer.measures.catalogue import measures_in
 from explorer.sweep.study import NAMES
@@ -300,6 +302,6 @@ class StudiesPanel:
                 turn = plan.with_variable_toggled if is_variable else plan.with_measure_advanced
                 return Set("studies.plan", turn(name), "New study", label_of(name))
 
-            self._session.post(object(), change, who=client.client_id)
+            self._session.do(change, who=client.client_id)
 
         return press

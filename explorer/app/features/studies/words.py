@@ -47,23 +47,23 @@ def status(drawing: StudyDrawing, *, is_running: bool = False) -> str:
         is_running: Whether it is being computed, so that its progress stands elsewhere.
     """
     study, count = drawing.study, drawing.results.count
-    total = "" if drawing.is_complete else f" of {study.count}"
-    parts = [] if is_running else [f"<b>{count}</b>{total} designs"]
+    total = "" if drawing.is_complete else f" of {format_number(study.count)}"
+    parts = [] if is_running else [f"<b>{format_number(count)}</b>{total} designs"]
     front, inside = len(drawing.front), int(drawing.inside.sum())
     if study.objectives:
-        parts.append(f"{_dot(FRONT)}<b>{front}</b> on the Pareto front")
+        parts.append(f"{_dot(FRONT)}<b>{format_number(front)}</b> on the Pareto front")
     if drawing.request.studies.brushes:
         clear = press_button(
             "studies.clear", "", "clear", hint="Clear all brushes", class_name="ex-link"
         )
-        parts.append(f"<b>{inside}</b> within the brushes {clear}")
+        parts.append(f"<b>{format_number(inside)}</b> within the brushes {clear}")
     plotted = drawing.plotted
     if plotted is not None and plotted.count > MOST_ROWS:
-        parts.append(f"{len(plotted.rows)} of them drawn, the front first")
+        parts.append(f"{format_number(len(plotted.rows))} of them drawn, the front first")
     if plotted is not None and plotted.lacking[0]:
         lacking, names = plotted.lacking
         lacks = escape(" or ".join(map(label_of, names)))
-        parts.append(f"<b>{lacking}</b> without a line, which lack {lacks}")
+        parts.append(f"<b>{format_number(lacking)}</b> without a line, which lack {lacks}")
     if count and plotted is None:
         parts.append("nothing to draw yet: the designs so far differ in fewer than two values")
     summary = _summary(study)
@@ -96,12 +96,16 @@ def failures(drawing: StudyDrawing) -> str:
     listed = [_reason(*counted) for counted in drawing.reasons[:MOST_REASONS]]
     rest = drawing.reasons[MOST_REASONS:]
     if rest:
-        listed.append(f"{sum(count for *_, count in rest)} for {len(rest)} other reasons")
-    return f'<div class="ex-beyond ex-small">{failed} not done: {escape("; ".join(listed))}</div>'
+        others = format_number(sum(count for *_, count in rest))
+        listed.append(f"{others} for {len(rest)} other reasons")
+    return (
+        f'<div class="ex-beyond ex-small">{format_number(failed)} not done: '
+        f"{escape('; '.join(listed))}</div>"
+    )
 
 
 def _reason(status: str, reason: str, count: int) -> str:
-    return f"{count} {status}{f' ({reason})' if reason else ''}"
+    return f"{format_number(count)} {status}{f' ({reason})' if reason else ''}"
 
 
 def run_words(run: Run) -> str:
@@ -110,7 +114,7 @@ def run_words(run: Run) -> str:
     if progress is None:
         words = "the process is starting …"
     else:
-        words = f"<b>{progress.done}</b> of {progress.total} designs"
+        words = f"<b>{format_number(progress.done)}</b> of {format_number(progress.total)} designs"
         if progress.rate > 0.0:
             words += f" · {format_number(progress.rate, 3)} a second"
         if left := progress.seconds_left:
@@ -131,9 +135,10 @@ def head(drawing: StudyDrawing | None, run: Run | None, plan: StudyPlan | None, 
     if run is not None:
         parts.append(f"<div>{run_words(run)}</div>{meter(100.0 * run.share)}")
     if plan is not None:
+        count, percent = format_number(plan.count), format_number(plan.percent)
         parts.append(
-            f"A new study: <b>{plan.count}</b> designs around <b>{escape(design)}</b>, the live "
-            f"design, with variables within ± {plan.percent:g} % of its values."
+            f"A new study: <b>{count}</b> designs around <b>{escape(design)}</b>, the live "
+            f"design, with variables within ± {percent} % of its values."
         )
     elif drawing is not None:
         is_running = run is not None and run.name == drawing.request.studies.name
@@ -235,7 +240,9 @@ def table(drawing: StudyDrawing) -> str:
     decimals = {name: _decimals(results.columns[name][drawing.front]) for name in names}
     lines = "".join(_line(drawing, int(row), decimals) for row in rows.tolist())
     count, inside = len(drawing.front), len(drawing.front_inside)
-    among = f"{inside} of {count}" if inside < count else str(count)
+    among = format_number(count)
+    if inside < count:
+        among = f"{format_number(inside)} of {among}"
     caption = f"Pareto front: {among}, from the best in {label_of(study.objectives[0].measure)}"
     return (
         f'<div class="ex-box ex-front" style="--columns:{len(names)}">'

@@ -1,1 +1,1 @@
-"""The visible parts of the mechanism."""
+"""The form and the visible parts of the mechanism, and the views of the camera."""

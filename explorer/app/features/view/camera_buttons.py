@@ -18,12 +18,12 @@ HINTS = {
     "Isometric": "Look at the mechanism from a corner.",
     FIT: "Show the whole mechanism from where you look.",
 }
-CAMERA_KEYS = {
-    "View › Isometric": (Key("0"),),
-    "View › Front": (Key("1"),),
-    "View › Side": (Key("3"),),
-    "View › Top": (Key("7"),),
-    "View › Fit": (Key("F"),),
+KEYS = {
+    "Isometric": (Key("0"),),
+    "Front": (Key("1"),),
+    "Side": (Key("3"),),
+    "Top": (Key("7"),),
+    FIT: (Key("F"),),
 }
 
 
@@ -34,19 +34,19 @@ class CameraButtons:
         self._cameras = services.cameras
         services.buttons.on(PRESS, self._point, values=HINTS)
         for label, hint in HINTS.items():
-            services.buttons.offer(f"View › {label}", hint, PRESS, label)
+            services.buttons.offer(f"View › {label}", hint, PRESS, label, keys=KEYS[label])
         self._markup = "".join(
             press_button(
                 PRESS,
                 label,
                 label,
-                hint=with_keys(hint, CAMERA_KEYS[f"View › {label}"]),
+                hint=with_keys(hint, KEYS[label]),
                 class_name="ex-tool",
             )
             for label, hint in HINTS.items()
         )
 
-    def markup(self, _: Frame) -> str:
+    def __call__(self, _: Frame) -> str:
         """Return the buttons as HTML."""
         return f'<span class="ex-views">{self._markup}</span>'
 

@@ -1,11 +1,11 @@
-"""The visible parts of the mechanism."""
+"""The form and the visible parts of the mechanism, and the views of the camera."""
 
 from __future__ import annotations
 
 import viser
 
 from explorer.app.features.feature import Feature, InBar, StateCommand, Tab
-from explorer.app.features.view.camera_buttons import CAMERA_KEYS, CameraButtons
+from explorer.app.features.view.camera_buttons import CameraButtons
 from explorer.app.features.view.panel import ViewPanel
 from explorer.app.state.action import Action
 from explorer.app.state.actions import Set
@@ -27,18 +27,16 @@ VIEW = Feature(
             "Show › All tetrahedra",
             "Show or hide the three tetrahedra that are flat where the mechanism is singular.",
             _toggle_tetrahedra,
+            keys=(Key("T"),),
         ),
     ),
     keys={
-        **CAMERA_KEYS,
         "Show › Flags": (shift("F"),),
         "Show › Bodies": (Key("B"),),
         "Show › Legs": (shift("B"),),
         "Show › Labels": (Key("L"),),
         "Show › Grid": (Key("G"),),
         "Show › Drag handle": (shift("H"),),
-        "Show › All tetrahedra": (Key("T"),),
-        "Show › 6-4 twin": (shift("T"),),
         "Show › Closest pair": (shift("C"),),
     },
 )

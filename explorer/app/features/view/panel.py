@@ -2,32 +2,57 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from explorer.app.features.feature import Services
+from explorer.app.session.session import Session
+from explorer.app.state.actions import draw_as
 from explorer.app.state.frame import Frame
+from explorer.app.state.state import State
+from explorer.app.state.view import DrawnAs
 from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.buttons import Buttons
+from explorer.app.widgets.chips import Chip, Chips, Effect
+from explorer.app.widgets.commands import Key, shift
 from explorer.app.widgets.controls import Controls
+from explorer.app.widgets.markup import box
 from explorer.mechanism.margins import TETRAHEDRA
 
-SWITCHES = (
+FORMS: Mapping[DrawnAs, tuple[str, tuple[Key, ...]]] = {
+    "schematic": ("Legs and plates as simple bodies.", ()),
+    "prototype": ("Parts that can be made; the tab Prototype lists them.", (Key("R"),)),
+    "6-4 twin": (
+        "Six legs: the same motion, with two legs from a1 and a2 in place of each carriage.",
+        (shift("T"),),
+    ),
+}
+"""Hint and keys of each form of the mechanism."""
+
+LAYERS = (
     ("flags", "Flags", "Point, line and plane of base and platform, coloured by proximity."),
     ("bodies", "Bodies", "The plates of base and platform."),
     ("legs", "Legs", "Actuators, joints, carriages and guide."),
     ("labels", "Labels", "The names a1 … b4 of the attachment points."),
     ("handle", "Drag handle", "Arrows and arcs on the platform that move it when dragged."),
     ("grid", "Grid", "The ground grid; its cells are round numbers of design units."),
+    (
+        "clearance",
+        "Closest pair",
+        "Mark the two legs that are closest to each other, and their clearance.",
+    ),
 )
 
 
 class ViewPanel:
-    """A switch for each part of the scene."""
+    """The form of the mechanism, and a switch for each layer of the scene."""
 
     def __init__(self, services: Services) -> None:
         gui = services.gui
+        self._forms = form_chips(services.buttons, services.session)
+        self._form_row = gui.add_html("")
         self._controls = controls = Controls(gui, services.session)
-        with gui.add_folder("Show"):
-            for name, label, hint in SWITCHES:
+        with gui.add_folder("Layers"):
+            for name, label, hint in LAYERS:
                 controls.checkbox(label, hint, f"view.{name}")
         with gui.add_folder("Tetrahedra"):
             for index, points in enumerate(TETRAHEDRA):
@@ -36,19 +61,28 @@ class ViewPanel:
                     f"The tetrahedron that is flat where δ{index + 1} is zero.",
                     f"view.tetrahedra.{index}",
                 )
-        with gui.add_folder("Legs"):
-            controls.checkbox(
-                "6-4 twin",
-                "Draw the equivalent manipulator with six legs: the same motion, and two legs "
-                "from a1 and a2 in place of each carriage.",
-                "view.twin",
-            )
-            controls.checkbox(
-                "Closest pair",
-                "Mark the two legs that are closest to each other, and their clearance.",
-                "view.clearance",
-            )
 
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that make the panel show the frame."""
+        yield self._form_row, "content", box(self._forms.html(frame.state))
         yield from self._controls.updates(frame)
+
+
+def form_chips(buttons: Buttons, session: Session) -> Chips:
+    """Return the options of what the mechanism is drawn as; a press on one again goes back."""
+
+    def chip(form: DrawnAs) -> Chip:
+        hint, keys = FORMS[form]
+
+        def is_on(state: State) -> bool:
+            return state.view.drawn_as == form
+
+        return Chip(
+            form.capitalize(),
+            f"Show › Drawn as › {form}",
+            hint,
+            Effect(lambda state: draw_as("schematic" if is_on(state) else form), is_on),
+            keys=keys,
+        )
+
+    return Chips(buttons, session, "view.form", "Drawn as", {form: chip(form) for form in FORMS})

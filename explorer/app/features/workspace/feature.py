@@ -9,7 +9,7 @@ import viser
 from explorer.app.features.feature import Export, Feature, InBar, Services, Tab
 from explorer.app.features.workspace.feed import WorkspaceFeed
 from explorer.app.features.workspace.files import FORMATS, Exported, WorkspaceFiles
-from explorer.app.features.workspace.panel import KEYS, WorkspacePanel
+from explorer.app.features.workspace.panel import WorkspacePanel
 from explorer.app.features.workspace.scene import WorkspaceScene
 from explorer.app.features.workspace.tasks import STEP, draw_workspace
 from explorer.app.features.workspace.volume import VolumeFeed, measure_volume
@@ -51,6 +51,5 @@ WORKSPACE = Feature(
     # A volume takes a tenth of the time of a drawing, and is requested before it.
     feeds=(VolumeFeed, WorkspaceFeed),
     tasks=(measure_volume, draw_workspace),
-    keys=KEYS,
     lists=("Region", "Orientation", "Colour by"),
 )

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from explorer.app.features.workspace.reached import Rows, rows_of
 from explorer.app.state.frame import Frame
+from explorer.mechanism.design import Design
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray
+
+# Rotations whose entries differ by less are the same.
+SAME = 1e-9
 
 
 def workspace_pose(frame: Frame) -> Pose:
@@ -14,6 +20,17 @@ def workspace_pose(frame: Frame) -> Pose:
     state = frame.state
     is_home = state.view.workspace.orientation == "home"
     return home_pose(state.design) if is_home else state.pose
+
+
+def orientation_word(frame: Frame) -> str:
+    """Return which orientation the workspace has: "present" or "home"."""
+    return "home" if frame.state.view.workspace.orientation == "home" else "present"
+
+
+def turned_suffix(design: Design, rotation: Rows) -> str:
+    """Return what follows the names of a workspace's measures; "" in the orientation of home."""
+    is_home = np.allclose(rotation, home_pose(design).rotation, atol=SAME)
+    return "" if is_home else ", turned"
 
 
 def workspace_rotation(frame: Frame) -> FloatArray:

@@ -33,12 +33,14 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.state.view import WorkspaceView
 from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.bindings import At, Bound
 from explorer.app.widgets.buttons import Buttons
-from explorer.app.widgets.chips import Chip, Chips
+from explorer.app.widgets.chips import Chip, Chips, Effect, turn
 from explorer.app.widgets.commands import Key, shift
-from explorer.app.widgets.controls import At, Bound, Controls, Span
+from explorer.app.widgets.controls import Controls
 from explorer.app.widgets.markup import alert, box, sentence
 from explorer.app.widgets.ranges import coordinate_span, fine_step, round_up
+from explorer.app.widgets.tracks import Span
 from explorer.app.widgets.under_way import UnderWay
 from explorer.mechanism.pose import Pose, Triple
 
@@ -209,7 +211,7 @@ class WorkspacePanel:
             if trouble.nearest is not None:
                 self._nearest_start = Pose.of(trouble.nearest, drawing.request.rotation)
             which = "home" if drawing.request.start is None else "present"
-            title = f"The {which} position is no start"
+            title = f"Nothing is accessible from the {which} position"
             yield self._trouble, "content", alert(title, sentence(trouble.reason))
         yield self._go, "visible", self._nearest_start is not None
 
@@ -221,8 +223,7 @@ class WorkspacePanel:
         """Move b4 to a position that a page sent, in the orientation of the map."""
         position: Triple | None = decode_text(text, _POSITION)
         if position is not None:
-            self._session.post(
-                object(),
+            self._session.do(
                 lambda state: SetPose(Pose(position, workspace_pose(Frame(state)).quaternion)),
                 who=client.client_id,
             )
@@ -232,19 +233,8 @@ def shown_chips(buttons: Buttons, session: Session) -> Chips:
     """Return the switches of what is shown."""
 
     def chip(name: str, words: str, hint: str) -> Chip:
-        path, command = f"view.workspace.{name}", f"Workspace › {words}"
-
-        def is_on(state: State) -> bool:
-            return bool(getattr(state.view.workspace, name))
-
-        return Chip(
-            words,
-            command,
-            hint,
-            lambda state: Set(path, not is_on(state), words),
-            is_on,
-            keys=KEYS[command],
-        )
+        command = f"Workspace › {words}"
+        return Chip(words, command, hint, turn(f"view.workspace.{name}", words), keys=KEYS[command])
 
     chips = {name: chip(name, words, hint) for name, (words, hint) in SHOWN.items()}
     return Chips(buttons, session, "workspace.show", "Show", chips)
@@ -266,8 +256,10 @@ def cut_chips(buttons: Buttons, session: Session) -> Chips:
             words,
             command,
             hint,
-            lambda state: _set_cut(state.view.workspace, axis, option),
-            lambda state: state.view.workspace.cut == axis,
+            Effect(
+                lambda state: _set_cut(state.view.workspace, axis, option),
+                lambda state: state.view.workspace.cut == axis,
+            ),
             keys=KEYS[command],
         )
 
@@ -276,10 +268,7 @@ def cut_chips(buttons: Buttons, session: Session) -> Chips:
         "other side",
         "Workspace › Cut open › other side",
         "Keep the other side of the cut.",
-        lambda state: Set(
-            "view.workspace.flipped", not state.view.workspace.flipped, "Other side of the cut"
-        ),
-        lambda state: state.view.workspace.flipped,
+        turn("view.workspace.flipped", "Other side of the cut"),
         lambda state: state.view.workspace.cut is not None,
     )
     return Chips(buttons, session, "workspace.cut", "Cut", chips)

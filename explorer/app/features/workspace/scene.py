@@ -37,6 +37,8 @@ CUT_OPACITY = 0.96
 PLANE_OPACITY = 0.12
 HULL_COLOUR: Rgb = (90, 100, 116)
 HULL_OPACITY = 0.3
+# Corners of a square about its centre, in order.
+CORNERS = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
 
 
 class WorkspaceScene(ScenePart):
@@ -174,9 +176,6 @@ class _SingularPlane:
         ]
         length = float(np.linalg.norm(normal))
         return normal / length if length > 1e-9 else None
-
-
-CORNERS = ((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
 
 
 def _opacity(colour: Rgb, *, is_cut: bool) -> float:

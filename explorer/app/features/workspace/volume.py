@@ -70,8 +70,13 @@ class VolumeFeed(Feed[VolumeRequest, MeasuredVolume]):
     def text(self) -> VolumeText:
         """The newest volume in words."""
         drawing = self.drawing
-        words = "–" if drawing is None else f"{format_number(drawing.measured.volume, 6)} units³"
-        return VolumeText(words, self.is_current)
+        return VolumeText("–" if drawing is None else volume_text(drawing), self.is_current)
+
+
+def volume_text(drawing: MeasuredVolume) -> str:
+    """Return a volume with its unit."""
+    size = drawing.request.design.reach**3
+    return f"{format_number(drawing.measured.volume, 6, size=size)} units³"
 
 
 def measure_volume(request: VolumeRequest) -> MeasuredVolume:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from explorer.app.features.feature import Services
+from explorer.app.features.workspace.orientation import orientation_word, turned_suffix
 from explorer.app.features.workspace.volume import VolumeFeed
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.buttons import figure
@@ -14,10 +15,13 @@ class VolumeFigure:
     def __init__(self, services: Services) -> None:
         self._feed = services.get(VolumeFeed)
 
-    def markup(self, frame: Frame) -> str:
+    def __call__(self, frame: Frame) -> str:
         """Return the figure for a frame, as HTML."""
-        text = self._feed.text
-        which = "present" if frame.state.view.workspace.orientation == "pose" else "home"
+        text, drawing = self._feed.text, self._feed.drawing
+        name = "Volume"
+        if drawing is not None:
+            name += turned_suffix(drawing.request.design, drawing.request.rotation)
+        which = orientation_word(frame)
         hint = f"Exact volume of the workspace within the limits, in the {which} orientation."
         look = "" if text.is_current else "is-outdated"
-        return figure("Workspace", "Volume", text.words, hint=hint, look=look)
+        return figure("Workspace", name, text.words, hint=hint, look=look)

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 
 from explorer.app.features.workspace.feed import WorkspaceFeed
+from explorer.app.features.workspace.orientation import orientation_word, turned_suffix
 from explorer.app.features.workspace.reached import Reached
 from explorer.app.features.workspace.tasks import WorkspaceDrawing
-from explorer.app.features.workspace.volume import MeasuredVolume, VolumeFeed
+from explorer.app.features.workspace.volume import MeasuredVolume, VolumeFeed, volume_text
 from explorer.app.scene.bands import COLLIDING, PLAIN
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.colours import css
@@ -77,10 +78,9 @@ def _volume(newest: MeasuredVolume, frame: Frame) -> str:
     if measured.volume <= 0.0:
         causes = ", ".join(measured.empty_because)
         return alert("The workspace is empty", f"Emptied by: {causes}.")
-    which = "present" if frame.state.view.workspace.orientation == "pose" else "home"
-    volume = format_number(measured.volume, 6)
+    which = orientation_word(frame)
     return (
-        f'<div class="ex-line"><span class="ex-large">{volume} units³</span>'
+        f'<div class="ex-line"><span class="ex-large">{volume_text(newest)}</span>'
         f"{dim(f'± {format_number(measured.error, 1)}')}</div>"
         + caption(
             f"{_litres(measured.volume, unit_mm)} within the limits, in the {which} orientation"
@@ -122,20 +122,23 @@ def workspace_details(frame: Frame, feed: WorkspaceFeed) -> str:
 def _numbers(drawing: WorkspaceDrawing) -> str:
     """Return the table of nodes, extent and volumes."""
     rows: list[tuple[str, str, str]] = []
-    nodes, reached = drawing.nodes, drawing.reached
+    nodes, reached, request = drawing.nodes, drawing.reached, drawing.request
     if nodes is not None:
-        count, volume = f"{nodes.count:,}", nodes.volume
+        count, volume = format_number(nodes.count), nodes.volume
         hint = "The paper's measure: grid nodes within the limits"
         volume_hint = "Nodes times step³; it overstates the volume"
+        names = "Nodes", "Node volume"
         if reached is not None and reached.node_count is not None:
-            count, volume = f"{reached.node_count:,} of {count}", reached.node_count * nodes.step**3
+            count = f"{format_number(reached.node_count)} of {count}"
+            volume = reached.node_count * nodes.step**3
             hint = "Nodes that collision-free steps of the grid lead to, of all within the limits"
             volume_hint = "Accessible nodes times step³, the paper's measure"
+            names = "Accessible nodes", "Accessible node volume"
         elif reached is not None:
             hint += "; too many to check each step between them"
         rows += [
-            ("Nodes", count, hint),
-            ("Node volume", format_number(volume, 6), volume_hint),
+            (names[0], count, hint),
+            (names[1], format_number(volume, 6), volume_hint),
             ("Node step", format_number(nodes.step, 4), "Step of the grid, in design units"),
         ]
     if drawing.extent is not None:
@@ -156,7 +159,8 @@ def _numbers(drawing: WorkspaceDrawing) -> str:
                 "Volume of the drawn solid, against the exact one",
             )
         )
-    return table(row(dim(name), value, hint=hint) for name, value, hint in rows)
+    suffix = turned_suffix(request.design, request.rotation)
+    return table(row(dim(name + suffix), value, hint=hint) for name, value, hint in rows)
 
 
 def deviation_text(deviation: float) -> str:
@@ -166,7 +170,7 @@ def deviation_text(deviation: float) -> str:
     return (
         f"off by {format_number(percent, 2)} %"
         if bound is None
-        else f"off by less than {bound:g} %"
+        else f"off by less than {format_number(bound)} %"
     )
 
 

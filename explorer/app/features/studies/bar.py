@@ -6,6 +6,7 @@ from explorer.app.features.feature import Services
 from explorer.app.features.studies.runner import study_runner
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.buttons import press_button, running
+from explorer.numerics.number_text import format_number
 
 
 class StudyChip:
@@ -14,7 +15,7 @@ class StudyChip:
     def __init__(self, services: Services) -> None:
         self._runner = services.get(study_runner)
 
-    def markup(self, _: Frame) -> str:
+    def __call__(self, _: Frame) -> str:
         """Return the chip, as HTML; "" while no study is computed."""
         run = self._runner.run
         if run is None:
@@ -28,4 +29,4 @@ class StudyChip:
             is_disabled=run.is_cancelled,
         )
         done = 0 if run.progress is None else run.progress.done
-        return running("Studies", run.name, f"{done} designs", run.share, cancel)
+        return running("Studies", run.name, f"{format_number(done)} designs", run.share, cancel)

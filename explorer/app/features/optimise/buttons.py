@@ -9,8 +9,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 
-import viser
-
 from explorer.app.features.designs.files import DesignFile
 from explorer.app.features.feature import Services
 from explorer.app.features.optimise.actions import (
@@ -27,7 +25,7 @@ from explorer.app.features.workspace.files import WorkspaceFiles
 from explorer.app.session.session import Who
 from explorer.app.state.action import Action
 from explorer.app.state.state import State
-from explorer.app.widgets.buttons import press_button
+from explorer.app.widgets.buttons import Does, press_button
 from explorer.app.widgets.commands import Key, shift, with_keys
 from explorer.optimise.record import encode_record
 
@@ -38,8 +36,8 @@ HULL, DESIGN, RECORD = "optimise.hull", "optimise.design", "optimise.record"
 
 
 @dataclass(frozen=True)
-class Press:
-    """A button.
+class Button:
+    """A button of the optimiser.
 
     Attributes:
         label: Words on the button, and its name in the palette.
@@ -80,63 +78,63 @@ def _lift(state: State, value: str) -> Action:
     return LiftLimit(value or next(iter(liftable(state)), ""))
 
 
-PRESSES: Mapping[str, Press] = {
-    START: Press(
+BUTTONS: Mapping[str, Button] = {
+    START: Button(
         "Optimise",
         "Search for the best design from the present one; its limits hold throughout.",
         lambda state: _is_idle(state) and not refuted(state),
         lambda _, __: StartRun(),
         (Key("O"),),
     ),
-    CANCEL: Press(
+    CANCEL: Button(
         "Cancel",
         "End the search, and keep the best so far.",
         _is_running,
         lambda _, __: CancelRun(),
         (shift("O"),),
     ),
-    ACCEPT: Press("Accept", "Keep the new design.", _is_undecided, lambda _, __: Accept()),
-    REVERT: Press(
+    ACCEPT: Button("Accept", "Keep the new design.", _is_undecided, lambda _, __: Accept()),
+    REVERT: Button(
         "Revert",
         "Return to your own design in its pose.",
         _is_undecided,
         lambda _, __: Revert(),
     ),
-    PAPER: Press(
+    PAPER: Button(
         "The paper's problem",
         "Open the paper's initial design within the box of its optimum, and ask for its volume of "
         "8000 with a clearance of 0.2; one undo brings your design back.",
         _is_idle,
         lambda _, __: TakePaperProblem(),
     ),
-    PAPER_BOX: Press(
+    PAPER_BOX: Button(
         "Take the paper's box",
         "Bound b4 by the box of the paper's optimum; one undo brings yours back.",
         lambda state: box_on_offer(state) is not None,
         lambda _, __: TakePaperBox(),
     ),
-    LIFT: Press(
+    LIFT: Button(
         "Lift the limit",
         "Take the limit that prevents the search out of the design; one undo brings it back.",
         lambda state: bool(liftable(state)),
         _lift,
     ),
-    HULL: Press(
+    HULL: Button(
         "Download the hull",
         "Download the convex hull of the workspace as 3MF; Export has other formats.",
         _has_result,
     ),
-    DESIGN: Press(
+    DESIGN: Button(
         "Download the design", "Download the design as a file to open again.", _has_result
     ),
-    RECORD: Press(
+    RECORD: Button(
         "Download the record", "Download the record to repeat the search from.", _has_result
     ),
 }
 """The buttons by their names."""
 
 
-class OptimisePresses:
+class OptimiseButtons:
     """Registers the buttons of the optimiser, and offers them in the palette."""
 
     def __init__(self, services: Services) -> None:
@@ -148,29 +146,24 @@ class OptimisePresses:
             DESIGN: services.get(DesignFile).send,
             RECORD: self._send_record,
         }
-        for name, press in PRESSES.items():
-            services.buttons.on(name, self._handler(name, press))
+        for name, each in BUTTONS.items():
+            handler = self._send(name) if each.action is None else self._do(each.action)
+            services.buttons.on(name, handler)
             services.buttons.offer(
-                f"Optimise › {press.label}",
-                press.hint,
+                f"Optimise › {each.label}",
+                each.hint,
                 name,
-                is_ready=lambda press=press: press.is_ready(self._session.state),
+                is_ready=lambda each=each: each.is_ready(self._session.state),
+                keys=each.keys,
             )
 
-    def _handler(self, name: str, press: Press) -> Callable[[str, viser.ClientHandle], None]:
-        action = press.action
+    def _send(self, name: str) -> Does:
+        return lambda _, client: self._sends[name](client.client_id)
 
-        def send(_: str, client: viser.ClientHandle) -> None:
-            self._sends[name](client.client_id)
-
-        def do(value: str, client: viser.ClientHandle) -> None:
-            if action is not None:
-                change = action
-                self._session.post(
-                    object(), lambda state: change(state, value), who=client.client_id
-                )
-
-        return send if name in self._sends else do
+    def _do(self, action: Callable[[State, str], Action]) -> Does:
+        return lambda value, client: self._session.do(
+            lambda state: action(state, value), who=client.client_id
+        )
 
     def _send_record(self, who: Who) -> None:
         state = self._session.state
@@ -193,19 +186,19 @@ def button(
     """Return a button as HTML, disabled where it cannot be pressed.
 
     Args:
-        name: Name of the button, out of `PRESSES`.
+        name: Name of the button, out of `BUTTONS`.
         state: The present state.
         words: Words on the button; its label if "".
         value: Value that its handler receives.
         hint: Sentence on what a press does; that of the button if "".
         is_main: Whether it is the filled one of several.
     """
-    press = PRESSES[name]
+    declared = BUTTONS[name]
     return press_button(
         name,
         value,
-        words or press.label,
-        hint=with_keys(hint or press.hint, press.keys),
+        words or declared.label,
+        hint=with_keys(hint or declared.hint, declared.keys),
         class_name="ex-button is-main" if is_main else "ex-button",
-        is_disabled=not press.is_ready(state),
+        is_disabled=not declared.is_ready(state),
     )

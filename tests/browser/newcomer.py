@@ -1,0 +1,212 @@
+"""A newcomer at the page, who finds everything by its role and its words and counts presses."""
+
+from __future__ import annotations
+
+import colorsys
+import re
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Literal
+
+from likeness import decoded
+from playwright.sync_api import Locator, Page, expect
+from tab import Tab
+
+Words = str | re.Pattern[str]
+Role = Literal["button", "checkbox", "tab"]
+
+# Words of those buttons that are lighter than what they are filled with, in one look: the page
+# draws buttons anew.
+FILLED = """() => [...document.querySelectorAll("button:enabled")].filter((button) => {
+    const { color, backgroundColor } = getComputedStyle(button);
+    const parts = (each) => each.match(/[\\d.]+/g).map(Number);
+    const [words, fill] = [parts(color), parts(backgroundColor)];
+    const light = ([r, g, b]) => 0.3 * r + 0.6 * g + 0.1 * b;
+    return button.checkVisibility() && (fill[3] ?? 1) === 1 && light(words) > light(fill);
+}).map((button) => button.innerText.trim())"""
+# Scroll to something; return whether it is then within the window.
+SCROLL = """it => {
+    it.scrollIntoView({ block: "nearest" });
+    const { top, bottom } = it.getBoundingClientRect();
+    return it.isConnected && top >= 0 && bottom <= innerHeight;
+}"""
+PLOTS = """() => {
+    const plots = [...document.querySelectorAll(".js-plotly-plot")];
+    return plots.length === 2 && plots.every((plot) => plot.explorerListens);
+}"""
+COLOUR = "it => getComputedStyle(it).color.match(/[\\d.]+/g)?.slice(0, 3).map(Number)"
+
+
+class Newcomer:
+    """Somebody who uses the page for the first time.
+
+    Args:
+        tab: The tab at which they sit.
+
+    Attributes:
+        page: Its page.
+        presses: Number of clicks, drags and keys so far, without those that type a value.
+    """
+
+    def __init__(self, tab: Tab) -> None:
+        self._tab = tab
+        self.page: Page = tab.page
+        self.presses = 0
+
+    def button(self, words: Words) -> Locator:
+        """Return the first button with these words; what runs has its buttons in the bar too."""
+        return self.page.get_by_role("button", name=words, exact=True).first
+
+    def press(self, words: Words, role: Role = "button") -> None:
+        """Press a button, a checkbox or a tab."""
+        self.presses += 1
+        self.page.get_by_role(role, name=words, exact=True).first.click()
+
+    def press_running(self, words: str) -> None:
+        """Press a button that is drawn anew again and again, where it stands."""
+        button = self.button(words)
+        expect(button).to_be_in_viewport(ratio=1.0)
+        self.press_at(*middle(button))
+
+    def press_at(self, x: float, y: float) -> None:
+        """Press a point of the page."""
+        self.presses += 1
+        self.page.mouse.click(x, y)
+
+    def open(self, title: str) -> None:
+        """Press a tab of the panels."""
+        self.press(title, "tab")
+        tab = self.page.get_by_role("tab", name=title, exact=True)
+        expect(tab).to_have_attribute("aria-selected", "true")
+
+    def key(self, key: str) -> None:
+        """Press a key that types no value."""
+        self.presses += 1
+        self.page.keyboard.press(key)
+
+    def field(self, words: str) -> Locator:
+        """Return the field with these words beside it."""
+        return self.page.get_by_role("textbox", name=words, exact=True).first
+
+    def type(self, words: str, text: str) -> None:
+        """Press a field, replace what is in it, and press Enter."""
+        self.presses += 2
+        self.field(words).click()
+        self.page.keyboard.press("ControlOrMeta+a")
+        self.page.keyboard.type(text)
+        self.page.keyboard.press("Enter")
+
+    def choose(self, words: str, option: str) -> None:
+        """Open a list and press an option."""
+        self.presses += 2
+        self.page.get_by_role("combobox", name=words, exact=True).click()
+        self.page.get_by_role("option", name=option, exact=True).click()
+
+    def drag(self, start: tuple[float, float], end: tuple[float, float]) -> None:
+        """Press at a point of the page, and release at another."""
+        self.presses += 1
+        mouse = self.page.mouse
+        mouse.move(*start)
+        mouse.down()
+        mouse.move(*end, steps=5)
+        mouse.up()
+
+    def drag_slider(self, words: str, pixels: float) -> None:
+        """Drag the thumb of a slider to the right."""
+        thumb = self.page.get_by_role("slider", name=words, exact=True)
+        thumb.scroll_into_view_if_needed()
+        x, y = middle(thumb)
+        self.drag((x, y), (x + pixels, y))
+
+    def export(self, what: str, file_format: str) -> bytes:
+        """Return the file that the dialog Export gives."""
+        self.press("Export")
+        dialog = self.page.get_by_role("dialog", name="Export")
+        with self.page.expect_download() as download:
+            self.press(f"Export {what} as {file_format}")
+        self.page.keyboard.press("Escape")
+        expect(dialog).to_have_count(0)
+        return Path(download.value.path()).read_bytes()
+
+    def upload(self, file: Path) -> None:
+        """Open a design file in the dialog of designs, which the design's name opens."""
+        self.press(re.compile("^paper-optimal"))
+        with self.page.expect_file_chooser() as chooser:
+            self.press("Open a file …")
+        chooser.value.set_files(file)
+
+    def figure(self, name: str) -> Locator:
+        """Return a figure of the bar, which begins with its name."""
+        return self.button(re.compile(f"^{name} "))
+
+    def sees(self, words: Words) -> Locator:
+        """Wait until words are in sight, scrolling to them as a wheel does; return where."""
+        text = self.page.get_by_text(words).filter(visible=True).first
+        # Words that change are other ones each time.
+        self._tab.wait_for(lambda: bool(text.evaluate(SCROLL)), f"{words} in sight")
+        return text
+
+    def filled(self) -> list[str]:
+        """Return the words of the buttons in sight that are filled."""
+        return sorted(set(self.page.evaluate(FILLED)))
+
+    def wait_for_field(self, words: str, value: float) -> None:
+        """Wait until a field holds a number."""
+        field = self.field(words)
+        self._tab.wait_for(lambda: float(field.input_value()) == value, f"{words} at {value}")
+
+    def wait_for_numbers(
+        self, where: Locator, values: Sequence[float], tolerance: float = 0.006
+    ) -> None:
+        """Wait until numbers are among those in the words of something."""
+
+        def are_there() -> bool:
+            found = numbers(where.inner_text())
+            return all(any(abs(each - value) <= tolerance for each in found) for value in values)
+
+        self._tab.wait_for(are_there, f"{values} in sight")
+
+    def wait_for_plots(self) -> None:
+        """Wait until both plots of a study are drawn and notice what is done to them."""
+        self._tab.wait_for(lambda: bool(self.page.evaluate(PLOTS)), "plots")
+
+    def lightness(self) -> float:
+        """Return how light the page is on the whole, from 0 to 1."""
+        return float(decoded(self.page.screenshot()).mean())
+
+    def wait_for_lightness(self, condition: Callable[[float], bool]) -> None:
+        """Wait until the page is as light as a condition says."""
+        self._tab.wait_for(lambda: condition(self.lightness()), "another theme")
+
+    def presses_for(self) -> int:
+        """Return how many presses there were since the last count, and begin to count anew."""
+        presses, self.presses = self.presses, 0
+        return presses
+
+    def reload(self) -> None:
+        """Load the page again."""
+        self.presses += 1
+        self._tab.reload()
+
+
+def middle(it: Locator) -> tuple[float, float]:
+    """Return the middle of something on the page."""
+    # There is none of what is drawn anew at this moment.
+    while (box := it.bounding_box()) is None:
+        pass
+    return box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"]
+
+
+def hue(it: Locator) -> float:
+    """Return the hue of words in degrees: red is 0, amber 40, green 120."""
+    # What is drawn anew at this moment has none.
+    while (colour := it.evaluate(COLOUR)) is None:
+        pass
+    red, green, blue = colour
+    return 360.0 * colorsys.rgb_to_hls(red / 255.0, green / 255.0, blue / 255.0)[0]
+
+
+def numbers(text: str) -> list[float]:
+    """Return the numbers in words of the page."""
+    plain = re.sub(r"(?<=\d)[,\u2009\u202f](?=\d{3})", "", text.replace("−", "-"))
+    return [float(each) for each in re.findall(r"-?\d+(?:\.\d+)?", plain)]

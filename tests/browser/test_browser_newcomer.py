@@ -1,0 +1,354 @@
+"""Fifteen tasks of a newcomer at the page: what is found by its words, and in how many presses."""
+
+from __future__ import annotations
+
+import io
+import re
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from kept_tab import KeptTab
+from newcomer import Newcomer, hue, middle, numbers
+from playwright.sync_api import Browser, expect
+from tab import Tab
+
+from explorer.app.server import start
+from explorer.app.storage.study_folders import StudyFolders
+from explorer.app.storage.user_data import open_user_data
+from explorer.mechanism.design import Design
+from explorer.mechanism.design_file import PRESETS, decode_design
+from explorer.numerics.number_text import format_number
+from explorer.workspace.slices.volume import workspace_volume
+
+OPTIMAL, INITIAL = PRESETS["paper-optimal"], PRESETS["paper-initial"]
+SIZES = ((1280, 720), (1440, 900))
+# A value of a3x other than that of the paper's optimum, and the design with it.
+A3X = 18.0
+CHANGED = OPTIMAL.with_variables((A3X, *OPTIMAL.variables[1:]))
+READING = re.compile(r"y ([−\d.]+), z ([−\d.]+) units: min \|δ\| ([\d.]+) \(δ(\d)\)")
+# Pixels below the words of an axis at which it is pressed and released.
+BRUSH = (50.0, 80.0)
+
+
+@pytest.fixture(scope="module", params=SIZES, ids=lambda size: "x".join(map(str, size)))
+def kept(
+    request: pytest.FixtureRequest, browser: Browser, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[KeptTab]:
+    """A tab in a window of one of the sizes, of an explorer with a data folder of its own."""
+    home = tmp_path_factory.mktemp("newcomer")
+
+    def opened() -> Tab:
+        studies = StudyFolders(home / "studies")
+        user_data = open_user_data(resume=False)
+        running = start(OPTIMAL, port=0, user_data=user_data, studies=studies)
+        return Tab(browser, running, size=request.param)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("EXPLORER_DATA", str(home))
+        kept = KeptTab(opened)
+        yield kept
+        kept.close()
+
+
+@pytest.fixture
+def newcomer(
+    request: pytest.FixtureRequest, kept: KeptTab, capfd: pytest.CaptureFixture[str]
+) -> Iterator[Newcomer]:
+    """A newcomer at the start page."""
+    with kept.watch(request, capfd) as tabs:
+        tabs.append(kept.begin())
+        yield Newcomer(tabs[0])
+
+
+def volume_of(design: Design) -> str:
+    """Return the volume of a design as the page writes it."""
+    return format_number(workspace_volume(design).volume, 6)
+
+
+def model_in(data: bytes) -> str:
+    """Return the model in a 3MF file."""
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        return archive.read("3D/3dmodel.model").decode()
+
+
+def test_platform_is_moved_by_a_slider_and_by_a_field(newcomer: Newcomer) -> None:
+    x, length = newcomer.field("x"), newcomer.field("l1 leg 1")
+    expect(x).to_have_value("10")
+    before = length.input_value()
+    newcomer.drag_slider("x", 12.0)
+    expect(x).not_to_have_value("10")
+    expect(length).not_to_have_value(before)
+    assert newcomer.presses_for() == 1
+    newcomer.type("z", "7.5")
+    expect(newcomer.field("z")).to_have_value("7.5")
+    expect(newcomer.button("Mode 1, − − +")).to_contain_text("7.50")
+    assert newcomer.presses_for() == 2
+
+
+def test_near_singular_pose_is_told_in_amber_with_its_distance(newcomer: Newcomer) -> None:
+    assert 90.0 < hue(newcomer.sees("Clear of singularities")) < 150.0
+    newcomer.type("z", "0.5")
+    assert 25.0 < hue(newcomer.sees("Near a singularity")) < 50.0
+    told = newcomer.sees(re.compile(r"mm from δ1 = 0, a1 on the platform plane")).inner_text()
+    assert 0.0 < numbers(told)[0] < 1.0
+    nearest = newcomer.figure("Nearest singular pose")
+    expect(nearest).to_contain_text("mm to δ1 = 0")
+    assert numbers(nearest.inner_text())[0] == numbers(told)[0]
+    assert newcomer.presses_for() == 2
+    newcomer.press("Go to δ1 = 0")
+    newcomer.sees(re.compile("^Singular$"))
+    newcomer.sees("Boundary of modes 1 and 5")
+    assert newcomer.presses_for() == 1
+
+
+def test_assembly_mode_is_switched(newcomer: Newcomer) -> None:
+    newcomer.sees("Mode 1 (− − +)")
+    lengths = [newcomer.field(words).input_value() for words in ("l1 leg 1", "d2 leg 2")]
+    newcomer.press("Mode 5, + − +")
+    newcomer.sees("Mode 5 (+ − +)")
+    expect(newcomer.button("Mode 5, + − +")).to_have_attribute("aria-pressed", "true")
+    expect(newcomer.field("roll (°)")).not_to_have_value("0")
+    assert [newcomer.field(words).input_value() for words in ("l1 leg 1", "d2 leg 2")] == lengths
+    assert newcomer.presses_for() <= 3
+
+
+def test_volume_after_a_change_of_the_design_is_in_sight(newcomer: Newcomer) -> None:
+    volume = newcomer.figure("Volume")
+    expect(volume).to_contain_text(volume_of(OPTIMAL))
+    newcomer.open("Design")
+    newcomer.type("a3x", f"{A3X:g}")
+    assert newcomer.presses_for() == 3
+    expect(volume).to_contain_text(volume_of(CHANGED))
+    expect(volume).to_be_in_viewport(ratio=1.0)
+    assert newcomer.presses_for() == 0
+
+
+def test_workspace_is_cut_in_its_middle_and_a_value_is_read(newcomer: Newcomer) -> None:
+    newcomer.open("Workspace")
+    newcomer.press("x")
+    expect(newcomer.field("Cut at")).to_have_value(re.compile(r"^10(\.0+)?$"))
+    chart = newcomer.page.get_by_role("img", name="Map of the slice at x = 10")
+    chart.scroll_into_view_if_needed()
+    newcomer.page.mouse.move(*middle(chart))
+    found = READING.search(newcomer.sees(READING).inner_text())
+    assert found is not None
+    assert float(found[3]) > 0.0
+    assert newcomer.presses_for() <= 3
+    # A press goes where the pointer reads.
+    newcomer.press_at(*middle(chart))
+    for words, value in zip(("y", "z"), (found[1], found[2]), strict=True):
+        newcomer.wait_for_field(words, numbers(value)[0])
+
+
+def test_workspace_and_hull_are_exported(newcomer: Newcomer) -> None:
+    solid = model_in(newcomer.export("Workspace", "3MF"))
+    assert solid.count("<triangle ") > 100
+    assert newcomer.presses_for() <= 3
+    assert newcomer.export("Workspace", "STEP").startswith(b"ISO-10303-21;")
+    assert newcomer.presses_for() <= 3
+    hull = model_in(newcomer.export("Convex hull", "3MF"))
+    assert hull.count("<triangle ") > 100
+    assert hull != solid
+    assert newcomer.presses_for() <= 3
+
+
+def test_papers_problem_is_solved_in_two_presses(newcomer: Newcomer) -> None:
+    newcomer.press("The paper's problem")
+    newcomer.button("Undo The paper's problem").wait_for()
+    expect(newcomer.field("Demanded clearance")).to_have_value("0.2")
+    newcomer.press("Optimise")
+    newcomer.sees(re.compile("^Converged$"))
+    assert newcomer.presses_for() == 2
+    assert newcomer.filled() == ["Accept"]
+    expect(newcomer.button("Accept")).to_be_in_viewport(ratio=1.0)
+    rows = newcomer.page.get_by_role("row")
+    volume = rows.filter(has_text=re.compile("^volume")).inner_text()
+    clearance = rows.filter(has_text=re.compile("^clearance")).inner_text()
+    assert numbers(volume)[1] >= 8000.0
+    assert numbers(clearance)[1] >= 0.2
+    expect(newcomer.figure("Volume")).to_contain_text("8,000 units³")
+    with newcomer.page.expect_download() as hull:
+        newcomer.press("Hull")
+    assert model_in(Path(hull.value.path()).read_bytes()).count("<triangle ") > 100
+    assert newcomer.presses_for() == 1
+    newcomer.press("Accept")
+    newcomer.sees("accepted")
+    expect(newcomer.button("Accept")).to_have_count(0)
+    assert newcomer.presses_for() == 1
+
+
+def test_three_designs_are_compared(newcomer: Newcomer) -> None:
+    newcomer.open("Compare")
+    newcomer.press("Pin paper-initial")
+    newcomer.press("Pin this design")
+    newcomer.open("Design")
+    newcomer.type("a3x", f"{A3X:g}")
+    volumes = [workspace_volume(each).volume for each in (CHANGED, INITIAL, OPTIMAL)]
+    row = newcomer.page.get_by_role("row").filter(has_text=re.compile("^volume units"))
+    newcomer.wait_for_numbers(row, volumes)
+    newcomer.press("Overlay workspaces")
+    overlay = newcomer.button("Overlay workspaces")
+    expect(overlay).to_have_attribute("aria-pressed", "true")
+    assert newcomer.presses_for() == 7
+
+
+def test_path_is_planned_and_played(newcomer: Newcomer, monkeypatch: pytest.MonkeyPatch) -> None:
+    # So long that even a slow browser can stop it on the way.
+    monkeypatch.setattr("explorer.app.state.paths.STRAIGHT_SECONDS", 60.0)
+    newcomer.open("Paths")
+    newcomer.choose("Goal", "Mode 7: + + +")
+    newcomer.press("Go")
+    newcomer.button(re.compile("^Playing ")).wait_for()
+    newcomer.press_running("Pause")
+    newcomer.sees("Singular 2 times")
+    assert 0.0 < float(newcomer.field("Time (s)").input_value()) < 60.0
+    newcomer.button("Play").wait_for()
+    assert newcomer.presses_for() == 5
+    newcomer.press("Home pose")
+    expect(newcomer.field("roll (°)")).to_have_value("0")
+    newcomer.choose("Goal", "Present pose")
+    newcomer.type("Goal x, y, z z", "8")
+    newcomer.press("Without singularity")
+    newcomer.press("Go")
+    newcomer.sees(re.compile("^Planned path of"))
+    newcomer.sees(re.compile("^No singular pose;"))
+    expect(newcomer.field("z")).to_have_value(re.compile(r"^8(\.0+)?$"))
+    assert newcomer.presses_for() == 7
+
+
+def test_prototype_is_shown_and_exported(newcomer: Newcomer) -> None:
+    newcomer.open("Prototype")
+    newcomer.press("Show the parts", "checkbox")
+    newcomer.sees("mass, g")
+    assert newcomer.presses_for() == 2
+    assert model_in(newcomer.export("Mechanism", "3MF")).count("<object ") > 5
+    assert newcomer.presses_for() <= 3
+
+
+def test_study_is_started_brushed_and_a_design_of_it_picked(newcomer: Newcomer) -> None:
+    newcomer.open("Studies")
+    newcomer.type("Number of designs", "32")
+    newcomer.sees(re.compile("A new study: 32 designs"))
+    newcomer.press("Start study")
+    newcomer.sees(re.compile("32 designs · .* on the Pareto front"))
+    newcomer.button("New study").wait_for()
+    assert newcomer.presses_for() == 4
+    newcomer.wait_for_plots()
+    # The words of an axis stand above its middle.
+    x, y = middle(newcomer.sees("volume [u³]"))
+    newcomer.drag((x, y + BRUSH[0]), (x, y + BRUSH[1]))
+    told = numbers(newcomer.sees("within the brushes").inner_text())
+    assert 0.0 < told[-1] < 32.0
+    # It comes with the pointer.
+    newcomer.button("Expand plot").wait_for()
+    row = newcomer.button(re.compile(r"^\d+ [\d,]+ "))
+    name, volume = row.inner_text().split()[:2]
+    newcomer.press(re.compile(f"^{name} "))
+    newcomer.wait_for_numbers(newcomer.figure("Volume"), numbers(volume), tolerance=0.5)
+    newcomer.button(re.compile(f" #{name} not saved$")).wait_for()
+    assert newcomer.presses_for() == 2
+
+
+def test_design_is_saved_renamed_reloaded_and_undone(newcomer: Newcomer) -> None:
+    newcomer.type("x", "12")
+    newcomer.press("paper-optimal preset")
+    newcomer.type("Name", "first try")
+    newcomer.press("Save")
+    newcomer.button("first try saved").wait_for()
+    newcomer.type("Name", "second try")
+    newcomer.press("Rename")
+    newcomer.button("second try saved").wait_for()
+    newcomer.button("second try").wait_for()
+    newcomer.key("Escape")
+    newcomer.reload()
+    newcomer.button("second try saved").wait_for()
+    expect(newcomer.field("x")).to_have_value("12")
+    newcomer.type("x", "13")
+    newcomer.press(re.compile("^Undo x = 13"))
+    expect(newcomer.field("x")).to_have_value("12")
+    newcomer.button("second try saved").wait_for()
+
+
+def test_design_scene_and_report_are_shared(newcomer: Newcomer, tmp_path: Path) -> None:
+    newcomer.open("Design")
+    newcomer.type("a3x", f"{A3X:g}")
+    newcomer.presses_for()
+    scene = newcomer.export("Scene", "HTML")
+    assert newcomer.presses_for() <= 3
+    report = newcomer.export("Report", "HTML")
+    assert newcomer.presses_for() <= 3
+    for page in (scene, report):
+        assert page.lstrip().lower().startswith(b"<!doctype html>")
+        assert b"paper-optimal" in page
+    assert volume_of(CHANGED).encode() in report
+    data = newcomer.export("Design", "JSON")
+    assert newcomer.presses_for() <= 3
+    assert decode_design(data, "shared").variables == CHANGED.variables
+    # Somebody else opens the file.
+    newcomer.press(re.compile("^Undo a3x"))
+    expect(newcomer.figure("Volume")).to_contain_text(volume_of(OPTIMAL))
+    shared = tmp_path / "shared.json"
+    shared.write_bytes(data)
+    newcomer.upload(shared)
+    expect(newcomer.figure("Volume")).to_contain_text(volume_of(CHANGED))
+
+
+def test_theme_palette_and_keys(newcomer: Newcomer) -> None:
+    dialog = newcomer.page.get_by_role("dialog")
+    light = newcomer.lightness()
+    newcomer.press("Theme")
+    newcomer.wait_for_lightness(lambda now: now < 0.5 * light)
+    newcomer.press("Theme")
+    newcomer.wait_for_lightness(lambda now: now > 0.9 * light)
+    assert newcomer.presses_for() == 2
+    newcomer.type("x", "12")
+    newcomer.press(re.compile("^Commands"))
+    newcomer.page.keyboard.type("home pose")
+    newcomer.press(re.compile("^Pose › Home pose"))
+    expect(dialog).to_have_count(0)
+    expect(newcomer.field("x")).to_have_value("10")
+    newcomer.press("Help")
+    newcomer.press("Keys")
+    card = newcomer.page.get_by_role("dialog", name="Keys")
+    expect(card).to_contain_text("Search all commands")
+    newcomer.key("Escape")
+    expect(dialog).to_have_count(0)
+    newcomer.key("k")
+    card.wait_for()
+    newcomer.press_at(20.0, 600.0)
+    expect(dialog).to_have_count(0)
+
+
+def test_mistakes_are_refused_with_a_reason_and_lose_nothing(
+    newcomer: Newcomer, tmp_path: Path
+) -> None:
+    x, volume = newcomer.field("x"), newcomer.figure("Volume")
+    newcomer.type("x", "1e9")
+    newcomer.sees(re.compile("too far to be drawn"))
+    expect(x).to_have_value("10")
+    newcomer.type("x", "ten")
+    expect(x).to_have_value("10")
+    expect(newcomer.button("Undo")).to_be_disabled()
+    # A length that closes nothing stays to be seen, with the reason, until it is undone.
+    newcomer.type("l1 leg 1", "300")
+    newcomer.sees("l1 = 300 cannot close the tetrahedron b1 b2 b3 a1")
+    newcomer.press(re.compile("^Undo"))
+    expect(newcomer.field("l1 leg 1")).to_have_value("11.74")
+    newcomer.open("Design")
+    newcomer.type("1 unit (mm)", "0")
+    newcomer.sees("The unit must be positive; got 0")
+    expect(newcomer.field("1 unit (mm)")).to_have_value("10")
+    newcomer.open("Optimise")
+    newcomer.type("Volume", "99999")
+    newcomer.sees("The box holds at most 12,240 of the 99,999 units³ asked for.")
+    expect(newcomer.button("Lift the box")).to_be_visible()
+    expect(newcomer.button("Optimise")).to_be_disabled()
+    broken = tmp_path / "broken.json"
+    broken.write_text('{"a3": [1, 2]}')
+    newcomer.upload(broken)
+    newcomer.sees("broken.json")
+    newcomer.key("Escape")
+    expect(newcomer.button("paper-optimal preset")).to_be_visible()
+    expect(volume).to_contain_text(volume_of(OPTIMAL))
