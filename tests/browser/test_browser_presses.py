@@ -61,6 +61,8 @@ def test_drag_of_a_slider_that_rests_is_one_step_and_the_next_drag_another(tab: 
         tab.page.wait_for_timeout(REST)
         move(tab, x + 0.08 * width, y)
         tab.page.mouse.up()
+        # The last of the moves may arrive after the release.
+        tab.wait_for(lambda: tab.stands("x", tab.state.pose.position[0]), "the last value")
         assert steps(tab) == drag
     tab.page.keyboard.press("ControlOrMeta+z")
     tab.page.keyboard.press("ControlOrMeta+z")
