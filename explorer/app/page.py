@@ -41,7 +41,7 @@ TITLE = "Flagged 4-4 explorer"
 # Modules that the worker imports at its start.
 TASKS = tuple({task.__module__: None for feature in FEATURES for task in feature.tasks})
 # Scripts of the whole page.
-SCRIPTS = ("fields", "names", "opens")
+SCRIPTS = ("throttles", "fields", "names", "opens")
 # Title of a notice that a request is refused.
 REFUSAL = "That is not possible"
 # Seconds for which a notice is shown, and not repeated.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+import inspect
 import re
 from collections.abc import Iterable
 from dataclasses import replace
@@ -49,7 +51,9 @@ class Desk:
         """Say that an input was used, as a browser does."""
         event = viser.GuiEvent(client=None, client_id=1, target=handle)
         for callback in handle._impl.update_cb:
-            callback(event)
+            outcome = callback(event)
+            if inspect.iscoroutine(outcome):
+                asyncio.run(outcome)
 
     def press(self, buttons: Buttons, name: str, value: object = "") -> None:
         """Press a button in markup."""

@@ -115,6 +115,17 @@ def test_unexpected_fault_is_reported_and_the_session_continues(watched: Watched
     assert watched.session.state.pose.position[0] == 9.0
 
 
+def test_settled_state_has_all_that_was_posted_before(watched: Watched) -> None:
+    settled: list[State] = []
+    with watched.busy():
+        for x in (3.0, 4.0):
+            watched.session.post("x", lambda _, x=x: SetPosition(0, x))
+        reader = threading.Thread(target=lambda: settled.append(watched.session.settled()))
+        reader.start()
+    reader.join()
+    assert settled[0].pose.position[0] == 4.0
+
+
 def test_changes_from_many_threads_are_all_made(watched: Watched) -> None:
     def run(axis: int) -> None:
         for i in range(100):

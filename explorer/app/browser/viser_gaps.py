@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import threading
+import time
 import warnings
 from collections.abc import Callable, Generator
 from typing import Any, cast
@@ -186,6 +187,23 @@ def put_camera(
         connection.queue_message(_messages.SetCameraLookAtMessage(triple(target)))
         # A browser answers this one, whatever its camera did.
         connection.queue_message(_messages.SetCameraFovMessage(field_of_view))
+
+
+def show_value(control: Any, value: object) -> None:
+    """Assign the value of a control, and send it to the browsers.
+
+    viser's own assignment calls the callbacks too, which are for what users do.
+    """
+    from viser import _messages
+
+    state = control._impl
+    value = type(state.value)(value)
+    if state.value == value:
+        return
+    message = _messages.GuiUpdateMessage(state.uuid, {"value": value})
+    state.gui_api._websock_interface.queue_message(message)
+    state.value = value
+    state.update_timestamp = time.time()
 
 
 def resend(handle: Any, name: str) -> None:

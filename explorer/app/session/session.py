@@ -6,6 +6,7 @@ that it is made from the newest state and the newest value of its control.
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -19,6 +20,9 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.presses import Press
 from explorer.app.state.state import State
 from explorer.errors import ExplorerError
+
+# Seconds after which changes that are not made are waited for no more.
+SETTLED_SECONDS = 10.0
 
 Change = Callable[[State], Action]
 Who = int | None
@@ -124,6 +128,21 @@ class Session:
         """Queue a move to the step with a number, in place of one with the same key."""
         move = HistoryMove(lambda history: history.move_to(number))
         self.post(key, move, stamp=stamp, who=who)
+
+    def settled(self) -> State:
+        """Return the state once all changes are made that were posted before.
+
+        A press that reads the state needs this, since it may follow a typed value at once.
+        """
+        made = threading.Event()
+
+        def mark(_: State) -> Action:
+            made.set()
+            return _Nothing()
+
+        self.post(object(), mark)
+        made.wait(SETTLED_SECONDS)
+        return self._state
 
     def is_waiting(self, key: object) -> bool:
         """Whether a change with this key waits."""

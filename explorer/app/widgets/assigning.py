@@ -14,7 +14,7 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from explorer.app.browser.viser_gaps import PLACE, is_stale, place, resend
+from explorer.app.browser.viser_gaps import PLACE, is_stale, place, resend, show_value
 from explorer.numerics.arrays import FloatArray
 
 Update: TypeAlias = tuple[Any, str, object]
@@ -60,6 +60,8 @@ class Assigner:
             for handle, name, value in new:
                 if name in PLACE:
                     place(handle, name, cast("FloatArray", value))
+                elif is_set_by_clients(handle, name):
+                    show_value(handle, value)
                 else:
                     setattr(handle, name, value)
                 if is_set_by_clients(handle, name):

@@ -60,7 +60,9 @@ class Control(Generic[Value]):
         self._is_set_here = False
         handle.on_update(self._post_change)
 
-    def _post_change(self, event: viser.GuiEvent[Any]) -> None:
+    # A coroutine runs on the thread that reads messages, so that changes and presses keep their
+    # order.
+    async def _post_change(self, event: viser.GuiEvent[Any]) -> None:
         # Assignments by the explorer itself have no client.
         if event.client_id is None:
             return

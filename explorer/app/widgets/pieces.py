@@ -6,6 +6,8 @@ The command palette and the tests read them here, so that neither lags behind th
 
 from __future__ import annotations
 
+import asyncio
+import inspect
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -71,7 +73,9 @@ class Widget:
             if not state.is_button:
                 resend(self.handle, "value")
         for callback in tuple(state.update_cb):
-            callback(viser.GuiEvent(client, client.client_id, self.handle))
+            outcome = callback(viser.GuiEvent(client, client.client_id, self.handle))
+            if inspect.iscoroutine(outcome):
+                asyncio.run(outcome)
 
 
 def widgets(server: viser.ViserServer) -> Iterator[Widget]:

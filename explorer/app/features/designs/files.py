@@ -16,5 +16,5 @@ class DesignFile:
 
     def send(self, who: Who) -> None:
         """Send the design as JSON."""
-        design = self._session.state.design
+        design = self._session.settled().design
         self._downloads.send(who, f"{design.name}.json", encode_design(design))

@@ -65,8 +65,8 @@ class DesignsPanel:
             disabled=lambda state: state.optimisation.is_on,
         )
         actions: dict[str, Callable[[Who], None]] = {
-            "Save": lambda who: saved.save(session.state.design, who),
-            "Save a copy": lambda who: saved.save_copy(session.state.design, who),
+            "Save": lambda who: saved.save(session.settled().design, who),
+            "Save a copy": lambda who: saved.save_copy(session.settled().design, who),
             "Rename": self._rename,
             "Download": services.get(DesignFile).send,
         }
@@ -132,7 +132,7 @@ class DesignsPanel:
             yield self.restore, "label", f"Bring back {deleted[0].name}"
 
     def _rename(self, who: Who) -> None:
-        state = self._session.state
+        state = self._session.settled()
         self._saved.rename(state.base.name, state.design.name, who)
 
     def _open(self, row: Row, who: Who) -> None:

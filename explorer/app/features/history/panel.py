@@ -54,7 +54,7 @@ class HistoryPanel:
         self._numbers = tuple(step.number for step in shown)
         yield self._list, "content", list_steps(shown, here)
 
-    def _travel(self, event: viser.GuiEvent[viser.GuiSliderHandle[int]]) -> None:
+    async def _travel(self, event: viser.GuiEvent[viser.GuiSliderHandle[int]]) -> None:
         if event.client_id is not None:
             stamp, number = self._slider.update_timestamp, int(self._slider.value)
             self._session.travel_to(self, number, stamp=stamp, who=event.client_id)

@@ -161,7 +161,7 @@ class DragHandle(ScenePart):
             return NO_POINTS
         return placed.points["b4"] + ARROW_LENGTH * placed.frame.snapshot.rotation.T
 
-    def _move_platform(self, event: viser.TransformControlsEvent) -> None:
+    async def _move_platform(self, event: viser.TransformControlsEvent) -> None:
         if event.client_id is not None:
             self._session.post(
                 "drag",

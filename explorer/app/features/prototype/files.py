@@ -24,13 +24,13 @@ class MechanismFiles:
 
     def assembly(self, name: str, who: Who) -> None:
         """Send the parts in a format, one of `ASSEMBLIES`."""
-        design = self._session.state.design
+        design = self._session.settled().design
         file_format, end = ASSEMBLIES[name]
         self._downloads.compute(who, f"{design.name}-{end}", export_assembly, (design, file_format))
 
     def simulation(self, who: Who) -> None:
         """Send the model, with the density of the prototype."""
-        state = self._session.state
+        state = self._session.settled()
         arguments = (state.design, state.view.prototype.density)
         self._downloads.compute(
             who, f"{state.design.name}-simulation.xml", export_simulation, arguments

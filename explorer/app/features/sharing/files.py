@@ -66,7 +66,7 @@ class SharedFiles:
         """Send the scene as an HTML file with the present camera of the browser."""
 
         def make(client: viser.ClientHandle) -> File:
-            state, date = self._session.state, dt.datetime.now().astimezone().date()
+            state, date = self._session.settled(), dt.datetime.now().astimezone().date()
             data = scene_html(self._services.server, state, FileCamera.of(client), date=date)
             return f"{state.design.name}-scene.html", data
 
@@ -80,7 +80,7 @@ class SharedFiles:
 
     def report(self, file_format: ReportFormat, client_id: Who) -> None:
         """Send the report of the design in its present pose."""
-        state = self._session.state
+        state = self._session.settled()
         self._downloads.compute(
             client_id,
             f"{state.design.name}-report.{file_format}",

@@ -258,7 +258,7 @@ class StudiesPanel:
 
     def _start(self, _: str, client: viser.ClientHandle) -> None:
         self._is_new_asked = False
-        state = self._session.state
+        state = self._session.settled()
         self.runner.start(state.design, state.studies.plan, client.client_id)
 
     def _go_on(self, _: str, client: viser.ClientHandle) -> None:

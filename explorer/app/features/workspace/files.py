@@ -35,14 +35,14 @@ class WorkspaceFiles:
 
     def send(self, what: Exported, file_format: str, who: Who) -> None:
         """Send the workspace that is shown, or its hull."""
-        state = self._session.state
+        state = self._session.settled()
         frame, region = Frame(state), state.view.workspace.region
         start = workspace_start(frame) if region == "reachable" else None
         self._send(who, state, region, what, file_format, workspace_rows(frame), start)
 
     def send_hull_at_home(self, file_format: str, who: Who) -> None:
         """Send the hull of the workspace within the limits, at the orientation of home."""
-        state = self._session.state
+        state = self._session.settled()
         rows = rows_of(home_pose(state.design).rotation)
         self._send(who, state, "limits", "hull", file_format, rows, None)
 
