@@ -1,8 +1,8 @@
 """Kernels: plain Python loops over arrays, which Numba compiles when they are needed.
 
-A call with many rows compiles the kernel first. A call with few rows runs the plain Python
-until the kernel has been compiled in the background: compiling takes seconds and importing
-Numba half a second, too long for a single pose. `explorer.numerics.kernel_cache` stores the
+A call with many rows loads the compiled kernel first, or compiles it. A call with few rows runs
+the plain Python until the compiled kernel is loaded in the background, because compiling takes
+seconds and loading too long for a single pose. `explorer.numerics.kernel_cache` stores the
 compiled code.
 """
 
@@ -11,23 +11,21 @@ from __future__ import annotations
 import functools
 import threading
 from collections.abc import Callable
-from types import FunctionType
 from typing import Any, Generic, ParamSpec, TypeVar
 
-from explorer.numerics.kernel_cache import Entry, Locator, await_cached, fingerprint_of, is_writable
+from explorer.numerics.kernel_cache import Entry, await_cached
+from explorer.numerics.object_code import compile_object, load_object, with_compiled_helpers
 
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
 
 # Number of rows from which compiling (or loading from the cache) is faster than interpreting.
 MANY_ROWS = 256
-# Numba's options for every kernel and helper.
-OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
 
 _kernels: list[Kernel[...]] = []
 # Functions that kernels call, with their compiled forms; None before they are compiled.
 _helpers: dict[Callable[..., Any], Any] = {}
-# One thread at a time configures Numba and compiles.
+# One thread at a time compiles and loads.
 _compile_lock = threading.RLock()
 # One thread at a time compiles in the background.
 _warm_lock = threading.Lock()
@@ -58,8 +56,7 @@ class Kernel(Generic[Arguments]):
     @functools.cached_property
     def entry(self) -> Entry:
         """The kernel's entry in the cache."""
-        options = (self._signature, OPTIONS)
-        return Entry(self._function, set(_helpers), options, self._compile_here)
+        return Entry(self._function, _helpers, self._signature, self._object)
 
     @property
     def ready(self) -> bool:
@@ -69,28 +66,19 @@ class Kernel(Generic[Arguments]):
     def compile(self) -> None:
         """Load the compiled form; wait while another process compiles it."""
         if self._compiled is None:
-            for entry in await_cached([self.entry], urgent=True):
-                entry.compile_here()
+            for _ in await_cached([self.entry], urgent=True):
+                self.load()
 
-    def _compile_here(self) -> None:
-        """Load the compiled form; compile it in this process if it is not in the cache."""
+    def load(self) -> None:
+        """Load the compiled form; compile it in this process if it is stored nowhere."""
         with _compile_lock:
-            if self._compiled is not None:
-                return
-            import numba
-            from numba.core import config
+            if self._compiled is None:
+                self._compiled = load_object(self.entry.code(), self._signature)
 
-            settings: Any = config
-            before = settings.CACHE_LOCATOR_CLASSES
-            settings.CACHE_LOCATOR_CLASSES = f"{Locator.__module__}.{Locator.__qualname__}"
-            try:
-                # A cache that cannot be written can still be read.
-                is_cached = self.entry.is_filled or is_writable()
-                source = _with_compiled_helpers(self._function, self.entry.fingerprint, is_cached)
-                self._compiled = numba.njit(self._signature, cache=is_cached, **OPTIONS)(source)
-            finally:
-                settings.CACHE_LOCATOR_CLASSES = before
-        self.entry.mark_used()
+    def _object(self) -> bytes:
+        """Return the object code, compiled in this process."""
+        with _compile_lock:
+            return compile_object(with_compiled_helpers(self._function, _helpers), self._signature)
 
 
 def kernel(signature: str) -> Callable[[Callable[Arguments, None]], Kernel[Arguments]]:
@@ -104,31 +92,9 @@ def helper(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]
     return function
 
 
-def _with_compiled_helpers(
-    function: Callable[..., Any], fingerprint: str, is_cached: bool
-) -> Callable[..., Any]:
-    """Return a copy of a function that calls compiled helpers instead of plain ones.
-
-    Args:
-        function: Function of a kernel or a helper.
-        fingerprint: Fingerprint under which the cache stores its code.
-        is_cached: Whether the cache stores code at all.
-    """
-    import numba
-
-    namespace = dict(function.__globals__)
-    for name in function.__code__.co_names:
-        called = namespace.get(name)
-        if isinstance(called, FunctionType) and called in _helpers:
-            if _helpers[called] is None:
-                called_fingerprint, _ = fingerprint_of(called, set(_helpers), OPTIONS)
-                plain = _with_compiled_helpers(called, called_fingerprint, is_cached)
-                _helpers[called] = numba.njit(cache=is_cached, **OPTIONS)(plain)
-            namespace[name] = _helpers[called]
-    copy = FunctionType(function.__code__, namespace, function.__name__, function.__defaults__)
-    copy.__module__, copy.__qualname__ = function.__module__, function.__qualname__
-    copy.__dict__["fingerprint"] = fingerprint
-    return copy
+def all_kernels() -> tuple[Kernel[...], ...]:
+    """Return every imported kernel."""
+    return tuple(_kernels)
 
 
 def fill_cache() -> None:
@@ -139,8 +105,9 @@ def fill_cache() -> None:
 
 def warm() -> None:
     """Load the compiled form of every imported kernel, so that small calls are fast too."""
-    for entry in await_cached(kernel.entry for kernel in _kernels if not kernel.ready):
-        entry.compile_here()
+    waiting = {kernel.entry: kernel for kernel in _kernels if not kernel.ready}
+    for entry in await_cached(waiting):
+        waiting[entry].load()
 
 
 def warm_in_background(then: Callable[[], None] | None = None) -> threading.Thread:

@@ -1,11 +1,11 @@
-"""The cache of compiled kernels, and the one process on a machine that fills it.
+"""The object code of kernels: packaged for common processors, else in a cache on each machine.
 
-The key of a kernel is a fingerprint of its own code, of the functions that it calls and of
-the constants that it names; Numba's own key misses changes in the latter two. A change in
-other code, a second checkout and a new installation therefore use the same entries. A child
-process compiles, because compiling holds the interpreter lock for seconds; a lock in the cache
-keeps a second process from compiling the same kernels. Kernels that a caller waits for are
-compiled first, the others in the order of their code's length.
+The key of a kernel is a fingerprint of its own source, of the functions that it calls and of
+the constants that it names. A change in other code, a second checkout and a new installation
+therefore use the same entries. What is not packaged is compiled once on a machine, by a child
+process, because compiling holds the interpreter lock for seconds; a lock in the cache keeps a
+second process from compiling the same kernels. Kernels that a caller waits for are compiled
+first, the others in the order of their code's length.
 """
 
 from __future__ import annotations
@@ -14,22 +14,33 @@ import contextlib
 import functools
 import hashlib
 import importlib
+import linecache
 import os
+import re
 import subprocess
 import sys
-import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Container, Iterable, Iterator
+from importlib.resources.abc import Traversable
 from pathlib import Path
-from types import FunctionType
+from types import CodeType, FunctionType
 from typing import Any
 
 import platformdirs
 from filelock import FileLock, Timeout
 
-from explorer.files.packaged import SOURCES
+from explorer.errors import StorageError
+from explorer.files.packaged import SOURCES, packaged_files
+from explorer.files.writing import write_whole
+from explorer.numerics.object_code import OPTIONS, processor
 
+# Folder of the object code that comes with the explorer, a folder for each processor.
+PACKAGED = "kernels"
+# End of the names of files with object code.
+SUFFIX = ".o"
+# Number of bytes of the digest before the code in a file.
+DIGEST = hashlib.sha256().digest_size
 # Exit status of a compiling process if another one holds the lock.
 BUSY = 75
 # Number of hexadecimal digits of a fingerprint.
@@ -46,8 +57,8 @@ class Entry:
     Args:
         function: Python function of the kernel.
         helpers: Functions that kernels may call.
-        options: Other values on which the compiled code depends, such as its signature.
-        compile_here: Function that compiles the kernel in this process, into the cache.
+        signature: The kernel's type signature for Numba.
+        compile_here: Function that compiles the kernel in this process and returns its object code.
 
     Attributes:
         module: Name of the module that defines the kernel.
@@ -59,17 +70,17 @@ class Entry:
     def __init__(
         self,
         function: Callable[..., Any],
-        helpers: set[Callable[..., Any]],
-        options: object,
-        compile_here: Callable[[], None],
+        helpers: Container[Callable[..., Any]],
+        signature: str,
+        compile_here: Callable[[], bytes],
     ) -> None:
         self.module, self.name = function.__module__, function.__name__
-        self.fingerprint, self.effort = fingerprint_of(function, helpers, options)
-        self.compile_here = compile_here
+        self.fingerprint, self.effort = fingerprint_of(function, helpers, signature)
+        self._compile_here = compile_here
 
     @property
     def is_filled(self) -> bool:
-        """Whether the cache holds the compiled kernel."""
+        """Whether the kernel is packaged, or in the cache of this machine."""
         return self.fingerprint in _cached_fingerprints()
 
     @property
@@ -77,11 +88,38 @@ class Entry:
         """The kernel's module and name, as an argument of the compiling process."""
         return f"{self.module}:{self.name}"
 
-    def mark_used(self) -> None:
-        """Set the time of last use of the compiled code, so that it is not removed."""
-        for path in cache_folder().glob(f"*-{self.fingerprint}.*"):
-            with contextlib.suppress(OSError):
+    @property
+    def file_name(self) -> str:
+        """Name of the file with the kernel's object code."""
+        return f"{self.name}-{self.fingerprint}{SUFFIX}"
+
+    def code(self) -> bytes:
+        """Return the kernel's object code; compile it in this process if there is none."""
+        for file in _packaged():
+            if file.name == self.file_name:
+                code = _checked(file.read_bytes())
+                if code is not None:
+                    return code
+        with contextlib.suppress(OSError):
+            path = cache_folder() / self.file_name
+            code = _checked(path.read_bytes())
+            if code is not None:
+                # What is not used is removed.
                 os.utime(path)
+                return code
+        return self.compile_here()
+
+    def compile_here(self) -> bytes:
+        """Compile the kernel in this process; return its object code, and cache it if possible."""
+        code = self._compile_here()
+        with contextlib.suppress(OSError, StorageError):
+            self.write_to(cache_folder(), code)
+        return code
+
+    def write_to(self, folder: Path, code: bytes) -> None:
+        """Write object code into a folder, with a check of its bytes."""
+        folder.mkdir(parents=True, exist_ok=True)
+        write_whole(folder / self.file_name, hashlib.sha256(code).digest() + code)
 
     def request(self) -> None:
         """Request that the compiling process, even of another program, takes this kernel next."""
@@ -99,17 +137,23 @@ class Entry:
         return _request_folder() / f"{self.name}-{self.fingerprint}"
 
 
+def _checked(data: bytes) -> bytes | None:
+    """Return the object code in a file's bytes; None if they are damaged."""
+    code = data[DIGEST:]
+    return code if hashlib.sha256(code).digest() == data[:DIGEST] else None
+
+
 def fingerprint_of(
-    function: Callable[..., Any], helpers: set[Callable[..., Any]], options: object
+    function: Callable[..., Any], helpers: Container[Callable[..., Any]], signature: str
 ) -> tuple[str, int]:
     """Return a fingerprint of a function and the helpers that it calls, and their bytes of code.
 
     Args:
         function: The function.
         helpers: Functions whose code is part of the compiled code of those that call them.
-        options: Other values on which the compiled code depends; their `repr` is hashed.
+        signature: The function's type signature for Numba.
     """
-    digest = hashlib.sha256(repr(options).encode())
+    digest = hashlib.sha256(repr((signature, OPTIONS)).encode())
     effort = 0
     visited: set[Callable[..., Any]] = {function}
     waiting = [function]
@@ -117,13 +161,9 @@ def fingerprint_of(
         called = waiting.pop()
         assert isinstance(called, FunctionType)  # noqa: S101 - kernels and helpers are
         code = called.__code__
-        # Compiled code holds the names of the modules that its functions come from.
-        digest.update(called.__module__.encode())
         effort += len(code.co_code)
-        digest.update(code.co_code)
-        for part in (code.co_consts, code.co_varnames, code.co_names, called.__defaults__):
-            digest.update(repr(part).encode())
-        for name in code.co_names:
+        digest.update(_source_of(code).encode())
+        for name in sorted(code.co_names):
             value = called.__globals__.get(name)
             if isinstance(value, FunctionType) and value in helpers:
                 if value not in visited:
@@ -137,60 +177,26 @@ def fingerprint_of(
     return digest.hexdigest()[:DIGITS], effort
 
 
+def _source_of(code: CodeType) -> str:
+    """Return the source of a function without comments; its bytes depend on Python's version."""
+    last = max(end or line or 0 for line, end, _, _ in code.co_positions())
+    lines = linecache.getlines(code.co_filename)[code.co_firstlineno - 1 : last]
+    return "\n".join(re.sub(r"\s*(#.*)?\s$", "", line) for line in lines)
+
+
+@functools.cache
+def _packaged() -> list[Traversable]:
+    """Return the files of object code that come with the explorer for this processor."""
+    with contextlib.suppress(OSError):
+        return packaged_files(f"{PACKAGED}/{processor()}", SUFFIX)
+    return []
+
+
 @functools.cache
 def cache_folder() -> Path:
-    """Return the folder for compiled code in the user's cache."""
-    from importlib.metadata import version
-
-    # Other versions of Numba or Python cannot load the code.
-    versions = f"{sys.implementation.cache_tag}-numba-{version('numba')}"
+    """Return the folder for object code in the user's cache."""
     root = Path(os.environ.get("XDG_CACHE_HOME") or platformdirs.user_cache_dir())
-    return root / "flagged-explorer" / "kernels" / versions
-
-
-def is_writable() -> bool:
-    """Return whether compiled code can be written to the cache."""
-    try:
-        cache_folder().mkdir(parents=True, exist_ok=True)
-        tempfile.TemporaryFile(dir=cache_folder()).close()
-    except OSError:
-        return False
-    return True
-
-
-class Locator:
-    """Numba's cache locator: the folder and the key of a function's compiled code.
-
-    Numba creates one for each function that it caches. The key is the function's attribute
-    `fingerprint`.
-    """
-
-    def __init__(self, function: FunctionType, file: str) -> None:
-        self._fingerprint = str(function.__dict__["fingerprint"])
-        # Numba reads this attribute for its warnings.
-        self._py_file = file
-
-    @classmethod
-    def from_function(cls, function: FunctionType, file: str) -> Locator | None:
-        """Return the locator of a function; None if the function has no fingerprint."""
-        return cls(function, file) if "fingerprint" in function.__dict__ else None
-
-    def ensure_cache_path(self) -> None:
-        """Create the folder."""
-        cache_folder().mkdir(parents=True, exist_ok=True)
-
-    def get_cache_path(self) -> str:
-        """Return the folder."""
-        self.ensure_cache_path()
-        return str(cache_folder())
-
-    def get_source_stamp(self) -> str:
-        """Return the fingerprint, which changes with the code."""
-        return self._fingerprint
-
-    def get_disambiguator(self) -> str:
-        """Return the fingerprint, which distinguishes functions of the same name in file names."""
-        return self._fingerprint
+    return root / "flagged-explorer" / "kernels" / processor()
 
 
 def await_cached(entries: Iterable[Entry], *, urgent: bool = False) -> Iterator[Entry]:
@@ -324,13 +330,11 @@ def _is_compiling_elsewhere() -> bool:
 
 
 def _cached_fingerprints() -> set[str]:
-    """Return the fingerprints of all functions whose compiled code is in the cache."""
-    try:
-        names = [path.name for path in cache_folder().iterdir()]
-    except OSError:
-        return set()
-    # Numba writes the index before the code, so only a file of code counts.
-    return {name.rpartition("-")[2][:DIGITS] for name in names if name.endswith(".nbc")}
+    """Return the fingerprints of all kernels that are packaged or in the cache."""
+    names = [file.name for file in _packaged()]
+    with contextlib.suppress(OSError):
+        names += [path.name for path in cache_folder().iterdir()]
+    return {name.rpartition("-")[2].removesuffix(SUFFIX) for name in names if name.endswith(SUFFIX)}
 
 
 def _lock() -> FileLock:

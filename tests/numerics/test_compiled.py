@@ -1,33 +1,48 @@
-"""The cache of kernels: each is compiled once on a machine, requested ones first."""
+"""Object code of kernels: packaged, else compiled once on a machine, requested ones first."""
 
 from __future__ import annotations
 
+import hashlib
 import os
+import runpy
 import subprocess
 import sys
 import threading
 from functools import partial
 from pathlib import Path
-from typing import Any
 
+import kernels
+import numpy as np
 import pytest
 from filelock import FileLock
 
 import explorer
+from explorer.files.packaged import SOURCES
 from explorer.legs import clearance, tetrahedra
 from explorer.numerics import kernel_cache
-from explorer.numerics.kernel_cache import Entry, await_cached, compile_all, fingerprint_of
+from explorer.numerics.compiled import all_kernels
+from explorer.numerics.kernel_cache import (
+    DIGEST,
+    PACKAGED,
+    Entry,
+    await_cached,
+    compile_all,
+    fingerprint_of,
+)
 from explorer.optimise.defaults import make_problem
 from explorer.optimise.solver import optimise_design
 from explorer.workspace.slices import nodes
 
+# The processors for which object code is packaged.
+COMMON = "linux-x86-64-v3"
 KERNELS = (nodes.count_nodes, clearance.pair_rows, tetrahedra.overlap_rows)
 
 
 @pytest.fixture
 def empty_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Let the cache be an empty folder."""
+    """Let nothing be packaged, and the cache be an empty folder."""
     monkeypatch.setattr(kernel_cache, "cache_folder", lambda: tmp_path)
+    monkeypatch.setattr(kernel_cache, "_packaged", list)
     return tmp_path
 
 
@@ -41,26 +56,42 @@ def unused(x):
     return {other}
 SCALE = {scale}
 def area(x):
-    return SCALE * square(Sides(x)[0])
+    return SCALE * (
+        square(Sides(x)[0])  {note}
+    )
 """
 
 
-def fingerprint(options: object = "f8(f8)", module: str = "areas", **changed: str) -> str:
+def fingerprint(folder: Path, signature: str = "f8(f8)", **changed: str) -> str:
     """Return the fingerprint of the function `area` in changed source code."""
-    code = {"scale": "2.0", "body": "x * x", "other": "x", "fields": "a"} | changed
-    names: dict[str, Any] = {"__name__": module}
-    exec(SOURCE.format(**code), names)
-    return fingerprint_of(names["area"], {names["square"], names["unused"]}, options)[0]
+    code = {"scale": "2.0", "body": "x * x", "other": "x", "fields": "a", "note": ""} | changed
+    path = folder / f"{len(list(folder.iterdir()))}.py"
+    path.write_text(SOURCE.format(**code), encoding="utf-8")
+    names = runpy.run_path(str(path))
+    return fingerprint_of(names["area"], {names["square"], names["unused"]}, signature)[0]
 
 
-def test_fingerprint_changes_with_the_code_and_constants_that_a_kernel_uses() -> None:
-    assert fingerprint() == fingerprint(other="x + 1.0")
-    assert fingerprint() != fingerprint(body="x * x * x")
-    assert fingerprint() != fingerprint(scale="3.0")
-    assert fingerprint() != fingerprint(options="f4(f4)")
-    assert fingerprint() != fingerprint(fields="b")
-    # Compiled code holds the names of its functions' modules.
-    assert fingerprint() != fingerprint(module="rooms.areas")
+def test_fingerprint_changes_with_the_code_and_constants_that_a_kernel_uses(tmp_path: Path) -> None:
+    print_of = partial(fingerprint, tmp_path)
+    assert print_of() == print_of(other="x + 1.0") == print_of(note="# A square.")
+    assert print_of() != print_of(body="x * x * x")
+    assert print_of() != print_of(scale="3.0")
+    assert print_of() != print_of(signature="f4(f4)")
+    assert print_of() != print_of(fields="b")
+
+
+def is_whole(path: Path) -> bool:
+    """Whether a file holds object code after the digest of it."""
+    data = path.read_bytes()
+    return hashlib.sha256(data[DIGEST:]).digest() == data[:DIGEST]
+
+
+def test_object_code_of_every_kernel_is_packaged_for_common_processors() -> None:
+    # To be mended by python tests/kernels.py on such a machine.
+    kernels.import_all()
+    names = {each.entry.file_name for each in all_kernels()}
+    assert names == {path.name for path in kernels.FOLDER.with_name(COMMON).iterdir()}
+    assert all(map(is_whole, kernels.FOLDER.with_name(COMMON).iterdir()))
 
 
 def test_fingerprints_of_kernels_differ() -> None:
@@ -74,7 +105,7 @@ def order(empty_cache: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
     def compile_into_cache(entry: Entry) -> None:
         names.append(entry.name)
-        (empty_cache / f"stand-{entry.fingerprint}.nbc").touch()
+        (empty_cache / entry.file_name).touch()
 
     for each in KERNELS:
         monkeypatch.setattr(each.entry, "compile_here", partial(compile_into_cache, each.entry))
@@ -132,14 +163,29 @@ def test_kernel_compiled_by_another_process_is_awaited_not_compiled_again(
     assert not any((empty_cache / "requests").glob("*"))
 
 
-def run_program(program: str, cache: Path) -> None:
-    """Run a program in a process of its own, with its cache in a folder."""
-    environment = {**os.environ, "XDG_CACHE_HOME": str(cache)}
-    subprocess.run([sys.executable, "-c", program], check=True, env=environment)
+@pytest.fixture
+def unpackaged(tmp_path: Path) -> Path:
+    """Return a folder with the sources of the explorer, and no packaged object code."""
+    folder = tmp_path / "sources"
+    (folder / "assets").mkdir(parents=True)
+    (folder / "explorer").symlink_to(SOURCES / "explorer")
+    for each in (SOURCES / "assets").iterdir():
+        if each.name != PACKAGED:
+            (folder / "assets" / each.name).symlink_to(each)
+    return folder
 
 
-def test_kernel_with_many_rows_is_compiled_by_a_child_into_the_cache(tmp_path: Path) -> None:
+def run_program(program: str, sources: Path, cache: Path) -> None:
+    """Run a program in a process of its own, with its sources and its cache in folders."""
+    environment = {**os.environ, "XDG_CACHE_HOME": str(cache), "PYTHONPATH": str(sources)}
+    subprocess.run([sys.executable, "-c", program], check=True, env=environment, cwd=sources)
+
+
+def test_kernel_with_many_rows_is_compiled_by_a_child_into_the_cache(
+    unpackaged: Path, tmp_path: Path
+) -> None:
     program = """
+import sys
 import numpy as np
 from explorer.legs import tetrahedra
 from explorer.legs.clearance import pair_rows
@@ -150,16 +196,48 @@ assert not pair_rows.ready
 pair_rows(300, axes, found, points)
 assert pair_rows.ready
 assert pair_rows.entry.is_filled
+assert "numba" not in sys.modules
 np.testing.assert_allclose(found, same, rtol=1e-12)
 """
+    cache = tmp_path / "cache"
     for _ in range(2):
-        run_program(program, tmp_path)
-    made = [path.name for path in tmp_path.rglob("*.nbc") if "pair_rows" in path.name]
-    assert len(made) == 1
-    assert not any("overlap_rows" in path.name for path in tmp_path.rglob("*"))
+        run_program(program, unpackaged, cache)
+    (made,) = (path for path in cache.rglob("*.o") if "pair_rows" in path.name)
+    assert not any("overlap_rows" in path.name for path in cache.rglob("*"))
+    # Damaged code is made again, rather than run.
+    made.write_bytes(made.read_bytes()[:-1])
+    run_program(program.replace('"numba" not in sys.modules', "True"), unpackaged, cache)
+    assert is_whole(made)
 
 
-def test_kernel_is_compiled_if_the_cache_cannot_be_written(tmp_path: Path) -> None:
+def test_packaged_kernel_needs_neither_numba_nor_a_cache(tmp_path: Path) -> None:
+    program = """
+import sys
+import numpy as np
+from explorer.legs.clearance import pair_rows
+axes = np.random.default_rng(0).normal(size=(300, 4, 2, 3))
+pair_rows(300, axes, np.zeros((300, 6)), np.zeros((300, 6, 2, 3)))
+assert pair_rows.ready
+assert "numba" not in sys.modules
+"""
+    cache = tmp_path / "cache"
+    run_program(program, SOURCES, cache)
+    assert not cache.exists()
+
+
+def test_kernel_takes_no_arrays_of_another_kind() -> None:
+    axes, found = np.zeros((1, 4, 2, 3)), np.zeros((1, 6))
+    points = np.zeros((1, 6, 2, 3))
+    clearance.pair_rows.compile()
+    clearance.pair_rows(1, axes, found, points)
+    for wrong in (axes[..., ::-1], axes.astype(np.float32), axes[0], axes.tolist(), None):
+        with pytest.raises(TypeError, match="argument 0"):
+            clearance.pair_rows(1, wrong, found, points)  # pyright: ignore[reportArgumentType]
+
+
+def test_kernel_is_compiled_if_the_cache_cannot_be_written(
+    unpackaged: Path, tmp_path: Path
+) -> None:
     blocked = tmp_path / "file"
     blocked.touch()
     program = """
@@ -170,7 +248,7 @@ pair_rows(300, axes, np.zeros((300, 6)), np.zeros((300, 6, 2, 3)))
 assert pair_rows.ready
 assert not pair_rows.entry.is_filled
 """
-    run_program(program, blocked)
+    run_program(program, unpackaged, blocked)
 
 
 def test_optimisation_needs_no_compiled_volume(monkeypatch: pytest.MonkeyPatch) -> None:

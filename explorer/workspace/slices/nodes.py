@@ -123,6 +123,17 @@ def add_crossings(a: float, b: float, c: float, ends: FloatArray, count: int) ->
     return count
 
 
+@helper
+def sort_ends(ends: FloatArray, count: int) -> None:
+    """Sort the first few ends in place."""
+    for i in range(1, count):
+        end, j = ends[i], i
+        while j > 0 and ends[j - 1] > end:
+            ends[j] = ends[j - 1]
+            j -= 1
+        ends[j] = end
+
+
 @kernel("void(f8[:,::1], f8[:,::1], f8[:,::1], f8[::1], f8[::1], i8, f8[::1])")
 def column_lengths(
     circles: FloatArray,
@@ -164,8 +175,8 @@ def column_lengths(
                 b = xy_along * cones[k, AXIS_Z]
                 c = xy_along * xy_along - square * (dx * dx + dy * dy)
                 count = add_crossings(a, b - a * zc, a * zc * zc - 2.0 * b * zc + c, ends, count)
-            stops = np.sort(ends[:count])
+            sort_ends(ends, count)
             for k in range(count - 1):
-                low, high = max(stops[k], lows[2]), min(stops[k + 1], highs[2])
+                low, high = max(ends[k], lows[2]), min(ends[k + 1], highs[2])
                 if high > low and is_within(x, y, 0.5 * (low + high), circles, planes, cones, 0.0):
                     total[0] += high - low

@@ -1,0 +1,246 @@
+"""Object code of kernels: machine code that Numba makes, and that runs without Numba.
+
+Object code depends on the processor and the operating system, but neither on Numba nor on the
+version of Python, so that it can be packaged. Loading it takes llvmlite alone and milliseconds.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import importlib
+import re
+import sys
+from collections.abc import Callable
+from types import FunctionType
+from typing import Any
+
+import numpy as np
+
+Function = Callable[..., Any]
+
+# Numba's options for every kernel and helper.
+OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
+# The type of most x86 processors since 2013 (in LLVM, and in the psABI of x86-64), and what it has.
+COMMON_TYPE = "x86-64-v3"
+COMMON_FEATURES = ("avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe")
+# Name of a kernel's function in its object code.
+SYMBOL = "kernel"
+# The types of a signature, their names in LLVM and their bytes.
+LLVM_TYPES = {"f8": ("double", 8), "i8": ("i64", 8), "b1": ("i8", 1)}
+SCALARS: dict[str, Any] = {"f8": ctypes.c_double, "i8": ctypes.c_int64}
+# Bytes from the start of an array's C structure to its data and to its shape (NumPy's public
+# structure PyArrayObject_fields, on 64-bit machines).
+DATA_AT = object.__basicsize__
+SHAPE_AT = DATA_AT + 16
+
+# What compiled code calls for its scratch arrays. The structure is that of Numba's arrays: count
+# of references, destructor and its argument, data, size.
+RUNTIME = """
+declare ptr @malloc(i64)
+declare void @free(ptr)
+
+define ptr @NRT_MemInfo_alloc_aligned(i64 %size, i32 %align) {
+  %wide = zext i32 %align to i64
+  %room = add i64 %wide, 40
+  %all = add i64 %room, %size
+  %info = call ptr @malloc(i64 %all)
+  %count = getelementptr i8, ptr %info, i64 0
+  store i64 1, ptr %count
+  %address = ptrtoint ptr %info to i64
+  %least = add i64 %address, %room
+  %mask = sub i64 0, %wide
+  %aligned = and i64 %least, %mask
+  %data = inttoptr i64 %aligned to ptr
+  %destructor = getelementptr i8, ptr %info, i64 8
+  store ptr null, ptr %destructor
+  %data.at = getelementptr i8, ptr %info, i64 24
+  store ptr %data, ptr %data.at
+  %size.at = getelementptr i8, ptr %info, i64 32
+  store i64 %size, ptr %size.at
+  ret ptr %info
+}
+
+define void @NRT_MemInfo_call_dtor(ptr %info) {
+  call void @free(ptr %info)
+  ret void
+}
+"""
+
+
+def arguments_of(signature: str) -> list[tuple[str, int]]:
+    """Return the type and the number of axes of each argument of a signature of Numba."""
+    inside = signature[len("void(") : -1]
+    arguments = re.findall(r"(\w\d)(\[[^\]]*\])?", inside)
+    return [(kind, axes.count(":") - 1 if axes else 0) for kind, axes in arguments]
+
+
+def compile_object(function: Function, signature: str) -> bytes:
+    """Return the object code of a function in the subset of Python that Numba compiles.
+
+    Its function `SYMBOL` takes arrays as pointers to their C structures.
+
+    Args:
+        function: Function that writes its results into arrays among its arguments.
+        signature: Its type signature for Numba; all arrays are contiguous.
+    """
+    numba, llvm = _numba(), _llvm()
+    # The wrappers for calls from Python would need Numba at run time.
+    options = {**OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    dispatcher = numba.njit(signature, **options)(function)
+    overload = next(iter(dispatcher.overloads.values()))
+    module = llvm.parse_assembly(overload.library.get_llvm_str())
+    entry = _entry(overload.fndesc.llvm_func_name, arguments_of(signature))
+    module.link_in(llvm.parse_assembly(RUNTIME))
+    module.link_in(llvm.parse_assembly(entry))
+    module.verify()
+    return _target_machine().emit_object(module)
+
+
+def load_object(code: bytes, signature: str) -> Function:
+    """Return the function in object code, as one that takes arrays of NumPy and numbers.
+
+    It raises a TypeError if an argument is none of its type, and releases the interpreter lock.
+    """
+    arguments = arguments_of(signature)
+    engine, address = _linked(code)
+    types = [ctypes.py_object if axes else SCALARS[kind] for kind, axes in arguments]
+    native = ctypes.CFUNCTYPE(ctypes.c_int32, *types)(address)
+    arrays = [(place, np.dtype(kind), axes) for place, (kind, axes) in enumerate(arguments) if axes]
+
+    def call(*given: Any) -> None:
+        for place, dtype, axes in arrays:
+            array = given[place]
+            if not (
+                type(array) is np.ndarray
+                and array.dtype == dtype
+                and array.ndim == axes
+                and array.flags.c_contiguous
+            ):
+                raise TypeError(f"argument {place} is none of the signature {signature}")
+        if native(*given):
+            raise RuntimeError(f"a kernel of the signature {signature} failed")
+
+    # The engine owns the machine code.
+    call.__dict__["engine"] = engine
+    return call
+
+
+def _linked(code: bytes) -> tuple[object, int]:
+    """Return the engine that holds object code, and the address of its function `SYMBOL`."""
+    llvm = _llvm()
+
+    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _target_machine())
+    engine.add_object_file(llvm.ObjectFileRef.from_data(code))
+    engine.finalize_object()
+    return engine, engine.get_function_address(SYMBOL)
+
+
+def _numba() -> Any:
+    """Return Numba without its types, which are partial; importing it takes half a second."""
+    return importlib.import_module("numba")
+
+
+def _llvm() -> Any:
+    """Return LLVM in Python, which has no types; importing it takes a tenth of a second."""
+    return importlib.import_module("llvmlite.binding")
+
+
+@functools.cache
+def processor() -> str:
+    """Return the name of this system and its kind of processor, which run the same object code."""
+    return f"{sys.platform}-{_processor_type()}"
+
+
+def _processor_type() -> str:
+    llvm = _llvm()
+
+    features = llvm.get_host_cpu_features()
+    is_common = all(features.get(each) for each in COMMON_FEATURES)
+    return COMMON_TYPE if is_common else llvm.get_host_cpu_name()
+
+
+@functools.cache
+def _target_machine() -> Any:
+    llvm = _llvm()
+
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    # As for Numba's own code: its calls of mathematical functions may go far.
+    return llvm.Target.from_default_triple().create_target_machine(
+        cpu=_processor_type(),
+        reloc="static" if llvm.get_process_triple().startswith("x86") else "default",
+        codemodel="jitdefault",
+        jit=True,
+    )
+
+
+def _entry(native: str, arguments: list[tuple[str, int]]) -> str:
+    """Return the function `SYMBOL` in LLVM's language, which calls Numba's own function.
+
+    Numba passes an array as the owners of its memory, which kernels do not use, the numbers of
+    its entries and of their bytes, the data, the shape and the strides.
+    """
+    taken: list[str] = []
+    types = ["ptr", "ptr"]
+    passed = ["ptr %returned", "ptr %raised"]
+    lines = ["  %returned = alloca ptr", "  %raised = alloca ptr"]
+    for index, (kind, axes) in enumerate(arguments):
+        llvm_type, size = LLVM_TYPES[kind]
+        name = f"%a{index}"
+        if not axes:
+            taken.append(f"{llvm_type} {name}")
+            types.append(llvm_type)
+            passed.append(f"{llvm_type} {name}")
+            continue
+        taken.append(f"ptr {name}")
+        lines += [
+            f"  {name}.data.at = getelementptr i8, ptr {name}, i64 {DATA_AT}",
+            f"  {name}.data = load ptr, ptr {name}.data.at",
+            f"  {name}.shape.at = getelementptr i8, ptr {name}, i64 {SHAPE_AT}",
+            f"  {name}.shape = load ptr, ptr {name}.shape.at",
+            f"  {name}.stride{axes} = add i64 0, {size}",
+        ]
+        for axis in reversed(range(axes)):
+            lines += [
+                f"  {name}.length{axis}.at = getelementptr i64, ptr {name}.shape, i64 {axis}",
+                f"  {name}.length{axis} = load i64, ptr {name}.length{axis}.at",
+                f"  {name}.stride{axis} = mul i64 {name}.stride{axis + 1}, {name}.length{axis}",
+            ]
+        lines.append(f"  {name}.count = udiv i64 {name}.stride0, {size}")
+        lengths = [f"i64 {name}.length{axis}" for axis in range(axes)]
+        strides = [f"i64 {name}.stride{axis + 1}" for axis in range(axes)]
+        types += ["ptr", "ptr", "i64", "i64", "ptr", *["i64"] * (2 * axes)]
+        passed += ["ptr null", "ptr null", f"i64 {name}.count", f"i64 {size}"]
+        passed += [f"ptr {name}.data", *lengths, *strides]
+    return "\n".join(
+        [
+            f'declare i32 @"{native}"({", ".join(types)})',
+            f"define i32 @{SYMBOL}({', '.join(taken)}) {{",
+            *lines,
+            f'  %status = call i32 @"{native}"({", ".join(passed)})',
+            "  ret i32 %status",
+            "}",
+        ]
+    )
+
+
+def with_compiled_helpers(function: Function, helpers: dict[Function, Any]) -> Function:
+    """Return a copy of a function that calls compiled helpers instead of plain ones.
+
+    Args:
+        function: Function of a kernel or a helper.
+        helpers: The compiled form of each helper; None before it is compiled.
+    """
+    numba = _numba()
+    names = dict(function.__globals__)
+    for name in function.__code__.co_names:
+        called = names.get(name)
+        if isinstance(called, FunctionType) and called in helpers:
+            if helpers[called] is None:
+                plain = with_compiled_helpers(called, helpers)
+                helpers[called] = numba.njit(**OPTIONS)(plain)
+            names[name] = helpers[called]
+    copy = FunctionType(function.__code__, names, function.__name__, function.__defaults__)
+    copy.__module__, copy.__qualname__ = function.__module__, function.__qualname__
+    return copy
