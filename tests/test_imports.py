@@ -45,6 +45,7 @@ APP_ROOMS = (
     "storage",
     "browser",
     "widgets",
+    "inputs",
     "scene",
     "features.feature",
     "features",

@@ -81,7 +81,7 @@ class Entry:
     @property
     def is_filled(self) -> bool:
         """Whether the kernel is packaged, or in the cache of this machine."""
-        return self.fingerprint in _cached_fingerprints()
+        return self.file_name in _stored_names()
 
     @property
     def label(self) -> str:
@@ -178,7 +178,7 @@ def fingerprint_of(
 
 
 def _source_of(code: CodeType) -> str:
-    """Return the source of a function without comments; its bytes depend on Python's version."""
+    """Return the source of a function without comments; its bytecode varies with Python."""
     last = max(end or line or 0 for line, end, _, _ in code.co_positions())
     lines = linecache.getlines(code.co_filename)[code.co_firstlineno - 1 : last]
     return "\n".join(re.sub(r"\s*(#.*)?\s$", "", line) for line in lines)
@@ -214,8 +214,8 @@ def await_cached(entries: Iterable[Entry], *, urgent: bool = False) -> Iterator[
     requested: list[Entry] = []
     try:
         while True:
-            cached = _cached_fingerprints()
-            for entry in [entry for entry in waiting if entry.fingerprint in cached]:
+            stored = _stored_names()
+            for entry in [entry for entry in waiting if entry.file_name in stored]:
                 waiting.remove(entry)
                 yield entry
             if not waiting:
@@ -329,12 +329,12 @@ def _is_compiling_elsewhere() -> bool:
         return False
 
 
-def _cached_fingerprints() -> set[str]:
-    """Return the fingerprints of all kernels that are packaged or in the cache."""
-    names = [file.name for file in _packaged()]
+def _stored_names() -> set[str]:
+    """Return the names of all files of object code that are packaged or in the cache."""
+    names = {file.name for file in _packaged()}
     with contextlib.suppress(OSError):
-        names += [path.name for path in cache_folder().iterdir()]
-    return {name.rpartition("-")[2].removesuffix(SUFFIX) for name in names if name.endswith(SUFFIX)}
+        names.update(path.name for path in cache_folder().iterdir())
+    return names
 
 
 def _lock() -> FileLock:

@@ -100,7 +100,8 @@ def compile_object(function: Function, signature: str) -> bytes:
 def load_object(code: bytes, signature: str) -> Function:
     """Return the function in object code, as one that takes arrays of NumPy and numbers.
 
-    It raises a TypeError if an argument is none of its type, and releases the interpreter lock.
+    It raises a TypeError if an array is of another type or not contiguous, and releases the
+    interpreter lock.
     """
     arguments = arguments_of(signature)
     engine, address = _linked(code)
@@ -117,7 +118,7 @@ def load_object(code: bytes, signature: str) -> Function:
                 and array.ndim == axes
                 and array.flags.c_contiguous
             ):
-                raise TypeError(f"argument {place} is none of the signature {signature}")
+                raise TypeError(f"argument {place} does not fit the signature {signature}")
         if native(*given):
             raise RuntimeError(f"a kernel of the signature {signature} failed")
 
@@ -129,7 +130,6 @@ def load_object(code: bytes, signature: str) -> Function:
 def _linked(code: bytes) -> tuple[object, int]:
     """Return the engine that holds object code, and the address of its function `SYMBOL`."""
     llvm = _llvm()
-
     engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _target_machine())
     engine.add_object_file(llvm.ObjectFileRef.from_data(code))
     engine.finalize_object()
@@ -142,19 +142,19 @@ def _numba() -> Any:
 
 
 def _llvm() -> Any:
-    """Return LLVM in Python, which has no types; importing it takes a tenth of a second."""
+    """Return LLVM's binding for Python, without types; importing it takes a tenth of a second."""
     return importlib.import_module("llvmlite.binding")
 
 
-@functools.cache
 def processor() -> str:
     """Return the name of this system and its kind of processor, which run the same object code."""
     return f"{sys.platform}-{_processor_type()}"
 
 
+@functools.cache
 def _processor_type() -> str:
+    """Return LLVM's name of the kind of processor for which code is made."""
     llvm = _llvm()
-
     features = llvm.get_host_cpu_features()
     is_common = all(features.get(each) for each in COMMON_FEATURES)
     return COMMON_TYPE if is_common else llvm.get_host_cpu_name()
@@ -163,7 +163,6 @@ def _processor_type() -> str:
 @functools.cache
 def _target_machine() -> Any:
     llvm = _llvm()
-
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     # As for Numba's own code: its calls of mathematical functions may go far.

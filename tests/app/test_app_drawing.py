@@ -11,6 +11,7 @@ from hypothesis import given, strategies as st
 
 from explorer.app.features.singularity.distance import distance_table
 from explorer.app.features.singularity.panel import measures_table, summary
+from explorer.app.inputs.tracks import decimals
 from explorer.app.scene.bands import COLLIDING, PLAIN
 from explorer.app.scene.camera import FIELD_OF_VIEW, VIEWS, ViewName, framing
 from explorer.app.scene.part import around
@@ -20,7 +21,6 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.state import opened
 from explorer.app.widgets.colours import FAR, FAR_WARNINGS, SINGULAR, Rgb, proximity_colour
 from explorer.app.widgets.markup import share
-from explorer.app.widgets.tracks import decimals
 from explorer.mechanism.design import Design, Limits
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose

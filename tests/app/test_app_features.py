@@ -12,6 +12,8 @@ from desk import CLIENT
 
 from explorer.app.features.feature import Feature, Services, StateCommand, Tab
 from explorer.app.features.listed import FEATURES
+from explorer.app.inputs.bindings import At, Bound
+from explorer.app.inputs.controls import Control, Controls
 from explorer.app.scene.part import ScenePart
 from explorer.app.scene.placing import Placed
 from explorer.app.server import Running, start
@@ -22,9 +24,7 @@ from explorer.app.state.values import value_at, with_value
 from explorer.app.storage.study_folders import StudyFolders
 from explorer.app.storage.user_data import open_user_data
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.bindings import At, Bound
 from explorer.app.widgets.commands import Key
-from explorer.app.widgets.controls import Control, Controls
 from explorer.app.widgets.pieces import Widget, widgets
 from explorer.mechanism.design_file import PRESETS
 from explorer.numerics.arrays import FloatArray

@@ -16,13 +16,13 @@ from explorer.app.features.legs.panel import DIGITS, LegsPanel, clearance_table,
 from explorer.app.features.legs.swept import SweptTetrahedra
 from explorer.app.features.mechanism.design_panel import DesignPanel
 from explorer.app.features.mechanism.legs import Legs
+from explorer.app.inputs.ranges import radius_span
 from explorer.app.scene.placing import Placed
 from explorer.app.session.gestures import UserAction
 from explorer.app.state.actions import SetPose, SetPosition
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, opened
 from explorer.app.widgets.colours import OUTLINE, SWEPT, TUBE
-from explorer.app.widgets.ranges import radius_span
 from explorer.legs.clearance import PAIRS, leg_axes, leg_clearances
 from explorer.legs.interference import step_overlaps, swept_tetrahedra
 from explorer.legs.moves import move_clearance

@@ -11,12 +11,12 @@ from desk import CLIENT
 
 from explorer.app.features.optimise.actions import SetRequest, StartRun
 from explorer.app.features.paths.actions import Go
+from explorer.app.inputs.controls import MAIN
 from explorer.app.server import Running
 from explorer.app.session.session import UNDO
 from explorer.app.state.actions import Open, Set, SetJoint
 from explorer.app.state.optimisation import OptimisationRequest
 from explorer.app.state.state import State
-from explorer.app.widgets.controls import MAIN
 from explorer.mechanism.design_file import PRESETS
 
 PATIENCE_SECONDS = 120.0

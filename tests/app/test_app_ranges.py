@@ -13,10 +13,7 @@ from hypothesis import given, strategies as st
 from explorer.app.features.feature import Services
 from explorer.app.features.mechanism.design_panel import DesignPanel, pushed
 from explorer.app.features.mechanism.pose_panel import MovePanel
-from explorer.app.state.actions import Set, SetJoint, SetPosition
-from explorer.app.state.frame import Frame
-from explorer.app.state.state import opened
-from explorer.app.widgets.ranges import (
+from explorer.app.inputs.ranges import (
     box_span,
     coordinate_span,
     gap_span,
@@ -28,7 +25,10 @@ from explorer.app.widgets.ranges import (
     round_up,
     variable_span,
 )
-from explorer.app.widgets.tracks import Span, close_up, round_span, tint_marks
+from explorer.app.inputs.tracks import Span, close_up, round_span, tint_marks
+from explorer.app.state.actions import Set, SetJoint, SetPosition
+from explorer.app.state.frame import Frame
+from explorer.app.state.state import opened
 from explorer.mechanism.design import JOINTS, LENGTHS, VARIABLES, Design
 from explorer.mechanism.design_file import PRESETS
 

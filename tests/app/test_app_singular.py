@@ -40,12 +40,12 @@ from explorer.app.features.singularity.performance import performance_table
 from explorer.app.features.singularity.scene import LONGEST, BallScene, EllipsoidScene, NearestGhost
 from explorer.app.features.singularity.strata import GOALS, StrataPanel, distances_of, neighbours
 from explorer.app.features.singularity.tasks import StrataRequest, strata_distances
+from explorer.app.inputs.ranges import coordinate_span
 from explorer.app.scene.placing import Placed
 from explorer.app.state.actions import GoHome, Open, Set, SetPose, SetPosition
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, opened
 from explorer.app.state.view import SingularView
-from explorer.app.widgets.ranges import coordinate_span
 from explorer.errors import InputError
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.displacement import displacement

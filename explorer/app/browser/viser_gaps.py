@@ -221,8 +221,8 @@ def resend(handle: Any, name: str) -> None:
 def is_stale(handle: Any, name: str) -> bool:
     """Whether browsers were last sent another `value` of a control than the one it holds.
 
-    viser's setter sends a value first and stores it after: a value that a user sets in between is
-    sent last, and then overwritten here.
+    A value is sent first and stored after: one that a user sets in between is sent last, and then
+    overwritten here.
     """
     from viser import _messages
 

@@ -1,6 +1,6 @@
-// Sends what controls still hold back before a hand goes on. The controls of a panel share a
-// throttle of viser that keeps the newest message only, so that the last value of a control would
-// be lost if another control is used within the throttle's time.
+// Sends what controls still hold back before the next press or key is handled. The controls of a
+// panel share a throttle of viser that keeps the newest message only, so that the last value of a
+// control would be lost if another control is used within the throttle's time.
 window.explorer.throttles ??= (() => {
   // The throttle's time in milliseconds, by which its timer is known.
   const PAUSE = 50;
@@ -45,7 +45,7 @@ window.explorer.throttles ??= (() => {
     });
   };
   const flush = () => {
-    // A throttle that sends waits again, and is asked again, with nothing left to send.
+    // A throttle that still had something to send starts a new timer, which this loop ends too.
     for (const [timer, end] of waiting) {
       clearTimeout(timer);
       end();

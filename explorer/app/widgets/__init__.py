@@ -1,1 +1,1 @@
-"""What panels are made of: bound controls, markup and charts."""
+"""What panels are made of: markup, buttons, charts, the palette and the theme."""

@@ -12,14 +12,14 @@ from explorer.app.features.designs.files import DesignFile
 from explorer.app.features.designs.name import saved_words
 from explorer.app.features.designs.saved_designs import SavedDesigns
 from explorer.app.features.feature import Services
+from explorer.app.inputs.bindings import Bound
+from explorer.app.inputs.controls import Controls
 from explorer.app.session.session import Who
 from explorer.app.state.actions import Open, SetName
 from explorer.app.state.frame import Frame
 from explorer.app.storage.library import Entry
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.bindings import Bound
 from explorer.app.widgets.buttons import Does, press_button
-from explorer.app.widgets.controls import Controls
 from explorer.app.widgets.markup import box, format_number, note
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import LARGEST_FILE, PRESETS

@@ -8,9 +8,9 @@ from collections.abc import Iterator
 from explorer.app.features.feature import Services
 from explorer.app.features.legs.feed import RadiusFeed
 from explorer.app.features.legs.radius_plot import RadiusPlot
+from explorer.app.inputs.controls import Controls
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.controls import Controls
 from explorer.app.widgets.markup import box, caption, dim, row, status, table
 from explorer.legs.clearance import PAIRS, pair_name
 from explorer.numerics.number_text import format_column, format_decimals

@@ -10,16 +10,9 @@ import viser
 
 from explorer.app.features.feature import Services
 from explorer.app.features.mechanism.sketch import sketch
-from explorer.app.session.field_words import SWINGS
-from explorer.app.state.action import Action
-from explorer.app.state.actions import Open, Reset, Set, SetVariable
-from explorer.app.state.frame import Frame
-from explorer.app.state.state import Hold, State
-from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.bindings import At, Bound
-from explorer.app.widgets.commands import NO_OPTION
-from explorer.app.widgets.controls import Controls
-from explorer.app.widgets.ranges import (
+from explorer.app.inputs.bindings import At, Bound
+from explorer.app.inputs.controls import Controls
+from explorer.app.inputs.ranges import (
     box_span,
     gap_span,
     guide_span,
@@ -28,7 +21,14 @@ from explorer.app.widgets.ranges import (
     radius_span,
     variable_span,
 )
-from explorer.app.widgets.tracks import Span
+from explorer.app.inputs.tracks import Span
+from explorer.app.session.field_words import SWINGS
+from explorer.app.state.action import Action
+from explorer.app.state.actions import Open, Reset, Set, SetVariable
+from explorer.app.state.frame import Frame
+from explorer.app.state.state import Hold, State
+from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.commands import NO_OPTION
 from explorer.mechanism.design import LENGTHS, VARIABLES, Design, Limits, Pair, Range
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Triple

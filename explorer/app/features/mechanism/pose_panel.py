@@ -8,6 +8,10 @@ import viser
 
 from explorer.app.features.feature import Services
 from explorer.app.features.mechanism.modes import ModesPanel
+from explorer.app.inputs.bindings import Bound
+from explorer.app.inputs.controls import Controls
+from explorer.app.inputs.ranges import joint_span, position_span
+from explorer.app.inputs.tracks import Span
 from explorer.app.state.actions import (
     GoHome,
     SetAngle,
@@ -18,11 +22,7 @@ from explorer.app.state.actions import (
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.bindings import Bound
-from explorer.app.widgets.controls import Controls
 from explorer.app.widgets.markup import alert, note, remark
-from explorer.app.widgets.ranges import joint_span, position_span
-from explorer.app.widgets.tracks import Span
 from explorer.mechanism.design import JOINTS
 
 JOINT_HINTS = {

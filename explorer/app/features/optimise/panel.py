@@ -17,13 +17,13 @@ from explorer.app.features.optimise.problem import (
     requested_volume,
 )
 from explorer.app.features.optimise.words import result_words
+from explorer.app.inputs.bindings import At, Bound
+from explorer.app.inputs.controls import Controls
 from explorer.app.state.action import Action
 from explorer.app.state.frame import Frame
 from explorer.app.state.optimisation import PLACE
 from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.bindings import At, Bound
-from explorer.app.widgets.controls import Controls
 from explorer.measures.catalogue import CATALOGUE
 from explorer.mechanism.design import VARIABLES
 from explorer.mechanism.pose import Triple

@@ -20,6 +20,9 @@ from explorer.app.features.paths.actions import (
     pose_of_end,
 )
 from explorer.app.features.paths.margin_plot import MarginPlot, crossing_words
+from explorer.app.inputs.bindings import Bound
+from explorer.app.inputs.controls import Controls
+from explorer.app.inputs.tracks import Span
 from explorer.app.session.session import Who
 from explorer.app.state.action import Action
 from explorer.app.state.actions import Set
@@ -27,12 +30,9 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.paths import End, PathKind
 from explorer.app.state.state import State, angles_of
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.bindings import Bound
 from explorer.app.widgets.buttons import Buttons, press_button
 from explorer.app.widgets.chips import Chip, Chips, choose
-from explorer.app.widgets.controls import Controls
 from explorer.app.widgets.markup import alert, beside, box, dim, note, sentence, signed
-from explorer.app.widgets.tracks import Span
 from explorer.errors import InputError
 from explorer.export.trajectory import trajectory_csv
 from explorer.mechanism.margins import margins, mode_name, mode_of

@@ -10,14 +10,14 @@ import viser
 from explorer.app.features.feature import Services
 from explorer.app.features.prototype.feed import PartsFeed
 from explorer.app.features.prototype.parts_list import PartsList
+from explorer.app.inputs.bindings import Bound
+from explorer.app.inputs.controls import Controls
+from explorer.app.inputs.tracks import Span
 from explorer.app.state.actions import Set, draw_as
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.bindings import Bound
 from explorer.app.widgets.buttons import press_button
-from explorer.app.widgets.controls import Controls
 from explorer.app.widgets.markup import alert, box, caption, note, row, sentence, table
-from explorer.app.widgets.tracks import Span
 from explorer.mechanism.design import LENGTHS
 from explorer.numerics.number_text import format_decimals, format_number
 from explorer.prototype.bill import Actuator

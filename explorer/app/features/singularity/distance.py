@@ -11,12 +11,12 @@ import viser
 
 from explorer.app.features.feature import Services
 from explorer.app.features.singularity.actions import GoToSingularity
+from explorer.app.inputs.controls import Controls
 from explorer.app.state.frame import Frame
 from explorer.app.state.view import Ghost
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import press_button
 from explorer.app.widgets.colours import FAR_WARNINGS, proximity_colour
-from explorer.app.widgets.controls import Controls
 from explorer.app.widgets.markup import box, fitted, format_number, margin_name, meter, swatch
 from explorer.mechanism.margins import INCIDENCES, TETRAHEDRA
 from explorer.numerics.number_text import format_decimals

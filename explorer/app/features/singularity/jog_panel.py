@@ -14,15 +14,15 @@ from typing import get_args
 from explorer.app.browser.viser_gaps import Mark
 from explorer.app.features.feature import Services
 from explorer.app.features.singularity.actions import Jog, jog_start
+from explorer.app.inputs.bindings import Bound
+from explorer.app.inputs.controls import Controls
+from explorer.app.inputs.ranges import coordinate_span
+from explorer.app.inputs.tracks import Span
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.state.view import Arrows
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.bindings import Bound
-from explorer.app.widgets.controls import Controls
 from explorer.app.widgets.markup import box, dim, fitted
-from explorer.app.widgets.ranges import coordinate_span
-from explorer.app.widgets.tracks import Span
 from explorer.singularity.uncoupled import UNCOUPLED, Travel, UncoupledMotion, travels
 
 FRAMES = {

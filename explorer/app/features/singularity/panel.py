@@ -11,11 +11,12 @@ from explorer.app.features.singularity.distance import DistancePanel
 from explorer.app.features.singularity.jog_panel import JogPanel
 from explorer.app.features.singularity.performance import PerformancePanel
 from explorer.app.features.singularity.strata import StrataPanel
+from explorer.app.inputs.bindings import At
+from explorer.app.inputs.controls import Controls
+from explorer.app.inputs.ranges import length_span
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.bindings import At
 from explorer.app.widgets.colours import CLEAR, FAR, FAR_WARNINGS, SINGULAR, WARNED, css
-from explorer.app.widgets.controls import Controls
 from explorer.app.widgets.markup import (
     Look,
     box,
@@ -27,7 +28,6 @@ from explorer.app.widgets.markup import (
     table,
     ticks,
 )
-from explorer.app.widgets.ranges import length_span
 from explorer.measures.snapshot import Snapshot
 from explorer.measures.verdict import Kind, warnings
 

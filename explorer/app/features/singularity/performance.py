@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from typing import get_args
 
 from explorer.app.features.feature import Services
+from explorer.app.inputs.controls import Controls
 from explorer.app.state.frame import Frame
 from explorer.app.state.view import Gain
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.controls import Controls
 from explorer.app.widgets.markup import box, dim, format_number, row, table
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.strata import GENERIC

@@ -11,11 +11,11 @@ import viser
 from explorer.app.features.feature import Services
 from explorer.app.features.singularity.actions import GoToStratum, stratum_name
 from explorer.app.features.singularity.feed import StrataFeed
+from explorer.app.inputs.controls import Controls
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import press_button
 from explorer.app.widgets.colours import css, proximity_colour
-from explorer.app.widgets.controls import Controls
 from explorer.app.widgets.markup import box, dim, fitted
 from explorer.measures.verdict import DISTANCE_SHARE
 from explorer.singularity.bruhat import (

@@ -17,6 +17,9 @@ from explorer.app.features.studies.feed import StudyDrawing
 from explorer.app.features.studies.plots import HINT, StudyPlots
 from explorer.app.features.studies.runner import Run, study_feed, study_runner
 from explorer.app.features.studies.words import ALONG, acts, chips, head, legend, table
+from explorer.app.inputs.bindings import At, Bound
+from explorer.app.inputs.controls import Control, Controls
+from explorer.app.inputs.tracks import Span
 from explorer.app.session.session import Who
 from explorer.app.state.action import Action
 from explorer.app.state.actions import Set
@@ -31,12 +34,9 @@ from explorer.app.state.studies import (
     label_of,
 )
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.bindings import At, Bound
 from explorer.app.widgets.buttons import Buttons, Does
 from explorer.app.widgets.commands import NO_OPTION
-from explorer.app.widgets.controls import Control, Controls
 from explorer.app.widgets.markup import alert, beside
-from explorer.app.widgets.tracks import Span
 from explorer.errors import ExplorerError
 from explorer.measures.catalogue import measures_in
 from explorer.sweep.study import NAMES

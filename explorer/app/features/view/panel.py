@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from explorer.app.features.feature import Services
+from explorer.app.inputs.controls import Controls
 from explorer.app.session.session import Session
 from explorer.app.state.actions import draw_as
 from explorer.app.state.frame import Frame
@@ -14,7 +15,6 @@ from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.buttons import Buttons
 from explorer.app.widgets.chips import Chip, Chips, Effect
 from explorer.app.widgets.commands import Key, shift
-from explorer.app.widgets.controls import Controls
 from explorer.app.widgets.markup import box
 from explorer.mechanism.margins import TETRAHEDRA
 

@@ -24,6 +24,10 @@ from explorer.app.features.workspace.words import (
     volume_headline,
     workspace_details,
 )
+from explorer.app.inputs.bindings import At, Bound
+from explorer.app.inputs.controls import Controls
+from explorer.app.inputs.ranges import coordinate_span, fine_step, round_up
+from explorer.app.inputs.tracks import Span
 from explorer.app.look import read_script
 from explorer.app.security.client_messages import decode_text
 from explorer.app.session.session import Session
@@ -33,14 +37,10 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.state.view import WorkspaceView
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.bindings import At, Bound
 from explorer.app.widgets.buttons import Buttons
 from explorer.app.widgets.chips import Chip, Chips, Effect, turn
 from explorer.app.widgets.commands import Key, shift
-from explorer.app.widgets.controls import Controls
 from explorer.app.widgets.markup import alert, box, sentence
-from explorer.app.widgets.ranges import coordinate_span, fine_step, round_up
-from explorer.app.widgets.tracks import Span
 from explorer.app.widgets.under_way import UnderWay
 from explorer.mechanism.pose import Pose, Triple
 

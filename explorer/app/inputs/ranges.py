@@ -9,8 +9,8 @@ from __future__ import annotations
 import functools
 import math
 
+from explorer.app.inputs.tracks import Span, round_span
 from explorer.app.state.state import State
-from explorer.app.widgets.tracks import Span, round_span
 from explorer.mechanism.design import JOINTS, LENGTHS, Design, Pair
 from explorer.mechanism.possible_ranges import possible_ranges, without_box, without_guide
 

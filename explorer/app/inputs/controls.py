@@ -13,13 +13,13 @@ from typing import Any, Generic, Literal, cast
 import viser
 
 from explorer.app.browser.viser_gaps import Mark, SliderMarks
+from explorer.app.inputs.bindings import Bound, Source, Value, bound_to
+from explorer.app.inputs.tracks import Intervals, Span, Track, decimals, tint_marks
 from explorer.app.session.session import Session
 from explorer.app.state.action import Action
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.bindings import Bound, Source, Value, bound_to
-from explorer.app.widgets.tracks import Intervals, Span, Track, decimals, tint_marks
 from explorer.mechanism.design import Pair
 from explorer.mechanism.pose import Triple
 from explorer.numerics.number_text import drop_rounding

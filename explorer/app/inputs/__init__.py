@@ -1,0 +1,1 @@
+"""Inputs bound to the state: sliders, fields and lists, with their ranges."""
