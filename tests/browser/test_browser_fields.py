@@ -305,8 +305,9 @@ def test_a_button_pressed_right_after_typing_gets_the_last_of_it(browser: Browse
         tab.open_dialog("Designs")
         saves = tab.page.get_by_role("button", name="Save", exact=True)
         tab.row("Name").locator("input").evaluate(TYPE_AND_PRESS, saves.element_handle())
-        tab.page.get_by_role("button", name="abcd", exact=True).wait_for()
         tab.page.get_by_text("Saved.", exact=True).wait_for()
+        tab.wait_for(lambda: tab.state.design.name == "abcd", "the name")
+        expect(tab.page.get_by_role("button", name="Duplicate abcd")).to_be_visible()
         assert tab.complaints() == []
         tab.close()
 
