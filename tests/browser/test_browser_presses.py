@@ -8,6 +8,7 @@ from explorer.app.features.mechanism.marks import ARROW_LENGTH
 from explorer.app.scene.placing import Placed
 from explorer.app.screenshot import settle
 from explorer.app.session.gestures import PAUSE_SECONDS
+from explorer.app.state.actions import SetPosition
 from explorer.app.state.frame import Frame
 
 REST = 1000 * (PAUSE_SECONDS + 0.3)
@@ -20,6 +21,12 @@ BUSY_AT_RELEASE = """() => {
         for (const end = performance.now() + 1000; performance.now() < end;);
     };
     addEventListener("pointerup", move, {capture: true, once: true});
+}"""
+
+# What viser does to markup whose numbers change.
+REPLACE = """selector => {
+    const button = document.querySelector(selector);
+    button.replaceWith(button.cloneNode(true));
 }"""
 
 
@@ -109,3 +116,21 @@ def test_release_that_was_lost_ends_with_the_next_move_of_the_pointer(tab: Tab) 
     tab.slider("x").focus()
     tab.page.keyboard.press("ArrowRight")
     tab.wait_for(lambda: steps(tab) == 2, "a step of its own")
+
+
+def test_same_press_after_the_page_was_loaded_again_counts(tab: Tab) -> None:
+    # It is the first press of its page each time.
+    for value in (11.0, 12.0):
+        tab.running.page.session.do(SetPosition(0, value))
+        button = tab.page.get_by_role("button", name=f"Undo x = {value:g}")
+        button.click()
+        tab.wait_for(lambda: tab.stands("x", 10.0), "the pose of before")
+        tab.reload()
+
+
+def test_press_on_markup_that_is_replaced_before_the_release_counts(tab: Tab) -> None:
+    tab.page.get_by_role("button", name="Help", exact=True).hover()
+    tab.page.mouse.down()
+    tab.page.evaluate(REPLACE, "[data-opens=Help]")
+    tab.page.mouse.up()
+    tab.page.get_by_role("dialog", name="Help").wait_for()

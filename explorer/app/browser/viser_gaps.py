@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
+import importlib
 import io
 import threading
 import time
@@ -48,6 +50,7 @@ def start_viser(
     """
     # A tab may close while a message is on its way to it; that needs no warning.
     warnings.filterwarnings("ignore", "Queued a .* on a closed connection")
+    _wake_tabs_by_their_loop()
     with contextlib.redirect_stdout(io.StringIO()), _serving_through(guarded) as is_guarded:
         server = viser.ViserServer(host=host, port=port, verbose=False)
     if not is_guarded():
@@ -57,6 +60,43 @@ def start_viser(
             "install the version that it asks for: pip install --force-reinstall flagged-explorer"
         )
     return server
+
+
+class _LoopEvent(asyncio.Event):
+    """An event that only its loop sets.
+
+    viser sets the event that wakes a tab's messages twice: at once, from any thread, and through
+    the loop. asyncio's events are not safe for the first: a tab that begins to wait at that moment
+    is overlooked for good, or the thread fails.
+
+    Args:
+        loop: The loop.
+    """
+
+    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
+        super().__init__()
+        self._own_loop = loop
+
+    def set(self) -> None:
+        """Set the event if this runs in its loop, and do nothing otherwise."""
+        with contextlib.suppress(RuntimeError):
+            if asyncio.get_running_loop() is self._own_loop:
+                super().set()
+
+
+def _wake_tabs_by_their_loop() -> None:
+    """Let all buffers of messages that viser makes from now on have events of their loop."""
+    serving: Any = importlib.import_module(SERVING_MODULE)
+    plain: Any = serving.AsyncMessageBuffer
+    if plain.__module__ == __name__:
+        return
+
+    class Buffer(plain):
+        def __init__(self, event_loop: asyncio.AbstractEventLoop, **options: Any) -> None:
+            plain.__init__(self, event_loop, **options)
+            self.message_event = _LoopEvent(event_loop)
+
+    serving.AsyncMessageBuffer = Buffer
 
 
 @contextlib.contextmanager

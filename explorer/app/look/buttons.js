@@ -3,20 +3,23 @@
 // that name with the same value, and without a value once it is left.
 window.explorer.buttons ??= (() => {
   let inbox = null;
-  // The same press twice in a row is two messages.
-  let count = 0;
+  // The same press twice in a row is two messages, also one from this page and one from another, or
+  // from the page before it was loaded again.
+  let count = Math.floor(Math.random() * 2 ** 52);
   window.explorer.press = (name, value) => {
     count += 1;
     const text = JSON.stringify({ name, value, count });
     window.explorer.send(inbox, text);
   };
-  const buttonAt = (target) => target.closest?.("[data-press]") ?? null;
-  const isSame = (one, other) =>
-    one.dataset.press === other.dataset.press && one.dataset.value === other.dataset.value;
   addEventListener("click", ({ target }) => {
-    const button = buttonAt(target);
+    const button = target.closest?.("[data-press]");
     if (button) window.explorer.press(button.dataset.press, button.dataset.value ?? "");
   });
+  // Buttons that press, and those that open a tab or a dialog.
+  const BUTTON = "[data-press], [data-opens]";
+  const buttonAt = (target) => target.closest?.(BUTTON) ?? null;
+  const isSame = (one, other) =>
+    ["press", "value", "opens"].every((key) => one.dataset[key] === other.dataset[key]);
   // Markup is replaced when its numbers change: a press that began on the old markup counts, and
   // the focus of the keyboard stays.
   let pressed = null;
@@ -78,7 +81,7 @@ window.explorer.buttons ??= (() => {
   };
   const keepFocus = () => {
     if (!focused || focused.isConnected || document.activeElement !== document.body) return;
-    const buttons = [...document.querySelectorAll("[data-press]")];
+    const buttons = [...document.querySelectorAll(BUTTON)];
     buttons.find((button) => isSame(button, focused))?.focus({ preventScroll: true });
   };
   const followMarkup = () => {
