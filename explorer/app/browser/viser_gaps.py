@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import importlib
 import io
+import sys
 import threading
 import time
 import warnings
@@ -86,10 +86,11 @@ class _LoopEvent(asyncio.Event):
 
 def _wake_tabs_by_their_loop() -> None:
     """Let all buffers of messages that viser makes from now on have events of their loop."""
-    serving: Any = importlib.import_module(SERVING_MODULE)
-    plain: Any = serving.AsyncMessageBuffer
-    if plain.__module__ == __name__:
+    serving: Any = sys.modules.get(SERVING_MODULE)
+    # A viser that serves from elsewhere is refused once it serves.
+    if serving is None or serving.AsyncMessageBuffer.__module__ == __name__:
         return
+    plain: Any = serving.AsyncMessageBuffer
 
     class Buffer(plain):
         def __init__(self, event_loop: asyncio.AbstractEventLoop, **options: Any) -> None:
