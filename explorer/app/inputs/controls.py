@@ -283,11 +283,10 @@ class Controls:
         bound = bound_to(at, label)
         if callable(step):
             handle = self._gui.add_number(label, least, min=least, hint=hint)
-            control = Number(self._session, handle, bound, step, visible)
+            self._controls.append(Number(self._session, handle, bound, step, visible))
         else:
             handle = self._gui.add_number(label, least, min=least, step=step, hint=hint)
-            control = Control(self._session, handle, bound, visible=visible)
-        self._controls.append(control)
+            self._bind(handle, bound, visible=visible)
 
     def triple(
         self,
@@ -300,8 +299,7 @@ class Controls:
     ) -> None:
         """Add three number fields side by side."""
         handle = self._gui.add_vector3(label, (0.0, 0.0, 0.0), step=step, hint=hint)
-        bound = bound_to(at, label)
-        self._controls.append(Control(self._session, handle, bound, visible=visible))
+        self._bind(handle, bound_to(at, label), visible=visible)
 
     def checkbox(
         self,
@@ -313,8 +311,7 @@ class Controls:
     ) -> None:
         """Add a checkbox."""
         handle = self._gui.add_checkbox(label, initial_value=False, hint=hint)
-        bound = bound_to(at, label)
-        self._controls.append(Control(self._session, handle, bound, disabled=disabled))
+        self._bind(handle, bound_to(at, label), disabled=disabled)
 
     def dropdown(
         self,
@@ -336,16 +333,14 @@ class Controls:
         """
         handle = self._gui.add_dropdown(label, tuple(options), hint=hint)
         values = options if isinstance(options, Mapping) else {text: text for text in options}
-        bound: Bound[str] = bound_to(at, label, values)
-        self._controls.append(Control[str](self._session, handle, bound, disabled=disabled))
+        self._bind(handle, bound_to(at, label, values), disabled=disabled)
 
     def text(
         self, label: str, hint: str, at: Source[str], *, disabled: Condition | None = None
     ) -> None:
         """Add a line of text."""
         handle = self._gui.add_text(label, "", hint=hint)
-        bound = bound_to(at, label)
-        self._controls.append(Control(self._session, handle, bound, disabled=disabled))
+        self._bind(handle, bound_to(at, label), disabled=disabled)
 
     def button(
         self,
@@ -372,6 +367,18 @@ class Controls:
             self._session.do(action(), who=event.client_id)
 
         return handle
+
+    def _bind(
+        self,
+        handle: viser.GuiInputHandle[Value],
+        bound: Bound[Value],
+        *,
+        disabled: Condition | None = None,
+        visible: Condition | None = None,
+    ) -> None:
+        """Bind an input that has no range to the state."""
+        control = Control(self._session, handle, bound, disabled=disabled, visible=visible)
+        self._controls.append(control)
 
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that make every control show the frame."""
