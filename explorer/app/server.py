@@ -14,8 +14,8 @@ from pathlib import Path
 
 import viser
 
-from explorer.app.browser.viser_gaps import (
-    ServerControls,
+from explorer.app.browser.viser_gaps import ServerControls
+from explorer.app.browser.viser_server import (
     refuse_tunnels,
     report_uploads_to_senders,
     start_viser,

@@ -9,7 +9,7 @@ import viser
 from desk import Desk
 from services import StubWorker, services_for
 
-from explorer.app.browser.viser_gaps import start_viser, stop_viser
+from explorer.app.browser.viser_server import start_viser, stop_viser
 from explorer.app.features.feature import Services
 from explorer.app.server import Running, start
 from explorer.app.session.jobs import Worker

@@ -20,7 +20,7 @@ import viser
 from page_props import shown_by
 
 import explorer.app
-from explorer.app.browser.viser_gaps import start_viser, stop_viser
+from explorer.app.browser.viser_server import start_viser, stop_viser
 from explorer.app.features.designs.saved_designs import SavedDesigns
 from explorer.app.features.listed import FEATURES
 from explorer.app.features.optimise.actions import (

@@ -25,7 +25,8 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Origin, Subprotocol
 
-from explorer.app.browser.viser_gaps import ServerControls, start_viser, stop_viser
+from explorer.app.browser.viser_gaps import ServerControls
+from explorer.app.browser.viser_server import start_viser, stop_viser
 from explorer.app.features.optimise import buttons
 from explorer.app.screenshot import PATIENCE_SECONDS
 from explorer.app.security import client_messages
@@ -472,8 +473,8 @@ def test_a_viser_that_serves_in_another_way_is_not_used(monkeypatch: pytest.Monk
         stop_viser(server)
 
     # As if viser had come to serve from elsewhere.
-    monkeypatch.setattr("explorer.app.browser.viser_gaps.SERVING_MODULE", "viser.elsewhere")
-    monkeypatch.setattr("explorer.app.browser.viser_gaps.stop_viser", stop)
+    monkeypatch.setattr("explorer.app.browser.viser_server.SERVING_MODULE", "viser.elsewhere")
+    monkeypatch.setattr("explorer.app.browser.viser_server.stop_viser", stop)
     with pytest.raises(
         ServerError, match=r"^viser [^\n]* does not guard; [^\n]*pip install[^\n]*$"
     ):

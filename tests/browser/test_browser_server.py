@@ -20,7 +20,8 @@ import viser
 from client import PROTOCOL, opened
 
 from explorer.app import server as server_module
-from explorer.app.browser.viser_gaps import Serve, start_viser
+from explorer.app.browser.viser_server import start_viser
+from explorer.app.security.guard import Serve
 from explorer.app.server import Running, start
 from explorer.errors import ServerError
 from explorer.mechanism.design_file import PRESETS

@@ -1,138 +1,24 @@
-"""Features of viser without a public name; only this module uses its private names."""
+"""Features of viser's scene and controls without a public name."""
 
 from __future__ import annotations
 
-import asyncio
-import contextlib
-import io
-import sys
-import threading
 import time
-import warnings
 from collections.abc import Callable, Generator
 from typing import Any, cast
 
 import numpy as np
 import viser
-import websockets.asyncio.server
 from numpy.typing import ArrayLike
 
 from explorer.app.security.client_messages import ControlValue
-from explorer.errors import ServerError
 from explorer.numerics.arrays import FloatArray
 
 Mark = tuple[float, str]
 SceneMessage = dict[str, Any]
 """A message that makes or changes a part of the scene: its type, its fields by name."""
-Serve = Callable[..., Any]
 
 # Properties that place a node of the scene.
 PLACE = ("position", "wxyz")
-
-# Name of the module of viser that serves.
-SERVING_MODULE = "viser.infra._infra"
-_serving_lock = threading.Lock()
-
-
-def start_viser(
-    host: str, port: int, guarded: Callable[[Serve], Serve] | None = None
-) -> viser.ViserServer:
-    """Return a running server, without the banner that viser prints to standard output.
-
-    Args:
-        host: The address to listen on.
-        port: The port to listen on; any free one if 0.
-        guarded: Returns a replacement for websockets' function by which viser serves; with
-            None everybody gets in.
-
-    Raises:
-        ServerError: this viser does not serve in the way that is guarded.
-    """
-    # A tab may close while a message is on its way to it; that needs no warning.
-    warnings.filterwarnings("ignore", "Queued a .* on a closed connection")
-    _wake_tabs_by_their_loop()
-    with contextlib.redirect_stdout(io.StringIO()), _serving_through(guarded) as is_guarded:
-        server = viser.ViserServer(host=host, port=port, verbose=False)
-    if not is_guarded():
-        stop_viser(server)
-        raise ServerError(
-            f"viser {viser.__version__} serves in a way that the explorer does not guard; "
-            "install the version that it asks for: pip install --force-reinstall flagged-explorer"
-        )
-    return server
-
-
-class _LoopEvent(asyncio.Event):
-    """An event that only its loop sets.
-
-    viser sets the event that wakes a tab's messages twice: at once, from any thread, and through
-    the loop. asyncio's events are not safe for the first: a tab that begins to wait at that moment
-    is overlooked for good, or the thread fails.
-
-    Args:
-        loop: The loop.
-    """
-
-    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
-        super().__init__()
-        self._own_loop = loop
-
-    def set(self) -> None:
-        """Set the event if this runs in its loop, and do nothing otherwise."""
-        with contextlib.suppress(RuntimeError):
-            if asyncio.get_running_loop() is self._own_loop:
-                super().set()
-
-
-def _wake_tabs_by_their_loop() -> None:
-    """Let all buffers of messages that viser makes from now on have events of their loop."""
-    serving: Any = sys.modules.get(SERVING_MODULE)
-    # A viser that serves from elsewhere is refused once it serves.
-    if serving is None or serving.AsyncMessageBuffer.__module__ == __name__:
-        return
-    plain: Any = serving.AsyncMessageBuffer
-
-    class Buffer(plain):
-        def __init__(self, event_loop: asyncio.AbstractEventLoop, **options: Any) -> None:
-            plain.__init__(self, event_loop, **options)
-            self.message_event = _LoopEvent(event_loop)
-
-    serving.AsyncMessageBuffer = Buffer
-
-
-@contextlib.contextmanager
-def _serving_through(guarded: Callable[[Serve], Serve] | None) -> Generator[Callable[[], bool]]:
-    """Let viser alone serve through `guarded`; yield a function that returns whether it did."""
-    if guarded is None:
-        yield lambda: True
-        return
-    websockets_server: Any = websockets.asyncio.server
-    plain = websockets_server.serve
-    used: list[Serve] = []
-
-    def serve(handler: Any, *args: Any, **options: Any) -> Any:
-        if handler.__module__ != SERVING_MODULE:
-            return plain(handler, *args, **options)
-        # viser tries port after port; each time it is the same guard.
-        used[:] = used or [guarded(plain)]
-        return used[0](handler, *args, **options)
-
-    with _serving_lock:
-        websockets_server.serve = serve
-        try:
-            yield lambda: bool(used)
-        finally:
-            websockets_server.serve = plain
-
-
-def stop_viser(server: viser.ViserServer) -> None:
-    """Stop a server, without the line that its thread prints to standard output."""
-    internals: Any = server
-    with contextlib.redirect_stdout(io.StringIO()):
-        server.stop()
-        thread = getattr(internals._websock_server, "_server_thread", None)
-        if thread is not None:
-            thread.join(timeout=5.0)
 
 
 class SliderMarks:
@@ -151,37 +37,6 @@ class SliderMarks:
         from viser import _messages
 
         self._slider._marks = tuple(_messages.GuiSliderMark(value, label) for value, label in marks)
-
-
-def refuse_tunnels(server: viser.ViserServer) -> None:
-    """Ignore every request for a public tunnel; viser opens one for any client that asks."""
-    from viser import _messages
-
-    internals: Any = server
-    internals._websock_server.unregister_handler(_messages.ShareUrlRequest)
-
-
-def report_uploads_to_senders(server: viser.ViserServer) -> None:
-    """Report the progress of an upload only to the browser that sends it.
-
-    viser reports it to all browsers, also later ones, which then show a file without a name.
-    """
-    from viser import _messages
-
-    gui: Any = server.gui
-    interface = gui._websock_interface
-    queue_for_all = interface.queue_message
-
-    def queue_message(message: Any) -> None:
-        if not isinstance(message, _messages.FileTransferPartAck):
-            queue_for_all(message)
-            return
-        upload = gui._current_file_upload_states.get(message.transfer_uuid)
-        sender: Any = server.get_clients().get(upload["client_id"]) if upload else None
-        if sender is not None:
-            sender._websock_connection.queue_message(message)
-
-    interface.queue_message = queue_message
 
 
 def place(node: viser.SceneNodeHandle, name: str, value: ArrayLike) -> None:

@@ -3,8 +3,8 @@
 // that name with the same value, and without a value once it is left.
 window.explorer.buttons ??= (() => {
   let inbox = null;
-  // The same press twice in a row is two messages, also one from this page and one from another, or
-  // from the page before it was loaded again.
+  // Two equal presses in a row must be different messages, even if they come from two pages or
+  // from one page before and after it was loaded again.
   let count = Math.floor(Math.random() * 2 ** 52);
   window.explorer.press = (name, value) => {
     count += 1;

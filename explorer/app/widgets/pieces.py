@@ -1,7 +1,8 @@
 """The controls of a page as viser holds them: places, words, options, and a way to use one.
 
 The command palette and the tests read them here, so that neither lags behind the page. Beside
-`explorer.app.browser.viser_gaps` this is the one module that uses private names of viser.
+`viser_gaps` and `viser_server` in `explorer.app.browser` this is the one module that uses private
+names of viser.
 """
 
 from __future__ import annotations

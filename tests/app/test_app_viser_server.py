@@ -6,7 +6,7 @@ import asyncio
 import threading
 from typing import Any
 
-from explorer.app.browser.viser_gaps import start_viser, stop_viser
+from explorer.app.browser.viser_server import start_viser, stop_viser
 
 
 def test_a_message_sent_as_a_tab_begins_to_wait_wakes_it() -> None:
