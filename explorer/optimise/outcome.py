@@ -11,12 +11,13 @@ from typing import Literal
 from explorer.mechanism.design import Design
 from explorer.optimise.problem import Problem
 
-Status = Literal["converged", "not converged", "infeasible", "stalled", "cancelled"]
+Status = Literal["converged", "not converged", "infeasible", "stalled", "outdone", "cancelled"]
 """Converged: the design, read back from its file, meets all demands and has a workspace, and no
 design nearby that meets them has a better objective. Not converged: the iterations ended first.
 Infeasible: the search found no design that meets all demands. Stalled: the demands are met,
-but no step improves the objective although the conditions of an optimum fail. Cancelled: `stop`
-ended the search."""
+but no step improves the objective although the conditions of an optimum fail. Outdone: even
+without the clearance demanded, the best design is no better than that of an earlier start.
+Cancelled: `stop` ended the search."""
 
 Phase = Literal["opening", "growing", "solving"]
 """Opening: searching a design whose workspace is not empty. Growing: enlarging the workspace,

@@ -9,13 +9,11 @@ from explorer.errors import InputError
 from explorer.numerics.compiled import warm_in_background
 from explorer.optimise.outcome import Outcome, Run
 from explorer.optimise.problem import Problem
-from explorer.optimise.search.search import Search
+from explorer.optimise.search.search import SAME, Search
 from explorer.optimise.search.starts import check_starts, more_starts
 from explorer.optimise.search.trail import Trail, Watch
 
 MOST_ITERATIONS = 300
-# Objectives that differ by less than this share are the same.
-SAME = 1e-6
 
 
 def optimise_design(
@@ -55,7 +53,9 @@ def optimise_design(
     runs: list[Run] = []
     for values in (problem.start_values, *more_starts(problem, starts - 1, seed)):
         trail.run = len(runs)
-        runs.append(Search(problem, values, iterations, trail).run())
+        best = runs[_best(runs, trail)] if runs else None
+        to_beat = best.best if best is not None and best.status == "converged" else None
+        runs.append(Search(problem, values, iterations, trail, to_beat).run())
         done = problem.objective == "match-volume" and runs[-1].status == "converged"
         if done or trail.is_cancelled:
             break

@@ -178,6 +178,32 @@ def test_several_starts_reach_an_optimum_that_one_misses() -> None:
     assert {each.run for each in several.history} == set(range(4))
 
 
+def test_start_outdone_even_without_the_clearance_ends_there() -> None:
+    problem = reach_problem(0.2)
+    outcome = optimise_design(problem, starts=2)
+    assert_is_sound(outcome)
+    first, second = outcome.runs
+    assert outcome.run is first
+    assert (first.status, second.status) == ("converged", "outdone")
+    margin = problem.demands.clearance_margin
+    assert least_clearance_by_sampling(first.best.design, margin, 100_000) >= 0.2
+    # The second comes to what it comes to without the demand, which is worse than the first.
+    alone = optimise_design(started_at(reach_problem(), second.start))
+    assert second.best.objective == pytest.approx(alone.best.objective, rel=1e-9)
+    assert second.best.objective > first.best.objective
+    # Its iterates say that the legs are too near.
+    assert least_clearance_by_sampling(second.best.design, margin, 100_000) < 0.2
+    assert second.best.spare < 0.0
+    assert "clearance of legs" in second.best.worst
+
+
+def test_optimum_on_the_clearance_is_between_those_without_it_and_with_more() -> None:
+    reaches = [optimise_design(reach_problem(each)).best.objective for each in (None, 0.2, 0.5)]
+    # The optimum without the demand keeps 0.2, but not 0.5.
+    assert reaches[0] == pytest.approx(reaches[1], rel=1e-9)
+    assert reaches[1] < reaches[2] * (1.0 - 1e-3)
+
+
 def test_optimum_in_a_kink_of_the_volume_converges() -> None:
     # With more room for b1 the balls of legs 1 and 4 become one: −R b1 = a3.
     outcome = optimise_design(make_problem(OPTIMAL, "smallest-reach"))
@@ -416,7 +442,7 @@ def test_crossings_agree_with_random_positions() -> None:
         design = OPTIMAL.with_variables((OPTIMAL.variables + 2.0 * random.normal(size=6)).tolist())
         rotation = home_pose(design).rotation
         sampled = least_clearance_by_sampling(design, 1.0, 40_000)
-        found = crossings(design, rotation, 0.25, 1.0, lambda: None)
+        found = crossings(design, rotation, 0.25, 1.0, 0.1, lambda: None)
         if not 0.24 < sampled < 0.25:
             assert (len(found) > 0) == (sampled < 0.25)
             verdicts.add(len(found) > 0)

@@ -50,17 +50,8 @@ class ClearanceDemand:
     def measure(self, state: State) -> Measured:
         """Return the bounds of the six pairs over the clearance, and their derivatives."""
         sharp, p = SHARPNESS / self.clearance, self.positions
-        axes = leg_axes(state.design, p, state.rotation)
-        distance, points = np.empty((len(p), 6)), np.empty((len(p), 6, 2, 3))
-        pair_rows(len(p), axes, distance, points)
-        # Infinite where two legs share a joint.
-        most = FAR * state.problem.size
-        # A limit that no position satisfies, such as the gap, has its own demand: as a way out
-        # it would make this bound leap, from far below zero to met, where that is missed by little.
-        limits = [it for it in state.limits if isinstance(it, BallOrCylinder | HalfSpace)]
-        outside = np.minimum([-limit.slack(p) for limit in limits], most)
-        spare = distance - radii_of_pairs(state.design) - self.clearance
-        spare[:, joined_pairs(state.design)] = most
+        axes, points, distance, spare = self._spare(state)
+        limits, outside = self._outside(state)
         # Shift that keeps the smooth maximum over all ways out from exceeding the true one.
         ways = math.log(len(outside) + 1.0)
         out = _log_sum(sharp * outside.T)
@@ -75,6 +66,36 @@ class ClearanceDemand:
             shares = by_leaving[rows] * np.exp(sharp * far[rows] - out[rows])[:, None]
             gradients -= shares.T @ state.slack(limit, p[rows])[1]
         return Measured(least / sharp / self.clearance, gradients / self.clearance)
+
+    def worst(self, state: State) -> tuple[float, str]:
+        """Return the least of the values that `measure` bounds from below, and its pair."""
+        spare, (_, outside) = self._spare(state)[-1], self._outside(state)
+        kept = np.maximum(spare, outside.max(axis=0)[:, None])
+        least = kept.min(axis=0, initial=_most(state)) / self.clearance
+        pair = int(least.argmin())
+        return float(least[pair]), self.names[pair]
+
+    def _spare(self, state: State) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Return axes of the legs, closest points, distances, and distances less the demanded."""
+        p = self.positions
+        axes = leg_axes(state.design, p, state.rotation)
+        distance, points = np.empty((len(p), 6)), np.empty((len(p), 6, 2, 3))
+        pair_rows(len(p), axes, distance, points)
+        spare = distance - radii_of_pairs(state.design) - self.clearance
+        spare[:, joined_pairs(state.design)] = _most(state)
+        return axes, points, distance, spare
+
+    def _outside(self, state: State) -> tuple[list[BallOrCylinder | HalfSpace], FloatArray]:
+        """Return the limits that offer a way out, and how far each position is outside them."""
+        # A limit that no position satisfies, such as the gap, has its own demand: as a way out
+        # it would make the bound leap, from far below zero to met, where that is missed by little.
+        limits = [it for it in state.limits if isinstance(it, BallOrCylinder | HalfSpace)]
+        return limits, np.minimum([-limit.slack(self.positions) for limit in limits], _most(state))
+
+
+def _most(state: State) -> float:
+    """Return the cap on slacks, that of two legs which share a joint, in design units."""
+    return FAR * state.problem.size
 
 
 def _log_sum(values: FloatArray) -> FloatArray:

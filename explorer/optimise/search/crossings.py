@@ -8,15 +8,13 @@ from explorer.mechanism.design import Design
 from explorer.numerics.arrays import FloatArray
 from explorer.workspace.least_clearance import least_clearances
 
-# Tolerance of a least clearance, over the clearance demanded.
-FINEST = 0.1
-
 
 def crossings(
     design: Design,
     rotation: FloatArray,
     clearance: float,
     margin: float,
+    tolerance: float,
     before_each: Callable[[], None],
 ) -> FloatArray:
     """Return the positions of the least clearances that are less than demanded, shape (k, 3).
@@ -26,12 +24,13 @@ def crossings(
         rotation: Rotation from platform to base, shape (3, 3).
         clearance: Clearance demanded of every pair of legs.
         margin: Least |δ| of the positions that count.
+        tolerance: Tolerance of a least clearance, over the clearance demanded.
         before_each: Function that is called before each batch of positions; it may raise.
     """
     least = least_clearances(
         design,
         rotation,
-        FINEST * clearance,
+        tolerance * clearance,
         below=clearance,
         margin=margin,
         before_each=before_each,

@@ -59,6 +59,7 @@ class Model:
         problem: The problem.
         start: Values of its variables to start from.
         before_each: Called before each evaluation; may raise to end the search.
+        is_relaxed: Whether the clearance, by far the most expensive demand, is left out.
     """
 
     def __init__(
@@ -66,8 +67,11 @@ class Model:
         problem: Problem,
         start: Sequence[float],
         before_each: Callable[[], None] | None = None,
+        *,
+        is_relaxed: bool = False,
     ) -> None:
         self.problem = problem
+        self.is_relaxed = is_relaxed
         self._before_each = before_each
         self.scales = scales(problem)
         self.count = len(problem.names)
@@ -75,6 +79,13 @@ class Model:
         u = np.array(start) / self.scales
         here = State(problem, u)
         self.demands: list[Demand] = _demands(problem, here)
+        clearance = problem.demands.clearance
+        self._clearance: ClearanceDemand | None = None
+        if clearance is not None:
+            positions = first_positions(problem, here.design)
+            self._clearance = ClearanceDemand(clearance, positions)
+            if not is_relaxed:
+                self.demands.append(self._clearance)
         self.margins = next((d for d in self.demands if isinstance(d, MarginDemand)), None)
         if self.raises_worst:
             u = np.append(u, float(box_margins(here)[0].min()) / problem.size)
@@ -114,19 +125,11 @@ class Model:
             pairs.append((-np.inf, np.inf))
         return np.array(pairs)
 
-    @property
-    def positions(self) -> FloatArray:
-        """Positions at which clearance is demanded, shape (k, 3)."""
-        return np.vstack([np.zeros((0, 3)), *(demand.positions for demand in self._clearances())])
-
     def add_positions(self, positions: FloatArray) -> None:
         """Demand clearance at more positions, shape (k, 3)."""
-        for demand in self._clearances():
-            demand.positions = np.vstack([demand.positions, positions])
+        if self._clearance is not None:
+            self._clearance.positions = np.vstack([self._clearance.positions, positions])
         self._last = None
-
-    def _clearances(self) -> list[ClearanceDemand]:
-        return [demand for demand in self.demands if isinstance(demand, ClearanceDemand)]
 
     def at(self, u: FloatArray) -> Evaluation:
         """Return the evaluation at scaled variables; the last one is remembered.
@@ -194,6 +197,14 @@ class Model:
         value = float(at.values[index])
         return value if spare[index] < 0.0 else max(0.0, value), self.names[index]
 
+    def worst_of_all(self, at: Evaluation) -> tuple[float, str]:
+        """Return what `worst` does with the clearance too, at its positions, if it is left out."""
+        spare, name = self.worst(at)
+        if self._clearance is None or not self.is_relaxed:
+            return spare, name
+        least, pair = self._clearance.worst(at.state)
+        return (spare, name) if spare <= max(least, -MET) else (least, pair)
+
     def reported(self, at: Evaluation) -> float:
         """Return the objective in its own unit, see `reported_objective`."""
         return reported_objective(self.problem, at.state)
@@ -228,7 +239,4 @@ def _demands(problem: Problem, start: State) -> list[Demand]:
         listed.append(BoxDemand(start))
     if problem.objective == "largest-margin":
         listed.append(MarginDemand())
-    if demands.clearance is not None:
-        positions = first_positions(problem, start.design)
-        listed.append(ClearanceDemand(demands.clearance, positions))
     return listed

@@ -6,12 +6,15 @@ too. All of this is checked with the design as its file will be read.
 
 Clearances divide the designs into regions: on the border between two of them legs cross, which
 no solver that follows slopes passes. Where a region holds no solution, the search continues in
-another.
+another. Without the clearance the search is ten times as short and passes those borders, so that
+it comes first: its optimum often keeps the clearance, or is outdone by another start already.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import contextlib
+import itertools
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import msgspec
@@ -44,10 +47,19 @@ OPEN = 0.01
 ROUNDS = 8
 # An objective that changes by no more than this share within so many steps has settled.
 STILL_STEPS, STILL = 4, 1e-9
-# Attempts of a search, and steps of an attempt to match a volume, for which Newton's method needs
-# a dozen or fails.
+# Attempts of a search with all its demands, and steps of an attempt to match a volume, for which
+# Newton's method needs a dozen or fails.
 ATTEMPTS = 8
 STEPS_TO_MATCH = 40
+# Steps of the attempt without the clearance, for which an optimum takes a dozen or two.
+STEPS_WITHOUT_CLEARANCE = 60
+# Tolerance of a least clearance, over the clearance demanded: between positions at which it is
+# demanded, and where it is demanded nowhere.
+BETWEEN, ANYWHERE = 0.1, 0.001
+# Statuses after which a run makes no other attempt.
+ENDED = ("converged", "outdone", "cancelled")
+# Objectives that differ by less than this share are the same.
+SAME = 1e-6
 
 
 class Attempt(NamedTuple):
@@ -67,35 +79,35 @@ class Search:
         start: Values of its variables to start from.
         most: Most steps of the solver.
         trail: Record of every iterate.
+        to_beat: Best iterate of the runs so far that converged; None if none did.
     """
 
-    def __init__(self, problem: Problem, start: Sequence[float], most: int, trail: Trail) -> None:
+    def __init__(
+        self,
+        problem: Problem,
+        start: Sequence[float],
+        most: int,
+        trail: Trail,
+        to_beat: Iterate | None = None,
+    ) -> None:
         self.problem = problem
         self.start = tuple(start)
         self.steps_left = most
         self.trail = trail
+        self.to_beat = to_beat
         self.steps = 0
         self.evaluations = 0
         self.largest_volume = 0.0
 
     def run(self) -> Run:
         """Search, and return the run."""
-        attempts = [self._attempt(self.start)]
-        elsewhere = None
-        while (
-            attempts[-1].status not in ("converged", "cancelled")
-            and self.steps_left > 0
-            and len(attempts) < ATTEMPTS
-        ):
-            if elsewhere is None:
-                elsewhere = promising_starts(self.problem, self.trail.run, self.trail.before_each)
-            try:
-                values = next(elsewhere, None)
-            except Stop:
-                break
-            if values is None:
-                break
-            attempts.append(self._attempt(values))
+        attempts: list[Attempt] = []
+        # `promising_starts` evaluates designs too.
+        with contextlib.suppress(Stop):
+            for attempt in self._attempts():
+                attempts.append(attempt)
+                if attempt.status in ENDED or self.steps_left <= 0:
+                    break
         chosen = min(attempts, key=self._rank)
         if self.trail.is_cancelled:
             chosen = chosen._replace(status="cancelled", holding="", message="")
@@ -110,6 +122,16 @@ class Search:
             holding=chosen.holding if limit is None else limit.limit,
             message=self._message(chosen, limit),
         )
+
+    def _attempts(self) -> Iterator[Attempt]:
+        """Yield one attempt after another, from the start and then from elsewhere."""
+        demands = self.problem.demands
+        if demands.clearance is not None and self.problem.objective != "match-volume":
+            yield self._attempt(self.start, is_relaxed=True)
+        yield self._attempt(self.start)
+        places = promising_starts(self.problem, self.trail.run, self.trail.before_each)
+        for values in itertools.islice(places, ATTEMPTS - 1):
+            yield self._attempt(values)
 
     def _rank(self, attempt: Attempt) -> tuple[bool, tuple[bool, float, float]]:
         return attempt.status != "converged", self.trail.rank(attempt.best)
@@ -140,8 +162,13 @@ class Search:
             )
         return chosen.message or _default_message(self.problem, chosen, self.steps)
 
-    def _attempt(self, values: Sequence[float]) -> Attempt:
-        """Search from some values of the variables."""
+    def _attempt(self, values: Sequence[float], *, is_relaxed: bool = False) -> Attempt:
+        """Search from some values of the variables.
+
+        Args:
+            values: The values.
+            is_relaxed: Whether the clearance is not demanded, but only looked at in the end.
+        """
         problem, trail = self.problem, self.trail
         trail.begin()
         try:
@@ -157,7 +184,8 @@ class Search:
                     )
                     return Attempt("infeasible", because[0] if because else "", words, trail.best)
                 values = (opened * scales(problem)).tolist()
-            return self._solve(Model(problem, values, trail.before_each))
+            model = Model(problem, values, trail.before_each, is_relaxed=is_relaxed)
+            return self._solve(model)
         except Stop:
             if not trail.history:
                 trail.see_opening(State(problem, np.array(values) / scales(problem)), "")
@@ -185,8 +213,13 @@ class Search:
             at = self._feasible(model, self._sqp(model, at.u, "solving", self._is_settled))
             is_done = self._is_done(model, at)
             if is_done:
-                missed = self._crossings(at.state.read_back())
+                missed = self._crossings(model, at)
                 if not len(missed):
+                    break
+                if model.is_relaxed:
+                    last = self.trail.last_at(at.state)
+                    if self._is_outdone(last):
+                        return Attempt("outdone", optimality(model, at).holding, "", last)
                     break
                 model.add_positions(missed)
                 # Earlier iterates do not keep the clearance there.
@@ -195,14 +228,23 @@ class Search:
                 break
             elif self._is_short(at.state) and not has_grown:
                 has_grown = True
-                grown = self._grow(at)
+                grown = self._grow(model, at)
                 if grown is None:
                     break
-                model = Model(self.problem, grown, self.trail.before_each)
+                model = Model(
+                    self.problem, grown, self.trail.before_each, is_relaxed=model.is_relaxed
+                )
                 at = model.at(model.start)
             elif self.problem.objective == "match-volume" or self.steps == before:
                 break
         return self._verdict(model, at, missed, is_done=is_done)
+
+    def _is_outdone(self, optimum: Iterate) -> bool:
+        """Whether an optimum without the clearance is no better than what is known with it."""
+        if self.to_beat is None:
+            return False
+        value, least = (self.trail.rank(iterate)[-1] for iterate in (optimum, self.to_beat))
+        return value >= least - SAME * abs(least)
 
     def _is_done(self, model: Model, at: Evaluation) -> bool:
         """Whether a place solves the problem, but for clearances between positions."""
@@ -241,12 +283,13 @@ class Search:
         demanded = self.problem.demands.volume
         return demanded is not None and state.volume < demanded * (1.0 - MET)
 
-    def _grow(self, at: Evaluation) -> list[float] | None:
+    def _grow(self, model: Model, at: Evaluation) -> list[float] | None:
         """Return values with the demanded volume; None if it is out of reach."""
         demands = msgspec.structs.replace(self.problem.demands, volume=None)
         growing = msgspec.structs.replace(self.problem, objective="largest-volume", demands=demands)
         demanded = self.problem.wanted_volume
-        model = Model(growing, at.state.values.tolist(), self.trail.before_each)
+        values, is_relaxed = at.state.values.tolist(), model.is_relaxed
+        model = Model(growing, values, self.trail.before_each, is_relaxed=is_relaxed)
 
         def is_enough(model: Model, now: Evaluation) -> bool:
             return now.state.volume >= demanded and model.worst(now)[0] >= 0.0
@@ -280,10 +323,12 @@ class Search:
                 raise Stop
 
         before = model.evaluations
-        most = max(1, self.steps_left)
+        most = self.steps_left
         if self.problem.objective == "match-volume":
             most = min(most, STEPS_TO_MATCH)
-        ended = solve(model, u, see=see, most=most)
+        if model.is_relaxed:
+            most = min(most, STEPS_WITHOUT_CLEARANCE - self.steps)
+        ended = solve(model, u, see=see, most=max(1, most))
         self.evaluations += model.evaluations - before
         self.steps += ended.steps
         self.steps_left -= ended.steps
@@ -291,9 +336,9 @@ class Search:
             raise Stop
         return ended.last
 
-    def _crossings(self, state: State) -> FloatArray:
+    def _crossings(self, model: Model, at: Evaluation) -> FloatArray:
         """Return positions at which the clearance is not kept after all, shape (k, 3)."""
-        demands = self.problem.demands
+        demands, state = self.problem.demands, at.state.read_back()
         if demands.clearance is None:
             return np.zeros((0, 3))
         return crossings(
@@ -301,6 +346,7 @@ class Search:
             state.rotation,
             demands.clearance,
             demands.clearance_margin,
+            ANYWHERE if model.is_relaxed else BETWEEN,
             self.trail.before_each,
         )
 
@@ -354,6 +400,8 @@ def _default_message(problem: Problem, attempt: Attempt, steps: int) -> str:
             return f"not converged: {end}{held}; allow more iterations or start elsewhere"
         case "stalled":
             return f"stalled: {end}{held}; try several starts"
+        case "outdone":
+            return f"no better than an earlier start, even without the clearance: {end}"
         case "cancelled":
             return f"cancelled: {end}"
 

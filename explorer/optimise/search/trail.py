@@ -60,7 +60,7 @@ class Trail:
 
     def see(self, model: Model, at: Evaluation, phase: Phase) -> None:
         """Record an iterate of the solver."""
-        spare, worst = model.worst(at)
+        spare, worst = model.worst_of_all(at)
         self._add(at.state, phase, worst, spare)
 
     def see_opening(self, state: State, worst: str) -> None:
