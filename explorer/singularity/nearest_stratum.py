@@ -1,24 +1,25 @@
 """The nearest pose in each stratum of codimension one or more.
 
 The conditions of a stratum leave three, two, one or no angles of the rotation free, and b4 must
-lie on a plane or a line through a1, or on a1 itself. The best position is then a projection,
-and the squared distance a smooth function of the angles: Newton's method, with derivatives by
-complex steps, refines its local minima on a grid. The three strata of codimension one have an
-exact solution in `explorer.singularity.nearest`; where the rotation alone is free, it is that of
-the orthogonal Procrustes problem (Schönemann 1966; for rotations, Kabsch 1976).
+lie on a plane or a line through a1, or on a1 itself. The best position is then a projection, and
+the squared distance a smooth function of the angles: Newton's method refines its local minima on a
+grid. It is L + s S², where L and S are linear in the cosine and the sine of each angle, so that one
+array of coefficients gives the value and all derivatives, for all strata at once.
+
+The three strata of codimension one have an exact solution in `explorer.singularity.nearest`; where
+the rotation alone is free, it is that of the orthogonal Procrustes problem (Schönemann 1966; for
+rotations, Kabsch 1976).
 """
 
 from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from explorer.errors import InputError
 from explorer.mechanism.design import Design
@@ -29,12 +30,17 @@ from explorer.singularity.bruhat import OF_INCIDENCES, Stratum, codimension, is_
 from explorer.singularity.nearest import nearest_singularities
 from explorer.singularity.strata import STRATA, stratum
 
-# Arrays of real numbers, or of complex ones for derivatives.
-Array: TypeAlias = NDArray[Any]
-
-# Number of grid angles in a turn, and largest number of Newton steps.
-GRID, STEPS = 12, 40
-COMPLEX_STEP, HESSIAN_STEP = 1e-40, 1e-5
+# Number of grid angles in a turn, largest number of Newton steps, and the last step in radians.
+GRID, STEPS, LAST_STEP = 12, 60, 1e-12
+# Largest number of angles.
+ANGLES = 3
+# Relative rounding error of a value.
+ROUNDING = 1e-15
+# Orders of derivatives by each angle, of the gradient and of the Hessian.
+_ORDERS = np.eye(ANGLES, dtype=np.int64)
+FIRST = tuple(_ORDERS.T)
+SECOND = tuple(np.moveaxis(_ORDERS[:, None] + _ORDERS, -1, 0))
+X, _, Z = np.eye(3)
 
 
 @dataclass(frozen=True)
@@ -119,25 +125,12 @@ def nearest_in_stratum(design: Design, pose: Pose, asked: Stratum) -> NearestInS
     w = tuple(asked)
     if w not in STRATA:
         raise InputError(f"a stratum is a permutation of (1, 2, 3, 4); got {w}")
-    here = seen_stratum(design, pose)
-    if is_below(here, w):
-        return NearestInStratum(w, here, 0.0, pose)
-    if codimension(w) == 1:
-        singular = nearest_singularities(design, pose)[OF_INCIDENCES.index(w)]
-        nearest, distance = singular.pose, singular.distance
-    else:
-        nearest = _nearest(design, pose, _CLOSURES[w])
-        distance = float(
-            displacement(design, pose.position, pose.rotation, nearest.position, nearest.rotation)
-        )
-    seen = seen_stratum(design, nearest)
-    # Within the tolerance of incidences a pose may lack one that its other incidences imply.
-    return NearestInStratum(w, seen if is_below(seen, w) else w, distance, nearest)
+    return _nearest(design, pose, (w,))[w]
 
 
 def nearest_in_strata(design: Design, pose: Pose) -> Mapping[Stratum, NearestInStratum]:
     """Return the nearest pose in the closure of each of the 24 strata, by stratum."""
-    return {w: nearest_in_stratum(design, pose, w) for w in STRATA}
+    return _nearest(design, pose, STRATA)
 
 
 def seen_stratum(design: Design, pose: Pose) -> Stratum:
@@ -145,129 +138,270 @@ def seen_stratum(design: Design, pose: Pose) -> Stratum:
     return tuple(stratum(pose.position, pose.rotation, design.reach).tolist())
 
 
+def _nearest(
+    design: Design, pose: Pose, strata: Sequence[Stratum]
+) -> dict[Stratum, NearestInStratum]:
+    """Return the nearest poses in the closures of strata."""
+    here = seen_stratum(design, pose)
+    found = {w: NearestInStratum(w, here, 0.0, pose) for w in strata if is_below(here, w)}
+    apart = [w for w in strata if w not in found]
+    if not apart:
+        return found
+    special = [w for w in apart if codimension(w) > 1]
+    nearest = dict(zip(special, _nearest_poses(design, pose, special), strict=True))
+    exact: dict[Stratum, float] = {}
+    if len(special) < len(apart):
+        for w, singular in zip(OF_INCIDENCES, nearest_singularities(design, pose), strict=True):
+            if w in apart:
+                nearest[w], exact[w] = singular.pose, float(singular.distance)
+    positions = np.array([each.position for each in nearest.values()])
+    rotations = np.array([each.rotation for each in nearest.values()])
+    ways: list[float] = displacement(
+        design, pose.position, pose.rotation, positions, rotations
+    ).tolist()
+    seen = map(tuple, stratum(positions, rotations, design.reach).tolist())
+    for (w, goal), way, at in zip(nearest.items(), ways, seen, strict=True):
+        # Within the tolerance of incidences a pose may lack one that its other incidences imply.
+        actual = at if is_below(at, w) else w
+        found[w] = NearestInStratum(w, actual, exact.get(w, way), goal)
+    return {w: found[w] for w in strata}
+
+
 @dataclass(frozen=True)
-class _Problem:
-    """The minimisation of the distance to a closure; the unit is `PlatformPoints.length`.
+class _Target:
+    """The pose to approximate; the unit of length is `PlatformPoints.length`.
 
     Attributes:
-        closure: The closure.
-        flip: One of its half turns as a rotation, shape (3, 3).
         centroid: Centroid of the points in the platform frame, shape (3,).
         goal: Centroid of the points of the given pose in the base frame, shape (3,).
         rotated_scatter: Product R M of the given rotation and the scatter, shape (3, 3).
     """
 
-    closure: _Closure
-    flip: FloatArray
     centroid: FloatArray
     goal: FloatArray
     rotated_scatter: FloatArray
 
-    def rotation(self, angles: Array) -> Array:
-        """Return rotations (..., 3, 3) of angles (..., d)."""
-        matrix: Array = np.broadcast_to(self.flip, (*angles.shape[:-1], 3, 3))
-        for index in reversed(range(len(self.closure.axes))):
-            matrix = _turn(self.closure.axes[index], angles[..., index]) @ matrix
-        return matrix
+    @property
+    def about_a1(self) -> FloatArray:
+        """The scatter of the points about a1 rather than about their centroid, rotated, (3, 3)."""
+        return self.rotated_scatter + np.outer(self.goal, self.centroid)
 
-    def position(self, angles: Array, rotation: Array) -> Array:
-        """Return the best positions (..., 3) at angles (..., d) and their rotations."""
+    def position(self, place: str, angles: FloatArray, rotation: FloatArray) -> FloatArray:
+        """Return the best position (3,) at angles (3,) and their rotation (3, 3)."""
         free = self.goal - rotation @ self.centroid
-        place = self.closure.place
         if place == "a1":
-            return np.zeros_like(free)
+            return np.zeros(3)
         if place in ("platform", "base"):
-            normal = rotation[..., 2] if place == "platform" else np.array([0.0, 0.0, 1.0])
-            return free - (free * normal).sum(axis=-1, keepdims=True) * normal
-        along: Array = np.array([1.0, 0.0, 0.0])
+            normal = rotation[:, 2] if place == "platform" else Z
+            return free - float(free @ normal) * normal
+        along = X
         if place == "u":
-            along = rotation[..., 0]
+            along = rotation[:, 0]
         elif place == "node":
             # The first turn is about the base's normal, the second about this line.
-            along = _turn("z", angles[..., 0])[..., 0]
-        return (free * along).sum(axis=-1, keepdims=True) * along
+            along = np.array([math.cos(angles[0]), math.sin(angles[0]), 0.0])
+        return float(free @ along) * along
 
-    def value(self, angles: Array) -> Array:
-        """Return the squared distance, shape (...), at angles (..., d)."""
-        rotation = self.rotation(angles)
-        position = self.position(angles, rotation)
-        off = self.goal - rotation @ self.centroid - position
-        # Without absolute values the function extends to complex angles.
-        trace = (rotation * self.rotated_scatter).sum(axis=(-2, -1))
-        return 2.0 - 2.0 * trace + (off * off).sum(axis=-1)
+    def coefficients(self, closure: _Closure, flip: str) -> tuple[FloatArray, float]:
+        """Return the coefficients (2, 3, 3, 3) of L and S in the squared distance, and s.
 
-    def slope(self, angles: FloatArray) -> FloatArray:
-        """Return the gradient (..., d) at angles (..., d), accurate to rounding."""
-        steps = 1j * COMPLEX_STEP * np.eye(angles.shape[-1])
-        return np.imag(self.value(angles[..., None, :] + steps)) / COMPLEX_STEP
-
-    def minimise(self) -> tuple[float, FloatArray]:
-        """Return the smallest squared distance and its angles, shape (d,)."""
-        count = len(self.closure.axes)
-        if count == 0:
-            none = np.zeros(0)
-            return float(self.value(none)), none
-        angles = self._starts(count)
-        value, damping = self.value(angles), np.zeros(len(angles))
-        for _ in range(STEPS):
-            slope = self.slope(angles)
-            offsets = HESSIAN_STEP * np.eye(count)
-            ahead = self.slope(angles[:, None, :] + offsets)
-            behind = self.slope(angles[:, None, :] - offsets)
-            hessian = (ahead - behind) / (2.0 * HESSIAN_STEP)
-            hessian = 0.5 * (hessian + np.swapaxes(hessian, -1, -2))
-            curvatures, axes = np.linalg.eigh(hessian)
-            # The step descends even if the value is not convex, and is short if it is flat.
-            curvatures = np.maximum(np.abs(curvatures), 1e-9) + damping[:, None]
-            along = (np.swapaxes(axes, -1, -2) @ slope[..., None])[..., 0] / curvatures
-            step = -(axes @ along[..., None])[..., 0]
-            step *= np.minimum(1.0, 0.5 / np.maximum(np.abs(step).max(axis=-1), 1e-300))[:, None]
-            moved = self.value(angles + step)
-            better = moved <= value + 1e-14
-            angles = np.where(better[:, None], angles + step, angles)
-            value = np.where(better, moved, value)
-            damping = np.where(better, 0.1 * damping, np.maximum(10.0 * damping, 1e-2))
-            if np.abs(step[better]).max(initial=0.0) < 1e-15:
-                break
-        best = int(value.argmin())
-        return float(value[best]), angles[best]
-
-    def _starts(self, count: int) -> FloatArray:
-        """Return the angles (n, d) of local minima on a grid over all turns.
-
-        For two angles these are the minima along either angle alone: far from a1 the value has
-        valleys too narrow for the grid to locate the lowest point of their floor. For three
-        angles there would be too many.
+        Each of the last three axes belongs to an angle, with the coefficients of its cosine, of
+        its sine and of 1.
         """
-        grid = _grid(count)
-        value = self.value(grid)
-        along = [
-            (value <= np.roll(value, 1, axis=axis)) & (value <= np.roll(value, -1, axis=axis))
-            for axis in range(count)
-        ]
-        low = np.any(along, axis=0) if count == 2 else np.all(along, axis=0)
-        return grid[low][np.argsort(value[low], kind="stable")]
+        basis = _rotation_coefficients(closure.axes, flip)
+        goal, centroid, place = self.goal, self.centroid, closure.place
+        square = np.zeros((3, 3, 3))
+        sign = 0.0
+        if place in ("platform", "base"):
+            # Across a plane only the distance from it counts.
+            sign, matrix, constant = 1.0, self.rotated_scatter, 2.0
+            if place == "platform":
+                square += _contract(basis, np.outer(goal, Z))
+                square[2, 2, 2] -= centroid[2]
+            else:
+                square -= _contract(basis, np.outer(Z, centroid))
+                square[2, 2, 2] += goal[2]
+        else:
+            matrix = self.about_a1
+            constant = 2.0 + float(goal @ goal + centroid @ centroid)
+            if place != "a1":
+                # Along a line the distance from a1 to the projection does not count.
+                sign = -1.0
+            if place == "u":
+                square += _contract(basis, np.outer(goal, X))
+                square[2, 2, 2] -= centroid[0]
+            elif place == "guide":
+                square -= _contract(basis, np.outer(X, centroid))
+                square[2, 2, 2] += goal[0]
+            elif place == "node":
+                square[0, 2, 2], square[1, 2, 2] = goal[0], goal[1]
+                square[2, 2, 0], square[2, 2, 1] = -centroid[0], centroid[1]
+        linear = -2.0 * _contract(basis, matrix)
+        linear[2, 2, 2] += constant
+        return np.stack([linear, square]), sign
 
 
-def _nearest(design: Design, pose: Pose, closure: _Closure) -> Pose:
-    """Return the nearest pose in a closure over all its flips."""
+def _contract(basis: FloatArray, matrix: FloatArray) -> FloatArray:
+    """Return the coefficients (3, 3, 3) of the sum of the products of entries with a matrix's."""
+    return np.einsum("abcij,ij->abc", basis, matrix)
+
+
+@functools.cache
+def _rotation_coefficients(axes: str, flip: str) -> FloatArray:
+    """Return the coefficients (3, 3, 3) of each entry (3, 3) of a product of turns."""
+    turns = [_turn_coefficients(axis) for axis in axes]
+    still = np.zeros((3, 3, 3))
+    still[2] = np.eye(3)
+    first, second, third = turns + [still] * (ANGLES - len(turns))
+    return np.einsum("aij,bjk,ckl,lm->abcim", first, second, third, _half_turn(flip))
+
+
+@functools.cache
+def _turn_coefficients(axis: str) -> FloatArray:
+    """Return the coefficients of cosine, sine and 1 in a turn about a base axis, (3, 3, 3)."""
+    unit = np.eye(3)["xyz".index(axis)]
+    along = np.outer(unit, unit)
+    return np.array([np.eye(3) - along, np.cross(unit, np.eye(3)).T, along])
+
+
+@functools.cache
+def _half_turn(axis: str) -> FloatArray:
+    """Return a half turn about an axis; no turn for ""."""
+    return 2.0 * np.diag(np.eye(3)["xyz".index(axis)]) - np.eye(3) if axis else np.eye(3)
+
+
+def _powers(angles: FloatArray) -> FloatArray:
+    """Return cosine, sine and 1 of angles (...), and two derivatives of each, (..., 3, 3)."""
+    cosine, sine = np.cos(angles), np.sin(angles)
+    powers = np.zeros((*angles.shape, 3, 3))
+    powers[..., 0, 0], powers[..., 0, 1], powers[..., 0, 2] = cosine, sine, 1.0
+    powers[..., 1, 0], powers[..., 1, 1] = -sine, cosine
+    powers[..., 2, 0], powers[..., 2, 1] = -cosine, -sine
+    return powers
+
+
+def _derivatives(
+    coefficients: FloatArray, sign: FloatArray, angles: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return values (n,), gradients (n, 3) and Hessians (n, 3, 3) of squared distances.
+
+    Args:
+        coefficients: Coefficients of L and S, shape (n, 2, 3, 3, 3).
+        sign: The sign s of the square, shape (n,).
+        angles: Angles, shape (n, 3).
+    """
+    count = len(angles)
+    powers = np.swapaxes(_powers(angles), -1, -2)
+    # Each product replaces the last axis by orders of derivatives, and puts it first.
+    result = coefficients.reshape(count, 2, 9, 3)
+    for angle in (2, 1, 0):
+        product = result.reshape(count, -1, 3) @ powers[:, angle]
+        result = np.moveaxis(product.reshape(count, 2, 9, 3), 3, 2)
+    result = result.reshape(count, 2, 3, 3, 3)
+    linear, square = result[:, 0], result[:, 1]
+    base = square[:, 0, 0, 0]
+    first = square[:, *FIRST]
+    value = linear[:, 0, 0, 0] + sign * base**2
+    slope = linear[:, *FIRST] + 2.0 * (sign * base)[:, None] * first
+    curvature = linear[:, *SECOND] + 2.0 * sign[:, None, None] * (
+        base[:, None, None] * square[:, *SECOND] + first[:, :, None] * first[:, None, :]
+    )
+    return value, slope, curvature
+
+
+def _starts(coefficients: FloatArray, sign: float, count: int) -> FloatArray:
+    """Return the angles (n, 3) of local minima of a squared distance on a grid over all turns.
+
+    For two angles these are the minima along either angle alone: far from a1 the value has
+    valleys too narrow for the grid to locate the lowest point of their floor. For three
+    angles there would be too many.
+    """
+    turn = np.linspace(0.0, 2.0 * math.pi, GRID, endpoint=False)
+    powers = _powers(turn)[:, 0]
+    grids = [powers] * count + [powers[:1]] * (ANGLES - count)
+    linear, square = coefficients
+    for grid in reversed(grids):
+        linear, square = (np.moveaxis(each @ grid.T, -1, 0) for each in (linear, square))
+    value = linear + sign * square**2
+    if count == 0:
+        return np.zeros((1, ANGLES))
+    along = [
+        (value <= np.roll(value, 1, axis=axis)) & (value <= np.roll(value, -1, axis=axis))
+        for axis in range(count)
+    ]
+    low = np.any(along, axis=0) if count == 2 else np.all(along, axis=0)
+    return turn[np.argwhere(low)]
+
+
+def _minimise(coefficients: FloatArray, sign: FloatArray, angles: FloatArray) -> FloatArray:
+    """Lower squared distances by Newton's method; change the angles (n, 3) and return the values.
+
+    For the arguments see `_derivatives`.
+    """
+    value, slope, curvature = _derivatives(coefficients, sign, angles)
+    rounding = ROUNDING * np.abs(coefficients[:, 0]).sum(axis=(1, 2, 3))
+    damping = np.zeros(len(angles))
+    active = np.arange(len(angles))
+    for _ in range(STEPS):
+        curvatures, axes = np.linalg.eigh(curvature[active])
+        # The step descends even if the value is not convex, and is short if it is flat.
+        curvatures = np.maximum(np.abs(curvatures), 1e-9) + damping[active, None]
+        along = (np.swapaxes(axes, -1, -2) @ slope[active, :, None])[..., 0] / curvatures
+        step = -(axes @ along[..., None])[..., 0]
+        longest = np.abs(step).max(axis=-1)
+        step *= np.minimum(1.0, 0.5 / np.maximum(longest, 1e-300))[:, None]
+        trial = angles[active] + step
+        moved = _derivatives(coefficients[active], sign[active], trial)
+        better = moved[0] <= value[active] + rounding[active]
+        done = active[better]
+        angles[done] = trial[better]
+        value[done], slope[done], curvature[done] = (each[better] for each in moved)
+        old = damping[active]
+        damping[active] = np.where(better, 0.1 * old, np.maximum(10.0 * old, 1e-2))
+        active = active[longest > LAST_STEP]
+        if not len(active):
+            break
+    return value
+
+
+def _nearest_poses(design: Design, pose: Pose, strata: Sequence[Stratum]) -> list[Pose]:
+    """Return the nearest poses in the closures of strata of codimension two or more."""
     platform = PlatformPoints.of(design)
     unit, rotation = platform.length, pose.rotation
     centroid = platform.centroid / unit
     goal = np.array(pose.position) / unit + rotation @ centroid
-    rotated_scatter = rotation @ platform.scatter / unit**2
-    if closure == _TURNED_ABOUT_A1:
-        turn = _nearest_rotation(rotated_scatter + np.outer(goal, centroid))
-        return Pose.of(np.zeros(3), turn)
-    best, nearest = math.inf, pose
-    for flip in closure.flips:
-        half_turn = _turn(flip, np.array(math.pi)) if flip else np.eye(3)
-        problem = _Problem(closure, half_turn, centroid, goal, rotated_scatter)
-        value, angles = problem.minimise()
-        if value < best:
-            turn = problem.rotation(angles)
-            best, nearest = value, Pose.of(unit * problem.position(angles, turn), turn)
-    return nearest
+    target = _Target(centroid, goal, rotation @ platform.scatter / unit**2)
+    best: dict[Stratum, Pose] = {}
+    problems: list[tuple[Stratum, str]] = []
+    terms: list[tuple[FloatArray, float]] = []
+    starts: list[FloatArray] = []
+    for w in strata:
+        closure = _CLOSURES[w]
+        if closure == _TURNED_ABOUT_A1:
+            best[w] = Pose.of(np.zeros(3), _nearest_rotation(target.about_a1))
+            continue
+        for flip in closure.flips:
+            problems.append((w, flip))
+            terms.append(target.coefficients(closure, flip))
+            starts.append(_starts(*terms[-1], len(closure.axes)))
+    if problems:
+        which = np.repeat(np.arange(len(problems)), [len(each) for each in starts])
+        coefficients = np.array([each for each, _ in terms])[which]
+        angles = np.concatenate(starts)
+        value = _minimise(coefficients, np.array([each for _, each in terms])[which], angles)
+        for index in np.argsort(value, kind="stable").tolist():
+            w, flip = problems[which[index]]
+            if w not in best:
+                closure, at = _CLOSURES[w], angles[index]
+                turn = _rotation(closure.axes, flip, at)
+                best[w] = Pose.of(unit * target.position(closure.place, at, turn), turn)
+    return [best[w] for w in strata]
+
+
+def _rotation(axes: str, flip: str, angles: FloatArray) -> FloatArray:
+    """Return the product of turns by angles (3,) and a half turn."""
+    a, b, c = _powers(angles)[:, 0]
+    return np.einsum("abcij,a,b,c->ij", _rotation_coefficients(axes, flip), a, b, c)
 
 
 def _nearest_rotation(matrix: FloatArray) -> FloatArray:
@@ -275,21 +409,3 @@ def _nearest_rotation(matrix: FloatArray) -> FloatArray:
     left, _, right = np.linalg.svd(matrix)
     side = np.sign(np.linalg.det(left @ right))
     return left @ np.diag([1.0, 1.0, side]) @ right
-
-
-@functools.cache
-def _grid(count: int) -> FloatArray:
-    steps = np.linspace(0.0, 2.0 * math.pi, GRID, endpoint=False, dtype=np.float64)
-    return np.stack(np.meshgrid(*[steps] * count, indexing="ij"), axis=-1)
-
-
-def _turn(axis: str, angle: Array) -> Array:
-    """Return the rotations (..., 3, 3) about a base axis by angles (...)."""
-    i = "xyz".index(axis)
-    j, k = (i + 1) % 3, (i + 2) % 3
-    cosine, sine = np.cos(angle), np.sin(angle)
-    matrix = np.zeros((*angle.shape, 3, 3), dtype=cosine.dtype)
-    matrix[..., i, i] = 1.0
-    matrix[..., j, j], matrix[..., k, k] = cosine, cosine
-    matrix[..., j, k], matrix[..., k, j] = -sine, sine
-    return matrix

@@ -1,0 +1,65 @@
+"""The gaps between the elements of the two flags: what is left to each of the three incidences.
+
+A gap is the shortest segment from an element of the base flag to one of the platform flag: from a1
+to the platform plane (δ1), between the lines a1a2 and b2b3 (δ2), and from the base plane to b4
+(δ3). The mechanism is singular where one of them closes, or where the two lines are parallel.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from explorer.numerics.arrays import FloatArray
+
+# Sine between two lines up to which they count as parallel: rounding errors of a rotation.
+PARALLEL = 1e-14
+
+
+@dataclass(frozen=True)
+class FlagGaps:
+    """The three gaps of a pose, in the order δ1, δ2, δ3, in design units.
+
+    Attributes:
+        base: Ends on a1, the line a1a2 and the base plane, in the base frame, shape (3, 3).
+        platform: Ends on the platform plane, the line b2b3 and b4, in the base frame, shape (3, 3).
+        lengths: Lengths: |δ1|, the distance of the lines and |δ3|. That of the lines is |δ2| over
+            the sine between them.
+        are_parallel: Whether the lines are parallel. Of their common perpendiculars, the second
+            gap is then the one through b4.
+    """
+
+    base: FloatArray
+    platform: FloatArray
+    lengths: tuple[float, float, float]
+    are_parallel: bool
+
+
+def flag_gaps(position: FloatArray, rotation: FloatArray) -> FlagGaps:
+    """Return the gaps of a pose.
+
+    Args:
+        position: b4 in the base frame, shape (3,), in design units.
+        rotation: Platform to base, shape (3, 3).
+    """
+    x, y, z = position.tolist()
+    height = float(rotation[:, 2] @ position)
+    along, uy, uz = rotation[:, 0].tolist()
+    sine = math.hypot(uy, uz)
+    are_parallel = sine <= PARALLEL
+    if are_parallel:
+        on_line = (x, y, z)
+        on_guide, distance = (x, 0.0, 0.0), math.hypot(y, z)
+    else:
+        ny, nz = -uz / sine, uy / sine
+        apart = ny * y + nz * z
+        # Way from b4 along b2b3 to the point closest to the guide.
+        way = -(y * uy + z * uz) / sine / sine
+        on_guide = (x + way * along, 0.0, 0.0)
+        on_line = (on_guide[0], apart * ny, apart * nz)
+        distance = abs(apart)
+    base = np.array([(0.0, 0.0, 0.0), on_guide, (x, y, 0.0)])
+    platform = np.array([height * rotation[:, 2], on_line, (x, y, z)])
+    return FlagGaps(base, platform, (abs(height), distance, abs(z)), are_parallel)

@@ -1,0 +1,102 @@
+"""Gaps: their ends lie on the elements of the two flags, and no shorter segment does."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from incidence import distance_of_lines, distance_to_plane
+from numpy.testing import assert_allclose
+from strategies import EPSILON, Case, all_cases, cases, singular_cases
+
+from explorer import PRESETS, attachment_points
+from explorer.numerics.arrays import FloatArray
+from explorer.singularity.gaps import FlagGaps, flag_gaps
+
+
+def gaps_of(case: Case) -> FlagGaps:
+    return flag_gaps(case.position, case.rotation)
+
+
+def sine_of(case: Case) -> float:
+    return math.hypot(case.rotation[1, 0], case.rotation[2, 0])
+
+
+def misses(case: Case, gaps: FlagGaps) -> FloatArray:
+    """Return how far each end is from its element, shape (3, 2), as computed from the axes."""
+    local = (gaps.platform - case.position) @ case.rotation
+    return np.array(
+        [
+            [math.hypot(*gaps.base[0]), abs(local[0, 2])],
+            [math.hypot(*gaps.base[1, 1:]), math.hypot(*local[1, 1:])],
+            [abs(gaps.base[2, 2]), math.hypot(*local[2])],
+        ],
+        dtype=np.float64,
+    )
+
+
+@given(all_cases())
+def test_ends_of_gaps_lie_on_the_elements_of_the_flags(case: Case) -> None:
+    gaps = gaps_of(case)
+    # Where lines are nearly parallel, rounding moves their closest points along them.
+    sizes = case.size * np.array([1.0, 1.0 / max(sine_of(case), 1e-14), 1.0])
+    if gaps.are_parallel:
+        sizes[1] = case.size
+    assert (misses(case, gaps) <= 32.0 * EPSILON * sizes[:, None]).all()
+
+
+@given(all_cases())
+def test_lengths_of_gaps_are_those_between_their_ends(case: Case) -> None:
+    gaps = gaps_of(case)
+    spans = np.linalg.norm(gaps.platform - gaps.base, axis=1)
+    assert_allclose(spans, gaps.lengths, rtol=1e-12, atol=32.0 * EPSILON * case.size)
+
+
+@given(cases())
+def test_lengths_of_gaps_are_the_distances_of_points_planes_and_lines(case: Case) -> None:
+    assume(sine_of(case) > 1e-3)
+    # Points of the two flags whose distances are of one size, whatever the design.
+    x, y, u, v = (case.size * each for each in (*np.eye(3)[:2], *case.rotation.T[:2]))
+    origin, b4 = np.zeros(3), case.position
+    distances = (
+        distance_to_plane(origin, (b4, b4 + u, b4 + v)),
+        distance_of_lines((origin, x), (b4, b4 + u)),
+        distance_to_plane(b4, (origin, x, y)),
+    )
+    assert_allclose(gaps_of(case).lengths, distances, rtol=1e-9, atol=1e-11 * case.size)
+
+
+@given(all_cases())
+def test_second_gap_is_the_margin_over_the_sine_and_others_the_margins(case: Case) -> None:
+    first, second, third = gaps_of(case).lengths
+    delta1, delta2, delta3 = np.abs(case.margins).tolist()
+    assert_allclose((first, third), (delta1, delta3), rtol=1e-12, atol=8.0 * EPSILON * case.size)
+    assert_allclose(second * sine_of(case), delta2, rtol=1e-9, atol=1e-13 * case.size)
+
+
+@given(singular_cases())
+def test_gap_of_an_incidence_is_closed_unless_lines_are_parallel(case: Case) -> None:
+    gaps = gaps_of(case)
+    holding = np.abs(case.margins) <= 8.0 * EPSILON * case.size
+    for index in np.flatnonzero(holding):
+        if index == 1 and sine_of(case) < 0.1:
+            continue
+        assert gaps.lengths[index] <= 1e-13 * case.size
+
+
+@pytest.mark.parametrize("angle", [0.0, math.pi])
+def test_parallel_lines_have_the_gap_through_b4(angle: float) -> None:
+    c, s = math.cos(angle), math.sin(angle)
+    # Of a turn about z by half a turn, sin π is a rounding error.
+    rotation = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    position = np.array([7.0, 3.0, 4.0])
+    gaps = flag_gaps(position, rotation)
+    assert gaps.are_parallel
+    assert gaps.lengths[1] == 5.0
+    assert gaps.base[1].tolist() == [7.0, 0.0, 0.0]
+    assert gaps.platform[1].tolist() == position.tolist()
+    points = attachment_points(PRESETS["paper-optimal"], position, rotation)
+    lines = (points.a1, points.a2), (points.b2, points.b3)
+    assert distance_of_lines(*lines) == pytest.approx(5.0)
