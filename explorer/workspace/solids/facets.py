@@ -60,9 +60,9 @@ class Box:
         farthest = np.linalg.norm(self.corners[:, start:] - point, axis=1).max()
         return float(np.linalg.norm(nearest - point)), float(farthest)
 
-    def surroundings(self) -> Box:
-        """Return a box that holds this one and touches it nowhere."""
-        more = BEYOND * self.size
+    def surroundings(self, share: float = BEYOND) -> Box:
+        """Return a box that holds this one and touches it nowhere; it is larger by a share."""
+        more = share * self.size
         return Box(self.lows - more, self.highs + more)
 
     def mesh(self) -> Facets:
@@ -101,9 +101,21 @@ def ball(
 
     The angle in radians is π for the whole ball; for the step see `step_of`.
     """
-    points, faces, outward = _unit_cap(*_cap_of(angle, step))
-    frame = _frame(towards)
-    return centre + (radius * outward) * (points @ frame), faces
+    points, faces, base, outward = _unit_cap(*_cap_of(angle, step))
+    frame = frame_about(towards)
+    return centre + (radius * outward) * (points @ frame), np.concatenate([faces, base])
+
+
+def sphere_part(angle: float, edge: float) -> Facets:
+    """Return the part of the unit sphere within an angle of z, or more, as regular triangles.
+
+    Args:
+        angle: Angle in radians, π for the whole sphere.
+        edge: Approximate length of edges.
+    """
+    # Rings are as far apart as an equilateral triangle is high.
+    step = edge * math.sqrt(3.0) * CIRCUMRADIUS
+    return _unit_cap(*_cap_of(angle, step))[:2]
 
 
 def ball_faces(angle: float, step: float) -> int:
@@ -164,7 +176,7 @@ def half_space(normal: FloatArray, offset: float, box: Box) -> Facets:
     off = box.middle - (float(unit @ box.middle) - offset / length) * unit
     reach = 2.0 * box.size + float(np.linalg.norm(off - box.middle))
     signs = Box(np.array([-1.0, -1.0, -2.0]), np.array([1.0, 1.0, 0.0])).corners
-    return off + reach * (signs @ _frame(unit)), _BLOCK
+    return off + reach * (signs @ frame_about(unit)), _BLOCK
 
 
 def wedge(apex: FloatArray, axis: FloatArray, half_angle: float, box: Box) -> Facets:
@@ -203,7 +215,7 @@ def cone(apex: FloatArray, axis: FloatArray, half_angle: float, step: float, box
             np.column_stack([np.zeros_like(inner), inner, inner + 1]) + 1 + count,
         ]
     )
-    return apex + points @ _frame(axis), faces
+    return apex + points @ frame_about(axis), faces
 
 
 def _far_rim(apex: FloatArray, half_angle: float, box: Box) -> tuple[float, float, float]:
@@ -221,7 +233,7 @@ def _outward_scale(step: float) -> float:
     return math.sqrt(step / math.sin(step))
 
 
-def _frame(axis: FloatArray) -> FloatArray:
+def frame_about(axis: FloatArray) -> FloatArray:
     """Return a right-handed frame, as rows, whose third row is a given unit vector (3,)."""
     first = np.zeros(3)
     first[int(np.argmin(np.abs(axis)))] = 1.0
@@ -238,8 +250,8 @@ def _cap_of(angle: float, step: float) -> tuple[int, int]:
 
 
 @functools.lru_cache(maxsize=64)
-def _unit_cap(size: int, rings: int) -> tuple[FloatArray, IntArray, float]:
-    """Return points and faces of a cap about z, and the factor to scale it to its volume."""
+def _unit_cap(size: int, rings: int) -> tuple[FloatArray, IntArray, IntArray, float]:
+    """Return points, faces and base of a cap about z, and the factor to scale it to its volume."""
     widest = math.pi * RATIO**-size
     height = widest / rings
     tilts = height * np.arange(rings + 1)
@@ -261,13 +273,11 @@ def _unit_cap(size: int, rings: int) -> tuple[FloatArray, IntArray, float]:
     areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     # Flat triangles lie below a sphere of radius one by this much on average.
     outward = 1.0 + float((areas * squares).sum() / areas.sum()) / 24.0
-    if size > 0:
-        last = int(counts[-1])
-        rim = first[-2] + np.arange(last)
-        inner = np.arange(1, last - 1)
-        base = np.column_stack([np.zeros_like(inner), inner + 1, inner])
-        faces = np.concatenate([faces, rim[base]])
-    return points, faces, outward
+    rim = first[-2] + np.arange(int(counts[-1]))
+    inner = np.arange(1, len(rim) - 1)
+    base = np.column_stack([np.zeros_like(inner), inner + 1, inner])
+    # A whole sphere ends in a point, which is no rim.
+    return points, faces, rim[base], outward
 
 
 def _stitch_rings(counts: IntArray, first: IntArray) -> IntArray:

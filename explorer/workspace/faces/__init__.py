@@ -1,0 +1,1 @@
+"""The faces of workspaces as fine triangles whose corners lie on the exact surfaces."""

@@ -1,0 +1,236 @@
+"""The faces of workspaces lie on the exact surfaces, and look smooth at the size of a page."""
+
+from __future__ import annotations
+
+import msgspec
+import numpy as np
+import pytest
+from limited_designs import ordinary_case, thin_case
+
+from explorer import PRESETS
+from explorer.mechanism.design import Design, Swing
+from explorer.mechanism.home import home_pose
+from explorer.numerics.arrays import FloatArray, dot
+from explorer.workspace.faces.divide import divide, find_roots
+from explorer.workspace.faces.faces import Faces, workspace_faces
+from explorer.workspace.limits.constraints import (
+    BallOrCylinder,
+    Cone,
+    Constraint,
+    HalfSpace,
+    constraints,
+)
+from explorer.workspace.solids.solid import Solid
+from explorer.workspace.solids.solids import cut_solid, workspace_solid
+
+OPTIMAL = PRESETS["paper-optimal"]
+# Pixels across the diagonal of a workspace that fills a page of 1440 x 900.
+PIXELS = 800.0
+
+
+def coned() -> Design:
+    limits = msgspec.structs.replace(OPTIMAL.limits, swing=Swing(a1=70.0, b2=60.0, b4=50.0))
+    return msgspec.structs.replace(OPTIMAL, limits=limits)
+
+
+def at_home(design: Design) -> tuple[Design, FloatArray]:
+    return design, home_pose(design).rotation
+
+
+PRESET_CASES = tuple(at_home(design) for design in PRESETS.values())
+CASES = (
+    *PRESET_CASES,
+    at_home(coned()),
+    *(ordinary_case(seed) for seed in range(6)),
+    *(thin_case(seed) for seed in range(3)),
+)
+
+
+def faces_of(
+    design: Design, rotation: FloatArray, *more: Constraint
+) -> tuple[Faces, tuple[Constraint, ...], Solid]:
+    limits = (*constraints(design, rotation), *more)
+    solid = workspace_solid(design, rotation, 2e-3 * design.reach)
+    return workspace_faces(limits), limits, solid
+
+
+def size_of(faces: Faces) -> float:
+    return float(np.linalg.norm(np.ptp(faces.vertices, axis=0)))
+
+
+def normals_of(faces: Faces) -> FloatArray:
+    """Return normals as long as twice the areas."""
+    a, b, c = (faces.vertices[faces.triangles[:, k]] for k in range(3))
+    return np.cross(b - a, c - a)
+
+
+def areas(faces: Faces | Solid) -> dict[str, float]:
+    triangles = faces.triangles if isinstance(faces, Faces) else faces.faces
+    owner = faces.limit_of_triangle if isinstance(faces, Faces) else faces.limit_of_face
+    a, b, c = (faces.vertices[triangles[:, k]] for k in range(3))
+    area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    return {name: float(area[owner == k].sum()) for k, name in enumerate(faces.limits)}
+
+
+def outward(limit: Constraint, points: FloatArray) -> FloatArray:
+    """Return the unit normals of a surface at points on it, by differences of its slack."""
+    step = 1e-6 * float(np.abs(points).max())
+    rate = np.stack(
+        [limit.slack(points + step * e) - limit.slack(points - step * e) for e in np.eye(3)], axis=1
+    )
+    return -rate / np.linalg.norm(rate, axis=1, keepdims=True)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_vertices_lie_on_the_surfaces_of_their_limits_and_within_all_others(
+    case: tuple[Design, FloatArray],
+) -> None:
+    faces, limits, _ = faces_of(*case)
+    size = size_of(faces)
+    for index, limit in enumerate(limits):
+        own = np.unique(faces.triangles[faces.limit_of_triangle == index])
+        assert (limit.distance(faces.vertices[own]) < 1e-9 * size).all()
+        beyond = np.minimum(limit.slack(faces.vertices), 0.0)
+        assert (np.where(beyond < 0.0, limit.distance(faces.vertices), 0.0) < 3e-4 * size).all()
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_faces_have_the_areas_of_a_boolean(case: tuple[Design, FloatArray]) -> None:
+    faces, _, solid = faces_of(*case)
+    found, expected = areas(faces), areas(solid)
+    total = sum(expected.values())
+    assert sum(found.values()) == pytest.approx(total, rel=5e-3)
+    assert max(abs(found[name] - expected[name]) for name in expected) < 0.01 * total
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_triangles_are_within_half_a_pixel_of_the_surface_and_face_outwards(
+    case: tuple[Design, FloatArray],
+) -> None:
+    faces, limits, _ = faces_of(*case)
+    corners, normals = faces.vertices[faces.triangles], normals_of(faces)
+    for index, limit in enumerate(limits):
+        own = faces.limit_of_triangle == index
+        middles = corners[own].mean(axis=1)
+        if not len(middles):
+            continue
+        sides = 0.5 * (corners[own] + np.roll(corners[own], 1, axis=1)).reshape(-1, 3)
+        off = np.concatenate([limit.distance(middles), limit.distance(sides)])
+        assert off.max() < 0.5 * size_of(faces) / PIXELS
+        assert (dot(normals[own], outward(limit, middles)) > 0.0).all()
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_normals_that_a_browser_computes_are_those_of_the_surface(
+    case: tuple[Design, FloatArray],
+) -> None:
+    """A browser takes the sum of the normals about a vertex, weighted by areas."""
+    faces, limits, _ = faces_of(*case)
+    sums, normals = np.zeros_like(faces.vertices), normals_of(faces)
+    for k in range(3):
+        np.add.at(sums, faces.triangles[:, k], normals)
+    sums /= np.linalg.norm(sums, axis=1, keepdims=True)
+    angles: list[float] = []
+    for index, limit in enumerate(limits):
+        own = np.unique(faces.triangles[faces.limit_of_triangle == index])
+        if len(own):
+            cosine = dot(sums[own], outward(limit, faces.vertices[own]))
+            angles.extend(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))).tolist())
+    # Beside the narrow ends of faces a vertex may have no triangle but slivers.
+    assert float(np.quantile(angles, 0.99)) < 5.0
+    assert float(np.median(angles)) < 1.0
+
+
+@pytest.mark.parametrize("case", PRESET_CASES)
+def test_no_vertex_of_the_presets_is_shaded_wrong(case: tuple[Design, FloatArray]) -> None:
+    faces, limits, _ = faces_of(*case)
+    sums, normals = np.zeros_like(faces.vertices), normals_of(faces)
+    for k in range(3):
+        np.add.at(sums, faces.triangles[:, k], normals)
+    sums /= np.linalg.norm(sums, axis=1, keepdims=True)
+    for index, limit in enumerate(limits):
+        own = np.unique(faces.triangles[faces.limit_of_triangle == index])
+        if len(own):
+            cosine = dot(sums[own], outward(limit, faces.vertices[own]))
+            assert float(cosine.min()) > np.cos(np.radians(8.0))
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_edges_lie_on_two_surfaces(case: tuple[Design, FloatArray]) -> None:
+    faces, limits, _ = faces_of(*case)
+    ends = faces.edges.reshape(-1, 3)
+    assert len(ends) > 0
+    off = np.sort([limit.distance(ends) for limit in limits], axis=0)
+    # Surfaces that nearly touch leave little to tell on which of their curves a point is.
+    assert float(np.quantile(off[1], 0.99)) < 1e-8 * size_of(faces)
+    assert float(off[1].max()) < 0.5 * size_of(faces) / PIXELS
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_cut_is_a_face_with_the_area_of_the_slice(axis: int) -> None:
+    level = (10.0, 5.0, 6.0)[axis]
+    half_space = HalfSpace("cut", np.eye(3)[axis], level)
+    faces, _, solid = faces_of(*PRESET_CASES[0], half_space)
+    expected = areas(cut_solid(solid, half_space))["cut"]
+    assert areas(faces)["cut"] == pytest.approx(expected, rel=1e-2)
+    assert float(faces.vertices[:, axis].max()) == pytest.approx(level, abs=1e-9)
+
+
+def test_limits_that_coincide_give_one_face() -> None:
+    design, rotation = PRESET_CASES[0]
+    once, limits, _ = faces_of(design, rotation)
+    twice, _, _ = faces_of(design, rotation, *limits)
+    area, expected = (np.linalg.norm(normals_of(each), axis=1).sum() for each in (twice, once))
+    assert area == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize("half_angle", [0.3, 1.2, 2.0])
+@pytest.mark.parametrize("flat", [False, True])
+def test_cone_of_a_joint_has_a_face(half_angle: float, flat: bool) -> None:
+    ball = BallOrCylinder("ball", np.zeros(3), 2.0, is_ball=True, inside=True)
+    axis = np.array([0.0, 0.6, 0.8])
+    cone = Cone("cone", np.zeros(3), axis, half_angle, flat)
+    faces = workspace_faces([ball, cone])
+    found = areas(faces)
+    # Half of a disc on either side of a wedge; the cone over a circle of the ball.
+    expected = 4.0 * np.pi if flat else 4.0 * np.pi * np.sin(half_angle)
+    assert found["cone"] == pytest.approx(expected, rel=5e-3)
+    share = half_angle / np.pi if flat else 0.5 * (1.0 - np.cos(half_angle))
+    assert found["ball"] == pytest.approx(16.0 * np.pi * share, rel=5e-3)
+
+
+def test_division_keeps_areas_and_separates_values() -> None:
+    rng = np.random.default_rng(7)
+    vertices = rng.normal(size=(60, 3))
+    triangles = rng.integers(0, 60, (400, 3))
+    triangles = triangles[(np.diff(np.sort(triangles, axis=1), axis=1) > 0).all(axis=1)]
+    values = vertices @ [0.3, -1.0, 0.5] - 0.2
+    division = divide(triangles, values >= 0.0)
+    a, b = division.ends.T
+    assert (values[a] < 0.0).all()
+    assert (values[b] >= 0.0).all()
+    share = find_roots(lambda at: values[a] + at * (values[b] - values[a]), values[a], values[b], 0)
+    points = np.concatenate([vertices, vertices[a] + share[:, None] * (vertices[b] - vertices[a])])
+    off = points @ [0.3, -1.0, 0.5] - 0.2
+    assert (off[division.faces[division.is_high]] > -1e-12).all()
+    assert (off[division.faces[~division.is_high]] < 1e-12).all()
+
+    def normals(each: FloatArray) -> FloatArray:
+        return np.cross(each[:, 1] - each[:, 0], each[:, 2] - each[:, 0])
+
+    # Parts keep the orientation of the whole, and together its area.
+    sums = np.zeros((len(triangles), 3))
+    np.add.at(sums, division.origin, normals(points[division.faces]))
+    np.testing.assert_allclose(sums, normals(vertices[triangles]), atol=1e-12)
+
+
+def test_roots_are_found_between_ends_of_any_slope() -> None:
+    power = np.array([1.0, 3.0, 9.0, 0.2, 0.5])
+    root = np.array([0.5, 0.9, 0.3, 0.01, 0.7])
+
+    def value(at: FloatArray) -> FloatArray:
+        return at**power - root**power
+
+    found = find_roots(value, value(np.zeros(5)), value(np.ones(5)), 1e-12)
+    np.testing.assert_allclose(value(found), 0.0, atol=1e-4)
+    assert len(find_roots(value, np.zeros(0), np.zeros(0), 1.0)) == 0
