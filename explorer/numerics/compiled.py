@@ -103,23 +103,39 @@ def fill_cache() -> None:
         pass
 
 
-def warm() -> None:
-    """Load the compiled form of every imported kernel, so that small calls are fast too."""
+def warm(tell: Callable[[float], None] | None = None) -> None:
+    """Load the compiled form of every imported kernel, so that small calls are fast too.
+
+    Args:
+        tell: Callback with the share of the work of compiling that is done, 0 to 1; it is called
+            only if some kernels are stored nowhere and have to be compiled.
+    """
     waiting = {kernel.entry: kernel for kernel in _kernels if not kernel.ready}
+    missing = {entry for entry in waiting if not entry.is_filled}
+    effort, done = sum(entry.effort for entry in missing), 0
+    if missing and tell is not None:
+        tell(0.0)
     for entry in await_cached(waiting):
         waiting[entry].load()
+        if entry in missing and tell is not None:
+            missing.remove(entry)
+            done += entry.effort
+            tell(done / effort if missing else 1.0)
 
 
-def warm_in_background(then: Callable[[], None] | None = None) -> threading.Thread:
+def warm_in_background(
+    then: Callable[[], None] | None = None, tell: Callable[[float], None] | None = None
+) -> threading.Thread:
     """Call `warm` in a thread; a kernel runs interpreted until its compiled form is loaded.
 
     Args:
         then: Callback in that thread, after every kernel is loaded.
+        tell: Callback in that thread, for `warm`.
     """
 
     def run() -> None:
         with _warm_lock:
-            warm()
+            warm(tell)
         if then is not None:
             then()
 

@@ -8,6 +8,7 @@ import runpy
 import subprocess
 import sys
 import threading
+from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
 
@@ -19,8 +20,8 @@ from filelock import FileLock
 import explorer
 from explorer.files.packaged import SOURCES
 from explorer.legs import clearance, tetrahedra
-from explorer.numerics import kernel_cache
-from explorer.numerics.compiled import all_kernels
+from explorer.numerics import compiled, kernel_cache
+from explorer.numerics.compiled import Kernel, all_kernels, warm
 from explorer.numerics.kernel_cache import (
     DIGEST,
     PACKAGED,
@@ -121,6 +122,36 @@ def test_compiling_takes_requested_kernels_first_then_the_shortest(order: list[s
         assert compile_all([entry.label for entry in entries]) == 0
         assert order == [longest.name, *(entry.name for entry in entries[:-1])]
         assert all(entry.is_filled for entry in entries)
+
+
+def test_progress_of_compiling_is_the_share_of_the_work_done_and_only_what_is_missing_counts(
+    empty_cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stored, *missing = sorted(KERNELS, key=lambda each: each.entry.effort)
+    (empty_cache / stored.entry.file_name).touch()
+    monkeypatch.setattr(compiled, "_kernels", [*missing, stored])
+    monkeypatch.setattr(compiled, "await_cached", by_effort)
+    loaded: list[Entry] = []
+
+    def load(kernel: Kernel[...]) -> None:
+        loaded.append(kernel.entry)
+
+    monkeypatch.setattr(Kernel, "ready", False)
+    monkeypatch.setattr(Kernel, "load", load)
+    shares: list[float] = []
+    warm(shares.append)
+    assert loaded == [each.entry for each in (stored, *missing)]
+    first, second = (each.entry.effort for each in missing)
+    assert shares == [0.0, first / (first + second), 1.0]
+    shares.clear()
+    for each in missing:
+        (empty_cache / each.entry.file_name).touch()
+    warm(shares.append)
+    assert shares == []
+
+
+def by_effort(entries: Iterable[Entry]) -> list[Entry]:
+    return sorted(entries, key=lambda entry: entry.effort)
 
 
 def test_request_of_another_version_or_package_is_ignored(
