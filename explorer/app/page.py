@@ -33,6 +33,7 @@ from explorer.app.storage.study_folders import StudyFolders
 from explorer.app.storage.user_data import UserData
 from explorer.app.widgets.assigning import QUIET_SECONDS, Assigner, Update
 from explorer.app.widgets.buttons import Buttons
+from explorer.app.widgets.compiling import CompilingNotice
 from explorer.app.widgets.palette import Command, Palette
 from explorer.app.widgets.theme import Theme
 from explorer.numerics.arrays import FloatArray
@@ -41,7 +42,16 @@ TITLE = "Flagged 4-4 explorer"
 # Modules that the worker imports at its start.
 TASKS = tuple({task.__module__: None for feature in FEATURES for task in feature.tasks})
 # Scripts of the whole page.
-SCRIPTS = ("throttles", "fields", "names", "opens")
+SCRIPTS = (
+    "throttles",
+    "frames",
+    "fields",
+    "names",
+    "opens",
+    "projection",
+    "labels",
+    "layers",
+)
 # Title of a notice that a request is refused.
 REFUSAL = "That is not possible"
 # Seconds for which a notice is shown, and not repeated.
@@ -92,6 +102,7 @@ class Page:
         self._is_complete = False
         self._frame = Frame(state)
         self._assigner = Assigner(server)
+        self.compiling = CompilingNotice(server)
         self._presses = presses = Presses()
         self.session = Session(
             state, self._draw, self._complain, self._report, history, press_at=presses.at
@@ -131,15 +142,19 @@ class Page:
         server.scene.set_up_direction("+z")
         self._features = tuple(each for each in FEATURES if each.is_offered(self.services))
         self.services.exports = tuple(each for one in self._features for each in one.exports)
-        self._feeds = [
-            self.services.get(kind) for feature in self._features for kind in feature.feeds
-        ]
         self._scene = [self.services.get(part) for each in self._features for part in each.scene]
+        # The worker computes in the order of their requests. The scene alone needs those feeds
+        # only of which it draws.
+        kinds = [kind for feature in self._features for kind in feature.feeds]
+        kinds += [kind for feature in self._features for kind in feature.later_feeds]
+        self._feeds = [
+            self.services.get(kind) for kind in kinds if panels or self.services.has(kind)
+        ]
         self._runners = [
             self.services.get(kind) for each in self._features for kind in each.runners
         ]
         self.services.cameras.frame_first()
-        self._panels = self._add_panels()
+        self._panels = self._add_panels() if panels else []
         layout = Layout(server, theme, self.services.cameras, self.panels if panels else None)
         self.palette = self._add_palette(layout)
         server.on_client_connect(self.services.cameras.connected)

@@ -9,13 +9,11 @@ from __future__ import annotations
 import itertools
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from explorer.app.browser.headless import PictureError, headless_browser
-from explorer.app.browser.viser_gaps import mark_broadcasts
-from explorer.app.scene.camera import ViewName
-from explorer.app.server import Running, start
 from explorer.files.writing import write_whole
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose
@@ -24,11 +22,14 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
     from viser import ClientHandle
 
+    from explorer.app.scene.camera import ViewName
+    from explorer.app.server import Running
+
 # A software renderer on a busy machine takes seconds for a large picture.
 PATIENCE_SECONDS = 60.0
 # Selector of the canvas with the scene: charts have canvases too, but three.js marks its own.
 SCENE_CANVAS = "canvas[data-engine]"
-HAS_ARRIVED = "mark => window.explorer?.mark >= mark"
+HAS_ARRIVED = "mark => window.explorer?.mark >= mark && window.explorer.ownMark >= mark"
 _marks = itertools.count(1)
 # Seconds after which the camera is moved a little if the size of the canvas is not known.
 NUDGE_SECONDS = 2.0
@@ -40,6 +41,47 @@ SCENE_ALONE = (
     f"body *:not(:has({SCENE_CANVAS})):not({SCENE_CANVAS}) {{ visibility: hidden !important; }}"
 )
 
+# A page prepares many frames before the one that is wanted. It draws none before, and none after:
+# each takes a software renderer as long as all else together.
+HOLD = """(() => {
+    const context = WebGL2RenderingContext.prototype;
+    for (const name of ["clear", "drawArrays", "drawElements", "drawArraysInstanced",
+                        "drawElementsInstanced", "drawRangeElements"]) {
+        const draw = context[name];
+        context[name] = function (...all) {
+            if (window.isReleased) draw.apply(this, all);
+        };
+    }
+})()"""
+# Wait for a number of frames to be drawn, and until the browser has taken the last of them.
+AWAIT_FRAMES = """(count) => new Promise((resolve) => {
+    const { render } = window.__viserTestpoints.rendererInfo;
+    const last = render.frame + count;
+    const next = () => {
+        if (render.frame < last) {
+            window.__viserMutable.requestRender();
+            requestAnimationFrame(next);
+        } else requestAnimationFrame(resolve);
+    };
+    next();
+})"""
+# Draw one frame on a page on hold.
+DRAW_FRAME = """() => new Promise((resolve) => {
+    const { scene, requestRender } = window.__viserMutable;
+    const [before, after] = [scene.onBeforeRender, scene.onAfterRender];
+    scene.onBeforeRender = (...all) => {
+        window.isReleased = true;
+        before(...all);
+    };
+    scene.onAfterRender = (...all) => {
+        after(...all);
+        Object.assign(scene, { onBeforeRender: before, onAfterRender: after });
+        window.isReleased = false;
+        requestAnimationFrame(resolve);
+    };
+    requestRender();
+})"""
+
 
 def take(
     design: Design,
@@ -49,7 +91,7 @@ def take(
     out: Path,
     size: tuple[int, int],
     panels: bool = False,
-    prepare: Callable[[Running], None] | None = None,
+    handle: bool = False,
 ) -> None:
     """Write a picture of a design in a pose as a PNG file, whole or not at all.
 
@@ -60,15 +102,22 @@ def take(
         out: The file to write.
         size: Width and height in pixels.
         panels: Whether to show the page with its panels, rather than the scene alone.
-        prepare: Called with the running explorer before the picture is taken.
+        handle: Whether to show the handle by which the platform is dragged.
 
     Raises:
         MissingExtraError: Playwright or a Chromium is missing.
         PictureError: the browser did not start or did not draw in time.
         StorageError: the file cannot be written.
     """
-    with headless_browser() as browser:
-        data = picture(browser, design, pose, view=view, size=size, panels=panels, prepare=prepare)
+    # The server starts while the browser does.
+    with ThreadPoolExecutor(1) as executor:
+        starting = executor.submit(_start, design, pose, panels=panels, handle=handle)
+        try:
+            with headless_browser() as browser:
+                data = _draw(browser, starting.result(), view=view, size=size, panels=panels)
+        finally:
+            if starting.exception() is None:
+                starting.result().stop()
     write_whole(out, data)
 
 
@@ -90,33 +139,64 @@ def picture(
     Raises:
         PictureError: the browser did not draw in time.
     """
-    running = start(design, pose, port=0, panels=panels)
+    running = _start(design, pose, panels=panels)
     try:
-        if prepare is not None:
-            prepare(running)
-            if not running.page.wait_until_drawn(PATIENCE_SECONDS):
-                raise PictureError("the explorer did not finish what it draws in time")
-        page, client = open_page(browser, running, size)
-        try:
-            if not panels:
-                page.add_style_tag(content=SCENE_ALONE)
-            if tab is not None:
-                page.get_by_role("tab", name=tab, exact=True).first.click()
-            # The size of the canvas, and with it the framing, is known only then.
-            settle(page, client)
-            running.page.point_cameras(view)
-            settle(page, client)
-            return stable_picture(page)
-        finally:
-            page.close()
+        return _draw(
+            browser, running, view=view, size=size, panels=panels, tab=tab, prepare=prepare
+        )
     finally:
         running.stop()
 
 
+def _start(design: Design, pose: Pose | None, *, panels: bool, handle: bool = True) -> Running:
+    # What it imports takes longer than all else that happens before there is a browser.
+    from explorer.app.server import start
+    from explorer.app.state.view import View
+
+    return start(design, pose, view=View(handle=handle), port=0, panels=panels)
+
+
+def _draw(
+    browser: Browser,
+    running: Running,
+    *,
+    view: ViewName,
+    size: tuple[int, int],
+    panels: bool,
+    tab: str | None = None,
+    prepare: Callable[[Running], None] | None = None,
+) -> bytes:
+    if prepare is not None:
+        prepare(running)
+        if not running.page.wait_until_drawn(PATIENCE_SECONDS):
+            raise PictureError("the explorer did not finish what it draws in time")
+    page, client = open_page(browser, running, size, hold=True)
+    try:
+        if not panels:
+            page.add_style_tag(content=SCENE_ALONE)
+        if tab is not None:
+            page.get_by_role("tab", name=tab, exact=True).first.click()
+        # The size of the canvas, and with it the framing, is known only then.
+        settle(page, client)
+        running.page.point_cameras(view)
+        settle(page, client)
+        page.evaluate(DRAW_FRAME)
+        # Panels fade in; the scene alone is at rest.
+        return stable_picture(page) if panels else page.screenshot()
+    finally:
+        page.close()
+
+
 def open_page(
-    browser: Browser, running: Running, size: tuple[int, int]
+    browser: Browser, running: Running, size: tuple[int, int], *, hold: bool = False
 ) -> tuple[Page, ClientHandle]:
     """Open the explorer in a new tab and wait until it is connected.
+
+    Args:
+        browser: The browser.
+        running: The explorer.
+        size: Width and height of the tab in pixels.
+        hold: Whether the tab draws only frames that it is told to draw.
 
     Raises:
         PictureError: it does not connect in time.
@@ -124,6 +204,8 @@ def open_page(
     known = set(running.viser.get_clients())
     page = browser.new_page(viewport={"width": size[0], "height": size[1]})
     page.set_default_timeout(1000.0 * PATIENCE_SECONDS)
+    if hold:
+        page.add_init_script(HOLD)
     page.goto(fixed_resolution_url(running))
     # viser warns of software rendering; no picture shows the warning.
     page.add_style_tag(content=".mantine-Notifications-root { display: none !important; }")
@@ -147,10 +229,14 @@ def settle(page: Page, client: ClientHandle) -> None:
     Raises:
         PictureError: it does not draw in time.
     """
+    from explorer.app.browser.viser_gaps import mark_broadcasts, run_script_in
+
     deadline = time.monotonic() + PATIENCE_SECONDS
     nudged = time.monotonic()
     mark = next(_marks)
     mark_broadcasts(client, mark)
+    # What is sent to this browser alone takes a way of its own.
+    run_script_in(client, f"(window.explorer ??= {{}}).ownMark = {mark};")
     while not (_is_size_known(page, client) and page.evaluate(HAS_ARRIVED, mark)):
         now = time.monotonic()
         if now > deadline:
@@ -160,11 +246,8 @@ def settle(page: Page, client: ClientHandle) -> None:
             client.camera.position = client.camera.position * (1.0 + 1e-4)
             nudged = now
         page.wait_for_timeout(50)
-    # A frame that comes back shows what the messages before it changed.
-    try:
-        client.get_render(16, 16, timeout=PATIENCE_SECONDS)
-    except (TimeoutError, RuntimeError):
-        raise PictureError("the page did not draw in time") from None
+    # A frame that has begun may show what was before.
+    page.evaluate(AWAIT_FRAMES, 2)
 
 
 def _is_size_known(page: Page, client: ClientHandle) -> bool:

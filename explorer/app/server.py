@@ -27,6 +27,7 @@ from explorer.app.security.guard import Guard
 from explorer.app.session.drawable import check_drawable
 from explorer.app.session.memory import freeze_objects, limit_arenas, trim_repeatedly
 from explorer.app.state.state import opened
+from explorer.app.state.view import View
 from explorer.app.storage.folder import data_folder
 from explorer.app.storage.preferences import PreferenceFile
 from explorer.app.storage.study_folders import STUDIES_FOLDER, StudyFolders
@@ -72,6 +73,7 @@ def start(
     design: Design,
     pose: Pose | None = None,
     *,
+    view: View | None = None,
     host: str = "127.0.0.1",
     port: int = 8080,
     token: str | None = None,
@@ -85,6 +87,7 @@ def start(
     Args:
         design: The manipulator to open, unless a session is gone on with.
         pose: Pose in which to open it; its home pose if None.
+        view: What to show; the usual if None.
         host: The address to listen on.
         port: The port to listen on; any free one if 0.
         token: What has to be known to get in; if None a random one is made, but none for
@@ -101,7 +104,7 @@ def start(
         ServerError: the address or the port cannot be had, or the token cannot be used.
     """
     history = None if user_data is None else user_data.history
-    state = opened(design, pose) if history is None else history.step.state
+    state = opened(design, pose, view) if history is None else history.step.state
     check_drawable(state)
     access = Access.to(host, token)
     guard = Guard(access)
@@ -191,7 +194,7 @@ def _wait_for_interruption(running: Running, open_browser: bool) -> None:
         )
     sys.stderr.flush()
     freeze_objects()
-    warm_in_background(then=freeze_objects)
+    warm_in_background(then=freeze_objects, tell=running.page.compiling.show)
     running.page.start_workers()
     if open_browser:
         threading.Thread(target=webbrowser.open, args=(running.url,), daemon=True).start()

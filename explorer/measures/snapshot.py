@@ -25,6 +25,7 @@ from explorer.mechanism.margins import describe_modes, margins, mode_name, mode_
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.bruhat import incidences
+from explorer.singularity.gaps import FlagGaps, flag_gaps
 from explorer.singularity.jacobian import (
     determinant,
     inverse_condition,
@@ -74,6 +75,11 @@ class Snapshot:
     def margins(self) -> FloatArray:
         """The margins (δ1, δ2, δ3), shape (3,)."""
         return margins(self.pose.position, self.rotation)
+
+    @cached_property
+    def gaps(self) -> FlagGaps:
+        """The gaps that are left to each incidence."""
+        return flag_gaps(np.array(self.pose.position), self.rotation)
 
     @cached_property
     def volumes(self) -> FloatArray:

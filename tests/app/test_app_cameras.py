@@ -17,6 +17,7 @@ from explorer.app.scene.camera import (
     Cameras,
     are_in_picture,
     framing,
+    has_perspective,
 )
 from explorer.numerics.arrays import FloatArray
 
@@ -168,8 +169,29 @@ def test_what_is_framed_is_in_the_picture_and_what_is_framed_closer_is_not(
     assert are_in_picture(points, eye, target, FIELD_OF_VIEW, aspect)
     closer = target + 0.85 * (eye - target)
     assert not are_in_picture(points, closer, target, FIELD_OF_VIEW, aspect)
-    # Nothing behind a camera is in its picture.
-    assert not are_in_picture(2.0 * eye - target + 0.0 * points, eye, target, 2.0, aspect)
+    # Nothing behind a camera is in its picture, if it has perspective.
+    if has_perspective(target - eye):
+        behind = 2.0 * eye - target + 0.0 * points
+        assert not are_in_picture(behind, eye, target, 2.0, aspect)
+
+
+AXES = [*np.eye(3), *-np.eye(3)]
+
+
+@pytest.mark.parametrize("axis", AXES, ids=str)
+def test_camera_has_no_perspective_along_an_axis_alone(axis: FloatArray) -> None:
+    upright = axis + [0.0, -1e-4, 0.0] if axis[2] else axis
+    assert not has_perspective(3.0 * upright)
+    turned = upright + 0.01 * np.array([0.3, 0.5, 0.8])
+    assert has_perspective(3.0 * turned)
+
+
+@given(st.floats(-100.0, 100.0))
+def test_camera_without_perspective_frames_the_same_whatever_the_depth(depth: float) -> None:
+    """Only what is seen counts: the height and the breadth, not how far away a point is."""
+    size = np.linalg.norm(np.subtract(*framing(POINTS, "front", 1.2)))
+    deeper = POINTS * [1.0, depth, 1.0]
+    assert np.linalg.norm(np.subtract(*framing(deeper, "front", 1.2))) == pytest.approx(size)
 
 
 def test_camera_follows_what_leaves_its_picture_and_keeps_its_direction(browser: Any) -> None:

@@ -8,6 +8,7 @@ import msgspec
 import numpy as np
 import pytest
 from hypothesis import given, strategies as st
+from limited_designs import scaled_design
 
 from explorer.app.features.singularity.distance import distance_table
 from explorer.app.features.singularity.panel import measures_table, summary
@@ -84,7 +85,9 @@ def test_every_view_holds_the_whole_mechanism(
     right /= np.linalg.norm(right)
     up = np.cross(right, forward)
     seen = points - eye
-    depth = seen @ forward
+    # Without perspective all is as large as at the target.
+    distance = float(np.linalg.norm(target - eye))
+    depth = seen @ forward if view == "isometric" else np.full(len(points), distance)
     half = np.tan(0.5 * FIELD_OF_VIEW)
     across = np.abs(seen @ right) / (half * aspect * depth)
     upward = np.abs(seen @ up) / (half * depth)
@@ -100,6 +103,21 @@ def test_scenes_are_about_ten_units_large_whatever_the_design(reach: float) -> N
     step = round_step(reach / 10.0)
     assert 6.3 <= reach / step <= 15.9
     assert float(f"{step:.0e}"[0]) in (1.0, 2.0, 5.0)
+
+
+@given(st.floats(1e-3, 1e3), st.floats(1e-3, 1e3))
+def test_squares_of_the_ground_are_as_large_as_they_are_said_to_be(
+    factor: float, unit_mm: float
+) -> None:
+    design = scaled_design(PRESETS["paper-optimal"], factor)
+    placed = Placed(Frame(opened(msgspec.structs.replace(design, unit_mm=unit_mm))))
+    assert float(f"{placed.square_mm:.6e}"[0]) in (1.0, 2.0, 5.0)
+    assert f"{placed.square_mm:.6e}"[1:8] == ".000000"
+    # Along the base's axis lie as many squares as a2 is millimetres away.
+    drawn = float(np.linalg.norm(placed.points["a2"] - placed.points["a1"]))
+    real = unit_mm * float(np.linalg.norm(placed.frame.snapshot.points.a2))
+    assert drawn / placed.square == pytest.approx(real / placed.square_mm)
+    assert 0.5 <= placed.square <= 2.0
 
 
 @pytest.mark.parametrize(("step", "digits"), [(1.0, 0), (0.1, 1), (0.001, 3), (10.0, 0), (0.25, 2)])

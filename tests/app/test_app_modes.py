@@ -47,10 +47,10 @@ def test_table_has_the_eight_modes_with_b4_and_the_limits_that_each_breaks() -> 
         assert f"{row[0]}:  {row[1]}" == MODES[mode]
         there = Frame(SetMode(mode).apply(frame.state))
         np.testing.assert_allclose(
-            [number(cell) for cell in row[2:5]], there.state.pose.position, atol=0.006
+            [number(cell) for cell in row[2:5]], there.state.pose.position, atol=0.06
         )
         # All numbers of the table have the same decimals.
-        assert {len(cell.partition(".")[2]) for cell in row[2:5]} == {2}
+        assert {len(cell.partition(".")[2]) for cell in row[2:5]} == {1}
         broken = there.snapshot.violations
         assert (row[5] == "within") == (not broken)
         if broken:
@@ -136,12 +136,12 @@ def test_all_ghosts_stay_all_while_a_pointer_rests_on_one() -> None:
 def test_ghost_of_a_browser_that_is_closed_goes(services: Services, desk: Desk) -> None:
     hovered = services.get(HoveredMode)
     desk.press(services.buttons, "modes.hover", "2")
-    assert hovered.mode == 2
+    assert hovered.row == 2
     for client_id, expected in ((CLIENT.client_id + 1, 2), (CLIENT.client_id, None)):
         client: Any = SimpleNamespace(client_id=client_id)
         for forget in list(getattr(services.server, "_client_disconnect_cb")):  # noqa: B009
             forget(client)
-        assert hovered.mode == expected
+        assert hovered.row == expected
 
 
 @pytest.mark.parametrize("text", ["9", "-1", "x"])
@@ -150,4 +150,4 @@ def test_pointer_on_what_is_no_mode_shows_nothing(
 ) -> None:
     hovered = services.get(HoveredMode)
     desk.press(services.buttons, "modes.hover", text)
-    assert hovered.mode is None
+    assert hovered.row is None

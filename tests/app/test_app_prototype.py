@@ -17,7 +17,9 @@ from test_app_drawing import closed_volume
 
 from explorer.app.features.feature import Services
 from explorer.app.features.mechanism.bodies import Bodies
+from explorer.app.features.mechanism.flags import Flags
 from explorer.app.features.mechanism.legs import Legs
+from explorer.app.features.mechanism.marks import DragHandle
 from explorer.app.features.prototype.feed import PartsFeed
 from explorer.app.features.prototype.files import ASSEMBLIES
 from explorer.app.features.prototype.panel import (
@@ -157,8 +159,7 @@ def test_parts_replace_bodies_and_legs_and_follow_their_switches(
     # The second design is too tight for parts.
     for state, has_parts in ((shown(), True), (thick(shown(), 0.4), False)):
         for path, is_shown in visible(state).items():
-            if path != "/grid":
-                assert is_shown == (path.startswith("/prototype") == has_parts), path
+            assert is_shown == (path.startswith("/prototype") == has_parts), path
     for switch, kinds in (
         ("legs", {"cross", "carriage", "cylinder", "rod"}),
         ("bodies", {"base", "platform", "ball"}),
@@ -169,6 +170,21 @@ def test_parts_replace_bodies_and_legs_and_follow_their_switches(
             if path.startswith("/prototype") and not is_shown
         }
         assert hidden == kinds
+
+
+def test_flags_and_handle_are_drawn_only_with_assembled_parts(services: Services) -> None:
+    drawn = (Flags(services), DragHandle(services))
+    for state, is_seen in (
+        (opened(OPTIMAL), True),
+        (shown(exploded=0.0), True),
+        (shown(exploded=0.5), False),
+        # It is too tight for parts, so that the schematic mechanism is drawn.
+        (thick(shown(exploded=0.5), 0.4), True),
+    ):
+        placed = placed_with_parts(services, viewed(state, handle=True, flags=True))
+        nodes = by_name(update for part in drawn for update in part.updates(placed))
+        assert {node["visible"] for node in nodes.values() if "visible" in node} == {is_seen}
+        assert all(bool(len(part.corners(placed))) == is_seen for part in drawn)
 
 
 def test_legs_that_collide_are_coloured(services: Services) -> None:

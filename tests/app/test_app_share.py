@@ -224,15 +224,23 @@ class Packed:
 
 def test_a_page_of_the_scene_holds_what_is_seen_and_nothing_else(running: Running) -> None:
     packed = Packed.of(scene_html(running.viser, running.page.session.state, EYE, date=DATE))
-    assert {"BackgroundImageMessage", "ThemeConfigurationMessage"} == {
+    # What draws labels and views without perspective comes along.
+    kept = {
+        "BackgroundImageMessage",
+        "EnableLightsMessage",
+        "EnvironmentMapMessage",
+        "RunJavascriptMessage",
+        "ThemeConfigurationMessage",
+    }
+    assert kept == {
         m["type"]
         for m in packed.messages
         if "name" not in m and not m["type"].startswith("SetCamera")
     }
     assert packed.named("/legs/")
-    assert [m["props"]["text"] for m in packed.messages if m["type"] == "LabelMessage"] == (
-        ["a1", "a2", "a3", "b1", "b2", "b3", "b4"]
-    )
+    labels = {m["name"]: m["props"]["text"] for m in packed.messages if m["type"] == "LabelMessage"}
+    del labels["/ground/scale"]
+    assert list(labels.values()) == (["δ1", "δ2", "δ3", "a1", "a2", "a3", "b1", "b2", "b3", "b4"])
     for hidden in ("/ghosts/", "/twin/", "/path/", "/workspace/", "/handle"):
         assert not packed.named(hidden)
     cameras = {m["type"]: m for m in packed.messages if m["type"].startswith("SetCamera")}
@@ -253,9 +261,8 @@ def test_what_is_shown_later_is_in_a_later_page(running: Running) -> None:
     assert running.page.wait_until_drawn()
     packed = Packed.of(scene_html(running.viser, session.state, EYE, date=DATE))
     assert packed.named("/ghosts/")
-    texts = [m["props"]["text"] for m in packed.messages if m["type"] == "LabelMessage"]
-    assert "a1" not in texts
-    assert len(texts) == 7
+    names = [m["name"] for m in packed.messages if m["type"] == "LabelMessage"]
+    assert set(names) == {"/ground/scale", *(f"/ghosts/name/{index}" for index in range(7))}
     session.do(Set("view", View()))
     assert running.page.wait_until_drawn()
 

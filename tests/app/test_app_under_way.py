@@ -15,7 +15,11 @@ from services import StubWorker, services_for
 from explorer.app.features.legs.tasks import RadiusRequest, draw_radius_curve
 from explorer.app.features.workspace.feed import WorkspaceFeed
 from explorer.app.features.workspace.reached import MOST_LIVE_NODES, reach_workspace
-from explorer.app.features.workspace.tasks import WorkspaceRequest, draw_workspace
+from explorer.app.features.workspace.tasks import (
+    WorkspaceRequest,
+    WorkspaceSurface,
+    draw_workspace,
+)
 from explorer.app.features.workspace.words import drawing_words
 from explorer.app.session import feed as session_feed
 from explorer.app.session.feed import Stage
@@ -62,7 +66,14 @@ class Watched:
 
     def __init__(self, last: int | None = None) -> None:
         self.stages: list[Stage] = []
-        self.line = Channel(self.stages.append, lambda: len(self.stages) == last)
+        self.surfaces: list[WorkspaceSurface] = []
+        self.line = Channel(self._keep, lambda: len(self.stages) == last)
+
+    def _keep(self, value: Stage | WorkspaceSurface) -> None:
+        if isinstance(value, Stage):
+            self.stages.append(value)
+        else:
+            self.surfaces.append(value)
 
 
 def test_a_reachable_workspace_tells_each_pair_of_legs_that_it_carves() -> None:
@@ -77,6 +88,7 @@ def test_a_reachable_workspace_tells_each_pair_of_legs_that_it_carves() -> None:
     assert shares == sorted(set(shares))
     assert shares[0] == 0.0
     assert shares[-1] < 1.0
+    assert watched.surfaces == [drawing.surface]
 
 
 @pytest.mark.parametrize("last", [0, 2, 3])

@@ -128,6 +128,7 @@ def test_empty_workspace_names_what_empties_it_instead_of_a_volume() -> None:
     follow(services, state)
     words = volume_headline(Frame(state), services.get(VolumeFeed))
     assert "The workspace is empty" in words
+    assert services.get(VolumeFeed).text.words == "empty"
     assert "l1 maximum" in words
     assert drawing_of(shown(state, solid=True, cut="x")).slice_map is None
 
@@ -291,7 +292,7 @@ def test_the_switch_keeps_the_other_side(services: Services, desk: Desk, axis: A
     # The camera's direction, by axis: see `explorer.app.scene.camera`.
     sign = (1.0, -1.0, 1.0)[index]
     for drawing, side in ((near, -sign), (far, sign)):
-        corners = np.concatenate([shell.vertices for shell in drawing.shells])[:, index]
+        corners = np.concatenate([shell.vertices for shell in drawing.surface.shells])[:, index]
         assert (side * (corners - near.level)).min() == pytest.approx(0.0, abs=1e-9)
     volumes: list[float] = []
     for side in (-1.0, 1.0):

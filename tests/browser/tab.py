@@ -11,7 +11,7 @@ import numpy as np
 import viser
 from playwright.sync_api import Browser, ConsoleMessage, Download, Locator, expect
 
-from explorer.app.scene.camera import ViewName, framing
+from explorer.app.scene.camera import ViewName, framing, has_perspective
 from explorer.app.screenshot import PATIENCE_SECONDS, SCENE_CANVAS, fixed_resolution_url, settle
 from explorer.app.server import Running
 from explorer.app.session.history import start_history
@@ -65,9 +65,6 @@ class Tab:
     ) -> None:
         self.running = running
         self._size = size
-        # A software renderer draws three times faster without reflections and shadows.
-        running.viser.scene.configure_environment_map(hdri=None)
-        running.viser.scene.configure_default_lights(cast_shadow=False)
         self.requests: list[str] = []
         self._complaints: list[str] = []
         self._context = browser.new_context(
@@ -262,7 +259,9 @@ class Tab:
         right = np.cross(forward, [0.0, 0.0, 1.0])
         right /= np.linalg.norm(right)
         up = np.cross(right, forward)
-        depth = (point - eye) @ forward * math.tan(0.5 * camera.fov)
+        # Along an axis the page draws without perspective.
+        along = point - eye if has_perspective(forward) else target - eye
+        depth = along @ forward * math.tan(0.5 * camera.fov)
         box = self.page.locator(SCENE_CANVAS).bounding_box()
         assert box is not None
         across = float((point - eye) @ right / depth) * box["height"] / 2

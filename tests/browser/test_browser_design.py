@@ -7,6 +7,7 @@ import pytest
 from playwright.sync_api import expect
 from tab import TRACK, Tab
 
+from explorer.app.screenshot import SCENE_CANVAS, settle
 from explorer.app.state.state import joints_of, opened
 from explorer.mechanism.design import VARIABLES
 from explorer.mechanism.design_file import PRESETS
@@ -51,6 +52,27 @@ def test_a_variable_changes_the_legs_when_the_pose_is_held(tab: Tab) -> None:
     assert_variables_shown(tab)
     # It is none of the presets any more.
     expect(tab.row("Preset").get_by_role("combobox")).to_have_value("—")
+
+
+def test_differences_of_a_change_last_until_a_press_outside_of_the_scene(tab: Tab) -> None:
+    card = tab.page.locator(".ex-change")
+    expect(card).to_have_count(0)
+    goal = tab.drag("b1x", 0.6)
+    tab.wait_for(lambda: abs(tab.state.design.b1[0] - goal) < 0.5, "the b1x dragged to")
+    for name in ("Volume", "Reach", "Clearance here"):
+        expect(card).to_contain_text(name)
+    # The camera is turned.
+    scene = tab.page.locator(SCENE_CANVAS).bounding_box()
+    assert scene is not None
+    x, y = scene["x"] + 0.5 * scene["width"], scene["y"] + 0.9 * scene["height"]
+    tab.page.mouse.move(x, y)
+    tab.page.mouse.down()
+    tab.page.mouse.move(x + 20.0, y)
+    tab.page.mouse.up()
+    settle(tab.page, tab.client)
+    expect(card).to_contain_text("Reach")
+    tab.turn_to("Show")
+    expect(card).to_have_count(0)
 
 
 def test_a_variable_changes_the_pose_when_the_legs_are_held(tab: Tab) -> None:

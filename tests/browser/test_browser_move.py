@@ -105,20 +105,20 @@ def test_pointer_on_a_mode_shows_its_ghost_until_it_leaves_or_the_mode_is_chosen
     row_of_mode(tab, 6).scroll_into_view_if_needed()
     for mode in (6, 2):
         row_of_mode(tab, mode).hover()
-        tab.wait_for(lambda mode=mode: hovered.mode == mode, f"the ghost of mode {mode}")
+        tab.wait_for(lambda mode=mode: hovered.row == mode, f"the ghost of mode {mode}")
     tab.wait_for(lambda: ghosts_shown(tab) == 1, "one ghost in the scene")
     assert tab.state == before
     assert tab.running.page.session.history.step.number == number
     tab.page.mouse.move(SIZE[0] // 2, 4)
-    tab.wait_for(lambda: hovered.mode is None, "no ghost")
+    tab.wait_for(lambda: hovered.row is None, "no ghost")
     tab.wait_for(lambda: ghosts_shown(tab) == 0, "no ghost in the scene")
     # A row that is replaced under the pointer, since its numbers change, is left later too.
     row_of_mode(tab, 2).hover()
-    tab.wait_for(lambda: hovered.mode == 2, "the ghost")
+    tab.wait_for(lambda: hovered.row == 2, "the ghost")
     tab.running.page.session.do(SetPosition(0, 11.0))
-    expect(row_of_mode(tab, 2)).to_contain_text("11.00")
+    expect(row_of_mode(tab, 2)).to_contain_text("11.0")
     tab.page.mouse.move(SIZE[0] // 2, 4)
-    tab.wait_for(lambda: hovered.mode is None, "no ghost any more")
+    tab.wait_for(lambda: hovered.row is None, "no ghost any more")
 
 
 def test_keyboard_on_a_mode_shows_its_ghost_and_chooses_it(tab: Tab) -> None:
@@ -126,7 +126,7 @@ def test_keyboard_on_a_mode_shows_its_ghost_and_chooses_it(tab: Tab) -> None:
     tab.page.get_by_role("button", name="Other modes as ghosts").focus()
     for _ in range(3):
         tab.page.keyboard.press("Tab")
-    tab.wait_for(lambda: hovered.mode == 2, "the ghost of the row with the focus")
+    tab.wait_for(lambda: hovered.row == 2, "the ghost of the row with the focus")
     tab.page.keyboard.press("Enter")
     tab.wait_for(lambda: tab.state.mode == 2, "that mode")
 

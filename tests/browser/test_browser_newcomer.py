@@ -352,3 +352,14 @@ def test_mistakes_are_refused_with_a_reason_and_lose_nothing(
     newcomer.key("Escape")
     expect(newcomer.button("paper-optimal preset")).to_be_visible()
     expect(volume).to_contain_text(volume_of(OPTIMAL))
+
+
+def test_notice_tells_how_far_compiling_is_until_it_is_done(tab: Tab) -> None:
+    compiling = tab.running.page.compiling
+    notice = tab.page.get_by_text("Compiling for this processor")
+    for share, words in ((0.0, "0 % done"), (0.4, "40 % done")):
+        compiling.show(share)
+        expect(tab.page.get_by_text(words)).to_be_visible()
+        expect(notice).to_have_count(1)
+    compiling.show(1.0)
+    expect(notice).to_have_count(0)

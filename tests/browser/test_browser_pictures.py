@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,14 @@ from scipy import ndimage
 from explorer.app.features.listed import FEATURES
 from explorer.app.features.mechanism.legs import Telescopes
 from explorer.app.scene.placing import Placed
-from explorer.app.screenshot import SCENE_ALONE, open_page, settle, stable_picture
+from explorer.app.screenshot import (
+    SCENE_ALONE,
+    open_page,
+    picture,
+    settle,
+    stable_picture,
+    take,
+)
 from explorer.app.server import Running, start
 from explorer.app.state.action import Action
 from explorer.app.state.actions import Set, SetPose, SetPosition
@@ -56,6 +64,32 @@ def test_a_fresh_picture_looks_like_the_stored_one(browser: Browser, name: str) 
 
 def scene_of(name: str) -> Part:
     return ABOVE_DRAWER if name in DRAWN_OUT else BETWEEN_PANELS
+
+
+def test_a_picture_is_that_of_a_page_which_draws_every_frame(
+    stage: Stage, browser: Browser
+) -> None:
+    got = picture(browser, DESIGN, None, view="isometric", size=SCENES["home"].size)
+    assert_alike("every-frame", stage.picture(), got, SCENE_LIMIT)
+
+
+def test_pictures_of_the_command_have_no_handle_unless_asked(
+    browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    @contextmanager
+    def same_browser() -> Generator[Browser]:
+        yield browser
+
+    monkeypatch.setattr("explorer.app.screenshot.headless_browser", same_browser)
+
+    def taken(*, handle: bool) -> bytes:
+        out = tmp_path / "shot.png"
+        take(DESIGN, None, view="isometric", out=out, size=(480, 300), handle=handle)
+        return out.read_bytes()
+
+    usual = picture(browser, DESIGN, None, view="isometric", size=(480, 300))
+    assert likeness(decoded(usual), decoded(taken(handle=True))).is_within(SCENE_LIMIT)
+    assert not likeness(decoded(usual), decoded(taken(handle=False))).is_within(SCENE_LIMIT)
 
 
 def a_pixel_lower(picture: FloatArray) -> FloatArray:

@@ -8,11 +8,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 from playwright.sync_api import expect
-from tab import Tab
+from tab import SIZE, Tab
 
+from explorer.app.features.mechanism.approach import HoveredMargin
+from explorer.app.features.mechanism.marks import (
+    ARROW_LENGTH,
+    CLEAR_HANDLE,
+    FAINT_HANDLE,
+    DragHandle,
+)
+from explorer.app.scene.placing import Placed
+from explorer.app.state.actions import SetPosition
 from explorer.app.state.frame import Frame
 from explorer.mechanism.home import home_pose
-from explorer.mechanism.margins import margins
+from explorer.mechanism.margins import INCIDENCES, margins
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 
@@ -95,3 +104,63 @@ def test_paths_are_gone_along_planned_and_saved(tab: Tab, monkeypatch: pytest.Mo
     assert rows[0][:7] == ["time_s", "l1", "d1", "d2", "d3", "d4", "l4"]
     assert [float(v) for v in rows[1][7:10]] == list(home.position)
     assert [float(v) for v in rows[-1][7:10]] == list(goal.position)
+
+
+def test_pointer_on_a_margin_fills_its_tetrahedron_until_it_leaves(tab: Tab) -> None:
+    before, number = tab.state, tab.running.page.session.history.step.number
+    hovered = tab.running.page.services.get(HoveredMargin)
+    assert not is_visible(tab, "/tetrahedra/faces")
+    for row in (3, 1):
+        words = tab.page.locator(".ex-margin-row").nth(row - 1).get_by_text(INCIDENCES[row - 1])
+        words.hover()
+        tab.wait_for(lambda row=row: hovered.row == row, f"the pointer on δ{row}")
+        tab.wait_for(lambda: is_visible(tab, "/tetrahedra/faces"), "a filled tetrahedron")
+        assert is_visible(tab, "/gaps/dashes")
+    # Its button shows it to the keyboard too.
+    tab.page.mouse.move(SIZE[0] // 2, 4)
+    tab.wait_for(lambda: not is_visible(tab, "/tetrahedra/faces"), "no filled tetrahedron")
+    tab.page.get_by_role("button", name="Go to δ1 = 0").focus()
+    tab.page.keyboard.press("Tab")
+    tab.wait_for(lambda: hovered.row == 2, "the row of the button with the focus")
+    tab.wait_for(lambda: is_visible(tab, "/tetrahedra/faces"), "its tetrahedron")
+    assert tab.state == before
+    assert tab.running.page.session.history.step.number == number
+
+
+def test_gizmo_that_gives_way_to_a_gap_in_a_pause_is_dragged_on(tab: Tab) -> None:
+    tab.page.set_viewport_size({"width": 1280, "height": 720})
+    session, gizmo = tab.running.page.session, tab.running.page.services.get(DragHandle)
+    # So high that the gap comes within the gizmo on the way down.
+    session.do(SetPosition(2, 5.0))
+    tab.look_from("isometric")
+    before = tab.state
+    assert gizmo.handle.scale == CLEAR_HANDLE[0]
+    placed = Placed(Frame(before))
+    arrow = np.array([0.0, 0.0, 1.0])
+    tip = placed.points["b4"] + 0.7 * ARROW_LENGTH * arrow
+    mouse = tab.page.mouse
+    mouse.move(*tab.on_screen(tip))
+    mouse.down()
+    mouse.move(*tab.on_screen(tip - 3.5 * arrow), steps=12)
+    tab.wait_for(lambda: gizmo.handle.scale == FAINT_HANDLE[0], "the small gizmo")
+    paused = tab.state.pose
+    mouse.move(*tab.on_screen(tip - 1.0 * arrow), steps=12)
+    mouse.up()
+    tab.wait_for(lambda: tab.state.pose.position[2] > paused.position[2] + 1.0, "going on")
+    tab.wait_for(lambda: gizmo.handle.scale == CLEAR_HANDLE[0], "the gizmo as it was")
+    tab.picture()
+    moved = placed.scale * (np.array(tab.state.pose.position) - before.pose.position)
+    np.testing.assert_allclose(moved, [0.0, 0.0, -1.0], atol=0.3)
+    # The camera turns again with the next drag beside the gizmo.
+    eye = np.array(tab.client.camera.position)
+    mouse.move(640, 600)
+    mouse.down()
+    mouse.move(700, 600, steps=5)
+    mouse.up()
+    tab.wait_for(lambda: not np.allclose(tab.client.camera.position, eye), "another view")
+
+
+def is_visible(tab: Tab, node: str) -> bool:
+    return bool(
+        tab.page.evaluate("name => !!window.__viserMutable.nodeRefFromName[name]?.visible", node)
+    )

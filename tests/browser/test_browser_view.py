@@ -75,3 +75,11 @@ def test_each_view_frames_the_mechanism_from_its_side(tab: Tab) -> None:
     for one, other in itertools.combinations(map(decoded, pictures), 2):
         spot = likeness(one, other).spot
         assert spot > 10.0
+
+
+def test_a_page_that_is_loaded_again_draws_the_same_scene(tab: Tab) -> None:
+    # Of a mesh that has got another shape, three.js may keep drawing the first one.
+    before = decoded(tab.picture())
+    for _ in range(3):
+        tab.reload()
+        assert likeness(before, decoded(tab.picture())).spot < 2.0

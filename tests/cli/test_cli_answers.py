@@ -246,11 +246,18 @@ def test_answers_are_free_of_messages_of_libraries(
     def chatty(design: object, pose: explorer.Pose, **options: object) -> None:
         print("(a library) did this")
         assert pose.position == POSITION
-        assert options == {"view": "top", "out": out, "size": (640, 480), "panels": True}
+        assert options == {
+            "view": "top",
+            "out": out,
+            "size": (640, 480),
+            "panels": True,
+            "handle": handle,
+        }
 
     out = tmp_path / "shot.png"
     monkeypatch.setattr("explorer.app.screenshot.take", chatty)
     words = ["--view", "top", "--out", out, "--size", "640x480", "--panels"]
-    argv = ["screenshot", *POSE, *words]
+    argv, handle = ["screenshot", *POSE, *words], False
     assert cli.text(*argv) == f"{out}\n"
-    assert cli.answer(*argv) == {"file": str(out), "size": [640, 480]}
+    handle = True
+    assert cli.answer(*argv, "--handle") == {"file": str(out), "size": [640, 480]}

@@ -98,6 +98,10 @@ class Services:
             self._shared[kind] = kind(self)
         return self._shared[kind]
 
+    def has(self, kind: Callable[[Services], object]) -> bool:
+        """Whether the one object of a class has been made."""
+        return kind in self._shared
+
     def at_end(self, stop: Callable[[], None]) -> None:
         """Register a function that is called when the page ends."""
         self._ends.append(stop)
@@ -251,6 +255,8 @@ class Feature:
         exports: The files that it offers.
         scene: Classes of its parts of the scene.
         feeds: Classes that request drawings from the worker.
+        later_feeds: Feeds whose requests come after those of all features' `feeds`, since nobody
+            waits for their results while the scene changes.
         runners: Classes that do long work.
         tasks: Functions that the worker calls; it imports them when it starts.
         commands: Commands that have no control.
@@ -270,6 +276,7 @@ class Feature:
     exports: tuple[Export, ...] = ()
     scene: tuple[Callable[[Services], ScenePart], ...] = ()
     feeds: tuple[Callable[[Services], Feed], ...] = ()
+    later_feeds: tuple[Callable[[Services], Feed], ...] = ()
     runners: tuple[Callable[[Services], Runner], ...] = ()
     tasks: tuple[Callable[..., object], ...] = ()
     commands: tuple[StateCommand, ...] = ()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from explorer.app.features.change.feature import CHANGE
 from explorer.app.features.compare.feature import COMPARE
 from explorer.app.features.designs.feature import DESIGNS
 from explorer.app.features.feature import Feature
@@ -25,6 +26,7 @@ FEATURES: tuple[Feature, ...] = (
     VIEW,
     SINGULARITY,
     WORKSPACE,
+    CHANGE,
     LEGS,
     PROTOTYPE,
     OPTIMISE,

@@ -44,6 +44,18 @@ window.explorer.buttons ??= (() => {
   addEventListener("focusin", ({ target }) => {
     focused = buttonAt(target);
   });
+  // Markup that is there until the next press, [data-until-press=name]: a press anywhere but in
+  // the scene, which turns the camera, is sent as a press of that name.
+  addEventListener(
+    "pointerdown",
+    ({ target }) => {
+      if (target.localName === "canvas") return;
+      for (const { dataset } of document.querySelectorAll("[data-until-press]")) {
+        window.explorer.press(dataset.untilPress, "");
+      }
+    },
+    true,
+  );
   // Milliseconds between two reports of what is rested on.
   const HOVER_PAUSE = 80;
   const isThere = ({ name, value }) =>

@@ -1,14 +1,14 @@
 """Surfaces in bands of colour: by the proximity to singularities, or by what bounds them.
 
 At one orientation margins are linear in the position, so that bands of the smallest margin are
-exact on each facet: their edges bend only where another margin becomes the smallest, and by the
-angle between facets, which the tolerance of the solid bounds. The condition number is not linear:
-it is computed at the corners of small facets, and signed, so that it is smooth where it is zero.
+exact on each triangle. The condition number is not linear: bands of it end at points that are
+found on the edges of small triangles. It is signed, so that it is smooth where it is zero.
 """
 
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -22,16 +22,20 @@ from explorer.singularity.colours import BAND_EDGES, OUTLINE, WARN_CONDITION, Rg
 from explorer.singularity.ellipsoids import planes_of_singularity
 from explorer.singularity.jacobian import inverse_condition, jacobian
 from explorer.workspace.accessible.workspace import PAIR_NAMES
-from explorer.workspace.solids.solid import Solid
+from explorer.workspace.faces.divide import divide, find_roots
+from explorer.workspace.faces.faces import Faces
 
 Measure = Literal["plain", "margin", "condition"]
 
 PLAIN: Rgb = (110, 150, 196)
 # Where legs begin to collide: what collides has this colour all over the page.
 COLLIDING: Rgb = OUTLINE
-# Longest edge of a coloured facet as a share of the reach, unless that takes too many facets.
-COLOURED_EDGE = 0.05
-# Most facets into which a surface is cut to be coloured.
+# Longest edge of a triangle that is coloured by the condition number, as a share of the reach,
+# unless that takes too many triangles.
+COLOURED_EDGE = 0.06
+# Largest error of a value at the end of a band.
+BAND_ERROR = 1e-5
+# Most triangles into which a surface is cut to be coloured.
 MOST_COLOURED = 100_000
 
 
@@ -67,81 +71,134 @@ class Colouring:
         rates = jacobian(self.design, points, self.rotation)
         return inverse_condition(rates, self.design.reach) / WARN_CONDITION
 
-    def shells(self, solid: Solid) -> tuple[tuple[Shell, ...], float | None]:
+    def shells(self, faces: Faces) -> tuple[tuple[Shell, ...], float | None]:
         """Return the parts of a surface, one for each colour, and its longest edge.
 
-        The longest edge of a facet that is coloured by the condition number, in design units, is
-        given if it is longer than usual, because the surface is large beside the reach; it is None
-        otherwise.
+        The longest edge of a triangle that is coloured by the condition number, in design units,
+        is given if it is longer than usual, because the surface is large beside the reach; it is
+        None otherwise.
         """
-        if solid.is_empty:
+        if not len(faces.triangles):
             return (), None
         if self.measure == "plain":
-            return _by_cause(solid), None
+            return _by_cause(faces), None
         coarse_edge = None
         if self.measure == "condition":
-            rest, share, longest = self._conditioned(solid)
+            vertices, triangles = cut_to_size(
+                faces.vertices, faces.triangles, COLOURED_EDGE * self.design.reach
+            )
+            longest = float(edge_lengths(vertices, triangles).max())
             coarse_edge = longest if longest > COLOURED_EDGE * self.design.reach else None
+            bands = _Bands(vertices, triangles, self._signed(vertices), self._signed)
+            levels = (*(-edge for edge in BAND_EDGES[:0:-1]), *BAND_EDGES)
         else:
-            rest = self._split_at_margins(solid.vertices[solid.faces])
-            share = self.values(rest.reshape(-1, 3)).reshape(-1, 3)
-        shells: list[Shell] = []
-        for colour, edge in zip(band_colours(), (*BAND_EDGES[1:], np.inf), strict=True):
-            band, rest, share = split_at(rest, share, edge)
-            if len(band):
-                corners = np.arange(3 * len(band), dtype=np.int32).reshape(-1, 3)
-                shells.append(Shell(colour, band.reshape(-1, 3), corners))
-        return tuple(shells), coarse_edge
+            vertices, triangles = self._split_at_margins(faces.vertices, faces.triangles)
+            bands = _Bands(vertices, triangles, self.values(vertices), None)
+            levels = BAND_EDGES[1:]
+        for level in levels:
+            bands.split(level)
+        return bands.shells(), coarse_edge
 
-    def _split_at_margins(self, triangles: FloatArray) -> FloatArray:
-        """Return triangles (n, 3, 3) split where the smallest margin is not linear."""
+    def _signed(self, points: FloatArray) -> FloatArray:
+        """Return the measure at points (n, 3) with the sign of the determinant."""
+        sign = np.where(margins(points, self.rotation).prod(axis=-1) < 0.0, -1.0, 1.0)
+        return sign * self.values(points)
+
+    def _split_at_margins(
+        self, vertices: FloatArray, triangles: IntArray
+    ) -> tuple[FloatArray, IntArray]:
+        """Return vertices and triangles, split where the smallest margin is not linear."""
         planes = planes_of_singularity(self.rotation)
         # Where two margins are equal, another one becomes the smallest.
         pairs = itertools.combinations(planes, 2)
         for normal in (*planes, *(a + sign * b for a, b in pairs for sign in (-1.0, 1.0))):
-            low, high, _ = split_at(triangles, triangles @ normal, 0.0)
-            triangles = np.concatenate([low, high])
-        return triangles
+            parts = _Bands(vertices, triangles, vertices @ normal, None)
+            parts.split(0.0)
+            vertices, triangles = parts.vertices, parts.triangles
+        return vertices, triangles
 
-    def _conditioned(self, solid: Solid) -> tuple[FloatArray, FloatArray, float]:
-        """Return small triangles (n, 3, 3), their measure (n, 3), and their longest edge."""
-        vertices, faces = cut_to_size(solid, COLOURED_EDGE * self.design.reach)
-        # With the sign of the determinant the measure is smooth where it is zero.
-        sign = np.where(margins(vertices, self.rotation).prod(axis=-1) < 0.0, -1.0, 1.0)
-        triangles, signed = vertices[faces], (sign * self.values(vertices))[faces]
-        _, positive, above = split_at(triangles, signed, 0.0)
-        # A facet of which every position is singular is one of the positive ones.
-        _, negative, below = split_at(triangles, -signed, np.nextafter(0.0, 1.0))
-        return (
-            np.concatenate([positive, negative]),
-            np.concatenate([above, below]),
-            float(edge_lengths(vertices, faces).max()),
+
+class _Bands:
+    """Triangles that are split at levels of a value.
+
+    Args:
+        vertices: Positions, shape (n, 3).
+        triangles: Indices of vertices, shape (m, 3).
+        values: Values at the vertices, shape (n,).
+        value: Function from points (n, 3) to values (n,); None if it is linear on each triangle.
+    """
+
+    def __init__(
+        self,
+        vertices: FloatArray,
+        triangles: IntArray,
+        values: FloatArray,
+        value: Callable[[FloatArray], FloatArray] | None,
+    ) -> None:
+        self.vertices, self.triangles = vertices, triangles
+        self._values, self._value = values, value
+
+    def split(self, level: float) -> None:
+        """Split all triangles along the line where the value equals a level."""
+        off = self._values - level
+        high = off >= 0.0
+        if high.all() or not high.any():
+            return
+        division = divide(self.triangles, high)
+        a, b = division.ends.T
+        start, span = self.vertices[a], self.vertices[b] - self.vertices[a]
+        share = -off[a] / (off[b] - off[a])
+        value = self._value
+        if value is not None:
+            share = find_roots(
+                lambda at: value(start + at[:, None] * span) - level, off[a], off[b], BAND_ERROR
+            )
+        self.vertices = np.concatenate([self.vertices, start + share[:, None] * span])
+        self._values = np.concatenate([self._values, np.full(len(a), level)])
+        self.triangles = division.faces
+
+    def shells(self) -> tuple[Shell, ...]:
+        """Return the bands of colour of the values' sizes."""
+        middle = np.abs(self._values[self.triangles].mean(axis=1))
+        band: IntArray = (middle[:, None] >= BAND_EDGES[1:]).sum(axis=1)
+        return tuple(
+            _shell(colour, self.vertices, self.triangles[band == index])
+            for index, colour in enumerate(band_colours())
+            if (band == index).any()
         )
 
 
-def cut_to_size(solid: Solid, edge: float) -> tuple[FloatArray, IntArray]:
-    """Return the vertices and faces of a surface whose facets are cut until their edges are short.
+def _shell(colour: Rgb, vertices: FloatArray, triangles: IntArray) -> Shell:
+    """Return triangles with the vertices that they have."""
+    used, corners = np.unique(triangles, return_inverse=True)
+    return Shell(colour, vertices[used], corners.reshape(-1, 3).astype(np.int32))
+
+
+def cut_to_size(
+    vertices: FloatArray, triangles: IntArray, edge: float
+) -> tuple[FloatArray, IntArray]:
+    """Return the vertices and triangles of a surface, cut until their edges are short.
 
     A surface that is large beside the edge keeps longer ones: halving goes on only as long as
-    it makes at most `MOST_COLOURED` facets.
+    it makes at most `MOST_COLOURED` triangles.
 
     Args:
-        solid: Solid with the surface; not empty.
+        vertices: Positions, shape (n, 3).
+        triangles: Indices of vertices, shape (m, 3).
         edge: Longest edge to aim at, in design units.
     """
-    from trimesh import remesh
-
-    untyped: Any = remesh
-    vertices, faces = solid.vertices, np.asarray(solid.faces, dtype=np.int64)
     while True:
-        lengths = edge_lengths(vertices, faces)
+        lengths = edge_lengths(vertices, triangles)
         longest = float(lengths.max())
         shorter = max(edge, 0.5 * longest)
-        # Each edge that is cut divides both facets beside it in two.
-        if longest <= edge or len(faces) + int((lengths > shorter).sum()) > MOST_COLOURED:
-            return vertices, faces
-        subdivided = untyped.subdivide_to_size(vertices, faces, shorter, max_iter=12)
-        vertices, faces = np.asarray(subdivided[0], dtype=np.float64), np.asarray(subdivided[1])
+        # Each edge that is cut divides both triangles beside it in two.
+        if longest <= edge or len(triangles) + int((lengths > shorter).sum()) > MOST_COLOURED:
+            return vertices, triangles
+        from trimesh import remesh
+
+        untyped: Any = remesh
+        subdivided = untyped.subdivide_to_size(vertices, triangles, shorter, max_iter=12)
+        vertices, triangles = np.asarray(subdivided[0], dtype=np.float64), np.asarray(subdivided[1])
 
 
 def edge_lengths(vertices: FloatArray, faces: IntArray) -> FloatArray:
@@ -150,55 +207,9 @@ def edge_lengths(vertices: FloatArray, faces: IntArray) -> FloatArray:
     return np.linalg.norm(ends - np.roll(ends, -1, axis=1), axis=2)
 
 
-def _by_cause(solid: Solid) -> tuple[Shell, ...]:
+def _by_cause(faces: Faces) -> tuple[Shell, ...]:
     """Return the surface along limits in one colour, and that along collisions in another."""
-    pairs = [index for index, name in enumerate(solid.limits) if name in PAIR_NAMES]
-    collide = np.isin(solid.limit_of_face, pairs)
-    parts = ((PLAIN, solid.faces[~collide]), (COLLIDING, solid.faces[collide]))
-    return tuple(Shell(colour, solid.vertices, faces) for colour, faces in parts if len(faces))
-
-
-def split_at(
-    triangles: FloatArray, values: FloatArray, level: float
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Split triangles along the line where a value, linear on each triangle, equals a level.
-
-    Args:
-        triangles: Corners of the triangles, shape (n, 3, 3).
-        values: Values at the corners, shape (n, 3).
-        level: Level at which to split.
-
-    Returns:
-        The triangles below, the triangles above, and the values of those above.
-    """
-    high = values >= level
-    count = high.sum(axis=1)
-    low_side, high_side = [triangles[count == 0]], [triangles[count == 3]]
-    high_values = [values[count == 3]]
-    for lone_is_high, mixed in ((True, count == 1), (False, count == 2)):
-        if not mixed.any():
-            continue
-        t, v, h = triangles[mixed], values[mixed], high[mixed]
-        # The corner that is alone on its side comes first.
-        lone = np.argmax(h == lone_is_high, axis=1)
-        order = (lone[:, None] + np.arange(3)) % 3
-        t = np.take_along_axis(t, order[:, :, None], axis=1)
-        v = np.take_along_axis(v, order, axis=1)
-        share = ((level - v[:, :1]) / (v[:, 1:] - v[:, :1]))[:, :, None]
-        cut = t[:, :1] + share * (t[:, 1:] - t[:, :1])
-        tip = np.stack([t[:, 0], cut[:, 0], cut[:, 1]], axis=1)
-        base = np.concatenate(
-            [
-                np.stack([cut[:, 0], t[:, 1], t[:, 2]], axis=1),
-                np.stack([cut[:, 0], t[:, 2], cut[:, 1]], axis=1),
-            ]
-        )
-        at = np.full(len(t), level)
-        tip_values = np.stack([v[:, 0], at, at], axis=1)
-        base_values = np.concatenate(
-            [np.stack([at, v[:, 1], v[:, 2]], axis=1), np.stack([at, v[:, 2], at], axis=1)]
-        )
-        (high_side if lone_is_high else low_side).append(tip)
-        (low_side if lone_is_high else high_side).append(base)
-        high_values.append(tip_values if lone_is_high else base_values)
-    return np.concatenate(low_side), np.concatenate(high_side), np.concatenate(high_values)
+    pairs = [index for index, name in enumerate(faces.limits) if name in PAIR_NAMES]
+    collide = np.isin(faces.limit_of_triangle, pairs)
+    parts = ((PLAIN, faces.triangles[~collide]), (COLLIDING, faces.triangles[collide]))
+    return tuple(_shell(colour, faces.vertices, part) for colour, part in parts if len(part))

@@ -1,4 +1,9 @@
-"""Cameras that frame the mechanism, in the four views that CAD programs offer."""
+"""Cameras that frame the mechanism, in the four views that CAD programs offer.
+
+The views from the front, the side and the top have no perspective: a script of the page,
+`projection.js`, draws in parallel projection while a camera looks along an axis. A length in the
+plane of its target is as large as with perspective.
+"""
 
 from __future__ import annotations
 
@@ -29,6 +34,9 @@ DIRECTIONS: dict[ViewName, tuple[float, float, float]] = {
 
 # Number of earlier positions at which a camera counts as not moved by its user.
 REMEMBERED = 4
+# Sine of the largest angle between the axes of a camera and those of the scene at which the camera
+# has no perspective; `projection.js` has the same.
+ALONG = 1e-3
 # Share by which points may lie beyond the edge of a picture and still count as in it.
 EDGE = 0.02
 # Guess of width over height of the scene in a new browser.
@@ -49,7 +57,7 @@ def framing(
     towards = np.array(DIRECTIONS[view]) if isinstance(view, str) else view
     forward, right, up = _axes(-towards)
     half = math.tan(0.5 * FIELD_OF_VIEW)
-    depth = (points - centre) @ forward
+    depth = _depth(points, centre, forward)
     distance, target = 0.0, centre
     for axis, slope in ((up, half), (right, half * max(aspect, 0.2))):
         # From the distance D, shifted by s, a point at x is seen if |x - s| <= slope (D + depth).
@@ -74,9 +82,22 @@ def are_in_picture(
     """
     forward, right, up = _axes(target - eye)
     away = points - eye
-    half = (1.0 + EDGE) * math.tan(0.5 * field_of_view) * (away @ forward)
+    depth = float(np.linalg.norm(target - eye)) + _depth(points, target, forward)
+    half = (1.0 + EDGE) * math.tan(0.5 * field_of_view) * depth
     # Behind the camera the half height is negative.
     return bool((np.abs(away @ up) <= half).all() and (np.abs(away @ right) <= aspect * half).all())
+
+
+def has_perspective(direction: FloatArray) -> bool:
+    """Whether an upright camera that looks in a direction (3,) draws nearer things larger."""
+    return any(int((np.abs(axis) > ALONG).sum()) > 1 for axis in _axes(direction))
+
+
+def _depth(points: FloatArray, centre: FloatArray, forward: FloatArray) -> FloatArray:
+    """Return how far points (n, 3) lie behind a centre for the perspective of a camera, (n,)."""
+    if has_perspective(forward):
+        return (points - centre) @ forward
+    return np.zeros(len(points))
 
 
 def _axes(direction: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -1,7 +1,8 @@
 """From design units to the scene, where every mechanism is about ten units large.
 
 The scale follows the design as it was opened and not its sliders, so that a growing
-design is seen to grow. It is 1, 2 or 5 times a power of ten: grid cells are round numbers.
+design is seen to grow. It is 1, 2 or 5 times a power of ten, as is the side of the ground's squares
+in millimetres.
 """
 
 from __future__ import annotations
@@ -56,10 +57,25 @@ class Placed:
         """Whether the schematic legs and bodies are drawn."""
         return self.floor is None
 
+    @property
+    def is_apart(self) -> bool:
+        """Whether parts are drawn apart, away from the points of the mechanism."""
+        return not self.is_schematic and self.frame.state.view.prototype.exploded > 0.0
+
     @cached_property
     def scale(self) -> float:
         """Scene units per design unit."""
         return scene_scale(self.frame.state)
+
+    @cached_property
+    def square_mm(self) -> float:
+        """Side of the squares of the ground in millimetres, about one scene unit."""
+        return round_step(self.frame.state.design.unit_mm / self.scale)
+
+    @property
+    def square(self) -> float:
+        """Side of the squares of the ground in scene units."""
+        return self.scale * self.square_mm / self.frame.state.design.unit_mm
 
     @cached_property
     def points(self) -> dict[str, FloatArray]:

@@ -7,8 +7,9 @@ balls, and all boxes.
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Iterator
-from typing import Any, Literal, TypeAlias
+from typing import Literal, TypeAlias
 
 import numpy as np
 import viser
@@ -23,6 +24,10 @@ Mesh: TypeAlias = tuple[FloatArray, IntArray]
 
 # Number of points on a circle.
 SECTIONS = 28
+# Number of points around the tube of a ring.
+TUBE_SECTIONS = 12
+# Turns a shape by half a turn about x.
+HALF_TURN = np.array([1.0, -1.0, -1.0])
 # Ends of the four sides of a quadrilateral.
 SIDES = np.array([[0, 1], [1, 2], [2, 3], [3, 0]])
 NO_MESH: Mesh = (np.zeros((3, 3)), np.array([[0, 1, 2]]))
@@ -74,7 +79,7 @@ def add_translucent(
     is_flat: bool = False,
     visible: bool = False,
 ) -> viser.MeshHandle:
-    """Add a translucent mesh, which casts and receives no shadow.
+    """Add a translucent mesh.
 
     Args:
         scene: Where it is added.
@@ -93,8 +98,6 @@ def add_translucent(
         opacity=opacity,
         side=side,
         flat_shading=is_flat,
-        cast_shadow=False,
-        receive_shadow=False,
         visible=visible,
     )
 
@@ -122,8 +125,6 @@ class Instances:
             batched_scales=np.ones((count, 3)),
             batched_colors=np.array(colours, dtype=np.uint8),
             opacity=opacity,
-            # Translucent bodies cast no shadow.
-            cast_shadow=opacity is None,
             lod="off",
         )
 
@@ -220,11 +221,45 @@ class Patch:
 
 
 @functools.lru_cache(maxsize=256)
+def linear_colour(colour: Rgb) -> Rgb:
+    """Return the linear value of an sRGB colour, for what shall look like a mesh in this colour.
+
+    viser's client takes the colours of copies and of the ends of segments for linear ones.
+    """
+    red, green, blue = (
+        round(255.0 * (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4))
+        for c in (value / 255.0 for value in colour)
+    )
+    return red, green, blue
+
+
+@functools.lru_cache(maxsize=256)
 def of_one_colour(colour: Rgb, count: int) -> NDArray[np.uint8]:
-    """Return the colours of both ends of segments (count, 2, 3), all the same; read only."""
-    colours = np.tile(np.array(colour, dtype=np.uint8), (count, 2, 1))
+    """Return what makes both ends of segments look one colour, shape (count, 2, 3); read only."""
+    colours = np.tile(np.array(linear_colour(colour), dtype=np.uint8), (count, 2, 1))
     colours.flags.writeable = False
     return colours
+
+
+def dashes(lines: FloatArray, most: int, period: float, drawn: float) -> FloatArray:
+    """Return lines (n, 2, 3) cut into dashes, shape (n * most, 2, 3).
+
+    Args:
+        lines: Ends of the lines.
+        most: Number of dashes of each line; those beyond its end have no length. One dash is the
+            whole line.
+        period: Length of a dash with the space after it; longer where the dashes would not do.
+        drawn: Share of the dash in its period.
+    """
+    if most == 1:
+        return lines
+    spans = (lines[:, 1] - lines[:, 0])[:, None, None]
+    lengths = np.linalg.norm(spans[:, 0, 0], axis=1)
+    # A line begins and ends with a dash.
+    periods = np.minimum(np.maximum(np.rint(lengths / period + 1.0 - drawn), 1.0), most) - 1.0
+    shares = (np.arange(most)[:, None] + [0.0, drawn]) / (periods + drawn)[:, None, None]
+    shares = np.minimum(shares, 1.0)
+    return (lines[:, None, :1] + shares[..., None] * spans).reshape(-1, 2, 3)
 
 
 def turned_to(directions: FloatArray) -> FloatArray:
@@ -259,21 +294,65 @@ def cylinder() -> Mesh:
 
 @functools.cache
 def sphere() -> Mesh:
-    """Return the sphere of radius one."""
-    from trimesh import creation
+    """Return the sphere of radius one, an icosahedron whose faces are split three times."""
+    # The corners are those of three golden rectangles; the faces are those of their hull.
+    golden = 0.5 * (1.0 + math.sqrt(5.0))
+    rectangle = np.array([[0.0, y, z] for y in (-1.0, 1.0) for z in (-golden, golden)])
+    vertices = np.concatenate([np.roll(rectangle, axis, axis=1) for axis in range(3)])
+    vertices /= math.hypot(1.0, golden)
+    faces = ConvexHull(vertices).simplices.astype(np.int64)
+    a, b, c = (vertices[faces[:, corner]] for corner in range(3))
+    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), a) < 0.0
+    faces[inward] = faces[inward, ::-1]
+    for _ in range(3):
+        vertices, faces = _split(vertices, faces)
+    return vertices, faces
 
-    untyped: Any = creation
-    mesh = untyped.icosphere(subdivisions=3)
-    return np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces, dtype=np.int64)
+
+@functools.cache
+def torus(radius: float, tube: float) -> Mesh:
+    """Return the ring about the z-axis with a radius and the radius of its tube."""
+    around, along = (
+        np.linspace(0.0, 2.0 * np.pi, count, endpoint=False) for count in (SECTIONS, TUBE_SECTIONS)
+    )
+    u, v = (each.ravel() for each in np.meshgrid(around, along, indexing="ij"))
+    distance = radius + tube * np.cos(v)
+    vertices = np.stack([distance * np.cos(u), distance * np.sin(u), tube * np.sin(v)], axis=1)
+    i, j = (each.ravel() for each in np.indices((SECTIONS, TUBE_SECTIONS)))
+    a, b, c, d = (
+        (i + di) % SECTIONS * TUBE_SECTIONS + (j + dj) % TUBE_SECTIONS
+        for di, dj in ((0, 0), (1, 0), (1, 1), (0, 1))
+    )
+    return vertices, np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+
+
+def joined(*meshes: Mesh) -> Mesh:
+    """Return several meshes as one."""
+    starts = np.cumsum([0, *(len(vertices) for vertices, _ in meshes)])
+    vertices = np.concatenate([vertices for vertices, _ in meshes])
+    faces = [faces + start for (_, faces), start in zip(meshes, starts, strict=False)]
+    return vertices, np.concatenate(faces)
 
 
 @functools.cache
 def box() -> Mesh:
     """Return the unit cube about the origin."""
-    from trimesh import creation
+    square = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
+    side = np.column_stack([square, np.full(4, 0.5)])
+    sides = [np.roll(turn * side, axis, axis=1) for axis in range(3) for turn in (HALF_TURN, 1.0)]
+    return _sharp(np.concatenate([each[[0, 1, 2, 0, 2, 3]].reshape(2, 3, 3) for each in sides]))
 
-    untyped: Any = creation
-    return _sharp(np.asarray(untyped.box().triangles, dtype=np.float64))
+
+def _split(vertices: FloatArray, faces: IntArray) -> Mesh:
+    """Return the mesh on the unit sphere with each face split into four."""
+    sides = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]], axis=2).reshape(-1, 2)
+    edges, index = np.unique(sides, axis=0, return_inverse=True)
+    middles = vertices[edges].sum(axis=1)
+    middles /= np.linalg.norm(middles, axis=1, keepdims=True)
+    a, b, c = faces.T
+    ab, bc, ca = len(vertices) + index.reshape(-1, 3).T
+    quarters = [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
+    return np.concatenate([vertices, middles]), np.concatenate([np.stack(q, 1) for q in quarters])
 
 
 def plate(points: FloatArray, radius: float, bottom: float, top: float) -> Mesh:

@@ -46,6 +46,7 @@ class _Status(Generic[Request, Drawing]):
     Attributes:
         request: The newest request; None if nothing is to be drawn.
         drawing: The newest drawing; None before the first.
+        part: What has arrived of a drawing that is newer still; None for nothing.
         problem: Why there is no newer drawing, if the last request failed.
         count: Number of requests that were submitted so far.
         submitted: Time of the newest request in seconds, by the monotonic clock.
@@ -55,6 +56,7 @@ class _Status(Generic[Request, Drawing]):
 
     request: Request | None = None
     drawing: Drawing | None = None
+    part: object = None
     problem: str | None = None
     count: int = 0
     submitted: float = 0.0
@@ -73,7 +75,8 @@ class Feed(Generic[Request, Drawing]):
         request_of: Returns the request of a frame; None if nothing is to be drawn.
         redraw: Called when there is a new drawing, stage or problem.
         key: Key of the requests, of which the newest counts; the task if None.
-        has_stages: Whether the task sends each `Stage`, and can be cancelled.
+        has_stages: Whether the task sends each `Stage`, and parts of the drawing as soon as they
+            are known, and can be cancelled.
     """
 
     def __init__(
@@ -99,8 +102,17 @@ class Feed(Generic[Request, Drawing]):
     def drawing(self) -> Drawing | None:
         """The newest drawing; None if there is none, none is requested, or it was cancelled."""
         status = self._status
-        is_shown = status.request is not None and status.problem != CANCELLED
-        return status.drawing if is_shown else None
+        return status.drawing if self._is_shown(status) else None
+
+    @property
+    def part(self) -> object:
+        """What has arrived of a drawing newer than the newest; None for nothing, or as there."""
+        status = self._status
+        return status.part if self._is_shown(status) else None
+
+    @staticmethod
+    def _is_shown(status: _Status[Request, Drawing]) -> bool:
+        return status.request is not None and status.problem != CANCELLED
 
     @property
     def request(self) -> Request | None:
@@ -180,8 +192,11 @@ class Feed(Generic[Request, Drawing]):
         def failed(problem: str) -> None:
             self._show_problem(count, problem)
 
-        def receive(stage: Stage) -> None:
-            self._receive(count, stage)
+        def receive(value: object) -> None:
+            if isinstance(value, Stage):
+                self._receive(count, value)
+            else:
+                self._show_part(value)
 
         order = (self._key, self._task, (request,), self._show_drawing, failed)
         if self._has_stages:
@@ -213,10 +228,14 @@ class Feed(Generic[Request, Drawing]):
         if count == self._status.count and not self.is_settled:
             self._redraw()
 
+    def _show_part(self, part: object) -> None:
+        self._set(part=part)
+        self._redraw()
+
     def _show_drawing(self, drawing: Drawing) -> None:
         with self._lock:
             # An older drawing is shown until the newest has arrived.
-            self._set(drawing=drawing)
+            self._set(drawing=drawing, part=None)
             if self.is_current:
                 self._set(problem=None, order=None)
         self._redraw()
@@ -226,5 +245,5 @@ class Feed(Generic[Request, Drawing]):
             is_newest = count == self._status.count and self._status.request is not None
             if not is_newest or self.is_cancelled:
                 return
-            self._set(drawing=None, problem=problem, order=None)
+            self._set(drawing=None, part=None, problem=problem, order=None)
         self._redraw()

@@ -104,7 +104,7 @@ class View:
         drawn_as: What is drawn: the schematic mechanism, the parts of its prototype in place of
             legs and bodies, or its 6-4 twin, with six legs in place of the four.
         flags, bodies, legs, labels, grid, handle: Whether each is drawn.
-        tetrahedra: Whether each of the three is drawn.
+        tetrahedra: Whether each of the three is drawn, and the gap that is left to its incidence.
         clearance: Whether the closest pair of legs is marked.
         swept: Whether the tetrahedra are drawn that the legs swept in the last move.
         radius_curve: Whether the accessible volume is drawn against the radius of the legs.

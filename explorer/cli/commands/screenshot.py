@@ -33,6 +33,9 @@ class Screenshot(JsonOptions, PoseOptions, DesignOptions):
     panels: bool = False
     """Include the panels of the page in the picture."""
 
+    handle: bool = False
+    """Include the handle by which the page moves the platform."""
+
     def run(self) -> None:
         """Draw the picture and write its path.
 
@@ -50,5 +53,13 @@ class Screenshot(JsonOptions, PoseOptions, DesignOptions):
 
         # Standard output belongs to the answer; viser reports there when a server stops.
         with contextlib.redirect_stdout(io.StringIO()):
-            take(design, pose, view=self.view, out=self.out, size=self.size, panels=self.panels)
+            take(
+                design,
+                pose,
+                view=self.view,
+                out=self.out,
+                size=self.size,
+                panels=self.panels,
+                handle=self.handle,
+            )
         self.write(lambda: {"file": self.out, "size": self.size}, lambda: [str(self.out)])

@@ -9,6 +9,7 @@ import numpy as np
 
 from explorer.app.features.workspace.reached import Rows
 from explorer.app.scene.bands import Shell
+from explorer.app.scene.outline import outline
 from explorer.errors import ExplorerError
 from explorer.measures.case import MESH_TOLERANCE, Case
 from explorer.measures.catalogue import measures_in
@@ -83,27 +84,9 @@ def compared_drawing(request: ComparedRequest) -> ComparedDrawing:
                 shell = Shell(NO_COLOUR, solid.vertices, solid.faces)
     except ExplorerError as error:
         problem = str(error)
-    return ComparedDrawing(request, measurements, shell, outline_of(design), problem)
-
-
-def outline_of(design: Design) -> FloatArray:
-    """Return lines along base, legs and platform in the home pose, shape (n, 2, 3)."""
-    snapshot = evaluate(design, home_pose(design))
-    points = snapshot.points
-    d1, d3 = float(snapshot.joints[1]), float(snapshot.joints[3])
-    first, second = np.array([d1, 0.0, 0.0]), np.array([d3, 0.0, 0.0])
-    # The part of the guide between a1 and the carriages.
-    low, high = np.array([[min(0.0, d1, d3), 0.0, 0.0], [max(0.0, d1, d3), 0.0, 0.0]])
-    base = ((low, high), (points.a1, points.a3), (high, points.a3))
-    legs = (
-        (points.a1, points.b1),
-        (first, points.b2),
-        (second, points.b3),
-        (points.a3, points.b4),
+    return ComparedDrawing(
+        request, measurements, shell, outline(evaluate(design, home_pose(design))), problem
     )
-    corners = (points.b1, points.b2, points.b3, points.b4)
-    platform = tuple((a, b) for index, a in enumerate(corners) for b in corners[index + 1 :])
-    return np.array([*base, *legs, *platform])
 
 
 @lru_cache(maxsize=CACHED)

@@ -12,6 +12,7 @@ from explorer.app.features.compare.drawing import ComparedDrawing
 from explorer.app.features.compare.feed import COLUMNS, LIVE, CompareFeed, unit_ratio
 from explorer.app.features.feature import Services
 from explorer.app.scene.creases import Drawn
+from explorer.app.scene.labels import add_label
 from explorer.app.scene.part import NO_POINTS, ScenePart
 from explorer.app.scene.placing import Placed
 from explorer.app.scene.shapes import NO_MESH, add_lines, add_translucent
@@ -59,7 +60,7 @@ class _Column:
             scene, f"{name}/workspace", NO_MESH, OPACITY, colour=colour, is_flat=True
         )
         self._lines = add_lines(scene, f"{name}/outline", 1, colour, 2.5)
-        self._label = scene.add_label(f"{name}/label", NAMES[column], visible=False)
+        self._label = add_label(scene, f"{name}/label", NAMES[column], colour=colour, visible=False)
         self._drawn: tuple[ComparedDrawing, float] | None = None
         self._workspace: Drawn | None = None
         self._outline: NDArray[np.float32] = np.zeros((1, 2, 3), dtype=np.float32)

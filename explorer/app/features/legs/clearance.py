@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from explorer.app.features.feature import Services
+from explorer.app.scene.labels import add_label
 from explorer.app.scene.part import ScenePart
 from explorer.app.scene.placing import Placed
 from explorer.app.scene.shapes import Balls, Rods, add_lines
@@ -24,7 +25,7 @@ class ClearanceScene(ScenePart):
     def __init__(self, services: Services) -> None:
         scene = services.scene
         self._line = add_lines(scene, "/clearance/line", 1, OUTLINE, 4.0)
-        self._label = scene.add_label("/clearance/label", "0", visible=False)
+        self._label = add_label(scene, "/clearance/label", "0", visible=False)
         self._rods = Rods(scene, "/clearance/rods", [TUBE] * 4, opacity=CAPSULE_OPACITY)
         self._ends = Balls(scene, "/clearance/ends", [TUBE] * 8, opacity=CAPSULE_OPACITY)
 

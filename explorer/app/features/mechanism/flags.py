@@ -1,17 +1,20 @@
 """The flags of base and platform, each a point, a line through it and a plane through the line.
 
 Each element has the colour of its incidence: a1 and the platform plane that of δ1, the two lines
-that of δ2, b4 and the base plane that of δ3.
+that of δ2, b4 and the base plane that of δ3. Lines and planes are drawn as far as the mechanism
+goes; where an incidence is near they reach out to its gap.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 import viser
 
 from explorer.app.features.feature import Services
+from explorer.app.features.mechanism.approach import Approach, HoveredMargin, approaches
 from explorer.app.features.mechanism.legs import guide_span
 from explorer.app.scene.part import NO_POINTS, ScenePart
 from explorer.app.scene.placing import Placed
@@ -23,7 +26,37 @@ from explorer.numerics.arrays import FloatArray
 POINT_RADIUS = 0.36
 LINE_RADIUS = 0.075
 PLANE_OPACITY = 0.2
+# How far lines and planes go on beyond the end of a gap, as a share of the reach.
+BEYOND = 0.06
+# Ends of a gap.
+BASE, PLATFORM = 0, 1
 ALONG_X = turned_to(np.array([[1.0, 0.0, 0.0]]))[0]
+
+
+class Extent(NamedTuple):
+    """The part of a plane that is drawn, in its flag's frame; the line is part of the x-axis."""
+
+    low: float
+    high: float
+    bottom: float
+    top: float
+
+    @property
+    def corners(self) -> FloatArray:
+        """The corners, shape (4, 3)."""
+        low, high, bottom, top = self
+        return np.array([[low, bottom, 0], [high, bottom, 0], [high, top, 0], [low, top, 0]], float)
+
+    def towards(self, point: FloatArray, share: float, beyond: float) -> Extent:
+        """Return the extent grown by a share of the way to one with a point (3,) in it."""
+        x, y, _ = point.tolist()
+        grown = (
+            min(self.low, x - beyond),
+            max(self.high, x + beyond),
+            min(self.bottom, y - beyond),
+            max(self.top, y + beyond),
+        )
+        return Extent(*(a + share * (b - a) for a, b in zip(self, grown, strict=True)))
 
 
 class Flag:
@@ -32,71 +65,95 @@ class Flag:
     def __init__(self, scene: viser.SceneApi, root: str, deltas: tuple[int, int, int]) -> None:
         # Indices of the margins that colour the point, the line and the plane.
         self._deltas = deltas
-        self._point = scene.add_mesh_simple(
-            f"{root}/flag/point", *sphere(), scale=POINT_RADIUS, cast_shadow=False
-        )
-        self._line = scene.add_mesh_simple(
-            f"{root}/flag/line", *cylinder(), wxyz=ALONG_X, cast_shadow=False
-        )
+        self._point = scene.add_mesh_simple(f"{root}/flag/point", *sphere(), scale=POINT_RADIUS)
+        self._line = scene.add_mesh_simple(f"{root}/flag/line", *cylinder(), wxyz=ALONG_X)
         self._patch = Patch(scene, f"{root}/flag", opacity=PLANE_OPACITY)
 
-    def updates(self, placed: Placed, corners: FloatArray, size: float) -> Iterator[Update]:
-        """Yield the updates that draw the flag; the first two corners (4, 3) are on its line."""
-        state = placed.frame.state
+    def updates(self, placed: Placed, line: Extent, plane: Extent, size: float) -> Iterator[Update]:
+        """Yield the updates that draw the flag.
+
+        Args:
+            placed: The frame that is drawn.
+            line: Extent whose ends along x are those of the line.
+            plane: Extent of the plane.
+            size: Scale of thicknesses.
+        """
         levels = placed.frame.verdict.levels
         point_colour, line_colour, plane_colour = (
             proximity_colour(levels[index]) for index in self._deltas
         )
-        low, high = corners[:2, 0].tolist()
+        visible = _are_visible(placed)
         for handle in (self._point, self._line):
-            yield handle, "visible", state.view.flags
-        yield from self._patch.show(state.view.flags)
+            yield handle, "visible", visible
+        yield from self._patch.show(visible)
         yield self._point, "color", point_colour
         yield self._point, "scale", POINT_RADIUS * size
         yield self._line, "color", line_colour
-        yield self._line, "position", (low, 0.0, 0.0)
-        yield self._line, "scale", (LINE_RADIUS * size, LINE_RADIUS * size, high - low)
-        yield from self._patch.span(corners, plane_colour)
+        yield self._line, "position", (line.low, 0.0, 0.0)
+        yield self._line, "scale", (LINE_RADIUS * size, LINE_RADIUS * size, line.high - line.low)
+        yield from self._patch.span(plane.corners, plane_colour)
 
 
 class Flags(ScenePart):
     """The base's flag and the platform's."""
 
     def __init__(self, services: Services) -> None:
-        scene = services.scene
+        scene, self._hovered = services.scene, services.get(HoveredMargin)
         self._base = Flag(scene, "/base", deltas=(0, 1, 2))
         self._platform = Flag(scene, "/platform", deltas=(2, 1, 0))
 
     def updates(self, placed: Placed) -> Iterator[Update]:
         """Yield the updates that draw the flags of this frame."""
-        yield from self._base.updates(placed, _base_corners(placed), 1.0)
+        beyond = BEYOND * placed.reach
+        to_platform_plane, of_lines, to_base_plane = approaches(placed, self._hovered.row)
+
+        def grown(extent: Extent, approach: Approach, end: int) -> Extent:
+            if approach.ends is None:
+                return extent
+            point = approach.ends[end]
+            if end == PLATFORM:
+                point = (point - placed.points["b4"]) @ placed.frame.snapshot.rotation
+            return extent.towards(point, approach.arrival, beyond)
+
+        base, platform = _base_extent(placed), _platform_extent(placed)
+        yield from self._base.updates(
+            placed, grown(base, of_lines, BASE), grown(base, to_base_plane, BASE), 1.0
+        )
         yield from self._platform.updates(
-            placed, _platform_corners(placed), max(0.6, placed.thickness)
+            placed,
+            grown(platform, of_lines, PLATFORM),
+            grown(platform, to_platform_plane, PLATFORM),
+            max(0.6, placed.thickness),
         )
 
     def corners(self, placed: Placed) -> FloatArray:
-        """Return the corners of both planes."""
-        if not placed.frame.state.view.flags:
+        """Return the corners of both planes where no incidence is near."""
+        if not _are_visible(placed):
             return NO_POINTS
         rotation = placed.frame.snapshot.rotation
-        platform = placed.points["b4"] + _platform_corners(placed) @ rotation.T
-        return np.concatenate([_base_corners(placed), platform])
+        platform = placed.points["b4"] + _platform_extent(placed).corners @ rotation.T
+        return np.concatenate([_base_extent(placed).corners, platform])
 
 
-def _base_corners(placed: Placed) -> FloatArray:
+def _are_visible(placed: Placed) -> bool:
+    # They would stand among parts that are drawn apart.
+    return placed.frame.state.view.flags and not placed.is_apart
+
+
+def _base_extent(placed: Placed) -> Extent:
     low, high = guide_span(placed)
-    return _rectangle(low - 1.0, high + 1.0, 1.2 * float(placed.points["a3"][1]))
+    return _between(low - 1.0, high + 1.0, 1.2 * float(placed.points["a3"][1]))
 
 
-def _platform_corners(placed: Placed) -> FloatArray:
+def _platform_extent(placed: Placed) -> Extent:
     local = placed.platform_points
     stations = [float(local[name][0]) for name in ("b1", "b2", "b3", "b4")]
     beyond = 0.16 * placed.reach
     side = float(local["b1"][1])
     edge = side + float(np.copysign(0.5 * beyond, side))
-    return _rectangle(min(stations) - beyond, max(stations) + beyond, edge)
+    return _between(min(stations) - beyond, max(stations) + beyond, edge)
 
 
-def _rectangle(low: float, high: float, y: float) -> FloatArray:
-    """Return the corners of a rectangle between the x-axis and a line at y, shape (4, 3)."""
-    return np.array([[low, 0, 0], [high, 0, 0], [high, y, 0], [low, y, 0]], float)
+def _between(low: float, high: float, y: float) -> Extent:
+    """Return the extent between the x-axis and a line at y."""
+    return Extent(low, high, min(0.0, y), max(0.0, y))

@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 import contextlib
+import math
+import threading
+import time
 from collections.abc import Iterator
 
 import numpy as np
 import viser
 
 from explorer.app.features.feature import Services
+from explorer.app.features.mechanism.approach import approaches
 from explorer.app.features.mechanism.bodies import platform_plate
 from explorer.app.features.mechanism.modes import MODES, HoveredMode, ghost_modes
+from explorer.app.scene.labels import add_label
 from explorer.app.scene.part import NO_POINTS, ScenePart, around
 from explorer.app.scene.placing import Placed, scene_scale
 from explorer.app.scene.shapes import NO_MESH, add_lines, add_translucent
+from explorer.app.session.latest import start_timer
 from explorer.app.state.actions import SetPose
 from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
@@ -29,6 +35,10 @@ HANDLE_NAME = "/handle"
 HANDLE_SCALE = 1.9
 # Length from the gizmo's origin to the tip of an arrow, as viser draws it.
 ARROW_LENGTH = 1.25 * HANDLE_SCALE
+# Size and opacity of the gizmo, and where it would hide what matters.
+CLEAR_HANDLE, FAINT_HANDLE = (HANDLE_SCALE, 0.85), (0.6 * HANDLE_SCALE, 0.3)
+# Seconds without a movement after which the gizmo's look may change during a drag.
+PAUSE = 0.2
 
 
 class Labels(ScenePart):
@@ -37,22 +47,20 @@ class Labels(ScenePart):
     def __init__(self, services: Services) -> None:
         scene = services.scene
         self._handles = {
-            name: scene.add_label(
-                f"{'/base' if name in BASE_LABELS else '/platform'}/label/{name}",
-                name,
-                anchor="bottom-left",
-                font_screen_scale=0.95,
+            name: add_label(
+                scene, f"{'/base' if name in BASE_LABELS else '/platform'}/label/{name}", name
             )
             for name in (*BASE_LABELS, *PLATFORM_LABELS)
         }
 
     def updates(self, placed: Placed) -> Iterator[Update]:
         """Yield the updates that draw the labels of this frame."""
+        # The points stay where they are when the parts about them move apart.
+        shown = placed.frame.state.view.labels and not placed.is_apart
         for name, handle in self._handles.items():
             points = placed.points if name in BASE_LABELS else placed.platform_points
-            lift = 0.3 if name in BASE_LABELS else 0.3 * placed.facing
-            yield handle, "visible", placed.frame.state.view.labels
-            yield handle, "position", tuple((points[name] + [0.0, 0.0, lift]).tolist())
+            yield handle, "visible", shown
+            yield handle, "position", tuple(points[name].tolist())
 
 
 class Ghosts(ScenePart):
@@ -70,13 +78,12 @@ class Ghosts(ScenePart):
         ]
         self._legs = add_lines(scene, "/ghosts/legs", 28, GHOST, 1.2)
         self._names = [
-            scene.add_label(f"/ghosts/name/{i}", MODES[i], font_screen_scale=0.85, visible=False)
-            for i in range(7)
+            add_label(scene, f"/ghosts/name/{i}", MODES[i], visible=False) for i in range(7)
         ]
 
     def updates(self, placed: Placed) -> Iterator[Update]:
         """Yield the updates that draw the ghosts of this frame."""
-        modes = ghost_modes(placed.frame, self._hovered.mode)
+        modes = ghost_modes(placed.frame, self._hovered.row)
         for index, (plate, label) in enumerate(zip(self._plates, self._names, strict=True)):
             for handle in (plate, label):
                 yield handle, "visible", index < len(modes)
@@ -124,15 +131,21 @@ def ghost_points(placed: Placed, modes: list[int]) -> FloatArray:
 
 
 class DragHandle(ScenePart):
-    """The gizmo at b4: arrows move the platform, arcs turn it."""
+    """The gizmo at b4: arrows move the platform, arcs turn it.
+
+    It is small and faint where it would hide the end of a gap to a near incidence.
+    """
 
     def __init__(self, services: Services) -> None:
-        scene = services.scene
+        scene, (scale, opacity) = services.scene, CLEAR_HANDLE
         self.handle = scene.add_transform_controls(
-            HANDLE_NAME, scale=HANDLE_SCALE, line_width=2.0, depth_test=False, opacity=0.85
+            HANDLE_NAME, scale=scale, line_width=2.0, depth_test=False, opacity=opacity
         )
         self._session = services.session
+        self._moved_at = -math.inf
+        self._timer: threading.Timer | None = None
         self.handle.on_update(self._move_platform)
+        services.at_end(self._forget_timer)
 
     def pose(self, state: State) -> Pose:
         """Return the pose of the platform where the gizmo is.
@@ -147,7 +160,10 @@ class DragHandle(ScenePart):
     def updates(self, placed: Placed) -> Iterator[Update]:
         """Yield the updates that keep the gizmo on the platform."""
         state = placed.frame.state
-        yield self.handle, "visible", state.view.handle
+        yield self.handle, "visible", _is_handle_visible(placed)
+        scale, opacity = self._look(placed)
+        yield self.handle, "scale", scale
+        yield self.handle, "opacity", opacity
         with contextlib.suppress(InputError):
             # A pose that was written back during a drag would move the gizmo under the pointer.
             if self.pose(state) == state.pose:
@@ -157,15 +173,50 @@ class DragHandle(ScenePart):
 
     def corners(self, placed: Placed) -> FloatArray:
         """Return the tips of the three arrows."""
-        if not placed.frame.state.view.handle:
+        if not _is_handle_visible(placed):
             return NO_POINTS
         return placed.points["b4"] + ARROW_LENGTH * placed.frame.snapshot.rotation.T
 
+    def _look(self, placed: Placed) -> tuple[float, float]:
+        """Return size and opacity for a frame, or the present ones while the gizmo moves."""
+        present = self.handle.scale, self.handle.opacity
+        wanted = FAINT_HANDLE if hides_a_gap(placed) else CLEAR_HANDLE
+        # viser's client forgets the movement that it has yet to send when the gizmo's look changes.
+        if wanted == present or time.monotonic() - self._moved_at > PAUSE:
+            return wanted
+        if self._timer is None:
+            self._timer = start_timer(PAUSE, self._look_again)
+        return present
+
+    def _look_again(self) -> None:
+        self._timer = None
+        self._session.redraw()
+
+    def _forget_timer(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+
     async def _move_platform(self, event: viser.TransformControlsEvent) -> None:
         if event.client_id is not None:
+            self._moved_at = time.monotonic()
             self._session.post(
                 "drag",
                 lambda state: SetPose(self.pose(state)),
                 stamp=self.handle.update_timestamp,
                 who=event.client_id,
             )
+
+
+def hides_a_gap(placed: Placed) -> bool:
+    """Whether an end of the gap to a near incidence lies within the gizmo."""
+    b4 = placed.points["b4"]
+    return any(
+        float(np.linalg.norm(each.ends - b4, axis=1).min()) < ARROW_LENGTH
+        for each in approaches(placed, None)
+        if each.ends is not None and each.has_gap
+    )
+
+
+def _is_handle_visible(placed: Placed) -> bool:
+    # Apart, the platform is not where the handle would move it.
+    return placed.frame.state.view.handle and not placed.is_apart

@@ -8,6 +8,7 @@ from html import escape
 import viser
 
 from explorer.app.features.feature import Services
+from explorer.app.features.mechanism.hovered import HoveredRow
 from explorer.app.state.actions import SetMode
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
@@ -28,35 +29,11 @@ GHOSTS_LABEL = "Other modes as ghosts"
 SHORT = {"gap |d1 − d3|": "gap", "carriage order": "order"}
 
 
-class HoveredMode:
-    """The mode on whose row a pointer rests, which the scene shows as a ghost.
-
-    It is no part of the state: it is neither saved nor undone.
-
-    Attributes:
-        mode: The mode; None if there is none.
-    """
+class HoveredMode(HoveredRow):
+    """The mode on whose row a pointer rests, which the scene shows as a ghost."""
 
     def __init__(self, services: Services) -> None:
-        self.mode: int | None = None
-        self._session = services.session
-        self._client: int | None = None
-        services.buttons.on(HOVER, self._hover, values={"", *VALUES})
-        services.server.on_client_disconnect(self._forget)
-
-    def _hover(self, value: str, client: viser.ClientHandle) -> None:
-        self._client = client.client_id
-        self._show(int(value) if value else None)
-
-    def _forget(self, client: viser.ClientHandle) -> None:
-        # A browser that is closed does not report that the pointer has left.
-        if client.client_id == self._client:
-            self._show(None)
-
-    def _show(self, mode: int | None) -> None:
-        if mode != self.mode:
-            self.mode = mode
-            self._session.redraw()
+        super().__init__(services, HOVER, range(len(MODES)))
 
 
 class ModesPanel:
@@ -118,7 +95,7 @@ def _row(frame: Frame, mode: int) -> str:
     is_here = mode in frame.snapshot.bordering_modes
     if solution.feasible:
         place = "".join(
-            f"<span>{fitted(value, reach, 4)}</span>" for value in solution.position[mode].tolist()
+            f"<span>{fitted(value, reach, 3)}</span>" for value in solution.position[mode].tolist()
         )
         limits, hint = _limits(frame.snapshot.mode_violations[mode])
     else:

@@ -14,6 +14,7 @@ from html import escape
 import viser
 
 from explorer.app.browser.viser_gaps import SceneMessage, scene_as_html
+from explorer.app.look import read_script
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.widgets.markup import format_number, signed
@@ -30,13 +31,15 @@ KEPT = (
 # Message of the drag handle, which would move nothing.
 HANDLE = "TransformControlsMessage"
 VISIBILITY = "SetSceneNodeVisibilityMessage"
+# Scripts that draw the scene as it is on the page.
+SCRIPTS = ("projection", "labels")
 POLICY = (
     "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval' blob: data:; "
     "worker-src blob: data:; style-src 'unsafe-inline'; img-src blob: data:; "
     "font-src data:; connect-src blob: data:; base-uri 'none'; form-action 'none'"
 )
 CAPTION_STYLE = (
-    "position:fixed;left:16px;bottom:14px;z-index:5;pointer-events:none;"
+    "position:fixed;right:16px;bottom:14px;text-align:right;z-index:5;pointer-events:none;"
     "font:12.5px/1.45 system-ui,sans-serif;color:var(--mantine-color-dimmed)"
 )
 
@@ -85,7 +88,10 @@ def scene_html(
         camera: Camera of the opened file.
         date: Date in the caption.
     """
-    page = scene_as_html(server, lambda all_: [*shown(all_), *camera.messages()])
+    scripts: list[SceneMessage] = [
+        {"type": "RunJavascriptMessage", "source": read_script(name)} for name in SCRIPTS
+    ]
+    page = scene_as_html(server, lambda all_: [*shown(all_), *camera.messages(), *scripts])
     title = f"{state.design.name} – flagged 4-4 manipulator"
     head, title_of_viser, rest = page.partition("<title>Viser</title>")
     body, end, after = rest.rpartition("</body>")

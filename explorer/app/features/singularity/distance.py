@@ -1,4 +1,7 @@
-"""The three margins with their danger: value, nearest singular pose, least turn, a button to it."""
+"""The three margins with their danger: value, nearest singular pose, least turn, a button to it.
+
+While a pointer rests on a margin, the scene shows its incidence.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,7 @@ from typing import get_args
 import viser
 
 from explorer.app.features.feature import Services
+from explorer.app.features.mechanism.approach import HOVER, HoveredMargin
 from explorer.app.features.singularity.actions import GoToSingularity
 from explorer.app.inputs.controls import Controls
 from explorer.app.state.frame import Frame
@@ -42,6 +46,7 @@ class DistancePanel:
     def __init__(self, services: Services) -> None:
         gui, buttons = services.gui, services.buttons
         self._session = services.session
+        services.get(HoveredMargin)
         self._table = gui.add_html("")
         self._controls = Controls(gui, services.session)
         self._controls.dropdown(
@@ -89,14 +94,17 @@ def _margin(frame: Frame, index: int) -> str:
         hint=GO_HINT,
         label=f"Go to δ{index + 1} = 0",
         class_name="ex-link",
+        hover=HOVER,
         is_disabled=nearest.distance == 0.0,
     )
     distance = fitted(nearest.distance * unit_mm, reach * unit_mm, 5)
     return (
+        f'<div class="ex-margin-row" data-hover="{HOVER}" data-value="{index + 1}">'
         f"<div{' class=ex-strong' if is_least else ''}>{margin_name(index + 1)}"
         f"<span>{fitted(float(snapshot.margins[index]), reach, 4)}</span>"
         f"<span>{distance} mm</span><span>{format_decimals(turn, 1)}°</span>{go}</div>"
         f'<div class="ex-danger" title="{escape(hint)}">{swatch(colour)}'
         f'<span class="ex-dim ex-small ex-fill">{INCIDENCES[index]}</span>'
-        f"{meter(min(100.0, 100.0 * level / FAR_WARNINGS), colour, look='ex-meter is-thin')}</div>"
+        f"{meter(min(100.0, 100.0 * level / FAR_WARNINGS), colour, look='ex-meter is-thin')}"
+        "</div></div>"
     )

@@ -11,6 +11,7 @@ from explorer.app.features.singularity.feed import StrataFeed
 from explorer.app.features.singularity.jog_scene import JogScene
 from explorer.app.features.singularity.panel import SingularityPanel
 from explorer.app.features.singularity.scene import BallScene, EllipsoidScene, NearestGhost
+from explorer.app.features.singularity.tasks import strata_distances
 from explorer.app.widgets.commands import shift
 
 SINGULARITY = Feature(
@@ -18,7 +19,8 @@ SINGULARITY = Feature(
     tabs=(Tab("analyse", "Singularity", SingularityPanel, viser.Icon.ALERT_TRIANGLE),),
     bar=(InBar("middle", lambda _: distance_figure),),
     scene=(NearestGhost, EllipsoidScene, BallScene, JogScene),
-    feeds=(StrataFeed,),
+    later_feeds=(StrataFeed,),
+    tasks=(strata_distances,),
     commands=(
         StateCommand(
             "Singularity › Go to the nearest one",

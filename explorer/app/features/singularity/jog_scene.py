@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from explorer.app.features.feature import Services
+from explorer.app.scene.labels import add_label
 from explorer.app.scene.part import ScenePart
 from explorer.app.scene.placing import Placed
 from explorer.app.scene.shapes import (
@@ -66,14 +67,12 @@ class JogScene(ScenePart):
             for index in range(len(UNCOUPLED))
         ]
         self._labels = [
-            scene.add_label(f"/motion/{index}/label", "δ1", font_screen_scale=0.8, visible=False)
+            add_label(scene, f"/motion/{index}/label", "δ1", visible=False)
             for index in range(len(UNCOUPLED))
         ]
         count = 2 * len(UNCOUPLED)
         self._heads = Instances(scene, "/motion/heads", _cone(), [SINGULAR] * count)
         self._stops = Instances(scene, "/motion/stops", cylinder(), [SINGULAR] * count)
-        for part in (self._heads, self._stops):
-            part.handle.cast_shadow = False
 
     def updates(self, placed: Placed) -> Iterator[Update]:
         """Yield the updates that draw the motions of this frame."""

@@ -9,6 +9,7 @@ import numpy as np
 from explorer.app.features.feature import Services
 from explorer.app.features.mechanism.bodies import platform_plate
 from explorer.app.features.singularity.performance import gain_text
+from explorer.app.scene.labels import add_label
 from explorer.app.scene.part import ScenePart
 from explorer.app.scene.placing import Placed
 from explorer.app.scene.shapes import NO_MESH, add_lines, add_translucent, sphere
@@ -40,9 +41,7 @@ class NearestGhost(ScenePart):
         )
         self._legs = add_lines(scene, "/nearest/legs", 4, GHOST, 1.5)
         self._displacements = add_lines(scene, "/nearest/ways", 4, SINGULAR, 3.0)
-        self._label = scene.add_label(
-            "/nearest/label", "δ1 = 0", font_screen_scale=0.9, visible=False
-        )
+        self._label = add_label(scene, "/nearest/label", "δ1 = 0", visible=False)
 
     def updates(self, placed: Placed) -> Iterator[Update]:
         """Yield the updates that draw the singular pose of this frame."""
@@ -100,9 +99,7 @@ class EllipsoidScene(ScenePart):
             for name, colour in (("speed", SPEED), ("force", FORCE))
         }
         self._axes = add_lines(scene, "/ellipsoid/axes", 3, FAR, 2.0)
-        self._label = scene.add_label(
-            "/ellipsoid/label", "1", font_screen_scale=0.85, visible=False
-        )
+        self._label = add_label(scene, "/ellipsoid/label", "1", visible=False)
 
     def updates(self, placed: Placed) -> Iterator[Update]:
         """Yield the updates that draw the ellipsoid of this frame."""
@@ -151,7 +148,7 @@ class BallScene(ScenePart):
             "/ball/touch", *sphere(), color=SINGULAR, scale=TOUCH_RADIUS, visible=False
         )
         self._line = add_lines(scene, "/ball/radius", 1, SINGULAR, 2.5)
-        self._label = scene.add_label("/ball/label", "δ1 = 0", font_screen_scale=0.9, visible=False)
+        self._label = add_label(scene, "/ball/label", "δ1 = 0", visible=False)
 
     def updates(self, placed: Placed) -> Iterator[Update]:
         """Yield the updates that draw the ball of this frame."""

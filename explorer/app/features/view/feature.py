@@ -7,6 +7,7 @@ import viser
 from explorer.app.features.feature import Feature, InBar, StateCommand, Tab
 from explorer.app.features.view.camera_buttons import CameraButtons
 from explorer.app.features.view.panel import ViewPanel
+from explorer.app.features.view.scene import GroundScale
 from explorer.app.state.action import Action
 from explorer.app.state.actions import Set
 from explorer.app.state.state import State
@@ -22,10 +23,12 @@ VIEW = Feature(
     "view",
     tabs=(Tab("build", "Show", ViewPanel, viser.Icon.EYE),),
     bar=(InBar("right", CameraButtons),),
+    scene=(GroundScale,),
     commands=(
         StateCommand(
             "Show › All tetrahedra",
-            "Show or hide the three tetrahedra that are flat where the mechanism is singular.",
+            "Show or hide the three tetrahedra that are flat where the mechanism is singular, and "
+            "the gaps that are left to such poses.",
             _toggle_tetrahedra,
             keys=(Key("T"),),
         ),

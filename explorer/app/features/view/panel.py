@@ -29,12 +29,24 @@ FORMS: Mapping[DrawnAs, tuple[str, tuple[Key, ...]]] = {
 """Hint and keys of each form of the mechanism."""
 
 LAYERS = (
-    ("flags", "Flags", "Point, line and plane of base and platform, coloured by proximity."),
+    (
+        "flags",
+        "Flags",
+        "Points, lines and planes, coloured by proximity; they reach out to near gaps.",
+    ),
     ("bodies", "Bodies", "The plates of base and platform."),
     ("legs", "Legs", "Actuators, joints, carriages and guide."),
-    ("labels", "Labels", "The names a1 … b4 of the attachment points."),
-    ("handle", "Drag handle", "Arrows and arcs on the platform that move it when dragged."),
-    ("grid", "Grid", "The ground grid; its cells are round numbers of design units."),
+    (
+        "labels",
+        "Labels",
+        "The names a1 … b4 of the attachment points, and δ1 … δ3 of the tetrahedra.",
+    ),
+    (
+        "handle",
+        "Drag handle",
+        "Arrows and arcs that move the platform when dragged; small where they hide a gap.",
+    ),
+    ("grid", "Grid", "The ground grid; a corner of the scene tells the size of its squares."),
     (
         "clearance",
         "Closest pair",
@@ -58,7 +70,8 @@ class ViewPanel:
             for index, points in enumerate(TETRAHEDRA):
                 controls.checkbox(
                     f"δ{index + 1}:  {' '.join(points)}",
-                    f"The tetrahedron that is flat where δ{index + 1} is zero.",
+                    f"The edges of the tetrahedron that is flat where δ{index + 1} is zero. Near "
+                    "such a pose it is filled, and the gap that is left to it is drawn.",
                     f"view.tetrahedra.{index}",
                 )
 

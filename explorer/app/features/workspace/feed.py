@@ -7,18 +7,30 @@ from __future__ import annotations
 
 from explorer.app.features.feature import Services
 from explorer.app.features.workspace.orientation import workspace_rows, workspace_start
-from explorer.app.features.workspace.tasks import WorkspaceDrawing, WorkspaceRequest, draw_workspace
+from explorer.app.features.workspace.tasks import (
+    WorkspaceDrawing,
+    WorkspaceRequest,
+    WorkspaceSurface,
+    draw_workspace,
+)
 from explorer.app.session.feed import Feed
 from explorer.app.state.frame import Frame
 
 
 class WorkspaceFeed(Feed[WorkspaceRequest, WorkspaceDrawing]):
-    """Drawings of the workspace."""
+    """Drawings of the workspace, of which the surface arrives before the numbers."""
 
     def __init__(self, services: Services) -> None:
         super().__init__(
             services.worker, draw_workspace, _request_for, services.session.redraw, has_stages=True
         )
+
+    @property
+    def surface(self) -> WorkspaceSurface | None:
+        """The newest surface; None if there is none, none is requested, or it was cancelled."""
+        if isinstance(self.part, WorkspaceSurface):
+            return self.part
+        return None if self.drawing is None else self.drawing.surface
 
 
 def _request_for(frame: Frame) -> WorkspaceRequest | None:

@@ -6,13 +6,15 @@ from collections.abc import Iterator
 
 import numpy as np
 import viser
+from numpy.typing import NDArray
 
 from explorer.app.features.feature import Services
 from explorer.app.features.workspace.feed import WorkspaceFeed
 from explorer.app.features.workspace.orientation import workspace_rotation
-from explorer.app.features.workspace.tasks import WorkspaceDrawing
+from explorer.app.features.workspace.tasks import WorkspaceDrawing, WorkspaceSurface
 from explorer.app.scene.bands import COLLIDING, PLAIN, Shell
 from explorer.app.scene.creases import Drawn
+from explorer.app.scene.labels import add_label
 from explorer.app.scene.part import NO_POINTS, ScenePart
 from explorer.app.scene.placing import Placed
 from explorer.app.scene.shapes import NO_MESH, Patch, add_lines, add_translucent
@@ -30,10 +32,15 @@ from explorer.workspace.limits.constraints import (
     constraints,
 )
 
-SOLID_OPACITY = 0.42
+# Each ray passes at least two faces: the mechanism stays readable within the solid.
+PLAIN_OPACITY = 0.125
+# Opacity of bands of colour, of which only the faces towards the camera are drawn.
+BAND_OPACITY = 0.4
 # Opacity where legs collide, so that this is visible through the rest.
-COLLIDING_OPACITY = 0.8
-CUT_OPACITY = 0.96
+COLLIDING_OPACITY = 0.6
+# Colour of the edges on a light page and on a dark one, and their thickness in pixels.
+EDGE_COLOURS: tuple[Rgb, Rgb] = (58, 86, 126), (138, 164, 200)
+EDGE_THICKNESS = 1.3
 PLANE_OPACITY = 0.12
 HULL_COLOUR: Rgb = (90, 100, 116)
 HULL_OPACITY = 0.3
@@ -54,12 +61,12 @@ class WorkspaceScene(ScenePart):
                 scene,
                 f"/workspace/shell/{index}",
                 NO_MESH,
-                SOLID_OPACITY,
+                PLAIN_OPACITY,
                 colour=colour,
-                is_flat=True,
             )
             for index, colour in enumerate(self._colours)
         ]
+        self._edges = add_lines(scene, "/workspace/edges", 1, EDGE_COLOURS[0], EDGE_THICKNESS)
         self._hull = scene.add_mesh_simple(
             "/workspace/hull",
             *NO_MESH,
@@ -70,26 +77,33 @@ class WorkspaceScene(ScenePart):
         )
         self._planes = [_SingularPlane(scene, index) for index in range(3)]
         self._broken = add_lines(scene, "/workspace/broken/lines", 1, OUTLINE, 4.0)
-        self._broken_label = scene.add_label(
-            "/workspace/broken/label", "limit", font_screen_scale=0.9, visible=False
-        )
-        self._scaled_from: tuple[WorkspaceDrawing, float] | None = None
+        self._broken_label = add_label(scene, "/workspace/broken/label", "limit", visible=False)
+        # What was scaled last, and the results.
+        self._surface: tuple[WorkspaceSurface | None, float] = None, 0.0
         self._scaled: dict[Rgb, Drawn] = {}
+        self._scaled_edges: NDArray[np.float32] | None = None
+        self._drawn_hull: tuple[Shell | None, float] = None, 0.0
         self._scaled_hull: Drawn | None = None
 
     def updates(self, placed: Placed) -> Iterator[Update]:
         """Yield the updates that draw the workspace of a frame."""
         view = placed.frame.state.view.workspace
-        drawing = self._feed.drawing
-        self._scale(drawing, placed.scale)
-        is_cut = drawing is not None and drawing.request.cut is not None
+        drawing, surface = self._feed.drawing, self._feed.surface
+        self._scale(surface, drawing, placed.scale)
+        is_cut = surface is not None and surface.request.cut is not None
         for colour, handle in zip(self._colours, self._shells, strict=True):
             shell = self._scaled.get(colour)
             yield handle, "visible", view.solid and shell is not None
             if view.solid and shell is not None:
                 yield handle, "opacity", _opacity(colour, is_cut=is_cut)
+                yield handle, "side", _side(colour, is_cut=is_cut)
                 yield handle, "vertices", shell[0]
                 yield handle, "faces", shell[1]
+        shows_edges = view.solid and self._scaled_edges is not None
+        yield self._edges, "visible", shows_edges
+        if shows_edges:
+            yield self._edges, "colors", np.array(EDGE_COLOURS[placed.dark], dtype=np.uint8)
+            yield self._edges, "points", self._scaled_edges
         hull = self._scaled_hull if view.hull else None
         yield self._hull, "visible", hull is not None
         if hull is not None:
@@ -106,16 +120,21 @@ class WorkspaceScene(ScenePart):
             return NO_POINTS
         return corners_of(placed.scale * np.array(drawing.extent))
 
-    def _scale(self, drawing: WorkspaceDrawing | None, scale: float) -> None:
-        """Scale a new drawing to scene units, once, so that updates compare it by identity."""
-        if drawing is None:
-            self._scaled_from, self._scaled, self._scaled_hull = None, {}, None
-        elif self._scaled_from is None or (
-            self._scaled_from[0] is not drawing or self._scaled_from[1] != scale
-        ):
-            self._scaled_from = drawing, scale
-            self._scaled = {shell.colour: _scaled(shell, scale) for shell in drawing.shells}
-            self._scaled_hull = None if drawing.hull is None else _scaled(drawing.hull, scale)
+    def _scale(
+        self, surface: WorkspaceSurface | None, drawing: WorkspaceDrawing | None, scale: float
+    ) -> None:
+        """Scale what is new to scene units, once, so that updates compare it by identity."""
+        if self._surface[0] is not surface or self._surface[1] != scale:
+            self._surface = surface, scale
+            shells = () if surface is None else surface.shells
+            self._scaled = {shell.colour: _scaled(shell, scale) for shell in shells}
+            self._scaled_edges = None
+            if surface is not None and len(surface.edges):
+                self._scaled_edges = np.asarray(scale * surface.edges, dtype=np.float32)
+        hull = None if drawing is None else drawing.hull
+        if self._drawn_hull[0] is not hull or self._drawn_hull[1] != scale:
+            self._drawn_hull = hull, scale
+            self._scaled_hull = None if hull is None else _scaled(hull, scale)
 
     def _broken_limit(self, placed: Placed) -> Iterator[Update]:
         """Yield the updates that draw a line from p to the surface of the limit it breaks most."""
@@ -145,8 +164,8 @@ class _SingularPlane:
     def __init__(self, scene: viser.SceneApi, index: int) -> None:
         self._index = index
         self._patch = Patch(scene, f"/singular/{index + 1}", opacity=PLANE_OPACITY, visible=False)
-        self._label = scene.add_label(
-            f"/singular/{index + 1}/label", f"δ{index + 1} = 0", visible=False
+        self._label = add_label(
+            scene, f"/singular/{index + 1}/label", f"δ{index + 1} = 0", visible=False
         )
 
     def updates(self, placed: Placed) -> Iterator[Update]:
@@ -178,10 +197,15 @@ class _SingularPlane:
         return normal / length if length > 1e-9 else None
 
 
-def _opacity(colour: Rgb, *, is_cut: bool) -> float:
+def _opacity(colour: Rgb, *, is_cut: bool) -> float | None:
     if is_cut:
-        return CUT_OPACITY
-    return COLLIDING_OPACITY if colour == COLLIDING else SOLID_OPACITY
+        return None
+    return {PLAIN: PLAIN_OPACITY, COLLIDING: COLLIDING_OPACITY}.get(colour, BAND_OPACITY)
+
+
+def _side(colour: Rgb, *, is_cut: bool) -> str:
+    """Return which sides of faces are drawn: of translucent bands only those in front."""
+    return "double" if is_cut or colour in (PLAIN, COLLIDING) else "front"
 
 
 def _scaled(shell: Shell, scale: float) -> Drawn:

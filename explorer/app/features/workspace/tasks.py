@@ -25,6 +25,7 @@ from explorer.app.features.workspace.slice_map import (
 )
 from explorer.app.features.workspace.volume import exact_volume
 from explorer.app.scene.bands import PLAIN, Colouring, Measure, Shell
+from explorer.app.scene.creases import creased_faces
 from explorer.app.session.worker import Channel
 from explorer.errors import InputError
 from explorer.mechanism.design import Design
@@ -32,7 +33,8 @@ from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.stages import unwatched
 from explorer.workspace.extremes import extent_of
-from explorer.workspace.limits.constraints import HalfSpace
+from explorer.workspace.faces.faces import Faces, workspace_faces
+from explorer.workspace.limits.constraints import HalfSpace, constraints
 from explorer.workspace.slices.volume import NodeCount, workspace_nodes
 from explorer.workspace.solids.solid import Solid
 from explorer.workspace.solids.solids import convex_hull, cut_solid, workspace_solid
@@ -41,6 +43,8 @@ Region = Literal["limits", "reachable"]
 
 # Chord tolerance of a live solid, as a share of the reach.
 LIVE_TOLERANCE = 0.004
+# The same for an accessible part, whose triangles are those that are drawn.
+REACHED_TOLERANCE = 0.001
 # The format with exact faces rather than facets.
 STEP = "step"
 
@@ -77,14 +81,30 @@ class WorkspaceRequest:
 
 
 @dataclass(frozen=True)
+class WorkspaceSurface:
+    """What is drawn of a workspace; lengths in design units.
+
+    Attributes:
+        request: The request.
+        shells: Surface, by colour.
+        edges: Ends of the segments where two faces of it meet, shape (k, 2, 3).
+        coarse_edge: Longest edge of a coloured triangle, if longer than usual; see
+            `explorer.app.scene.bands.Colouring.shells`.
+    """
+
+    request: WorkspaceRequest
+    shells: tuple[Shell, ...]
+    edges: FloatArray
+    coarse_edge: float | None
+
+
+@dataclass(frozen=True)
 class WorkspaceDrawing:
     """A workspace drawn and measured; lengths in design units.
 
     Attributes:
         request: The request.
-        shells: Surface, by colour.
-        coarse_edge: Longest edge of a coloured facet, if longer than usual; see
-            `explorer.app.scene.bands.Colouring.shells`.
+        surface: What is drawn.
         hull: Convex hull, if requested.
         slice_map: Map of the slice, if the solid is cut.
         level: Coordinate of the cut, if the solid is cut.
@@ -101,8 +121,7 @@ class WorkspaceDrawing:
     """
 
     request: WorkspaceRequest
-    shells: tuple[Shell, ...]
-    coarse_edge: float | None
+    surface: WorkspaceSurface
     hull: Shell | None
     slice_map: SliceMap | None
     level: float | None
@@ -123,41 +142,59 @@ def draw_workspace(request: WorkspaceRequest, channel: Channel | None = None) ->
 
     Args:
         request: Workspace to draw.
-        channel: Channel to the parent, which gets each `Stage` and may cancel; None for neither.
+        channel: Channel to the parent, which gets each `Stage`, and the `WorkspaceSurface` as soon
+            as it is known, and may cancel; None for neither.
     """
     design, rotation = request.design, np.array(request.rotation)
-    tolerance = request.tolerance or LIVE_TOLERANCE * design.reach
+    share = REACHED_TOLERANCE if request.region == "reachable" else LIVE_TOLERANCE
+    tolerance = request.tolerance or share * design.reach
     watch = watch_of(channel)
+    colouring = Colouring(design, rotation, request.colour, request.warn_below)
+    limits = constraints(design, rotation)
+
+    def draw(faces: Faces) -> WorkspaceSurface:
+        shells, coarse_edge = colouring.shells(faces)
+        surface = WorkspaceSurface(request, shells, faces.edges, coarse_edge)
+        if channel is not None:
+            channel.send(surface)
+        return surface
+
     measured = exact_volume(design, request.rotation)
+    surface = None
+    if request.region == "limits" and request.cut is None:
+        # It is waited for; it needs none of what follows.
+        surface = draw(workspace_faces(limits))
     whole = workspace_solid(design, rotation, tolerance, volume=measured)
     reached = trouble = None
     if request.region == "reachable":
         result = reach_workspace(design, request.rotation, request.start, tolerance, watch)
         reached, trouble = (None, result) if isinstance(result, Trouble) else (result, None)
     solid = whole if reached is None else reached.solid
-    hull = convex_hull(solid) if request.hull and not solid.is_empty else None
-    colouring = Colouring(design, rotation, request.colour, request.warn_below)
     shown, mapped, level = solid, None, None
     whole_extent = None if whole.is_empty else extent_of(design, rotation, whole)
     extent = whole_extent if reached is None else _extent(solid)
+    cut = None
     if request.cut is not None and extent is not None and whole_extent is not None:
         axis = AXES.index(request.cut)
         level = level_within(float(extent[0][axis]), float(extent[1][axis]), request.level)
         # The half that faces the isometric camera is cut away.
         side = -1.0 if (request.cut == "y") != request.flipped else 1.0
-        half_space = HalfSpace(CUT, side * np.eye(3)[axis], side * level)
-        shown = cut_solid(solid, half_space)
-        cut_solids = (None, None) if reached is None else (cut_solid(whole, half_space), shown)
-        mapped = slice_map(colouring, whole_extent, request.cut, level, *cut_solids)
+        cut = request.cut, level, HalfSpace(CUT, side * np.eye(3)[axis], side * level)
+        limits = (*limits, cut[2])
+        shown = solid if reached is None else cut_solid(solid, cut[2])
+    if surface is None:
+        surface = draw(workspace_faces(limits) if reached is None else creased_faces(shown))
+    if cut is not None and whole_extent is not None:
+        cut_solids = (None, None) if reached is None else (cut_solid(whole, cut[2]), shown)
+        mapped = slice_map(colouring, whole_extent, *cut[:2], *cut_solids)
+    hull = convex_hull(solid) if request.hull and not solid.is_empty else None
     try:
         nodes = workspace_nodes(design, rotation)
     except InputError:
         nodes = None
-    shells, coarse_edge = colouring.shells(shown)
     return WorkspaceDrawing(
         request=request,
-        shells=shells,
-        coarse_edge=coarse_edge,
+        surface=surface,
         hull=None if hull is None else Shell(PLAIN, hull.vertices, hull.faces),
         slice_map=mapped,
         level=level,

@@ -48,7 +48,8 @@ class VolumeText:
     """The volume in words.
 
     Attributes:
-        words: The volume with its unit, such as "7053.04 units³"; "–" before the first one.
+        words: The volume with its unit, such as "7,053.04 units³" or "empty"; "–" before the
+            first one.
         is_current: Whether it is that of the present design.
     """
 
@@ -74,7 +75,9 @@ class VolumeFeed(Feed[VolumeRequest, MeasuredVolume]):
 
 
 def volume_text(drawing: MeasuredVolume) -> str:
-    """Return a volume with its unit."""
+    """Return a volume with its unit, or that the workspace is empty."""
+    if drawing.measured.volume <= 0.0:
+        return "empty"
     size = drawing.request.design.reach**3
     return f"{format_number(drawing.measured.volume, 6, size=size)} units³"
 

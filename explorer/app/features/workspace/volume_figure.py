@@ -23,5 +23,7 @@ class VolumeFigure:
             name += turned_suffix(drawing.request.design, drawing.request.rotation)
         which = orientation_word(frame)
         hint = f"Exact volume of the workspace within the limits, in the {which} orientation."
+        if drawing is not None and drawing.measured.volume <= 0.0:
+            hint += f" It is emptied by: {', '.join(drawing.measured.empty_because)}."
         look = "" if text.is_current else "is-outdated"
         return figure("Workspace", name, text.words, hint=hint, look=look)

@@ -110,10 +110,11 @@ def workspace_details(frame: Frame, feed: WorkspaceFeed) -> str:
     parts.append(_numbers(drawing))
     if drawing.reached is not None and drawing.volume > 0.0:
         parts.append(_pairs(drawing.reached, is_coloured=view.colour == "plain"))
-    if drawing.coarse_edge is not None:
+    coarse_edge = drawing.surface.coarse_edge
+    if coarse_edge is not None:
         parts.append(
             '<div class="ex-dim ex-after">The workspace is large beside the reach: its condition '
-            f"number is computed at corners up to {format_number(drawing.coarse_edge, 3)} units "
+            f"number is computed at corners up to {format_number(coarse_edge, 3)} units "
             "apart.</div>"
         )
     return box(*parts)

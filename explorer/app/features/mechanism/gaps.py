@@ -1,0 +1,150 @@
+"""The gaps to the incidences: dashes between the two flags, with δ and the length beside them.
+
+Where an incidence holds, a ring with a ball in the colour of singular poses marks the contact.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterator
+
+import numpy as np
+
+from explorer.app.features.feature import Services
+from explorer.app.features.mechanism.approach import (
+    Approach,
+    HoveredMargin,
+    approaches,
+    is_shown,
+)
+from explorer.app.scene.labels import add_label
+from explorer.app.scene.part import NO_POINTS, ScenePart
+from explorer.app.scene.placing import Placed
+from explorer.app.scene.shapes import (
+    Balls,
+    Instances,
+    Mesh,
+    add_lines,
+    dashes,
+    joined,
+    linear_colour,
+    of_one_colour,
+    sphere,
+    torus,
+    turned_to,
+)
+from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.colours import SINGULAR, WARNED, Rgb, proximity_colour
+from explorer.app.widgets.markup import fitted
+from explorer.mechanism.margins import TETRAHEDRA
+from explorer.numerics.arrays import FloatArray
+
+# Most dashes of one gap, their period in scene units, and the share that is drawn.
+DASHES, PERIOD, DRAWN = 32, 0.32, 0.6
+# Thickness of the dashes in pixels, when they fade in and in full.
+THIN, THICK = 1.0, 3.0
+FOOT_RADIUS = 0.13
+RING_RADIUS, RING_TUBE, CONTACT_RADIUS = 0.85, 0.09, 0.42
+# Ends of gaps that have no mark of their own, as margin and end: a1 and b4 have one.
+FEET = ((0, 1), (1, 0), (1, 1), (2, 0))
+
+
+class Gaps(ScenePart):
+    """The gaps that are near, each with its ends and its label, and the contacts."""
+
+    def __init__(self, services: Services) -> None:
+        scene, self._hovered = services.scene, services.get(HoveredMargin)
+        self._dashes = add_lines(scene, "/gaps/dashes", 3 * DASHES, None, THICK)
+        self._feet = Balls(scene, "/gaps/feet", [WARNED] * len(FEET))
+        self._contacts = Instances(
+            scene, "/gaps/contacts", _contact_mark(), [linear_colour(SINGULAR)] * 3
+        )
+        self._labels = [
+            add_label(scene, f"/gaps/label/{index}", f"δ{index}", fades=False, visible=False)
+            for index in (1, 2, 3)
+        ]
+
+    def updates(self, placed: Placed) -> Iterator[Update]:
+        """Yield the updates that draw the gaps of this frame."""
+        shown = shown_gaps(placed, self._hovered.row)
+        ends = {i: each.ends for i, each in shown.items() if each.ends is not None}
+        closed = {i: each for i, each in ends.items() if shown[i].is_touching}
+        gaps = {i: each for i, each in ends.items() if i not in closed}
+        yield self._dashes, "visible", bool(gaps)
+        yield from self._feet.show(bool(gaps))
+        yield from self._contacts.show(bool(closed))
+        for index, label in enumerate(self._labels):
+            yield label, "visible", index in shown and shown[index].has_label
+        for index, each in shown.items():
+            corners = [placed.points[name] for name in TETRAHEDRA[index]]
+            at = np.mean(corners if each.ends is None else each.ends, axis=0)
+            yield self._labels[index], "text", gap_text(placed, index, each)
+            yield self._labels[index], "position", tuple(at.tolist())
+        if gaps:
+            yield from self._draw_gaps(gaps, shown)
+        if closed:
+            yield from self._draw_contacts(placed, closed)
+
+    def corners(self, placed: Placed) -> FloatArray:
+        """Return the ends of the gaps to incidences that are below their warning value."""
+        shown = shown_gaps(placed, None).values()
+        ends = [each.ends for each in shown if each.ends is not None and each.level < 1.0]
+        return np.concatenate(ends) if ends else NO_POINTS
+
+    def _draw_gaps(
+        self, gaps: dict[int, FloatArray], shown: dict[int, Approach]
+    ) -> Iterator[Update]:
+        ends, feet = np.zeros((3, 2, 3)), np.full(len(FEET), 1e-6)
+        colours: list[Rgb] = [WARNED] * 3
+        for index, gap in gaps.items():
+            ends[index], colours[index] = gap, proximity_colour(shown[index].level)
+        for foot, (index, _) in enumerate(FEET):
+            if index in gaps:
+                feet[foot] = FOOT_RADIUS * shown[index].presence
+        presence = max(shown[index].presence for index in gaps)
+        yield self._dashes, "points", dashes(ends, DASHES, PERIOD, DRAWN).astype(np.float32)
+        yield self._dashes, "colors", np.concatenate([of_one_colour(c, DASHES) for c in colours])
+        yield self._dashes, "thickness", THIN + (THICK - THIN) * presence
+        yield from self._feet.at(np.array([ends[foot] for foot in FEET]), feet)
+        yield from self._feet.colour([linear_colour(colours[index]) for index, _ in FEET])
+
+    def _draw_contacts(self, placed: Placed, closed: dict[int, FloatArray]) -> Iterator[Update]:
+        positions, scales = np.zeros((3, 3)), np.full((3, 3), 1e-6)
+        for index, ends in closed.items():
+            positions[index], scales[index] = ends.mean(axis=0), 1.0
+        rotation = placed.frame.snapshot.rotation
+        # The mark lies in the plane in which the contact is.
+        normals = np.array([rotation[:, 2], [0.0, -rotation[2, 0], rotation[1, 0]], [0, 0, 1.0]])
+        yield from self._contacts.place(positions, turned_to(normals), scales)
+
+
+def shown_gaps(placed: Placed, hovered: int | None) -> dict[int, Approach]:
+    """Return the incidences whose gaps are shown, by the index of their margin.
+
+    Args:
+        placed: The frame that is drawn.
+        hovered: Number 1 to 3 of the margin on whose row a pointer rests, if any.
+    """
+    return {
+        index: each
+        for index, each in enumerate(approaches(placed, hovered))
+        if each.has_gap and is_shown(placed, index, each)
+    }
+
+
+def gap_text(placed: Placed, index: int, approach: Approach) -> str:
+    """Return the text beside a gap, such as "δ1 −0.42 · 4.2 mm"."""
+    snapshot = placed.frame.snapshot
+    reach, unit_mm = snapshot.design.reach, snapshot.design.unit_mm
+    if approach.level == 0.0:
+        return f"δ{index + 1} = 0{'' if approach.is_touching else ', lines parallel'}"
+    margin = fitted(float(snapshot.margins[index]), reach, 4)
+    length = fitted(snapshot.gaps.lengths[index] * unit_mm, reach * unit_mm, 4)
+    return f"δ{index + 1} {margin} · {length} mm"
+
+
+@functools.cache
+def _contact_mark() -> Mesh:
+    """Return a ring about the z-axis with a ball in its middle."""
+    vertices, faces = sphere()
+    return joined((CONTACT_RADIUS * vertices, faces), torus(RING_RADIUS, RING_TUBE))

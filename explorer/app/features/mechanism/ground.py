@@ -1,0 +1,151 @@
+"""The ground under the mechanism: a grid, and on it the shadow of plates and legs.
+
+The shadow is the outline of each body as the sun projects it on the ground, in closed form:
+shadow maps would cost a software renderer more than all that it draws besides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from explorer.app.features.feature import Services
+from explorer.app.features.mechanism.bodies import (
+    BASE_RADIUS,
+    PLATE_THICKNESS,
+    PLATFORM_RADIUS,
+    PLATFORM_SHIFT,
+)
+from explorer.app.features.mechanism.legs import PLATE_TOP, ROD_RADIUS, TUBE_RADIUS, TWIN
+from explorer.app.features.mechanism.lighting import TO_SUN
+from explorer.app.scene.part import ScenePart
+from explorer.app.scene.placing import Placed
+from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.colours import Rgb
+from explorer.numerics.arrays import FloatArray
+
+# The shadow lies below the lines of the grid, and both below the base plate.
+GRID_BELOW, SHADOW_BELOW = 0.01, 0.03
+# Colours of the grid's cells and sections, by whether the page is dark.
+GRID: dict[bool, tuple[Rgb, Rgb]] = {
+    False: ((226, 230, 236), (203, 209, 218)),
+    True: ((38, 41, 46), (56, 61, 69)),
+}
+SHADOW: dict[bool, Rgb] = {False: (188, 192, 200), True: (4, 4, 5)}
+# Directions on the ground, in each of which an outline has a corner.
+CORNERS = 32
+ANGLES = np.linspace(0.0, 2.0 * np.pi, CORNERS, endpoint=False)
+OUTWARD = np.stack([np.cos(ANGLES), np.sin(ANGLES)], axis=1)
+# Both plates, and as many legs as the twin has.
+OUTLINES = 2 + len(TWIN)
+# Rows that project a direction along the sun's rays on the ground.
+PROJECTION = np.column_stack([np.eye(2), -TO_SUN[:2] / TO_SUN[2]])
+
+
+class Ground(ScenePart):
+    """The grid and the shadow."""
+
+    def __init__(self, services: Services) -> None:
+        scene = services.scene
+        self._grid = scene.add_grid(
+            "/grid",
+            width=60.0,
+            height=60.0,
+            cell_color=GRID[False][0],
+            section_color=GRID[False][1],
+            fade_distance=46.0,
+            fade_from="origin",
+            shadow_opacity=0.0,
+        )
+        fans = np.stack(
+            [np.zeros(CORNERS - 2, int), np.arange(1, CORNERS - 1), np.arange(2, CORNERS)], axis=1
+        )
+        faces = (CORNERS * np.arange(OUTLINES)[:, None, None] + fans).reshape(-1, 3)
+        self._shadow = scene.add_mesh_simple(
+            "/shadow",
+            np.zeros((OUTLINES * CORNERS, 3)),
+            faces,
+            # Flat and of one tone, so that the cheapest material does.
+            material="toon3",
+        )
+
+    def updates(self, placed: Placed) -> Iterator[Update]:
+        """Yield the updates that draw the ground of this frame."""
+        view = placed.frame.state.view
+        lowest = ground_of(placed)
+        yield self._grid, "visible", view.grid
+        cell, section = GRID[placed.dark]
+        yield self._grid, "cell_color", cell
+        yield self._grid, "section_color", section
+        yield self._grid, "cell_size", placed.square
+        yield self._grid, "section_size", 5.0 * placed.square
+        yield self._grid, "position", (0.0, 0.0, lowest - GRID_BELOW)
+        outlines = shadow_outlines(placed, lowest)
+        # Without the grid nothing says that there is a ground.
+        yield self._shadow, "visible", view.grid and bool(outlines)
+        vertices = np.zeros((OUTLINES, CORNERS, 3))
+        if outlines:
+            vertices[: len(outlines), :, :2] = outlines
+        yield self._shadow, "vertices", vertices.reshape(-1, 3).astype(np.float32)
+        yield self._shadow, "color", SHADOW[placed.dark]
+        yield self._shadow, "position", (0.0, 0.0, lowest - SHADOW_BELOW)
+
+
+def ground_of(placed: Placed) -> float:
+    """Return the height at which the base stands, in scene units."""
+    if placed.floor is None:
+        return PLATE_TOP - PLATE_THICKNESS
+    return placed.scale * placed.floor
+
+
+def shadow_outlines(placed: Placed, ground: float) -> list[FloatArray]:
+    """Return the shadows of the bodies and legs that are drawn, convex polygons (CORNERS, 2).
+
+    Args:
+        placed: What is drawn.
+        ground: Height of the ground, in scene units.
+    """
+    view, p, size = placed.frame.state.view, placed.points, placed.thickness
+    outlines: list[FloatArray] = []
+    if view.bodies and placed.is_schematic:
+        feet = np.array([p[name] * [1.0, 1.0, 0.0] for name in ("a1", "a2", "a3")])
+        discs = np.concatenate([feet + [0.0, 0.0, PLATE_TOP - t] for t in (0.0, PLATE_THICKNESS)])
+        outlines.append(_outline(discs, BASE_RADIUS * np.eye(3)[:, :2], ground))
+        rotation = placed.frame.snapshot.rotation
+        local = np.array(list(placed.platform_points.values()))
+        centres = local + [0.0, 0.0, PLATFORM_SHIFT * size * placed.facing]
+        axes = PLATFORM_RADIUS * size * rotation[:, :2]
+        outlines.append(_outline(p["b4"] + centres @ rotation.T, axes, ground))
+    if view.legs and (placed.is_schematic or view.is_twin):
+        legs = [(p[base], p[tip]) for base, tip in TWIN] if view.is_twin else _legs(placed)
+        radius = 0.5 * (TUBE_RADIUS + ROD_RADIUS) * size * np.eye(3)[:, :2]
+        outlines += [_outline(np.stack(leg), radius, ground) for leg in legs]
+    return outlines
+
+
+def _legs(placed: Placed) -> list[tuple[FloatArray, FloatArray]]:
+    p, along = placed.points, np.array([1.0, 0.0, 0.0])
+    return [
+        (p["a1"], p["b1"]),
+        (p["b2"] * along, p["b2"]),
+        (p["b3"] * along, p["b3"]),
+        (p["a3"], p["b4"]),
+    ]
+
+
+def _outline(centres: FloatArray, axes: FloatArray, ground: float) -> FloatArray:
+    """Return the outline of the hull of equal discs, projected on the ground, (CORNERS, 2).
+
+    Args:
+        centres: Centres of the discs, (n, 3).
+        axes: Two perpendicular radii of a disc, (3, 2).
+        ground: Height of the ground.
+    """
+    flat = (centres - [0.0, 0.0, ground]) @ PROJECTION.T
+    # Farthest point of an ellipse in each direction, seen from its centre.
+    ellipse = PROJECTION @ axes
+    reach = OUTWARD @ ellipse
+    lengths = np.linalg.norm(reach, axis=1, keepdims=True)
+    rim = (reach / np.maximum(lengths, 1e-9)) @ ellipse.T
+    return flat[np.argmax(flat @ OUTWARD.T, axis=0)] + rim

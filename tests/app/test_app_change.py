@@ -1,0 +1,121 @@
+"""What was before the last change of the design: a ghost and differences, until the next press."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+import viser
+from desk import Desk
+from services import StubWorker, services_for
+
+from explorer.app.features.change.before import OVER, DesignChange
+from explorer.app.features.change.card import ChangeCard
+from explorer.app.features.change.scene import ChangeScene
+from explorer.app.features.workspace.volume import VolumeFeed
+from explorer.app.scene.placing import Placed
+from explorer.app.session.session import REDO, UNDO
+from explorer.app.state.action import Action
+from explorer.app.state.actions import Open, Set, SetPosition, SetVariable
+from explorer.app.state.frame import Frame
+from explorer.app.widgets.buttons import Buttons
+from explorer.measures.snapshot import evaluate
+from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.home import home_pose
+from explorer.workspace.slices.volume import workspace_volume
+
+OPTIMAL = PRESETS["paper-optimal"]
+WIDER = OPTIMAL.with_variable("a3x", 20.0)
+
+
+class Watcher:
+    """The parts of the feature on one session, followed after each action."""
+
+    def __init__(self, server: viser.ViserServer, buttons: Buttons, desk: Desk) -> None:
+        self.desk = desk
+        worker = StubWorker(at_once=True)
+        services = services_for(server, desk.session, worker, buttons=buttons)
+        self._volumes = services.get(VolumeFeed)
+        self.change = services.get(DesignChange)
+        self.card = ChangeCard(services)
+        self.scene = ChangeScene(services)
+        self.follow()
+
+    def follow(self) -> Frame:
+        frame = Frame(self.desk.state)
+        self._volumes.follow(frame)
+        self.change.follow(frame)
+        return frame
+
+    def do(self, action: Action) -> Frame:
+        self.desk.session.do(action)
+        return self.follow()
+
+
+@pytest.fixture
+def watcher(server: viser.ViserServer, buttons: Buttons, desk: Desk) -> Watcher:
+    return Watcher(server, buttons, desk)
+
+
+def test_change_shows_the_differences_of_volume_reach_and_clearance(watcher: Watcher) -> None:
+    card = watcher.card(watcher.do(SetVariable("a3x", 20.0)))
+    cells = re.sub(r"<[^>]+>", " ", card)
+    before, after = (
+        workspace_volume(design, home_pose(OPTIMAL).rotation).volume for design in (OPTIMAL, WIDER)
+    )
+    for value in (before, after):
+        assert f"{value:,.0f}" in cells
+    numbers = [float(text.replace("−", "-")) for text in re.findall(r"[+−]([\d.]+)", cells)]
+    assert numbers[0] == pytest.approx(abs(after - before), rel=5e-3)
+    assert numbers[1] == pytest.approx(10.0 * (WIDER.reach - OPTIMAL.reach), rel=5e-3)
+    assert cells.count("same") == 1, "the clearance in the pose does not depend on a3x"
+
+
+def test_ghost_is_the_mechanism_before_the_change_to_true_size(watcher: Watcher) -> None:
+    frame = watcher.do(SetVariable("a3x", 20.0))
+    placed = Placed(frame)
+    updates: dict[str, Any] = {name: value for _, name, value in watcher.scene.updates(placed)}
+    points = evaluate(OPTIMAL, watcher.desk.state.pose).points
+    ends = updates["points"].reshape(-1, 3) / placed.scale
+    for point in (points.a3, points.b1, points.b2, points.b3, points.b4):
+        assert np.abs(ends - point).max(axis=1).min() < 1e-5
+    assert updates["visible"]
+
+
+@pytest.mark.parametrize("name", ["a3y", "b1x", "b3"])
+def test_change_is_over_with_the_next_step_with_a_press_and_with_undo(
+    watcher: Watcher, buttons: Buttons, name: str
+) -> None:
+    change, desk = watcher.change, watcher.desk
+
+    def begin(value: float) -> None:
+        watcher.do(SetPosition(0, 10.0 + 0.1 * value))
+        watcher.do(SetVariable(name, value))
+        assert change.before is not None
+        assert change.before.frame.state.pose.position[0] == 10.0 + 0.1 * value
+
+    begin(4.0)
+    watcher.do(SetPosition(0, 11.0))
+    assert change.before is None
+    begin(4.25)
+    desk.press(buttons, OVER)
+    watcher.follow()
+    assert change.before is None
+    begin(4.5)
+    for move in (UNDO, REDO):
+        desk.session.travel(move)
+        watcher.follow()
+        assert change.before is None
+
+
+def test_design_that_is_opened_is_no_change_and_limits_are(watcher: Watcher) -> None:
+    watcher.do(Open(PRESETS["paper-initial"]))
+    assert watcher.change.before is None
+    assert watcher.card(watcher.follow()) == ""
+    design = watcher.desk.state.design
+    watcher.do(Set("design.limits", msgspec.structs.replace(design.limits, box=None)))
+    assert watcher.change.before is not None
+    assert watcher.change.before.frame.state.design == design

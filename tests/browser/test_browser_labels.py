@@ -1,0 +1,360 @@
+"""Labels, axes and scale over the scene, and views without perspective, in a real page."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from likeness import decoded
+from limited_designs import scaled_design
+from tab import Tab
+
+from explorer.app.features.mechanism.marks import ARROW_LENGTH, HANDLE_NAME
+from explorer.app.features.singularity.actions import GoToSingularity
+from explorer.app.scene.camera import VIEWS, ViewName, framing
+from explorer.app.scene.placing import Placed
+from explorer.app.screenshot import PATIENCE_SECONDS, SCENE_CANVAS, settle
+from explorer.app.state.actions import Open, Set, SetAngle, SetPosition
+from explorer.app.state.frame import Frame
+from explorer.app.state.view import PrototypeView, View
+from explorer.mechanism.design_file import PRESETS
+from explorer.numerics.arrays import FloatArray
+
+SIZE = (1280, 720)
+ON_AXES: tuple[ViewName, ...] = ("front", "side", "top")
+NAMES = ("a1", "a2", "a3", "b1", "b2", "b3", "b4")
+# Labels as they are drawn, by name.
+DRAWN = """() => Object.fromEntries(window.explorer.labels.drawn().map(
+    ({ name, at, box }) => [name, { at, box, isHidden: window.explorer.labels.hidden().has(name) }]
+))"""
+SCALE = "window.explorer.labels.scale()"
+IS_PARALLEL = "window.explorer.projection.isParallel(window.__viserMutable.camera)"
+# Whether viser draws its own labels, which have boxes.
+HAS_BOXES = """() => {
+    let parent = null;
+    window.__viserMutable.scene.traverse((each) => {
+        if (each.material?.uniforms?.uLabelData) parent = each.parent;
+    });
+    return parent.visible;
+}"""
+# Longer than what hides a label waits for a look.
+LOOK = 700
+BARE = View(
+    flags=False,
+    bodies=False,
+    legs=False,
+    labels=False,
+    grid=False,
+    handle=False,
+    tetrahedra=(False, False, False),
+)
+
+
+@pytest.fixture
+def wide(tab: Tab) -> Tab:
+    """The tab, in a window of the usual size."""
+    tab.page.set_viewport_size({"width": SIZE[0], "height": SIZE[1]})
+    settle(tab.page, tab.client)
+    return tab
+
+
+def show(tab: Tab, view: View) -> None:
+    tab.running.page.session.do(Set("view", view))
+    assert tab.running.page.wait_until_drawn()
+
+
+def drawn(tab: Tab) -> dict[str, Any]:
+    """Return the labels that are drawn, after all that has been asked for."""
+    tab.picture()
+    tab.page.wait_for_timeout(LOOK)
+    return tab.page.evaluate(DRAWN)
+
+
+def in_scene(tab: Tab, point: FloatArray) -> FloatArray:
+    """Return where a point of the scene (3,) is in the canvas of the scene."""
+    box = tab.page.locator(SCENE_CANVAS).bounding_box()
+    assert box is not None
+    return np.array(tab.on_screen(point)) - [box["x"], box["y"]]
+
+
+def overlap(one: list[float], other: list[float]) -> bool:
+    return all(one[k] < other[k + 2] and other[k] < one[k + 2] for k in (0, 1))
+
+
+@pytest.mark.parametrize("design", PRESETS)
+def test_labels_lie_apart_from_each_other_and_from_the_handle(wide: Tab, design: str) -> None:
+    wide.running.page.session.do(Open(PRESETS[design]))
+    shown = {"joints": View(), "modes": View(ghosts=True)}
+    for view, (what, parts) in itertools.product(VIEWS, shown.items()):
+        show(wide, parts)
+        wide.look_from(view)
+        labels = drawn(wide)
+        assert {name.rpartition("/")[2] for name in labels} >= set(NAMES), (view, what)
+        boxes = {name: label["box"] for name, label in labels.items()}
+        centre = in_scene(wide, Placed(Frame(wide.state)).points["b4"])
+        boxes[HANDLE_NAME] = [*(centre - 8.0).tolist(), *(centre + 8.0).tolist()]
+        for (one, a), (other, b) in itertools.combinations(boxes.items(), 2):
+            assert not overlap(a, b), (view, what, one, other)
+
+
+@pytest.mark.parametrize("view", VIEWS)
+def test_labels_stand_at_their_points(wide: Tab, view: ViewName) -> None:
+    wide.look_from(view)
+    session = wide.running.page.session
+    assert not wide.page.evaluate(HAS_BOXES)
+    for action in (SetPosition(2, 8.0), SetAngle(1, 20.0)):
+        session.do(action)
+        labels = drawn(wide)
+        points = Placed(Frame(wide.state)).points
+        for name in NAMES:
+            at = labels[f"/{'base' if name[0] == 'a' else 'platform'}/label/{name}"]["at"]
+            np.testing.assert_allclose(at, in_scene(wide, points[name]), atol=1.0)
+
+
+def test_label_of_a_point_behind_a_body_is_pale(wide: Tab) -> None:
+    show(wide, replace(BARE, labels=True, bodies=True))
+    wide.look_from("isometric")
+    before = drawn(wide)
+    assert not before["/base/label/a1"]["isHidden"]
+    dark = darkest(wide, before["/base/label/a1"]["box"])
+    # A small board between a1 and the eye.
+    scene = wide.running.viser.scene
+    eye = np.array(wide.client.camera.position)
+    middle = Placed(Frame(wide.state)).points["a1"] + 0.3 * eye
+    half = 0.15
+    corners = middle + half * np.array([[-1, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]])
+    board = scene.add_mesh_simple(
+        "/board", corners, np.array([[0, 1, 2], [0, 2, 3]]), color=(255, 255, 255), side="double"
+    )
+    try:
+        after = drawn(wide)
+        hidden = {name for name, label in after.items() if label["isHidden"]}
+        assert hidden - {n for n, label in before.items() if label["isHidden"]} == {
+            "/base/label/a1"
+        }
+        assert darkest(wide, after["/base/label/a1"]["box"]) > dark + 0.2
+    finally:
+        board.remove()
+    assert not drawn(wide)["/base/label/a1"]["isHidden"]
+
+
+def test_label_of_a_gap_is_not_pale_where_a_body_hides_it(wide: Tab) -> None:
+    session = wide.running.page.session
+    session.do(GoToSingularity(3))
+    wide.look_from("isometric")
+    # b4, with the contact at the same place, is behind the platform.
+    labels = drawn(wide)
+    assert labels["/platform/label/b4"]["isHidden"]
+    assert not labels["/gaps/label/3"]["isHidden"]
+
+
+def darkest(tab: Tab, box: list[float]) -> float:
+    """Return the lightness of the darkest pixel that the canvas of the labels has in a box."""
+    return tab.page.evaluate(
+        """([left, top, right, bottom]) => {
+            const { canvas } = window.__viserMutable;
+            const labels = canvas.nextElementSibling;
+            const copy = Object.assign(document.createElement("canvas"), {
+                width: labels.width, height: labels.height,
+            });
+            const pen = copy.getContext("2d", { willReadFrequently: true });
+            pen.drawImage(labels, 0, 0);
+            const { data } = pen.getImageData(left, top, right - left, bottom - top);
+            let least = 1;
+            for (let k = 0; k < data.length; k += 4) {
+                if (data[k + 3] > 250) least = Math.min(least, data[k] / 255);
+            }
+            return least;
+        }""",
+        box,
+    )
+
+
+def test_labels_are_gone_while_the_parts_of_the_prototype_are_apart(wide: Tab) -> None:
+    apart = View(drawn_as="prototype")
+    show(wide, apart)
+    assert len(drawn(wide)) >= len(NAMES)
+    show(wide, replace(apart, prototype=PrototypeView(exploded=0.5)))
+    assert drawn(wide) == {}
+
+
+def lengths(tab: Tab) -> tuple[float, float]:
+    """Return the breadths, in pixels, of a red line near the eye and of a green one far away.
+
+    Both are as long in the scene, across the picture, one above the middle and one below.
+    """
+    show(tab, BARE)
+    camera = tab.client.camera
+    target = np.array(camera.look_at)
+    forward = target - np.array(camera.position)
+    forward /= np.linalg.norm(forward)
+    right = np.cross(forward, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    up = np.cross(right, forward)
+    scene = tab.running.viser.scene
+    lines = [
+        scene.add_line_segments(
+            f"/lines/{name}",
+            (target + away * forward + 0.1 * away * up + 3.0 * np.array([[-right, right]])),
+            np.full((1, 2, 3), colour),
+            thickness=3.0,
+            thickness_units="screen",
+        )
+        for name, away, colour in (("near", -9.0, (255, 0, 0)), ("far", 9.0, (0, 255, 0)))
+    ]
+    try:
+        picture = decoded(tab.picture())
+    finally:
+        for line in lines:
+            line.remove()
+    # The axes in the corner have the same colours.
+    picture = picture[:-120]
+    reds, greens = picture[..., 0] - picture[..., 1], picture[..., 1] - picture[..., 0]
+    # Tone mapping makes pure colours pale.
+    return breadth(reds > 0.2), breadth(greens > 0.2)
+
+
+def breadth(mask: Any) -> float:
+    columns = np.flatnonzero(mask.any(axis=0))
+    return float(columns[-1] - columns[0])
+
+
+@pytest.mark.parametrize("view", ON_AXES)
+def test_views_along_an_axis_draw_what_is_far_as_large_as_what_is_near(
+    wide: Tab, view: ViewName
+) -> None:
+    wide.look_from(view)
+    near, far = lengths(wide)
+    assert near == pytest.approx(far, abs=2.0)
+    target = np.array(wide.client.camera.look_at)
+    across = [1.0, 0.0, 0.0] if view != "side" else [0.0, 1.0, 0.0]
+    expected = in_scene(wide, target + 3.0 * np.array(across)) - in_scene(wide, target)
+    assert near == pytest.approx(2.0 * expected[0], abs=5.0)
+
+
+def test_other_views_draw_what_is_far_smaller(wide: Tab) -> None:
+    wide.look_from("isometric")
+    near, far = lengths(wide)
+    distance = float(np.linalg.norm(np.subtract(*eye_and_target(wide))))
+    assert near / far == pytest.approx((distance + 9.0) / (distance - 9.0), rel=0.03)
+
+
+def eye_and_target(tab: Tab) -> tuple[FloatArray, FloatArray]:
+    camera = tab.client.camera
+    return np.array(camera.position), np.array(camera.look_at)
+
+
+def test_view_along_an_axis_stays_without_perspective_until_it_is_turned(wide: Tab) -> None:
+    page = wide.page
+    wide.look_from("front")
+    box = page.locator(SCENE_CANVAS).bounding_box()
+    assert box is not None
+    x, y = box["x"] + 0.5 * box["width"], box["y"] + 0.8 * box["height"]
+    eye, target = eye_and_target(wide)
+    page.mouse.move(x, y)
+    page.mouse.wheel(0, -400)
+    wide.wait_for(lambda: not np.allclose(eye_and_target(wide)[0], eye, atol=0.1), "a closer eye")
+    # A drag with the right button shifts the picture.
+    page.mouse.down(button="right")
+    page.mouse.move(x + 60, y - 20, steps=4)
+    page.mouse.up(button="right")
+    wide.wait_for(lambda: not np.allclose(eye_and_target(wide)[1], target, atol=0.1), "a shift")
+    settle(page, wide.client)
+    assert page.evaluate(IS_PARALLEL)
+    near, far = lengths(wide)
+    assert near == pytest.approx(far, abs=2.0)
+    wide.push("Fit")
+    first, _ = framing(wide.running.page.corners(), "front", wide.client.camera.aspect)
+    wide.wait_for(lambda: np.allclose(eye_and_target(wide)[0], first, atol=0.01), "the whole")
+    assert page.evaluate(IS_PARALLEL)
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + 80, y, steps=4)
+    page.mouse.up()
+    settle(page, wide.client)
+    assert not page.evaluate(IS_PARALLEL)
+    wide.look_from("top")
+    assert page.evaluate(IS_PARALLEL)
+
+
+def test_handle_moves_the_platform_in_a_view_without_perspective(wide: Tab) -> None:
+    wide.look_from("front")
+    before = wide.state
+    placed = Placed(Frame(before))
+    tip = placed.points["b4"] + [0.0, 0.0, 0.7 * ARROW_LENGTH]
+    mouse = wide.page.mouse
+    mouse.move(*wide.on_screen(tip))
+    mouse.down()
+    mouse.move(*wide.on_screen(tip + [0.0, 0.0, 1.5]), steps=8)
+    mouse.up()
+    wide.wait_for(lambda: wide.state.pose != before.pose, "another pose")
+    wide.picture()
+    moved = placed.scale * (np.array(wide.state.pose.position) - before.pose.position)
+    np.testing.assert_allclose(moved, [0.0, 0.0, 1.5], atol=0.1)
+
+
+@pytest.mark.parametrize("factor", [0.003, 1.0, 47.0])
+def test_scale_tells_how_large_things_are(wide: Tab, factor: float) -> None:
+    design = scaled_design(PRESETS["paper-optimal"], factor)
+    wide.running.page.session.do(Open(design))
+    assert wide.running.page.wait_until_drawn()
+    placed = Placed(Frame(wide.state))
+    wide.look_from("isometric")
+    scale = wide.page.evaluate(SCALE)
+    assert scale["text"] == f"1 square = {placed.square_mm:,.6g} mm"
+    wide.look_from("front")
+    scale = wide.page.evaluate(SCALE)
+    a1, a2 = (in_scene(wide, placed.points[name]) for name in ("a1", "a2"))
+    pixels_per_mm = (a2[0] - a1[0]) / (design.unit_mm * placed.frame.snapshot.points.a2[0])
+    millimetres = float(scale["text"].removesuffix(" mm").replace(",", ""))
+    assert scale["length"] == pytest.approx(millimetres * pixels_per_mm, rel=1e-3)
+    assert 30.0 <= scale["length"] <= 100.0
+    assert f"{millimetres:e}"[0] in "125"
+    # Nearer, the bar is about as long and stands for less.
+    wide.page.evaluate("window.__viserMutable.cameraControl.dollyTo(3, false)")
+    wide.wait_for(lambda: wide.page.evaluate(SCALE)["text"] != scale["text"], "another bar")
+    settle(wide.page, wide.client)
+    closer = wide.page.evaluate(SCALE)
+    assert float(closer["text"].removesuffix(" mm").replace(",", "")) < millimetres
+    assert 30.0 <= closer["length"] <= 100.0
+
+
+def test_labels_axes_and_scale_are_in_pictures(wide: Tab) -> None:
+    def opacity() -> FloatArray:
+        wide.picture()
+        pixels = wide.client.get_render(600, 640, transport_format="png", timeout=PATIENCE_SECONDS)
+        return pixels[..., 3].astype(np.float64)
+
+    wide.look_from("top")
+    show(wide, BARE)
+    bare = opacity()
+    assert (bare[-100:, :100] > 200.0).any()
+    assert not bare[:-100].any()
+    show(wide, replace(BARE, labels=True))
+    assert (opacity()[:-100] > 200.0).any()
+
+
+def test_mesh_that_changes_as_its_shadow_goes_is_drawn(wide: Tab) -> None:
+    """Three.js takes a geometry for updated that was replaced after its shadow was drawn."""
+    show(wide, BARE)
+    wide.look_from("top")
+    viser, camera = wide.running.viser, wide.client.camera
+    mesh = viser.scene.add_mesh_simple(
+        "/growing", np.zeros((3, 3)), np.array([[0, 1, 2]]), color=(255, 0, 0)
+    )
+    viser.scene.configure_default_lights(cast_shadow=True)
+    try:
+        wide.picture()
+        corners = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) + camera.look_at
+        with viser.atomic():
+            mesh.vertices = corners.astype(np.float32)
+            mesh.faces = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.uint32)
+            viser.scene.configure_default_lights(cast_shadow=False)
+        reds = decoded(wide.picture())
+        assert (reds[..., 0] - reds[..., 1] > 0.3).sum() > 500
+    finally:
+        viser.scene.configure_default_lights(cast_shadow=False)
+        mesh.remove()

@@ -1,0 +1,98 @@
+"""All that moves with the platform is drawn in one pose, in each frame of a real page."""
+
+from __future__ import annotations
+
+import math
+from typing import TypedDict
+
+import numpy as np
+from tab import Tab
+
+from explorer.app.features.mechanism.ground import ground_of, shadow_outlines
+from explorer.app.scene.placing import Placed
+from explorer.app.state.actions import SetPose
+from explorer.app.state.frame import Frame
+from explorer.app.state.state import opened
+from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.margins import TETRAHEDRA
+from explorer.mechanism.pose import Pose
+
+DESIGN = PRESETS["paper-optimal"]
+# Between two poses, less than a software renderer takes for a frame.
+PAUSE_MILLISECONDS = 30
+# Fewest poses that must have been drawn for the test to say something.
+FEWEST = 5
+
+# Note what each frame draws, right before it is drawn.
+WATCH = """() => {
+    const { scene, nodeRefFromName: nodes } = window.__viserMutable;
+    const meshOf = (name) => {
+        const found = [];
+        nodes[name].traverse((each) => each.geometry && found.push(each));
+        return found[0];
+    };
+    const vertices = (name) => Array.from(meshOf(name).geometry.attributes.position.array);
+    const matrix = new nodes["/platform"].matrix.constructor();
+    const before = scene.onBeforeRender;
+    const frames = [];
+    scene.onBeforeRender = (...all) => {
+        before(...all);
+        const rod = meshOf("/legs/actuators").getMatrixAt(7, matrix).elements;
+        frames.push({
+            platform: nodes["/platform"].position.toArray(),
+            handle: nodes["/handle"].position.toArray(),
+            rod_end: [0, 1, 2].map((axis) => rod[12 + axis] + rod[8 + axis]),
+            tetrahedron: vertices("/tetrahedra/3/faces"),
+            shadow: vertices("/shadow"),
+        });
+    };
+    window.explorer.stopWatching = () => {
+        scene.onBeforeRender = before;
+        return frames;
+    };
+}"""
+
+
+class Drawn(TypedDict):
+    """What one frame drew, in scene units."""
+
+    platform: list[float]
+    handle: list[float]
+    rod_end: list[float]
+    tetrahedron: list[float]
+    shadow: list[float]
+
+
+def moved(share: float) -> Pose:
+    turn = 2.0 * math.pi * share
+    position = (10.0 + 2.0 * math.sin(turn), 5.0 + math.cos(turn), 9.0 + math.sin(2.0 * turn))
+    return Pose.of_yaw_pitch_roll(position, (-73.0, 5.0 * math.sin(turn), 0.0))
+
+
+def test_fast_motion_draws_everything_in_one_pose_in_each_frame(tab: Tab) -> None:
+    poses = [moved(share) for share in np.linspace(0.0, 3.0, 80).tolist()]
+    tab.running.page.session.do(SetPose(poses[0]))
+    tab.picture()
+    tab.page.evaluate(WATCH)
+    for pose in poses:
+        tab.running.page.session.do(SetPose(pose))
+        tab.page.wait_for_timeout(PAUSE_MILLISECONDS)
+    tab.picture()
+    frames: list[Drawn] = tab.page.evaluate("window.explorer.stopWatching()")
+    scenes = [Placed(Frame(opened(DESIGN, pose))) for pose in poses]
+    places = np.array([scene.points["b4"] for scene in scenes])
+    seen: set[int] = set()
+    for frame in frames:
+        index = int(np.linalg.norm(places - frame["platform"], axis=1).argmin())
+        scene = scenes[index]
+        seen.add(index)
+        b4 = scene.points["b4"]
+        np.testing.assert_allclose(frame["platform"], b4, atol=1e-5)
+        np.testing.assert_allclose(frame["handle"], b4, atol=1e-5)
+        np.testing.assert_allclose(frame["rod_end"], b4, atol=1e-5)
+        corners = [scene.points[name] for name in TETRAHEDRA[2]]
+        np.testing.assert_allclose(frame["tetrahedron"], np.ravel(corners), atol=1e-5)
+        outlines = np.ravel(shadow_outlines(scene, ground_of(scene)))
+        drawn = np.reshape(frame["shadow"], (-1, 3))[: outlines.size // 2, :2]
+        np.testing.assert_allclose(drawn.ravel(), outlines, atol=1e-5)
+    assert len(seen) >= FEWEST
