@@ -33,6 +33,9 @@ BENCHMARKS: Mapping[str, str] = {
     "drag_browser": "lag of two long drags at once, seen in two tabs of a real browser",
     "saving": "saving a session of fifty steps, and opening it again",
     "page": "from starting the explorer to the first byte of its page",
+    "frame_cost": "a frame of the scene in the software renderer, over viser's hello-world",
+    "page_ready": "from the address to a page that has drawn all, over viser's hello-world",
+    "screenshot": "the first picture from the command line",
     "first_minute": "the first searches on a machine that has never run the explorer",
     "command": "wall time of one command",
 }

@@ -17,9 +17,9 @@ from explorer.numerics.compiled import warm
 
 
 @contextmanager
-def ready_page() -> Generator[Running]:
+def ready_page(*, panels: bool = True) -> Generator[Running]:
     """Run an explorer meanwhile, its kernels compiled and the collector at rest."""
-    running = start(PRESETS["paper-optimal"], port=0)
+    running = start(PRESETS["paper-optimal"], port=0, panels=panels)
     warm()
     freeze_objects()
     try:
