@@ -53,5 +53,5 @@ class KeptTab:
         error = capfd.readouterr().err
         if complaints or error or request.session.testsfailed > failures:
             self.close()
-        assert complaints == []
+        assert not complaints, complaints
         assert error == ""

@@ -9,6 +9,7 @@ import numpy as np
 from tab import Tab
 
 from explorer.app.features.mechanism.ground import ground_of, shadow_outlines
+from explorer.app.features.mechanism.tetrahedra import EDGES, INSET
 from explorer.app.scene.placing import Placed
 from explorer.app.state.actions import SetPose
 from explorer.app.state.frame import Frame
@@ -42,7 +43,7 @@ WATCH = """() => {
             platform: nodes["/platform"].position.toArray(),
             handle: nodes["/handle"].position.toArray(),
             rod_end: [0, 1, 2].map((axis) => rod[12 + axis] + rod[8 + axis]),
-            tetrahedron: vertices("/tetrahedra/3/faces"),
+            edges: Array.from(meshOf("/tetrahedra/1/edges").geometry.attributes.instanceStart.data.array),
             shadow: vertices("/shadow"),
         });
     };
@@ -59,7 +60,7 @@ class Drawn(TypedDict):
     platform: list[float]
     handle: list[float]
     rod_end: list[float]
-    tetrahedron: list[float]
+    edges: list[float]
     shadow: list[float]
 
 
@@ -90,8 +91,9 @@ def test_fast_motion_draws_everything_in_one_pose_in_each_frame(tab: Tab) -> Non
         np.testing.assert_allclose(frame["platform"], b4, atol=1e-5)
         np.testing.assert_allclose(frame["handle"], b4, atol=1e-5)
         np.testing.assert_allclose(frame["rod_end"], b4, atol=1e-5)
-        corners = [scene.points[name] for name in TETRAHEDRA[2]]
-        np.testing.assert_allclose(frame["tetrahedron"], np.ravel(corners), atol=1e-5)
+        corners = np.array([scene.points[name] for name in TETRAHEDRA[0]])
+        inner = corners + INSET * (corners.mean(axis=0) - corners)
+        np.testing.assert_allclose(frame["edges"], np.ravel(inner[EDGES]), atol=1e-5)
         outlines = np.ravel(shadow_outlines(scene, ground_of(scene)))
         drawn = np.reshape(frame["shadow"], (-1, 3))[: outlines.size // 2, :2]
         np.testing.assert_allclose(drawn.ravel(), outlines, atol=1e-5)

@@ -83,7 +83,7 @@ def test_platform_is_moved_by_a_slider_and_by_a_field(newcomer: Newcomer) -> Non
     assert newcomer.presses_for() == 1
     newcomer.type("z", "7.5")
     expect(newcomer.field("z")).to_have_value("7.5")
-    expect(newcomer.button("Mode 1, − − +")).to_contain_text("7.50")
+    expect(newcomer.button("Mode 1, − − +")).to_contain_text("7.5")
     assert newcomer.presses_for() == 2
 
 

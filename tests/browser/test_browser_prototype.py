@@ -11,7 +11,7 @@ from tab import Tab
 from explorer.app.features.prototype.feed import PartsFeed
 from explorer.app.features.prototype.tasks import export_simulation
 from explorer.app.screenshot import PATIENCE_SECONDS
-from explorer.app.state.actions import Set, SetPosition
+from explorer.app.state.actions import Open, Set, SetPosition
 from explorer.workspace.accessible.radii import with_radius
 
 # A difference of two pictures that the eye cannot miss.
@@ -70,7 +70,7 @@ def test_the_prototype_takes_the_place_of_the_schematic_moves_and_is_exported(ta
 
 def test_a_design_too_tight_is_told_and_stays_schematic(tab: Tab) -> None:
     tab.turn_to("Prototype")
-    tab.running.page.session.do(Set("design.limits", with_radius(tab.state.design, 0.4).limits))
+    tab.running.page.session.do(Open(with_radius(tab.state.design, 0.4)))
     schematic = tab.picture()
     tab.switch("Show the parts", on=True)
     alert = tab.page.get_by_role("alert").filter(has_text="No prototype of this design")
@@ -82,7 +82,7 @@ def test_a_design_too_tight_is_told_and_stays_schematic(tab: Tab) -> None:
     tab.page.mouse.move(0, 0)
     tab.page.get_by_role("tooltip").wait_for(state="hidden")
     assert difference(schematic, tab.picture()) < ALIKE
-    tab.running.page.session.do(Set("design.limits", with_radius(tab.state.design, 0.3).limits))
+    tab.running.page.session.do(Open(with_radius(tab.state.design, 0.3)))
     tab.label("Exploded").wait_for()
     expect(alert).to_be_hidden()
     wait_until_drawn(tab)

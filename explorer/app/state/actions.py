@@ -327,6 +327,8 @@ class Set(Action):
         name = self.name or self.at.rpartition(".")[2].replace("_", " ").capitalize()
         if self.text:
             return f"{name}: {self.text}"
+        if isinstance(self.value, msgspec.Struct):
+            return f"{name} changed"
         text = value_text(self.value)
         return f"{name} {text}" if isinstance(self.value, bool) else f"{name} = {text}"
 

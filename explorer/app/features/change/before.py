@@ -9,6 +9,7 @@ import viser
 from explorer.app.features.feature import Services
 from explorer.app.features.workspace.volume import VolumeFeed
 from explorer.app.state.frame import Frame
+from explorer.app.state.state import State
 from explorer.mechanism.design import Design
 
 OVER = "change.over"
@@ -41,7 +42,7 @@ class DesignChange:
         self._session = services.session
         self._feed = services.get(VolumeFeed)
         self._volumes: dict[Design, float] = {}
-        self._ended = -1
+        self._ended: State | None = None
         self._before: Before | None = None
         services.buttons.on(OVER, self._end, values=("",))
 
@@ -67,10 +68,11 @@ class DesignChange:
 
     def _find(self, frame: Frame) -> Before | None:
         history = self._session.history
-        if not history.is_open or history.at == 0 or history.step.number == self._ended:
+        if not history.is_open or history.at == 0:
             return None
-        state = history.steps[history.at - 1].state
-        now = frame.state
+        state, now = history.steps[history.at - 1].state, frame.state
+        if state is self._ended:
+            return None
         # Another design that is opened is no change of this one.
         if state.base != now.base or state.design == now.design:
             return None
@@ -82,5 +84,5 @@ class DesignChange:
     def _end(self, _: str, client: viser.ClientHandle) -> None:
         del client
         if self._before is not None:
-            self._ended = self._session.history.step.number
+            self._ended = self._before.frame.state
             self._session.redraw()

@@ -15,6 +15,9 @@ from explorer.app.scene.shapes import add_lines
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.colours import GHOST
 
+# In scene units, of which the present mechanism is some ten large.
+LARGEST = 1e6
+
 
 class ChangeScene(ScenePart):
     """The outline of base, legs and platform before the change."""
@@ -26,8 +29,13 @@ class ChangeScene(ScenePart):
     def updates(self, placed: Placed) -> Iterator[Update]:
         """Yield the updates that draw the ghost of this frame."""
         before = self._change.before
-        yield self._lines, "visible", before is not None
-        if before is None:
-            return
-        scale = placed.scale * before.frame.state.design.unit_mm / placed.frame.state.design.unit_mm
-        yield self._lines, "points", (scale * outline(before.frame.snapshot)).astype(np.float32)
+        lines = None
+        if before is not None:
+            design, now = before.frame.state.design, placed.frame.state.design
+            scale = placed.scale * design.unit_mm / now.unit_mm
+            # A unit that grew beyond measure leaves nothing to see.
+            if scale * design.reach < LARGEST:
+                lines = scale * outline(before.frame.snapshot)
+        yield self._lines, "visible", lines is not None
+        if lines is not None:
+            yield self._lines, "points", lines.astype(np.float32)

@@ -28,6 +28,7 @@ from explorer.app.widgets.markup import (
 from explorer.app.widgets.under_way import problem, progress
 from explorer.export.report.drawings.slices import NOT_ACCESSIBLE, NOT_ACCESSIBLE_OPACITY
 from explorer.legs.clearance import pair_name
+from explorer.mechanism.design import Design
 from explorer.singularity.colours import BAND_EDGES, WARN_CONDITION, band_colours
 from explorer.workspace.accessible.workspace import PairCost
 
@@ -74,7 +75,7 @@ def drawing_words(frame: Frame, feed: WorkspaceFeed) -> str:
 
 
 def _volume(newest: MeasuredVolume, frame: Frame) -> str:
-    measured, unit_mm = newest.measured, newest.request.design.unit_mm
+    measured, design = newest.measured, newest.request.design
     if measured.volume <= 0.0:
         causes = ", ".join(measured.empty_because)
         return alert("The workspace is empty", f"Emptied by: {causes}.")
@@ -83,14 +84,18 @@ def _volume(newest: MeasuredVolume, frame: Frame) -> str:
         f'<div class="ex-line"><span class="ex-large">{volume_text(newest)}</span>'
         f"{dim(f'± {format_number(measured.error, 1)}')}</div>"
         + caption(
-            f"{_litres(measured.volume, unit_mm)} within the limits, in the {which} orientation"
+            f"{_litres(measured.volume, design)} within the limits, in the {which} orientation"
         )
     )
 
 
-def _litres(volume: float, unit_mm: float) -> str:
-    litres = volume * (0.01 * unit_mm) ** 3
-    return f"{format_number(1e3 * litres, 4)} cm³ ({format_number(litres, 4)} l)"
+def _litres(volume: float, design: Design) -> str:
+    litres = (0.01 * design.unit_mm) ** 3
+    size = design.reach**3
+    one, other = (
+        format_number(factor * volume, 4, size=factor * size) for factor in (1e3 * litres, litres)
+    )
+    return f"{one} cm³ ({other} l)"
 
 
 def workspace_details(frame: Frame, feed: WorkspaceFeed) -> str:
