@@ -17,6 +17,7 @@ from explorer.app.state.state import opened
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.margins import TETRAHEDRA
 from explorer.mechanism.pose import Pose
+from explorer.numerics.arrays import FloatArray
 
 DESIGN = PRESETS["paper-optimal"]
 # Between two poses, less than a software renderer takes for a frame.
@@ -33,6 +34,8 @@ WATCH = """() => {
         return found[0];
     };
     const vertices = (name) => Array.from(meshOf(name).geometry.attributes.position.array);
+    const starts = (name) =>
+        Array.from(meshOf(name).geometry.attributes.instanceStart.data.array);
     const matrix = new nodes["/platform"].matrix.constructor();
     const before = scene.onBeforeRender;
     const frames = [];
@@ -43,7 +46,7 @@ WATCH = """() => {
             platform: nodes["/platform"].position.toArray(),
             handle: nodes["/handle"].position.toArray(),
             rod_end: [0, 1, 2].map((axis) => rod[12 + axis] + rod[8 + axis]),
-            edges: Array.from(meshOf("/tetrahedra/1/edges").geometry.attributes.instanceStart.data.array),
+            edges: starts("/tetrahedra/1/edges"),
             shadow: vertices("/shadow"),
         });
     };
@@ -91,9 +94,10 @@ def test_fast_motion_draws_everything_in_one_pose_in_each_frame(tab: Tab) -> Non
         np.testing.assert_allclose(frame["platform"], b4, atol=1e-5)
         np.testing.assert_allclose(frame["handle"], b4, atol=1e-5)
         np.testing.assert_allclose(frame["rod_end"], b4, atol=1e-5)
-        corners = np.array([scene.points[name] for name in TETRAHEDRA[0]])
+        corners: FloatArray = np.array([scene.points[name] for name in TETRAHEDRA[0]])
         inner = corners + INSET * (corners.mean(axis=0) - corners)
-        np.testing.assert_allclose(frame["edges"], np.ravel(inner[EDGES]), atol=1e-5)
+        edges: FloatArray = inner[EDGES]
+        np.testing.assert_allclose(frame["edges"], edges.ravel(), atol=1e-5)
         outlines = np.ravel(shadow_outlines(scene, ground_of(scene)))
         drawn = np.reshape(frame["shadow"], (-1, 3))[: outlines.size // 2, :2]
         np.testing.assert_allclose(drawn.ravel(), outlines, atol=1e-5)
