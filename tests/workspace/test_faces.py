@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import msgspec
 import numpy as np
 import pytest
@@ -164,6 +166,19 @@ def test_edges_lie_on_two_surfaces(case: tuple[Design, FloatArray]) -> None:
     # Surfaces that nearly touch leave little to tell on which of their curves a point is.
     assert float(np.quantile(off[1], 0.99)) < 1e-8 * size_of(faces)
     assert float(off[1].max()) < 0.5 * size_of(faces) / PIXELS
+
+
+def test_a_limit_that_coincides_with_others_has_edges_only_where_surfaces_cross() -> None:
+    # At home the plane z = 0 is a side of the box and the place of all three incidences.
+    faces, limits, _ = faces_of(*at_home(PRESETS["paper-optimal"]))
+    ends = faces.edges.reshape(-1, 3)
+    near = [np.abs(limit.distance(ends)) < 1e-7 * size_of(faces) for limit in limits]
+    normals = [outward(limit, ends) for limit in limits]
+    crosses = np.zeros(len(ends), dtype=np.bool_)
+    for i, j in itertools.combinations(range(len(limits)), 2):
+        slope = np.linalg.norm(np.cross(normals[i], normals[j]), axis=1)
+        crosses |= near[i] & near[j] & (slope > 1e-6)
+    assert crosses.all()
 
 
 @pytest.mark.parametrize("axis", range(3))

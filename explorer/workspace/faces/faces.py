@@ -300,7 +300,12 @@ def _edges_of(cut: _Cut) -> FloatArray:
     """Return the segments (k, 2, 3) on the curves of two surfaces, each from one of the two."""
     sides = np.stack([cut.triangles, np.roll(cut.triangles, -1, axis=1)], axis=-1).reshape(-1, 2)
     sides = np.sort(sides, axis=1)
-    common = cut.cuts[sides[:, 0]] & cut.cuts[sides[:, 1]]
+    # A face that lies on another surface as a whole does not meet it along a curve.
+    whole = np.zeros(len(cut.vertices), dtype=np.int64)
+    for owner in np.unique(cut.owner):
+        own = cut.owner == owner
+        whole[own] = np.bitwise_and.reduce(cut.cuts[own])
+    common = cut.cuts[sides[:, 0]] & cut.cuts[sides[:, 1]] & ~whole[sides[:, 0]]
     sides, other = sides[common != 0], _lowest_bit(common[common != 0])
     keys = sides[:, 0] * len(cut.vertices) + sides[:, 1]
     _, first, counts = np.unique(keys, return_index=True, return_counts=True)
