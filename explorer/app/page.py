@@ -97,6 +97,8 @@ class Page:
         self._redraw_timer: threading.Timer | None = None
         # Looks after the cameras once nothing has been drawn for a while.
         self._camera_timer: threading.Timer | None = None
+        # Held while the timer is started, so that it is known before it is over.
+        self._camera_lock = threading.Lock()
         self._drawn_at = 0.0
         # Other threads may ask for a frame before the last panel is there.
         self._is_complete = False
@@ -254,8 +256,9 @@ class Page:
         if self._assigner.settle():
             self._schedule_redraw()
         self._drawn_at = time.monotonic()
-        if self._camera_timer is None:
-            self._camera_timer = start_timer(FOLLOW_SECONDS, self._follow)
+        with self._camera_lock:
+            if self._camera_timer is None:
+                self._camera_timer = start_timer(FOLLOW_SECONDS, self._follow)
 
     def _schedule_redraw(self) -> None:
         """Schedule one more frame for when no control is moved, unless one is scheduled."""
@@ -267,10 +270,11 @@ class Page:
         clients, now = self._server.get_clients(), time.time()
         held = [number for number in clients if self._presses.at(number, now) is not None]
         waits = time.monotonic() - self._drawn_at < 0.9 * FOLLOW_SECONDS
-        if waits or held:
-            self._camera_timer = start_timer(FOLLOW_SECONDS, self._follow)
+        with self._camera_lock:
+            again = waits or held
+            self._camera_timer = start_timer(FOLLOW_SECONDS, self._follow) if again else None
+        if again:
             return
-        self._camera_timer = None
         self.services.cameras.follow(clients.values())
 
     def _redraw(self) -> None:

@@ -55,7 +55,7 @@ def test_a_variable_changes_the_legs_when_the_pose_is_held(tab: Tab) -> None:
 
 
 def test_differences_of_a_change_last_until_a_press_outside_of_the_scene(tab: Tab) -> None:
-    card = tab.page.locator(".ex-change")
+    card = tab.page.locator(".ex-change-card")
     expect(card).to_have_count(0)
     goal = tab.drag("b1x", 0.6)
     tab.wait_for(lambda: abs(tab.state.design.b1[0] - goal) < 0.5, "the b1x dragged to")

@@ -37,7 +37,7 @@ class ChangeCard:
         ]
         body = table(lines, head=("", "before", "now", ""))
         return (
-            f'<div class="ex-change" role="status" data-until-press="{OVER}">'
+            f'<div class="ex-change-card" role="status" data-until-press="{OVER}">'
             f"<b>{escape(before.words)}</b>{body}</div>"
         )
 
