@@ -97,8 +97,8 @@ class Page:
         self._redraw_timer: threading.Timer | None = None
         # Looks after the cameras once nothing has been drawn for a while.
         self._camera_timer: threading.Timer | None = None
-        # Held while the timer is started, so that it is known before it is over.
-        self._camera_lock = threading.Lock()
+        # Held while a timer is started, so that it is known before it is over.
+        self._timer_lock = threading.Lock()
         self._drawn_at = 0.0
         # Other threads may ask for a frame before the last panel is there.
         self._is_complete = False
@@ -256,21 +256,22 @@ class Page:
         if self._assigner.settle():
             self._schedule_redraw()
         self._drawn_at = time.monotonic()
-        with self._camera_lock:
+        with self._timer_lock:
             if self._camera_timer is None:
                 self._camera_timer = start_timer(FOLLOW_SECONDS, self._follow)
 
     def _schedule_redraw(self) -> None:
         """Schedule one more frame for when no control is moved, unless one is scheduled."""
-        if self._redraw_timer is None:
-            self._redraw_timer = start_timer(QUIET_SECONDS, self._redraw)
+        with self._timer_lock:
+            if self._redraw_timer is None:
+                self._redraw_timer = start_timer(QUIET_SECONDS, self._redraw)
 
     def _follow(self) -> None:
         """Have the cameras follow what was drawn, once a user holds nothing and nothing changes."""
         clients, now = self._server.get_clients(), time.time()
         held = [number for number in clients if self._presses.at(number, now) is not None]
         waits = time.monotonic() - self._drawn_at < 0.9 * FOLLOW_SECONDS
-        with self._camera_lock:
+        with self._timer_lock:
             again = waits or held
             self._camera_timer = start_timer(FOLLOW_SECONDS, self._follow) if again else None
         if again:
@@ -278,7 +279,8 @@ class Page:
         self.services.cameras.follow(clients.values())
 
     def _redraw(self) -> None:
-        self._redraw_timer = None
+        with self._timer_lock:
+            self._redraw_timer = None
         self.session.redraw()
 
     def _panel_updates(self, frame: Frame) -> list[Update]:
