@@ -53,11 +53,22 @@ def other_address() -> str:
     return socket.gethostbyname(socket.gethostname())
 
 
-def test_a_taken_port_is_an_error_of_one_line_and_leaves_no_server(taken: int) -> None:
-    threads = set(threading.enumerate())
+def test_a_taken_port_is_an_error_of_one_line_and_starts_no_thread(
+    taken: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    started: list[threading.Thread] = []
+    here, start_thread = threading.get_ident(), threading.Thread.start
+
+    def recorded(thread: threading.Thread) -> None:
+        # Explorers of other tests have threads that start others.
+        if threading.get_ident() == here:
+            started.append(thread)
+        start_thread(thread)
+
+    monkeypatch.setattr(threading.Thread, "start", recorded)
     with pytest.raises(ServerError, match=f"^port {taken} is taken; [^\n]*--port[^\n]*$"):
         start(DESIGN, port=taken)
-    assert set(threading.enumerate()) <= threads
+    assert started == []
 
 
 def test_a_port_that_is_taken_in_between_leaves_no_server(
