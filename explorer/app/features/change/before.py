@@ -77,9 +77,9 @@ class DesignChange:
         if state.base != now.base or state.design == now.design:
             return None
         known = self._before
-        if known is None or known.frame.state is not state:
-            known = Before(Frame(state), history.step.words, None)
-        return Before(known.frame, history.step.words, self.volume_of(state.design))
+        # What a frame has computed is kept from one value of a slider to the next.
+        old = Frame(state) if known is None or known.frame.state is not state else known.frame
+        return Before(old, history.step.words, self.volume_of(state.design))
 
     def _end(self, _: str, client: viser.ClientHandle) -> None:
         del client
