@@ -55,6 +55,12 @@ from .mechanism.pose import (
     rotation_from_yaw_pitch_roll as rotation_from_yaw_pitch_roll,
     yaw_pitch_roll_from_rotation as yaw_pitch_roll_from_rotation,
 )
+from .mechanism.tilt_torsion import (
+    TiltTorsion as TiltTorsion,
+    pose_of_tilt_torsion as pose_of_tilt_torsion,
+    rotation_from_tilt_torsion as rotation_from_tilt_torsion,
+    tilt_torsion_from_rotation as tilt_torsion_from_rotation,
+)
 from .optimise.defaults import make_problem as make_problem
 from .optimise.outcome import Iterate as Iterate, Outcome as Outcome, Run as Run
 from .optimise.problem import Demands as Demands, Problem as Problem, Variable as Variable
@@ -93,6 +99,10 @@ from .workspace.least_clearance import (
 )
 from .workspace.limits.valid_moves import moves_are_valid as moves_are_valid
 from .workspace.limits.valid_poses import poses_are_valid as poses_are_valid
+from .workspace.orientation_share import (
+    OrientationShare as OrientationShare,
+    orientation_share as orientation_share,
+)
 from .workspace.orientations import orientation_capability as orientation_capability
 from .workspace.slices.fields import slice_field as slice_field
 from .workspace.slices.volume import (
@@ -103,6 +113,16 @@ from .workspace.slices.volume import (
 )
 from .workspace.solids.solid import Solid as Solid
 from .workspace.solids.solids import convex_hull as convex_hull, workspace_solid as workspace_solid
+from .workspace.tilts import (
+    GreatestTilt as GreatestTilt,
+    TiltMap as TiltMap,
+    TorsionRange as TorsionRange,
+    greatest_tilt as greatest_tilt,
+    greatest_tilts as greatest_tilts,
+    is_connected as is_connected,
+    tilt_map as tilt_map,
+    torsion_range as torsion_range,
+)
 
 __all__: list[str]
 __version__: str

@@ -18,6 +18,7 @@ from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import load_design
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import Pose, Quadruple, Triple
+from explorer.mechanism.tilt_torsion import pose_of_tilt_torsion
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,22 +99,32 @@ def make_pose(
     position: Triple | None,
     quaternion: Quadruple | None,
     yaw_pitch_roll: Triple | None,
+    tilt_torsion: Triple | None,
 ) -> Pose:
     """Return the pose that options give, completed from a default pose.
 
     Args:
-        option: Start of the names of both options for the orientation, such as ``--to-``.
+        option: Start of the names of the options for the orientation, such as ``--to-``.
         default: Pose that completes what is not given.
         position: Position of b4 in the base frame, in design units.
         quaternion: Orientation as (w, x, y, z), of any length but zero.
         yaw_pitch_roll: Orientation as angles in degrees.
+        tilt_torsion: Orientation as azimuth, tilt and torsion in degrees.
 
     Raises:
         InputError: There are two orientations, or the quaternion is zero.
     """
-    if quaternion is not None and yaw_pitch_roll is not None:
-        raise InputError(f"give one of {option}quaternion and {option}yaw-pitch-roll, not both")
+    orientations = {
+        "quaternion": quaternion,
+        "yaw-pitch-roll": yaw_pitch_roll,
+        "tilt-torsion": tilt_torsion,
+    }
+    given = [f"{option}{name}" for name, value in orientations.items() if value is not None]
+    if len(given) > 1:
+        raise InputError(f"give one of {given[0]} and {given[1]}, not both")
     at = default.position if position is None else position
+    if tilt_torsion is not None:
+        return pose_of_tilt_torsion(at, tilt_torsion)
     if yaw_pitch_roll is not None:
         return Pose.of_yaw_pitch_roll(at, yaw_pitch_roll)
     return Pose(at, quaternion or default.quaternion)
@@ -136,9 +147,21 @@ class OrientationOptions:
     ] = None
     """Orientation of the platform: angles in degrees about its own z, then y, then x axis."""
 
+    tilt_torsion: Annotated[
+        Triple | None,
+        numbers("--tilt-torsion", "azimuth tilt torsion"),
+        hint("instead of --quaternion"),
+    ] = None
+    """Orientation of the platform: azimuth and angle of its tilt, and its torsion, in degrees."""
+
     def oriented_home(self, design: Design) -> Pose:
         """Return the home pose of the design with the given orientation, as `make_pose` does."""
-        return make_pose("--", home_pose(design), None, self.quaternion, self.yaw_pitch_roll)
+        return make_pose("--", home_pose(design), None, *self._orientation)
+
+    @property
+    def _orientation(self) -> tuple[Quadruple | None, Triple | None, Triple | None]:
+        """The orientations that may be given, in the order of `make_pose`."""
+        return self.quaternion, self.yaw_pitch_roll, self.tilt_torsion
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -150,5 +173,4 @@ class PoseOptions(OrientationOptions):
 
     def pose(self, design: Design) -> Pose:
         """Return the given pose completed from the home pose, as `make_pose` does."""
-        home, position = home_pose(design), self.position
-        return make_pose("--", home, position, self.quaternion, self.yaw_pitch_roll)
+        return make_pose("--", home_pose(design), self.position, *self._orientation)

@@ -15,6 +15,7 @@ from explorer.cli.streams import write
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import encode_design
 from explorer.mechanism.pose import Pose, yaw_pitch_roll_from_rotation
+from explorer.mechanism.tilt_torsion import tilt_torsion_of
 from explorer.numerics.number_text import format_ascii, format_fixed
 
 if TYPE_CHECKING:
@@ -42,6 +43,15 @@ def _plain(value: Any) -> object:
 def attributes(of: object, names: str) -> dict[str, object]:
     """Return attributes of a value by their names, which spaces separate."""
     return {name: getattr(of, name) for name in names.split()}
+
+
+def pose_json(pose: Pose) -> dict[str, object]:
+    """Return position, quaternion, and azimuth, tilt and torsion in degrees of a pose."""
+    return {
+        "position": pose.position,
+        "quaternion": pose.quaternion,
+        "tilt_torsion": tilt_torsion_of(pose.rotation),
+    }
 
 
 def finite(value: float) -> float | None:
@@ -134,7 +144,7 @@ def heading(design: Design) -> str:
 
 
 def pose_table(design: Design, pose: Pose) -> str:
-    """Return three lines: position, quaternion and angles of a pose."""
+    """Return four lines: position, quaternion and angles of a pose."""
     angles = yaw_pitch_roll_from_rotation(pose.rotation).tolist()
     millimetres = [value * design.unit_mm for value in pose.position]
     size = max(map(abs, millimetres))
@@ -144,6 +154,7 @@ def pose_table(design: Design, pose: Pose) -> str:
             ("position", f"{'  '.join(figures(pose.position))}  [{in_mm} mm]"),
             ("quaternion", "  ".join(figures(pose.quaternion))),
             ("yaw pitch roll", "  ".join(degrees(angles))),
+            ("azimuth tilt torsion", "  ".join(degrees(tilt_torsion_of(pose.rotation)))),
         ],
         "<<",
     )

@@ -124,6 +124,18 @@ def texts(option: str, metavar: str) -> PrimitiveConstructorSpec[Any]:
     return _parser(metavar, read, list, many=True)
 
 
+def finite_number(option: str) -> PrimitiveConstructorSpec[Any]:
+    """Return the parser of an option with one finite number."""
+
+    def read(words: list[str]) -> float:
+        value = _number(option, words[0])
+        if not math.isfinite(value):
+            raise UsageError(f"{option} must be a finite number; got {words[0]}")
+        return value
+
+    return _parser("NUMBER", read)
+
+
 def positive(option: str) -> PrimitiveConstructorSpec[Any]:
     """Return the parser of an option with one finite number above zero."""
 

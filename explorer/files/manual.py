@@ -12,6 +12,7 @@ FILES = (
     "mechanism.md",
     "page.md",
     "workspace.md",
+    "orientation.md",
     "singularity.md",
     "legs.md",
     "optimise.md",

@@ -17,10 +17,11 @@ from explorer.errors import InputError
 from explorer.legs.clearance import PAIRS
 from explorer.measures.case import Case
 from explorer.measures.measure import Measure, Place
-from explorer.measures.size import box_margin, longest_leg
+from explorer.measures.size import box_margin, box_tilt, home_tilt, longest_leg
 from explorer.mechanism.design import LENGTHS, VARIABLES
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import yaw_pitch_roll_from_rotation
+from explorer.workspace.orientation_share import orientation_share
 
 COMPARE: frozenset[Place] = frozenset({"compare"})
 OPTIMISE: frozenset[Place] = frozenset({"optimise"})
@@ -309,6 +310,39 @@ def _conditions() -> Iterable[Measure]:
     )
 
 
+def _orientations() -> Iterable[Measure]:
+    yield Measure(
+        "orientation_share",
+        "orientation share at home",
+        "Share of all orientations that the home position can have within the limits",
+        lambda case: orientation_share(case.design, case.at.position).share,
+        unit="share",
+        sense="more",
+        places=PAGE | REPORT,
+    )
+    yield Measure(
+        "home_tilt",
+        "tilt at home",
+        "Greatest tilt in every azimuth at the home position, from tilt zero at home's torsion; 0 "
+        "if tilt zero violates a limit",
+        lambda case: home_tilt(case.design, case.at),
+        unit="°",
+        sense="more",
+        places=PAGE | REPORT,
+    )
+    yield Measure(
+        "box_tilt",
+        "tilt over the box",
+        "Least of the greatest tilts in every azimuth at the nodes of a grid over the required "
+        "box; 0 if tilt zero violates a limit at one",
+        lambda case: math.nan if case.box is None else box_tilt(case.design, case.box, case.at),
+        unit="°",
+        sense="more",
+        needs="box",
+        places=OPTIMISE,
+    )
+
+
 def _coordinates() -> Iterable[Measure]:
     yield Measure(
         "yaw",
@@ -331,7 +365,14 @@ def _coordinates() -> Iterable[Measure]:
 
 CATALOGUE: Mapping[str, Measure] = {
     measure.name: measure
-    for group in (_sizes(), _margins(), _clearances(), _conditions(), _coordinates())
+    for group in (
+        _sizes(),
+        _margins(),
+        _clearances(),
+        _conditions(),
+        _orientations(),
+        _coordinates(),
+    )
     for measure in group
 }
 """All measures by name, in the order in which every list has them."""

@@ -6,8 +6,13 @@ import numpy as np
 
 from explorer.mechanism.design import LENGTHS, Design
 from explorer.mechanism.margins import margins
-from explorer.mechanism.pose import Triple
+from explorer.mechanism.pose import Pose, Triple
+from explorer.mechanism.tilt_torsion import tilt_torsion_of
 from explorer.numerics.arrays import FloatArray
+from explorer.workspace.tilts import greatest_tilts
+
+BOX_NODES = 9
+"""Number of nodes on each axis of the grid over a required box, its faces included."""
 
 
 def longest_leg(design: Design) -> float:
@@ -35,3 +40,28 @@ def box_margin(box: tuple[Triple, Triple], rotation: FloatArray) -> float:
         rotation: Platform to base, shape (3, 3).
     """
     return float(np.abs(margins(corners_of(box), rotation)).min())
+
+
+def home_tilt(design: Design, pose: Pose) -> float:
+    """Return the greatest tilt in every azimuth at the position and torsion of a pose, in degrees.
+
+    It is 0 if tilt zero violates a limit.
+    """
+    torsion = tilt_torsion_of(pose.rotation).torsion
+    return float(np.nan_to_num(greatest_tilts(design, pose.position, torsion)))
+
+
+def box_tilt(design: Design, box: tuple[Triple, Triple], pose: Pose) -> float:
+    """Return the least of the greatest tilts in every azimuth over the nodes of a box, in degrees.
+
+    The torsion is that of the pose. The value is 0 if tilt zero violates a limit at a node.
+
+    Args:
+        design: The manipulator.
+        box: Lows and highs of the positions.
+        pose: Pose whose torsion the tilts have.
+    """
+    axes = [np.linspace(low, high, BOX_NODES) for low, high in zip(*box, strict=True)]
+    nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    tilts = greatest_tilts(design, nodes, tilt_torsion_of(pose.rotation).torsion)
+    return float(np.nan_to_num(tilts).min())

@@ -11,6 +11,7 @@ from command_line import CommandLine
 
 import explorer
 from explorer.mechanism.feasible_intervals import feasible_intervals
+from explorer.mechanism.tilt_torsion import tilt_torsion_of
 
 POSITION = (8.0, -2.5, 1.1e1)
 ANGLES = (-60.0, 12.5, -7.0)
@@ -75,6 +76,7 @@ def test_singularity_json_has_the_snapshot(cli: CommandLine) -> None:
                 "distance": expected.nearest[index].distance,
                 "position": list(expected.nearest[index].pose.position),
                 "quaternion": list(expected.nearest[index].pose.quaternion),
+                "tilt_torsion": list(tilt_torsion_of(expected.nearest[index].pose.rotation)),
             }
             for index in range(3)
         ],
@@ -110,7 +112,7 @@ def test_forward_joints_of_inverse_give_the_pose_in_its_mode(
     np.testing.assert_allclose(found["discriminants"], expected.margins**2, rtol=1e-9)
     assert [mode["mode"] for mode in found["modes"]] == list(range(8))
     mode = found["modes"][expected.mode]
-    assert set(mode) == {"mode", "signs", "position", "quaternion", "margins"}
+    assert set(mode) == {"mode", "signs", "position", "quaternion", "tilt_torsion", "margins"}
     np.testing.assert_allclose(mode["position"], POSITION, rtol=1e-9)
     np.testing.assert_allclose(
         explorer.rotation_from_quaternion(mode["quaternion"]), expected.rotation, atol=1e-9

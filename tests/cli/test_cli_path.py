@@ -11,6 +11,7 @@ from command_line import CommandLine
 
 import explorer
 from explorer.mechanism.pose import rotation_from_yaw_pitch_roll
+from explorer.mechanism.tilt_torsion import tilt_torsion_of
 
 COMMAND = ("path",)
 PRESET = explorer.PRESETS["paper-optimal"]
@@ -24,7 +25,11 @@ def test_path_json_has_poses_and_trajectory(cli: CommandLine, tmp_path: Path) ->
     assert found["found"] is True
     assert found["reason"] is None
     assert found["poses"][0]["position"] == list(HOME.position)
-    assert found["poses"][-1] == {"position": [12.0, 8.0, 7.0], "quaternion": list(HOME.quaternion)}
+    assert found["poses"][-1] == {
+        "position": [12.0, 8.0, 7.0],
+        "quaternion": list(HOME.quaternion),
+        "tilt_torsion": list(tilt_torsion_of(HOME.rotation)),
+    }
     course = found["trajectory"]
     assert course["time"][-1] == found["duration"] > 0.0
     assert found["length"] == pytest.approx(float(np.linalg.norm([2.0, 3.0, 2.0])))
@@ -65,7 +70,11 @@ def test_path_forms_of_a_pose_agree(cli: CommandLine, words: list[str]) -> None:
 def test_path_quaternion_after_position_is_used(cli: CommandLine) -> None:
     words = [*map(repr, HOME.quaternion)]
     found = cli.answer("--to", "11", "6", "8", *words)
-    assert found["poses"][-1] == {"position": [11.0, 6.0, 8.0], "quaternion": list(HOME.quaternion)}
+    assert found["poses"][-1] == {
+        "position": [11.0, 6.0, 8.0],
+        "quaternion": list(HOME.quaternion),
+        "tilt_torsion": list(tilt_torsion_of(HOME.rotation)),
+    }
 
 
 def test_path_without_solution_has_status_1_and_reason(

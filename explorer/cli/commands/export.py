@@ -147,7 +147,9 @@ def _mechanism(command: Export, file_format: str) -> tuple[bytes, Facts]:
     from explorer.prototype.assembly import make_prototype
     from explorer.prototype.bill import bill_of_materials
 
-    command.refuse("tolerance", "masses", "position", "quaternion", "yaw_pitch_roll")
+    command.refuse(
+        "tolerance", "masses", "position", "quaternion", "yaw_pitch_roll", "tilt_torsion"
+    )
     file_format = {"zip": "stl-zip", "stp": "step"}.get(file_format, file_format)
     if file_format == "step":
         from explorer.export.step import check_extra
@@ -183,7 +185,7 @@ def _simulation(command: Export, file_format: str) -> tuple[bytes, Facts]:
     from explorer.export.simulation import DENSITY, simulation_mjcf
     from explorer.prototype.chains import BODIES, CHAIN_JOINTS
 
-    command.refuse("tolerance", "position", "quaternion", "yaw_pitch_roll")
+    command.refuse("tolerance", "position", "quaternion", "yaw_pitch_roll", "tilt_torsion")
     if file_format not in ("mjcf", "xml"):
         raise InputError(f"no simulation format {file_format!r}; there is mjcf")
     design, density = command.load(), command.density or DENSITY

@@ -19,6 +19,7 @@ from explorer.mechanism.kinematics import (
 )
 from explorer.mechanism.margins import TETRAHEDRA, margins, mode_name, signs_of
 from explorer.mechanism.pose import quaternion_from_rotation, yaw_pitch_roll_from_rotation
+from explorer.mechanism.tilt_torsion import tilt_torsion_from_rotation
 from explorer.numerics.arrays import FloatArray
 
 Joints = tuple[float, float, float, float, float, float]
@@ -57,6 +58,7 @@ class Forward(JsonOptions, DesignOptions):
 
 def _modes_json(modes: ForwardKinematics) -> list[dict[str, object]]:
     quaternion = quaternion_from_rotation(modes.rotation)
+    tilt_torsion = tilt_torsion_from_rotation(modes.rotation)
     margin = margins(modes.position, modes.rotation)
     return [
         {
@@ -64,6 +66,7 @@ def _modes_json(modes: ForwardKinematics) -> list[dict[str, object]]:
             "signs": signs_of(mode),
             "position": modes.position[mode],
             "quaternion": quaternion[mode],
+            "tilt_torsion": tilt_torsion[mode],
             "margins": margin[mode],
         }
         for mode in range(len(margin))

@@ -49,6 +49,13 @@ class Interference(JsonOptions, RadiiOptions, PoseOptions, DesignOptions):
     ] = None
     """Rotate the platform to this orientation on the move, in degrees."""
 
+    to_tilt_torsion: Annotated[
+        Triple | None,
+        numbers("--to-tilt-torsion", "azimuth tilt torsion"),
+        hint("instead of --to-quaternion"),
+    ] = None
+    """Rotate the platform to this azimuth, tilt and torsion on the move, in degrees."""
+
     steps: Annotated[
         int | None,
         whole_number("--steps", 1, MOST_STEPS),
@@ -61,12 +68,12 @@ class Interference(JsonOptions, RadiiOptions, PoseOptions, DesignOptions):
         design = self.with_radii(self.load())
         start = self.pose(design)
         here = evaluate(design, start)
-        target = (self.to, self.to_quaternion, self.to_yaw_pitch_roll)
-        if target == (None, None, None):
+        target = (self.to, self.to_quaternion, self.to_yaw_pitch_roll, self.to_tilt_torsion)
+        if target == (None, None, None, None):
             if self.steps is not None:
                 raise InputError(
-                    "--steps divides a move; say where it goes with --to, --to-quaternion or "
-                    "--to-yaw-pitch-roll"
+                    "--steps divides a move; say where it goes with --to, --to-quaternion, "
+                    "--to-yaw-pitch-roll or --to-tilt-torsion"
                 )
             self.write(lambda: pose_json(here), lambda: pose_lines(here))
             return

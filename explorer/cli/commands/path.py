@@ -16,6 +16,7 @@ from explorer.cli.output import (
     figure,
     heading,
     indented,
+    pose_json,
     pose_table,
     table,
     write_json,
@@ -68,6 +69,13 @@ class Path(JsonOptions, RadiiOptions, DesignOptions):
     ] = None
     """Orientation of the platform at the start, in degrees."""
 
+    from_tilt_torsion: Annotated[
+        Triple | None,
+        numbers("--from-tilt-torsion", "azimuth tilt torsion"),
+        hint("instead of --from-quaternion"),
+    ] = None
+    """Azimuth, tilt and torsion of the platform at the start, in degrees."""
+
     to: Annotated[Numbers | None, pose_numbers("--to"), OPTIONAL] = None
     """End of the path; lengths are in design units."""
 
@@ -84,6 +92,13 @@ class Path(JsonOptions, RadiiOptions, DesignOptions):
         hint("instead of --to-quaternion"),
     ] = None
     """Orientation of the platform at the end, in degrees."""
+
+    to_tilt_torsion: Annotated[
+        Triple | None,
+        numbers("--to-tilt-torsion", "azimuth tilt torsion"),
+        hint("instead of --to-quaternion"),
+    ] = None
+    """Azimuth, tilt and torsion of the platform at the end, in degrees."""
 
     seconds: Annotated[float, positive("--seconds")] = 2.0
     """Longest time to search for a path, in seconds."""
@@ -112,12 +127,18 @@ class Path(JsonOptions, RadiiOptions, DesignOptions):
         from explorer.paths.trajectory import trajectory
 
         design = self.with_radii(self.load())
-        starts = (self.from_, self.from_quaternion, self.from_yaw_pitch_roll)
-        ends = (self.to, self.to_quaternion, self.to_yaw_pitch_roll)
+        starts = (
+            self.from_,
+            self.from_quaternion,
+            self.from_yaw_pitch_roll,
+            self.from_tilt_torsion,
+        )
+        ends = (self.to, self.to_quaternion, self.to_yaw_pitch_roll, self.to_tilt_torsion)
         start = _pose("--from", home_pose(design), *starts)
-        if ends == (None, None, None):
+        if ends == (None, None, None, None):
             raise InputError(
-                "say where the path ends with --to, --to-quaternion or --to-yaw-pitch-roll"
+                "say where the path ends with --to, --to-quaternion, --to-yaw-pitch-roll "
+                "or --to-tilt-torsion"
             )
         goal = _pose("--to", start, *ends)
         if self.out is not None:
@@ -143,28 +164,35 @@ def _pose(
     values: Numbers | None,
     quaternion: Quadruple | None,
     yaw_pitch_roll: Triple | None,
+    tilt_torsion: Triple | None,
 ) -> Pose:
     """Return the pose of an option whose position an orientation may follow."""
     position = None
     if values is not None:
         x, y, z, *rest = values
         position = (x, y, z)
-        if rest and (quaternion is None) != (yaw_pitch_roll is None):
-            other = "yaw-pitch-roll" if quaternion is None else "quaternion"
+        others = {
+            "quaternion": quaternion,
+            "yaw-pitch-roll": yaw_pitch_roll,
+            "tilt-torsion": tilt_torsion,
+        }
+        given = [name for name, value in others.items() if value is not None]
+        if rest and len(given) == 1:
+            other = given[0]
             raise InputError(f"{option} has an orientation already; leave {option}-{other} out")
-        if rest and quaternion is None:
+        if rest and not given:
             if len(rest) == 3:
                 yaw_pitch_roll = (rest[0], rest[1], rest[2])
             else:
                 quaternion = (rest[0], rest[1], rest[2], rest[3])
-    return make_pose(f"{option}-", default, position, quaternion, yaw_pitch_roll)
+    return make_pose(f"{option}-", default, position, quaternion, yaw_pitch_roll, tilt_torsion)
 
 
 def _as_json(path: PlannedPath, timed: Trajectory, out: File | None) -> dict[str, object]:
     answer: dict[str, object] = {
         "found": True,
         "reason": None,
-        "poses": [attributes(pose, "position quaternion") for pose in path.poses],
+        "poses": [pose_json(pose) for pose in path.poses],
         **attributes(path, "length margin clearance seconds checked"),
         "duration": timed.duration,
         "trajectory": attributes(timed, "time joints position quaternion"),

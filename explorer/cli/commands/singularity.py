@@ -13,6 +13,7 @@ from explorer.cli.output import (
     figures,
     heading,
     lengths,
+    pose_json,
     pose_table,
     table,
 )
@@ -47,7 +48,7 @@ def _as_json(snapshot: Snapshot) -> dict[str, object]:
         "nearest": [
             {
                 **attributes(nearest, "incidence distance"),
-                **attributes(nearest.pose, "position quaternion"),
+                **pose_json(nearest.pose),
             }
             for nearest in snapshot.nearest
         ],

@@ -1,0 +1,144 @@
+"""`explorer orientation`: the orientations that a position can have."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated
+
+from explorer.cli.options import DesignOptions, JsonOptions
+from explorer.cli.output import degrees, figure, figures, finite, heading, table
+from explorer.cli.values import finite_number, hint, numbers, whole_number
+from explorer.mechanism.design import Design
+from explorer.mechanism.home import home_pose
+from explorer.mechanism.pose import Triple
+
+if TYPE_CHECKING:
+    from explorer.workspace.orientation_share import OrientationShare
+    from explorer.workspace.tilts import GreatestTilt, TiltMap, TorsionRange
+
+
+@dataclass(frozen=True, kw_only=True)
+class Orientation(JsonOptions, DesignOptions):
+    """Measure the orientations of a position: share of all, greatest tilts, torsion.
+
+    The platform tilts from tilt zero, at one torsion and in each azimuth, until it meets the first
+    limit. Collisions of legs are not among the limits.
+    """
+
+    position: Annotated[
+        Triple | None, numbers("--position", "x y z"), hint("default: that of the home pose")
+    ] = None
+    """Position of b4 in the base frame, in design units."""
+
+    torsion: Annotated[
+        float | None,
+        finite_number("--torsion"),
+        hint("default: that of the home pose"),
+    ] = None
+    """Torsion of the tilts, in degrees."""
+
+    samples: Annotated[int, whole_number("--samples", 2, 1_000_000)] = 100_000
+    """Number of orientations for the share."""
+
+    def run(self) -> None:
+        """Write the measures of the orientations."""
+        from explorer.workspace.orientation_share import orientation_share
+        from explorer.workspace.tilts import greatest_tilt, is_connected, tilt_map, torsion_range
+
+        design = self.load()
+        home = home_pose(design)
+        position = home.position if self.position is None else self.position
+        found = _Orientations(
+            design=design,
+            position=position,
+            share=orientation_share(design, position, self.samples),
+            least=greatest_tilt(design, position, self.torsion),
+            tilts=tilt_map(design, position, self.torsion),
+            torsions=torsion_range(design, position, self.torsion),
+            is_home_connected=is_connected(design, position, home.rotation),
+        )
+        self.write(found.as_json, found.as_lines)
+
+
+@dataclass(frozen=True)
+class _Orientations:
+    """The orientations of a position, ready to be written."""
+
+    design: Design
+    position: Triple
+    share: OrientationShare
+    least: GreatestTilt
+    tilts: TiltMap
+    torsions: TorsionRange
+    is_home_connected: bool
+
+    def as_json(self) -> dict[str, object]:
+        """Return the answer as plain values."""
+        least, torsions = self.least, self.torsions
+        return {
+            "position": self.position,
+            "share": self.share.share,
+            "standard_error": self.share.standard_error,
+            "orientations": self.share.orientations,
+            "torsion": least.torsion,
+            "greatest_tilt": finite(least.tilt),
+            "azimuth": finite(least.azimuth),
+            "limit": least.limit,
+            "azimuths": self.tilts.azimuths,
+            "tilts": [finite(tilt) for tilt in self.tilts.tilts.tolist()],
+            "limits": self.tilts.limits,
+            "torsion_range": [finite(torsions.low), finite(torsions.high)],
+            "torsion_limits": [torsions.low_limit, torsions.high_limit],
+            "home_connected": self.is_home_connected,
+        }
+
+    def as_lines(self) -> Iterator[str]:
+        """Yield the answer as lines of text."""
+        share, least = self.share, self.least
+        yield from (heading(self.design), f"position  {'  '.join(figures(self.position))}", "")
+        error = f"standard error {figure(share.standard_error)}"
+        rows = [
+            (
+                "share of all orientations",
+                f"{figure(share.share)} ({error}, {share.orientations} orientations)",
+            ),
+            ("torsion", *degrees([least.torsion])),
+            ("greatest tilt in every azimuth", self._greatest()),
+            ("torsion range at tilt zero", self._torsions()),
+            ("home orientation", self._home()),
+        ]
+        yield from (table(rows, "<<"), "")
+        if math.isnan(least.tilt):
+            return
+        listed = [("azimuth", "tilt", "ends at")]
+        for azimuth, tilt, limit in zip(
+            self.tilts.azimuths.tolist(), self.tilts.tilts.tolist(), self.tilts.limits, strict=True
+        ):
+            towards, most = degrees([azimuth, tilt])
+            listed.append((towards, most, limit or "no limit"))
+        yield table(listed, ">><")
+
+    def _greatest(self) -> str:
+        least = self.least
+        if math.isnan(least.tilt):
+            return f"none: tilt zero violates {least.limit}"
+        (tilt,) = degrees([least.tilt])
+        if least.limit is None:
+            return f"{tilt}, no limit"
+        return f"{tilt} in azimuth {degrees([least.azimuth])[0]}, ended by {least.limit}"
+
+    def _torsions(self) -> str:
+        torsions = self.torsions
+        if math.isnan(torsions.low):
+            return f"none: tilt zero violates {torsions.low_limit}"
+        if torsions.low_limit is None:
+            return "all"
+        low, high = degrees([torsions.low, torsions.high])
+        return f"{low} ({torsions.low_limit}) to {high} ({torsions.high_limit})"
+
+    def _home(self) -> str:
+        if self.is_home_connected:
+            return "connected to tilt zero by a tilt without a gap"
+        return "not connected to tilt zero by a tilt within the limits"

@@ -1,0 +1,135 @@
+"""The share of all orientations that a position can have, with its standard error.
+
+The orientations are several sets of super-Fibonacci spirals (see
+`explorer.workspace.orientations`), each turned by a random rotation of its own. Every turned
+point is spread evenly over all rotations, so the mean of the sets is without bias, and the spread
+of the sets gives its standard error (randomised quasi-Monte Carlo; A. B. Owen, "Practical
+Quasi-Monte Carlo Integration", 2023, chapter 17). It is a few times smaller than that of as many
+independent orientations.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
+
+from explorer.errors import InputError
+from explorer.mechanism.design import Design
+from explorer.numerics.arrays import FloatArray, IntArray, finite_array, for_kernel
+from explorer.numerics.compiled import kernel
+from explorer.workspace.limits.valid_poses import Rules, is_valid
+from explorer.workspace.orientations import (
+    CAPABILITY_ORIENTATIONS,
+    MOST_ORIENTATIONS,
+    PHI,
+    PSI,
+)
+
+# Largest number of sets of orientations.
+SETS = 20
+
+
+@dataclass(frozen=True)
+class OrientationShare:
+    """The share of all orientations that a position can have.
+
+    Attributes:
+        share: Share, 0 to 1.
+        standard_error: Standard error of the share; 0 if all sets of orientations agree, as where
+            a position can have every orientation or none.
+        orientations: Number of orientations that were checked.
+    """
+
+    share: float
+    standard_error: float
+    orientations: int
+
+
+def orientation_share(
+    design: Design,
+    position: ArrayLike,
+    n: int = CAPABILITY_ORIENTATIONS,
+    seed: int = 0,
+) -> OrientationShare:
+    """Return the share of all orientations that a position can have within the limits.
+
+    The limits are those of `explorer.workspace.limits.broken.violations`: lengths, guide, gap,
+    carriage order, box, margins with the home's sign triple, and swing cones.
+
+    Args:
+        design: The manipulator.
+        position: Position of b4 in the base frame, in design units, shape (3,).
+        n: Number of orientations.
+        seed: Seed of the random rotations; the same seed gives the same result.
+
+    Raises:
+        InputError: not a position, no usable number of orientations, or a negative seed.
+    """
+    p = finite_array("position", position, (3,))
+    if p.ndim != 1:
+        raise InputError(f"give one position, three numbers; got the shape {p.shape}")
+    if not 2 <= n <= MOST_ORIENTATIONS:
+        raise InputError(
+            f"the number of orientations must lie within 2 to {MOST_ORIENTATIONS:,}; got {n}"
+        )
+    if seed < 0:
+        raise InputError(f"the seed must not be negative; got {seed}")
+    sets = min(SETS, n)
+    sizes = np.full(sets, n // sets, dtype=np.int64)
+    sizes[: n % sets] += 1
+    turns = Rotation.random(sets, random_state=np.random.default_rng(seed))
+    quaternions = for_kernel(turns.as_quat(scalar_first=True).reshape(sets, 4))
+    counts = np.zeros(sets, dtype=np.int64)
+    rules = Rules.of(design).without_clearances()
+    share_rows(n, rules.row, rules.cones, for_kernel(p), quaternions, sizes, counts)
+    share = float(counts.sum()) / n
+    weights = sizes / n
+    # The sets differ in size by one orientation at the most.
+    spread = float(np.sum(weights * (counts / sizes - share) ** 2))
+    return OrientationShare(share, math.sqrt(spread / (sets - 1)), n)
+
+
+@kernel("void(f8[::1], f8[:,::1], f8[::1], f8[:,::1], i8[::1], i8[::1])")
+def share_rows(
+    row: FloatArray,
+    cones: FloatArray,
+    position: FloatArray,
+    turns: FloatArray,
+    sizes: IntArray,
+    counts: IntArray,
+) -> None:
+    """Write how many orientations of each set satisfy all rules.
+
+    Args:
+        row: Row of `Rules`.
+        cones: Cones of `Rules`.
+        position: Position of b4, shape (3,).
+        turns: Unit quaternions (w, x, y, z) that turn the sets, shape (m, 4).
+        sizes: Number of orientations of each set, shape (m,).
+        counts: Numbers of orientations that are allowed, shape (m,).
+    """
+    base, ends, r = np.zeros((4, 3)), np.zeros((4, 3)), np.zeros((3, 3))
+    for index in range(turns.shape[0]):
+        a, b, c, d = turns[index, 0], turns[index, 1], turns[index, 2], turns[index, 3]
+        size = sizes[index]
+        count = 0
+        for number in range(size):
+            s = number + 0.5
+            inner, outer = math.sqrt(s / size), math.sqrt(1.0 - s / size)
+            first, second = 2.0 * math.pi * s / PHI, 2.0 * math.pi * s / PSI
+            e, f = outer * math.cos(second), inner * math.sin(first)
+            g, h = inner * math.cos(first), outer * math.sin(second)
+            w, x = a * e - b * f - c * g - d * h, a * f + b * e + c * h - d * g
+            y, z = a * g - b * h + c * e + d * f, a * h + b * g - c * f + d * e
+            r[0, 0], r[0, 1] = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z)
+            r[0, 2], r[1, 0] = 2.0 * (x * z + w * y), 2.0 * (x * y + w * z)
+            r[1, 1], r[1, 2] = 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)
+            r[2, 0], r[2, 1] = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x)
+            r[2, 2] = 1.0 - 2.0 * (x * x + y * y)
+            if is_valid(row, cones, position, r, base, ends):
+                count += 1
+        counts[index] = count

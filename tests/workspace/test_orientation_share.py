@@ -1,0 +1,93 @@
+"""Shares of all orientations against an independent count, pose by pose, and over seeds."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from limited_designs import limited, ordinary_case
+from reference import read_reference
+from scipy.spatial.transform import Rotation
+from test_carriage_order import case_design
+
+from explorer import PRESETS, InputError, evaluate, home_pose, orientation_capability
+from explorer.mechanism.design import Swing
+from explorer.mechanism.pose import Pose
+from explorer.workspace.orientation_share import orientation_share
+
+pytestmark = pytest.mark.usefixtures("warm_kernels")
+
+OPTIMAL = PRESETS["paper-optimal"]
+CASES: list[dict[str, Any]] = read_reference("orientation")["cases"]
+# Standard error of the reference's count.
+REFERENCE_ERROR = 7e-4
+
+
+@pytest.mark.parametrize("index", range(len(CASES)))
+def test_share_is_that_of_an_independent_count(index: int) -> None:
+    case = CASES[index]
+    design, position = case_design(case), case["position"]
+    for name, limits in (
+        ("share_with_signs_and_order", {}),
+        ("share_with_signs", {"carriage_order": "any"}),
+        ("share_of_lengths", {"carriage_order": "any", "margin": None}),
+    ):
+        found = orientation_share(limited(design, **limits), position)
+        error = math.hypot(found.standard_error, REFERENCE_ERROR)
+        assert found.share == pytest.approx(case[name], abs=4.5 * error), name
+        assert found.standard_error < 1.5e-3
+        assert found.orientations == 100_000
+
+
+def test_standard_error_is_the_spread_over_seeds() -> None:
+    design = limited(OPTIMAL, l1=(5.0, 15.0), swing=Swing(b1=70.0))
+    p = home_pose(OPTIMAL).position
+    found = [orientation_share(design, p, 2000, seed) for seed in range(200)]
+    spread = float(np.std([each.share for each in found]))
+    told = math.sqrt(float(np.mean([each.standard_error**2 for each in found])))
+    assert told == pytest.approx(spread, rel=0.25)
+    mean = float(np.mean([each.share for each in found]))
+    assert mean == pytest.approx(orientation_capability(design, p), abs=1e-3)
+    # As many independent orientations have a larger one.
+    assert told < 0.8 * math.sqrt(mean * (1.0 - mean) / 2000)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_share_agrees_with_single_poses(seed: int) -> None:
+    design, _ = ordinary_case(seed)
+    position = home_pose(design).position
+    rotations = Rotation.random(3000, random_state=np.random.default_rng(seed)).as_matrix()
+    allowed = [not evaluate(design, Pose.of(position, r)).violations for r in rotations]
+    found = orientation_share(design, position)
+    expected = float(np.mean(allowed))
+    error = math.sqrt(max(expected, 1e-3) / len(rotations))
+    assert found.share == pytest.approx(expected, abs=4.5 * error)
+
+
+def test_share_is_the_same_for_a_seed_and_none_outside_the_box() -> None:
+    p = home_pose(OPTIMAL).position
+    assert orientation_share(OPTIMAL, p, 500, 7) == orientation_share(OPTIMAL, p, 500, 7)
+    outside = orientation_share(OPTIMAL, [30.0, 5.0, 9.0], 100)
+    assert (outside.share, outside.standard_error) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("n", [2, 3, 19, 21, 1001])
+def test_any_number_of_orientations_is_counted_in_full(n: int) -> None:
+    free = limited(OPTIMAL, margin=None, carriage_order="any", box=None)
+    assert orientation_share(free, [1.0, 1.0, 1.0], n).share == 1.0
+    assert 0.0 <= orientation_share(OPTIMAL, home_pose(OPTIMAL).position, n).share <= 1.0
+
+
+def test_unusable_positions_numbers_and_seeds_are_refused() -> None:
+    p = home_pose(OPTIMAL).position
+    for n in (1, 0, -5, 10**9):
+        with pytest.raises(InputError, match="number of orientations"):
+            orientation_share(OPTIMAL, p, n)
+    with pytest.raises(InputError, match="seed"):
+        orientation_share(OPTIMAL, p, seed=-1)
+    with pytest.raises(InputError, match="one position"):
+        orientation_share(OPTIMAL, [p])
+    with pytest.raises(InputError, match="position"):
+        orientation_share(OPTIMAL, [math.nan, 0.0, 0.0])

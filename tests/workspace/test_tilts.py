@@ -1,0 +1,197 @@
+"""Tilts of a position against single poses on dense turns, and the angles against SciPy's."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from limited_designs import limited, ordinary_case, troubled_case
+from scipy.spatial.transform import Rotation
+
+from explorer import PRESETS, Design, InputError, evaluate, home_pose
+from explorer.mechanism.design import Swing
+from explorer.mechanism.pose import Pose
+from explorer.numerics.arrays import FloatArray
+from explorer.workspace.limits.constraints import CARRIAGE_ORDER
+from explorer.workspace.orientations import orientations_within
+from explorer.workspace.tilts import (
+    greatest_tilt,
+    greatest_tilts,
+    is_connected,
+    tilt_map,
+    torsion_range,
+)
+
+pytestmark = pytest.mark.usefixtures("warm_kernels")
+
+STEP = 0.05
+
+
+def tilted(azimuth: float, tilts: FloatArray, torsion: float) -> FloatArray:
+    """Return the rotations of tilts, by SciPy's Euler angles."""
+    angles = [(azimuth, tilt, torsion - azimuth) for tilt in tilts.tolist()]
+    return Rotation.from_euler("ZYZ", angles, degrees=True).as_matrix()
+
+
+def sampled_tilt(design: Design, position: Any, azimuth: float, torsion: float) -> float:
+    """Return the last of many tilts up to which all poses are allowed; NaN if none is."""
+    tilts = np.arange(0.0, 180.0 + 0.5 * STEP, STEP)
+    within = orientations_within(design, position, tilted(azimuth, tilts, torsion))
+    if not within[0]:
+        return math.nan
+    return float(tilts[-1] if within.all() else tilts[within.argmin() - 1])
+
+
+def case_of(seed: int) -> tuple[Design, FloatArray, float]:
+    """Return a design, a position near its home, and a torsion."""
+    rng = np.random.default_rng([3, seed])
+    if seed % 4 == 0:
+        design = PRESETS[("paper-initial", "paper-optimal")[seed // 4 % 2]]
+    else:
+        design = (ordinary_case if seed % 4 < 3 else troubled_case)(seed)[0]
+    home = home_pose(design)
+    if seed % 2:
+        names = rng.choice(["a1", "a3", "b1", "b2", "b3", "b4"], 3, replace=False).tolist()
+        design = limited(design, swing=Swing(**{n: float(rng.uniform(10, 170)) for n in names}))
+    position = np.array(home.position) + rng.normal(scale=0.02 * design.reach, size=3)
+    r = home.rotation
+    torsion = math.degrees(math.atan2(r[1, 0] - r[0, 1], r[0, 0] + r[1, 1]))
+    return design, position, torsion
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_tilt_map_agrees_with_dense_turns(seed: int) -> None:
+    design, position, torsion = case_of(seed)
+    found = tilt_map(design, position, torsion, 12)
+    for azimuth, tilt, limit in zip(found.azimuths, found.tilts, found.limits, strict=True):
+        expected = sampled_tilt(design, position, float(azimuth), torsion)
+        if math.isnan(expected):
+            assert math.isnan(tilt)
+            assert limit is not None
+        else:
+            assert expected - 1e-6 <= tilt <= expected + STEP + 1e-6
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_tilt_map_names_the_limit_that_is_violated_beyond(seed: int) -> None:
+    design, position, torsion = case_of(seed)
+    found = tilt_map(design, position, torsion, 12)
+    for azimuth, tilt, limit in zip(found.azimuths, found.tilts, found.limits, strict=True):
+        if limit is None:
+            assert tilt == 180.0
+            continue
+        beyond = 0.0 if math.isnan(tilt) else float(tilt) + 1e-3
+        rotation = tilted(float(azimuth), np.array([beyond]), torsion)[0]
+        broken = {each.limit for each in evaluate(design, Pose.of(position, rotation)).violations}
+        names = {limit, limit.removesuffix(" minimum").removesuffix(" maximum")}
+        assert names & broken, (limit, broken)
+
+
+def test_tilt_map_of_the_paper_ends_at_margins_and_the_carriage_order() -> None:
+    design = PRESETS["paper-optimal"]
+    found = tilt_map(design, home_pose(design).position)
+    assert len(found.tilts) == 72
+    assert {"margin δ1", "margin δ2", CARRIAGE_ORDER} == set(found.limits)
+    # Towards the azimuth zero the carriages meet where b3 - b2 is upright.
+    assert found.tilts[0] == pytest.approx(90.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_greatest_tilt_is_the_least_of_a_fine_map(seed: int) -> None:
+    design, position, torsion = case_of(seed)
+    found = greatest_tilt(design, position, torsion)
+    fine = tilt_map(design, position, torsion, 7200)
+    if math.isnan(found.tilt):
+        assert np.isnan(fine.tilts).all()
+        return
+    assert found.tilt <= fine.tilts.min() + 1e-9
+    assert found.tilt >= fine.tilts.min() - 0.02
+    if found.limit is not None:
+        there = tilt_map(design, position, torsion, [found.azimuth])
+        assert there.tilts[0] == pytest.approx(found.tilt, abs=1e-6)
+        assert there.limits[0] == found.limit
+
+
+def test_greatest_tilts_of_many_positions_are_those_of_each() -> None:
+    design, position, torsion = case_of(4)
+    rng = np.random.default_rng(0)
+    positions = position + rng.normal(scale=0.2 * design.reach, size=(3, 20, 3))
+    found = greatest_tilts(design, positions, torsion)
+    each = [[greatest_tilt(design, p, torsion).tilt for p in row] for row in positions]
+    np.testing.assert_allclose(found, each, atol=1e-6)
+    assert 0 < np.isnan(found).sum() < found.size
+    assert greatest_tilts(design, np.zeros((0, 3))).shape == (0,)
+
+
+@pytest.mark.parametrize("seed", range(16))
+def test_torsion_range_agrees_with_dense_turns(seed: int) -> None:
+    design, position, torsion = case_of(seed)
+    for azimuth, tilt in ((0.0, 0.0), (40.0, 15.0)):
+        found = torsion_range(design, position, torsion, azimuth, tilt)
+        turns = np.arange(0.0, 360.0, STEP)
+        angles = [
+            np.array([[azimuth, tilt, s - azimuth] for s in torsion + k * turns]) for k in (-1, 1)
+        ]
+        down, up = (
+            orientations_within(
+                design, position, Rotation.from_euler("ZYZ", each, degrees=True).as_matrix()
+            )
+            for each in angles
+        )
+        if not down[0]:
+            assert math.isnan(found.low)
+            assert found.low_limit == found.high_limit is not None
+        elif up.all():
+            assert (found.low, found.high) == (torsion - 180.0, torsion + 180.0)
+            assert found.low_limit is found.high_limit is None
+        else:
+            for within, end in ((down, torsion - found.low), (up, found.high - torsion)):
+                last = float(turns[within.argmin() - 1])
+                assert last - 1e-6 <= end <= last + STEP + 1e-6
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_orientation_is_connected_to_tilt_zero_up_to_the_tilt_of_the_map(seed: int) -> None:
+    design, position, torsion = case_of(seed)
+    found = tilt_map(design, position, torsion, 8)
+    for azimuth, tilt in zip(found.azimuths.tolist(), found.tilts.tolist(), strict=True):
+        if math.isnan(tilt):
+            assert not is_connected(design, position, tilted(azimuth, np.zeros(1), torsion)[0])
+            continue
+        inside, outside = tilted(azimuth, np.array([0.99 * tilt, tilt + 0.01]), torsion)
+        level = tilted(0.0, np.zeros(1), torsion)[0]
+        assert is_connected(design, position, inside)
+        assert is_connected(design, position, inside, level)
+        if tilt < 179.9:
+            assert not is_connected(design, position, outside)
+
+
+def test_tilt_zero_that_violates_a_limit_has_no_tilt() -> None:
+    design = PRESETS["paper-optimal"]
+    found = tilt_map(design, [30.0, 5.0, 9.0], azimuths=3)
+    assert np.isnan(found.tilts).all()
+    least = greatest_tilt(design, [30.0, 5.0, 9.0])
+    assert math.isnan(least.tilt)
+    assert math.isnan(least.azimuth)
+    assert least.limit == found.limits[0] is not None
+
+
+def test_tilts_with_unusable_input_are_refused() -> None:
+    design = PRESETS["paper-optimal"]
+    p = home_pose(design).position
+    for count in (0, -1, 10**9):
+        with pytest.raises(InputError, match="number of azimuths"):
+            tilt_map(design, p, azimuths=count)
+    with pytest.raises(InputError, match="number of azimuths"):
+        greatest_tilts(design, p, azimuths=2)
+    with pytest.raises(InputError, match="azimuths must be"):
+        tilt_map(design, p, azimuths=[[1.0]])
+    with pytest.raises(InputError, match="one position"):
+        tilt_map(design, [p])
+    for torsion in (math.nan, math.inf):
+        with pytest.raises(InputError, match="torsion"):
+            tilt_map(design, p, torsion)
+    with pytest.raises(InputError, match="rotation"):
+        is_connected(design, p, np.zeros((3, 3)))
