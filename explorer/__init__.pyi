@@ -47,6 +47,14 @@ from .mechanism.kinematics import (
     forward as forward,
     inverse as inverse,
 )
+from .mechanism.machine import (
+    Actuators as Actuators,
+    Guide as Guide,
+    Payload as Payload,
+    Struts as Struts,
+    Tolerances as Tolerances,
+    Tool as Tool,
+)
 from .mechanism.margins import margins as margins
 from .mechanism.pose import (
     Pose as Pose,
@@ -82,6 +90,35 @@ from .singularity.nearest import (
 from .singularity.nearest_stratum import nearest_in_stratum as nearest_in_stratum
 from .singularity.strata import stratum as stratum
 from .singularity.uncoupled import UNCOUPLED as UNCOUPLED
+from .statics.accuracy import (
+    Precision as Precision,
+    ToolError as ToolError,
+    error_by_actuator as error_by_actuator,
+    geometry_error as geometry_error,
+    pose_error_by_geometry as pose_error_by_geometry,
+    pose_precision as pose_precision,
+    rms_error as rms_error,
+    worst_error as worst_error,
+)
+from .statics.compliance import (
+    compliance as compliance,
+    compliance_shares as compliance_shares,
+    deflection as deflection,
+    principal_compliances as principal_compliances,
+)
+from .statics.forces import (
+    actuator_forces as actuator_forces,
+    largest_force as largest_force,
+    strut_bending as strut_bending,
+    worst_direction as worst_direction,
+)
+from .statics.reactions import (
+    Reactions as Reactions,
+    largest_payload as largest_payload,
+    limit_shares as limit_shares,
+    reactions as reactions,
+)
+from .statics.weights import Weights as Weights
 from .sweep.cluster import DaskWorkers as DaskWorkers
 from .sweep.results import Results as Results, load_results as load_results
 from .sweep.run import run_study as run_study

@@ -2,11 +2,23 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import msgspec
 from hypothesis import strategies as st
 from strategies import designs
 
-from explorer import Design, Limits, Pose
+from explorer import (
+    Actuators,
+    Design,
+    Guide,
+    Limits,
+    Payload,
+    Pose,
+    Struts,
+    Tolerances,
+    Tool,
+)
 
 finite = st.floats(-1e3, 1e3)
 lengths = st.floats(0.0, 1e3)
@@ -38,9 +50,34 @@ def limits() -> st.SearchStrategy[Limits]:
     )
 
 
+def machines() -> st.SearchStrategy[dict[str, Any]]:
+    """Draw the fields of the machine around a mechanism, with the tool at b4."""
+    some, angles = st.floats(1e-3, 1e3), st.tuples(lengths, lengths)
+    six, errors = st.tuples(*[some] * 6), st.tuples(*[lengths] * 6)
+    offsets = st.tuples(lengths, lengths, lengths)
+    names = ("a1", "a3", "guide", "b1", "b2", "b3", "b4")
+    turns = st.tuples(finite, finite, finite, finite)
+    return st.fixed_dictionaries(
+        {
+            "tool": st.builds(
+                Tool, quaternion=turns.filter(lambda turn: max(map(abs, turn)) > 1e-6)
+            ),
+            "payload": st.builds(Payload, lengths),
+            "gravity": triples.filter(lambda way: max(map(abs, way)) > 1e-6),
+            "actuators": st.builds(Actuators, st.none() | six, st.none() | six, errors, six),
+            "struts": st.builds(Struts, st.floats(2.0, 9.0), st.floats(0.0, 1.0), some, some),
+            "guide": st.builds(Guide, st.none() | some, st.none() | some),
+            "tolerances": st.builds(
+                Tolerances, **dict.fromkeys(names, offsets), guide_tilt_deg=angles
+            ),
+        }
+    )
+
+
 @st.composite
 def complete_designs(draw: st.DrawFn) -> Design:
     """Draw a design with every field given or left to its default."""
+    ideal: dict[str, Any] = {}
     return msgspec.structs.replace(
         draw(designs()),
         name=draw(st.text(max_size=100).filter(str.isprintable)),
@@ -48,4 +85,5 @@ def complete_designs(draw: st.DrawFn) -> Design:
         node_step=draw(st.none() | st.floats(1e-3, 1e3)),
         limits=draw(limits()),
         home=draw(st.none() | poses),
+        **draw(st.just(ideal) | machines()),
     )

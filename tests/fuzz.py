@@ -60,11 +60,24 @@ FULL: dict[str, Any] = {
     },
     "home": {"position": [5, 3, 5], "quaternion": [0.8, 0.1, 0.2, -0.5]},
 }
-"""All fields of a design file."""
+"""All fields of a design file of the first schema."""
+
+MACHINE: dict[str, Any] = {
+    **PLAIN,
+    "schema": 2,
+    "tool": {"position": [0, 0, 1.5]},
+    "payload": {"mass_kg": 0.5, "centre": [0.5, 0, 0.5]},
+    "gravity": [0, 1, -1],
+    "actuators": {"push_n": [50, 60, 50, 60, 50, 40], "error_mm": [0, 0, 0.1, 0, 0, 0]},
+    "struts": {"outer_mm": 6, "inner_mm": 4, "stress_mpa": 200},
+    "guide": {"force_n": 100, "moment_nm": None},
+    "tolerances": {"a3": [0.1, 0.1, 0], "guide_tilt_deg": [0.1, 0]},
+}
+"""A design file with the fields that the second schema added."""
 
 VALID: tuple[bytes, ...] = (
     *map(encode_design, PRESETS.values()),
-    *(json.dumps(fields, ensure_ascii=False).encode() for fields in (PLAIN, FULL)),
+    *(json.dumps(fields, ensure_ascii=False).encode() for fields in (PLAIN, FULL, MACHINE)),
 )
 NUMBER = re.compile(r"-?[0-9][0-9.eE+-]{0,30}")
 FIELD = re.compile(r'"\w+": (\[[^\]]*\]|[^,\[{]+), ?')

@@ -24,6 +24,7 @@ ROOMS = (
     "mechanism",
     "singularity",
     "legs",
+    "statics",
     "workspace",
     "measures",
     "paths",

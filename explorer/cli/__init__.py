@@ -22,6 +22,8 @@ COMMANDS: Mapping[str, str] = {
     "inverse": "Compute the joints of a pose.",
     "forward": "Compute the eight assembly modes of the joints.",
     "singularity": "Measure how near a pose is to a singularity, and to which.",
+    "forces": "Compute the forces of actuators and struts under a load, and their limits.",
+    "accuracy": "Compute the errors and the deflection of the tool in a pose.",
     "interference": "Measure the clearances of the legs, in a pose or over a move.",
     "path": "Plan a path between two poses within limits, margins and clearances.",
     "workspace": "Measure the workspace: exact volume and gradient, the paper's nodes, a mesh.",

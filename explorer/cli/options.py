@@ -29,7 +29,7 @@ class DesignOptions:
     """A preset (paper-initial, paper-optimal), a design file (JSON), or the name of a design
     saved on the page."""
 
-    def load(self) -> Design:
+    def read_design(self) -> Design:
         """Return the design, as `load` does."""
         return load(self.design)
 

@@ -113,6 +113,25 @@ def pose_numbers(option: str) -> PrimitiveConstructorSpec[Any]:
     return _parser("X Y Z [...]", read, lambda value: value or (), many=True)
 
 
+def load_numbers(option: str) -> PrimitiveConstructorSpec[Any]:
+    """Return the parser of an option with a force and, optionally, a moment.
+
+    Three numbers are a force without a moment; the value always has six.
+    """
+    orders = {3: "fx fy fz", 6: "fx fy fz mx my mz"}
+
+    def read(words: list[str]) -> Numbers:
+        if len(words) not in orders:
+            raise UsageError(
+                f"{option} needs a force fx fy fz, and may go on with a moment mx my mz; "
+                f"got {len(words)} numbers"
+            )
+        values = numbers(option, orders[len(words)]).instance_from_str(words)
+        return (*values, *(0.0,) * (6 - len(values)))
+
+    return _parser("FX FY FZ [MX MY MZ]", read, lambda value: value or (), many=True)
+
+
 def texts(option: str, metavar: str) -> PrimitiveConstructorSpec[Any]:
     """Return the parser of an option with one word or more."""
 
@@ -143,6 +162,18 @@ def positive(option: str) -> PrimitiveConstructorSpec[Any]:
         value = _number(option, words[0])
         if not (math.isfinite(value) and value > 0.0):
             raise UsageError(f"{option} must be a positive number; got {words[0]}")
+        return value
+
+    return _parser("NUMBER", read)
+
+
+def not_negative(option: str) -> PrimitiveConstructorSpec[Any]:
+    """Return the parser of an option with one finite number of at least zero."""
+
+    def read(words: list[str]) -> float:
+        value = _number(option, words[0])
+        if not (math.isfinite(value) and value >= 0.0):
+            raise UsageError(f"{option} must be a number of at least 0; got {words[0]}")
         return value
 
     return _parser("NUMBER", read)

@@ -6,7 +6,8 @@ values are those of `explorer.prototype.chains`, with lengths in metres. Positio
 the six actuators.
 
 The swing limit of a universal joint is a cone; its two hinges have the box around it. Limits
-of the ball joints and of the pose (box, margins) have no counterpart in MJCF and are left out.
+of the ball joints and of the pose (box, margins) have no counterpart in MJCF and are left out, as
+is the payload, whose weight would need servos of its own size.
 """
 
 from __future__ import annotations
@@ -19,9 +20,10 @@ import numpy as np
 
 from explorer import __version__
 from explorer.errors import InputError
-from explorer.mechanism.design import JOINTS, Design
+from explorer.mechanism.design import DOWN, JOINTS, Design
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.kinematics import platform_points
+from explorer.mechanism.machine import STANDARD_GRAVITY
 from explorer.mechanism.pose import quaternion_from_rotation
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.chains import (
@@ -142,7 +144,7 @@ class _Model:
             )
         )
         ET.SubElement(root, "compiler", angle="radian", autolimits="true")
-        ET.SubElement(
+        option = ET.SubElement(
             root,
             "option",
             timestep=repr(TIMESTEP),
@@ -151,6 +153,8 @@ class _Model:
             iterations="100",
             tolerance="1e-12",
         )
+        if self.design.gravity != DOWN:
+            option.set("gravity", _row([STANDARD_GRAVITY * part for part in self.design.gravity]))
         default = ET.SubElement(root, "default")
         # Bodies overlap in their joints, so contacts are off; the explorer checks collisions.
         ET.SubElement(default, "geom", contype="0", conaffinity="0")

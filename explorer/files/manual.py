@@ -15,6 +15,8 @@ FILES = (
     "orientation.md",
     "singularity.md",
     "legs.md",
+    "loads.md",
+    "precision.md",
     "optimise.md",
     "studies.md",
     "prototype-and-export.md",

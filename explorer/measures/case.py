@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from explorer.measures.clearance import clearance_beyond, clearance_margin_of
+from explorer.measures.statics import BoxStatics
 from explorer.mechanism.design import Design
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import Pose, Triple
@@ -144,6 +145,49 @@ class Case:
             return reachable_workspace(self.design, self.rotation).reachable_volume, ""
         except StartError as error:
             return math.nan, str(error)
+
+    @cached_property
+    def box_statics(self) -> BoxStatics | None:
+        """Loads, errors and compliance over the required box; None without a box."""
+        return None if self.box is None else BoxStatics(self.design, self.box, self.rotation)
+
+    @property
+    def limited_statics(self) -> BoxStatics | None:
+        """Those of a design that limits forces or moments, or None."""
+        design = self.design
+        limits = [*design.actuators.limits, design.struts.largest_moment]
+        is_limited = any(np.isfinite(limit).any() for limit in limits)
+        guide = design.guide
+        is_limited = is_limited or guide.force_n is not None or guide.moment_nm is not None
+        return self.box_statics if is_limited else None
+
+    @property
+    def payload_statics(self) -> BoxStatics | None:
+        """Those of a design with a payload, or None."""
+        return self.box_statics if self.design.payload.mass_kg else None
+
+    @property
+    def limited_payload_statics(self) -> BoxStatics | None:
+        """Those of a design with a payload and limits, or None."""
+        return self.limited_statics and self.payload_statics
+
+    @property
+    def actuator_statics(self) -> BoxStatics | None:
+        """Those of a design with a payload and limits of its actuators, or None."""
+        is_limited = self.design.actuators.push_n or self.design.actuators.pull_n
+        return self.payload_statics if is_limited else None
+
+    @property
+    def error_statics(self) -> BoxStatics | None:
+        """Those of a design whose actuators have errors, or None."""
+        return self.box_statics if any(self.design.actuators.error_mm) else None
+
+    @property
+    def elastic_statics(self) -> BoxStatics | None:
+        """Those of a design whose actuators or struts give way, or None."""
+        design = self.design
+        is_rigid = design.actuators.stiffness_n_mm is None and design.struts.outer_mm is None
+        return None if is_rigid else self.box_statics
 
     def inverse_conditions(self, positions: FloatArray) -> FloatArray:
         """Return the inverse condition of the Jacobian at positions (n, 3), shape (n,)."""

@@ -13,9 +13,18 @@ Place = Literal["compare", "optimise", "studies", "workspace", "report"]
 `explorer workspace`, or the report."""
 
 Sense = Literal["more", "less"]
-Unit = Literal["", "°", "share"]
+Unit = Literal["", "°", "share", "N m", "kg", "mm/N"]
 Cost = Literal["low", "high"]
-Demand = Literal["box", "demanded_margin"]
+Demand = Literal[
+    "box",
+    "demanded_margin",
+    "limited_statics",
+    "payload_statics",
+    "limited_payload_statics",
+    "actuator_statics",
+    "error_statics",
+    "elastic_statics",
+]
 
 EVERYWHERE: frozenset[Place] = frozenset(get_args(Place))
 POWERS = {1: "", 2: "²", 3: "³"}

@@ -13,6 +13,16 @@ from typing import Literal, cast, get_args
 import msgspec
 
 from explorer.errors import DesignError
+from explorer.mechanism.machine import (
+    Actuators,
+    Guide,
+    Payload,
+    Struts,
+    Tolerances,
+    Tool,
+    check_near,
+    checked_gravity,
+)
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.checks import (
     instance,
@@ -49,6 +59,18 @@ DEGENERATE_RATIO = 1e-12
 # Bounds of the largest design variable, whose seventh power in det J must not over- or
 # underflow.
 SMALLEST_SIZE, LARGEST_SIZE = 1e-30, 1e30
+
+DOWN: Triple = (0.0, 0.0, -1.0)
+"""The default direction of gravity."""
+
+_MACHINE = {
+    "tool": Tool,
+    "payload": Payload,
+    "actuators": Actuators,
+    "struts": Struts,
+    "guide": Guide,
+    "tolerances": Tolerances,
+}
 
 
 def _set(struct: msgspec.Struct, name: str, value: object) -> None:
@@ -170,13 +192,21 @@ class Design(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         limits: Limits of the mechanism.
         home: Home pose, whose orientation and sign triple are those of the workspace; None
             for the one that `explorer.mechanism.home` chooses.
+        tool: Frame of the tool on the platform.
+        payload: Mass that the platform carries.
+        gravity: Direction of gravity in the base frame, normalised.
+        actuators: Limits, errors and stiffness of the six actuators.
+        struts: Tubes of legs 2 and 3.
+        guide: Limits of the guide.
+        tolerances: Tolerances of the geometric dimensions.
 
     Raises:
         DesignError: A value is not finite, the design is degenerate (a3y = 0, b1y = 0 or
-            b2 = b3), or its size exceeds the range of double precision.
+            b2 = b3), its size exceeds the range of double precision, or the tool or the payload
+            lies more than a hundred reaches from b4.
     """
 
-    schema: Literal[1] = 1
+    schema: Literal[2] = 2
     name: str = "untitled"
     unit_mm: float = 10.0
     node_step: float | None = None
@@ -186,10 +216,17 @@ class Design(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     b3: float
     limits: Limits = Limits()
     home: Pose | None = None
+    tool: Tool = Tool()
+    payload: Payload = Payload()
+    gravity: Triple = DOWN
+    actuators: Actuators = Actuators()
+    struts: Struts = Struts()
+    guide: Guide = Guide()
+    tolerances: Tolerances = Tolerances()
 
     def __post_init__(self) -> None:
-        if self.schema != 1:
-            raise DesignError(f"schema must be 1; got {self.schema!r}")
+        if self.schema != 2:
+            raise DesignError(f"schema must be 2; got {self.schema!r}")
         instance("name", self.name, str)
         if len(self.name) > 100 or not self.name.isprintable():
             raise DesignError("name must be one printable line of at most 100 characters")
@@ -219,6 +256,23 @@ class Design(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
                     f"singular; it must exceed {DEGENERATE_RATIO:g} of the largest "
                     f"variable ({size:g}) in magnitude"
                 )
+        self._check_machine()
+
+    def _check_machine(self) -> None:
+        for name, kind in _MACHINE.items():
+            part = getattr(self, name)
+            if type(part) is not kind:
+                instance(name, part, kind)
+        # Searches make thousands of designs that differ in their variables only.
+        if self.gravity is not DOWN:
+            gravity = checked_gravity(self.gravity)
+            _set(self, "gravity", DOWN if gravity == DOWN else gravity)
+        for name, point in (
+            ("tool.position", self.tool.position),
+            ("payload.centre", self.payload.centre),
+        ):
+            if any(point):
+                check_near(name, point, self.reach)
 
     @property
     def variables(self) -> tuple[float, float, float, float, float, float]:

@@ -21,9 +21,25 @@ from explorer.mechanism.design import Design
 
 # Largest accepted size of a design file, in bytes.
 LARGEST_FILE = 1_000_000
-SCHEMA = 1
+SCHEMA = 2
 
-MIGRATIONS: dict[int, Callable[[dict[str, Any]], dict[str, Any]]] = {}
+# Fields that the second schema added; each may be left out.
+_OF_SECOND_SCHEMA = (*("tool", "payload", "gravity", "actuators", "struts", "guide", "tolerances"),)
+
+
+def _from_first_schema(fields: dict[str, Any]) -> dict[str, Any]:
+    """Return the fields of a design of schema 1 as those of schema 2, which only added some.
+
+    Raises:
+        DesignError: A field is of schema 2.
+    """
+    for name in _OF_SECOND_SCHEMA:
+        if name in fields:
+            raise DesignError(f'unknown field `{name}` of schema 1; it needs "schema": 2')
+    return fields
+
+
+MIGRATIONS: dict[int, Callable[[dict[str, Any]], dict[str, Any]]] = {1: _from_first_schema}
 """Conversions of a file's fields to those of the next schema, by schema."""
 
 

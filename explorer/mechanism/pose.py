@@ -147,8 +147,17 @@ def checked_rotation(rotation: ArrayLike) -> FloatArray:
 
 def _deviation(matrices: FloatArray) -> tuple[float, bool]:
     """Return the largest entry of |R Rᵀ − I|, and whether any matrix is a reflection."""
-    residual = np.abs(matrices @ np.swapaxes(matrices, -1, -2) - np.eye(3))
-    return float(residual.max(initial=0.0)), bool((np.linalg.det(matrices) < 0.0).any())
+    # Products of rows take a tenth of the time of many small matrix products.
+    rows = [[matrices[..., i, j] for j in range(3)] for i in range(3)]
+    deviation = 0.0
+    for i in range(3):
+        for j in range(i + 1):
+            product = sum(a * b for a, b in zip(rows[i], rows[j], strict=True))
+            residual = np.abs(product - float(i == j))
+            deviation = max(deviation, float(np.max(residual, initial=0.0)))
+    (ax, ay, az), (bx, by, bz), (cx, cy, cz) = rows
+    det = ax * (by * cz - bz * cy) + ay * (bz * cx - bx * cz) + az * (bx * cy - by * cx)
+    return deviation, bool((det < 0.0).any())
 
 
 def _deviation_of_one(matrix: FloatArray) -> tuple[float, bool]:

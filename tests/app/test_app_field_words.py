@@ -73,7 +73,7 @@ def test_refusals_of_the_page_hold_no_names_of_the_code(
 def test_refusal_of_a_file_names_its_field_and_the_page_says_it_in_words(
     field: str, message: str
 ) -> None:
-    data = f'{{"schema": 1, "a3": [9, 4], "b1": [4, -1], "b2": 3, "b3": 1.5, {field}}}'
+    data = f'{{"schema": 2, "a3": [9, 4], "b1": [4, -1], "b2": 3, "b3": 1.5, {field}}}'
     name = field.strip('"').partition('"')[0]
     with pytest.raises(DesignError, match=name):
         decode_design(data.encode(), "mine.json")

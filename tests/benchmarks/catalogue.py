@@ -19,6 +19,8 @@ BENCHMARKS: Mapping[str, str] = {
     "reachable": "the workspace that can be reached without collisions, against the radius",
     "nearest": "nearest singular pose of all three incidences",
     "validity": "whether poses and moves keep limits, margins and clearances",
+    "forces": "forces of the actuators in many poses",
+    "accuracy": "compliance and errors in many poses",
     "optimise": "optimal designs: iterations, precision, time, random starts",
     "studies": "many designs: a second, on two workers, on Dask, with workers killed",
     "studies_scale": "a study of a million designs: overhead of tasks, memory, files, time",

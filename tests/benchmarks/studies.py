@@ -143,7 +143,7 @@ def local_cluster() -> Any:
     """Return a Dask cluster of two processes with one thread each."""
     distributed: Any = importlib.import_module("distributed")
     return distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0"
     )
 
 

@@ -211,7 +211,7 @@ def test_sweep_scheduler_without_workers_is_reported(
     distributed: Any = importlib.import_module("distributed")
     said: list[str] = []
     with distributed.LocalCluster(
-        n_workers=0, threads_per_worker=1, processes=True, dashboard_address=None
+        n_workers=0, threads_per_worker=1, processes=True, dashboard_address=":0"
     ) as farm:
 
         def send_one(words: str) -> None:

@@ -43,7 +43,7 @@ HUGE = 10**5000
         *({"a3": (value, 1.0)} for value in (math.inf, HUGE)),
         {"b1": (1.0, -math.inf)},
         {"name": 5},
-        {"schema": 2},
+        {"schema": 3},
         {"limits": None},
         {"limits": {"gap": 1}},
         {"home": "home"},

@@ -233,7 +233,7 @@ def test_file_of_older_schema_opens_as_the_present_one_does() -> None:
     common: dict[str, Any] = {"name": "mine", "a3": [8, 5], "b1": [3, -2.5]}
     for older in ({"schema": SCHEMA - 2, "b": [2, 5]}, {"schema": SCHEMA - 1, "bs": [2, 5]}):
         design = decode(common | older)
-        assert design == decode(PLAIN | {"name": "mine"})
+        assert design == decode(PLAIN | {"schema": SCHEMA, "name": "mine"})
         assert json.loads(encode_design(design))["schema"] == SCHEMA
 
 
@@ -258,7 +258,9 @@ def test_file_of_newer_schema_is_refused_whatever_it_holds(schema: int) -> None:
 
 
 def test_file_without_schema_is_of_the_first() -> None:
-    assert decode(PLAIN).schema == 1
+    assert decode(PLAIN) == decode(PLAIN | {"schema": 1}) == decode(PLAIN | {"schema": SCHEMA})
+    assert decode(PLAIN).schema == SCHEMA
+    assert 'it needs "schema": 2' in message_of(PLAIN | {"tool": {}})
 
 
 @pytest.mark.parametrize(

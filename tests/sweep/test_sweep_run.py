@@ -698,7 +698,7 @@ def test_run_on_dask_with_a_killed_worker_writes_the_same_bytes(
     distributed: Any = importlib.import_module("distributed")
     with (
         distributed.LocalCluster(
-            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0"
         ) as farm,
         distributed.Client(farm) as client,
     ):

@@ -118,7 +118,7 @@ def _mesh(command: Export, file_format: str) -> tuple[bytes, Facts]:
         return _step(command)
     command.refuse("density", "masses", "position")
     check_format(file_format)
-    design = command.load()
+    design = command.read_design()
     from explorer.workspace.solids.solids import convex_hull, workspace_solid
 
     solid = workspace_solid(design, command.oriented_home(design).rotation, command.tolerance)
@@ -134,7 +134,7 @@ def _step(command: Export) -> tuple[bytes, Facts]:
 
     command.refuse("tolerance", "density", "masses", "position")
     check_extra()
-    design = command.load()
+    design = command.read_design()
     solid = exact_workspace(design, command.oriented_home(design).rotation)
     volume = solid.volume / design.unit_mm**3
     facts = {"format": "step", "volume": volume, "faces": len(solid.limit_of_face)}
@@ -156,11 +156,11 @@ def _mechanism(command: Export, file_format: str) -> tuple[bytes, Facts]:
         from explorer.export.step_assembly import assembly_step
 
         check_extra()
-        prototype = make_prototype(command.load())
+        prototype = make_prototype(command.read_design())
         data = assembly_step(prototype.sizes)
     else:
         check_format(file_format)
-        prototype = make_prototype(command.load())
+        prototype = make_prototype(command.read_design())
         data = assembly_bytes(prototype, file_format)
     bill = bill_of_materials(prototype, command.density or DENSITY)
     parts = [
@@ -188,7 +188,7 @@ def _simulation(command: Export, file_format: str) -> tuple[bytes, Facts]:
     command.refuse("tolerance", "position", "quaternion", "yaw_pitch_roll", "tilt_torsion")
     if file_format not in ("mjcf", "xml"):
         raise InputError(f"no simulation format {file_format!r}; there is mjcf")
-    design, density = command.load(), command.density or DENSITY
+    design, density = command.read_design(), command.density or DENSITY
     masses = None
     if command.masses == "parts":
         from explorer.prototype.assembly import make_prototype
@@ -203,7 +203,7 @@ def _scene(command: Export, file_format: str) -> tuple[bytes, Facts]:
     command.refuse("tolerance", "density", "masses")
     if file_format not in ("html", "htm"):
         raise InputError(f"no format {file_format!r} of the scene; there is html")
-    design = command.load()
+    design = command.read_design()
     pose = command.pose(design)
     import datetime as dt
 

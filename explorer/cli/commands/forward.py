@@ -42,7 +42,7 @@ class Forward(JsonOptions, DesignOptions):
         Raises:
             NoAnswerError: The lengths do not close.
         """
-        design = self.load()
+        design = self.read_design()
         joints = checked_joints(design, self.joints)
         squares, modes = discriminants(design, joints), forward(design, joints)
         if self.json:

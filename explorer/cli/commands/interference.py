@@ -65,7 +65,7 @@ class Interference(JsonOptions, RadiiOptions, PoseOptions, DesignOptions):
 
     def run(self) -> None:
         """Write the clearances of the pose or of the move."""
-        design = self.with_radii(self.load())
+        design = self.with_radii(self.read_design())
         start = self.pose(design)
         here = evaluate(design, start)
         target = (self.to, self.to_quaternion, self.to_yaw_pitch_roll, self.to_tilt_torsion)

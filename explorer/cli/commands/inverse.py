@@ -20,7 +20,7 @@ class Inverse(JsonOptions, PoseOptions, DesignOptions):
 
     def run(self) -> None:
         """Write the joints of the pose."""
-        design = self.load()
+        design = self.read_design()
         snapshot = evaluate(design, self.pose(design))
         self.write(
             lambda: {"joints": snapshot.joints, **limits_json(snapshot)}, lambda: _lines(snapshot)

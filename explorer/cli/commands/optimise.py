@@ -176,7 +176,7 @@ class Optimise(JsonOptions, DesignOptions):
 
     def _start(self) -> Design:
         """Return the start of the search, whose home is fixed before the box changes."""
-        design = self.load()
+        design = self.read_design()
         if self.box is None:
             return design
         from explorer.optimise.refutation.refutation import with_box

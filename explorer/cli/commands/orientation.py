@@ -47,7 +47,7 @@ class Orientation(JsonOptions, DesignOptions):
         from explorer.workspace.orientation_share import orientation_share
         from explorer.workspace.tilts import greatest_tilt, is_connected, tilt_map, torsion_range
 
-        design = self.load()
+        design = self.read_design()
         home = home_pose(design)
         position = home.position if self.position is None else self.position
         found = _Orientations(

@@ -126,7 +126,7 @@ class Path(JsonOptions, RadiiOptions, DesignOptions):
         from explorer.paths.planning import EndError, NoPathError, plan_path
         from explorer.paths.trajectory import trajectory
 
-        design = self.with_radii(self.load())
+        design = self.with_radii(self.read_design())
         starts = (
             self.from_,
             self.from_quaternion,

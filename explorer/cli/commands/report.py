@@ -41,7 +41,7 @@ class Report(JsonOptions, PoseOptions, DesignOptions):
         start = time.monotonic()
         file_format = format_of(self.out)
         check_writable(self.out)
-        design = self.load()
+        design = self.read_design()
         pose = self.pose(design)
         record = None
         if self.record is not None:

@@ -47,7 +47,7 @@ class Screenshot(JsonOptions, PoseOptions, DesignOptions):
         if self.out.suffix.lower() != ".png":
             raise InputError(f"--out must end in .png; got {str(self.out)!r}")
         check_writable(self.out)
-        design = self.load()
+        design = self.read_design()
         pose = self.pose(design)
         from explorer.app.screenshot import take
 

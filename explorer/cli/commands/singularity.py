@@ -35,7 +35,7 @@ class Singularity(JsonOptions, PoseOptions, DesignOptions):
 
     def run(self) -> None:
         """Write the margins of the pose and the measures of singularity."""
-        design = self.load()
+        design = self.read_design()
         snapshot = evaluate(design, self.pose(design))
         self.write(lambda: _as_json(snapshot), lambda: _as_lines(snapshot))
 

@@ -85,7 +85,7 @@ class Workspace(JsonOptions, RadiiOptions, OrientationOptions, DesignOptions):
 
             self.write(as_json, as_lines)
             return
-        design = self.with_radii(self.load())
+        design = self.with_radii(self.read_design())
         pose = self.oriented_home(design)
         measures = self._measure(design, pose, self._orientations(pose))
         angles = "  ".join(degrees(yaw_pitch_roll_from_rotation(pose.rotation).tolist()))

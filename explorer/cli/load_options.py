@@ -1,0 +1,73 @@
+"""The options of the load that the commands of statics share."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+import msgspec
+import numpy as np
+
+from explorer.cli.options import DesignOptions, JsonOptions, PoseOptions
+from explorer.cli.values import hint, load_numbers, not_negative
+from explorer.errors import NoAnswerError
+from explorer.mechanism.design import Design
+from explorer.mechanism.machine import Payload
+from explorer.mechanism.margins import INCIDENCES, margins
+from explorer.mechanism.pose import Pose, Triple
+from explorer.numerics.arrays import FloatArray
+from explorer.statics.equilibrium import SINGULAR
+
+Load = tuple[float, float, float, float, float, float]
+At = Literal["b4", "tool"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoadOptions(JsonOptions, PoseOptions, DesignOptions):
+    """The options for a load on the platform in a pose."""
+
+    load: Annotated[Load, load_numbers("--load"), hint("default: none")] = (
+        *(0.0, 0.0, 0.0),
+        *(0.0, 0.0, 0.0),
+    )
+    """Force in N and moment in N × unit on the platform, along the axes of the base."""
+
+    payload: Annotated[
+        float | None, not_negative("--payload"), hint("default: that of the design")
+    ] = None
+    """Mass of the payload, in kg; its weight is added to the load."""
+
+    at: At = "b4"
+    """Point at which the load acts and for which results hold: b4 or the design's tool."""
+
+    def read_loaded_design(self) -> Design:
+        """Return the design with the given mass of the payload.
+
+        Raises:
+            DesignError: There is no such design, or the file holds none.
+        """
+        design = self.read_design()
+        if self.payload is None:
+            return design
+        payload = Payload(self.payload, design.payload.centre)
+        return msgspec.structs.replace(design, payload=payload)
+
+    def tool(self, design: Design) -> Triple:
+        """Return the point of the load in the platform frame, in design units."""
+        return design.tool.position if self.at == "tool" else (0.0, 0.0, 0.0)
+
+
+def check_regular(pose: Pose, values: FloatArray) -> None:
+    """Check that results of a pose are finite.
+
+    Raises:
+        NoAnswerError: The pose is singular, so that no forces hold a load.
+    """
+    if np.isfinite(values).all():
+        return
+    least = SINGULAR * float(np.linalg.norm(pose.position))
+    margin = np.abs(margins(pose.position, pose.rotation))
+    zero = [f"δ{k + 1} = 0: {INCIDENCES[k]}" for k in np.flatnonzero(margin <= least)]
+    raise NoAnswerError(
+        f"the pose is singular ({'; '.join(zero)}): the forces that hold a load are infinite"
+    )

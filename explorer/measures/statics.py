@@ -1,0 +1,105 @@
+"""Loads, errors and compliance over the required box, at the nodes of a grid.
+
+Forces are not linear in the position, so corners alone do not bound them; the grid has the corners
+among its nodes. Where a margin changes its sign within the box, all of them are infinite.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from explorer.measures.size import corners_of
+from explorer.mechanism.design import Design
+from explorer.mechanism.margins import margins
+from explorer.mechanism.pose import Triple
+from explorer.numerics.arrays import FloatArray
+from explorer.statics.accuracy import actuator_errors, worst_error
+from explorer.statics.compliance import compliance, principal_compliances, stiffness_of
+from explorer.statics.reactions import Reactions, largest_payload, limit_shares, reactions
+from explorer.statics.weights import design_weights
+
+BOX_NODES = 9
+"""Number of nodes on each axis of the required box."""
+
+
+@dataclass(frozen=True)
+class BoxStatics:
+    """A design under its payload over a box, at one orientation.
+
+    Attributes:
+        design: The manipulator.
+        box: Lows and highs of the positions, in design units.
+        rotation: Platform to base, shape (3, 3).
+    """
+
+    design: Design
+    box: tuple[Triple, Triple]
+    rotation: FloatArray
+
+    @cached_property
+    def is_regular(self) -> bool:
+        """Whether no margin changes its sign or vanishes within the box."""
+        signs = np.sign(margins(corners_of(self.box), self.rotation))
+        return bool((np.abs(signs.sum(axis=0)) == len(signs)).all())
+
+    @cached_property
+    def positions(self) -> FloatArray:
+        """Nodes of the grid, shape (n, 3)."""
+        axes = [np.linspace(*ends, BOX_NODES) for ends in zip(*self.box, strict=True)]
+        return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+
+    @cached_property
+    def held(self) -> Reactions:
+        """The reactions to the weight of the payload."""
+        weights = design_weights(self.design)
+        return reactions(self.design, self.positions, self.rotation, np.zeros(6), weights=weights)
+
+    @cached_property
+    def shares(self) -> FloatArray:
+        """The largest shares of the limits over the nodes, shape (12,), as in `LIMITED`."""
+        return limit_shares(self.design, self.held).max(axis=0)
+
+    @property
+    def largest_share(self) -> float:
+        """The largest share of any limit."""
+        return float(self.shares.max()) if self.is_regular else np.inf
+
+    @property
+    def worst_actuator(self) -> float:
+        """The place in `JOINTS`, from 1, of the actuator with the largest share."""
+        return float(self.shares[:6].argmax() + 1) if self.is_regular else np.inf
+
+    @property
+    def largest_bending(self) -> float:
+        """The largest bending moment of a strut, in N m."""
+        metres = 1e-3 * self.design.unit_mm
+        return metres * float(self.held.bending.max()) if self.is_regular else np.inf
+
+    @property
+    def largest_payload(self) -> float:
+        """The largest mass in place of the payload that keeps all limits everywhere, in kg."""
+        if not self.is_regular:
+            return 0.0
+        return float(largest_payload(self.design, self.positions, self.rotation).min())
+
+    @property
+    def worst_error(self) -> float:
+        """The worst displacement of the tool by the actuators' errors, in design units."""
+        if not self.is_regular:
+            return np.inf
+        errors, tool = actuator_errors(self.design), self.design.tool.position
+        found = worst_error(self.design, self.positions, self.rotation, errors, tool)
+        return float(found.displacement.max())
+
+    @property
+    def softest_compliance(self) -> float:
+        """The largest displacement of the tool per force, in mm/N."""
+        if not self.is_regular:
+            return np.inf
+        stiffness, tool = stiffness_of(self.design), self.design.tool.position
+        found = compliance(self.design, self.positions, self.rotation, *stiffness, tool)
+        softest = principal_compliances(found).displacement.max()
+        return self.design.unit_mm * float(softest)

@@ -1,0 +1,277 @@
+"""The machine around the mechanism: tool, payload, actuators, struts, guide and tolerances.
+
+None of it changes the kinematics. Points are in design units like those of the design; the data
+of bought components keep the units of their data sheets, which the names of the fields state.
+Every default means an ideal part: no mass, no limit, no error and no deflection.
+"""
+
+from __future__ import annotations
+
+import math
+
+import msgspec
+import numpy as np
+
+from explorer.errors import DesignError
+from explorer.mechanism.pose import Quadruple, Triple
+from explorer.numerics.arrays import FloatArray
+from explorer.numerics.checks import not_negative, number, numbers, positive, two
+
+Pair = tuple[float, float]
+Six = tuple[float, float, float, float, float, float]
+
+STANDARD_GRAVITY = 9.80665
+"""Standard acceleration of gravity, in m/s²."""
+
+LARGEST_DISTANCE = 100.0
+"""Largest distance of the tool and of the payload's centre from b4, as a multiple of the reach."""
+
+DIMENSIONS = (
+    *(f"a1{axis}" for axis in "xyz"),
+    *(f"a3{axis}" for axis in "xyz"),
+    *(f"guide {axis}" for axis in "xyz"),
+    *("guide tilt y", "guide tilt z"),
+    *(f"b{point}{axis}" for point in (1, 2, 3, 4) for axis in "xyz"),
+)
+"""The 23 geometric dimensions: points of the base, offset and tilt of the guide, points of the
+platform, in the order of every array axis of 23."""
+
+
+def _set(struct: msgspec.Struct, name: str, value: object) -> None:
+    msgspec.structs.force_setattr(struct, name, value)
+
+
+class Tool(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The frame of the tool in the platform frame.
+
+    Attributes:
+        position: Tool point, in design units.
+        quaternion: Orientation (w, x, y, z) from the tool frame to the platform frame,
+            normalised.
+
+    Raises:
+        DesignError: A value is not finite, or the quaternion is zero.
+    """
+
+    position: Triple = (0.0, 0.0, 0.0)
+    quaternion: Quadruple = (1.0, 0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        _set(self, "position", tuple(numbers("tool.position", self.position, 3)))
+        name = "tool.quaternion"
+        _set(self, "quaternion", _unit(name, numbers(name, self.quaternion, 4)))
+
+
+class Payload(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A mass that the platform carries.
+
+    Attributes:
+        mass_kg: Mass, in kilograms.
+        centre: Centre of mass in the platform frame, in design units.
+
+    Raises:
+        DesignError: The mass is negative, or a value is not finite.
+    """
+
+    mass_kg: float = 0.0
+    centre: Triple = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        _set(self, "mass_kg", not_negative("payload.mass_kg", self.mass_kg))
+        _set(self, "centre", tuple(numbers("payload.centre", self.centre, 3)))
+
+
+class Actuators(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Data of the six actuators, each six numbers in the order of `JOINTS`.
+
+    Attributes:
+        push_n: Largest force that increases the joint's value, in newtons; None for no limit.
+        pull_n: Largest force that decreases it, in newtons; None for the same as `push_n`.
+        error_mm: Largest positioning error to either side, in millimetres.
+        stiffness_n_mm: Stiffness, in newtons per millimetre; None for rigid actuators.
+
+    Raises:
+        DesignError: A limit or a stiffness is not positive, an error is negative, or there are
+            not six numbers.
+    """
+
+    push_n: Six | None = None
+    pull_n: Six | None = None
+    error_mm: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    stiffness_n_mm: Six | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("push_n", "pull_n", "stiffness_n_mm"):
+            values = getattr(self, name)
+            if values is not None:
+                field = f"actuators.{name}"
+                checked = tuple(positive(field, value) for value in numbers(field, values, 6))
+                _set(self, name, checked)
+        errors = numbers("actuators.error_mm", self.error_mm, 6)
+        _set(self, "error_mm", tuple(not_negative("actuators.error_mm", each) for each in errors))
+
+    @property
+    def limits(self) -> tuple[FloatArray, FloatArray]:
+        """Largest push and largest pull, each of shape (6,), in newtons; infinite for no limit."""
+        push = self.push_n or (math.inf,) * 6
+        return np.array(push), np.array(self.pull_n or push)
+
+
+class Struts(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The struts of legs 2 and 3, tubes that are cantilevers on their carriages.
+
+    Attributes:
+        outer_mm: Outer diameter of the tube, in millimetres; None for a rigid strut.
+        inner_mm: Inner diameter, in millimetres; 0 for a bar.
+        modulus_gpa: Young's modulus, in gigapascals.
+        stress_mpa: Largest bending stress, in megapascals; None for no limit.
+        moment_nm: Largest bending moment, in newton metres, in place of that of tube and stress;
+            None to use those.
+
+    Raises:
+        DesignError: A value is not positive, or the inner diameter is not below the outer one.
+    """
+
+    outer_mm: float | None = None
+    inner_mm: float = 0.0
+    modulus_gpa: float = 70.0
+    stress_mpa: float | None = None
+    moment_nm: float | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("outer_mm", "modulus_gpa", "stress_mpa", "moment_nm"):
+            value = getattr(self, name)
+            if value is not None or name == "modulus_gpa":
+                _set(self, name, positive(f"struts.{name}", value))
+        _set(self, "inner_mm", not_negative("struts.inner_mm", self.inner_mm))
+        if self.outer_mm is not None and self.inner_mm >= self.outer_mm:
+            raise DesignError(
+                f"struts.inner_mm must be below the outer diameter {self.outer_mm:g}; "
+                f"got {self.inner_mm:g}",
+                "struts.inner_mm",
+            )
+
+    @property
+    def largest_moment(self) -> float:
+        """Largest bending moment, in newton metres; infinite for no limit."""
+        if self.moment_nm is not None:
+            return self.moment_nm
+        if self.outer_mm is None or self.stress_mpa is None:
+            return math.inf
+        # Newton millimetres, since a megapascal is a newton per square millimetre.
+        return self.stress_mpa * self._area_moment / (0.5 * self.outer_mm) * 1e-3
+
+    @property
+    def bending_stiffness(self) -> float:
+        """Bending stiffness EI, in newton square millimetres; infinite for a rigid strut."""
+        return math.inf if self.outer_mm is None else 1e3 * self.modulus_gpa * self._area_moment
+
+    @property
+    def _area_moment(self) -> float:
+        """Second moment of area of the tube, in millimetres to the fourth power."""
+        return math.pi / 64.0 * ((self.outer_mm or 0.0) ** 4 - self.inner_mm**4)
+
+
+class Guide(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Limits of the guide at each of its two carriages; None for no limit.
+
+    Attributes:
+        force_n: Largest force across the guide, in newtons.
+        moment_nm: Largest moment, in newton metres.
+
+    Raises:
+        DesignError: A limit is not positive.
+    """
+
+    force_n: float | None = None
+    moment_nm: float | None = None
+
+    def __post_init__(self) -> None:
+        for name in self.__struct_fields__:
+            value = getattr(self, name)
+            if value is not None:
+                _set(self, name, positive(f"guide.{name}", value))
+
+
+class Tolerances(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Largest deviations of the 23 geometric dimensions to either side.
+
+    Attributes:
+        a1, a3: Of these points along the axes of the base, in millimetres.
+        guide: Of the guide's offset along the axes of the base, in millimetres.
+        guide_tilt_deg: Of the guide's turn about y and z through a1, in degrees.
+        b1, b2, b3, b4: Of these points along the axes of the platform, in millimetres.
+
+    Raises:
+        DesignError: A tolerance is negative or not finite.
+    """
+
+    a1: Triple = (0.0, 0.0, 0.0)
+    a3: Triple = (0.0, 0.0, 0.0)
+    guide: Triple = (0.0, 0.0, 0.0)
+    guide_tilt_deg: Pair = (0.0, 0.0)
+    b1: Triple = (0.0, 0.0, 0.0)
+    b2: Triple = (0.0, 0.0, 0.0)
+    b3: Triple = (0.0, 0.0, 0.0)
+    b4: Triple = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        for name in self.__struct_fields__:
+            field, values = f"tolerances.{name}", getattr(self, name)
+            given = two(field, values) if name == "guide_tilt_deg" else numbers(field, values, 3)
+            _set(self, name, tuple(not_negative(field, value) for value in given))
+
+    def values(self, unit_mm: float) -> FloatArray:
+        """Return the tolerances in the order of `DIMENSIONS`, shape (23,).
+
+        Offsets are in design units, tilts in radians.
+
+        Args:
+            unit_mm: Millimetres in one design unit.
+        """
+        lengths = [*self.a1, *self.a3, *self.guide]
+        points = [*self.b1, *self.b2, *self.b3, *self.b4]
+        return np.concatenate(
+            [
+                np.array(lengths) / unit_mm,
+                np.radians(self.guide_tilt_deg),
+                np.array(points) / unit_mm,
+            ]
+        )
+
+
+def checked_gravity(value: object) -> Triple:
+    """Return a direction of gravity as a unit vector in the base frame.
+
+    Raises:
+        DesignError: It is not three finite numbers, or is zero.
+    """
+    x, y, z = _unit("gravity", numbers("gravity", value, 3))
+    return x, y, z
+
+
+def check_near(name: str, point: Triple, reach: float) -> None:
+    """Check that a point of the platform lies within `LARGEST_DISTANCE` of b4.
+
+    Raises:
+        DesignError: It lies farther away.
+    """
+    distance, most = math.hypot(*point), LARGEST_DISTANCE * reach
+    if distance > most:
+        raise DesignError(
+            f"{name} must lie within {LARGEST_DISTANCE:g} reaches ({most:g}) of b4; "
+            f"got a distance of {distance:g}",
+            name,
+        )
+
+
+def _unit(name: str, values: list[float]) -> tuple[float, ...]:
+    """Return a vector of unit length; one that has it already stays the same to the last bit."""
+    size = max(map(abs, values))
+    if size == 0.0:
+        raise DesignError(f"{name} must not be all zeros", name)
+    scaled = [number(name, value / size) for value in values]
+    norm = math.hypot(*scaled)
+    if abs(norm * size - 1.0) <= 4e-16:
+        return tuple(values)
+    return tuple(value / norm for value in scaled)

@@ -1,0 +1,350 @@
+"""Errors of the tool from the actuators' errors and from the geometric dimensions.
+
+The model is linear: the tool moves by J⁻¹ times the errors of the joints, and by −J⁻¹ ∂q/∂g times
+the errors of the dimensions g while the actuators hold their values.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from explorer.errors import InputError
+from explorer.mechanism.design import Design
+from explorer.mechanism.machine import DIMENSIONS
+from explorer.numerics.arrays import FloatArray
+from explorer.numerics.compiled import helper, kernel
+from explorer.statics.compliance import compliance_of, stiffness_of
+from explorer.statics.equilibrium import A3X, A3Y, B1X, B1Y, B2, B3, Poses
+
+# First columns of the dimensions, in the order of `DIMENSIONS`.
+A1_COLUMN, A3_COLUMN, GUIDE_COLUMN, TILT_COLUMN, B_COLUMN = 0, 3, 6, 9, 11
+
+# Corners of the cube of the actuators' errors, up to a common sign.
+CORNERS = 32
+
+
+class ToolError(NamedTuple):
+    """An error of the tool; infinite in a singular pose.
+
+    Attributes:
+        displacement: Displacement of the tool point, shape (...), in design units.
+        turn: Turn of the tool, shape (...), in radians.
+    """
+
+    displacement: FloatArray
+    turn: FloatArray
+
+
+class Precision(NamedTuple):
+    """All of the precision of poses, from one inversion of J; infinite in singular poses.
+
+    Attributes:
+        compliance: C at the tool, shape (..., 6, 6), as of `explorer.compliance`.
+        worst: Largest errors for actuator errors within their bounds.
+        rms: Root-mean-square errors, with the bounds as standard deviations.
+        by_actuator: Errors of each actuator alone, with axes of six in the order of `JOINTS`.
+        by_geometry: Error of the tool per error of each dimension, shape (..., 6, 23).
+    """
+
+    compliance: FloatArray
+    worst: ToolError
+    rms: ToolError
+    by_actuator: ToolError
+    by_geometry: FloatArray
+
+
+@helper
+def largest_at_corners(twists: FloatArray, row: int, errors: FloatArray) -> float:
+    """Return the largest |Σ ± e_i v_i| over all signs, with v_i three rows of J⁻¹ from `row`."""
+    x, y, z = 0.0, 0.0, 0.0
+    for i in range(6):
+        x += errors[i] * twists[row, i]
+        y += errors[i] * twists[row + 1, i]
+        z += errors[i] * twists[row + 2, i]
+    largest = x * x + y * y + z * z
+    signs = 0
+    for corner in range(1, CORNERS):
+        # Gray code: one sign changes from a corner to the next.
+        i = 0
+        while corner >> i & 1 == 0:
+            i += 1
+        twice = 2.0 * errors[i] if signs >> i & 1 else -2.0 * errors[i]
+        signs ^= 1 << i
+        x += twice * twists[row, i]
+        y += twice * twists[row + 1, i]
+        z += twice * twists[row + 2, i]
+        largest = max(largest, x * x + y * y + z * z)
+    return math.sqrt(largest)
+
+
+@kernel("void(f8[:,:,::1], f8[:,::1], f8[:,:,::1])")
+def error_rows(twists: FloatArray, errors: FloatArray, out: FloatArray) -> None:
+    """Write the errors of n poses, shape (n, 2, 8): displacement and turn.
+
+    The eight columns are the worst, the root mean square, and those of each actuator alone.
+    """
+    for k in range(twists.shape[0]):
+        e = errors[k % errors.shape[0]]
+        if math.isinf(twists[k, 0, 0]):
+            for i in range(8):
+                out[k, 0, i] = math.inf
+                out[k, 1, i] = math.inf
+            continue
+        for half in range(2):
+            row = 3 * half
+            total = 0.0
+            for i in range(6):
+                x, y, z = twists[k, row, i], twists[k, row + 1, i], twists[k, row + 2, i]
+                square = e[i] * e[i] * (x * x + y * y + z * z)
+                out[k, half, 2 + i] = math.sqrt(square)
+                total += square
+            out[k, half, 0] = largest_at_corners(twists[k], row, e)
+            out[k, half, 1] = math.sqrt(total)
+
+
+@kernel("void(f8[::1], f8[:,::1], f8[:,:,::1], f8[:,:,::1], f8[:,:,::1])")
+def geometry_rows(
+    x: FloatArray,
+    position: FloatArray,
+    rotation: FloatArray,
+    twists: FloatArray,
+    out: FloatArray,
+) -> None:
+    """Write −J⁻¹ ∂q/∂g of n poses, shape (n, 6, 23), infinite in singular ones."""
+    dq = np.zeros((6, 23))
+    for k in range(position.shape[0]):
+        if math.isinf(twists[k, 0, 0]):
+            for row in range(6):
+                for i in range(23):
+                    out[k, row, i] = math.inf
+            continue
+        p, r = position[k], rotation[k]
+        # Legs 1 and 4: from a1 to b1 and from a3 to b4.
+        for leg in range(2):
+            joint = 5 * leg
+            base = A3_COLUMN if leg == 1 else A1_COLUMN
+            end = B_COLUMN + 9 * leg
+            if leg == 0:
+                cx = p[0] + x[B1X] * r[0, 0] + x[B1Y] * r[0, 1]
+                cy = p[1] + x[B1X] * r[1, 0] + x[B1Y] * r[1, 1]
+                cz = p[2] + x[B1X] * r[2, 0] + x[B1Y] * r[2, 1]
+            else:
+                cx, cy, cz = p[0] - x[A3X], p[1] - x[A3Y], p[2]
+            length = math.sqrt(cx * cx + cy * cy + cz * cz)
+            cx, cy, cz = cx / length, cy / length, cz / length
+            dq[joint, base], dq[joint, base + 1], dq[joint, base + 2] = -cx, -cy, -cz
+            for i in range(3):
+                dq[joint, end + i] = cx * r[0, i] + cy * r[1, i] + cz * r[2, i]
+        # Legs 2 and 3: the place along the guide, and the distance from it.
+        for leg in range(2):
+            joint, end = 1 + 2 * leg, B_COLUMN + 3 + 3 * leg
+            b = x[B3] if leg == 1 else x[B2]
+            d, cy, cz = p[0] + b * r[0, 0], p[1] + b * r[1, 0], p[2] + b * r[2, 0]
+            radius = math.sqrt(cy * cy + cz * cz)
+            uy, uz = cy / radius, cz / radius
+            dq[joint, GUIDE_COLUMN] = -1.0
+            dq[joint, TILT_COLUMN], dq[joint, TILT_COLUMN + 1] = -cz, cy
+            dq[joint + 1, GUIDE_COLUMN + 1], dq[joint + 1, GUIDE_COLUMN + 2] = -uy, -uz
+            dq[joint + 1, TILT_COLUMN], dq[joint + 1, TILT_COLUMN + 1] = d * uz, -d * uy
+            for i in range(3):
+                dq[joint, end + i] = r[0, i]
+                dq[joint + 1, end + i] = uy * r[1, i] + uz * r[2, i]
+        for row in range(6):
+            for i in range(23):
+                out[k, row, i] = 0.0
+            for joint in range(6):
+                share = -twists[k, row, joint]
+                for i in range(23):
+                    out[k, row, i] += share * dq[joint, i]
+
+
+def worst_error(
+    design: Design,
+    position: ArrayLike,
+    rotation: ArrayLike,
+    errors: ArrayLike,
+    tool: ArrayLike | None = None,
+) -> ToolError:
+    """Return the largest displacement and the largest turn for actuator errors within ±errors.
+
+    They are the largest over the 64 corners of the cube of errors, exact for the linear model.
+    Both are infinite in a singular pose.
+
+    Args:
+        design: The manipulator.
+        position: b4 in the base frame, shape (..., 3), in design units.
+        rotation: Platform to base, shape (..., 3, 3).
+        errors: Bounds of the errors, shape (..., 6), in design units, not negative.
+        tool: Tool point in the platform frame, shape (..., 3), in design units; None for b4.
+
+    Raises:
+        InputError: An error is negative, a value is not finite, the rotation is not one, or batch
+            axes do not broadcast.
+    """
+    return _errors(design, position, rotation, errors, tool)[0]
+
+
+def rms_error(
+    design: Design,
+    position: ArrayLike,
+    rotation: ArrayLike,
+    deviations: ArrayLike,
+    tool: ArrayLike | None = None,
+) -> ToolError:
+    """Return the root-mean-square errors for independent actuator errors.
+
+    Both are infinite in a singular pose.
+
+    Args:
+        design: The manipulator.
+        position: b4 in the base frame, shape (..., 3), in design units.
+        rotation: Platform to base, shape (..., 3, 3).
+        deviations: Standard deviations of the errors, shape (..., 6), in design units.
+        tool: Tool point in the platform frame, shape (..., 3), in design units; None for b4.
+
+    Raises:
+        InputError: A deviation is negative, a value is not finite, the rotation is not one, or
+            batch axes do not broadcast.
+    """
+    return _errors(design, position, rotation, deviations, tool)[1]
+
+
+def error_by_actuator(
+    design: Design,
+    position: ArrayLike,
+    rotation: ArrayLike,
+    errors: ArrayLike,
+    tool: ArrayLike | None = None,
+) -> ToolError:
+    """Return the errors that each actuator's error alone causes, each of shape (..., 6).
+
+    Args:
+        design: The manipulator.
+        position: b4 in the base frame, shape (..., 3), in design units.
+        rotation: Platform to base, shape (..., 3, 3).
+        errors: Errors of the actuators, shape (..., 6), in design units, not negative.
+        tool: Tool point in the platform frame, shape (..., 3), in design units; None for b4.
+
+    Raises:
+        InputError: An error is negative, a value is not finite, the rotation is not one, or batch
+            axes do not broadcast.
+    """
+    return _errors(design, position, rotation, errors, tool)[2]
+
+
+def pose_error_by_geometry(
+    design: Design, position: ArrayLike, rotation: ArrayLike, tool: ArrayLike | None = None
+) -> FloatArray:
+    """Return the tool's error per error of each dimension, −J⁻¹ ∂q/∂g, shape (..., 6, 23).
+
+    Rows are the displacement and the turn of the tool, base axes, while the actuators hold their
+    values. Columns have the order of `explorer.mechanism.machine.DIMENSIONS`: a1, a3 and the
+    guide's offset along base axes, the guide's tilt about y and z through a1, and b1 to b4 along
+    platform axes. Offsets are in design units, tilts in radians. All entries are infinite in a
+    singular pose.
+
+    Args:
+        design: The manipulator.
+        position: b4 in the base frame, shape (..., 3), in design units.
+        rotation: Platform to base, shape (..., 3, 3).
+        tool: Tool point in the platform frame, shape (..., 3), in design units; None for b4.
+
+    Raises:
+        InputError: The position or the tool is not finite, or the rotation is not one.
+    """
+    poses = Poses(design, position, rotation, tool)
+    out = _by_geometry(poses, poses.inverse_jacobians())
+    return out.reshape(*poses.batch, 6, len(DIMENSIONS))
+
+
+def pose_precision(
+    design: Design,
+    position: ArrayLike,
+    rotation: ArrayLike,
+    tool: ArrayLike | None = None,
+) -> Precision:
+    """Return all of the precision of poses, with the design's own stiffness and errors.
+
+    Args:
+        design: The manipulator, with its actuators and struts.
+        position: b4 in the base frame, shape (..., 3), in design units.
+        rotation: Platform to base, shape (..., 3, 3).
+        tool: Tool point in the platform frame, shape (..., 3), in design units; None for b4.
+
+    Raises:
+        InputError: The position or the tool is not finite, or the rotation is not one.
+    """
+    poses = Poses(design, position, rotation, tool)
+    twists = poses.inverse_jacobians()
+    stiffness, bending = stiffness_of(design)
+    softness = compliance_of(poses, twists, 1.0 / stiffness, 1.0 / (3.0 * bending))
+    worst, rms, single = _errors_of(poses, twists, actuator_errors(design))
+    return Precision(
+        softness.reshape(*poses.batch, 6, 6),
+        worst,
+        rms,
+        single,
+        _by_geometry(poses, twists).reshape(*poses.batch, 6, len(DIMENSIONS)),
+    )
+
+
+def actuator_errors(design: Design) -> FloatArray:
+    """Return the largest errors of a design's actuators, shape (6,), in design units."""
+    return np.array(design.actuators.error_mm) / design.unit_mm
+
+
+def geometry_error(design: Design, by_geometry: FloatArray) -> ToolError:
+    """Return the largest error per dimension within the design's tolerances, shapes (..., 23).
+
+    Args:
+        design: The manipulator, with its tolerances.
+        by_geometry: Tool errors per error of each dimension, shape (..., 6, 23).
+    """
+    tolerances = design.tolerances.values(design.unit_mm)
+    sizes = [
+        np.sqrt(np.einsum("...ij,...ij->...j", half, half))
+        for half in (by_geometry[..., :3, :], by_geometry[..., 3:, :])
+    ]
+    infinite = np.isinf(sizes[0]) & (tolerances == 0.0)
+    moved, turned = (np.where(infinite, 0.0, size) * tolerances for size in sizes)
+    return ToolError(moved, turned)
+
+
+def _by_geometry(poses: Poses, twists: FloatArray) -> FloatArray:
+    out = np.empty((poses.count, 6, len(DIMENSIONS)))
+    geometry_rows(poses.count, poses.variables, poses.positions, poses.rotations, twists, out)
+    return out
+
+
+def _errors(
+    design: Design,
+    position: ArrayLike,
+    rotation: ArrayLike,
+    errors: ArrayLike,
+    tool: ArrayLike | None,
+) -> tuple[ToolError, ToolError, ToolError]:
+    e = np.asarray(errors, dtype=np.float64)
+    if e.shape[-1:] != (6,) or not (np.isfinite(e) & (e >= 0.0)).all():
+        text = np.array2string(e, threshold=12).replace("\n", "")
+        raise InputError(
+            f"the errors of the actuators must be six finite numbers, none negative; got {text}"
+        )
+    poses = Poses(design, position, rotation, tool, (e, 1))
+    return _errors_of(poses, poses.inverse_jacobians(), e)
+
+
+def _errors_of(
+    poses: Poses, twists: FloatArray, errors: FloatArray
+) -> tuple[ToolError, ToolError, ToolError]:
+    out = np.empty((poses.count, 2, 8))
+    error_rows(poses.count, twists, poses.rows_or_one(errors), out)
+    halves = out.reshape(*poses.batch, 2, 8)
+    return (
+        ToolError(halves[..., 0, 0], halves[..., 1, 0]),
+        ToolError(halves[..., 0, 1], halves[..., 1, 1]),
+        ToolError(halves[..., 0, 2:], halves[..., 1, 2:]),
+    )

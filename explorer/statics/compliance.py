@@ -1,0 +1,260 @@
+"""Compliance of the tool: how far a load moves it, and what gives way.
+
+C = J⁻¹ diag(c) J⁻ᵀ with c = 1 / k for each actuator. The struts of legs 2 and 3 are cantilevers on
+their carriages: they add d2³ / 3EI to c(d1) and d4³ / 3EI to c(d3). The model is linear about the
+unloaded pose and has no preload terms, which matter only if forces approach stiffness × length.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from explorer.errors import InputError
+from explorer.mechanism.design import Design
+from explorer.numerics.arrays import FloatArray, finite_array
+from explorer.numerics.compiled import helper, kernel
+from explorer.statics.equilibrium import B2, B3, Poses
+
+
+class PrincipalCompliances(NamedTuple):
+    """The principal values and directions of a compliance, from the softest to the stiffest.
+
+    Attributes:
+        displacement: Displacement per force, shape (..., 3), in design units per newton.
+        force_directions: Unit vectors, base axes, as rows, shape (..., 3, 3).
+        turn: Turn per moment, shape (..., 3), in radians per (N × unit).
+        moment_directions: Unit vectors, base axes, as rows, shape (..., 3, 3).
+    """
+
+    displacement: FloatArray
+    force_directions: FloatArray
+    turn: FloatArray
+    moment_directions: FloatArray
+
+
+class ComplianceShares(NamedTuple):
+    """Parts of the work that a load does on what gives way, each from 0 to 1.
+
+    Attributes:
+        guide: Share of the actuators d1 and d3, which hold the carriages, shape (...).
+        struts: Share of the bending of struts 2 and 3, shape (...).
+        actuators: Share of the actuators l1, d2, d4 and l4, shape (...).
+    """
+
+    guide: FloatArray
+    struts: FloatArray
+    actuators: FloatArray
+
+
+@helper
+def strut_length(x: FloatArray, which: int, p: FloatArray, r: FloatArray) -> float:
+    """Return d2 or d4, given the column of b2 or b3 in the design variables."""
+    y, z = p[1] + x[which] * r[1, 0], p[2] + x[which] * r[2, 0]
+    return math.sqrt(y * y + z * z)
+
+
+@kernel("void(f8[::1], f8[:,::1], f8[:,:,::1], f8[:,:,::1], f8[:,::1], f8[:,::1], f8[:,:,::1])")
+def compliance_rows(
+    x: FloatArray,
+    position: FloatArray,
+    rotation: FloatArray,
+    twists: FloatArray,
+    softness: FloatArray,
+    bending: FloatArray,
+    out: FloatArray,
+) -> None:
+    """Write the compliance of n poses, infinite in singular ones.
+
+    Twists are J⁻¹; softness is 1 / k, shape (n or 1, 6), and bending 1 / 3EI of both struts, shape
+    (n or 1, 2).
+    """
+    c = np.zeros(6)
+    for k in range(position.shape[0]):
+        for i in range(6):
+            c[i] = softness[k % softness.shape[0], i]
+        b = bending[k % bending.shape[0]]
+        c[1] += b[0] * strut_length(x, B2, position[k], rotation[k]) ** 3
+        c[3] += b[1] * strut_length(x, B3, position[k], rotation[k]) ** 3
+        singular = math.isinf(twists[k, 0, 0])
+        for i in range(6):
+            for j in range(i + 1):
+                total = 0.0
+                for q in range(6):
+                    total += twists[k, i, q] * c[q] * twists[k, j, q] if not singular else math.inf
+                out[k, i, j] = total
+                out[k, j, i] = total
+
+
+def compliance(
+    design: Design,
+    position: ArrayLike,
+    rotation: ArrayLike,
+    stiffness: ArrayLike,
+    bending_stiffness: ArrayLike | None = None,
+    tool: ArrayLike | None = None,
+) -> FloatArray:
+    """Return the compliance C at the tool, shape (..., 6, 6): (displacement; turn) = C (F; M).
+
+    Axes are those of the base. The blocks are in units/N, 1/N and rad/(N × unit). All entries are
+    infinite in a singular pose.
+
+    Args:
+        design: The manipulator.
+        position: b4 in the base frame, shape (..., 3), in design units.
+        rotation: Platform to base, shape (..., 3, 3).
+        stiffness: Stiffness of the actuators, shape (..., 6), in N/unit, positive; infinite for
+            rigid ones.
+        bending_stiffness: EI of struts 2 and 3, shape (..., 2), in N × unit², positive; None for
+            rigid struts.
+        tool: Tool point in the platform frame, shape (..., 3), in design units; None for b4.
+
+    Raises:
+        InputError: A stiffness is not positive, a value is not finite, the rotation is not one, or
+            batch axes do not broadcast.
+    """
+    c, b = _softness(stiffness, bending_stiffness)
+    poses = Poses(design, position, rotation, tool, (c, 1), (b, 1))
+    return compliance_of(poses, poses.inverse_jacobians(), c, b).reshape(*poses.batch, 6, 6)
+
+
+def compliance_of(
+    poses: Poses, twists: FloatArray, softness: FloatArray, bending: FloatArray
+) -> FloatArray:
+    """Return the compliance of poses whose J⁻¹ is known, shape (n, 6, 6)."""
+    out = np.empty((poses.count, 6, 6))
+    compliance_rows(
+        poses.count,
+        poses.variables,
+        poses.positions,
+        poses.rotations,
+        twists,
+        poses.rows_or_one(softness),
+        poses.rows_or_one(bending),
+        out,
+    )
+    return out
+
+
+def stiffness_of(design: Design) -> tuple[FloatArray, FloatArray]:
+    """Return the stiffness of a design's actuators and the bending stiffness of its struts.
+
+    Shapes are (6,) in N/unit and (2,) in N × unit²; infinite where the design states none.
+    """
+    given = design.actuators.stiffness_n_mm
+    stiffness = np.full(6, np.inf) if given is None else np.array(given) * design.unit_mm
+    return stiffness, np.full(2, design.struts.bending_stiffness / design.unit_mm**2)
+
+
+def deflection(compliance: FloatArray, load: ArrayLike) -> FloatArray:
+    """Return the displacement and the turn (v; ω) of the tool under a load, shape (..., 6).
+
+    They are in design units and radians along the axes of the base, infinite in a singular pose.
+
+    Args:
+        compliance: C at the tool, shape (..., 6, 6).
+        load: (F; M) at the tool, shape (..., 6), in N and N × unit.
+
+    Raises:
+        InputError: The load is not finite.
+    """
+    w = finite_array("load (FX FY FZ MX MY MZ)", load, (6,))
+    regular = np.isfinite(compliance[..., 0, 0])
+    finite = np.where(regular[..., None, None], compliance, 0.0)
+    moved = np.einsum("...ij,...j->...i", finite, w)
+    return np.where(regular[..., None], moved, np.inf)
+
+
+def principal_compliances(compliance: FloatArray) -> PrincipalCompliances:
+    """Return the six principal directions of a compliance, three of forces and three of moments.
+
+    In a singular pose the values are infinite and the directions NaN.
+
+    Args:
+        compliance: C at the tool, shape (..., 6, 6).
+    """
+    displacement, forces = _principal(compliance[..., :3, :3])
+    turn, moments = _principal(compliance[..., 3:, 3:])
+    return PrincipalCompliances(displacement, forces, turn, moments)
+
+
+def _principal(block: FloatArray) -> tuple[FloatArray, FloatArray]:
+    regular = np.asarray(np.isfinite(block).all(axis=(-1, -2)))[..., None]
+    finite = np.where(regular[..., None], block, 0.0)
+    values, vectors = np.linalg.eigh(finite)
+    values = np.where(regular, values[..., ::-1], np.inf)
+    rows = np.swapaxes(vectors[..., ::-1], -1, -2)
+    return values, np.where(regular[..., None], rows, np.nan)
+
+
+def compliance_shares(
+    design: Design,
+    position: ArrayLike,
+    rotation: ArrayLike,
+    load: ArrayLike,
+    stiffness: ArrayLike,
+    bending_stiffness: ArrayLike | None = None,
+    tool: ArrayLike | None = None,
+) -> ComplianceShares:
+    """Return which parts of the deflection's work guide, struts and actuators take.
+
+    The shares add up to 1; they are NaN where nothing gives way and in singular poses.
+
+    Args:
+        design: The manipulator.
+        position: b4 in the base frame, shape (..., 3), in design units.
+        rotation: Platform to base, shape (..., 3, 3).
+        load: (F; M) at the tool, shape (..., 6), in N and N × unit.
+        stiffness: Stiffness of the actuators, shape (..., 6), in N/unit.
+        bending_stiffness: EI of struts 2 and 3, shape (..., 2), in N × unit²; None for rigid ones.
+        tool: Tool point in the platform frame, shape (..., 3), in design units; None for b4.
+
+    Raises:
+        InputError: A stiffness is not positive, a value is not finite, the rotation is not one, or
+            batch axes do not broadcast.
+    """
+    w = finite_array("load (FX FY FZ MX MY MZ)", load, (6,))
+    c, b = _softness(stiffness, bending_stiffness)
+    poses = Poses(design, position, rotation, tool, (w, 1), (c, 1), (b, 1))
+    twists = poses.inverse_jacobians()
+    regular = np.isfinite(twists[:, 0, 0])
+    forces = np.einsum(
+        "nji,nj->ni", np.where(regular[:, None, None], twists, 0.0), poses.rows(w, 1)
+    )
+    lengths = _strut_lengths(poses)
+    work = forces**2 * poses.rows(c, 1)
+    bent = (forces[:, [1, 3]] ** 2 * poses.rows(b, 1) * lengths**3).sum(axis=1)
+    guide, actuators = work[:, [1, 3]].sum(axis=1), work[:, [0, 2, 4, 5]].sum(axis=1)
+    total: FloatArray = guide + actuators + bent
+    parts = [
+        np.divide(part, total, out=np.full(total.shape, np.nan), where=total > 0.0)
+        for part in (guide, bent, actuators)
+    ]
+    return ComplianceShares(*(part.reshape(poses.batch) for part in parts))
+
+
+def _strut_lengths(poses: Poses) -> FloatArray:
+    across = poses.rotations[:, 1:, 0, None] * poses.variables[[B2, B3]]
+    points = poses.positions[:, 1:, None] + across
+    return np.sqrt((points**2).sum(axis=1))
+
+
+def _softness(
+    stiffness: ArrayLike, bending_stiffness: ArrayLike | None
+) -> tuple[FloatArray, FloatArray]:
+    """Return 1 / k, shape (..., 6), and 1 / 3EI, shape (..., 2)."""
+    k = _positive("the stiffness of the actuators", stiffness, 6)
+    if bending_stiffness is None:
+        return 1.0 / k, np.zeros(2)
+    return 1.0 / k, 1.0 / (3.0 * _positive("the bending stiffness", bending_stiffness, 2))
+
+
+def _positive(name: str, values: ArrayLike, count: int) -> FloatArray:
+    array = np.asarray(values, dtype=np.float64)
+    if array.shape[-1:] != (count,) or not (array > 0.0).all():
+        text = np.array2string(array, threshold=12).replace("\n", "")
+        raise InputError(f"{name} must be {count} positive numbers, infinite if rigid; got {text}")
+    return array

@@ -1,0 +1,246 @@
+"""The equilibrium of the platform in closed form, in compiled loops over poses.
+
+With u the direction of b2b3, F the load's force and M its moment about b4, leg 1 alone resists a
+turn about the line b2b3 and leg 4 alone a turn about the guide:
+f(l1) = l1 (M · u) / (b1y δ1) and f(l4) = −l4 x̂ · (M + p × F) / (a3y δ3).
+Legs 2 and 3 hold the rest. Each can push along the guide and along its strut, but not across the
+plane of both; δ2 is what this condition divides by.
+
+The forces of six unit loads are the columns of −J⁻ᵀ, so the same closed form inverts J.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from explorer.legs.segments import Vector, cross3, dot3
+from explorer.mechanism.design import Design
+from explorer.mechanism.pose import checked_rotation
+from explorer.numerics.arrays import FloatArray, batch_shape, finite_array, for_kernel
+from explorer.numerics.compiled import helper, kernel
+
+# Share of |p| up to which a margin is zero but for rounding.
+SINGULAR = 1e-13
+
+# Columns of the row of design variables, `Design.variables`.
+A3X, A3Y, B1X, B1Y, B2, B3 = range(6)
+
+NO_TOOL = np.zeros((1, 3))
+
+
+@helper
+def column(r: FloatArray, axis: int) -> Vector:
+    """Return a column of a rotation."""
+    return (r[0, axis], r[1, axis], r[2, axis])
+
+
+@helper
+def along(a: Vector, share: float, b: Vector) -> Vector:
+    """Return a + share · b."""
+    return (a[0] + share * b[0], a[1] + share * b[1], a[2] + share * b[2])
+
+
+@helper
+def is_singular(p: FloatArray, r: FloatArray) -> bool:
+    """Return whether a margin of the pose vanishes to rounding."""
+    least = SINGULAR * math.sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2])
+    delta1 = r[0, 2] * p[0] + r[1, 2] * p[1] + r[2, 2] * p[2]
+    delta2 = r[1, 0] * p[2] - r[2, 0] * p[1]
+    return abs(delta1) <= least or abs(delta2) <= least or abs(p[2]) <= least
+
+
+@helper
+def held_across(q: Vector, u: Vector, point: Vector, delta2: float) -> Vector:
+    """Return the force of leg 2 or 3, given its part q across u.
+
+    The part along u makes the force lie in the plane of the guide and the strut to `point`.
+    """
+    return along(q, (point[1] * q[2] - point[2] * q[1]) / delta2, u)
+
+
+@helper
+def holding_forces(
+    x: FloatArray, p: FloatArray, r: FloatArray, force: Vector, moment: Vector
+) -> tuple[float, float, float, float, float, float]:
+    """Return the actuator forces that hold a load in a regular pose.
+
+    Args:
+        x: Design variables, shape (6,).
+        p: b4 in the base frame, shape (3,).
+        r: Platform to base, shape (3, 3).
+        force: Force on the platform, base axes.
+        moment: Moment of the load about b4, base axes.
+    """
+    u, v, b4 = column(r, 0), column(r, 1), (p[0], p[1], p[2])
+    zero = (0.0, 0.0, 0.0)
+    delta1 = -dot3(column(r, 2), b4)
+    delta2 = u[1] * p[2] - u[2] * p[1]
+    arm1 = along(along(zero, x[B1X], u), x[B1Y], v)
+    leg1 = along(b4, 1.0, arm1)
+    leg4 = (p[0] - x[A3X], p[1] - x[A3Y], p[2])
+    l1, l4 = math.sqrt(dot3(leg1, leg1)), math.sqrt(dot3(leg4, leg4))
+    # Forces over lengths.
+    f1 = dot3(moment, u) / (x[B1Y] * delta1)
+    f4 = -(moment[0] + p[1] * force[2] - p[2] * force[1]) / (x[A3Y] * p[2])
+    rest = along(along(force, f1, leg1), f4, leg4)
+    turning = along(moment, f1, cross3(arm1, leg1))
+    lever = cross3(u, rest)
+    span = x[B3] - x[B2]
+    c2, c3 = along(b4, x[B2], u), along(b4, x[B3], u)
+    across2 = cross3(along(turning, -x[B3], lever), u)
+    across3 = cross3(along(turning, -x[B2], lever), u)
+    held2 = held_across(along(zero, 1.0 / span, across2), u, c2, delta2)
+    held3 = held_across(along(zero, -1.0 / span, across3), u, c3, delta2)
+    d2, d4 = math.sqrt(c2[1] * c2[1] + c2[2] * c2[2]), math.sqrt(c3[1] * c3[1] + c3[2] * c3[2])
+    return (
+        f1 * l1,
+        held2[0],
+        (c2[1] * held2[1] + c2[2] * held2[2]) / d2,
+        held3[0],
+        (c3[1] * held3[1] + c3[2] * held3[2]) / d4,
+        f4 * l4,
+    )
+
+
+@kernel("void(f8[::1], f8[:,::1], f8[:,::1], f8[:,:,::1], f8[:,::1], f8[:,::1])")
+def force_rows(
+    x: FloatArray,
+    tools: FloatArray,
+    position: FloatArray,
+    rotation: FloatArray,
+    loads: FloatArray,
+    out: FloatArray,
+) -> None:
+    """Write the actuator forces of n poses, infinite in singular ones.
+
+    Tools, shape (n or 1, 3), are in platform coordinates; loads, shape (n or 1, 6), act there.
+    """
+    for k in range(position.shape[0]):
+        p, r = position[k], rotation[k]
+        if is_singular(p, r):
+            for i in range(6):
+                out[k, i] = math.inf
+            continue
+        t, w = tools[k % tools.shape[0]], loads[k % loads.shape[0]]
+        arm = (
+            r[0, 0] * t[0] + r[0, 1] * t[1] + r[0, 2] * t[2],
+            r[1, 0] * t[0] + r[1, 1] * t[1] + r[1, 2] * t[2],
+            r[2, 0] * t[0] + r[2, 1] * t[1] + r[2, 2] * t[2],
+        )
+        force = (w[0], w[1], w[2])
+        moment = along((w[3], w[4], w[5]), 1.0, cross3(arm, force))
+        forces = holding_forces(x, p, r, force, moment)
+        for i in range(6):
+            out[k, i] = forces[i]
+
+
+@kernel("void(f8[::1], f8[:,::1], f8[:,::1], f8[:,:,::1], f8[:,:,::1])")
+def inverse_rows(
+    x: FloatArray,
+    tools: FloatArray,
+    position: FloatArray,
+    rotation: FloatArray,
+    out: FloatArray,
+) -> None:
+    """Write J⁻¹ of n poses at the tool, shape (n, 6, 6), infinite in singular ones.
+
+    Tools, shape (n or 1, 3), are in platform coordinates.
+    """
+    for k in range(position.shape[0]):
+        p, r = position[k], rotation[k]
+        if is_singular(p, r):
+            for row in range(6):
+                for i in range(6):
+                    out[k, row, i] = math.inf
+            continue
+        t = tools[k % tools.shape[0]]
+        arm = (
+            r[0, 0] * t[0] + r[0, 1] * t[1] + r[0, 2] * t[2],
+            r[1, 0] * t[0] + r[1, 1] * t[1] + r[1, 2] * t[2],
+            r[2, 0] * t[0] + r[2, 1] * t[1] + r[2, 2] * t[2],
+        )
+        for axis in range(3):
+            unit = (
+                1.0 if axis == 0 else 0.0,
+                1.0 if axis == 1 else 0.0,
+                1.0 if axis == 2 else 0.0,
+            )
+            by_force = holding_forces(x, p, r, unit, cross3(arm, unit))
+            by_moment = holding_forces(x, p, r, (0.0, 0.0, 0.0), unit)
+            for i in range(6):
+                out[k, axis, i] = -by_force[i]
+                out[k, 3 + axis, i] = -by_moment[i]
+
+
+class Poses:
+    """Checked poses with a tool, as rows for kernels.
+
+    Args:
+        design: The manipulator.
+        position: b4 in the base frame, shape (..., 3), in design units.
+        rotation: Platform to base, shape (..., 3, 3).
+        tool: Tool point in the platform frame, shape (..., 3), in design units; None for b4.
+        more: Batch axes of other arguments, such as loads.
+
+    Raises:
+        InputError: The position or the tool is not finite, or the rotation is not one.
+    """
+
+    def __init__(
+        self,
+        design: Design,
+        position: ArrayLike,
+        rotation: ArrayLike,
+        tool: ArrayLike | None = None,
+        *more: tuple[FloatArray, int],
+    ) -> None:
+        p, r = finite_array("position", position, (3,)), checked_rotation(rotation)
+        t = NO_TOOL[0] if tool is None else finite_array("tool", tool, (3,))
+        self.batch = batch_shape((p, 1), (r, 2), (t, 1), *more)
+        self.variables = np.array(design.variables)
+        self.positions, self.rotations = self.rows(p, 1), self.rows(r, 2)
+        self.tools = self.rows_or_one(t)
+
+    @property
+    def count(self) -> int:
+        """Number of poses."""
+        return len(self.positions)
+
+    def rows(self, array: FloatArray, trailing: int) -> FloatArray:
+        """Return an array as one row for each pose."""
+        own = array.shape[array.ndim - trailing :]
+        return for_kernel(np.broadcast_to(array, (*self.batch, *own)).reshape(-1, *own))
+
+    def rows_or_one(self, array: FloatArray) -> FloatArray:
+        """Return vectors as one row for each pose, or one for all."""
+        return for_kernel(array[None]) if array.ndim == 1 else self.rows(array, 1)
+
+    def inverse_jacobians(self) -> FloatArray:
+        """Return J⁻¹ at the tool, shape (n, 6, 6); infinite in singular poses."""
+        out = np.empty((self.count, 6, 6))
+        inverse_rows(self.count, self.variables, self.tools, self.positions, self.rotations, out)
+        return out
+
+
+def twists_of_actuators(
+    design: Design, position: ArrayLike, rotation: ArrayLike, tool: ArrayLike | None = None
+) -> FloatArray:
+    """Return J⁻¹ at the tool, shape (..., 6, 6): twist of the tool = J⁻¹ @ joint rates.
+
+    Column i is the twist (v; ω) of the tool point for a unit rate of joint i, in the order of
+    `JOINTS`, along the axes of the base. All entries are infinite in a singular pose.
+
+    Args:
+        design: The manipulator.
+        position: b4 in the base frame, shape (..., 3), in design units.
+        rotation: Platform to base, shape (..., 3, 3).
+        tool: Tool point in the platform frame, shape (..., 3), in design units; None for b4.
+
+    Raises:
+        InputError: The position or the tool is not finite, or the rotation is not one.
+    """
+    poses = Poses(design, position, rotation, tool)
+    return poses.inverse_jacobians().reshape(*poses.batch, 6, 6)

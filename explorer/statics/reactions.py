@@ -1,0 +1,230 @@
+"""All that a load does to the parts of the machine, and the shares of their limits."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from explorer.mechanism.design import JOINTS, Design
+from explorer.mechanism.kinematics import attachment_points, inverse
+from explorer.mechanism.machine import Payload
+from explorer.numerics.arrays import FloatArray, dot
+from explorer.statics.forces import GUIDE_ROWS, STRUT_ROWS, actuator_forces
+from explorer.statics.weights import Carried, Weights, carry
+
+LIMITED = (
+    *JOINTS,
+    *("bending 2", "bending 3", "guide force 2", "guide force 3"),
+    *("guide moment 2", "guide moment 3"),
+)
+"""The loaded parts with a limit, in the order of `limit_shares`."""
+
+# Columns of `_signed`: actuators, moments at the carriages, forces across the guide (y, z).
+_ACTUATORS, _MOMENTS, _ACROSS_2, _ACROSS_3 = slice(0, 6), slice(6, 8), slice(8, 10), slice(10, 12)
+
+
+class Reactions(NamedTuple):
+    """What holds a load in a pose; all entries are infinite in a singular pose.
+
+    Attributes:
+        actuators: Forces in the order of `JOINTS`, shape (..., 6), in N; positive ones push.
+        joints: Forces of the legs on the platform at b1 to b4, base axes, shape (..., 4, 3), in N.
+        bending: Bending moments of struts 2 and 3 at their carriages, shape (..., 2), in N × unit.
+        guide_force: Forces of carriages 2 and 3 across the guide, shape (..., 2), in N.
+        guide_moment: Moments of carriages 2 and 3 on the guide, shape (..., 2), in N × unit.
+    """
+
+    actuators: FloatArray
+    joints: FloatArray
+    bending: FloatArray
+    guide_force: FloatArray
+    guide_moment: FloatArray
+
+
+def reactions(
+    design: Design,
+    position: ArrayLike,
+    rotation: ArrayLike,
+    load: ArrayLike,
+    tool: ArrayLike | None = None,
+    weights: Weights | None = None,
+) -> Reactions:
+    """Return all that holds a load and weights.
+
+    The bending of a strut across the guide by its own weight is left out: its carriage turns
+    about the guide, so that this moment vanishes at the carriage.
+
+    Args:
+        design: The manipulator.
+        position: b4 in the base frame, shape (..., 3), in design units.
+        rotation: Platform to base, shape (..., 3, 3).
+        load: (F; M) on the platform at the tool point, base axes, shape (..., 6), in N and
+            N × unit.
+        tool: Tool point in the platform frame, shape (..., 3), in design units; None for b4.
+        weights: Masses of the moving bodies; None for none.
+
+    Raises:
+        InputError: A value is not finite, the rotation is not one, or batch axes do not broadcast.
+    """
+    carried = carry(design, position, rotation, weights or Weights(), tool)
+    total = carried.wrench + np.asarray(load, dtype=np.float64)
+    forces = actuator_forces(design, position, rotation, total, tool)
+    signed = _signed(design, position, rotation, forces, carried)
+    moments = np.abs(signed[..., _MOMENTS])
+    across = signed[..., 8:].reshape(*signed.shape[:-1], 2, 2)
+    return Reactions(
+        actuators=forces,
+        joints=_joint_forces(design, position, rotation, forces, carried),
+        bending=moments,
+        guide_force=np.sqrt(dot(across, across)),
+        guide_moment=moments,
+    )
+
+
+def limit_shares(design: Design, held: Reactions) -> FloatArray:
+    """Return the shares of their limits that reactions use, shape (..., 12), as in `LIMITED`.
+
+    A share of a part without a limit is 0, unless the pose is singular.
+
+    Args:
+        design: The manipulator, with the limits of its actuators, struts and guide.
+        held: Reactions of poses of this design.
+    """
+    push, pull = design.actuators.limits
+    values = np.concatenate(
+        [held.actuators, held.bending, held.guide_force, held.guide_moment], axis=-1
+    )
+    actuators = np.where(held.actuators > 0.0, push, pull)
+    others = np.broadcast_to(_limits(design), (*values.shape[:-1], 6))
+    limits = np.concatenate([actuators, others], axis=-1)
+    out = np.full(values.shape, np.inf)
+    np.divide(np.abs(values), limits, out=out, where=np.isfinite(values))
+    return out
+
+
+def largest_payload(
+    design: Design,
+    position: ArrayLike,
+    rotation: ArrayLike,
+    load: ArrayLike = (0.0,) * 6,
+    tool: ArrayLike | None = None,
+    weights: Weights | None = None,
+) -> FloatArray:
+    """Return the largest mass at the payload's centre that keeps all limits, shape (...), in kg.
+
+    It is 0 in a singular pose or if the load alone exceeds a limit, and infinite if there is no
+    limit.
+
+    Args:
+        design: The manipulator, with its limits and the centre of its payload.
+        position: b4 in the base frame, shape (..., 3), in design units.
+        rotation: Platform to base, shape (..., 3, 3).
+        load: (F; M) at the tool point besides the payload, shape (..., 6), in N and N × unit.
+        tool: Tool point in the platform frame, shape (..., 3), in design units; None for b4.
+        weights: Masses besides the payload; None for none.
+
+    Raises:
+        InputError: A value is not finite, the rotation is not one, or batch axes do not broadcast.
+    """
+    base = carry(design, position, rotation, weights or Weights(), tool)
+    one = Weights(on_platform=(Payload(1.0, design.payload.centre),))
+    kilogram = carry(design, position, rotation, one, tool)
+    total = base.wrench + np.asarray(load, dtype=np.float64)
+    at_zero = actuator_forces(design, position, rotation, total, tool)
+    by_one = actuator_forces(design, position, rotation, kilogram.wrench, tool)
+    regular = np.isfinite(at_zero[..., 0])
+    at_zero, by_one = np.nan_to_num(at_zero, posinf=0.0), np.nan_to_num(by_one, posinf=0.0)
+    start = _signed(design, position, rotation, at_zero, base)
+    slope = _signed(design, position, rotation, by_one, kilogram)
+    start, slope = np.broadcast_arrays(start, slope)
+    push, pull = design.actuators.limits
+    limits = _limits(design)
+    moment = np.minimum(limits[:2], limits[4:])
+    highs, lows = np.concatenate([push, moment]), np.concatenate([pull, moment])
+    largest = np.minimum(
+        _largest_linear(start[..., :8], slope[..., :8], lows, highs),
+        np.minimum(
+            _largest_square(start[..., _ACROSS_2], slope[..., _ACROSS_2], limits[2]),
+            _largest_square(start[..., _ACROSS_3], slope[..., _ACROSS_3], limits[3]),
+        ),
+    )
+    return np.where(regular, largest, 0.0)
+
+
+def _limits(design: Design) -> FloatArray:
+    """Return the limits of bending, guide force and guide moment, two each, in N and N × unit."""
+    newton_metre = 1e3 / design.unit_mm
+    bending = design.struts.largest_moment * newton_metre
+    guide = design.guide
+    force = np.inf if guide.force_n is None else guide.force_n
+    moment = np.inf if guide.moment_nm is None else guide.moment_nm * newton_metre
+    return np.array([bending, bending, force, force, moment, moment])
+
+
+def _signed(
+    design: Design, position: ArrayLike, rotation: ArrayLike, forces: FloatArray, carried: Carried
+) -> FloatArray:
+    """Return what limits bound, linear in the load, shape (..., 12).
+
+    It is the actuator forces, the moments at the carriages along the guide, and the (y, z)
+    components of the forces of both carriages on the guide.
+    """
+    points = attachment_points(design, position, rotation)
+    joints = inverse(design, position, rotation)
+    lengths, along = joints[..., STRUT_ROWS], forces[..., GUIDE_ROWS]
+    regular = np.isfinite(along)
+    finite = np.where(regular, along, 0.0)
+    moments = np.where(regular, finite * lengths + carried.along_guide, np.inf)
+    across: list[FloatArray] = []
+    for leg, point in ((1, points.b2), (2, points.b3)):
+        radial = forces[..., STRUT_ROWS[leg - 1], None]
+        length = lengths[..., leg - 1, None]
+        axis = np.divide(
+            point[..., 1:], length, out=np.zeros_like(point[..., 1:]), where=length > 0.0
+        )
+        # The weight of the leg acts on the guide, less what the platform carries of it.
+        own = carried.legs[leg, 1:] - carried.at_joints[..., leg, 1:]
+        ok = np.isfinite(radial)
+        across.append(np.where(ok, own - np.where(ok, radial, 0.0) * axis, np.inf))
+    parts = [forces, moments, *across]
+    batch = np.broadcast_shapes(*(part.shape[:-1] for part in parts))
+    return np.concatenate([np.broadcast_to(e, (*batch, e.shape[-1])) for e in parts], axis=-1)
+
+
+def _joint_forces(
+    design: Design, position: ArrayLike, rotation: ArrayLike, forces: FloatArray, carried: Carried
+) -> FloatArray:
+    points = attachment_points(design, position, rotation)
+    across = np.array([0.0, 1.0, 1.0])
+    legs = [points.b1, points.b2 * across, points.b3 * across, points.b4 - points.a3]
+    axes = np.stack(legs, axis=-2)
+    lengths = np.sqrt(dot(axes, axes))[..., None]
+    units = np.divide(axes, lengths, out=np.zeros_like(axes), where=lengths > 0.0)
+    finite = np.where(np.isfinite(forces), forces, 0.0)
+    out = finite[..., [0, 2, 4, 5], None] * units + carried.at_joints
+    out[..., 1, 0] += finite[..., 1]
+    out[..., 2, 0] += finite[..., 3]
+    return np.where(np.isfinite(forces[..., 0, None, None]), out, np.inf)
+
+
+def _largest_linear(
+    start: FloatArray, slope: FloatArray, lows: FloatArray, highs: FloatArray
+) -> FloatArray:
+    """Return the largest m ≥ 0 with −lows ≤ start + m slope ≤ highs, shape (...)."""
+    room = np.where(slope > 0.0, highs - start, lows + start)
+    free = (slope == 0.0) | np.isinf(room)
+    largest = np.divide(room, np.abs(slope), out=np.full(room.shape, np.inf), where=~free)
+    is_within = (start <= highs) & (start >= -lows)
+    return np.where(is_within.all(axis=-1), largest.min(axis=-1), 0.0)
+
+
+def _largest_square(start: FloatArray, slope: FloatArray, limit: float) -> FloatArray:
+    """Return the largest m ≥ 0 with |start + m slope| ≤ limit, of vectors (..., 2), shape (...)."""
+    if np.isinf(limit):
+        return np.full(start.shape[:-1], np.inf)
+    a, b, c = dot(slope, slope), dot(start, slope), limit**2 - dot(start, start)
+    root = np.sqrt(np.maximum(b * b + a * c, 0.0))
+    largest = np.divide(root - b, a, out=np.full(a.shape, np.inf), where=a > 0.0)
+    return np.where(c >= 0.0, largest, 0.0)

@@ -1,0 +1,145 @@
+"""The weights of the payload, the platform and the legs, as a load that the actuators hold.
+
+By virtual work, the weight of a leg acts on the actuators like one force at its platform joint.
+For a leg of length l with the direction û, whose cylinder (mass m, centre at a distance s from
+its base joint) and rod (mass n, centre at a distance r back from its platform joint) have their
+centres on the axis, that force is n g + (m s − n r) / l · P g, where P projects across û. A leg on
+the guide turns about the guide only, so P projects across û and x̂, and the actuator d1 or d3 holds
+the part along the guide of all its weights, its carriage included.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from explorer.mechanism.design import Design
+from explorer.mechanism.kinematics import AttachmentPoints, attachment_points
+from explorer.mechanism.machine import STANDARD_GRAVITY, Payload
+from explorer.mechanism.pose import Quadruple
+from explorer.numerics.arrays import FloatArray, dot, finite_array, rotate
+
+NOTHING: Quadruple = (0.0, 0.0, 0.0, 0.0)
+ON_GUIDE = np.array([False, True, True, False])
+X_AXIS = np.array([1.0, 0.0, 0.0])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Weights:
+    """Masses of the moving bodies, in kilograms, with distances in design units.
+
+    Attributes:
+        on_platform: Masses that move with the platform, such as the platform and its payload.
+        carriages: Masses of the carriages of legs 2 and 3; those of legs 1 and 4 do not move.
+        cylinders: Masses of the cylinders, by leg.
+        cylinder_centres: Distances of their centres from the base joints, along the legs.
+        rods: Masses of the rods, by leg.
+        rod_centres: Distances of their centres from the platform joints, back along the legs.
+    """
+
+    on_platform: tuple[Payload, ...] = ()
+    carriages: Quadruple = NOTHING
+    cylinders: Quadruple = NOTHING
+    cylinder_centres: Quadruple = NOTHING
+    rods: Quadruple = NOTHING
+    rod_centres: Quadruple = NOTHING
+
+
+@dataclass(frozen=True)
+class Carried:
+    """What weights do in some poses.
+
+    Attributes:
+        wrench: (F; M) on the platform at the tool point, base axes, that stands for all weights,
+            shape (..., 6), in N and N × unit.
+        at_joints: Parts of it that stand for the legs, at b1 to b4, shape (..., 4, 3), in N.
+        along_guide: Moments by which the weights of legs 2 and 3 change those of the forces of d1
+            and d3 at the carriages, shape (..., 2), in N × unit.
+        legs: Weights of the legs, carriages included, shape (4, 3), in N.
+    """
+
+    wrench: FloatArray
+    at_joints: FloatArray
+    along_guide: FloatArray
+    legs: FloatArray = field(repr=False)
+
+
+def design_weights(design: Design) -> Weights:
+    """Return the weights that a design states: its payload."""
+    return Weights(on_platform=(design.payload,))
+
+
+def carry(
+    design: Design,
+    position: ArrayLike,
+    rotation: ArrayLike,
+    weights: Weights,
+    tool: ArrayLike | None = None,
+) -> Carried:
+    """Return what weights do in poses, in the design's direction of gravity.
+
+    Args:
+        design: The manipulator.
+        position: b4 in the base frame, shape (..., 3), in design units.
+        rotation: Platform to base, shape (..., 3, 3).
+        weights: Masses of the moving bodies.
+        tool: Tool point in the platform frame, shape (..., 3), in design units; None for b4.
+
+    Raises:
+        InputError: The position or the tool is not finite, or the rotation is not one.
+    """
+    points = attachment_points(design, position, rotation)
+    r = np.asarray(rotation, dtype=np.float64)
+    shift = np.zeros(3) if tool is None else rotate(r, finite_array("tool", tool, (3,)))
+    g = STANDARD_GRAVITY * np.array(design.gravity)
+    at_joints = _legs_at_joints(points, weights, g)
+    ends = np.stack([points.b1, points.b2, points.b3, points.b4], axis=-2)
+    arms = ends - points.b4[..., None, :] - shift[..., None, :]
+    moment = np.cross(arms, at_joints).sum(axis=-2)
+    force = at_joints.sum(axis=-2)
+    for body in weights.on_platform:
+        weight = body.mass_kg * g
+        arm = rotate(r, np.array(body.centre)) - shift
+        force = force + weight
+        moment = moment + np.cross(arm, weight)
+    wrench = np.concatenate(np.broadcast_arrays(force, moment), axis=-1)
+    legs = np.outer(np.add(weights.cylinders, weights.rods), g)
+    legs += np.outer(np.where(ON_GUIDE, weights.carriages, 0.0), g)
+    return Carried(wrench, at_joints, _moments_along_guide(points, weights, g), legs)
+
+
+def _legs_at_joints(points: AttachmentPoints, weights: Weights, g: FloatArray) -> FloatArray:
+    axes, lengths = _legs(points)
+    cylinders, rods = np.array(weights.cylinders), np.array(weights.rods)
+    moments = cylinders * np.array(weights.cylinder_centres) - rods * np.array(weights.rod_centres)
+    along = dot(axes, np.broadcast_to(g, axes.shape))[..., None] * axes
+    across = g - along - np.where(ON_GUIDE[:, None], g[0] * X_AXIS, 0.0)
+    ratio = np.divide(moments, lengths, out=np.zeros(lengths.shape), where=lengths > 0.0)
+    carried = np.where(ON_GUIDE, cylinders + np.array(weights.carriages), 0.0)
+    return np.asarray(
+        rods[:, None] * g + ratio[..., None] * across + np.outer(carried, g[0] * X_AXIS)
+    )
+
+
+def _moments_along_guide(points: AttachmentPoints, weights: Weights, g: FloatArray) -> FloatArray:
+    """Return g_x (m_carriage d + m_rod r + m_cylinder (d − s)) of legs 2 and 3."""
+    lengths = _legs(points)[1][..., 1:3]
+    carriages, cylinders = np.array(weights.carriages)[1:3], np.array(weights.cylinders)[1:3]
+    of_rods = np.array(weights.rods)[1:3] * np.array(weights.rod_centres)[1:3]
+    of_cylinders = cylinders * (lengths - np.array(weights.cylinder_centres)[1:3])
+    return g[0] * (carriages * lengths + of_rods + of_cylinders)
+
+
+def _legs(points: AttachmentPoints) -> tuple[FloatArray, FloatArray]:
+    """Return the directions (..., 4, 3) and the lengths (..., 4) of the legs."""
+    across = np.array([0.0, 1.0, 1.0])
+    legs = np.stack(
+        [points.b1, points.b2 * across, points.b3 * across, points.b4 - points.a3], axis=-2
+    )
+    lengths = np.sqrt(dot(legs, legs))
+    axes = np.divide(
+        legs, lengths[..., None], out=np.zeros_like(legs), where=lengths[..., None] > 0
+    )
+    return axes, lengths

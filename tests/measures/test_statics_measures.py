@@ -1,0 +1,115 @@
+"""Measures of loads and precision over the required box: samples, needs, singular boxes."""
+
+from __future__ import annotations
+
+import math
+
+import msgspec
+import numpy as np
+import pytest
+
+from explorer import (
+    PRESETS,
+    Actuators,
+    Design,
+    Guide,
+    Payload,
+    Pose,
+    Struts,
+    Tool,
+    home_pose,
+    limit_shares,
+    pose_precision,
+    reactions,
+)
+from explorer.measures.case import Case
+from explorer.measures.catalogue import CATALOGUE, measures_in
+from explorer.measures.measurements import measure_design, reason_for_missing
+from explorer.statics.weights import design_weights
+
+OPTIMAL = PRESETS["paper-optimal"]
+BOX = ((9.0, 4.0, 8.0), (11.0, 6.0, 10.0))
+NAMES = (
+    *("load_share", "worst_actuator", "largest_payload"),
+    *("largest_bending", "worst_error", "softest_compliance"),
+)
+MACHINE = msgspec.structs.replace(
+    OPTIMAL,
+    tool=Tool(position=(0.5, 0.25, 1.0)),
+    payload=Payload(0.6, (0.0, 0.5, 1.0)),
+    actuators=Actuators(
+        push_n=(90.0, 80.0, 70.0, 60.0, 50.0, 40.0),
+        error_mm=(0.1, 0.2, 0.1, 0.2, 0.1, 0.1),
+        stiffness_n_mm=(50.0, 60.0, 50.0, 60.0, 50.0, 40.0),
+    ),
+    struts=Struts(outer_mm=8.0, inner_mm=6.0, stress_mpa=200.0),
+)
+
+
+def values(
+    design: Design, box: tuple[tuple[float, ...], ...] | None = BOX
+) -> dict[str, float | None]:
+    found = measure_design(Case(design, box=box), measures_in("optimise"))  # pyright: ignore[reportArgumentType]
+    return {name: found.values[name] for name in NAMES if name in found.values}
+
+
+def test_measures_of_statics_bound_those_of_samples_in_the_box() -> None:
+    found = {name: value or math.nan for name, value in values(MACHINE).items()}
+    assert tuple(found) == NAMES
+    rotation = home_pose(MACHINE).rotation
+    positions = np.random.default_rng(1).uniform(*BOX, (3000, 3))
+    given = MACHINE, positions, rotation
+    held = reactions(*given, np.zeros(6), None, design_weights(MACHINE))
+    shares = limit_shares(MACHINE, held)
+    precision = pose_precision(*given, MACHINE.tool.position)
+    sampled = {
+        "load_share": shares.max(),
+        "largest_bending": held.bending.max() * 1e-3 * MACHINE.unit_mm,
+        "worst_error": precision.worst.displacement.max(),
+        "softest_compliance": np.linalg.norm(precision.compliance[:, :3, :3], 2, axis=(1, 2)).max()
+        * MACHINE.unit_mm,
+    }
+    for name, value in sampled.items():
+        # The largest values lie at the border of the box, most of them at a corner.
+        assert 0.7 * found[name] < value <= 1.001 * found[name], name
+    assert found["worst_actuator"] == shares[:, :6].max(axis=0).argmax() + 1
+    # Without another load, shares are proportional to the mass.
+    assert found["largest_payload"] == pytest.approx(0.6 / found["load_share"], rel=1e-9)
+
+
+def test_measures_of_statics_need_a_box_and_the_parts_of_a_machine() -> None:
+    assert values(OPTIMAL) == {}
+    assert values(MACHINE, None) == {}
+    parts = {
+        "payload": ["largest_bending"],
+        "struts": ["largest_payload", "softest_compliance"],
+        "actuators": ["largest_payload", "worst_error", "softest_compliance"],
+    }
+    for part, names in parts.items():
+        design = msgspec.structs.replace(OPTIMAL, **{part: getattr(MACHINE, part)})
+        assert list(values(design)) == names
+    guided = msgspec.structs.replace(OPTIMAL, guide=Guide(force_n=10.0))
+    assert list(values(guided)) == ["largest_payload"]
+
+
+def test_measures_of_statics_in_a_singular_box_are_none_with_a_reason() -> None:
+    box = ((9.0, 4.0, -1.0), (11.0, 6.0, 10.0))
+    found = values(MACHINE, box)
+    assert found.pop("largest_payload") == 0.0
+    assert set(found.values()) == {None}
+    case = Case(MACHINE, box=box)
+    measured = measure_design(case, NAMES)
+    assert "the required box has singular positions" in reason_for_missing(case, measured)
+
+
+def test_measures_of_statics_are_of_the_given_orientation() -> None:
+    pose = Pose.of_yaw_pitch_roll((10.0, 5.0, 9.0), (-60.0, 5.0, 2.0))
+    turned = msgspec.structs.replace(MACHINE, home=pose)
+    one = measure_design(Case(MACHINE, box=BOX, pose=pose), NAMES).values
+    assert one == measure_design(Case(turned, box=BOX), NAMES).values
+    assert one != measure_design(Case(MACHINE, box=BOX), NAMES).values
+
+
+def test_measures_of_statics_name_their_units() -> None:
+    units = [CATALOGUE[name].unit_in("mm") for name in NAMES]
+    assert units == ["", "", "kg", "N m", "mm", "mm/N"]

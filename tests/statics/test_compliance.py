@@ -1,0 +1,146 @@
+"""Compliance: the reference, symmetry, a loaded spring model, principal directions, shares."""
+
+from __future__ import annotations
+
+import msgspec
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from refusals import refusal
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
+from statics_cases import CASES, Loaded, random_poses
+
+from explorer import (
+    PRESETS,
+    Actuators,
+    InputError,
+    Struts,
+    actuator_forces,
+    compliance,
+    compliance_shares,
+    deflection,
+    home_pose,
+    inverse,
+    principal_compliances,
+)
+from explorer.statics.compliance import stiffness_of
+
+OPTIMAL = PRESETS["paper-optimal"]
+STIFFNESS = np.array([900.0, 1100.0, 700.0, 1300.0, 800.0, 1000.0])
+BENDING = np.array([4e4, 6e4])
+TOOL = (0.5, -0.3, 1.5)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_compliance_of_reference_is_that_of_the_reference(case: Loaded) -> None:
+    found = compliance(*case.pose, case.actuator_stiffness, case.bending_stiffness, case.tool)
+    assert_allclose(found, case.compliance, atol=1e-9 * np.abs(case.compliance).max())
+
+
+def test_compliance_is_symmetric_and_positive() -> None:
+    positions, rotations = random_poses(OPTIMAL, 300)
+    found = compliance(OPTIMAL, positions, rotations, STIFFNESS, BENDING, TOOL)
+    assert (found == np.swapaxes(found, -1, -2)).all()
+    assert (np.linalg.eigvalsh(found)[:, 0] > 0.0).all()
+    stiffer = compliance(OPTIMAL, positions, rotations, 2.0 * STIFFNESS, 2.0 * BENDING, TOOL)
+    assert_allclose(stiffer, 0.5 * found, rtol=1e-12)
+
+
+def test_compliance_is_the_motion_of_soft_legs_under_a_small_load() -> None:
+    home = home_pose(OPTIMAL)
+    position, rotation = np.array(home.position), home.rotation
+    held = inverse(OPTIMAL, position, rotation)
+    load = 1e-4 * np.array([3.0, -2.0, 4.0, 5.0, -6.0, 2.0])
+    soft = 1.0 / STIFFNESS
+    soft[[1, 3]] += held[[2, 4]] ** 3 / (3.0 * BENDING)
+
+    def moved(twist: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        turn = Rotation.from_rotvec(twist[3:]).as_matrix() @ rotation
+        # The tool point, not b4, moves by the first three.
+        return position + rotation @ TOOL + twist[:3] - turn @ TOOL, turn
+
+    def unbalanced(scaled: np.ndarray) -> np.ndarray:
+        pose = moved(1e-6 * scaled)
+        stretch = inverse(OPTIMAL, *pose) - held
+        # A leg that is pushed together pushes back.
+        forces = actuator_forces(OPTIMAL, *pose, load, TOOL)
+        return 1e6 * (stretch + soft * forces)
+
+    solution = least_squares(unbalanced, np.zeros(6), xtol=1e-14, ftol=1e-14, gtol=1e-14)
+    twist = 1e-6 * solution.x
+    found = deflection(compliance(OPTIMAL, position, rotation, STIFFNESS, BENDING, TOOL), load)
+    assert_allclose(found, twist, rtol=1e-4, atol=1e-4 * np.abs(twist).max())
+
+
+def test_principal_compliances_are_the_extremes_of_directions() -> None:
+    positions, rotations = random_poses(OPTIMAL, 20)
+    found = compliance(OPTIMAL, positions, rotations, STIFFNESS, BENDING, TOOL)
+    principal = principal_compliances(found)
+    assert (np.diff(principal.displacement, axis=-1) <= 0.0).all()
+    assert (np.diff(principal.turn, axis=-1) <= 0.0).all()
+    for block, values, rows in (
+        (found[:, :3, :3], principal.displacement, principal.force_directions),
+        (found[:, 3:, 3:], principal.turn, principal.moment_directions),
+    ):
+        assert_allclose(
+            rows @ np.swapaxes(rows, -1, -2), np.broadcast_to(np.eye(3), (20, 3, 3)), atol=1e-12
+        )
+        along = np.einsum("nij,njk->nik", rows, block)
+        assert_allclose(along, values[..., None] * rows, atol=1e-9 * np.abs(block).max())
+
+
+def test_compliance_shares_add_up_and_follow_what_is_soft() -> None:
+    positions, rotations = random_poses(OPTIMAL, 50)
+    load = [3.0, -2.0, 4.0, 5.0, -6.0, 2.0]
+    given = OPTIMAL, positions, rotations, load
+    shares = compliance_shares(*given, STIFFNESS, BENDING, TOOL)
+    assert_allclose(np.sum(shares, axis=0), 1.0, rtol=1e-12)
+    rigid = compliance_shares(*given, STIFFNESS, None, TOOL)
+    assert not rigid.struts.any()
+    only_struts = compliance_shares(*given, np.full(6, np.inf), BENDING, TOOL)
+    assert_allclose(only_struts.struts, 1.0, rtol=1e-12)
+    # The work of the load is twice the energy that the parts store.
+    found = compliance(OPTIMAL, positions, rotations, STIFFNESS, BENDING, TOOL)
+    no_struts = compliance(OPTIMAL, positions, rotations, STIFFNESS, None, TOOL)
+    work, without = (deflection(each, load) @ np.array(load) for each in (found, no_struts))
+    assert_allclose(shares.struts, 1.0 - without / work, atol=1e-9)
+    assert np.isnan(compliance_shares(*given, np.full(6, np.inf)).guide).all()
+
+
+def test_stiffness_of_a_design_is_in_its_units() -> None:
+    stiffness, bending = stiffness_of(OPTIMAL)
+    assert np.isinf(stiffness).all()
+    assert np.isinf(bending).all()
+    six = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
+    design = msgspec.structs.replace(
+        OPTIMAL, actuators=Actuators(stiffness_n_mm=six), struts=Struts(outer_mm=10.0)
+    )
+    stiffness, bending = stiffness_of(design)
+    assert_allclose(stiffness, 10.0 * np.array(six))
+    assert_allclose(bending, 70e3 * np.pi * 10.0**4 / 64.0 / 100.0)
+    home = home_pose(design)
+    found = compliance(design, home.position, home.rotation, stiffness, bending)
+    assert np.isfinite(found).all()
+
+
+@pytest.mark.parametrize("count", [1, 600])
+def test_compliance_of_singular_pose_is_infinite(count: int) -> None:
+    positions = np.resize([3.0, 4.0, 5.0], (count, 3))
+    found = compliance(OPTIMAL, positions, np.eye(3), STIFFNESS, BENDING)
+    assert (found == np.inf).all()
+    assert (deflection(found, [1.0, 0, 0, 0, 0, 0]) == np.inf).all()
+    principal = principal_compliances(found)
+    assert (principal.displacement == np.inf).all()
+    assert np.isnan(principal.moment_directions).all()
+    shares = compliance_shares(OPTIMAL, positions, np.eye(3), np.ones(6), STIFFNESS)
+    assert np.isnan(shares).all()
+
+
+def test_compliance_of_unusable_arguments_is_refused() -> None:
+    home = home_pose(OPTIMAL)
+    given = OPTIMAL, home.position, home.rotation
+    for stiffness in ([0.0] * 6, [-1.0] * 6, [1.0] * 5, [np.nan] * 6):
+        message = refusal(compliance, *given, stiffness, kind=InputError)
+        assert "six" in message or "6 positive" in message
+    assert "bending" in refusal(compliance, *given, STIFFNESS, [0.0, 1.0], kind=InputError)

@@ -1,0 +1,313 @@
+"""Forces of actuators and struts: the reference, virtual work, laws of statics, singular poses."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import msgspec
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from reference import read_reference
+from refusals import refusal
+from scipy.spatial.transform import Rotation
+from statics_cases import CASES, Loaded, random_poses
+
+from explorer import (
+    PRESETS,
+    Actuators,
+    Design,
+    Guide,
+    InputError,
+    Payload,
+    Struts,
+    Weights,
+    actuator_forces,
+    home_pose,
+    inverse,
+    jacobian,
+    largest_force,
+    largest_payload,
+    limit_shares,
+    reactions,
+    strut_bending,
+    worst_direction,
+)
+from explorer.mechanism.kinematics import attachment_points
+from explorer.mechanism.machine import STANDARD_GRAVITY
+from explorer.numerics.arrays import FloatArray
+from explorer.numerics.compiled import MANY_ROWS
+from explorer.statics.equilibrium import twists_of_actuators
+from explorer.statics.weights import carry, design_weights
+
+OPTIMAL = PRESETS["paper-optimal"]
+LIMITED = msgspec.structs.replace(
+    OPTIMAL,
+    payload=Payload(0.8, (0.5, -0.3, 1.0)),
+    actuators=Actuators(
+        push_n=(300.0, 400.0, 300.0, 400.0, 300.0, 250.0),
+        pull_n=(200.0, 300.0, 200.0, 300.0, 200.0, 150.0),
+    ),
+    struts=Struts(outer_mm=12.0, inner_mm=9.0, stress_mpa=250.0),
+    guide=Guide(force_n=260.0, moment_nm=22.0),
+)
+WEIGHTS = Weights(
+    on_platform=(Payload(0.4, (1.0, -0.5, 0.2)),),
+    carriages=(0.0, 0.15, 0.2, 0.0),
+    cylinders=(0.3, 0.25, 0.35, 0.2),
+    cylinder_centres=(2.0, 1.5, 1.0, 2.5),
+    rods=(0.1, 0.15, 0.12, 0.08),
+    rod_centres=(2.5, 1.0, 2.0, 1.5),
+)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_forces_of_reference_are_those_of_the_reference(case: Loaded) -> None:
+    given = case.pose
+    forces = actuator_forces(*given, case.load, case.tool)
+    assert_allclose(forces, case.actuator_forces, atol=1e-9 * np.abs(forces).max())
+    bending = strut_bending(*given, case.load, case.tool)
+    assert_allclose(bending, case.strut_bending, atol=1e-9 * bending.max())
+    force = largest_force(*given, case.most_force, case.tool)
+    assert float(force) == pytest.approx(case.force_in_any_direction, rel=1e-9)
+
+
+def test_forces_at_the_papers_home_are_the_published_ones() -> None:
+    home = home_pose(OPTIMAL)
+    down = [0.0, 0.0, -10.0, 0.0, 0.0, 0.0]
+    forces = actuator_forces(OPTIMAL, home.position, home.rotation, down)
+    assert_allclose(forces, [0.0, 16.04, 6.34, -8.76, -3.24, 10.32], atol=0.02)
+    bending = strut_bending(OPTIMAL, home.position, home.rotation, down)
+    assert_allclose(bending, [149.8, 78.9], atol=0.2)
+
+
+@pytest.mark.parametrize("count", [10, 2 * MANY_ROWS])
+def test_forces_of_a_batch_are_those_of_its_poses(count: int) -> None:
+    positions, rotations = random_poses(OPTIMAL, count)
+    rng = np.random.default_rng(1)
+    loads, tools = rng.normal(size=(count, 6)), rng.normal(size=(count, 3))
+    together = actuator_forces(OPTIMAL, positions, rotations, loads, tools)
+    # Unlike a single pose, a batch may run compiled.
+    for k in range(0, count, count // 5):
+        one = actuator_forces(OPTIMAL, positions[k], rotations[k], loads[k], tools[k])
+        assert_allclose(together[k], one, rtol=1e-9, atol=1e-9 * np.abs(one).max())
+    grid = actuator_forces(OPTIMAL, positions[:6].reshape(2, 3, 3), rotations[0], loads[:3])
+    assert grid.shape == (2, 3, 6)
+
+
+def test_twists_of_actuators_invert_the_jacobian() -> None:
+    positions, rotations = random_poses(OPTIMAL, 200)
+    twists = twists_of_actuators(OPTIMAL, positions, rotations)
+    products = jacobian(OPTIMAL, positions, rotations) @ twists
+    scale = np.abs(twists).max(axis=(1, 2))[:, None, None]
+    assert (np.abs(products - np.eye(6)) < 1e-12 * np.maximum(scale, 1.0)).all()
+
+
+def moved(position: FloatArray, rotation: FloatArray, twist: FloatArray) -> Any:
+    """Return the pose after a small displacement of b4 and a turn, base axes."""
+    return position + twist[:3], Rotation.from_rotvec(twist[3:]).as_matrix() @ rotation
+
+
+def test_forces_do_the_work_of_the_load_in_every_displacement() -> None:
+    positions, rotations = random_poses(OPTIMAL, 30, seed=4)
+    rng = np.random.default_rng(4)
+    for position, rotation in zip(positions, rotations, strict=True):
+        load, tool = rng.normal(size=6), rng.normal(size=3)
+        forces = actuator_forces(OPTIMAL, position, rotation, load, tool)
+        step = 1e-5 * rng.normal(size=6)
+        ends = [moved(position, rotation, sign * step) for sign in (1.0, -1.0)]
+        joints = np.subtract(*(inverse(OPTIMAL, *end) for end in ends))
+        points = np.subtract(*(p + r @ tool for p, r in ends))
+        work = load[:3] @ points + load[3:] @ (2.0 * step[3:])
+        assert forces @ joints + work == pytest.approx(0.0, abs=1e-8 * np.abs(forces).max())
+
+
+class Centres(NamedTuple):
+    masses: list[float]
+    points: list[FloatArray]
+
+
+def centres(design: Design, position: FloatArray, rotation: FloatArray) -> Centres:
+    """Return all masses of `WEIGHTS` and their centres, from the geometry of the legs."""
+    at = attachment_points(design, position, rotation)
+    masses = [body.mass_kg for body in WEIGHTS.on_platform]
+    points = [position + rotation @ np.array(body.centre) for body in WEIGHTS.on_platform]
+    foot2, foot3 = at.b2 * [1.0, 0.0, 0.0], at.b3 * [1.0, 0.0, 0.0]
+    legs = [(at.a1, at.b1), (foot2, at.b2), (foot3, at.b3), (at.a3, at.b4)]
+    for leg, (base, end) in enumerate(legs):
+        axis = (end - base) / np.linalg.norm(end - base)
+        masses += [WEIGHTS.carriages[leg], WEIGHTS.cylinders[leg], WEIGHTS.rods[leg]]
+        points += [base, base + WEIGHTS.cylinder_centres[leg] * axis]
+        points += [end - WEIGHTS.rod_centres[leg] * axis]
+    return Centres(masses, points)
+
+
+@pytest.mark.parametrize("gravity", [(0.0, 0.0, -1.0), (1.0, 2.0, -0.5)])
+def test_weights_do_the_work_of_their_centres(gravity: tuple[float, float, float]) -> None:
+    design = msgspec.structs.replace(OPTIMAL, gravity=gravity)
+    g = STANDARD_GRAVITY * np.array(design.gravity)
+    positions, rotations = random_poses(design, 30, seed=5)
+    rng = np.random.default_rng(5)
+    for position, rotation in zip(positions, rotations, strict=True):
+        tool = rng.normal(size=3)
+        wrench = carry(design, position, rotation, WEIGHTS, tool).wrench
+        forces = actuator_forces(design, position, rotation, wrench, tool)
+        step = 1e-5 * rng.normal(size=6)
+        ends = [moved(position, rotation, sign * step) for sign in (1.0, -1.0)]
+        joints = np.subtract(*(inverse(design, *end) for end in ends))
+        first, second = (centres(design, *end) for end in ends)
+        work = sum(
+            mass * g @ (a - b)
+            for mass, a, b in zip(first.masses, first.points, second.points, strict=True)
+        )
+        assert forces @ joints + work == pytest.approx(0.0, abs=1e-7 * np.abs(forces).max())
+
+
+@pytest.mark.parametrize("gravity", [(0.0, 0.0, -1.0), (1.0, 2.0, -0.5)])
+def test_joint_forces_balance_the_platform_and_each_leg(
+    gravity: tuple[float, float, float],
+) -> None:
+    design = msgspec.structs.replace(OPTIMAL, gravity=gravity)
+    g = STANDARD_GRAVITY * np.array(design.gravity)
+    positions, rotations = random_poses(design, 20, seed=6)
+    load = np.array([3.0, -2.0, 5.0, 1.0, 4.0, -6.0])
+    held = reactions(design, positions, rotations, load, None, WEIGHTS)
+    scale = np.abs(held.joints).max()
+    for k, (position, rotation) in enumerate(zip(positions, rotations, strict=True)):
+        at = attachment_points(design, position, rotation)
+        ends = [at.b1, at.b2, at.b3, at.b4]
+        body = WEIGHTS.on_platform[0]
+        centre, weight = rotation @ np.array(body.centre), body.mass_kg * g
+        force = load[:3] + weight + held.joints[k].sum(axis=0)
+        arms = np.array([end - position for end in ends])
+        moment = load[3:] + np.cross(centre, weight)
+        moment = moment + np.cross(arms, held.joints[k]).sum(axis=0)
+        assert_allclose(force, 0.0, atol=1e-10 * scale)
+        assert_allclose(moment, 0.0, atol=1e-9 * scale)
+        # Legs 2 and 3 about their carriages: the moment across the strut is the bending.
+        _, points = centres(design, position, rotation)
+        for leg in (1, 2):
+            carriage, cylinder, rod = points[1 + 3 * leg : 4 + 3 * leg]
+            on_strut = np.cross(ends[leg] - carriage, -held.joints[k, leg])
+            on_strut += np.cross(cylinder - carriage, WEIGHTS.cylinders[leg] * g)
+            on_strut += np.cross(rod - carriage, WEIGHTS.rods[leg] * g)
+            bending = held.bending[k, leg - 1]
+            # The carriage turns freely about the guide.
+            assert on_strut[0] == pytest.approx(0.0, abs=1e-9 * scale)
+            assert np.linalg.norm(on_strut) == pytest.approx(bending, rel=1e-9, abs=1e-9 * scale)
+            total = (WEIGHTS.carriages[leg] + WEIGHTS.cylinders[leg] + WEIGHTS.rods[leg]) * g
+            across = (total - held.joints[k, leg])[1:]
+            assert np.linalg.norm(across) == pytest.approx(held.guide_force[k, leg - 1], rel=1e-9)
+
+
+def test_reactions_without_weights_are_those_of_the_load() -> None:
+    positions, rotations = random_poses(OPTIMAL, 20)
+    load = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
+    held = reactions(OPTIMAL, positions, rotations, load)
+    assert_allclose(held.actuators, actuator_forces(OPTIMAL, positions, rotations, load))
+    assert_allclose(held.bending, strut_bending(OPTIMAL, positions, rotations, load))
+    assert_allclose(held.guide_force, np.abs(held.actuators[:, [2, 4]]), rtol=1e-12)
+
+
+def test_worst_direction_loads_its_actuator_to_the_limit() -> None:
+    positions, rotations = random_poses(OPTIMAL, 40, seed=8)
+    most = np.array([50.0, 60.0, 70.0, 80.0, 90.0, 40.0])
+    tool = (0.3, 0.2, 1.0)
+    worst = worst_direction(OPTIMAL, positions, rotations, most, tool)
+    force = largest_force(OPTIMAL, positions, rotations, most, tool)
+    load = np.concatenate([force[:, None] * worst.direction, np.zeros((40, 3))], axis=1)
+    shares = np.abs(actuator_forces(OPTIMAL, positions, rotations, load, tool)) / most
+    assert_allclose(shares.max(axis=1), 1.0, rtol=1e-9)
+    assert (shares.argmax(axis=1) == worst.actuator).all()
+    rng = np.random.default_rng(8)
+    for _ in range(50):
+        other = rng.normal(size=(40, 3))
+        other *= (force / np.linalg.norm(other, axis=1))[:, None]
+        load = np.concatenate([other, np.zeros((40, 3))], axis=1)
+        held = np.abs(actuator_forces(OPTIMAL, positions, rotations, load, tool)) / most
+        assert (held <= 1.0 + 1e-9).all()
+
+
+def test_largest_payload_uses_a_limit_up_and_keeps_all() -> None:
+    positions, rotations = random_poses(LIMITED, 60, seed=9)
+    load = [1.0, 2.0, -3.0, 0.0, 1.0, 0.0]
+    most = largest_payload(LIMITED, positions, rotations, load, None, WEIGHTS)
+    assert (most > 0.0).sum() > 20
+    for k in np.flatnonzero(most > 0.0):
+        for factor, kept in ((1.0 - 1e-9, True), (1.0 + 1e-9, False)):
+            payload = Payload(float(most[k]) * factor, LIMITED.payload.centre)
+            weights = with_payload(WEIGHTS, payload)
+            held = reactions(LIMITED, positions[k], rotations[k], load, None, weights)
+            assert (limit_shares(LIMITED, held).max() <= 1.0) == kept
+    for k in np.flatnonzero(most == 0.0):
+        held = reactions(LIMITED, positions[k], rotations[k], load, None, WEIGHTS)
+        assert limit_shares(LIMITED, held).max() > 1.0
+
+
+def with_payload(weights: Weights, payload: Payload) -> Weights:
+    """Return weights with a payload more."""
+    return replace(weights, on_platform=(*weights.on_platform, payload))
+
+
+def test_limit_shares_without_limits_are_zero_and_the_payload_is_unbounded() -> None:
+    positions, rotations = random_poses(OPTIMAL, 10)
+    held = reactions(OPTIMAL, positions, rotations, [0.0, 0.0, -10.0, 0.0, 0.0, 0.0])
+    assert not limit_shares(OPTIMAL, held).any()
+    assert np.isinf(largest_payload(OPTIMAL, positions, rotations)).all()
+    assert np.isinf(largest_force(OPTIMAL, positions, rotations, np.full(6, np.inf))).all()
+
+
+def test_payload_of_the_design_weighs_at_its_centre() -> None:
+    home = home_pose(LIMITED)
+    wrench = carry(LIMITED, home.position, home.rotation, design_weights(LIMITED)).wrench
+    weight = np.array([0.0, 0.0, -0.8 * STANDARD_GRAVITY])
+    assert_allclose(wrench[:3], weight, rtol=1e-12)
+    arm = home.rotation @ np.array(LIMITED.payload.centre)
+    assert_allclose(wrench[3:], np.cross(arm, weight), rtol=1e-12, atol=1e-12)
+
+
+SINGULAR = [
+    ([3.0, 4.0, 5.0], [1.0, 0.0, 0.0, 0.0]),
+    ([3.0, 4.0, 0.0], [0.8, 0.3, 0.2, 0.4]),
+    ([0.0, 0.0, 0.0], [0.8, 0.3, 0.2, 0.4]),
+    ([*OPTIMAL.a3, 0.0], [0.8, 0.3, 0.2, 0.4]),
+]
+
+
+@pytest.mark.parametrize("count", [1, 2 * MANY_ROWS])
+@pytest.mark.parametrize(("position", "quaternion"), SINGULAR)
+def test_forces_of_singular_pose_are_infinite(
+    position: list[float], quaternion: list[float], count: int
+) -> None:
+    positions = np.resize(np.array(position), (count, 3))
+    turn = Rotation.from_quat(quaternion, scalar_first=True).as_matrix()
+    given = LIMITED, positions, np.resize(turn, (count, 3, 3))
+    load = [1.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+    assert (actuator_forces(*given, load) == np.inf).all()
+    assert (strut_bending(*given, load) == np.inf).all()
+    assert (largest_force(*given, np.ones(6)) == 0.0).all()
+    assert (largest_payload(*given) == 0.0).all()
+    assert np.isnan(worst_direction(*given, np.ones(6)).direction).all()
+    held = reactions(*given, load)
+    for values in (*held, limit_shares(LIMITED, held)):
+        assert (values == np.inf).all()
+
+
+def test_forces_of_unusable_arguments_are_refused() -> None:
+    home = home_pose(OPTIMAL)
+    given = OPTIMAL, home.position, home.rotation
+    assert "load (FX FY FZ MX MY MZ)" in refusal(actuator_forces, *given, [1, 2], kind=InputError)
+    refusal(actuator_forces, *given, [np.nan] * 6, kind=InputError)
+    refusal(actuator_forces, *given, np.zeros(6), [1.0, 2.0], kind=InputError)
+    for most in ([0.0] * 6, [1.0] * 5, [np.nan] * 6):
+        assert "six positive" in refusal(largest_force, *given, most, kind=InputError)
+    positions, rotations = random_poses(OPTIMAL, 4)
+    loads = np.zeros((3, 6))
+    assert "broadcast" in refusal(
+        actuator_forces, OPTIMAL, positions, rotations, loads, kind=InputError
+    )
+
+
+def test_reference_has_all_cases() -> None:
+    assert len(read_reference("loads")["cases"]) == len(CASES) == 150

@@ -1,0 +1,117 @@
+"""Forces with all weights, judged by MuJoCo: the equilibrium of the model, and its servos."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import msgspec
+import mujoco  # pyright: ignore[reportMissingTypeStubs]
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from statics_cases import random_poses
+
+from explorer import PRESETS, Design, Payload, actuator_forces
+from explorer.export.simulation import DENSITY, simulation_joints, simulation_mjcf
+from explorer.mechanism.design import DOWN
+from explorer.mechanism.machine import STANDARD_GRAVITY
+from explorer.numerics.arrays import FloatArray
+from explorer.prototype.chains import ACTUATED
+from explorer.prototype.mass import ball, total_mass
+from explorer.prototype.weights import bar_masses, machine_weights
+from explorer.statics.weights import carry
+
+engine: Any = mujoco
+OPTIMAL = PRESETS["paper-optimal"]
+THICK = msgspec.structs.replace(
+    OPTIMAL,
+    limits=msgspec.structs.replace(OPTIMAL.limits, leg_radii=(0.3, 0.4, 0.5, 0.35)),
+    payload=Payload(0.5, (1.0, -2.0, 1.5)),
+)
+TILTED = msgspec.structs.replace(THICK, gravity=(0.4, -0.5, -0.8))
+TOOL = np.array([0.5, 1.0, -2.0])
+LOAD = np.array([3.0, -2.0, 4.0, 20.0, -10.0, 5.0])
+
+
+def loaded_model(design: Design) -> Any:
+    """Return the model with the payload on its platform."""
+    masses = dict(bar_masses(design, DENSITY))
+    metres = 1e-3 * design.unit_mm
+    payload = ball(0.01, metres * np.array(design.payload.centre), 1.0)
+    heavy = payload.scaled(1.0, design.payload.mass_kg / payload.mass)
+    masses["platform"] = total_mass([masses["platform"], heavy])
+    model = engine.MjModel.from_xml_string(simulation_mjcf(design, masses=masses))
+    if design.gravity == DOWN:
+        # The model keeps MuJoCo's own 9.81 m/s².
+        model.opt.gravity[:] = STANDARD_GRAVITY * np.array(DOWN)
+    return model
+
+
+def our_forces(
+    design: Design, position: FloatArray, rotation: FloatArray, share: float = 1.0
+) -> FloatArray:
+    weights = machine_weights(design, bar_masses(design, DENSITY))
+    wrench = carry(design, position, rotation, weights, TOOL).wrench
+    return actuator_forces(design, position, rotation, wrench + share * LOAD, TOOL)
+
+
+def apply_load(design: Design, model: Any, data: Any, share: float = 1.0) -> None:
+    """Apply a share of the load at the tool, as generalised forces of the model."""
+    metres = 1e-3 * design.unit_mm
+    platform = data.body("platform")
+    point = platform.xpos + platform.xmat.reshape(3, 3) @ (metres * TOOL)
+    force, moment = share * LOAD[:3], share * metres * LOAD[3:]
+    data.qfrc_applied[:] = 0.0
+    engine.mj_applyFT(model, data, force, moment, point, platform.id, data.qfrc_applied)
+
+
+def loops_of(model: Any, data: Any) -> FloatArray:
+    """Return the Jacobian (12, 18) of the ball joints."""
+    own = np.array(data.efc_type) == int(engine.mjtConstraint.mjCNSTR_EQUALITY)
+    dense = np.zeros((data.nefc, model.nv))
+    if engine.mj_isSparse(model):
+        engine.mju_sparse2dense(
+            dense, data.efc_J, data.efc_J_rownnz, data.efc_J_rowadr, data.efc_J_colind
+        )
+    else:
+        dense = np.array(data.efc_J).reshape(data.nefc, model.nv)
+    return dense[own]
+
+
+@pytest.mark.parametrize("design", [THICK, TILTED])
+def test_forces_with_weights_are_those_of_the_models_equilibrium(design: Design) -> None:
+    model = loaded_model(design)
+    data = engine.MjData(model)
+    positions, rotations = random_poses(design, 20, seed=2)
+    for position, rotation in zip(positions, rotations, strict=True):
+        data.qpos[:] = simulation_joints(design, position, rotation)
+        data.qvel[:] = 0.0
+        engine.mj_forward(model, data)
+        apply_load(design, model, data)
+        # What weights and load leave to the servos and to the ball joints.
+        needed = np.array(data.qfrc_bias) - np.array(data.qfrc_applied)
+        columns = np.concatenate([np.eye(model.nv)[list(ACTUATED)], loops_of(model, data)]).T
+        forces = np.linalg.solve(columns, needed)[:6]
+        ours = our_forces(design, position, rotation)
+        assert_allclose(ours, forces, atol=1e-8 * np.abs(forces).max())
+
+
+def test_forces_with_weights_are_those_of_the_servos_at_rest() -> None:
+    # The servos suit the mass of the mechanism: a heavy payload on an arm makes them oscillate.
+    design = msgspec.structs.replace(THICK, payload=Payload(0.005, (1.0, -1.0, 0.3)))
+    share = 0.1
+    model = loaded_model(design)
+    data = engine.MjData(model)
+    engine.mj_resetDataKeyframe(model, data, 0)
+    engine.mj_forward(model, data)
+    for step in range(2500):
+        apply_load(design, model, data, share * min(1.0, step / 500))
+        engine.mj_step(model, data)
+    assert np.abs(data.qvel).max() < 1e-6
+    forces = np.array(data.actuator_force)
+    # The servos give a little, so the pose is that at which they came to rest.
+    metres = 1e-3 * design.unit_mm
+    platform = data.body("platform")
+    place, turn = platform.xpos / metres, platform.xmat.reshape(3, 3)
+    ours = our_forces(design, place, turn, share)
+    assert_allclose(ours, forces, atol=1e-3 * np.abs(forces).max())
