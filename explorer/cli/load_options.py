@@ -12,7 +12,6 @@ from explorer.cli.options import DesignOptions, JsonOptions, PoseOptions
 from explorer.cli.values import hint, load_numbers, not_negative
 from explorer.errors import NoAnswerError
 from explorer.mechanism.design import Design
-from explorer.mechanism.machine import Payload
 from explorer.mechanism.margins import INCIDENCES, margins
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray
@@ -49,7 +48,7 @@ class LoadOptions(JsonOptions, PoseOptions, DesignOptions):
         design = self.read_design()
         if self.payload is None:
             return design
-        payload = Payload(self.payload, design.payload.centre)
+        payload = msgspec.structs.replace(design.payload, mass_kg=self.payload)
         return msgspec.structs.replace(design, payload=payload)
 
     def tool(self, design: Design) -> Triple:

@@ -15,6 +15,7 @@ from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.jacobian import inverse_condition, jacobian
+from explorer.statics.reactions import part_limits
 from explorer.workspace.extremes import extent_of, least_margins
 from explorer.workspace.node_measures import DEFAULT_NODES, NodeMeasures, node_measures
 from explorer.workspace.slices.volume import NodeCount, Volume, workspace_nodes, workspace_volume
@@ -151,43 +152,50 @@ class Case:
         """Loads, errors and compliance over the required box; None without a box."""
         return None if self.box is None else BoxStatics(self.design, self.box, self.rotation)
 
+    @cached_property
+    def home_statics(self) -> BoxStatics:
+        """Loads, errors and compliance at the position of the case's pose."""
+        position = self.at.position
+        return BoxStatics(self.design, (position, position), self.rotation)
+
     @property
-    def limited_statics(self) -> BoxStatics | None:
-        """Those of a design that limits forces or moments, or None."""
+    def is_loaded(self) -> bool:
+        """Whether the design has a load."""
+        return bool(self.design.payload.mass_kg or self.design.payload.force_n)
+
+    @property
+    def is_limited(self) -> bool:
+        """Whether the design limits forces or moments."""
+        return bool(np.isfinite(part_limits(self.design)).any())
+
+    @property
+    def limits_actuators(self) -> bool:
+        """Whether the design limits the forces of its actuators."""
+        return self.design.actuators.push_n is not None or self.design.actuators.pull_n is not None
+
+    @property
+    def has_errors(self) -> bool:
+        """Whether the design's actuators have errors."""
+        return any(self.design.actuators.error_mm)
+
+    @property
+    def is_elastic(self) -> bool:
+        """Whether the design's actuators or struts give way."""
         design = self.design
-        limits = [*design.actuators.limits, design.struts.largest_moment]
-        is_limited = any(np.isfinite(limit).any() for limit in limits)
-        guide = design.guide
-        is_limited = is_limited or guide.force_n is not None or guide.moment_nm is not None
-        return self.box_statics if is_limited else None
+        return design.actuators.stiffness_n_mm is not None or design.struts.outer_mm is not None
 
-    @property
-    def payload_statics(self) -> BoxStatics | None:
-        """Those of a design with a payload, or None."""
-        return self.box_statics if self.design.payload.mass_kg else None
+    def has(self, need: str) -> bool:
+        """Return whether the case has what a measure needs, an attribute."""
+        value = getattr(self, need)
+        return value is not None and value is not False
 
-    @property
-    def limited_payload_statics(self) -> BoxStatics | None:
-        """Those of a design with a payload and limits, or None."""
-        return self.limited_statics and self.payload_statics
+    @cached_property
+    def held_volume(self) -> float:
+        """The volume where the design's load is held, in cubed design units."""
+        # It loads the kernel of solids.
+        from explorer.workspace.held import held_workspace
 
-    @property
-    def actuator_statics(self) -> BoxStatics | None:
-        """Those of a design with a payload and limits of its actuators, or None."""
-        is_limited = self.design.actuators.push_n or self.design.actuators.pull_n
-        return self.payload_statics if is_limited else None
-
-    @property
-    def error_statics(self) -> BoxStatics | None:
-        """Those of a design whose actuators have errors, or None."""
-        return self.box_statics if any(self.design.actuators.error_mm) else None
-
-    @property
-    def elastic_statics(self) -> BoxStatics | None:
-        """Those of a design whose actuators or struts give way, or None."""
-        design = self.design
-        is_rigid = design.actuators.stiffness_n_mm is None and design.struts.outer_mm is None
-        return None if is_rigid else self.box_statics
+        return held_workspace(self.design, self.rotation).held_volume
 
     def inverse_conditions(self, positions: FloatArray) -> FloatArray:
         """Return the inverse condition of the Jacobian at positions (n, 3), shape (n,)."""

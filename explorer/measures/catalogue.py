@@ -16,9 +16,9 @@ import numpy as np
 from explorer.errors import InputError
 from explorer.legs.clearance import PAIRS
 from explorer.measures.case import Case
+from explorer.measures.loads import loads
 from explorer.measures.measure import Measure, Place
 from explorer.measures.size import box_margin, box_tilt, home_tilt, longest_leg
-from explorer.measures.statics import BOX_NODES, BoxStatics
 from explorer.mechanism.design import LENGTHS, VARIABLES
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import yaw_pitch_roll_from_rotation
@@ -218,7 +218,7 @@ def _margins() -> Iterable[Measure]:
         "margin over the box",
         "The least |δ| over the required box",
         lambda case: math.nan if case.box is None else box_margin(case.box, case.rotation),
-        needs="box",
+        needs=("box",),
         places=OPTIMISE,
     )
 
@@ -241,7 +241,7 @@ def _clearances() -> Iterable[Measure]:
         "what the demand says",
         lambda case: _clearance_or_nan(case.demanded_clearance),
         cost="high",
-        needs="demanded_margin",
+        needs=("demanded_margin",),
         places=OPTIMISE,
     )
     yield MarginAtNodes(
@@ -339,83 +339,8 @@ def _orientations() -> Iterable[Measure]:
         lambda case: math.nan if case.box is None else box_tilt(case.design, case.box, case.at),
         unit="°",
         sense="more",
-        needs="box",
+        needs=("box",),
         places=OPTIMISE,
-    )
-
-
-def _statics(value: Callable[[BoxStatics], float]) -> Callable[[Case], float]:
-    """Return the function of a measure over the required box, NaN without one."""
-
-    def function(case: Case) -> float:
-        return math.nan if case.box_statics is None else value(case.box_statics)
-
-    return function
-
-
-def _box_is_singular(case: Case) -> str:
-    if case.box_statics is None or case.box_statics.is_regular:
-        return ""
-    return "the required box has singular positions, where forces and errors are infinite"
-
-
-OverBox = partial(Measure, reason=_box_is_singular, places=OPTIMISE)
-
-
-def _loads() -> Iterable[Measure]:
-    nodes = f"at {BOX_NODES} nodes an axis of the required box"
-    yield OverBox(
-        "load_share",
-        "load over the box",
-        f"The largest share of a limit of actuators, struts or guide under the payload, {nodes}",
-        _statics(lambda box: box.largest_share),
-        sense="less",
-        needs="limited_payload_statics",
-    )
-    yield OverBox(
-        "worst_actuator",
-        "worst actuator",
-        "Place of the actuator with the largest share of its limit in the order l1, d1, d2, d3, "
-        f"d4, l4, under the payload, {nodes}",
-        _statics(lambda box: box.worst_actuator),
-        is_whole=True,
-        needs="actuator_statics",
-    )
-    yield OverBox(
-        "largest_payload",
-        "largest payload",
-        f"The largest mass in place of the payload that keeps all limits, {nodes}",
-        _statics(lambda box: box.largest_payload),
-        unit="kg",
-        sense="more",
-        needs="limited_statics",
-    )
-    yield OverBox(
-        "largest_bending",
-        "largest bending",
-        f"The largest bending moment of struts 2 and 3 under the payload, {nodes}",
-        _statics(lambda box: box.largest_bending),
-        unit="N m",
-        sense="less",
-        needs="payload_statics",
-    )
-    yield OverBox(
-        "worst_error",
-        "worst error",
-        f"The largest displacement of the tool by the errors of the actuators, {nodes}",
-        _statics(lambda box: box.worst_error),
-        power=1,
-        sense="less",
-        needs="error_statics",
-    )
-    yield OverBox(
-        "softest_compliance",
-        "softest compliance",
-        f"The largest displacement of the tool per force at it, {nodes}",
-        _statics(lambda box: box.softest_compliance),
-        unit="mm/N",
-        sense="less",
-        needs="elastic_statics",
     )
 
 
@@ -447,7 +372,7 @@ CATALOGUE: Mapping[str, Measure] = {
         _clearances(),
         _conditions(),
         _orientations(),
-        _loads(),
+        loads(),
         _coordinates(),
     )
     for measure in group

@@ -15,15 +15,14 @@ Place = Literal["compare", "optimise", "studies", "workspace", "report"]
 Sense = Literal["more", "less"]
 Unit = Literal["", "°", "share", "N m", "kg", "mm/N"]
 Cost = Literal["low", "high"]
-Demand = Literal[
+Need = Literal[
     "box",
     "demanded_margin",
-    "limited_statics",
-    "payload_statics",
-    "limited_payload_statics",
-    "actuator_statics",
-    "error_statics",
-    "elastic_statics",
+    "is_loaded",
+    "is_limited",
+    "limits_actuators",
+    "has_errors",
+    "is_elastic",
 ]
 
 EVERYWHERE: frozenset[Place] = frozenset(get_args(Place))
@@ -47,7 +46,7 @@ class Measure:
         is_whole: Whether it is a count.
         gradient: Partial derivatives by the name of the parameter, as in
             `explorer.workspace.slices.volume.Volume`; None if there is no closed form.
-        needs: Attribute of the case that the measure needs, or None.
+        needs: Attributes of the case that the measure needs, see `Case.has`.
         reason: Why a workspace that is not empty lacks the value; "" if nothing is known.
         places: Where it is listed.
     """
@@ -63,7 +62,7 @@ class Measure:
     cost: Cost = "low"
     is_whole: bool = False
     gradient: Callable[[Case], Mapping[str, float]] | None = None
-    needs: Demand | None = None
+    needs: tuple[Need, ...] = ()
     reason: Callable[[Case], str] = lambda _: ""
     places: frozenset[Place] = EVERYWHERE
 

@@ -49,7 +49,7 @@ def measure_design(case: Case, names: Iterable[str]) -> Measurements:
     values: dict[str, float | None] = {}
     for name in names:
         measure = CATALOGUE[name]
-        if measure.needs is not None and getattr(case, measure.needs) is None:
+        if not all(map(case.has, measure.needs)):
             continue
         value = measure.function(case)
         values[name] = None if not math.isfinite(value) else value

@@ -1,5 +1,6 @@
-"""Loads, errors and compliance over the required box, at the nodes of a grid.
+"""Loads, errors and compliance over the required box, at the nodes of a grid, or at one position.
 
+The load is the payload's weight and its force of any direction; the legs count as weightless.
 Forces are not linear in the position, so corners alone do not bound them; the grid has the corners
 among its nodes. Where a margin changes its sign within the box, all of them are infinite.
 """
@@ -13,11 +14,13 @@ import numpy as np
 
 from explorer.measures.size import corners_of
 from explorer.mechanism.design import Design
+from explorer.mechanism.kinematics import inverse
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.statics.accuracy import actuator_errors, worst_error
 from explorer.statics.compliance import compliance, principal_compliances, stiffness_of
+from explorer.statics.forces import STRUT_ROWS
 from explorer.statics.reactions import Reactions, largest_payload, limit_shares, reactions
 from explorer.statics.weights import design_weights
 
@@ -28,6 +31,8 @@ BOX_NODES = 9
 @dataclass(frozen=True)
 class BoxStatics:
     """A design under its payload over a box, at one orientation.
+
+    A box whose lows are its highs is one position.
 
     Attributes:
         design: The manipulator.
@@ -48,14 +53,28 @@ class BoxStatics:
     @cached_property
     def positions(self) -> FloatArray:
         """Nodes of the grid, shape (n, 3)."""
-        axes = [np.linspace(*ends, BOX_NODES) for ends in zip(*self.box, strict=True)]
+        axes = [
+            np.linspace(low, high, BOX_NODES if high > low else 1)
+            for low, high in zip(*self.box, strict=True)
+        ]
         return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
 
     @cached_property
     def held(self) -> Reactions:
         """The reactions to the weight of the payload."""
-        weights = design_weights(self.design)
-        return reactions(self.design, self.positions, self.rotation, np.zeros(6), weights=weights)
+        design, weights = self.design, design_weights(self.design)
+        return reactions(design, self.positions, self.rotation, np.zeros(6), weights=weights)
+
+    @cached_property
+    def strut_lengths(self) -> FloatArray:
+        """The lengths d2 and d4 at the nodes, shape (n, 2), in design units."""
+        return inverse(self.design, self.positions, self.rotation)[:, STRUT_ROWS]
+
+    @cached_property
+    def errors(self) -> FloatArray:
+        """The worst displacement of the tool at the nodes, shape (n,), in design units."""
+        errors, tool = actuator_errors(self.design), self.design.tool.position
+        return worst_error(self.design, self.positions, self.rotation, errors, tool).displacement
 
     @cached_property
     def shares(self) -> FloatArray:
@@ -76,7 +95,8 @@ class BoxStatics:
     def largest_bending(self) -> float:
         """The largest bending moment of a strut, in N m."""
         metres = 1e-3 * self.design.unit_mm
-        return metres * float(self.held.bending.max()) if self.is_regular else np.inf
+        bending = self.held.bending + self.held.spread[:, 6:8]
+        return metres * float(bending.max()) if self.is_regular else np.inf
 
     @property
     def largest_payload(self) -> float:
@@ -88,11 +108,7 @@ class BoxStatics:
     @property
     def worst_error(self) -> float:
         """The worst displacement of the tool by the actuators' errors, in design units."""
-        if not self.is_regular:
-            return np.inf
-        errors, tool = actuator_errors(self.design), self.design.tool.position
-        found = worst_error(self.design, self.positions, self.rotation, errors, tool)
-        return float(found.displacement.max())
+        return float(self.errors.max()) if self.is_regular else np.inf
 
     @property
     def softest_compliance(self) -> float:

@@ -63,22 +63,26 @@ class Tool(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Payload(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A mass that the platform carries.
+    """What the platform carries: a mass, and a force of any direction at the tool point.
 
     Attributes:
         mass_kg: Mass, in kilograms.
         centre: Centre of mass in the platform frame, in design units.
+        force_n: Largest force of the process, which acts at the tool point in any direction, in
+            newtons.
 
     Raises:
-        DesignError: The mass is negative, or a value is not finite.
+        DesignError: The mass or the force is negative, or a value is not finite.
     """
 
     mass_kg: float = 0.0
     centre: Triple = (0.0, 0.0, 0.0)
+    force_n: float = 0.0
 
     def __post_init__(self) -> None:
         _set(self, "mass_kg", not_negative("payload.mass_kg", self.mass_kg))
         _set(self, "centre", tuple(numbers("payload.centre", self.centre, 3)))
+        _set(self, "force_n", not_negative("payload.force_n", self.force_n))
 
 
 class Actuators(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

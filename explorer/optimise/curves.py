@@ -21,6 +21,8 @@ GOALS: Mapping[ObjectiveName, str] = MappingProxyType(
         "smallest-reach": "longest_leg",
         "largest-volume": "volume",
         "largest-margin": "box_margin",
+        "smallest-load": "load_share",
+        "smallest-error": "worst_error",
     }
 )
 """The name in the catalogue of the measure that each objective improves."""

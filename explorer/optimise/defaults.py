@@ -42,6 +42,8 @@ def make_problem(
     least: float | None = None,
     stroke_ratio: float | None = None,
     required_box: Box | None = None,
+    held: bool = False,
+    error: float | None = None,
     free: Iterable[str] = (),
     bounds: Iterable[Variable] = (),
 ) -> Problem:
@@ -58,6 +60,8 @@ def make_problem(
             the start itself is half as far from degenerate.
         stroke_ratio: See `Demands`.
         required_box: See `Demands`.
+        held: See `Demands`.
+        error: See `Demands`.
         free: Variables of `OPTIONAL` that may change besides the six design variables.
         bounds: Variables with other bounds than the default ones.
 
@@ -88,6 +92,8 @@ def make_problem(
             least=least,
             stroke_ratio=stroke_ratio,
             required_box=required_box,
+            held=held,
+            error=error,
         ),
     )
 

@@ -34,7 +34,7 @@ class Iterate:
         phase: Phase of the search.
         design: The design.
         values: Values of the variables of the problem.
-        objective: F = |1 − V/V′|, the longest leg, the volume or the worst margin.
+        objective: F = |1 − V/V′|, or the value of the measure that the objective improves.
         volume: Exact volume of the workspace, in cubed design units.
         worst: Demand that is missed most, or has the least to spare; "" without demands.
         spare: Value of that demand, dimensionless: below zero where it is missed by more than

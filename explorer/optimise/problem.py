@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping
 from typing import Literal, get_args
 
 import msgspec
+import numpy as np
 
 from explorer.errors import InputError
 from explorer.measures.size import longest_leg
@@ -18,12 +19,24 @@ from explorer.mechanism.design import DEGENERATE_RATIO, LENGTHS, VARIABLES, Desi
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import Pose, Triple, yaw_pitch_roll_from_rotation
 from explorer.numerics.checks import not_negative, number, numbers, ordered, positive, two
+from explorer.statics.reactions import part_limits
 
-ObjectiveName = Literal["match-volume", "smallest-reach", "largest-volume", "largest-margin"]
+ObjectiveName = Literal[
+    "match-volume",
+    "smallest-reach",
+    "largest-volume",
+    "largest-margin",
+    "smallest-load",
+    "smallest-error",
+]
 
 OBJECTIVES: tuple[ObjectiveName, ...] = get_args(ObjectiveName)
 """Objectives: to match the demanded volume (the paper's F = |1 − V/V′|), the shortest longest leg
-for it, the largest volume, the largest worst margin over the required box."""
+for it, the largest volume, the largest worst margin over the required box, and over that box the
+smallest largest share of a limit under the design's load, and the smallest worst error."""
+
+OVER_BOX: tuple[ObjectiveName, ...] = ("largest-margin", "smallest-load", "smallest-error")
+"""Objectives that are the worst of several values over the required box."""
 
 YAW = "yaw"
 REACH = "reach"
@@ -70,6 +83,10 @@ class Demands(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         stroke_ratio: Longest over shortest of each actuator: raises its minimum length to
             its maximum over this ratio, so that the workspace is what such strokes reach.
         required_box: (lows, highs) of positions that must lie in the workspace.
+        held: Whether the design's load must be held over the required box, within the limits of
+            its actuators, struts and guide.
+        error: Worst displacement of the tool by the actuators' errors over the required box, in
+            design units.
     """
 
     volume: float | None = None
@@ -79,6 +96,8 @@ class Demands(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     least: float = 0.0
     stroke_ratio: float | None = None
     required_box: Box | None = None
+    held: bool = False
+    error: float | None = None
 
     def __post_init__(self) -> None:
         if self.volume is not None:
@@ -88,7 +107,7 @@ class Demands(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
                     f"the volume demanded must be a positive, finite number; got {self.volume:g}"
                 )
             msgspec.structs.force_setattr(self, "volume", float(self.volume))
-        for field in ("reach", "clearance", "stroke_ratio"):
+        for field in ("reach", "clearance", "stroke_ratio", "error"):
             value = getattr(self, field)
             if value is not None:
                 label = f"the {field.replace('_', ' ')} demanded"
@@ -308,6 +327,7 @@ def _check_demands(problem: Problem) -> None:
             "clearance can be demanded only off the singular planes, where legs may have to "
             "meet: give a positive clearance margin"
         )
+    _check_statics(problem)
     ratio = demands.stroke_ratio
     if ratio is not None and not ratio > 1.0:
         raise InputError(f"a stroke ratio is longest over shortest, above 1; got {ratio:g}")
@@ -319,6 +339,25 @@ def _check_demands(problem: Problem) -> None:
                 f"the start has |{name}| = {distance:g}, below the least allowed "
                 f"{demands.least:g}: start elsewhere or lower it"
             )
+
+
+def _check_statics(problem: Problem) -> None:
+    demands, design = problem.demands, problem.start
+    needs_load = demands.held or problem.objective == "smallest-load"
+    needs_error = demands.error is not None or problem.objective == "smallest-error"
+    if (needs_load or needs_error) and demands.required_box is None:
+        raise InputError("loads and errors are measured over a required box, and none is given")
+    if needs_load and not (design.payload.mass_kg or design.payload.force_n):
+        raise InputError(
+            "the design has no load: give its payload a mass, or a force of any direction"
+        )
+    if needs_load and np.isinf(part_limits(design)).all():
+        raise InputError(
+            "the design limits neither its actuators nor its struts nor its guide: give a limit "
+            "of forces or moments"
+        )
+    if needs_error and not any(design.actuators.error_mm):
+        raise InputError("the actuators of the design have no errors: give them")
 
 
 def _check_objective(problem: Problem) -> None:
@@ -334,7 +373,7 @@ def _check_objective(problem: Problem) -> None:
                     "the design fixes maximum lengths: tie them to the reach |a3|, or let the "
                     "reach change as a variable of its own"
                 )
-        case "largest-volume":
+        case "largest-volume" | "smallest-load" | "smallest-error":
             pass
         case "largest-margin":
             if demands.required_box is None:

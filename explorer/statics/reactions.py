@@ -11,6 +11,7 @@ from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.kinematics import attachment_points, inverse
 from explorer.mechanism.machine import Payload
 from explorer.numerics.arrays import FloatArray, dot
+from explorer.statics.equilibrium import twists_of_actuators
 from explorer.statics.forces import GUIDE_ROWS, STRUT_ROWS, actuator_forces
 from explorer.statics.weights import Carried, Weights, carry
 
@@ -26,7 +27,7 @@ _ACTUATORS, _MOMENTS, _ACROSS_2, _ACROSS_3 = slice(0, 6), slice(6, 8), slice(8, 
 
 
 class Reactions(NamedTuple):
-    """What holds a load in a pose; all entries are infinite in a singular pose.
+    """What holds a load in a pose; in a singular pose all but the spread is infinite.
 
     Attributes:
         actuators: Forces in the order of `JOINTS`, shape (..., 6), in N; positive ones push.
@@ -34,6 +35,8 @@ class Reactions(NamedTuple):
         bending: Bending moments of struts 2 and 3 at their carriages, shape (..., 2), in N × unit.
         guide_force: Forces of carriages 2 and 3 across the guide, shape (..., 2), in N.
         guide_moment: Moments of carriages 2 and 3 on the guide, shape (..., 2), in N × unit.
+        spread: Most by which the payload's force of any direction increases each of these, in the
+            order of `LIMITED`, shape (..., 12).
     """
 
     actuators: FloatArray
@@ -41,6 +44,7 @@ class Reactions(NamedTuple):
     bending: FloatArray
     guide_force: FloatArray
     guide_moment: FloatArray
+    spread: FloatArray
 
 
 def reactions(
@@ -52,6 +56,9 @@ def reactions(
     weights: Weights | None = None,
 ) -> Reactions:
     """Return all that holds a load and weights.
+
+    The payload's force of any direction is not part of the load; its effect is the `spread`. Where
+    legs have weights, that of the force on the guide is an upper bound.
 
     The bending of a strut across the guide by its own weight is left out: its carriage turns
     about the guide, so that this moment vanishes at the carriage.
@@ -80,6 +87,7 @@ def reactions(
         bending=moments,
         guide_force=np.sqrt(dot(across, across)),
         guide_moment=moments,
+        spread=_spread(design, position, rotation, forces.shape[:-1]),
     )
 
 
@@ -96,12 +104,24 @@ def limit_shares(design: Design, held: Reactions) -> FloatArray:
     values = np.concatenate(
         [held.actuators, held.bending, held.guide_force, held.guide_moment], axis=-1
     )
-    actuators = np.where(held.actuators > 0.0, push, pull)
-    others = np.broadcast_to(_limits(design), (*values.shape[:-1], 6))
-    limits = np.concatenate([actuators, others], axis=-1)
-    out = np.full(values.shape, np.inf)
-    np.divide(np.abs(values), limits, out=out, where=np.isfinite(values))
-    return out
+    is_regular = np.isfinite(values)
+    values = np.where(is_regular, values, 0.0)
+    limits = _limits(design)
+    up = (values + held.spread) / np.concatenate([push, limits])
+    down = (held.spread - values) / np.concatenate([pull, limits])
+    return np.where(is_regular, np.maximum(up, down), np.inf)
+
+
+def part_limits(design: Design) -> FloatArray:
+    """Return the largest and, with a minus, the least values of loaded parts, shape (2, 10).
+
+    The parts are the actuators, the bending of struts 2 and 3 in N × unit, which the guide takes
+    too, and the forces of carriages 2 and 3 across the guide. A limit that is not given is
+    infinite.
+    """
+    limits = _limits(design)
+    moments = np.minimum(limits[:2], limits[4:])
+    return np.array([[*most, *moments, *limits[2:4]] for most in design.actuators.limits])
 
 
 def largest_payload(
@@ -114,8 +134,8 @@ def largest_payload(
 ) -> FloatArray:
     """Return the largest mass at the payload's centre that keeps all limits, shape (...), in kg.
 
-    It is 0 in a singular pose or if the load alone exceeds a limit, and infinite if there is no
-    limit.
+    The payload's force of any direction acts besides. The mass is 0 in a singular pose or if the
+    load alone exceeds a limit, and infinite if there is no limit.
 
     Args:
         design: The manipulator, with its limits and the centre of its payload.
@@ -139,15 +159,14 @@ def largest_payload(
     start = _signed(design, position, rotation, at_zero, base)
     slope = _signed(design, position, rotation, by_one, kilogram)
     start, slope = np.broadcast_arrays(start, slope)
-    push, pull = design.actuators.limits
-    limits = _limits(design)
-    moment = np.minimum(limits[:2], limits[4:])
-    highs, lows = np.concatenate([push, moment]), np.concatenate([pull, moment])
+    highs, lows = part_limits(design)
+    spread = _spread(design, position, rotation, regular.shape)[..., :10]
+    highs, lows = highs - spread, lows - spread
     largest = np.minimum(
-        _largest_linear(start[..., :8], slope[..., :8], lows, highs),
+        _largest_linear(start[..., :8], slope[..., :8], lows[..., :8], highs[..., :8]),
         np.minimum(
-            _largest_square(start[..., _ACROSS_2], slope[..., _ACROSS_2], limits[2]),
-            _largest_square(start[..., _ACROSS_3], slope[..., _ACROSS_3], limits[3]),
+            _largest_square(start[..., _ACROSS_2], slope[..., _ACROSS_2], highs[..., 8]),
+            _largest_square(start[..., _ACROSS_3], slope[..., _ACROSS_3], highs[..., 9]),
         ),
     )
     return np.where(regular, largest, 0.0)
@@ -193,6 +212,24 @@ def _signed(
     return np.concatenate([np.broadcast_to(e, (*batch, e.shape[-1])) for e in parts], axis=-1)
 
 
+def _spread(
+    design: Design, position: ArrayLike, rotation: ArrayLike, batch: tuple[int, ...]
+) -> FloatArray:
+    """Return the effect of the payload's force of any direction, see `Reactions`."""
+    if not design.payload.force_n:
+        return np.zeros((*batch, 12))
+    # By the principle of virtual work, a force F at the tool asks F · v of an actuator whose
+    # unit rate moves the tool by v.
+    twists = twists_of_actuators(design, position, rotation, design.tool.position)
+    velocities = twists[..., :3, :]
+    speeds = np.sqrt((velocities * velocities).sum(axis=-2))
+    forces = design.payload.force_n * np.where(np.isfinite(speeds), speeds, 0.0)
+    lengths = inverse(design, position, rotation)[..., STRUT_ROWS]
+    bending = forces[..., GUIDE_ROWS] * lengths
+    parts = [forces, bending, forces[..., STRUT_ROWS], bending]
+    return np.concatenate([np.broadcast_to(e, (*batch, e.shape[-1])) for e in parts], axis=-1)
+
+
 def _joint_forces(
     design: Design, position: ArrayLike, rotation: ArrayLike, forces: FloatArray, carried: Carried
 ) -> FloatArray:
@@ -220,11 +257,11 @@ def _largest_linear(
     return np.where(is_within.all(axis=-1), largest.min(axis=-1), 0.0)
 
 
-def _largest_square(start: FloatArray, slope: FloatArray, limit: float) -> FloatArray:
+def _largest_square(start: FloatArray, slope: FloatArray, limit: FloatArray) -> FloatArray:
     """Return the largest m ≥ 0 with |start + m slope| ≤ limit, of vectors (..., 2), shape (...)."""
-    if np.isinf(limit):
+    if np.isinf(limit).all():
         return np.full(start.shape[:-1], np.inf)
     a, b, c = dot(slope, slope), dot(start, slope), limit**2 - dot(start, start)
     root = np.sqrt(np.maximum(b * b + a * c, 0.0))
     largest = np.divide(root - b, a, out=np.full(a.shape, np.inf), where=a > 0.0)
-    return np.where(c >= 0.0, largest, 0.0)
+    return np.where((c >= 0.0) & (limit >= 0.0), largest, 0.0)

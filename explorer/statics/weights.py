@@ -71,6 +71,18 @@ def design_weights(design: Design) -> Weights:
     return Weights(on_platform=(design.payload,))
 
 
+def payload_wrench(design: Design, rotation: FloatArray) -> FloatArray:
+    """Return the weight of the design's payload as a wrench (F; M) at its tool, shape (6,).
+
+    Args:
+        design: The manipulator.
+        rotation: Platform to base, shape (3, 3).
+    """
+    weight = design.payload.mass_kg * STANDARD_GRAVITY * np.array(design.gravity)
+    arm = rotation @ (np.array(design.payload.centre) - design.tool.position)
+    return np.concatenate([weight, np.cross(arm, weight)])
+
+
 def carry(
     design: Design,
     position: ArrayLike,

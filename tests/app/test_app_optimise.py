@@ -20,6 +20,7 @@ from desk import number, rows_of
 from limited_designs import limited
 from services import services_for
 
+from explorer import Actuators, Payload
 from explorer.app.features.optimise import runner as optimiser
 from explorer.app.features.optimise.actions import (
     Accept,
@@ -780,9 +781,16 @@ def test_lifting_a_limit_that_is_not_there_is_refused() -> None:
 @pytest.mark.parametrize("name", PRESETS)
 @pytest.mark.parametrize("objective", OBJECTIVES)
 def test_demands_by_default_can_be_kept_by_every_preset(name: str, objective: Any) -> None:
-    state = SetRequest("optimisation.request", OptimisationRequest(objective=objective)).apply(
-        opened(PRESETS[name])
+    design = msgspec.structs.replace(
+        PRESETS[name],
+        payload=Payload(force_n=1.0),
+        actuators=Actuators(
+            push_n=(50.0, 50.0, 50.0, 50.0, 50.0, 50.0),
+            error_mm=(0.01, 0.01, 0.01, 0.01, 0.01, 0.01),
+        ),
     )
+    request = OptimisationRequest(objective=objective)
+    state = SetRequest("optimisation.request", request).apply(opened(design))
     assert refuted(state) == ()
     assert liftable(state) == ()
     assert StartRun().apply(state).optimisation.is_on

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from limited_designs import limited, ordinary_case, reference_case, scaled_design, troubled_case
 
+from explorer import Actuators, Payload
 from explorer.legs.clearance import PAIRS, leg_clearances
 from explorer.measures.case import Case
 from explorer.measures.catalogue import CATALOGUE, measures_in
@@ -23,7 +24,7 @@ from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.optimise.curves import GOALS
 from explorer.optimise.defaults import make_problem
-from explorer.optimise.problem import OBJECTIVES, YAW, ObjectiveName
+from explorer.optimise.problem import OBJECTIVES, OVER_BOX, YAW, ObjectiveName
 from explorer.optimise.search.model import Model, reported_objective
 from explorer.workspace.extremes import extent_of, farthest, least_margins
 from explorer.workspace.least_clearance import least_clearances
@@ -245,6 +246,15 @@ def test_objective_of_a_search_is_the_measure_that_it_is_named_after(
     design = ordinary_case(seed)[0]
     if objective == "smallest-reach":
         design = limited(design, **dict.fromkeys(LENGTHS, (0.0, None)))
+    if objective in OVER_BOX:
+        design = msgspec.structs.replace(
+            design,
+            payload=Payload(force_n=3.0),
+            actuators=Actuators(
+                push_n=(9.0, 9.0, 9.0, 9.0, 9.0, 9.0),
+                error_mm=(0.01, 0.01, 0.01, 0.01, 0.01, 0.01),
+            ),
+        )
     middle = np.array(home_pose(design).position)
     box = (tuple((middle - 1e-3).tolist()), tuple((middle + 1e-3).tolist()))
     problem = make_problem(design, objective, volume=5.0, required_box=box, free=(YAW,))

@@ -68,7 +68,9 @@ def values_of_places(design: Design, folder: Path, capsys: pytest.CaptureFixture
         },
         "Studies": {label_of(name): value for name, value in studied.items()},
         "explorer workspace": {
-            each.label: measured[name] for name, each in measures_in("workspace").items()
+            each.label: measured[name]
+            for name, each in measures_in("workspace").items()
+            if name in measured
         },
         "report": {
             CATALOGUE[name].label: value

@@ -11,13 +11,24 @@ import pytest
 from limited_designs import limited
 from numpy.testing import assert_allclose
 
-from explorer import PRESETS, Design, Limits, make_problem, workspace_volume
+from explorer import (
+    PRESETS,
+    Actuators,
+    Design,
+    Guide,
+    Limits,
+    Payload,
+    Struts,
+    Tool,
+    make_problem,
+    workspace_volume,
+)
 from explorer.errors import DesignError
 from explorer.mechanism.design import Range
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import warm
-from explorer.optimise.problem import OBJECTIVES, ObjectiveName, Problem
+from explorer.optimise.problem import OBJECTIVES, OVER_BOX, ObjectiveName, Problem
 from explorer.optimise.search.model import Evaluation, Model
 from explorer.workspace.limits.constraints import BallOrCylinder, HalfSpace
 
@@ -45,7 +56,28 @@ def tilted() -> Design:
     )
 
 
-DESIGNS = {"paper-optimal": OPTIMAL, "many limits": many_limits(), "tilted": tilted()}
+def loaded(design: Design) -> Design:
+    """Return a design with a load, limits of all its parts, and errors."""
+    return msgspec.structs.replace(
+        design,
+        tool=Tool((1.0, -1.0, 2.0)),
+        payload=Payload(2.0, (1.0, 2.0, 3.0), 7.0),
+        gravity=(0.1, -0.2, -1.0),
+        actuators=Actuators(
+            push_n=(60.0, 50.0, 40.0, 50.0, 45.0, 70.0),
+            pull_n=(30.0, 40.0, 50.0, 60.0, 70.0, 80.0),
+            error_mm=(0.01, 0.02, 0.01, 0.02, 0.03, 0.02),
+        ),
+        struts=Struts(moment_nm=2.0),
+        guide=Guide(force_n=70.0, moment_nm=1.9),
+    )
+
+
+DESIGNS = {
+    "paper-optimal": loaded(OPTIMAL),
+    "many limits": loaded(many_limits()),
+    "tilted": loaded(tilted()),
+}
 FREE = (("yaw", "shift-x", "shift-y", "shift-z"), ("yaw", "reach", "shift-z"))
 
 
@@ -60,6 +92,8 @@ def problems(name: str) -> Iterator[Problem]:
             clearance=0.2,
             stroke_ratio=ratio,
             required_box=REQUIRED,
+            held=True,
+            error=0.01,
             free=free,
         )
 
@@ -103,7 +137,7 @@ def test_slopes_of_objectives_match_central_differences(
         DESIGNS[name],
         objective,
         volume=7000.0,
-        required_box=REQUIRED if objective == "largest-margin" else None,
+        required_box=REQUIRED if objective in OVER_BOX else None,
         free=["yaw"],
     )
     model = Model(problem, problem.start_values)
@@ -125,7 +159,10 @@ def test_problems_with_all_demands_cover_every_kind() -> None:
     problem = next(problems("many limits"))
     model = Model(problem, problem.start_values)
     kinds = {name.split(" ")[0] for name in model.names}
-    assert kinds == {"volume", "longest", "distance", "gap", "required", "margin", "clearance"}
+    assert kinds == {
+        *("volume", "longest", "distance", "gap", "required", "margin", "clearance"),
+        *("load", "error"),
+    }
 
 
 def test_slack_of_state_matches_its_limit() -> None:

@@ -290,7 +290,7 @@ def test_forces_of_singular_pose_are_infinite(
     assert (largest_payload(*given) == 0.0).all()
     assert np.isnan(worst_direction(*given, np.ones(6)).direction).all()
     held = reactions(*given, load)
-    for values in (*held, limit_shares(LIMITED, held)):
+    for values in (*held[:-1], limit_shares(LIMITED, held)):
         assert (values == np.inf).all()
 
 

@@ -14,10 +14,13 @@ from explorer.measures.measurements import Measurements
 from explorer.mechanism.design import VARIABLES
 from explorer.numerics.number_text import format_number
 from explorer.optimise.outcome import Iterate, Outcome, Status
-from explorer.optimise.problem import YAW, Box, Demands, ObjectiveName, Problem
+from explorer.optimise.problem import OVER_BOX, YAW, Box, Demands, ObjectiveName, Problem
 from explorer.optimise.record import Record, Settings, record_of
 from explorer.optimise.search.starts import check_starts
 from explorer.optimise.search.trail import Trail
+
+OF_THE_MACHINE: tuple[ObjectiveName, ...] = ("smallest-load", "smallest-error")
+"""Objectives that keep at least the present volume with legs of at most the present length."""
 
 PLACE = "place"
 """Name in `OptimisationRequest.free` for the three shifts of the required box."""
@@ -36,6 +39,8 @@ class OptimisationRequest:
         starts: Number of designs to start from.
         with_box: Whether a box must lie within the workspace, whatever the objective.
         box: The required box; None for one that suits the design.
+        held: Whether the design's load must be held over the required box.
+        error: Worst error of the tool over the required box; 0 for no demand.
 
     Raises:
         InputError: a volume or reach that is not positive, a clearance below zero, too few or too
@@ -50,28 +55,35 @@ class OptimisationRequest:
     starts: int = 1
     with_box: bool = False
     box: Box | None = None
+    held: bool = False
+    error: float = 0.0
 
     def __post_init__(self) -> None:
         unknown = {*self.free} - {*VARIABLES, YAW, PLACE}
         if unknown:
             raise InputError(f"nothing named {min(unknown)!r} can be free in an optimisation")
         check_starts(self.starts)
-        Demands(volume=self.volume, reach=self.reach, clearance=self.clearance or None)
+        Demands(
+            volume=self.volume,
+            reach=self.reach,
+            clearance=self.clearance or None,
+            error=self.error or None,
+        )
 
     @property
     def needs_volume(self) -> bool:
         """Whether the objective takes a volume."""
-        return self.objective in ("match-volume", "smallest-reach")
+        return self.objective in ("match-volume", "smallest-reach", *OF_THE_MACHINE)
 
     @property
     def needs_reach(self) -> bool:
         """Whether the objective takes a reach."""
-        return self.objective == "largest-volume"
+        return self.objective in ("largest-volume", *OF_THE_MACHINE)
 
     @property
     def needs_box(self) -> bool:
         """Whether a box is required."""
-        return self.with_box or self.objective == "largest-margin"
+        return self.with_box or self.held or self.error > 0.0 or self.objective in OVER_BOX
 
 
 @dataclass(frozen=True)

@@ -127,7 +127,7 @@ def measure_rows(
             continue
         measure = CATALOGUE[name]
         label = f"{measure.label} (degrees)" if measure.unit == "°" else measure.label
-        if measure.needs == "demanded_margin":
+        if "demanded_margin" in measure.needs:
             label += f", margins ≥ {after.demanded_margin:.4g}"
         yield label, (before[name], value)
 

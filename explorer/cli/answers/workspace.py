@@ -27,6 +27,7 @@ from explorer.measures.measurements import Measurements, measure_design
 if TYPE_CHECKING:
     from explorer.workspace.accessible.radii import RadiusCurve
     from explorer.workspace.accessible.workspace import ReachableWorkspace
+    from explorer.workspace.held import HeldWorkspace
     from explorer.workspace.solids.solid import Solid
 
 # The measures of nodes that the remark on their volume gives.
@@ -47,6 +48,7 @@ class WorkspaceMeasures:
         capability: Share of feasible orientations at a position, from 0 to 1.
         interference: Accessible workspace.
         curve: Accessible volume as a function of the radius of all legs.
+        held: Part where a load is held.
     """
 
     case: Case
@@ -58,6 +60,7 @@ class WorkspaceMeasures:
     capability: float | None
     interference: ReachableWorkspace | None
     curve: RadiusCurve | None
+    held: HeldWorkspace | None
 
     def _measured(self) -> Measurements:
         return measure_design(self.case, measures_in("workspace"))
@@ -81,6 +84,9 @@ class WorkspaceMeasures:
             answer["orientations"] = self.orientations
             answer["reachable_mesh"] = mesh_json(self.reachable)
             answer["dexterous_mesh"] = mesh_json(self.dexterous)
+        if self.held is not None:
+            answer["held_volume"] = self.held.held_volume
+            answer["held_mesh"] = mesh_json(self.held.solid)
         if self.capability is not None:
             answer["orientation_capability"] = self.capability
         if self.interference is not None:
@@ -102,13 +108,7 @@ class WorkspaceMeasures:
             elif name not in _IN_REMARK:
                 text = f"{measure_text(measure, value)} {measure.unit_in('units')}"
                 others.append((measure.heading, text.rstrip()))
-        volumes.append(("mesh", self.solid.volume, _mesh_remark(self.solid)))
-        if self.hull is not None:
-            volumes.append(("convex hull", self.hull.volume, ""))
-        for name, solid in (("reachable", self.reachable), ("dexterous", self.dexterous)):
-            if solid is not None:
-                remark = f"{self.orientations} orientations, {_mesh_remark(solid)}"
-                volumes.append((name, solid.volume, remark))
+        volumes += self._volumes_of_meshes()
         accessible = self.interference
         if accessible is not None:
             remark = f"{accessible.reachable_node_count} of {accessible.node_count} nodes"
@@ -136,6 +136,18 @@ class WorkspaceMeasures:
             yield from ("", interference_table(design, accessible))
         if self.curve is not None:
             yield from ("", curve_table(design, self.curve))
+
+    def _volumes_of_meshes(self) -> Iterator[tuple[str, float, str]]:
+        """Yield the name, the volume and a remark of each mesh."""
+        yield "mesh", self.solid.volume, _mesh_remark(self.solid)
+        if self.hull is not None:
+            yield "convex hull", self.hull.volume, ""
+        for name, solid in (("reachable", self.reachable), ("dexterous", self.dexterous)):
+            if solid is not None:
+                remark = f"{self.orientations} orientations, {_mesh_remark(solid)}"
+                yield name, solid.volume, remark
+        if self.held is not None:
+            yield "that holds the load", self.held.held_volume, _mesh_remark(self.held.solid)
 
 
 def _mesh_remark(solid: Solid) -> str:

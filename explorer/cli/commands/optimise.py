@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
+import msgspec
+
 from explorer.cli.answers.optimisation import (
     finding_json,
     findings_table,
@@ -55,11 +57,16 @@ class Optimise(JsonOptions, DesignOptions):
     status is 1, and the output is the best iterate.
     """
 
-    objective: Literal["match-volume", "smallest-reach", "largest-volume", "largest-margin"] = (
-        "match-volume"
-    )
-    """Objective: F = |1 − V/V′| of the exact volume, the longest leg, the volume, or the worst
-    margin over a box."""
+    objective: Literal[
+        "match-volume",
+        "smallest-reach",
+        "largest-volume",
+        "largest-margin",
+        "smallest-load",
+        "smallest-error",
+    ] = "match-volume"
+    """Objective: F = |1 − V/V′| of the exact volume, the longest leg, the volume, or over the
+    required box the worst margin, the largest share of a limit of forces, or the worst error."""
 
     target_volume: Annotated[float | None, positive("--target-volume"), OPTIONAL] = None
     """Volume to match, or least volume; for the shortest leg by default that of the design."""
@@ -87,6 +94,29 @@ class Optimise(JsonOptions, DesignOptions):
 
     required_box: Annotated[Six | None, numbers("--required-box", _CORNERS), OPTIONAL] = None
     """A box that must lie in the workspace, in design units."""
+
+    force: Annotated[float | None, positive("--force"), hint("default: that of the design")] = None
+    """Force of any direction at the tool in N, besides the weight of the payload."""
+
+    most: Annotated[
+        Six | None,
+        numbers("--most", "l1 d1 d2 d3 d4 l4", or_one=True),
+        hint("default: those of the design"),
+    ] = None
+    """Largest forces of the actuators in N, or one for all."""
+
+    most_bending: Annotated[
+        float | None, positive("--most-bending"), hint("default: that of the design")
+    ] = None
+    """Largest bending moment of the struts in N m."""
+
+    held: Flag = False
+    """Demand that payload and force are held over the required box, within the limits of
+    actuators, struts and guide."""
+
+    error: Annotated[float | None, positive("--error"), OPTIONAL] = None
+    """Worst displacement of the tool by the actuators' errors over the required box, in design
+    units."""
 
     least: Annotated[
         float | None, positive("--least"), hint("default: a 20th of the largest variable")
@@ -169,6 +199,8 @@ class Optimise(JsonOptions, DesignOptions):
             least=self.least,
             stroke_ratio=self.stroke_ratio,
             required_box=None if self.required_box is None else _as_box(self.required_box),
+            held=self.held,
+            error=self.error,
             free=self.free,
             bounds=[_as_variable(word) for word in self.bounds],
         )
@@ -176,12 +208,25 @@ class Optimise(JsonOptions, DesignOptions):
 
     def _start(self) -> Design:
         """Return the start of the search, whose home is fixed before the box changes."""
-        design = self.read_design()
+        design = self._loaded(self.read_design())
         if self.box is None:
             return design
         from explorer.optimise.refutation.refutation import with_box
 
         return with_box(design, _as_box(self.box) if self.box else None)
+
+    def _loaded(self, design: Design) -> Design:
+        """Return the design with the given force and limits of forces and moments."""
+        replace = msgspec.structs.replace
+        if self.force is not None:
+            design = replace(design, payload=replace(design.payload, force_n=self.force))
+        if self.most is not None:
+            actuators = replace(design.actuators, push_n=self.most, pull_n=None)
+            design = replace(design, actuators=actuators)
+        if self.most_bending is not None:
+            struts = replace(design.struts, moment_nm=self.most_bending)
+            design = replace(design, struts=struts)
+        return design
 
     def _check_possible(self, problem: Problem) -> None:
         """Refuse a problem that the limits make infeasible, before kernels are compiled.

@@ -5,10 +5,21 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
+import numpy as np
+
 from explorer.cli.answers.workspace import WorkspaceMeasures
+from explorer.cli.load_options import Load
 from explorer.cli.options import DesignOptions, JsonOptions, OrientationOptions, RadiiOptions
 from explorer.cli.output import degrees, heading
-from explorer.cli.values import OPTIONAL, Flag, hint, numbers, positive, whole_number
+from explorer.cli.values import (
+    OPTIONAL,
+    Flag,
+    hint,
+    load_numbers,
+    numbers,
+    positive,
+    whole_number,
+)
 from explorer.errors import InputError
 from explorer.measures.case import Case
 from explorer.mechanism.design import Design
@@ -18,6 +29,7 @@ if TYPE_CHECKING:
     from explorer.numerics.arrays import FloatArray
     from explorer.workspace.accessible.radii import RadiusCurve
     from explorer.workspace.accessible.workspace import ReachableWorkspace
+    from explorer.workspace.held import HeldWorkspace
 
 Ends = tuple[float, float]
 
@@ -72,6 +84,10 @@ class Workspace(JsonOptions, RadiiOptions, OrientationOptions, DesignOptions):
     ] = None
     """Number of orientations: per range, of a tilt, or of all."""
 
+    load: Annotated[Load | None, load_numbers("--load"), OPTIONAL] = None
+    """Force in N and moment in N × unit at the tool, besides the payload: add the volume where it
+    is held within the limits of actuators, struts and guide."""
+
     capability: Annotated[Triple | None, numbers("--capability", "x y z"), OPTIONAL] = None
     """Position at which to compute the share of feasible orientations, among the given or all."""
 
@@ -114,6 +130,7 @@ class Workspace(JsonOptions, RadiiOptions, OrientationOptions, DesignOptions):
             reachable=reachable,
             dexterous=dexterous,
             capability=self._share(design, orientations),
+            held=self._held(design, pose),
             interference=self._interference(design, pose),
             curve=self._curve(design, pose),
         )
@@ -126,6 +143,19 @@ class Workspace(JsonOptions, RadiiOptions, OrientationOptions, DesignOptions):
         return reachable_workspace(
             design, pose.rotation, node_step=self.step, tolerance=self.tolerance
         )
+
+    def _held(self, design: Design, pose: Pose) -> HeldWorkspace | None:
+        if self.load is None:
+            return None
+        from explorer.statics.reactions import part_limits
+        from explorer.workspace.held import held_workspace
+
+        if np.isinf(part_limits(design)).all():
+            raise InputError(
+                "the design limits neither its actuators nor its struts nor its guide, so that it "
+                "holds any load: give its file a limit, such as actuators.push_n"
+            )
+        return held_workspace(design, pose.rotation, self.load, tolerance=self.tolerance)
 
     def _curve(self, design: Design, pose: Pose) -> RadiusCurve | None:
         if not self.radius_curve:

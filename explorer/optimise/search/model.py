@@ -14,7 +14,7 @@ import numpy as np
 
 from explorer.errors import DesignError
 from explorer.numerics.arrays import BoolArray, FloatArray
-from explorer.optimise.problem import Problem
+from explorer.optimise.problem import OVER_BOX, Problem
 from explorer.optimise.search.clearances import ClearanceDemand
 from explorer.optimise.search.demands import (
     MET,
@@ -26,6 +26,12 @@ from explorer.optimise.search.demands import (
     ReachDemand,
     VolumeDemand,
     box_margins,
+)
+from explorer.optimise.search.loads import (
+    ErrorDemand,
+    LoadDemand,
+    largest_error,
+    largest_share,
 )
 from explorer.optimise.search.starts import first_positions
 from explorer.optimise.search.state import State, scales
@@ -75,7 +81,7 @@ class Model:
         self._before_each = before_each
         self.scales = scales(problem)
         self.count = len(problem.names)
-        self.raises_worst = problem.objective == "largest-margin"
+        self.raises_worst = problem.objective in OVER_BOX
         u = np.array(start) / self.scales
         here = State(problem, u)
         self.demands: list[Demand] = _demands(problem, here)
@@ -84,11 +90,13 @@ class Model:
         if clearance is not None:
             positions = first_positions(problem, here.design)
             self._clearance = ClearanceDemand(clearance, positions)
-            if not is_relaxed:
-                self.demands.append(self._clearance)
-        self.margins = next((d for d in self.demands if isinstance(d, MarginDemand)), None)
+        self.raised: Demand | None = None
         if self.raises_worst:
-            u = np.append(u, float(box_margins(here)[0].min()) / problem.size)
+            # The last one, see `_demands`.
+            self.raised = self.demands[-1]
+            u = np.append(u, float(self.raised.measure(here).values.min()))
+        if self._clearance is not None and not is_relaxed:
+            self.demands.append(self._clearance)
         self.start: FloatArray = u
         self._volume = problem.demands.volume or here.volume or problem.size**3
         self._last: Evaluation | None = None
@@ -157,9 +165,9 @@ class Model:
         for demand in self.demands:
             value, gradient = demand.measure(state)
             if self.raises_worst:
-                is_margin = demand is self.margins
-                column = np.full((len(value), 1), -1.0 if is_margin else 0.0)
-                value = value - u[-1] if is_margin else value
+                is_raised = demand is self.raised
+                column = np.full((len(value), 1), -1.0 if is_raised else 0.0)
+                value = value - u[-1] if is_raised else value
                 gradient = np.hstack([gradient, column])
             values.append(value)
             gradients.append(gradient)
@@ -178,7 +186,7 @@ class Model:
                 root = (state.volume / self._volume) ** (1.0 / 3.0)
                 slope = root / (3.0 * state.volume) if state.volume > 0.0 else 0.0
                 return -root, -slope * state.volume_gradient
-            case "largest-margin":
+            case "largest-margin" | "smallest-load" | "smallest-error":
                 slope = np.zeros(len(u))
                 slope[-1] = -1.0
                 return -float(u[-1]), slope
@@ -211,7 +219,7 @@ class Model:
 
 
 def reported_objective(problem: Problem, state: State) -> float:
-    """Return F, the longest leg, the volume or the worst margin, whichever a problem is about."""
+    """Return the value that the objective of a problem is about, in its own unit."""
     match problem.objective:
         case "match-volume":
             return abs(1.0 - state.volume / problem.wanted_volume)
@@ -221,6 +229,10 @@ def reported_objective(problem: Problem, state: State) -> float:
             return state.volume
         case "largest-margin":
             return float(box_margins(state)[0].min())
+        case "smallest-load":
+            return largest_share(state)
+        case "smallest-error":
+            return largest_error(state)
 
 
 def _demands(problem: Problem, start: State) -> list[Demand]:
@@ -237,6 +249,20 @@ def _demands(problem: Problem, start: State) -> list[Demand]:
         listed.append(GapDemand(start))
     if demands.required_box is not None:
         listed.append(BoxDemand(start))
+    is_load = problem.objective == "smallest-load"
+    is_error = problem.objective == "smallest-error"
+    if demands.held and not is_load:
+        listed.append(LoadDemand(start))
+    if demands.error is not None and not is_error:
+        listed.append(ErrorDemand(demands.error))
+    if demands.held or demands.error is not None or is_load or is_error:
+        # On the way to a singular pose loads and errors grow, and beyond it they fall again.
+        listed.append(MarginDemand())
+    # What an objective raises comes last.
     if problem.objective == "largest-margin":
         listed.append(MarginDemand())
+    elif is_load:
+        listed.append(LoadDemand(start))
+    elif is_error:
+        listed.append(ErrorDemand(largest_error(start)))
     return listed

@@ -24,7 +24,7 @@ from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_ascii, format_number
 from explorer.optimise.curves import CALLED
 from explorer.optimise.outcome import Iterate, Phase, Run, Status
-from explorer.optimise.problem import Problem
+from explorer.optimise.problem import OVER_BOX, Problem
 from explorer.optimise.refutation.binding import BindingLimit, find_binding_limit
 from explorer.optimise.search.crossings import crossings
 from explorer.optimise.search.demands import MET
@@ -193,7 +193,7 @@ class Search:
 
     def _is_closed(self, u: FloatArray) -> bool:
         """Whether the workspace must be opened first."""
-        if self.problem.objective == "largest-margin" and self.problem.demands.volume is None:
+        if self.problem.objective in OVER_BOX and self.problem.demands.volume is None:
             return False
         demanded = self.problem.demands.volume or self.problem.size**3
         return State(self.problem, u).volume < OPEN * demanded

@@ -100,8 +100,13 @@ class Surface:
     name_of: Callable[[FloatArray], IntArray]
 
 
-def carved_solid(whole: Solid, surface: Surface | None, seed: FloatArray) -> Solid:
-    """Return the part of a workspace that holds a position (3,), less what a surface removes.
+def carved_solid(whole: Solid, surface: Surface | None, seed: FloatArray | None = None) -> Solid:
+    """Return a workspace less what a surface removes.
+
+    Args:
+        whole: The workspace.
+        surface: The surface, or None to remove nothing.
+        seed: Position in the part to return, shape (3,); None for all parts.
 
     Raises:
         ExplorerError: a boolean fails.
@@ -116,17 +121,19 @@ def carved_solid(whole: Solid, surface: Surface | None, seed: FloatArray) -> Sol
         face_id = Manifold.reserve_ids(1)
         origins[face_id] = len(names)
         body = body - _below_zero(surface, frame, face_id)
+    pieces = [body] if seed is None else body.decompose() or [body]
     parts = [
-        replace(_solid_of(part, origins, frame, names), agrees=whole.agrees)
-        for part in body.decompose() or [body]
+        replace(_solid_of(part, origins, frame, names), agrees=whole.agrees) for part in pieces
     ]
 
     def nearness(part: Solid) -> tuple[float, float]:
+        if seed is None:
+            return 0.0, 0.0
         # Rounding may put the seed on the surface or outside; the nearest vertex then decides.
         distance = float(np.linalg.norm(part.vertices - seed, axis=1).min())
         return round(part.winding(seed), 1), -distance
 
-    solid = max(parts, key=nearness)
+    solid = parts[0] if seed is None else max(parts, key=nearness)
     if surface is None:
         return solid
     limit_of_face = solid.limit_of_face.copy()

@@ -27,13 +27,15 @@ from explorer.app.widgets.assigning import Update
 from explorer.measures.catalogue import CATALOGUE
 from explorer.mechanism.design import VARIABLES
 from explorer.mechanism.pose import Triple
-from explorer.optimise.problem import YAW, ObjectiveName
+from explorer.optimise.problem import OVER_BOX, YAW, ObjectiveName
 
 OBJECTIVES: dict[str, ObjectiveName] = {
     "match a volume": "match-volume",
     "shortest legs for a volume": "smallest-reach",
     "largest volume for a leg length": "largest-volume",
     "largest worst margin over a box": "largest-margin",
+    "smallest load on the parts over a box": "smallest-load",
+    "smallest worst error over a box": "smallest-error",
 }
 FREE = {
     **{name: f"Let {name} change." for name in VARIABLES},
@@ -116,7 +118,23 @@ class OptimisePanel:
                 lambda frame: frame.state.optimisation.request.needs_box,
                 lambda _, on: SetRequest("optimisation.request.with_box", on, "Required box"),
             ),
-            disabled=lambda state: state.optimisation.request.objective == "largest-margin",
+            disabled=lambda state: state.optimisation.request.objective in OVER_BOX,
+        )
+        controls.checkbox(
+            "Hold the load",
+            "Demand that the payload's weight and force are held within the limits of actuators, "
+            "struts and guide, wherever in the required box.",
+            At("optimisation.request.held", action=SetRequest),
+            disabled=lambda state: state.optimisation.request.objective == "smallest-load",
+        )
+        controls.number(
+            _label("worst_error"),
+            "The worst displacement of the tool by the actuators' errors allowed in the required "
+            "box, in units; 0 for no demand.",
+            At("optimisation.request.error", action=SetRequest),
+            least=0.0,
+            step=STEP,
+            visible=lambda state: any(state.design.actuators.error_mm),
         )
         for end, word in enumerate(("from", "to")):
             self._add_corner(end, f"Box {word}")

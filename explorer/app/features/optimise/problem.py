@@ -52,7 +52,8 @@ def requested_box(state: State) -> Box:
 def _requested_volume(base: Design, request: OptimisationRequest) -> float:
     if request.volume is not None:
         return request.volume
-    return _default_volume(base, same=request.objective == "smallest-reach")
+    same = request.objective != "match-volume"
+    return _default_volume(base, same=same)
 
 
 def _requested_reach(base: Design, request: OptimisationRequest) -> float:
@@ -83,6 +84,8 @@ def _problem(design: Design, base: Design, request: OptimisationRequest) -> Prob
         reach=_requested_reach(base, request) if request.needs_reach else None,
         clearance=None if request.clearance == 0.0 else request.clearance,
         required_box=_requested_box(base, request) if request.needs_box else None,
+        held=request.held,
+        error=request.error or None,
         free=[name for name in free if name not in VARIABLES],
     )
     variables = tuple(variable for variable in problem.variables if variable.name in free)

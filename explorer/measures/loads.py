@@ -1,0 +1,173 @@
+"""The measures of loads, errors and compliance: at home and over the required box."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+from explorer.measures.case import Case
+from explorer.measures.measure import Measure, Need, Place, Sense, Unit
+from explorer.measures.statics import BOX_NODES, BoxStatics
+
+OPTIMISE: frozenset[Place] = frozenset({"optimise"})
+WORKSPACE: frozenset[Place] = frozenset({"workspace"})
+ELSEWHERE: frozenset[Place] = frozenset({"compare", "studies", "report"})
+
+
+@dataclass(frozen=True)
+class Site:
+    """Where loads, errors and compliance are measured.
+
+    Attributes:
+        prefix: Beginning of the names of the measures.
+        label: End of their labels.
+        hint: End of their hints.
+        needs: What they need besides the parts of the machine.
+        places: Where they are listed.
+        of: Function that returns the statics of a case.
+    """
+
+    prefix: str
+    label: str
+    hint: str
+    needs: tuple[Need, ...]
+    places: frozenset[Place]
+    of: Callable[[Case], BoxStatics | None]
+
+
+SITES = (
+    Site("home_", "at home", "at home", (), ELSEWHERE, lambda case: case.home_statics),
+    Site(
+        "",
+        "over the box",
+        f"at {BOX_NODES} nodes an axis of the required box",
+        ("box",),
+        OPTIMISE,
+        lambda case: case.box_statics,
+    ),
+)
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A measure of loads, errors or compliance, wherever it is measured.
+
+    Attributes:
+        name, label, hint: As in `Measure`, without the site.
+        value: Value of the statics at a site.
+        needs: What it needs of the machine.
+        power, unit, sense, is_whole: As in `Measure`.
+    """
+
+    name: str
+    label: str
+    hint: str
+    value: Callable[[BoxStatics], float]
+    needs: tuple[Need, ...]
+    power: int = 0
+    unit: Unit = ""
+    sense: Sense | None = "less"
+    is_whole: bool = False
+
+
+KINDS = (
+    Kind(
+        "load_share",
+        "load",
+        "The largest share of a limit of actuators, struts or guide under the payload's weight and "
+        "force",
+        lambda statics: statics.largest_share,
+        ("is_loaded", "is_limited"),
+    ),
+    Kind(
+        "worst_actuator",
+        "worst actuator",
+        "Place of the actuator with the largest share of its limit in the order l1, d1, d2, d3, "
+        "d4, l4, under the payload's weight and force",
+        lambda statics: statics.worst_actuator,
+        ("is_loaded", "limits_actuators"),
+        sense=None,
+        is_whole=True,
+    ),
+    Kind(
+        "largest_payload",
+        "largest payload",
+        "The largest mass in place of the payload that keeps all limits",
+        lambda statics: statics.largest_payload,
+        ("is_limited",),
+        unit="kg",
+        sense="more",
+    ),
+    Kind(
+        "largest_bending",
+        "largest bending",
+        "The largest bending moment of struts 2 and 3 under the payload's weight and force",
+        lambda statics: statics.largest_bending,
+        ("is_loaded",),
+        unit="N m",
+    ),
+    Kind(
+        "worst_error",
+        "worst error",
+        "The largest displacement of the tool by the errors of the actuators",
+        lambda statics: statics.worst_error,
+        ("has_errors",),
+        power=1,
+    ),
+    Kind(
+        "softest_compliance",
+        "softest compliance",
+        "The largest displacement of the tool per force at it",
+        lambda statics: statics.softest_compliance,
+        ("is_elastic",),
+        unit="mm/N",
+    ),
+)
+
+
+def loads() -> Iterable[Measure]:
+    """Yield the measures of loads, errors and compliance."""
+    for site in SITES:
+        for kind in KINDS:
+            yield _measure(kind, site)
+    yield Measure(
+        "held_volume",
+        "volume that holds the payload",
+        "Volume of the workspace at whose positions the payload's weight and force are held within "
+        "the limits of actuators, struts and guide",
+        lambda case: case.held_volume,
+        title="that holds the payload",
+        power=3,
+        sense="more",
+        cost="high",
+        needs=("is_loaded", "is_limited"),
+        places=ELSEWHERE | WORKSPACE,
+    )
+
+
+def _measure(kind: Kind, site: Site) -> Measure:
+    def function(case: Case) -> float:
+        statics = site.of(case)
+        return math.nan if statics is None else kind.value(statics)
+
+    def reason(case: Case) -> str:
+        statics = site.of(case)
+        if statics is None or statics.is_regular:
+            return ""
+        where = "the required box has singular positions" if site.needs else "home is singular"
+        return f"{where}, where forces and errors are infinite"
+
+    return Measure(
+        f"{site.prefix}{kind.name}",
+        f"{kind.label} {site.label}",
+        f"{kind.hint}, {site.hint}",
+        function,
+        power=kind.power,
+        unit=kind.unit,
+        sense=kind.sense,
+        is_whole=kind.is_whole,
+        needs=(*site.needs, *kind.needs),
+        reason=reason,
+        places=site.places,
+    )

@@ -1,0 +1,199 @@
+"""Loads and errors of the tool over the required box, as demands with exact gradients.
+
+They are evaluated at the nodes of a grid over the box, see `explorer.measures.statics`. Of the
+nodes of each eighth of the box the worst one counts, so that only a few values have gradients and
+most of them stay smooth from step to step.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from explorer.measures.statics import BoxStatics
+from explorer.mechanism.design import JOINTS, VARIABLES
+from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
+from explorer.optimise.problem import SHIFTS
+from explorer.optimise.search.demands import Measured
+from explorer.optimise.search.state import State
+from explorer.statics.accuracy import actuator_errors
+from explorer.statics.equilibrium import twists_of_actuators
+from explorer.statics.forces import GUIDE_ROWS, STRUT_ROWS
+from explorer.statics.reactions import part_limits
+from explorer.statics.slopes import PARAMETERS, TwistSlopes, twist_slopes
+from explorer.statics.weights import payload_wrench
+from explorer.workspace.limits.constraints import YAW
+
+CHAIN = (*VARIABLES, YAW, *SHIFTS)
+"""The parameters of the chain rule that are those of `twist_slopes`, in their order."""
+
+PARTS = (*JOINTS, "bending 2", "bending 3", "guide force 2", "guide force 3")
+"""The loaded parts; the moment on the guide is the bending of the strut."""
+
+# Parts by the actuator whose force loads them.
+ACTUATOR_OF = np.array([*range(6), *GUIDE_ROWS, *STRUT_ROWS])
+BENDING = slice(6, 8)
+EIGHTHS = 8
+
+
+def spare_of(share: FloatArray) -> FloatArray:
+    """Return 1 − s up to a share s of 1, and 1 / s − 1 beyond, which is as smooth there.
+
+    Shares grow beyond all bounds towards singular poses; the reciprocal vanishes linearly.
+    """
+    return np.asarray((1.0 - share) / np.maximum(1.0, share))
+
+
+def _spare_slope(share: FloatArray) -> FloatArray:
+    return np.asarray(-1.0 / np.maximum(1.0, share) ** 2)
+
+
+def _worst_nodes(box: BoxStatics, values: FloatArray) -> IntArray:
+    """Return the node with the largest of values (n, m) in each eighth, shape (8, m)."""
+    middle = np.mean(box.box, axis=0)
+    eighths = (box.positions > middle) @ np.array([4, 2, 1])
+    rows: list[IntArray] = []
+    for eighth in range(EIGHTHS):
+        # A box without depth along an axis has empty eighths.
+        members = np.flatnonzero(eighths == eighth)
+        members = members if len(members) else np.arange(len(values))
+        rows.append(members[values[members].argmax(axis=0)])
+    return np.array(rows)
+
+
+class LoadDemand:
+    """The limits of actuators, struts and guide under the design's load, over the required box.
+
+    The load is the payload's weight and its force of any direction. The limits are those of the
+    design at the start of a run, which no variable changes.
+    """
+
+    is_equality = False
+    is_limit = False
+
+    def __init__(self, start: State) -> None:
+        self.limits = part_limits(start.design)
+        self.counts: BoolArray = np.asarray(np.isfinite(self.limits).any(axis=0))
+        self.names = tuple(
+            f"load of {part} over the required box"
+            for part, counts in zip(PARTS, self.counts, strict=True)
+            if counts
+            for _ in range(EIGHTHS)
+        )
+
+    def largest_share(self, state: State) -> float:
+        """Return the largest share of a limit at the nodes."""
+        box = _statics_of(state)
+        return float(self._shares(state, _twists(box), box)[0].max())
+
+    def measure(self, state: State) -> Measured:
+        """Return what the largest shares of each part leave, see `spare_of`."""
+        box = _statics_of(state)
+        shares = self._shares(state, _twists(box), box)[0]
+        parts = np.flatnonzero(self.counts)
+        worst = _worst_nodes(box, shares[:, parts]).T.ravel()
+        part = np.repeat(parts, EIGHTHS)
+        nodes, row = np.unique(worst, return_inverse=True)
+        slopes = twist_slopes(state.design, box.positions[nodes], state.rotation)
+        share, gradient = self._gradients(state, slopes, row, part)
+        return Measured(spare_of(share), _spare_slope(share)[:, None] * gradient)
+
+    def _shares(
+        self, state: State, twists: FloatArray, box: BoxStatics
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the shares of the limits (n, 10), the forces (n, 6), and their spread (n, 6)."""
+        design = state.design
+        forces = -np.einsum("nki,k->ni", twists, payload_wrench(design, state.rotation))
+        spread = design.payload.force_n * np.linalg.norm(twists[:, :3], axis=1)
+        highs, lows = self.limits
+        lever = np.ones((len(twists), len(PARTS)))
+        lever[:, BENDING] = box.strut_lengths
+        up = (forces + spread)[:, ACTUATOR_OF] * lever / highs
+        down = (spread - forces)[:, ACTUATOR_OF] * lever / lows
+        return np.maximum(up, down), forces, spread
+
+    def _gradients(
+        self, state: State, slopes: TwistSlopes, row: IntArray, part: IntArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the shares of parts at nodes, shape (k,), and their derivatives, (k, n)."""
+        design, joint = state.design, ACTUATOR_OF[part]
+        wrench = payload_wrench(design, state.rotation)
+        # A turn about z turns the arm of the weight with the platform, not the weight.
+        arm = state.rotation @ (np.array(design.payload.centre) - design.tool.position)
+        turned = np.zeros(6)
+        turned[3:] = np.cross(np.cross([0.0, 0.0, 1.0], arm), wrench[:3])
+        twist, by = slopes.twists[row, :, joint], slopes.by[row, :, :, joint]
+        force, force_by = -twist @ wrench, -by @ wrench
+        force_by[:, PARAMETERS.index("yaw")] -= twist @ turned
+        speed = np.linalg.norm(twist[:, :3], axis=1)
+        along = twist[:, :3] / np.maximum(speed, 1e-300)[:, None]
+        spread = design.payload.force_n * speed
+        spread_by = design.payload.force_n * np.einsum("ki,kqi->kq", along, by[..., :3])
+        highs, lows = self.limits[0, part], self.limits[1, part]
+        is_up = (force + spread) / highs >= (spread - force) / lows
+        sign = np.where(is_up, 1.0, -1.0)
+        limit = np.asarray(np.where(is_up, highs, lows), dtype=np.float64)
+        value = sign * force + spread
+        value_by = sign[:, None] * force_by + spread_by
+        bends = (part >= BENDING.start) & (part < BENDING.stop)
+        strut = np.where(bends, part - BENDING.start, 0)
+        lever = np.where(bends, slopes.struts[row, strut], 1.0)
+        lever_by = np.where(bends[:, None], slopes.struts_by[row, :, strut], 0.0)
+        value_by = value_by * lever[:, None] + value[:, None] * lever_by
+        return value * lever / limit, (value_by / limit[:, None]) @ state.rows(CHAIN)
+
+
+class ErrorDemand:
+    """The worst displacement of the tool by the actuators' errors, over the required box.
+
+    Args:
+        most: Largest displacement allowed, in design units.
+    """
+
+    is_equality = False
+    is_limit = False
+    names = ("error over the required box",) * EIGHTHS
+
+    def __init__(self, most: float) -> None:
+        self.most = most
+
+    def measure(self, state: State) -> Measured:
+        """Return what the largest displacements leave, see `spare_of`."""
+        box = _statics_of(state)
+        worst = _worst_nodes(box, box.errors[:, None])[:, 0]
+        slopes = twist_slopes(state.design, box.positions[worst], state.rotation)
+        errors = actuator_errors(state.design)
+        signed = errors * _corners()
+        moved = np.einsum("kji,ci->kcj", slopes.twists[:, :3], signed)
+        length = np.linalg.norm(moved, axis=2)
+        corner, row = length.argmax(axis=1), np.arange(EIGHTHS)
+        largest = length[row, corner]
+        along = moved[row, corner] / np.maximum(largest, 1e-300)[:, None]
+        by = np.einsum("kj,kqji,ki->kq", along, slopes.by[:, :, :3], signed[corner])
+        share = largest / self.most
+        gradient = by @ state.rows(CHAIN) / self.most
+        return Measured(spare_of(share), _spare_slope(share)[:, None] * gradient)
+
+
+def largest_share(state: State) -> float:
+    """Return the largest share of a limit under the load over the required box."""
+    return LoadDemand(state).largest_share(state)
+
+
+def largest_error(state: State) -> float:
+    """Return the worst displacement of the tool over the required box, in design units."""
+    return float(_statics_of(state).errors.max())
+
+
+def _statics_of(state: State) -> BoxStatics:
+    return BoxStatics(state.design, state.box, state.rotation)
+
+
+def _twists(box: BoxStatics) -> FloatArray:
+    design = box.design
+    return twists_of_actuators(design, box.positions, box.rotation, design.tool.position)
+
+
+def _corners() -> FloatArray:
+    """Return the signs of the corners of the cube of errors, up to a common one, (32, 6)."""
+    bits = np.arange(32)[:, None] >> np.arange(6) & 1
+    return np.asarray(1.0 - 2.0 * bits, dtype=np.float64)

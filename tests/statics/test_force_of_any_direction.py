@@ -1,0 +1,103 @@
+"""The payload's force of any direction, beside forces of many directions one by one."""
+
+from __future__ import annotations
+
+import msgspec
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from explorer import (
+    PRESETS,
+    Actuators,
+    Design,
+    DesignError,
+    Guide,
+    Payload,
+    Struts,
+    Tool,
+    largest_payload,
+    limit_shares,
+    reactions,
+)
+from explorer.mechanism.home import home_pose
+from explorer.numerics.arrays import FloatArray
+from explorer.statics.held import HIGHEST, held_load, held_values
+from explorer.statics.reactions import part_limits
+from explorer.statics.weights import design_weights
+
+OPTIMAL = PRESETS["paper-optimal"]
+ROTATION = home_pose(OPTIMAL).rotation
+
+
+def loaded(force: float, mass: float = 2.0) -> Design:
+    """Return a design with a load and limits of all its parts."""
+    return msgspec.structs.replace(
+        OPTIMAL,
+        tool=Tool((1.0, -1.0, 2.0)),
+        payload=Payload(mass, (1.0, 2.0, 3.0), force),
+        actuators=Actuators(push_n=(60, 50, 40, 50, 45, 70), pull_n=(30, 40, 50, 60, 70, 80)),
+        struts=Struts(moment_nm=4.0),
+        guide=Guide(force_n=70.0, moment_nm=5.0),
+    )
+
+
+def positions(count: int) -> FloatArray:
+    """Return regular positions in the mode of home, shape (count, 3)."""
+    return np.random.default_rng(7).uniform((4, 1, 4), (16, 9, 14), (count, 3))
+
+
+def shares(design: Design, at: FloatArray, load: FloatArray) -> FloatArray:
+    """Return the shares of the limits under a load at the tool, besides the payload's weight."""
+    weights = design_weights(design)
+    held = reactions(design, at, ROTATION, load, design.tool.position, weights)
+    return limit_shares(design, held)
+
+
+def test_shares_are_the_largest_of_all_directions() -> None:
+    at = positions(20)
+    ours = shares(loaded(7.0), at, np.zeros(6))
+    directions = np.random.default_rng(1).normal(size=(20_000, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    loads = np.zeros((len(directions), 1, 6))
+    loads[:, 0, :3] = 7.0 * directions
+    sampled = shares(loaded(0.0), at, loads).max(axis=0)
+    assert (sampled <= ours * (1.0 + 1e-12)).all()
+    assert_allclose(sampled, ours, rtol=2e-3)
+
+
+def test_largest_payload_leaves_room_for_the_force() -> None:
+    at = positions(50)
+    design = loaded(3.0, 0.0)
+    most = largest_payload(design, at, ROTATION, tool=design.tool.position)
+    for p, mass in zip(at, most.tolist(), strict=True):
+        if mass > 0.0:
+            share = shares(loaded(3.0, mass), p, np.zeros(6)).max()
+            assert share == pytest.approx(1.0, rel=1e-9)
+        else:
+            assert shares(design, p, np.zeros(6)).max() > 1.0
+
+
+@pytest.mark.parametrize("force", [0.0, 7.0])
+def test_kernel_of_regions_has_the_same_shares(force: float) -> None:
+    design, at = loaded(force), positions(300)
+    load = np.array([3.0, -2.0, 5.0, 10.0, -20.0, 5.0])
+    expected = shares(design, at, load).max(axis=1)
+    values, parts = held_values(held_load(design, ROTATION, load), ROTATION, at)
+    assert_allclose(values + 1.0, np.minimum(1.0 / expected, 1.0 + HIGHEST), rtol=1e-9)
+    assert set(parts.tolist()) <= set(range(part_limits(design).shape[1]))
+
+
+def test_function_of_regions_falls_through_singular_planes() -> None:
+    design = loaded(5.0)
+    held = held_load(design, ROTATION, np.zeros(6))
+    heights = np.linspace(0.2, -0.2, 41)
+    at = np.array([10.0, 5.0, 0.0]) + heights[:, None] * [0.0, 0.0, 1.0]
+    values = held_values(held, ROTATION, at)[0]
+    assert values[20] == -1.0
+    assert (np.diff(values) < 1e-12).all()
+
+
+def test_force_below_zero_is_refused() -> None:
+    with pytest.raises(DesignError, match="force_n"):
+        Payload(force_n=-1.0)

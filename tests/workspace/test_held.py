@@ -1,0 +1,145 @@
+"""The part of a workspace that holds a load, beside positions drawn at random one by one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+
+from explorer import (
+    PRESETS,
+    Actuators,
+    Design,
+    Guide,
+    InputError,
+    Payload,
+    Struts,
+    Tool,
+    limit_shares,
+    reactions,
+)
+from explorer.mechanism.home import home_pose
+from explorer.numerics.arrays import FloatArray
+from explorer.statics.weights import design_weights
+from explorer.workspace.held import PART_NAMES, held_workspace
+from explorer.workspace.limits.constraints import constraints, satisfies
+
+OPTIMAL = PRESETS["paper-optimal"]
+LOAD = (4.0, -3.0, -6.0, 5.0, 10.0, -5.0)
+CASES = {
+    "bending": msgspec.structs.replace(
+        OPTIMAL, payload=Payload(force_n=10.0), struts=Struts(moment_nm=5.0)
+    ),
+    "actuators": msgspec.structs.replace(
+        OPTIMAL,
+        payload=Payload(2.0, (1.0, 2.0, 3.0)),
+        actuators=Actuators(push_n=(60, 50, 40, 50, 45, 70), pull_n=(30, 40, 50, 60, 70, 80)),
+    ),
+    "all parts": msgspec.structs.replace(
+        OPTIMAL,
+        tool=Tool((1.0, -1.0, 2.0)),
+        payload=Payload(2.0, (1.0, 2.0, 3.0), 4.0),
+        actuators=Actuators(push_n=(60, 50, 40, 50, 45, 70), pull_n=(30, 40, 50, 60, 70, 80)),
+        struts=Struts(moment_nm=4.0),
+        guide=Guide(force_n=70.0, moment_nm=5.0),
+    ),
+    "strong": msgspec.structs.replace(
+        OPTIMAL, payload=Payload(1.0), actuators=Actuators(push_n=(1e3, 1e3, 1e3, 1e3, 1e3, 1e3))
+    ),
+}
+
+
+def largest_shares(design: Design, at: FloatArray, load: tuple[float, ...]) -> FloatArray:
+    """Return the largest share of a limit at positions (n, 3)."""
+    rotation = home_pose(design).rotation
+    weights = design_weights(design)
+    held = reactions(design, at, rotation, np.array(load), design.tool.position, weights)
+    return np.asarray(limit_shares(design, held).max(axis=1))
+
+
+@pytest.mark.parametrize("load", [(0.0,) * 6, LOAD])
+@pytest.mark.parametrize("name", list(CASES))
+def test_volume_is_that_of_positions_which_hold_the_load(
+    name: str, load: tuple[float, ...]
+) -> None:
+    design = CASES[name]
+    part = held_workspace(design, load=load)
+    signed = msgspec.structs.replace(design.limits, margin=0.0)
+    limits = constraints(msgspec.structs.replace(design, limits=signed), home_pose(design).rotation)
+    random = np.random.default_rng(3)
+    at = random.uniform((0.0, -12.0, 0.0), (20.0, 22.0, 18.0), (150_000, 3))
+    at = at[satisfies(design, limits, at).all(axis=-1)]
+    share = float((largest_shares(design, at, load) <= 1.0).mean())
+    error = np.sqrt(share * (1.0 - share) / len(at))
+    assert part.held_volume / part.volume == pytest.approx(share, abs=4.0 * error + 0.005 * share)
+    assert part.solid.is_empty or part.solid.is_watertight
+
+
+@pytest.mark.parametrize("name", ["bending", "actuators", "all parts"])
+def test_volume_error_is_below_half_a_percent(name: str) -> None:
+    coarse, fine = (held_workspace(CASES[name], nodes=count).held_volume for count in (28, 90))
+    assert coarse == pytest.approx(fine, rel=5e-3)
+
+
+@pytest.mark.parametrize("name", ["bending", "all parts"])
+def test_new_faces_lie_where_a_part_takes_its_limit(name: str) -> None:
+    design = CASES[name]
+    solid = held_workspace(design).solid
+    of_parts = np.isin(solid.limit_of_face, [solid.limits.index(part) for part in PART_NAMES])
+    others = set(solid.faces[~of_parts].ravel().tolist())
+    corners = sorted(set(solid.faces[of_parts].ravel().tolist()) - others)
+    assert len(corners) > 100
+    shares = largest_shares(design, solid.vertices[corners], (0.0,) * 6)
+    # Where two parts change places the surface has a crease, which faces cut short.
+    assert np.quantile(np.abs(shares - 1.0), 0.9) < 1e-6
+    assert np.abs(shares - 1.0).max() < 0.1
+
+
+def test_load_that_nothing_holds_names_the_part() -> None:
+    design = msgspec.structs.replace(
+        OPTIMAL, payload=Payload(500.0), actuators=Actuators(push_n=(1.0, 1.0, 1.0, 1.0, 1.0, 1.0))
+    )
+    part = held_workspace(design)
+    assert part.held_volume == 0.0
+    assert part.solid.is_empty
+    assert part.solid.empty_because[0] in PART_NAMES
+
+
+def test_without_limits_the_whole_holds_any_load() -> None:
+    part = held_workspace(OPTIMAL, load=LOAD)
+    assert part.held_volume == pytest.approx(part.volume, rel=1e-12)
+
+
+def test_scale_of_a_design_does_not_matter() -> None:
+    design, size = CASES["actuators"], 1e3
+
+    def scaled(vector: Iterable[float]) -> Any:
+        return tuple(size * x for x in vector)
+
+    assert design.limits.box is not None
+    home = home_pose(design)
+    larger = msgspec.structs.replace(
+        design,
+        a3=scaled(design.a3),
+        b1=scaled(design.b1),
+        b2=size * design.b2,
+        b3=size * design.b3,
+        unit_mm=design.unit_mm / size,
+        payload=Payload(2.0, scaled(design.payload.centre)),
+        limits=msgspec.structs.replace(
+            design.limits, box=tuple(scaled(end) for end in design.limits.box)
+        ),
+        home=msgspec.structs.replace(home, position=scaled(home.position)),
+    )
+    ours, theirs = held_workspace(design), held_workspace(larger)
+    assert theirs.held_volume == pytest.approx(size**3 * ours.held_volume, rel=1e-4)
+
+
+def test_bad_input_is_refused() -> None:
+    with pytest.raises(InputError, match="nodes on an axis"):
+        held_workspace(OPTIMAL, nodes=2)
+    with pytest.raises(InputError, match="load"):
+        held_workspace(OPTIMAL, load=(np.nan,) * 6)
