@@ -31,6 +31,7 @@ ROOMS = (
     "optimise",
     "sweep",
     "prototype",
+    "reproduce",
     "export",
     "app",
     "cli",

@@ -18,6 +18,7 @@ FILES = (
     "loads.md",
     "precision.md",
     "optimise.md",
+    "claims.md",
     "studies.md",
     "prototype-and-export.md",
     "command-line.md",

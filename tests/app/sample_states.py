@@ -240,6 +240,9 @@ def rich_state() -> State:
         "volume": 1e4 / 3,
         "free": (VARIABLES[4], YAW, PLACE),
         "box": ((0.0, 0.0, 0.0), (4 / 3, 2.0, 1 / 3)),
+        # The design has no load and no errors to search with.
+        "held": False,
+        "error": 0.0,
     }
     actions: list[Action | Callable[[State], Action]] = [
         Change("optimisation.request", request),
@@ -259,6 +262,7 @@ def rich_state() -> State:
         Change("compared", {"look": varied(Look())}),
         Change("", {"studies": varied(Studies())}),
         BrushAxis("volume", ((1 / 3, 10.0),)),
+        Change("optimisation.request", {"held": True, "error": 1 / 3}),
         SetJoint(0, 99.1),
     ]
     for action in actions:

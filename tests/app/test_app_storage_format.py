@@ -18,6 +18,7 @@ from explorer.app.features.optimise.actions import Advance, StartRun
 from explorer.app.session.history import History, Step, start_history
 from explorer.app.state.actions import SetPosition
 from explorer.app.state.compared import Compared
+from explorer.app.state.optimisation import OptimisationRequest
 from explorer.app.state.state import Run, State, opened
 from explorer.app.state.studies import Studies
 from explorer.app.state.values import with_value
@@ -289,6 +290,10 @@ def test_file_of_an_earlier_schema_opens_to_the_state_it_was_written_from(schema
             expected = with_value(expected, f"{view}.workspace.flipped", False)
             # Twin and prototype were both switched on.
             expected = with_value(expected, f"{view}.drawn_as", "6-4 twin")
+        for request in ("optimisation.request", "optimisation.run.own.optimisation.request"):
+            for name in ("held", "error"):
+                value = getattr(OptimisationRequest(), name)
+                expected = with_value(expected, f"{request}.{name}", value)
         # There were no kinds of paths, and titles named the signs of modes.
         paths = state.paths
         assert paths.journey is not None

@@ -105,6 +105,7 @@ def test_report_title_block_names_design_unit_and_hash() -> None:
     assert explorer.__version__ in block.text
     assert hashlib.sha256(encode_design(OPTIMAL)).hexdigest()[:16] in block.text
     sections = ["Mechanism", "Workspace", "Singularities", "Legs", "Prototype"]
+    sections.append("The paper’s claims")
     assert [each.text for each in page.all("h2")] == [*sections, "How to reproduce it"]
 
 

@@ -92,14 +92,16 @@ class Workspace(JsonOptions, RadiiOptions, OrientationOptions, DesignOptions):
     """Position at which to compute the share of feasible orientations, among the given or all."""
 
     table1: Flag = False
-    """Reproduce the paper's Table 1 instead, from both presets."""
+    """Measure the claim table-1 of `explorer reproduce` instead: the paper's Table 1."""
 
     def run(self) -> None:
         """Write the measures of the workspace."""
         if self.table1:
-            from explorer.cli.answers.table_one import as_json, as_lines
+            from explorer.cli.commands.reproduce import claim_lines
+            from explorer.reproduce.claims import measure_claims
 
-            self.write(as_json, as_lines)
+            (result,) = measure_claims(["table-1"])
+            self.write(lambda: dict(result.measured.figures), lambda: claim_lines(result))
             return
         design = self.with_radii(self.read_design())
         pose = self.oriented_home(design)

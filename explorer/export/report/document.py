@@ -21,6 +21,7 @@ from explorer.export.report.markup import (
     table,
     whole,
 )
+from explorer.export.report.sections.claims import claims_section
 from explorer.export.report.sections.legs import legs_section
 from explorer.export.report.sections.mechanism import mechanism_section
 from explorer.export.report.sections.parts import parts_section
@@ -181,5 +182,6 @@ _SECTIONS: tuple[Callable[[ReportData], Iterable[Element]], ...] = (
     legs_section,
     parts_section,
     search_section,
+    claims_section,
     _reproduction,
 )

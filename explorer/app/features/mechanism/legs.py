@@ -20,9 +20,7 @@ from explorer.app.widgets.colours import BALL, CARRIAGE, JOINT, OUTLINE, RAIL, R
 from explorer.legs.clearance import legs_of
 from explorer.measures.snapshot import Snapshot
 from explorer.numerics.arrays import FloatArray
-
-TWIN = (("a1", "b1"), ("a1", "b2"), ("a1", "b3"), ("a2", "b2"), ("a2", "b3"), ("a3", "b4"))
-"""The six legs of the 6-4 twin, base point and platform point."""
+from explorer.reproduce.six_legs import TWIN
 
 # Sizes in scene units, at thickness one.
 PLATE_TOP = -0.6

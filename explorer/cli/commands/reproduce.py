@@ -1,0 +1,92 @@
+"""`explorer reproduce`: the claims of the paper, each beside what is measured."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from textwrap import fill
+from typing import TYPE_CHECKING, Annotated
+
+from explorer.cli.options import JsonOptions
+from explorer.cli.streams import write_error
+from explorer.cli.values import OPTIONAL, texts
+
+if TYPE_CHECKING:
+    from explorer.reproduce.claim import Result
+
+WIDTH = 96
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reproduce(JsonOptions):
+    """Measure every claim of the paper again, and judge it.
+
+    A claim is confirmed, confirmed within what the measured values state, not confirmed, or not
+    testable from the paper. What the paper leaves open is marked as our reading. All random cases
+    have fixed seeds.
+    """
+
+    claim: Annotated[tuple[str, ...], texts("--claim", "NAME …"), OPTIONAL] = ()
+    """Names of the claims, such as table-1; all by default."""
+
+    def run(self) -> None:
+        """Write the claims with their verdicts."""
+        from explorer.numerics.compiled import warm
+        from explorer.reproduce.claims import measure_claims
+
+        warm()
+        results = list(
+            measure_claims(self.claim or None, lambda title: write_error(f"measuring: {title}"))
+        )
+        self.write(
+            lambda: {"claims": [claim_json(result) for result in results]}, lambda: lines(results)
+        )
+
+
+def claim_json(result: Result) -> dict[str, object]:
+    """Return a claim and what is measured for it as plain values."""
+    claim, measured = result.claim, result.measured
+    return {
+        "name": claim.name,
+        "claim": claim.title,
+        "reading": claim.reading,
+        "paper": claim.paper,
+        "measured": measured.text,
+        "verdict": measured.verdict,
+        "command": claim.command,
+        "figures": measured.figures,
+    }
+
+
+def lines(results: Sequence[Result]) -> Iterator[str]:
+    """Yield claims with their verdicts, and how often there is each verdict."""
+    for result in results:
+        yield from claim_lines(result)
+    if len(results) > 1:
+        counts = Counter(result.measured.verdict for result in results)
+        yield "; ".join(f"{count} {verdict}" for verdict, count in counts.items())
+
+
+def claim_lines(result: Result) -> Iterator[str]:
+    """Yield a claim with what is measured for it as lines of text."""
+    claim, measured = result.claim, result.measured
+    yield f"{measured.verdict.upper()}: {claim.title}"
+    for name, text in (
+        ("paper", f"“{claim.paper}”"),
+        ("reading", claim.reading),
+        ("measured", measured.text),
+        ("see", claim.command),
+    ):
+        if text:
+            yield fill(
+                text,
+                WIDTH,
+                initial_indent=f"  {name:9} ",
+                subsequent_indent=" " * 12,
+                break_on_hyphens=False,
+            )
+    if measured.table:
+        yield ""
+        yield from (f"    {line}".rstrip() for line in measured.table)
+    yield ""

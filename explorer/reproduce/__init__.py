@@ -1,0 +1,1 @@
+"""The claims of the paper, each measured again and judged."""

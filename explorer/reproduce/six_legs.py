@@ -1,0 +1,164 @@
+"""Mechanisms with six straight legs to compare with: the 6-4 twin and an octahedral platform."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from explorer.legs.segments import write_closest
+from explorer.legs.tetrahedra import tetrahedra_overlap
+from explorer.mechanism.design import Design
+from explorer.mechanism.home import home_pose
+from explorer.mechanism.margins import margins
+from explorer.numerics.arrays import BoolArray, FloatArray, for_kernel
+from explorer.numerics.compiled import kernel
+
+TWIN = (("a1", "b1"), ("a1", "b2"), ("a1", "b3"), ("a2", "b2"), ("a2", "b3"), ("a3", "b4"))
+"""The six legs of the 6-4 twin, base point and platform point (the paper's Figure 1a)."""
+
+
+@kernel("void(f8[:,:,:,::1], i8[:,::1], f8[:,:,::1], f8[:,::1])")
+def distance_rows(axes: FloatArray, pairs: FloatArray, points: FloatArray, out: FloatArray) -> None:
+    """Write the distances of pairs of segments, shape (n, m), of axes (n, legs, 2, 3).
+
+    `points` is a place to work in, shape (1, 2, 3).
+    """
+    for k in range(axes.shape[0]):
+        for i in range(pairs.shape[0]):
+            out[k, i] = write_closest(axes[k, pairs[i, 0]], axes[k, pairs[i, 1]], points[0])
+
+
+@dataclass(frozen=True)
+class SixLegs:
+    """A platform on six legs, each between a point of the base and one of the platform.
+
+    Attributes:
+        name: Name for people.
+        base: Points of the base, shape (6, 3), in design units.
+        platform: Points of the platform in its frame, shape (6, 3).
+        longest: Largest length of every leg; there is no least one.
+        flags: Whether the mechanism has the flags of the 4-4, so that margins are its modes.
+        home: Position and rotation of its home pose.
+    """
+
+    name: str
+    base: FloatArray
+    platform: FloatArray
+    longest: float
+    flags: bool
+    home: tuple[FloatArray, FloatArray]
+
+    @cached_property
+    def pairs(self) -> FloatArray:
+        """The pairs of legs that share no joint, shape (m, 2)."""
+        return np.array(
+            [
+                (i, j)
+                for i, j in itertools.combinations(range(6), 2)
+                if not (
+                    np.array_equal(self.base[i], self.base[j])
+                    or np.array_equal(self.platform[i], self.platform[j])
+                )
+            ]
+        )
+
+    def axes(self, position: FloatArray, rotation: FloatArray) -> FloatArray:
+        """Return both ends of each leg, shape (n, 6, 2, 3)."""
+        tips = position[:, None, :] + np.einsum("...ij,kj->...ki", rotation, self.platform)
+        base = np.broadcast_to(self.base, tips.shape)
+        return np.stack([base, tips], axis=-2)
+
+    def clearances(self, position: FloatArray, rotation: FloatArray) -> FloatArray:
+        """Return the distances of the axes of the pairs, shape (n, m)."""
+        axes = for_kernel(self.axes(position, rotation))
+        out = np.empty((len(axes), len(self.pairs)))
+        distance_rows(len(axes), axes, self.pairs, np.empty((1, 2, 3)), out)
+        return out
+
+    def step_overlaps(self, start: FloatArray, end: FloatArray, rotation: FloatArray) -> BoolArray:
+        """Return whether legs collide on steps by the paper's test, shape (n,)."""
+        one, two = self.axes(start, rotation), self.axes(end, rotation)
+        swept = np.stack([one[:, :, 0], two[:, :, 0], one[:, :, 1], two[:, :, 1]], axis=-2)
+        overlaps = [tetrahedra_overlap(swept[:, i], swept[:, j]) for i, j in self.pairs.tolist()]
+        return np.asarray(np.any(overlaps, axis=0))
+
+    def holds(self, position: FloatArray, rotation: FloatArray) -> BoolArray:
+        """Return whether poses keep the lengths and the mode of home, shape (n,).
+
+        Without flags the sign of det J stands for the mode, which may hold several.
+        """
+        axes = self.axes(position, rotation)
+        lengths = np.linalg.norm(axes[:, :, 1] - axes[:, :, 0], axis=-1)
+        within = (lengths <= self.longest).all(axis=1)
+        home, turned = self.home
+        if self.flags:
+            signs = np.sign(margins(home, turned))
+            return within & (np.sign(margins(position, rotation)) == signs).all(axis=-1)
+        sign = np.sign(self.determinant(home[None], turned[None]))[0]
+        return within & (np.sign(self.determinant(position, rotation)) == sign)
+
+    def determinant(self, position: FloatArray, rotation: FloatArray) -> FloatArray:
+        """Return det J of poses, rows (n; b × n) of unit directions, shape (n,)."""
+        axes = self.axes(position, rotation)
+        directions = axes[:, :, 1] - axes[:, :, 0]
+        directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
+        arms = axes[:, :, 1] - position[:, None]
+        return np.linalg.det(np.concatenate([directions, np.cross(arms, directions)], axis=-1))
+
+
+def six_four_twin(design: Design, a2x: float) -> SixLegs:
+    """Return the 6-4 twin of a design: each leg along the guide becomes two from a1 and a2.
+
+    Args:
+        design: The design; every leg of the twin is at most as long as its longest one.
+        a2x: Position of a2 on the base's x-axis, which the 4-4 leaves free.
+    """
+    points = {
+        "a1": np.zeros(3),
+        "a2": np.array([a2x, 0.0, 0.0]),
+        "a3": np.array([*design.a3, 0.0]),
+        "b1": np.array([*design.b1, 0.0]),
+        "b2": np.array([design.b2, 0.0, 0.0]),
+        "b3": np.array([design.b3, 0.0, 0.0]),
+        "b4": np.zeros(3),
+    }
+    home = home_pose(design)
+    return SixLegs(
+        f"6-4, a2x = {a2x:g}",
+        np.array([points[base] for base, _ in TWIN]),
+        np.array([points[tip] for _, tip in TWIN]),
+        design.reach,
+        flags=True,
+        home=(np.array(home.position), home.rotation),
+    )
+
+
+def octahedral(design: Design) -> SixLegs:
+    """Return the octahedral Stewart-Gough platform of the same reach.
+
+    Base and platform are equilateral triangles with the areas of a1 a2 a3 and b1 b2 b3, turned
+    against each other by 60°; neighbouring legs share their joints.
+    """
+    base = _circumradius(0.5 * abs(design.a2x * design.a3[1]))
+    platform = _circumradius(0.5 * abs((design.b3 - design.b2) * design.b1[1]))
+    corners = np.radians([0.0, 120.0, 240.0])
+    tips = np.radians([60.0, 180.0, 300.0])
+    a = base * np.column_stack([np.cos(corners), np.sin(corners), np.zeros(3)])
+    b = platform * np.column_stack([np.cos(tips), np.sin(tips), np.zeros(3)])
+    return SixLegs(
+        "octahedral",
+        a[[0, 1, 1, 2, 2, 0]],
+        b[[0, 0, 1, 1, 2, 2]],
+        design.reach,
+        flags=False,
+        home=(np.array([0.0, 0.0, 0.5 * design.reach]), np.eye(3)),
+    )
+
+
+def _circumradius(area: float) -> float:
+    """Return the circumradius of the equilateral triangle with an area."""
+    return math.sqrt(4.0 * area / (3.0 * math.sqrt(3.0)))
