@@ -44,6 +44,7 @@ def make_problem(
     required_box: Box | None = None,
     held: bool = False,
     error: float | None = None,
+    tilt: float | None = None,
     free: Iterable[str] = (),
     bounds: Iterable[Variable] = (),
 ) -> Problem:
@@ -62,6 +63,7 @@ def make_problem(
         required_box: See `Demands`.
         held: See `Demands`.
         error: See `Demands`.
+        tilt: See `Demands`.
         free: Variables of `OPTIONAL` that may change besides the six design variables.
         bounds: Variables with other bounds than the default ones.
 
@@ -94,6 +96,7 @@ def make_problem(
             required_box=required_box,
             held=held,
             error=error,
+            tilt=tilt,
         ),
     )
 

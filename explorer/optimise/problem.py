@@ -47,6 +47,11 @@ lengths, and the shift of the required box along each axis."""
 
 Box = tuple[Triple, Triple]
 
+AZIMUTHS = 12
+"""Number of azimuths, at equal distances from the yaw of home, in which a tilt is demanded."""
+
+MOST_TILT = 90.0
+
 # Least value of the reach as a variable, as a share of the start's.
 LEAST_REACH = 1e-3
 
@@ -85,6 +90,9 @@ class Demands(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         required_box: (lows, highs) of positions that must lie in the workspace.
         held: Whether the design's load must be held over the required box, within the limits of
             its actuators, struts and guide.
+        tilt: Tilt from the orientation of home that the required box must allow in every azimuth,
+            in degrees. It is demanded in `AZIMUTHS` of them; between these the box may allow
+            some hundredths less.
         error: Worst displacement of the tool by the actuators' errors over the required box, in
             design units.
     """
@@ -98,6 +106,7 @@ class Demands(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     required_box: Box | None = None
     held: bool = False
     error: float | None = None
+    tilt: float | None = None
 
     def __post_init__(self) -> None:
         if self.volume is not None:
@@ -107,7 +116,7 @@ class Demands(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
                     f"the volume demanded must be a positive, finite number; got {self.volume:g}"
                 )
             msgspec.structs.force_setattr(self, "volume", float(self.volume))
-        for field in ("reach", "clearance", "stroke_ratio", "error"):
+        for field in ("reach", "clearance", "stroke_ratio", "error", "tilt"):
             value = getattr(self, field)
             if value is not None:
                 label = f"the {field.replace('_', ' ')} demanded"
@@ -345,8 +354,13 @@ def _check_statics(problem: Problem) -> None:
     demands, design = problem.demands, problem.start
     needs_load = demands.held or problem.objective == "smallest-load"
     needs_error = demands.error is not None or problem.objective == "smallest-error"
-    if (needs_load or needs_error) and demands.required_box is None:
-        raise InputError("loads and errors are measured over a required box, and none is given")
+    needs_box = needs_load or needs_error or demands.tilt is not None
+    if needs_box and demands.required_box is None:
+        raise InputError(
+            "loads, errors and tilts are demanded over a required box, and none is given"
+        )
+    if demands.tilt is not None and not demands.tilt < MOST_TILT:
+        raise InputError(f"the tilt demanded must be below {MOST_TILT:g}°; got {demands.tilt:g}°")
     if needs_load and not (design.payload.mass_kg or design.payload.force_n):
         raise InputError(
             "the design has no load: give its payload a mass, or a force of any direction"

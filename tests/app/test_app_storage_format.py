@@ -18,10 +18,10 @@ from explorer.app.features.optimise.actions import Advance, StartRun
 from explorer.app.session.history import History, Step, start_history
 from explorer.app.state.actions import SetPosition
 from explorer.app.state.compared import Compared
-from explorer.app.state.optimisation import OptimisationRequest
 from explorer.app.state.state import Run, State, opened
 from explorer.app.state.studies import Studies
 from explorer.app.state.values import with_value
+from explorer.app.state.view import OrientationView
 from explorer.app.storage.packing import present_view
 from explorer.app.storage.session_format import (
     MOST_BYTES,
@@ -288,12 +288,12 @@ def test_file_of_an_earlier_schema_opens_to_the_state_it_was_written_from(schema
         for view in ("view", "optimisation.run.own.view"):
             # Fields that came later are as in a new state.
             expected = with_value(expected, f"{view}.workspace.flipped", False)
+            expected = with_value(expected, f"{view}.orientation", OrientationView())
             # Twin and prototype were both switched on.
             expected = with_value(expected, f"{view}.drawn_as", "6-4 twin")
         for request in ("optimisation.request", "optimisation.run.own.optimisation.request"):
-            for name in ("held", "error"):
-                value = getattr(OptimisationRequest(), name)
-                expected = with_value(expected, f"{request}.{name}", value)
+            expected = with_value(expected, f"{request}.held", False)
+            expected = with_value(expected, f"{request}.error", 0.0)
         # There were no kinds of paths, and titles named the signs of modes.
         paths = state.paths
         assert paths.journey is not None

@@ -94,6 +94,8 @@ def problems(name: str) -> Iterator[Problem]:
             required_box=REQUIRED,
             held=True,
             error=0.01,
+            # It has hundreds of conditions, which one of the problems shows.
+            tilt=12.0 if ratio is None and "reach" in free else None,
             free=free,
         )
 

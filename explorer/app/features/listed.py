@@ -11,6 +11,7 @@ from explorer.app.features.history.feature import HISTORY
 from explorer.app.features.legs.feature import LEGS
 from explorer.app.features.mechanism.feature import MECHANISM
 from explorer.app.features.optimise.feature import OPTIMISE
+from explorer.app.features.orientation.feature import ORIENTATION
 from explorer.app.features.paths.feature import PATHS
 from explorer.app.features.prototype.feature import PROTOTYPE
 from explorer.app.features.sharing.feature import SHARING
@@ -26,6 +27,7 @@ FEATURES: tuple[Feature, ...] = (
     VIEW,
     SINGULARITY,
     WORKSPACE,
+    ORIENTATION,
     CHANGE,
     LEGS,
     PROTOTYPE,

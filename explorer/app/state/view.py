@@ -47,6 +47,30 @@ class WorkspaceView:
 
 
 @dataclass(frozen=True)
+class OrientationView:
+    """What is drawn of the orientations over the workspace.
+
+    Attributes:
+        tilts: Whether the greatest tilts at nodes are drawn.
+        over: Which workspace over a range of tilts is drawn.
+        range: Largest tilt of that range, in degrees.
+
+    Raises:
+        InputError: the range is not from 0 to 180.
+    """
+
+    tilts: bool = False
+    over: Literal["none", "reachable", "dexterous"] = "none"
+    range: float = 20.0
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.range <= 180.0:
+            raise InputError(
+                f"the tilts must be above 0° and up to 180°; got {format_number(self.range)}°"
+            )
+
+
+@dataclass(frozen=True)
 class PrototypeView:
     """How the prototype is shown.
 
@@ -135,6 +159,7 @@ class View:
     warn_below: float | None = None
     prototype: PrototypeView = field(default_factory=PrototypeView)
     workspace: WorkspaceView = field(default_factory=WorkspaceView)
+    orientation: OrientationView = field(default_factory=OrientationView)
     singular: SingularView = field(default_factory=SingularView)
 
     @property

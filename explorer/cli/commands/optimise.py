@@ -118,6 +118,9 @@ class Optimise(JsonOptions, DesignOptions):
     """Worst displacement of the tool by the actuators' errors over the required box, in design
     units."""
 
+    tilt: Annotated[float | None, positive("--tilt"), OPTIONAL] = None
+    """Tilt in every azimuth that the required box must allow, in degrees."""
+
     least: Annotated[
         float | None, positive("--least"), hint("default: a 20th of the largest variable")
     ] = None
@@ -201,6 +204,7 @@ class Optimise(JsonOptions, DesignOptions):
             required_box=None if self.required_box is None else _as_box(self.required_box),
             held=self.held,
             error=self.error,
+            tilt=self.tilt,
             free=self.free,
             bounds=[_as_variable(word) for word in self.bounds],
         )

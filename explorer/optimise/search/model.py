@@ -35,6 +35,7 @@ from explorer.optimise.search.loads import (
 )
 from explorer.optimise.search.starts import first_positions
 from explorer.optimise.search.state import State, scales
+from explorer.optimise.search.tilts import tilt_demands
 
 
 @dataclass(frozen=True)
@@ -249,6 +250,8 @@ def _demands(problem: Problem, start: State) -> list[Demand]:
         listed.append(GapDemand(start))
     if demands.required_box is not None:
         listed.append(BoxDemand(start))
+    if demands.tilt is not None:
+        listed += tilt_demands(start, demands.tilt)
     is_load = problem.objective == "smallest-load"
     is_error = problem.objective == "smallest-error"
     if demands.held and not is_load:

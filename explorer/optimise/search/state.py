@@ -15,6 +15,10 @@ import numpy as np
 from explorer.mechanism.design import LENGTHS, VARIABLES, Design
 from explorer.mechanism.design_file import decode_design, encode_design
 from explorer.mechanism.home import home_pose
+from explorer.mechanism.pose import (
+    rotation_from_yaw_pitch_roll,
+    yaw_pitch_roll_from_rotation,
+)
 from explorer.numerics.arrays import FloatArray
 from explorer.optimise.problem import REACH, YAW, Box, Problem
 from explorer.workspace.limits.constraints import (
@@ -63,6 +67,18 @@ class State:
     def rotation(self) -> FloatArray:
         """The orientation of the workspace, shape (3, 3)."""
         return home_pose(self.design).rotation
+
+    def turned(self, turn: FloatArray) -> State:
+        """Return the same place at another orientation: that of home, turned by a rotation.
+
+        Args:
+            turn: Rotation along the axes of the base after its yaw is home's, shape (3, 3).
+        """
+        other = State(self.problem, self.u, self.design)
+        own = self.rotation
+        yaw = rotation_from_yaw_pitch_roll((yaw_pitch_roll_from_rotation(own)[0], 0.0, 0.0))
+        other.rotation = yaw @ turn @ yaw.T @ own
+        return other
 
     @cached_property
     def box(self) -> Box:

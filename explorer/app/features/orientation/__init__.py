@@ -1,0 +1,1 @@
+"""The tab Orientation: what orientations a position can have, and positions over orientations."""

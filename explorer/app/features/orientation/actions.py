@@ -1,0 +1,51 @@
+"""Actions on the orientation in azimuth, tilt and torsion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from explorer.app.state.action import Action
+from explorer.app.state.actions import moved
+from explorer.app.state.state import State
+from explorer.mechanism.tilt_torsion import pose_of_tilt_torsion, tilt_torsion_of
+from explorer.numerics.number_text import format_number
+
+ANGLES = ("azimuth", "tilt", "torsion")
+FULL_TURN = 360.0
+
+
+@dataclass(frozen=True)
+class SetTiltTorsion(Action):
+    """Set azimuth, tilt or torsion, 0 to 2, in degrees."""
+
+    axis: int
+    value: float
+
+    def apply(self, state: State) -> State:
+        """Return the next state."""
+        angles = list(tilt_torsion_of(state.pose.rotation))
+        angles[self.axis] = self.value
+        return moved(state, pose_of_tilt_torsion(state.pose.position, angles))
+
+    def words(self) -> str:
+        """Return what the action does."""
+        return f"{ANGLES[self.axis]} = {format_number(self.value, 6, size=FULL_TURN)}°"
+
+
+@dataclass(frozen=True)
+class GoToTilt(Action):
+    """Tilt the platform in an azimuth at its present torsion; angles in degrees."""
+
+    azimuth: float
+    tilt: float
+
+    def apply(self, state: State) -> State:
+        """Return the next state."""
+        torsion = tilt_torsion_of(state.pose.rotation).torsion
+        angles = (self.azimuth, self.tilt, torsion)
+        return moved(state, pose_of_tilt_torsion(state.pose.position, angles))
+
+    def words(self) -> str:
+        """Return what the action does."""
+        tilt, azimuth = (format_number(angle, 4) for angle in (self.tilt, self.azimuth))
+        return f"Tilt {tilt}° towards {azimuth}°"

@@ -1,0 +1,63 @@
+"""What the worker computes for the tab, kept in step with the state."""
+
+from __future__ import annotations
+
+from explorer.app.features.feature import Services
+from explorer.app.features.orientation.tasks import (
+    RangeDrawing,
+    RangeRequest,
+    ShareDrawing,
+    ShareRequest,
+    TiltsDrawing,
+    TiltsRequest,
+    range_solids,
+    share_at,
+    tilts_at_nodes,
+)
+from explorer.app.session.feed import Feed
+from explorer.app.state.frame import Frame
+from explorer.mechanism.home import home_pose
+from explorer.mechanism.tilt_torsion import tilt_torsion_of
+
+# Digits of a torsion in degrees beyond which tilts are not computed again.
+DIGITS = 3
+
+
+class ShareFeed(Feed[ShareRequest, ShareDrawing]):
+    """Shares of all orientations at the present position."""
+
+    def __init__(self, services: Services) -> None:
+        super().__init__(
+            services.worker,
+            share_at,
+            lambda frame: ShareRequest(frame.state.design, frame.state.pose.position),
+            services.session.redraw,
+        )
+
+
+class TiltsFeed(Feed[TiltsRequest, TiltsDrawing]):
+    """Greatest tilts over the workspace, while they are shown."""
+
+    def __init__(self, services: Services) -> None:
+        super().__init__(services.worker, tilts_at_nodes, _tilts_of, services.session.redraw)
+
+
+def _tilts_of(frame: Frame) -> TiltsRequest | None:
+    if not frame.state.view.orientation.tilts:
+        return None
+    torsion = tilt_torsion_of(frame.state.pose.rotation).torsion
+    return TiltsRequest(frame.state.design, round(torsion, DIGITS))
+
+
+class RangeFeed(Feed[RangeRequest, RangeDrawing]):
+    """Workspaces over a range of tilts, while one is shown."""
+
+    def __init__(self, services: Services) -> None:
+        super().__init__(services.worker, range_solids, _range_of, services.session.redraw)
+
+
+def _range_of(frame: Frame) -> RangeRequest | None:
+    view, design = frame.state.view.orientation, frame.state.design
+    if view.over == "none":
+        return None
+    return RangeRequest(design, home_pose(design), view.range)

@@ -1,0 +1,140 @@
+"""The polar map of the tilts that a position can have, as SVG, with the limit that ends each."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator
+from html import escape
+
+import msgspec
+
+from explorer.app.widgets.colours import Rgb, css
+from explorer.app.widgets.markup import row, swatch, table
+from explorer.mechanism.tilt_torsion import TiltTorsion
+from explorer.workspace.tilts import TiltMap
+
+WIDTH, HEIGHT = 316.0, 268.0
+CENTRE, RADIUS = (158.0, 134.0), 112.0
+RING = 30.0
+# The map shows at least this tilt at its edge, in degrees.
+LEAST_EDGE = 60.0
+# Difference of torsions up to which home is drawn in the map, in degrees.
+SAME_TORSION = 0.05
+
+FREE: Rgb = (140, 150, 160)
+"""Colour where the platform tilts by 180° without a limit, and of limits without their own."""
+
+COLOURS: dict[str, Rgb] = {
+    "margin δ1": (213, 94, 0),
+    "margin δ2": (204, 121, 167),
+    "margin δ3": (230, 159, 0),
+    "carriage order": (0, 158, 115),
+    "gap": (90, 190, 150),
+    "l1": (0, 114, 178),
+    "d2": (86, 180, 233),
+    "d4": (64, 110, 220),
+    "l4": (120, 94, 200),
+    "guide": (110, 120, 60),
+    "swing": (150, 80, 60),
+}
+"""Colours of limits by the beginning of their names, apart for those with faulty colour vision."""
+
+
+def colour_of(limit: str | None) -> Rgb:
+    """Return the colour of a limit; None for no limit."""
+    if limit is None:
+        return FREE
+    return next((colour for name, colour in COLOURS.items() if limit.startswith(name)), FREE)
+
+
+def edge_of(tilts: TiltMap, here: TiltTorsion) -> float:
+    """Return the tilt at the edge of the map, in degrees."""
+    largest = max([LEAST_EDGE, here.tilt, *(t for t in tilts.tilts.tolist() if math.isfinite(t))])
+    return min(180.0, RING * math.ceil(largest / RING - 1e-9))
+
+
+def polar_map(tilts: TiltMap, here: TiltTorsion, home: TiltTorsion) -> str:
+    """Return the map as SVG: azimuth as the direction, tilt as the distance from the centre.
+
+    Args:
+        tilts: Greatest tilts in azimuths at equal distances.
+        here: The present orientation.
+        home: The orientation of home.
+    """
+    edge = edge_of(tilts, here)
+    facts = {"centre": CENTRE, "radius": RADIUS, "edge": edge}
+    pieces = [*_rings(edge), *_region(tilts, edge)]
+    if abs((home.torsion - here.torsion + 180.0) % 360.0 - 180.0) <= SAME_TORSION:
+        x, y = _place(home.azimuth, home.tilt, edge)
+        pieces.append(f'<circle class="home" cx="{x:.1f}" cy="{y:.1f}" r="5"/>')
+    x, y = _place(here.azimuth, here.tilt, edge)
+    arms = f"M{x - 6:.1f} {y:.1f}h12M{x:.1f} {y - 6:.1f}v12"
+    pieces.append(f'<path class="cross casing" d="{arms}"/><path class="cross" d="{arms}"/>')
+    return (
+        f'<svg class="ex-map ex-tilts" viewBox="0 0 {WIDTH:g} {HEIGHT:g}" role="img" '
+        'aria-label="Greatest tilt by azimuth" '
+        f'data-tilts="{escape(msgspec.json.encode(facts).decode())}">{"".join(pieces)}</svg>'
+        f'<div class="ex-reading ex-dim">{HINT}</div>'
+    )
+
+
+HINT = "Point at the map to read it, click to tilt there."
+
+
+def legend(tilts: TiltMap) -> str:
+    """Return the limits that end the tilts, with the number of azimuths of each, as HTML."""
+    counts = Counter(tilts.limits)
+    rows = [
+        row(
+            f"{swatch(colour_of(limit))} {escape(limit or 'no limit')}",
+            f"{100.0 * count / len(tilts.limits):.0f} %",
+        )
+        for limit, count in counts.most_common()
+    ]
+    return table(rows)
+
+
+def _place(azimuth: float, tilt: float, edge: float) -> tuple[float, float]:
+    angle, distance = math.radians(azimuth), RADIUS * tilt / edge
+    return CENTRE[0] + distance * math.cos(angle), CENTRE[1] - distance * math.sin(angle)
+
+
+def _rings(edge: float) -> Iterator[str]:
+    """Yield the circles of tilts, the axes x and y, and their labels."""
+    x, y = CENTRE
+    count = round(edge / RING)
+    for ring in range(1, count + 1):
+        radius = RADIUS * ring / count
+        look = "frame" if ring == count else "ring"
+        yield f'<circle class="{look}" cx="{x}" cy="{y}" r="{radius:.1f}"/>'
+    yield f'<path class="ring" d="M{x - RADIUS} {y}h{2 * RADIUS}M{x} {y - RADIUS}v{2 * RADIUS}"/>'
+    for ring in range(1, count + 1):
+        at = RADIUS * ring / count * math.sqrt(0.5)
+        yield (
+            f'<text class="angle" x="{x + at + 2:.1f}" y="{y + at + 10:.1f}">'
+            f"{RING * ring:.0f}°</text>"
+        )
+    for words, dx, dy, anchor in (
+        ("x", RADIUS + 8, 4, "start"),
+        ("−x", -RADIUS - 8, 4, "end"),
+        ("y", 0, -RADIUS - 7, "middle"),
+        ("−y", 0, RADIUS + 15, "middle"),
+    ):
+        yield f'<text class="axis" x="{x + dx}" y="{y + dy}" text-anchor="{anchor}">{words}</text>'
+
+
+def _region(tilts: TiltMap, edge: float) -> Iterator[str]:
+    """Yield the tilts that are possible, and their border in the colours of the limits."""
+    values = [t if math.isfinite(t) else 0.0 for t in tilts.tilts.tolist()]
+    points = [_place(a, t, edge) for a, t in zip(tilts.azimuths.tolist(), values, strict=True)]
+    outline = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
+    yield f'<polygon class="possible" points="{outline}"/>'
+    for index, limit in enumerate(tilts.limits):
+        x, y = points[index]
+        before, after = (
+            f"{0.5 * (x + u):.1f} {0.5 * (y + v):.1f}"
+            for u, v in (points[index - 1], points[(index + 1) % len(points)])
+        )
+        path = f"M{before}L{x:.1f} {y:.1f}L{after}"
+        yield f'<path class="border" stroke="{css(colour_of(limit))}" d="{path}"/>'

@@ -1,0 +1,60 @@
+"""Tilts in a real page: the map to click on, angles to type, positions to colour."""
+
+from __future__ import annotations
+
+import pytest
+from playwright.sync_api import expect
+from tab import Tab
+
+from explorer.app.features.orientation.feeds import RangeFeed, TiltsFeed
+from explorer.app.features.orientation.polar_map import RADIUS, WIDTH, edge_of
+from explorer.mechanism.tilt_torsion import TiltTorsion, tilt_torsion_of
+from explorer.workspace.tilts import tilt_map
+
+
+def angles(tab: Tab) -> TiltTorsion:
+    return tilt_torsion_of(tab.state.pose.rotation)
+
+
+def test_a_click_on_the_map_tilts_there(tab: Tab) -> None:
+    tab.turn_to("Tilt")
+    chart = tab.page.locator(".ex-tilts")
+    chart.scroll_into_view_if_needed()
+    box = chart.bounding_box()
+    assert box is not None
+    scale = box["width"] / WIDTH
+    torsion = angles(tab).torsion
+    edge = edge_of(tilt_map(tab.state.design, tab.state.pose.position, torsion), angles(tab))
+    x, y = box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"]
+    off = 20.0 / edge * RADIUS * scale
+    tab.page.mouse.move(x, y - off)
+    expect(tab.page.get_by_text("azimuth 90.0°, tilt", exact=False)).to_be_visible()
+    tab.page.mouse.click(x, y - off)
+    tab.wait_for(lambda: angles(tab).tilt > 1.0, "a tilt")
+    assert angles(tab).azimuth == pytest.approx(90.0, abs=2.0)
+    assert angles(tab).tilt == pytest.approx(20.0, abs=1.0)
+    assert angles(tab).torsion == pytest.approx(torsion, abs=1e-9)
+    expect(chart.locator(".home")).to_have_count(1)
+
+
+def test_typed_angles_move_the_platform(tab: Tab) -> None:
+    tab.turn_to("Tilt")
+    tab.type("Tilt (°)", "12\n")
+    tab.wait_for(lambda: abs(angles(tab).tilt - 12.0) < 1e-9, "a tilt of 12°")
+    tab.type("Torsion (°)", "-60\n")
+    tab.wait_for(lambda: abs(angles(tab).torsion + 60.0) < 1e-9, "a torsion of −60°")
+    # The map of another torsion does not show home.
+    expect(tab.page.locator(".ex-tilts .home")).to_have_count(0)
+
+
+def test_positions_are_coloured_and_ranges_have_volumes(tab: Tab) -> None:
+    tab.turn_to("Tilt")
+    services = tab.running.page.services
+    tab.switch("Greatest tilts", on=True)
+    tab.wait_for(lambda: services.get(TiltsFeed).drawing is not None, "tilts at nodes")
+    expect(tab.page.get_by_text("nodes, 0.", exact=False)).to_be_visible()
+    tab.choose("Positions with", "all of the tilts")
+    tab.wait_for(lambda: services.get(RangeFeed).drawing is not None, "the volumes")
+    expect(tab.page.get_by_text("dexterous", exact=True)).to_be_visible()
+    tab.switch("Greatest tilts", on=False)
+    tab.wait_for(lambda: services.get(TiltsFeed).drawing is None, "no tilts")
