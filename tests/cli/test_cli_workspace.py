@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,6 +12,8 @@ import pytest
 from command_line import CommandLine
 
 import explorer
+from explorer import PRESETS
+from explorer.mechanism.design_file import encode_design
 from explorer.workspace.accessible.radii import with_radius
 from explorer.workspace.orientations import (
     cone_of_directions,
@@ -245,3 +248,18 @@ def test_workspace_interference_unusable_input_is_refused(
     cli: CommandLine, words: tuple[str, ...], reason: str
 ) -> None:
     assert reason in cli.refusal(*words)
+
+
+def test_workspace_with_a_load_has_the_volume_that_holds_it(
+    cli: CommandLine, tmp_path: Path
+) -> None:
+    limited = {"push_n": [60.0, 50.0, 40.0, 50.0, 45.0, 70.0]}
+    design = json.loads(encode_design(PRESETS["paper-optimal"]))
+    path = tmp_path / "limited.json"
+    path.write_text(json.dumps({**design, "schema": 2, "actuators": limited}), encoding="utf-8")
+    found = cli.answer("--design", path, "--load", 0, 0, -20)
+    assert 0.0 < found["held_volume"] < found["volume"]
+    assert found["held_mesh"]["watertight"]
+    assert "that holds the load" in cli.text("--design", path, "--load", 0, 0, -20)
+    refusal = cli.refusal("--design", "paper-optimal", "--load", 0, 0, -20)
+    assert "so that it holds any load" in refusal

@@ -13,23 +13,30 @@ from limited_designs import limited
 
 from explorer import (
     PRESETS,
+    Actuators,
     Design,
     DesignError,
     InputError,
     Iterate,
     Outcome,
+    Payload,
     Problem,
+    Struts,
     Variable,
     home_pose,
     leg_clearances,
     make_problem,
     margins,
     optimise_design,
+    tilt_map,
     workspace_volume,
 )
 from explorer.measures.case import Case
+from explorer.measures.size import corners_of, longest_leg
+from explorer.measures.statics import BoxStatics
+from explorer.mechanism.pose import yaw_pitch_roll_from_rotation
 from explorer.optimise.findings import paper_problem, paper_start, reach_problem
-from explorer.optimise.problem import DISTANCES, ObjectiveName, distance_of
+from explorer.optimise.problem import AZIMUTHS, DISTANCES, ObjectiveName, distance_of
 from explorer.optimise.record import (
     Settings,
     decode_record,
@@ -575,3 +582,101 @@ def test_problem_without_demands_is_solved_within_its_bounds() -> None:
         for b2 in np.linspace(1.0, 4.0, 13).tolist()
     ]
     assert outcome.best.volume >= max(grid) - 1e-6
+
+
+ROTATION = home_pose(PRESETS["paper-optimal"]).rotation
+
+
+def bearing(**demands: Any) -> Problem:
+    """Return the search for a design that bends its struts less, from the paper's optimum."""
+    design = msgspec.structs.replace(
+        PRESETS["paper-optimal"], payload=Payload(force_n=10.0), struts=Struts(moment_nm=1.0)
+    )
+    given: dict[str, Any] = {"volume": 8000.0, "reach": design.reach, **demands}
+    return make_problem(
+        design, "smallest-load", required_box=((6.0, 1.0, 1.0), (14.0, 9.0, 11.0)), **given
+    )
+
+
+def test_struts_of_the_design_found_bend_by_less_than_a_fifth() -> None:
+    problem = bearing()
+    outcome = optimise_design(problem)
+    assert outcome.converged
+    before, after = (
+        BoxStatics(design, problem.required_box_at(problem.start_values), ROTATION)
+        for design in (problem.start, outcome.design)
+    )
+    assert after.largest_bending < 0.2 * before.largest_bending
+    assert outcome.best.objective == pytest.approx(after.largest_bending, rel=1e-9)
+    assert workspace_volume(outcome.design).volume >= 8000.0 * (1.0 - 1e-6)
+    assert longest_leg(outcome.design) <= problem.start.reach * (1.0 + 1e-6)
+
+
+def test_demand_of_a_load_is_kept_by_the_design_found() -> None:
+    start = bearing().start
+    limited = msgspec.structs.replace(start, struts=Struts(moment_nm=8.0))
+    problem = make_problem(
+        limited,
+        "largest-volume",
+        required_box=((6.0, 1.0, 1.0), (14.0, 9.0, 11.0)),
+        held=True,
+    )
+    outcome = optimise_design(problem)
+    assert outcome.converged
+    box = problem.required_box_at(outcome.best.values)
+    assert BoxStatics(outcome.design, box, ROTATION).largest_share <= 1.0 + 1e-6
+
+
+def test_demand_of_an_error_is_kept_by_the_design_found() -> None:
+    actuators = Actuators(error_mm=(0.1, 0.1, 0.1, 0.1, 0.1, 0.1))
+    start = msgspec.structs.replace(PRESETS["paper-optimal"], actuators=actuators)
+    box = ((8.0, 3.0, 7.0), (12.0, 7.0, 11.0))
+    problem = make_problem(start, "smallest-error", volume=7053.0, reach=20.5, required_box=box)
+    outcome = optimise_design(problem)
+    assert outcome.converged
+    before, after = (
+        BoxStatics(design, box, ROTATION).worst_error for design in (start, outcome.design)
+    )
+    assert outcome.best.objective == pytest.approx(after, rel=1e-9)
+    assert after < before
+    least = make_problem(
+        start, "smallest-reach", volume=7053.0, required_box=box, error=0.5 * (before + after)
+    )
+    found = optimise_design(least)
+    assert found.converged
+    assert BoxStatics(found.design, box, ROTATION).worst_error <= 0.5 * (before + after) + 1e-9
+
+
+def test_demand_of_a_tilt_is_kept_in_its_azimuths() -> None:
+    box = ((8.0, 3.0, 7.0), (12.0, 7.0, 11.0))
+    start = PRESETS["paper-optimal"]
+    problem = make_problem(
+        start, "smallest-reach", volume=7053.0, required_box=box, tilt=25.0, free=["yaw"]
+    )
+    outcome = optimise_design(problem)
+    assert outcome.converged
+    found = outcome.design
+    yaw = float(yaw_pitch_roll_from_rotation(home_pose(found).rotation)[0])
+    azimuths = yaw + np.linspace(0.0, 360.0, AZIMUTHS, endpoint=False)
+    for corner in corners_of(box):
+        assert tilt_map(found, corner, yaw, azimuths).tilts.min() >= 25.0 - 1e-3
+    assert longest_leg(found) < longest_leg(start)
+
+
+@pytest.mark.parametrize(
+    ("change", "demands", "words"),
+    [
+        ({"payload": Payload()}, {"held": True}, "the design has no load"),
+        ({"struts": Struts()}, {"held": True}, "limits neither its actuators nor its struts"),
+        ({}, {"error": 0.1}, "the actuators of the design have no errors"),
+        ({}, {"tilt": 95.0}, "the tilt demanded must be below 90°; got 95°"),
+        ({}, {"held": True, "required_box": None}, "over a required box, and none is given"),
+    ],
+)
+def test_demands_without_what_they_need_are_refused(
+    change: dict[str, Any], demands: dict[str, Any], words: str
+) -> None:
+    design = msgspec.structs.replace(bearing().start, **change)
+    given: dict[str, Any] = {"required_box": ((6.0, 1.0, 1.0), (14.0, 9.0, 11.0)), **demands}
+    with pytest.raises(InputError, match=words):
+        make_problem(design, "match-volume", volume=8000.0, **given)

@@ -1,0 +1,67 @@
+"""Kernels of tilts, shares, forces and regions give the same interpreted and compiled."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import msgspec
+import numpy as np
+import pytest
+
+from explorer import PRESETS, Actuators, Payload, Struts
+from explorer.mechanism.home import home_pose
+from explorer.numerics.arrays import FloatArray
+from explorer.numerics.compiled import all_kernels, warm
+from explorer.statics.held import held_load, held_values, settle_on_limit
+from explorer.statics.slopes import twist_slopes
+from explorer.workspace.orientation_share import orientation_share
+from explorer.workspace.tilts import greatest_tilts, tilt_map, torsion_range
+
+OPTIMAL = PRESETS["paper-optimal"]
+ROTATION = home_pose(OPTIMAL).rotation
+POSITION = (10.0, 5.0, 9.0)
+LOADED = msgspec.structs.replace(
+    OPTIMAL,
+    payload=Payload(2.0, (1.0, 2.0, 3.0), 4.0),
+    actuators=Actuators(push_n=(60.0, 50.0, 40.0, 50.0, 45.0, 70.0)),
+    struts=Struts(moment_nm=3.0),
+)
+
+
+def positions() -> FloatArray:
+    return np.random.default_rng(3).uniform((4.0, 1.0, 4.0), (16.0, 9.0, 14.0), (12, 3))
+
+
+def tilts() -> FloatArray:
+    found = tilt_map(OPTIMAL, POSITION, azimuths=9)
+    torsions = torsion_range(OPTIMAL, POSITION, azimuth=20.0, tilt=10.0)
+    return np.array([*found.tilts, torsions.low, torsions.high])
+
+
+def regions() -> FloatArray:
+    held = held_load(LOADED, ROTATION, np.zeros(6))
+    at = positions()
+    values, parts = held_values(held, ROTATION, at)
+    beside = np.where(values[:, None] > 0.0, at, np.array(POSITION))
+    settled = settle_on_limit(held, ROTATION, at, beside, np.full(3, 2.0))
+    return np.concatenate([values, parts.astype(np.float64), settled.ravel()])
+
+
+CASES: dict[str, Callable[[], FloatArray]] = {
+    "tilts": tilts,
+    "greatest tilts": lambda: greatest_tilts(OPTIMAL, positions()[:2], azimuths=5),
+    "share": lambda: np.array([orientation_share(OPTIMAL, POSITION, 200).share]),
+    "regions": regions,
+    "slopes": lambda: twist_slopes(LOADED, positions(), ROTATION).by,
+}
+
+
+@pytest.mark.parametrize("name", list(CASES))
+def test_interpreted_and_compiled_kernels_agree(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    warm()
+    compiled = CASES[name]()
+    monkeypatch.setattr("explorer.numerics.compiled.MANY_ROWS", 10**9)
+    for kernel in all_kernels():
+        monkeypatch.setattr(kernel, "_compiled", None)
+    np.testing.assert_allclose(CASES[name](), compiled, rtol=1e-9, atol=1e-9)
+    assert not any(kernel.ready for kernel in all_kernels())
