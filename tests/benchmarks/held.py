@@ -52,13 +52,12 @@ def _marching_cubes(true: float) -> tuple[int, float, float]:
     rotation = home_pose(LOADED).rotation
     limits = constraints(LOADED, rotation)
     held = held_load(LOADED, rotation, np.zeros(6))
-    lows, highs = (np.array(end) for end in LOADED.limits.box or ((0.0,) * 3, (0.0,) * 3))
+    box = LOADED.limits.box or ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     count, taken, error = 10, 0.0, 1.0
     while error > ERROR:
         count += 10
         began = time.perf_counter()
-        ends = zip((lows - 0.5).tolist(), (highs + 0.5).tolist(), strict=True)
-        axes = [np.linspace(low, high, count) for low, high in ends]
+        axes = [np.linspace(low - 0.5, high + 0.5, count) for low, high in zip(*box, strict=True)]
         nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
         values = slacks(limits, nodes).min(axis=-1)
         values = np.minimum(values, held_values(held, rotation, nodes)[0])
