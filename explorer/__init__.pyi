@@ -136,21 +136,12 @@ from .workspace.least_clearance import (
 )
 from .workspace.limits.valid_moves import moves_are_valid as moves_are_valid
 from .workspace.limits.valid_poses import poses_are_valid as poses_are_valid
-from .workspace.orientation_share import (
+from .workspace.orientations.share import (
     OrientationShare as OrientationShare,
+    orientation_capability as orientation_capability,
     orientation_share as orientation_share,
 )
-from .workspace.orientations import orientation_capability as orientation_capability
-from .workspace.slices.fields import slice_field as slice_field
-from .workspace.slices.volume import (
-    NodeCount as NodeCount,
-    Volume as Volume,
-    workspace_nodes as workspace_nodes,
-    workspace_volume as workspace_volume,
-)
-from .workspace.solids.solid import Solid as Solid
-from .workspace.solids.solids import convex_hull as convex_hull, workspace_solid as workspace_solid
-from .workspace.tilts import (
+from .workspace.orientations.tilts import (
     GreatestTilt as GreatestTilt,
     TiltMap as TiltMap,
     TorsionRange as TorsionRange,
@@ -160,6 +151,15 @@ from .workspace.tilts import (
     tilt_map as tilt_map,
     torsion_range as torsion_range,
 )
+from .workspace.slices.fields import slice_field as slice_field
+from .workspace.slices.volume import (
+    NodeCount as NodeCount,
+    Volume as Volume,
+    workspace_nodes as workspace_nodes,
+    workspace_volume as workspace_volume,
+)
+from .workspace.solids.solid import Solid as Solid
+from .workspace.solids.solids import convex_hull as convex_hull, workspace_solid as workspace_solid
 
 __all__: list[str]
 __version__: str

@@ -22,7 +22,7 @@ from explorer.measures.size import box_margin, box_tilt, home_tilt, longest_leg
 from explorer.mechanism.design import LENGTHS, VARIABLES
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import yaw_pitch_roll_from_rotation
-from explorer.workspace.orientation_share import orientation_share
+from explorer.workspace.orientations.share import orientation_share
 
 COMPARE: frozenset[Place] = frozenset({"compare"})
 OPTIMISE: frozenset[Place] = frozenset({"optimise"})

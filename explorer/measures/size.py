@@ -9,7 +9,7 @@ from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose, Triple
 from explorer.mechanism.tilt_torsion import tilt_torsion_of
 from explorer.numerics.arrays import FloatArray
-from explorer.workspace.tilts import greatest_tilts
+from explorer.workspace.orientations.tilts import greatest_tilts
 
 BOX_NODES = 9
 """Number of nodes on each axis of the grid over a required box, its faces included."""

@@ -34,10 +34,10 @@ from explorer.errors import InputError
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.tilt_torsion import TiltTorsion, tilt_torsion_of
-from explorer.workspace.orientation_share import orientation_share
-from explorer.workspace.orientations import cone_of_directions
+from explorer.workspace.orientations.sets import cone_of_directions
+from explorer.workspace.orientations.share import orientation_share
+from explorer.workspace.orientations.tilts import TiltMap, greatest_tilt, tilt_map
 from explorer.workspace.solids.solids import dexterous_solid, reachable_solid
-from explorer.workspace.tilts import TiltMap, greatest_tilt, tilt_map
 
 pytestmark = pytest.mark.usefixtures("warm_kernels")
 

@@ -31,7 +31,6 @@ BENCHMARKS: Mapping[str, str] = {
     "prototype": "parts of the prototype, their places, their files, STEP, the simulation",
     "prototype_page": "from a design slider to the new parts, and their moves with a pose",
     "report": "the report of a design as HTML and as PDF, from the command to the file",
-    "capability": "share of all orientations that a position allows",
     "orientation": "shares of orientations, greatest tilts at a position and over many",
     "drag_sockets": "lag of two long drags at once, seen by bare websocket clients",
     "tabs": "twenty tabs at once, each dragging a control",

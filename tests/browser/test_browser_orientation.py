@@ -9,7 +9,7 @@ from tab import Tab
 from explorer.app.features.orientation.feeds import RangeFeed, TiltsFeed
 from explorer.app.features.orientation.polar_map import RADIUS, WIDTH, edge_of
 from explorer.mechanism.tilt_torsion import TiltTorsion, tilt_torsion_of
-from explorer.workspace.tilts import tilt_map
+from explorer.workspace.orientations.tilts import tilt_map
 
 
 def angles(tab: Tab) -> TiltTorsion:

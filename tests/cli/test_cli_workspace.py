@@ -15,11 +15,8 @@ import explorer
 from explorer import PRESETS
 from explorer.mechanism.design_file import encode_design
 from explorer.workspace.accessible.radii import with_radius
-from explorer.workspace.orientations import (
-    cone_of_directions,
-    orientation_capability,
-    yaw_pitch_roll_range,
-)
+from explorer.workspace.orientations.sets import cone_of_directions, yaw_pitch_roll_range
+from explorer.workspace.orientations.share import orientation_capability
 from explorer.workspace.slices.volume import workspace_nodes, workspace_volume
 from explorer.workspace.solids.solid import Solid
 from explorer.workspace.solids.solids import (

@@ -26,7 +26,7 @@ from explorer.reproduce.claim import VERDICTS, Result
 from explorer.reproduce.claims import CLAIMS, measure_claims
 from explorer.reproduce.six_legs import SixLegs, octahedral, six_four_twin
 from explorer.singularity.uncoupled import UNCOUPLED
-from explorer.workspace.orientation_share import orientation_share
+from explorer.workspace.orientations.share import orientation_share
 
 OPTIMAL = PRESETS["paper-optimal"]
 NUMBER = re.compile(r"[-−+]?\d[\d.,]*(?:e[-+]?\d+)?")

@@ -1,7 +1,6 @@
 """The order of the carriages is that of the home pose, for every part of the explorer.
 
-Shares of orientations are compared with those of an independent count over 400,000 random
-orientations, and the answers of all parts for single poses with each other.
+The answers of all parts for single poses are compared with each other.
 """
 
 from __future__ import annotations
@@ -12,7 +11,6 @@ import msgspec
 import numpy as np
 import pytest
 from limited_designs import limited, ordinary_case
-from reference import read_reference
 from scipy.spatial.transform import Rotation
 
 from explorer import (
@@ -26,51 +24,21 @@ from explorer import (
     evaluate,
     home_pose,
     inverse,
-    margins,
-    orientation_capability,
+    orientation_share,
     poses_are_valid,
     workspace_nodes,
     workspace_volume,
 )
 from explorer.mechanism.design import LENGTHS
 from explorer.workspace.limits.constraints import CARRIAGE_ORDER, Never, constraints, demanded_order
-from explorer.workspace.orientations import orientations_within, uniform_rotations
+from explorer.workspace.orientations.share import orientations_within
 from explorer.workspace.solids.solids import dexterous_solid, reachable_solid, workspace_solid
 
 pytestmark = pytest.mark.usefixtures("warm_kernels")
 
 OPTIMAL = PRESETS["paper-optimal"]
-CASES: list[dict[str, Any]] = read_reference("orientation")["cases"]
 # Half a turn of the platform about the base's z-axis reverses the order of the carriages.
 MIRRORED = np.diag([-1.0, -1.0, 1.0]) @ home_pose(OPTIMAL).rotation
-
-
-def case_design(case: dict[str, Any]) -> Design:
-    """Return the design of a case, with a home of the signs and the order that it demands."""
-    lengths: dict[str, Any] = {
-        name: (low, high)
-        for name, low, high in zip(LENGTHS, case["least"], case["most"], strict=True)
-    }
-    x = case["design"]
-    free = Design(a3=tuple(x["a3"]), b1=tuple(x["b1"]), b2=x["b2"], b3=x["b3"])
-    rotations = uniform_rotations(1000)
-    signs = np.sign(margins(case["position"], rotations)) == case["signs"]
-    order = np.sign((free.b3 - free.b2) * rotations[:, 0, 0]) == case["order"]
-    home = Pose.of(case["position"], rotations[signs.all(axis=1) & order][0])
-    return msgspec.structs.replace(free, limits=Limits(**lengths), home=home)
-
-
-@pytest.mark.parametrize("index", range(len(CASES)))
-def test_orientation_shares_are_those_of_an_independent_count(index: int) -> None:
-    case = CASES[index]
-    design, position = case_design(case), case["position"]
-    for name, limits in (
-        ("share_with_signs_and_order", {}),
-        ("share_with_signs", {"carriage_order": "any"}),
-        ("share_of_lengths", {"carriage_order": "any", "margin": None}),
-    ):
-        share = orientation_capability(limited(design, **limits), position)
-        assert share == pytest.approx(case[name], abs=0.004), name
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -182,9 +150,7 @@ def test_design_file_without_the_order_demands_that_of_home() -> None:
 
 def test_orientation_share_with_the_order_at_the_paper_s_home_is_half() -> None:
     home = home_pose(OPTIMAL)
-    kept = orientations_within(OPTIMAL, home.position, uniform_rotations(20_000)).mean()
-    plain = orientations_within(
-        limited(OPTIMAL, carriage_order="any"), home.position, uniform_rotations(20_000)
-    ).mean()
-    assert plain == pytest.approx(0.25, abs=0.005)
-    assert kept == pytest.approx(0.125, abs=0.005)
+    kept = orientation_share(OPTIMAL, home.position)
+    plain = orientation_share(limited(OPTIMAL, carriage_order="any"), home.position)
+    assert plain.share == pytest.approx(0.25, abs=0.005)
+    assert kept.share == pytest.approx(0.125, abs=0.005)

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 from limited_designs import limited, ordinary_case
-from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from explorer import PRESETS, InputError, Pose, evaluate, home_pose
@@ -17,13 +16,8 @@ from explorer.mechanism.pose import checked_rotation, yaw_pitch_roll_from_rotati
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import warm
 from explorer.workspace.limits.valid_poses import valid_rows
-from explorer.workspace.orientations import (
-    cone_of_directions,
-    orientation_capability,
-    orientations_within,
-    uniform_rotations,
-    yaw_pitch_roll_range,
-)
+from explorer.workspace.orientations.sets import cone_of_directions, yaw_pitch_roll_range
+from explorer.workspace.orientations.share import orientation_capability, orientations_within
 
 OPTIMAL = PRESETS["paper-optimal"]
 HOME = home_pose(OPTIMAL)
@@ -34,45 +28,6 @@ EVERY_LIMIT: dict[str, Any] = {
     "l4": (4.0, 19.0),
     "swing": Swing(a1=70.0, a3=50.0, b1=80.0, b2=100.0, b3=95.0, b4=60.0),
 }
-
-
-@pytest.mark.parametrize("count", [1, 2, 50, 3000])
-def test_uniform_rotations_are_rotations_and_always_the_same(count: int) -> None:
-    found = uniform_rotations(count)
-    assert found.shape == (count, 3, 3)
-    np.testing.assert_array_equal(checked_rotation(found), uniform_rotations(count))
-
-
-def test_uniform_rotations_have_no_preferred_direction() -> None:
-    r = uniform_rotations(20_000)
-    # Of all rotations the mean is zero, and of entries' products only equal ones are left.
-    np.testing.assert_allclose(r.mean(axis=0), 0.0, atol=1e-3)
-    products = np.einsum("nij,nkl->ijkl", r, r) / len(r)
-    expected = np.einsum("ik,jl->ijkl", np.eye(3), np.eye(3)) / 3.0
-    np.testing.assert_allclose(products, expected, atol=2e-3)
-
-
-def test_uniform_rotations_have_the_distribution_of_angles_of_so3() -> None:
-    """The share of rotations by at most an angle is (angle - sin angle) / π."""
-    r = uniform_rotations(20_000)
-    angles = np.sort(Rotation.from_matrix(r).magnitude())
-    expected = (angles - np.sin(angles)) / math.pi
-    share = (np.arange(len(r)) + 0.5) / len(r)
-    # Random ones would be off by about 0.006.
-    assert float(np.abs(share - expected).max()) < 2e-3
-
-
-def test_uniform_rotations_leave_no_gaps_and_no_clusters() -> None:
-    count = 4000
-    quaternions = Rotation.from_matrix(uniform_rotations(count)).as_quat()
-    tree: Any = cKDTree(np.concatenate([quaternions, -quaternions]))
-    nearest: FloatArray = tree.query(quaternions, k=2)[0][:, 1]
-    probes = Rotation.random(20_000, random_state=np.random.default_rng(0)).as_quat()
-    farthest = float(tree.query(probes)[0].max())
-    # Side of a cube of the volume that each point of the half sphere in 4D has.
-    spacing = (math.pi**2 / count) ** (1.0 / 3.0)
-    assert float(nearest.min()) > 0.5 * spacing
-    assert farthest < 1.2 * spacing
 
 
 def test_yaw_pitch_roll_range_is_a_grid_with_its_ends() -> None:
@@ -192,7 +147,7 @@ def test_orientations_within_interpreted_and_compiled_agree(
     def interpreted(_: int, *arguments: Any) -> None:
         untyped.__wrapped__(*arguments)
 
-    monkeypatch.setattr("explorer.workspace.orientations.valid_rows", interpreted)
+    monkeypatch.setattr("explorer.workspace.orientations.share.valid_rows", interpreted)
     np.testing.assert_array_equal(orientations_within(design, position, rotations), compiled)
     assert 0 < compiled.sum() < len(rotations)
 
@@ -207,8 +162,6 @@ def test_orientations_with_reversed_ranges_or_unusable_counts_are_refused() -> N
         with pytest.raises(InputError, match="half-angle"):
             cone_of_directions(HOME.rotation, half_angle, 5)
     for count in (0, -1, 10**9):
-        with pytest.raises(InputError, match="number of orientations"):
-            uniform_rotations(count)
         with pytest.raises(InputError, match="number of orientations"):
             orientation_capability(OPTIMAL, HOME.position, count)
     with pytest.raises(InputError, match="shape"):

@@ -15,8 +15,8 @@ from explorer.mechanism.design import Swing
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.workspace.limits.constraints import CARRIAGE_ORDER
-from explorer.workspace.orientations import orientations_within
-from explorer.workspace.tilts import (
+from explorer.workspace.orientations.share import orientations_within
+from explorer.workspace.orientations.tilts import (
     greatest_tilt,
     greatest_tilts,
     is_connected,

@@ -41,7 +41,7 @@ from explorer.numerics.arrays import FloatArray
 from explorer.optimise.problem import SHIFTS, Box
 from explorer.workspace.limits.constraints import constraints, slacks
 from explorer.workspace.limits.joint_cones import angle_between, legs
-from explorer.workspace.orientations import orientations_within
+from explorer.workspace.orientations.share import orientations_within
 
 pytestmark = pytest.mark.usefixtures("warm_kernels")
 

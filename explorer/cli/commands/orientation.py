@@ -15,8 +15,8 @@ from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import Triple
 
 if TYPE_CHECKING:
-    from explorer.workspace.orientation_share import OrientationShare
-    from explorer.workspace.tilts import GreatestTilt, TiltMap, TorsionRange
+    from explorer.workspace.orientations.share import OrientationShare
+    from explorer.workspace.orientations.tilts import GreatestTilt, TiltMap, TorsionRange
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,8 +44,13 @@ class Orientation(JsonOptions, DesignOptions):
 
     def run(self) -> None:
         """Write the measures of the orientations."""
-        from explorer.workspace.orientation_share import orientation_share
-        from explorer.workspace.tilts import greatest_tilt, is_connected, tilt_map, torsion_range
+        from explorer.workspace.orientations.share import orientation_share
+        from explorer.workspace.orientations.tilts import (
+            greatest_tilt,
+            is_connected,
+            tilt_map,
+            torsion_range,
+        )
 
         design = self.read_design()
         home = home_pose(design)

@@ -168,7 +168,7 @@ class Workspace(JsonOptions, RadiiOptions, OrientationOptions, DesignOptions):
 
     def _orientations(self, pose: Pose) -> FloatArray | None:
         """Return the requested orientations, shape (n, 3, 3); None without any."""
-        from explorer.workspace.orientations import cone_of_directions, yaw_pitch_roll_range
+        from explorer.workspace.orientations.sets import cone_of_directions, yaw_pitch_roll_range
 
         ranges = (self.yaw_range, self.pitch_range, self.roll_range)
         if self.tilt is not None:
@@ -191,7 +191,10 @@ class Workspace(JsonOptions, RadiiOptions, OrientationOptions, DesignOptions):
     def _share(self, design: Design, orientations: FloatArray | None) -> float | None:
         if self.capability is None:
             return None
-        from explorer.workspace.orientations import CAPABILITY_ORIENTATIONS, orientation_capability
+        from explorer.workspace.orientations.share import (
+            CAPABILITY_ORIENTATIONS,
+            orientation_capability,
+        )
 
         count = self.samples or CAPABILITY_ORIENTATIONS
         chosen = count if orientations is None else orientations

@@ -28,8 +28,13 @@ from explorer.app.widgets.markup import alert, box, caption, dim, format_number,
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.tilt_torsion import TiltTorsion, tilt_torsion_of
 from explorer.numerics.number_text import format_decimals
+from explorer.workspace.orientations.tilts import (
+    GreatestTilt,
+    greatest_tilt,
+    tilt_map,
+    torsion_range,
+)
 from explorer.workspace.solids.solid import Solid
-from explorer.workspace.tilts import GreatestTilt, greatest_tilt, tilt_map, torsion_range
 
 OVER = {"nothing": "none", "some of the tilts": "reachable", "all of the tilts": "dexterous"}
 SPANS = (Span(-180.0, 180.0, 0.1), Span(0.0, 180.0, 0.1), Span(-180.0, 180.0, 0.1))

@@ -12,7 +12,7 @@ import msgspec
 from explorer.app.widgets.colours import Rgb, css
 from explorer.app.widgets.markup import row, swatch, table
 from explorer.mechanism.tilt_torsion import TiltTorsion
-from explorer.workspace.tilts import TiltMap
+from explorer.workspace.orientations.tilts import TiltMap
 
 WIDTH, HEIGHT = 316.0, 268.0
 CENTRE, RADIUS = (158.0, 134.0), 112.0

@@ -12,11 +12,11 @@ from explorer.mechanism.pose import Pose, Triple
 from explorer.mechanism.tilt_torsion import rotation_from_tilt_torsion
 from explorer.numerics.arrays import FloatArray
 from explorer.workspace.extremes import extent_of
-from explorer.workspace.orientation_share import OrientationShare, orientation_share
-from explorer.workspace.orientations import cone_of_directions
+from explorer.workspace.orientations.sets import cone_of_directions
+from explorer.workspace.orientations.share import OrientationShare, orientation_share
+from explorer.workspace.orientations.tilts import greatest_tilts
 from explorer.workspace.solids.solid import Solid
 from explorer.workspace.solids.solids import dexterous_solid, reachable_solid, workspace_solid
-from explorer.workspace.tilts import greatest_tilts
 
 NODES = 20
 """Number of nodes on each axis of the extent, at which tilts are computed."""

@@ -1,11 +1,11 @@
-"""The share of all orientations that a position can have, with its standard error.
+"""The share of orientations that a position can have: of all with its standard error, or of a set.
 
-The orientations are several sets of super-Fibonacci spirals (see
-`explorer.workspace.orientations`), each turned by a random rotation of its own. Every turned
-point is spread evenly over all rotations, so the mean of the sets is without bias, and the spread
-of the sets gives its standard error (randomised quasi-Monte Carlo; A. B. Owen, "Practical
-Quasi-Monte Carlo Integration", 2023, chapter 17). It is a few times smaller than that of as many
-independent orientations.
+Orientations that stand for all are several sets of super-Fibonacci spirals (M. Alexa,
+"Super-Fibonacci Spirals: Fast, Low-Discrepancy Sampling of SO(3)", CVPR 2022), each turned by a
+random rotation of its own. Every turned point is spread evenly over all rotations, so the mean of
+the sets is without bias, and the spread of the sets gives its standard error (randomised
+quasi-Monte Carlo; A. B. Owen, "Practical Quasi-Monte Carlo Integration", 2023, chapter 17). It is a
+few times smaller than that of as many independent orientations.
 """
 
 from __future__ import annotations
@@ -19,18 +19,19 @@ from scipy.spatial.transform import Rotation
 
 from explorer.errors import InputError
 from explorer.mechanism.design import Design
-from explorer.numerics.arrays import FloatArray, IntArray, finite_array, for_kernel
+from explorer.mechanism.pose import checked_rotation
+from explorer.numerics.arrays import BoolArray, FloatArray, IntArray, finite_array, for_kernel
 from explorer.numerics.compiled import kernel
-from explorer.workspace.limits.valid_poses import Rules, is_valid
-from explorer.workspace.orientations import (
-    CAPABILITY_ORIENTATIONS,
-    MOST_ORIENTATIONS,
-    PHI,
-    PSI,
-)
+from explorer.workspace.limits.valid_poses import Rules, is_valid, valid_rows
+from explorer.workspace.orientations.sets import MOST_ORIENTATIONS
+
+CAPABILITY_ORIENTATIONS = 100_000
+"""Number of orientations that gives the share at a position to about a thousandth."""
 
 # Largest number of sets of orientations.
 SETS = 20
+# Turns of the two spirals between neighbours: 1/√2, and 1/ψ with ψ⁴ = ψ + 4.
+PHI, PSI = math.sqrt(2.0), 1.533751168755204288118041
 
 
 @dataclass(frozen=True)
@@ -91,6 +92,51 @@ def orientation_share(
     # The sets differ in size by one orientation at the most.
     spread = float(np.sum(weights * (counts / sizes - share) ** 2))
     return OrientationShare(share, math.sqrt(spread / (sets - 1)), n)
+
+
+def orientation_capability(
+    design: Design, position: ArrayLike, orientations: ArrayLike | int = CAPABILITY_ORIENTATIONS
+) -> float:
+    """Return the share of orientations that a position can have within all limits, 0 to 1.
+
+    Args:
+        design: The manipulator.
+        position: Position of b4 in the base frame, in design units, shape (3,).
+        orientations: Rotations from platform to base, shape (n, 3, 3), or their number for
+            `orientation_share`, which gives the standard error too.
+
+    Raises:
+        InputError: not a position, not rotations, or no usable count.
+    """
+    array = np.asarray(orientations)
+    if array.ndim == 0:
+        return orientation_share(design, position, int(array)).share
+    return float(orientations_within(design, position, array).mean())
+
+
+def orientations_within(design: Design, position: ArrayLike, rotations: ArrayLike) -> BoolArray:
+    """Return which orientations a position can have within all limits, shape (n,).
+
+    The limits are those of `explorer.workspace.limits.broken.violations`: lengths, guide, gap,
+    carriage order, box, margins with the home's sign triple, and swing cones.
+
+    Args:
+        design: The manipulator.
+        position: Position of b4 in the base frame, in design units, shape (3,).
+        rotations: Rotations from platform to base, shape (n, 3, 3).
+
+    Raises:
+        InputError: not a position, or not rotations.
+    """
+    p, r = finite_array("position", position, (3,)), checked_rotation(rotations)
+    if p.ndim != 1:
+        raise InputError(f"give one position, three numbers; got the shape {p.shape}")
+    if r.ndim != 3 or not len(r):
+        raise InputError(f"rotations must have the shape (n, 3, 3); got {r.shape}")
+    within = np.empty(len(r), dtype=np.bool_)
+    rules = Rules.of(design).without_clearances()
+    valid_rows(len(r), rules.row, rules.cones, np.full((len(r), 3), p), for_kernel(r), within)
+    return within
 
 
 @kernel("void(f8[::1], f8[:,::1], f8[::1], f8[:,::1], i8[::1], i8[::1])")

@@ -2,7 +2,7 @@
 
 The angles are those of `explorer.mechanism.tilt_torsion`. At a torsion the platform tilts from
 tilt zero in each azimuth, b4 held in its place, until it meets the first limit. That tilt is exact
-but for rounding (`explorer.workspace.turns`). The limits are those of
+but for rounding (`explorer.workspace.orientations.turns`). The limits are those of
 `explorer.workspace.limits.broken.violations`; collisions of legs are not among them.
 """
 
@@ -21,13 +21,8 @@ from explorer.mechanism.pose import checked_rotation
 from explorer.mechanism.tilt_torsion import rotation_from_tilt_torsion, tilt_torsion_of
 from explorer.numerics.arrays import FloatArray, finite_array, for_kernel
 from explorer.workspace.limits.valid_poses import Rules
-from explorer.workspace.turns import (
-    NO_LIMIT,
-    least_tilt_rows,
-    limit_names,
-    tilt_rows,
-    turn_rows,
-)
+from explorer.workspace.orientations.least_tilts import least_tilt_rows
+from explorer.workspace.orientations.turns import NO_LIMIT, limit_names, tilt_rows, turn_rows
 
 AZIMUTHS = 72
 """Number of azimuths of a map of tilts, and of those between which the least tilt is searched."""

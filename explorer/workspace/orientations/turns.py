@@ -1,0 +1,318 @@
+"""The first limit that a turn of the platform about one axis meets, b4 held in its place.
+
+Each limit is a polynomial along the turn (`explorer.workspace.orientations.turn_polynomials`): of
+degree 2 for l1, the guide, the gap, the carriage order and the margins, of degree 4 for d2 and d4.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from explorer.mechanism.design import LENGTHS, Design
+from explorer.numerics.arrays import FloatArray, IntArray
+from explorer.numerics.compiled import helper, kernel
+from explorer.workspace.limits.constraints import CARRIAGE_ORDER, GAP as GAP_NAME
+from explorer.workspace.limits.joint_cones import joint_cones
+from explorer.workspace.limits.valid_poses import (
+    A3,
+    B1,
+    B2,
+    B3,
+    BOX_HIGHS,
+    BOX_LOWS,
+    GAP,
+    GUIDE_HIGH,
+    GUIDE_LOW,
+    LENGTH_HIGHS,
+    LENGTH_LOWS,
+    MARGIN,
+    ORDER,
+    SIGNS,
+)
+from explorer.workspace.orientations.turn_cones import end_in_cone
+from explorer.workspace.orientations.turn_polynomials import (
+    BINOMIALS_4,
+    LEG_ROW,
+    NOT_EVEN_THE_START,
+    POLYNOMIAL,
+    SCRATCH,
+    add_product,
+    angle_at,
+    nearer_end,
+    nearer_linear_end,
+    place_of,
+    write_tilt,
+)
+
+# Numbers of the limits in the order of `limit_names`; those of the cones follow.
+LENGTH_LIMITS, GUIDE_LIMITS, GAP_LIMIT, ORDER_LIMIT, BOX_LIMITS, MARGIN_LIMITS, CONE_LIMITS = (
+    0,
+    8,
+    12,
+    13,
+    14,
+    20,
+    23,
+)
+NO_LIMIT = -1
+# Angle over which a turn is searched.
+HALF_TURN = math.pi
+
+
+def limit_names(design: Design) -> tuple[str, ...]:
+    """Return the names of the limits by their numbers here, as in the constraints of a region."""
+    return (
+        *(f"{name} {end}" for name in LENGTHS for end in ("minimum", "maximum")),
+        *(f"{name} {end}" for name in ("d1", "d3") for end in ("minimum", "maximum")),
+        GAP_NAME,
+        CARRIAGE_ORDER,
+        *(f"box {axis} {end}" for axis in "xyz" for end in ("minimum", "maximum")),
+        *(f"margin δ{index}" for index in (1, 2, 3)),
+        *(f"swing {cone.joint}" for cone in joint_cones(design)),
+    )
+
+
+@helper
+def nearer_end_of_length(
+    row: FloatArray,
+    leg: int,
+    p: FloatArray,
+    turn: FloatArray,
+    bound: float,
+    sign: float,
+    end: float,
+    scratch: FloatArray,
+) -> float:
+    """Return what `nearer_end` does for a bound of a length, with sign 1 for a maximum."""
+    limit = bound * bound
+    if leg == 0:
+        x, y = row[B1], row[B1 + 1]
+        sum_of_squares = p[0] * p[0] + p[1] * p[1] + p[2] * p[2] + x * x + y * y
+        a = b = c = 0.0
+        for i in range(3):
+            a += p[i] * (x * turn[i, 0, 0] + y * turn[i, 1, 0])
+            b += p[i] * (x * turn[i, 0, 1] + y * turn[i, 1, 1])
+            c += p[i] * (x * turn[i, 0, 2] + y * turn[i, 1, 2])
+        offset = limit - sum_of_squares
+        return nearer_linear_end(
+            sign * (offset - 2.0 * a), -2.0 * sign * b, sign * (offset - 2.0 * c), end
+        )
+    if leg == 3:
+        x, y = p[0] - row[A3], p[1] - row[A3 + 1]
+        is_kept = sign * (limit - x * x - y * y - p[2] * p[2]) >= 0.0
+        return end if is_kept else NOT_EVEN_THE_START
+    arm = row[B2] if leg == 1 else row[B3]
+    radius = math.hypot(p[1], p[2])
+    # Most bounds are beyond what any orientation needs.
+    if radius + abs(arm) <= bound if sign > 0.0 else radius - abs(arm) >= bound:
+        return end
+    square = scratch[POLYNOMIAL]
+    for k in range(5):
+        square[k] = -limit * (1.0 if k % 4 == 0 else (2.0 if k == 2 else 0.0))
+    for i in range(1, 3):
+        leg_row = scratch[LEG_ROW + i]
+        for k in range(3):
+            leg_row[k] = arm * turn[i, 0, k] + (0.0 if k == 1 else p[i])
+        add_product(leg_row, leg_row, 2, square)
+    for k in range(5):
+        square[k] *= -sign / BINOMIALS_4[k]
+    return nearer_end(4, end, scratch)
+
+
+@helper
+def margin_at(index: int, k: int, p: FloatArray, turn: FloatArray) -> float:
+    """Return a coefficient of a margin's polynomial."""
+    if index == 0:
+        return -(p[0] * turn[0, 2, k] + p[1] * turn[1, 2, k] + p[2] * turn[2, 2, k])
+    if index == 1:
+        return turn[1, 0, k] * p[2] - turn[2, 0, k] * p[1]
+    return 0.0 if k == 1 else p[2]
+
+
+@helper
+def end_by_lengths(
+    row: FloatArray, p: FloatArray, turn: FloatArray, end: float, scratch: FloatArray
+) -> tuple[float, int]:
+    """Return what `first_limit` does as a place, for the lengths alone."""
+    limit = NO_LIMIT
+    for leg in range(4):
+        low, high = row[LENGTH_LOWS + leg], row[LENGTH_HIGHS + leg]
+        for side in range(2):
+            if side == 0 and low <= 0.0:
+                continue
+            bound, sign = (high, 1.0) if side else (low, -1.0)
+            found = nearer_end_of_length(row, leg, p, turn, bound, sign, end, scratch)
+            if found < end:
+                end, limit = found, LENGTH_LIMITS + 2 * leg + side
+            if found < 0.0:
+                return end, limit
+    return end, limit
+
+
+@helper
+def end_by_guide(row: FloatArray, p: FloatArray, turn: FloatArray, end: float) -> tuple[float, int]:
+    """Return what `first_limit` does as a place, for the ends of the guide alone."""
+    limit = NO_LIMIT
+    for carriage in range(2):
+        b = row[B3] if carriage else row[B2]
+        for side in range(2):
+            bound = row[GUIDE_HIGH] if side else row[GUIDE_LOW]
+            if math.isinf(bound):
+                continue
+            sign = -1.0 if side else 1.0
+            offset = p[0] - bound
+            found = nearer_linear_end(
+                sign * (offset + b * turn[0, 0, 0]),
+                sign * b * turn[0, 0, 1],
+                sign * (offset + b * turn[0, 0, 2]),
+                end,
+            )
+            if found < end:
+                end, limit = found, GUIDE_LIMITS + 2 * carriage + side
+            if found < 0.0:
+                return end, limit
+    return end, limit
+
+
+@helper
+def end_by_carriages(row: FloatArray, turn: FloatArray, end: float) -> tuple[float, int]:
+    """Return what `first_limit` does as a place, for the gap and the order of the carriages."""
+    apart = row[B3] - row[B2]
+    order = row[ORDER]
+    if order == 0.0 and row[GAP] <= 0.0:
+        return end, NO_LIMIT
+    at_start = apart * turn[0, 0, 0]
+    if order == 0.0:
+        order = 1.0 if at_start >= 0.0 else -1.0
+    limit = GAP_LIMIT
+    if row[GAP] <= 0.0 or (order * at_start < 0.0 and abs(at_start) >= row[GAP]):
+        limit = ORDER_LIMIT
+    found = nearer_linear_end(
+        order * apart * turn[0, 0, 0] - row[GAP],
+        order * apart * turn[0, 0, 1],
+        order * apart * turn[0, 0, 2] - row[GAP],
+        end,
+    )
+    return (found, limit) if found < end else (end, NO_LIMIT)
+
+
+@helper
+def broken_side_of_box(row: FloatArray, p: FloatArray) -> int:
+    """Return the number of the first side of the box that a position violates, or `NO_LIMIT`."""
+    for i in range(3):
+        if p[i] < row[BOX_LOWS + i]:
+            return BOX_LIMITS + 2 * i
+        if p[i] > row[BOX_HIGHS + i]:
+            return BOX_LIMITS + 2 * i + 1
+    return NO_LIMIT
+
+
+@helper
+def end_by_margins(
+    row: FloatArray, p: FloatArray, turn: FloatArray, end: float
+) -> tuple[float, int]:
+    """Return what `first_limit` does as a place, for the margins alone."""
+    least, limit = row[MARGIN], NO_LIMIT
+    if least == -math.inf:
+        return end, limit
+    for index in range(3):
+        sign = row[SIGNS + index]
+        found = nearer_linear_end(
+            sign * margin_at(index, 0, p, turn) - least,
+            sign * margin_at(index, 1, p, turn),
+            sign * margin_at(index, 2, p, turn) - least,
+            end,
+        )
+        if found < end:
+            end, limit = found, MARGIN_LIMITS + index
+        if found < 0.0:
+            return end, limit
+    return end, limit
+
+
+@helper
+def first_limit(
+    row: FloatArray,
+    cones: FloatArray,
+    p: FloatArray,
+    turn: FloatArray,
+    most: float,
+    scratch: FloatArray,
+) -> tuple[float, int]:
+    """Return the angle at which a turn meets its first limit, and the number of that limit.
+
+    Args:
+        row: Row of `Rules`.
+        cones: Cones of `Rules`.
+        p: Position of b4, shape (3,).
+        turn: Coefficients of the rotation, shape (3, 3, 3): those of (1 − u)², (1 − u) u and u².
+        most: Angle in radians, at most half a turn, beyond which limits do not count.
+        scratch: Array of the shape `SCRATCH`.
+
+    Returns:
+        The angle in radians and the limit: `most` and `NO_LIMIT` if the turn meets none, a
+        negative angle and the first limit of the list if its start violates one.
+    """
+    limit = NO_LIMIT
+    end, found = end_by_lengths(row, p, turn, place_of(most), scratch)
+    limit = found if found >= 0 else limit
+    if end >= 0.0:
+        end, found = end_by_guide(row, p, turn, end)
+        limit = found if found >= 0 else limit
+    if end >= 0.0:
+        end, found = end_by_carriages(row, turn, end)
+        limit = found if found >= 0 else limit
+    if end >= 0.0:
+        found = broken_side_of_box(row, p)
+        if found >= 0:
+            end, limit = NOT_EVEN_THE_START, found
+    if end >= 0.0:
+        end, found = end_by_margins(row, p, turn, end)
+        limit = found if found >= 0 else limit
+    for index in range(cones.shape[0]):
+        if end >= 0.0:
+            place = end_in_cone(row, cones[index], p, turn, end, scratch)
+            if place < end:
+                end, limit = place, CONE_LIMITS + index
+    if end < 0.0:
+        return NOT_EVEN_THE_START, limit
+    return (most if limit == NO_LIMIT else angle_at(end)), limit
+
+
+@kernel("void(f8[::1], f8[:,::1], f8[:,::1], f8[:,:,:,::1], f8[::1], i8[::1])")
+def turn_rows(
+    row: FloatArray,
+    cones: FloatArray,
+    positions: FloatArray,
+    turns: FloatArray,
+    angles: FloatArray,
+    limits: IntArray,
+) -> None:
+    """Write the angles and first limits of n turns, shape (n, 3, 3, 3), as `first_limit` does."""
+    scratch = np.zeros(SCRATCH)
+    for index in range(positions.shape[0]):
+        angles[index], limits[index] = first_limit(
+            row, cones, positions[index], turns[index], HALF_TURN, scratch
+        )
+
+
+@kernel("void(f8[::1], f8[:,::1], f8[:,::1], f8, f8[::1], f8[:,::1], i8[:,::1])")
+def tilt_rows(
+    row: FloatArray,
+    cones: FloatArray,
+    positions: FloatArray,
+    torsion: float,
+    azimuths: FloatArray,
+    tilts: FloatArray,
+    limits: IntArray,
+) -> None:
+    """Write the greatest tilts of n positions in m azimuths, shape (n, m), angles in radians."""
+    scratch, turn = np.zeros(SCRATCH), np.zeros((3, 3, 3))
+    for index in range(positions.shape[0]):
+        for k in range(azimuths.shape[0]):
+            write_tilt(azimuths[k], torsion, turn)
+            tilts[index, k], limits[index, k] = first_limit(
+                row, cones, positions[index], turn, HALF_TURN, scratch
+            )
