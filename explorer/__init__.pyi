@@ -136,6 +136,7 @@ from .workspace.least_clearance import (
 )
 from .workspace.limits.valid_moves import moves_are_valid as moves_are_valid
 from .workspace.limits.valid_poses import poses_are_valid as poses_are_valid
+from .workspace.orientations.connected import is_connected as is_connected
 from .workspace.orientations.share import (
     OrientationShare as OrientationShare,
     orientation_capability as orientation_capability,
@@ -144,11 +145,14 @@ from .workspace.orientations.share import (
 from .workspace.orientations.tilts import (
     GreatestTilt as GreatestTilt,
     TiltMap as TiltMap,
-    TorsionRange as TorsionRange,
     greatest_tilt as greatest_tilt,
     greatest_tilts as greatest_tilts,
-    is_connected as is_connected,
     tilt_map as tilt_map,
+)
+from .workspace.orientations.torsions import (
+    TiltByTorsion as TiltByTorsion,
+    TorsionRange as TorsionRange,
+    tilt_by_torsion as tilt_by_torsion,
     torsion_range as torsion_range,
 )
 from .workspace.slices.fields import slice_field as slice_field

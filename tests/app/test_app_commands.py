@@ -29,6 +29,7 @@ from explorer.app.features.optimise.actions import (
     EndRun,
     GiveUp,
 )
+from explorer.app.features.orientation.actions import GoToTilt, SetTiltTorsion
 from explorer.app.features.paths.actions import (
     Advance as PlayOn,
     SetPathTime,
@@ -71,6 +72,8 @@ OF_VALUES = {
     SetAngle: "sliders of the pose",
     SetPose: "the handle at b4",
     Jog: "sliders of one margin",
+    SetTiltTorsion: "sliders of tilt and torsion",
+    GoToTilt: "the map of tilts",
     SetVariable: "sliders of the design",
     SetName: "the name of a design",
     SetPathTime: "slider of the time",

@@ -14,7 +14,8 @@ from services import StubWorker, services_for
 
 from explorer.app.features.orientation.actions import GoToTilt, SetTiltTorsion
 from explorer.app.features.orientation.feature import ORIENTATION
-from explorer.app.features.orientation.feeds import RangeFeed, ShareFeed, TiltsFeed
+from explorer.app.features.orientation.feeds import PositionFeed, RangeFeed, TiltsFeed
+from explorer.app.features.orientation.panel import best_words
 from explorer.app.features.orientation.polar_map import (
     CENTRE,
     COLOURS,
@@ -26,10 +27,17 @@ from explorer.app.features.orientation.polar_map import (
     polar_map,
 )
 from explorer.app.features.orientation.scale import STOPS, colours_of, most_of, scale_of_tilts
+from explorer.app.features.orientation.scene import kept_nodes
 from explorer.app.features.orientation.tasks import ORIENTATIONS
+from explorer.app.features.orientation.torsion_strip import LEFT, RIGHT, torsion_strip
+from explorer.app.features.workspace.feed import workspace_request
+from explorer.app.features.workspace.slice_map import AXES
+from explorer.app.features.workspace.tasks import draw_workspace
 from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, opened
+from explorer.app.state.view import WorkspaceView
+from explorer.app.widgets.colours import css
 from explorer.errors import InputError
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.home import home_pose
@@ -37,6 +45,7 @@ from explorer.mechanism.tilt_torsion import TiltTorsion, tilt_torsion_of
 from explorer.workspace.orientations.sets import cone_of_directions
 from explorer.workspace.orientations.share import orientation_share
 from explorer.workspace.orientations.tilts import TiltMap, greatest_tilt, tilt_map
+from explorer.workspace.orientations.torsions import tilt_by_torsion
 from explorer.workspace.solids.solids import dexterous_solid, reachable_solid
 
 pytestmark = pytest.mark.usefixtures("warm_kernels")
@@ -86,9 +95,13 @@ def test_map_draws_each_tilt_at_its_place_in_the_colour_of_its_limit() -> None:
         angle = np.radians(azimuth)
         assert x == pytest.approx(CENTRE[0] + distance * np.cos(angle), abs=0.06)
         assert y == pytest.approx(CENTRE[1] - distance * np.sin(angle), abs=0.06)
-    strokes = re.findall(r'class="border" stroke="([^"]+)"', markup)
-    assert len(strokes) == len(tilts.limits)
-    assert len(set(strokes)) == len({colour_of(limit) for limit in tilts.limits})
+    # The border goes through every tilt, in the colour of what ends it.
+    borders = re.findall(r'class="border" stroke="([^"]+)" d="M([^"]+)"', markup)
+    assert {stroke for stroke, _ in borders} == {css(colour_of(limit)) for limit in tilts.limits}
+    for pair, limit in zip(points[1].split(), tilts.limits, strict=True):
+        at = pair.replace(",", " ")
+        own = [path.split("L") for stroke, path in borders if stroke == css(colour_of(limit))]
+        assert any(at in path for path in own)
     # Home is drawn, since the torsion is its own.
     assert 'class="home"' in markup
     assert 'class="home"' not in polar_map(tilts, here._replace(torsion=0.0), HOME)
@@ -121,24 +134,67 @@ def test_feeds_compute_what_is_shown_and_nothing_else() -> None:
         worker.work()
 
     follow(state)
-    assert [order.task.__name__ for order in worker.orders] == ["share_at"]
-    drawing = services.get(ShareFeed).drawing
+    assert [order.task.__name__ for order in worker.orders] == ["orientations_at"]
+    drawing = services.get(PositionFeed).drawing
     assert drawing is not None
     assert drawing.share == orientation_share(OPTIMAL, state.pose.position)
+    best = tilt_by_torsion(OPTIMAL, state.pose.position).best
+    assert drawing.by_torsion.best == best
     follow(shown(state, tilts=True, over="dexterous", range=15.0))
     tilts = services.get(TiltsFeed).drawing
     assert tilts is not None
     for index in np.random.default_rng(0).integers(len(tilts.tilts), size=20):
         expected = greatest_tilt(OPTIMAL, tilts.positions[index], tilts.request.torsion).tilt
         assert tilts.tilts[index] == pytest.approx(expected, abs=1e-6)
-    ranged = services.get(RangeFeed).drawing
-    assert ranged is not None
-    assert ranged.reachable is not None
-    assert ranged.dexterous is not None
-    rotations = cone_of_directions(home_pose(OPTIMAL).rotation, 15.0, ORIENTATIONS)
-    assert ranged.reachable.volume == reachable_solid(OPTIMAL, rotations).volume
-    assert ranged.dexterous.volume == dexterous_solid(OPTIMAL, rotations).volume
-    assert ranged.dexterous.volume < ranged.reachable.volume
+    volumes: dict[str, float] = {}
+    for over, make in (("dexterous", dexterous_solid), ("reachable", reachable_solid)):
+        follow(shown(state, over=over, range=15.0))
+        ranged = services.get(RangeFeed).drawing
+        assert ranged is not None
+        rotations = cone_of_directions(home_pose(OPTIMAL).rotation, 15.0, ORIENTATIONS)
+        volumes[over] = ranged.solid.volume
+        assert volumes[over] == pytest.approx(make(OPTIMAL, rotations).volume, rel=1e-3)
+    assert volumes["dexterous"] < volumes["reachable"]
+
+
+def test_strip_of_torsions_has_the_tilts_and_a_mark_at_the_torsion() -> None:
+    found = tilt_by_torsion(OPTIMAL, (10.0, 5.0, 9.0))
+    markup = torsion_strip(found, -90.0)
+    told = re.search(r'data-torsions="([^"]+)"', markup)
+    assert told is not None
+    facts: dict[str, Any] = json.loads(unescape(told[1]))
+    assert facts["tilts"] == [
+        None if np.isnan(tilt) else pytest.approx(tilt, abs=0.05) for tilt in found.tilts
+    ]
+    assert f'class="here" d="M{0.75 * LEFT + 0.25 * RIGHT:.1f} ' in markup
+    nowhere = tilt_by_torsion(OPTIMAL, (30.0, 5.0, 9.0))
+    assert "nan" not in torsion_strip(nowhere, 0.0)
+    assert best_words(nowhere.best, nowhere.best) == "none"
+    assert best_words(found.best, found.best).endswith(", as here")
+
+
+def test_cut_of_the_workspace_opens_the_tilts_on_the_same_side() -> None:
+    services, state = services_for(), shown(opened(OPTIMAL), tilts=True)
+    feed = services.get(TiltsFeed)
+    feed.follow(Frame(state))
+    worker = services.worker
+    assert isinstance(worker, StubWorker)
+    worker.work()
+    drawing = feed.drawing
+    assert drawing is not None
+    assert kept_nodes(drawing, WorkspaceView()).all()
+    for axis, cut in enumerate(AXES):
+        for flipped in (False, True):
+            view = WorkspaceView(solid=True, cut=cut, level=6.0, flipped=flipped)
+            request = workspace_request(Frame(Set("view.workspace", view).apply(state)))
+            assert request is not None
+            surface = draw_workspace(request).surface
+            ends = [shell.vertices[:, axis] for shell in surface.shells if len(shell.vertices)]
+            low, high = min(map(np.min, ends)), max(map(np.max, ends))
+            kept = drawing.positions[kept_nodes(drawing, view), axis]
+            assert len(kept)
+            assert low - 1e-9 <= kept.min()
+            assert kept.max() <= high + 1e-9
 
 
 def test_scale_ends_at_a_round_tilt_with_the_colours_of_its_stops() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 from playwright.sync_api import expect
 from tab import Tab
@@ -18,7 +20,7 @@ def angles(tab: Tab) -> TiltTorsion:
 
 def test_a_click_on_the_map_tilts_there(tab: Tab) -> None:
     tab.turn_to("Tilt")
-    chart = tab.page.locator(".ex-tilts")
+    chart = tab.page.locator("[data-tilts]")
     chart.scroll_into_view_if_needed()
     box = chart.bounding_box()
     assert box is not None
@@ -44,7 +46,21 @@ def test_typed_angles_move_the_platform(tab: Tab) -> None:
     tab.type("Torsion (°)", "-60\n")
     tab.wait_for(lambda: abs(angles(tab).torsion + 60.0) < 1e-9, "a torsion of −60°")
     # The map of another torsion does not show home.
-    expect(tab.page.locator(".ex-tilts .home")).to_have_count(0)
+    expect(tab.page.locator("[data-tilts] .home")).to_have_count(0)
+
+
+def test_a_click_on_the_torsions_turns_the_platform(tab: Tab) -> None:
+    tab.turn_to("Tilt")
+    strip = tab.page.locator("[data-torsions]")
+    strip.scroll_into_view_if_needed()
+    box = strip.bounding_box()
+    assert box is not None
+    # The middle of the strip is a little left of that of its axis.
+    x, y = box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"]
+    tab.page.mouse.move(x, y)
+    expect(tab.page.get_by_text(re.compile("torsion −1[0-9].*, tilt"))).to_be_visible()
+    tab.page.mouse.click(x, y)
+    tab.wait_for(lambda: abs(angles(tab).torsion + 15.0) < 6.0, "a torsion near −15°")
 
 
 def test_positions_are_coloured_and_ranges_have_volumes(tab: Tab) -> None:
@@ -53,8 +69,8 @@ def test_positions_are_coloured_and_ranges_have_volumes(tab: Tab) -> None:
     tab.switch("Greatest tilts", on=True)
     tab.wait_for(lambda: services.get(TiltsFeed).drawing is not None, "tilts at nodes")
     expect(tab.page.get_by_text("nodes, 0.", exact=False)).to_be_visible()
-    tab.choose("Positions with", "all of the tilts")
-    tab.wait_for(lambda: services.get(RangeFeed).drawing is not None, "the volumes")
-    expect(tab.page.get_by_text("dexterous", exact=True)).to_be_visible()
+    tab.choose("Solid over tilts", "dexterous")
+    tab.wait_for(lambda: services.get(RangeFeed).drawing is not None, "the solid")
+    expect(tab.page.get_by_text("Dexterous volume", exact=True)).to_be_visible()
     tab.switch("Greatest tilts", on=False)
     tab.wait_for(lambda: services.get(TiltsFeed).drawing is None, "no tilts")

@@ -27,6 +27,13 @@ def test_orientation_json_has_share_tilts_and_torsions(cli: CommandLine) -> None
     torsions = explorer.torsion_range(PRESET, POSITION, -60.0)
     assert found["torsion_range"] == [torsions.low, torsions.high]
     assert found["torsion_limits"] == [torsions.low_limit, torsions.high_limit]
+    by_torsion = explorer.tilt_by_torsion(PRESET, POSITION)
+    assert found["torsions"] == by_torsion.torsions.tolist()
+    assert found["tilts_by_torsion"] == [
+        None if np.isnan(tilt) else tilt for tilt in by_torsion.tilts.tolist()
+    ]
+    assert found["best_tilt"] == by_torsion.best.tilt >= found["greatest_tilt"]
+    assert found["best_torsion"] == by_torsion.best.torsion
     assert found["home_connected"] is True
 
 

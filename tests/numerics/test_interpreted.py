@@ -15,7 +15,8 @@ from explorer.numerics.compiled import all_kernels, warm
 from explorer.statics.held import held_load, held_values, settle_on_limit
 from explorer.statics.slopes import twist_slopes
 from explorer.workspace.orientations.share import orientation_share
-from explorer.workspace.orientations.tilts import greatest_tilts, tilt_map, torsion_range
+from explorer.workspace.orientations.tilts import greatest_tilts, tilt_map
+from explorer.workspace.orientations.torsions import torsion_range
 
 OPTIMAL = PRESETS["paper-optimal"]
 ROTATION = home_pose(OPTIMAL).rotation

@@ -15,14 +15,10 @@ from explorer.mechanism.design import Swing
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.workspace.limits.constraints import CARRIAGE_ORDER
+from explorer.workspace.orientations.connected import is_connected
 from explorer.workspace.orientations.share import orientations_within
-from explorer.workspace.orientations.tilts import (
-    greatest_tilt,
-    greatest_tilts,
-    is_connected,
-    tilt_map,
-    torsion_range,
-)
+from explorer.workspace.orientations.tilts import greatest_tilt, greatest_tilts, tilt_map
+from explorer.workspace.orientations.torsions import tilt_by_torsion, torsion_range
 
 pytestmark = pytest.mark.usefixtures("warm_kernels")
 
@@ -114,6 +110,35 @@ def test_greatest_tilt_is_the_least_of_a_fine_map(seed: int) -> None:
         assert there.limits[0] == found.limit
 
 
+@pytest.mark.parametrize("seed", range(12))
+def test_tilt_by_torsion_is_that_of_each_torsion_and_its_best_the_largest(seed: int) -> None:
+    design, position, _ = case_of(seed)
+    found = tilt_by_torsion(design, position, 24)
+    np.testing.assert_allclose(np.diff(found.torsions), 15.0)
+    each = [greatest_tilt(design, position, sigma).tilt for sigma in found.torsions]
+    np.testing.assert_allclose(found.tilts, each, atol=1e-3)
+    if np.isnan(found.tilts).all():
+        assert math.isnan(found.best.tilt)
+        assert found.best.limit is not None
+        return
+    assert found.best.tilt >= np.nanmax(found.tilts)
+    there = greatest_tilt(design, position, found.best.torsion)
+    assert there.tilt == pytest.approx(found.best.tilt, abs=1e-9)
+    fine = found.best.torsion + np.linspace(-14.0, 14.0, 561)
+    assert found.best.tilt >= np.nanmax(greatest_tilts(design, position, fine)) - 1e-3
+
+
+def test_greatest_tilts_take_torsions_beside_positions() -> None:
+    design, position, torsion = case_of(4)
+    positions = position + np.random.default_rng(1).normal(scale=0.1, size=(3, 1, 3))
+    torsions = torsion + np.array([-10.0, 0.0, 10.0, 180.0])
+    found = greatest_tilts(design, positions, torsions)
+    each = [[greatest_tilt(design, p[0], s).tilt for s in torsions] for p in positions]
+    np.testing.assert_allclose(found, each, atol=1e-6)
+    with pytest.raises(InputError, match="do not go with torsions"):
+        greatest_tilts(design, positions[:, 0], torsions)
+
+
 def test_greatest_tilts_of_many_positions_are_those_of_each() -> None:
     design, position, torsion = case_of(4)
     rng = np.random.default_rng(0)
@@ -186,6 +211,8 @@ def test_tilts_with_unusable_input_are_refused() -> None:
             tilt_map(design, p, azimuths=count)
     with pytest.raises(InputError, match="number of azimuths"):
         greatest_tilts(design, p, azimuths=2)
+    with pytest.raises(InputError, match="number of torsions"):
+        tilt_by_torsion(design, p, 2)
     with pytest.raises(InputError, match="azimuths must be"):
         tilt_map(design, p, azimuths=[[1.0]])
     with pytest.raises(InputError, match="one position"):

@@ -1,47 +1,70 @@
-// Reads the polar map of tilts under the pointer; a click tilts the platform there, as a press of
-// "orientation.go".
+// Reads the charts of orientations under the pointer; a click turns the platform there, as a press
+// of the button that the chart names: the polar map of tilts, and the tilt by torsion.
 window.explorer.tilts ??= (() => {
-  const HINT = "Point at the map to read it, click to tilt there.";
-  const mapAt = (target) => target.closest?.("[data-tilts]") ?? null;
-  const anglesAt = (map, { clientX, clientY }) => {
-    const matrix = map.getScreenCTM();
-    if (!matrix) return null;
-    const at = new DOMPoint(clientX, clientY).matrixTransform(matrix.inverse());
-    const { centre, radius, edge } = JSON.parse(map.dataset.tilts);
+  const CHART = "[data-tilts], [data-torsions]";
+  const chartAt = (target) => target.closest?.(CHART) ?? null;
+  const rounded = (angle) => Number(angle.toFixed(1));
+  const text = (angle) => `${angle.toFixed(1)}°`.replace("-", "\u2212");
+  const pointIn = (chart, { clientX, clientY }) => {
+    const matrix = chart.getScreenCTM();
+    return matrix && new DOMPoint(clientX, clientY).matrixTransform(matrix.inverse());
+  };
+  const tiltAt = (chart, at) => {
+    const { centre, radius, edge } = JSON.parse(chart.dataset.tilts);
     const [x, y] = [at.x - centre[0], centre[1] - at.y];
     const tilt = (edge * Math.hypot(x, y)) / radius;
     if (tilt > edge) return null;
-    return [(Math.atan2(y, x) * 180) / Math.PI, tilt].map((angle) => Number(angle.toFixed(1)));
+    const angles = [(Math.atan2(y, x) * 180) / Math.PI, tilt].map(rounded);
+    return {
+      value: angles,
+      words: `azimuth ${text(angles[0])}, tilt ${text(angles[1])}`,
+      button: "orientation.go",
+    };
   };
-  const words = (angles) =>
-    `azimuth ${angles[0].toFixed(1)}°, tilt ${angles[1].toFixed(1)}°`.replace("-", "\u2212");
+  const torsionAt = (chart, at) => {
+    const { left, right, tilts } = JSON.parse(chart.dataset.torsions);
+    const share = (at.x - left) / (right - left);
+    if (share < 0 || share > 1) return null;
+    const torsion = rounded(360 * share - 180);
+    const tilt = tilts[Math.round(share * tilts.length) % tilts.length];
+    const most = tilt === null ? "none" : text(tilt);
+    return {
+      value: torsion,
+      words: `torsion ${text(torsion)}, tilt ${most}`,
+      button: "orientation.torsion",
+    };
+  };
+  const read = (chart, event) => {
+    const at = pointIn(chart, event);
+    return at && (chart.dataset.tilts ? tiltAt(chart, at) : torsionAt(chart, at));
+  };
+  const tell = (chart, words) => {
+    const reading = chart?.parentElement?.querySelector(".ex-reading");
+    if (reading) reading.textContent = words ?? reading.dataset.hint;
+  };
   let last = null;
   const show = () => {
-    const map = last && mapAt(last.target);
-    const reading = map?.parentElement?.querySelector(".ex-reading");
-    if (!reading) return;
-    const angles = anglesAt(map, last);
-    reading.textContent = angles ? words(angles) : HINT;
+    const chart = last && chartAt(last.target);
+    if (chart) tell(chart, read(chart, last)?.words);
   };
   addEventListener("pointermove", ({ target, clientX, clientY }) => {
-    const left = last?.target.isConnected && mapAt(last.target);
-    last = mapAt(target) ? { target, clientX, clientY } : null;
-    const reading = !last && left && left.parentElement?.querySelector(".ex-reading");
-    if (reading) reading.textContent = HINT;
+    const left = last?.target.isConnected && chartAt(last.target);
+    last = chartAt(target) ? { target, clientX, clientY } : null;
+    if (left && left !== (last && chartAt(target))) tell(left);
     show();
   });
-  // The map is drawn anew while the mechanism moves; its reading stays.
+  // A chart is drawn anew while the mechanism moves; its reading stays.
   new MutationObserver(() => {
     if (!last || last.target.isConnected) return;
     const target = document.elementFromPoint(last.clientX, last.clientY);
-    last = target && mapAt(target) ? { ...last, target } : null;
+    last = target && chartAt(target) ? { ...last, target } : null;
     show();
   }).observe(document.body, { childList: true, subtree: true });
   addEventListener("click", (event) => {
-    const map = mapAt(event.target),
-      // A click tells whole pixels, other than the pointer that read the map.
-      angles = map && anglesAt(map, last ?? event);
-    if (angles) window.explorer.press("orientation.go", JSON.stringify(angles));
+    const chart = chartAt(event.target),
+      // A click tells whole pixels, other than the pointer that read the chart.
+      found = chart && read(chart, last ?? event);
+    if (found) window.explorer.press(found.button, JSON.stringify(found.value));
   });
-  return { anglesAt };
+  return { read };
 })();

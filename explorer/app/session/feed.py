@@ -12,6 +12,7 @@ from explorer.app.session.jobs import LONG_SECONDS, Worker
 from explorer.app.session.latest import start_timer
 from explorer.app.session.worker import CANCELLED, Channel
 from explorer.app.state.frame import Frame
+from explorer.numerics.stages import Watch, unwatched
 
 # Seconds after which a drawing that the user cancelled ends with its process.
 CANCEL_SECONDS = 2.0
@@ -28,6 +29,18 @@ class Stage:
 
     words: str
     share: float
+
+
+def watch_of(channel: Channel | None) -> Watch:
+    """Return a watch that sends each stage to the parent and ends the task when it cancels."""
+    if channel is None:
+        return unwatched
+
+    def watch(words: str, share: float) -> None:
+        channel.raise_if_cancelled()
+        channel.send(Stage(words, share))
+
+    return watch
 
 
 class _Drawn(Protocol):

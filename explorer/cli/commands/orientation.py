@@ -16,7 +16,8 @@ from explorer.mechanism.pose import Triple
 
 if TYPE_CHECKING:
     from explorer.workspace.orientations.share import OrientationShare
-    from explorer.workspace.orientations.tilts import GreatestTilt, TiltMap, TorsionRange
+    from explorer.workspace.orientations.tilts import GreatestTilt, TiltMap
+    from explorer.workspace.orientations.torsions import TiltByTorsion, TorsionRange
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,13 +45,10 @@ class Orientation(JsonOptions, DesignOptions):
 
     def run(self) -> None:
         """Write the measures of the orientations."""
+        from explorer.workspace.orientations.connected import is_connected
         from explorer.workspace.orientations.share import orientation_share
-        from explorer.workspace.orientations.tilts import (
-            greatest_tilt,
-            is_connected,
-            tilt_map,
-            torsion_range,
-        )
+        from explorer.workspace.orientations.tilts import greatest_tilt, tilt_map
+        from explorer.workspace.orientations.torsions import tilt_by_torsion, torsion_range
 
         design = self.read_design()
         home = home_pose(design)
@@ -61,6 +59,7 @@ class Orientation(JsonOptions, DesignOptions):
             share=orientation_share(design, position, self.samples),
             least=greatest_tilt(design, position, self.torsion),
             tilts=tilt_map(design, position, self.torsion),
+            by_torsion=tilt_by_torsion(design, position),
             torsions=torsion_range(design, position, self.torsion),
             is_home_connected=is_connected(design, position, home.rotation),
         )
@@ -76,12 +75,13 @@ class _Orientations:
     share: OrientationShare
     least: GreatestTilt
     tilts: TiltMap
+    by_torsion: TiltByTorsion
     torsions: TorsionRange
     is_home_connected: bool
 
     def as_json(self) -> dict[str, object]:
         """Return the answer as plain values."""
-        least, torsions = self.least, self.torsions
+        least, torsions, best = self.least, self.torsions, self.by_torsion.best
         return {
             "position": self.position,
             "share": self.share.share,
@@ -94,6 +94,10 @@ class _Orientations:
             "azimuths": self.tilts.azimuths,
             "tilts": [finite(tilt) for tilt in self.tilts.tilts.tolist()],
             "limits": self.tilts.limits,
+            "torsions": self.by_torsion.torsions,
+            "tilts_by_torsion": [finite(tilt) for tilt in self.by_torsion.tilts.tolist()],
+            "best_torsion": best.torsion,
+            "best_tilt": finite(best.tilt),
             "torsion_range": [finite(torsions.low), finite(torsions.high)],
             "torsion_limits": [torsions.low_limit, torsions.high_limit],
             "home_connected": self.is_home_connected,
@@ -111,6 +115,7 @@ class _Orientations:
             ),
             ("torsion", *degrees([least.torsion])),
             ("greatest tilt in every azimuth", self._greatest()),
+            ("largest at any torsion", self._best()),
             ("torsion range at tilt zero", self._torsions()),
             ("home orientation", self._home()),
         ]
@@ -133,6 +138,13 @@ class _Orientations:
         if least.limit is None:
             return f"{tilt}, no limit"
         return f"{tilt} in azimuth {degrees([least.azimuth])[0]}, ended by {least.limit}"
+
+    def _best(self) -> str:
+        best = self.by_torsion.best
+        if math.isnan(best.tilt):
+            return "none: tilt zero violates a limit at every torsion"
+        tilt, torsion = degrees([best.tilt, best.torsion])
+        return f"{tilt} at torsion {torsion}"
 
     def _torsions(self) -> str:
         torsions = self.torsions

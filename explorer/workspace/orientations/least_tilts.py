@@ -66,12 +66,12 @@ def lowest_between(
     return at_second, second, limit_second
 
 
-@kernel("void(f8[::1], f8[:,::1], f8[:,::1], f8, f8[::1], f8[::1], f8[::1], f8[::1], i8[::1])")
+@kernel("void(f8[::1], f8[:,::1], f8[:,::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], i8[::1])")
 def least_tilt_rows(
     row: FloatArray,
     cones: FloatArray,
     positions: FloatArray,
-    torsion: float,
+    torsions: FloatArray,
     azimuths: FloatArray,
     tilts: FloatArray,
     least: FloatArray,
@@ -84,7 +84,7 @@ def least_tilt_rows(
         row: Row of `Rules`.
         cones: Cones of `Rules`.
         positions: Positions of b4, shape (n, 3).
-        torsion: Torsion in radians.
+        torsions: Torsion of each position in radians, shape (n,).
         azimuths: Azimuths in radians at equal distances once around, shape (m,).
         tilts: Scratch array, shape (m,).
         least: Least tilt of each position, negative where tilt zero violates a limit, shape (n,).
@@ -95,7 +95,7 @@ def least_tilt_rows(
     count = azimuths.shape[0]
     step = 2.0 * math.pi / count
     for index in range(positions.shape[0]):
-        p = positions[index]
+        p, torsion = positions[index], torsions[index]
         best, towards[index], limits[index] = HALF_TURN, 0.0, NO_LIMIT
         for k in range(count):
             tilts[k], limit = tilt_in(row, cones, p, azimuths[k], torsion, turn, scratch)

@@ -17,21 +17,19 @@ from numpy.typing import ArrayLike
 from explorer.errors import InputError
 from explorer.mechanism.design import Design
 from explorer.mechanism.home import home_pose
-from explorer.mechanism.pose import checked_rotation
-from explorer.mechanism.tilt_torsion import rotation_from_tilt_torsion, tilt_torsion_of
+from explorer.mechanism.tilt_torsion import tilt_torsion_of
 from explorer.numerics.arrays import FloatArray, finite_array, for_kernel
 from explorer.workspace.limits.valid_poses import Rules
 from explorer.workspace.orientations.least_tilts import least_tilt_rows
-from explorer.workspace.orientations.turns import NO_LIMIT, limit_names, tilt_rows, turn_rows
+from explorer.workspace.orientations.turns import NO_LIMIT, limit_names, tilt_rows
 
 AZIMUTHS = 72
 """Number of azimuths of a map of tilts, and of those between which the least tilt is searched."""
 
-FEWEST_AZIMUTHS, MOST_AZIMUTHS = 3, 100_000
+# Largest number of azimuths or torsions.
+MOST_ANGLES = 100_000
 # Number of rows of a kernel that a single turn is worth.
 ROWS_OF_TURN = 20
-# Error of an angle that is computed in two ways, in degrees.
-ANGLE_TOLERANCE = 1e-7
 
 
 @dataclass(frozen=True)
@@ -71,24 +69,6 @@ class GreatestTilt:
     limit: str | None
 
 
-@dataclass(frozen=True)
-class TorsionRange:
-    """The torsions that lead on from one without a gap, at a tilt; angles in degrees.
-
-    Attributes:
-        low: Least torsion; NaN if the torsion that the range starts from violates a limit.
-        high: Largest torsion, at most 360° above the least one; NaN as `low`.
-        low_limit: Name of the limit at the least torsion, or that the start violates; None if
-            every torsion is possible.
-        high_limit: Name of the limit at the largest torsion, as `low_limit`.
-    """
-
-    low: float
-    high: float
-    low_limit: str | None
-    high_limit: str | None
-
-
 def tilt_map(
     design: Design,
     position: ArrayLike,
@@ -106,15 +86,15 @@ def tilt_map(
     Raises:
         InputError: not a position, angles that are not finite, or no usable number of azimuths.
     """
-    p, sigma = _one_position(position), checked_torsion(design, torsion)
+    p, sigma = one_position(position), checked_torsion(design, torsion)
     array = np.asarray(azimuths)
     if array.ndim == 0:
-        directions = _even_azimuths(int(array), fewest=1)
+        directions = even_angles("azimuths", int(array), fewest=1)
     else:
         directions = finite_array("azimuths", array, ())
-        if directions.ndim != 1 or not 1 <= len(directions) <= MOST_AZIMUTHS:
+        if directions.ndim != 1 or not 1 <= len(directions) <= MOST_ANGLES:
             raise InputError(
-                f"azimuths must be 1 to {MOST_AZIMUTHS:,} angles; got the shape {directions.shape}"
+                f"azimuths must be 1 to {MOST_ANGLES:,} angles; got the shape {directions.shape}"
             )
     count = len(directions)
     tilts, limits = np.empty((1, count)), np.empty((1, count), dtype=np.int64)
@@ -129,7 +109,7 @@ def tilt_map(
         tilts,
         limits,
     )
-    return TiltMap(sigma, directions, _degrees(tilts[0]), _names(design, limits[0].tolist()))
+    return TiltMap(sigma, directions, in_degrees(tilts[0]), names_of(design, limits[0].tolist()))
 
 
 def greatest_tilt(
@@ -148,18 +128,18 @@ def greatest_tilt(
     Raises:
         InputError: not a position, or a torsion that is not finite.
     """
-    p, sigma = _one_position(position), checked_torsion(design, torsion)
-    tilts, towards, limits = _least_tilts(design, p[None], sigma, AZIMUTHS)
+    p, sigma = one_position(position), checked_torsion(design, torsion)
+    tilts, towards, limits = _least_tilts(design, p[None], np.array([sigma]), AZIMUTHS)
     tilt = float(tilts[0])
     is_ended = not math.isnan(tilt) and limits[0] != NO_LIMIT
     azimuth = float(towards[0]) % 360.0 if is_ended else math.nan
-    return GreatestTilt(sigma, tilt, azimuth, _names(design, limits)[0])
+    return GreatestTilt(sigma, tilt, azimuth, names_of(design, limits)[0])
 
 
 def greatest_tilts(
     design: Design,
     position: ArrayLike,
-    torsion: float | None = None,
+    torsion: ArrayLike | None = None,
     azimuths: int = AZIMUTHS,
 ) -> FloatArray:
     """Return the greatest tilts of positions in every azimuth, in degrees, shape (...).
@@ -169,88 +149,27 @@ def greatest_tilts(
     Args:
         design: The manipulator.
         position: Positions of b4 in the base frame, in design units, shape (..., 3).
-        torsion: Torsion in degrees; that of the home pose if None.
+        torsion: Torsions in degrees, shape (...); that of the home pose if None.
         azimuths: Number of azimuths from which the least tilt is searched, 3 or more.
 
     Raises:
-        InputError: not positions, a torsion that is not finite, or no usable number of azimuths.
+        InputError: not positions, torsions that are not finite or do not broadcast with the
+            positions, or no usable number of azimuths.
     """
-    p, sigma = finite_array("position", position, (3,)), checked_torsion(design, torsion)
-    return _least_tilts(design, p.reshape(-1, 3), sigma, azimuths)[0].reshape(p.shape[:-1])
-
-
-def torsion_range(
-    design: Design,
-    position: ArrayLike,
-    torsion: float | None = None,
-    azimuth: float = 0.0,
-    tilt: float = 0.0,
-) -> TorsionRange:
-    """Return the torsions that a position can have without a gap from one torsion, at a tilt.
-
-    Args:
-        design: The manipulator.
-        position: Position of b4 in the base frame, in design units, shape (3,).
-        torsion: Torsion in degrees that the range starts from; that of the home pose if None.
-        azimuth: Azimuth in degrees, which stays the same.
-        tilt: Tilt in degrees, which stays the same.
-
-    Raises:
-        InputError: not a position, or angles that are not finite.
-    """
-    p, sigma = _one_position(position), checked_torsion(design, torsion)
-    r = rotation_from_tilt_torsion([azimuth, tilt, sigma])
-    # Downwards the platform's y-axis turns towards the negative x-axis.
-    turns = np.stack([_turn_about_z(r, -1.0), _turn_about_z(r, 1.0)])
-    angles, limits = _end_of_turns(design, p, turns)
-    down, up = _degrees(angles).tolist()
-    names = _names(design, limits)
-    if names[0] is None and names[1] is None:
-        return TorsionRange(sigma - 180.0, sigma + 180.0, None, None)
-    if names[0] is None or names[1] is None:
-        # Half a turn one way ends where the other way ends, beyond that half turn.
-        rest = np.stack([_turn_about_z(_turned_half(r), -1.0), _turn_about_z(_turned_half(r), 1.0)])
-        angles, limits = _end_of_turns(design, p, rest)
-        more, rest_names = _degrees(angles).tolist(), _names(design, limits)
-        if names[0] is None:
-            down, names = 180.0 + more[0], (rest_names[0], names[1])
-        else:
-            up, names = 180.0 + more[1], (names[0], rest_names[1])
-    return TorsionRange(sigma - down, sigma + up, *names)
-
-
-def is_connected(
-    design: Design, position: ArrayLike, rotation: ArrayLike, other: ArrayLike | None = None
-) -> bool:
-    """Return whether an orientation is connected to tilt zero by a tilt without a gap.
-
-    The tilt keeps azimuth and torsion. At tilt 180°, where many torsions give one orientation, it
-    is that of torsion 0.
-
-    Args:
-        design: The manipulator.
-        position: Position of b4 in the base frame, in design units, shape (3,).
-        rotation: Orientation, platform to base, shape (3, 3).
-        other: Second orientation, shape (3, 3). If given, the question is whether a tilt from the
-            first one to tilt zero, a change of the torsion there and a tilt to the second one
-            connect the two.
-
-    Raises:
-        InputError: not a position, or not a rotation.
-    """
-    p = _one_position(position)
-    ends = [
-        tilt_torsion_of(checked_rotation(each)) for each in (rotation, other) if each is not None
-    ]
-    for azimuth, tilt, torsion in ends:
-        reached = tilt_map(design, p, torsion, [azimuth]).tilts[0]
-        if not reached >= tilt - ANGLE_TOLERANCE:
-            return False
-    if other is None:
-        return True
-    span = torsion_range(design, p, ends[0].torsion)
-    turn = (ends[1].torsion - span.low) % 360.0
-    return span.high - span.low >= min(turn, 360.0 - ANGLE_TOLERANCE) - ANGLE_TOLERANCE
+    p = finite_array("position", position, (3,))
+    sigma = np.asarray(checked_torsion(design, None))
+    if torsion is not None:
+        sigma = finite_array("torsion", torsion, ())
+    try:
+        shape = np.broadcast_shapes(p.shape[:-1], sigma.shape)
+    except ValueError:
+        raise InputError(
+            f"positions of the shape {p.shape[:-1]} do not go with torsions of the shape "
+            f"{sigma.shape}"
+        ) from None
+    positions = np.broadcast_to(p, (*shape, 3)).reshape(-1, 3)
+    torsions = np.broadcast_to(sigma, shape).reshape(-1)
+    return _least_tilts(design, positions, torsions, azimuths)[0].reshape(shape)
 
 
 def checked_torsion(design: Design, torsion: float | None) -> float:
@@ -264,26 +183,41 @@ def checked_torsion(design: Design, torsion: float | None) -> float:
     return float(finite_array("torsion", torsion, ()))
 
 
-def _one_position(position: ArrayLike) -> FloatArray:
+def one_position(position: ArrayLike) -> FloatArray:
+    """Return one position (3,) after checking it.
+
+    Raises:
+        InputError: The position is not finite, or there are several.
+    """
     p = finite_array("position", position, (3,))
     if p.ndim != 1:
         raise InputError(f"give one position, three numbers; got the shape {p.shape}")
     return p
 
 
-def _even_azimuths(count: int, fewest: int) -> FloatArray:
-    if not fewest <= count <= MOST_AZIMUTHS:
+def even_angles(name: str, count: int, fewest: int = 3) -> FloatArray:
+    """Return angles in degrees at equal distances once around from 0 on, shape (count,).
+
+    Args:
+        name: Name of the angles in messages.
+        count: Their number.
+        fewest: Least allowed number.
+
+    Raises:
+        InputError: Too few or too many angles.
+    """
+    if not fewest <= count <= MOST_ANGLES:
         raise InputError(
-            f"the number of azimuths must lie within {fewest} to {MOST_AZIMUTHS:,}; got {count}"
+            f"the number of {name} must lie within {fewest} to {MOST_ANGLES:,}; got {count}"
         )
     return np.asarray(np.arange(count) * (360.0 / count), dtype=np.float64)
 
 
 def _least_tilts(
-    design: Design, positions: FloatArray, torsion: float, azimuths: int
+    design: Design, positions: FloatArray, torsions: FloatArray, azimuths: int
 ) -> tuple[FloatArray, FloatArray, list[int]]:
     """Return least tilts and their azimuths in degrees, and the numbers of their limits."""
-    n, directions = len(positions), np.radians(_even_azimuths(azimuths, FEWEST_AZIMUTHS))
+    n, directions = len(positions), np.radians(even_angles("azimuths", azimuths))
     least, towards, limits = np.empty(n), np.empty(n), np.empty(n, dtype=np.int64)
     rules = Rules.of(design).without_clearances()
     least_tilt_rows(
@@ -291,47 +225,24 @@ def _least_tilts(
         rules.row,
         rules.cones,
         for_kernel(positions),
-        math.radians(torsion),
+        np.radians(torsions),
         directions,
         np.empty(azimuths),
         least,
         towards,
         limits,
     )
-    return _degrees(least), np.degrees(towards), limits.tolist()
+    return in_degrees(least), np.degrees(towards), limits.tolist()
 
 
-def _end_of_turns(
-    design: Design, position: FloatArray, turns: FloatArray
-) -> tuple[FloatArray, list[int]]:
-    """Return the angles (n,) in radians at which turns (n, 3, 3, 3) end, and their limits."""
-    angles, limits = np.empty(len(turns)), np.empty(len(turns), dtype=np.int64)
-    rules = Rules.of(design).without_clearances()
-    positions = np.full((len(turns), 3), position)
-    turn_rows(len(turns), rules.row, rules.cones, positions, turns, angles, limits)
-    return angles, limits.tolist()
-
-
-def _turn_about_z(rotation: FloatArray, sign: float) -> FloatArray:
-    """Return the turn from a rotation about the platform's z-axis, shape (3, 3, 3)."""
-    x, y, z = rotation.T
-    still = np.column_stack([0.0 * x, 0.0 * y, z])
-    cosine = np.column_stack([x, y, 0.0 * z])
-    sine = sign * np.column_stack([y, -x, 0.0 * z])
-    return np.stack([still + cosine, 2.0 * sine, still - cosine], axis=-1)
-
-
-def _turned_half(rotation: FloatArray) -> FloatArray:
-    return rotation * np.array([-1.0, -1.0, 1.0])
-
-
-def _degrees(angles: FloatArray) -> FloatArray:
+def in_degrees(angles: FloatArray) -> FloatArray:
     """Return angles in degrees; NaN for those whose start violates a limit."""
     degrees: FloatArray = np.rad2deg(angles)
     degrees[angles < 0.0] = math.nan
     return degrees
 
 
-def _names(design: Design, limits: list[int]) -> tuple[str | None, ...]:
+def names_of(design: Design, limits: list[int]) -> tuple[str | None, ...]:
+    """Return the names of limits by their numbers, as in `limit_names`; None for no limit."""
     names = limit_names(design)
     return tuple(None if limit == NO_LIMIT else names[limit] for limit in limits)

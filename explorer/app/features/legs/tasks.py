@@ -10,8 +10,8 @@ from explorer.app.features.workspace.reached import (
     Rows,
     Trouble,
     trouble_of,
-    watch_of,
 )
+from explorer.app.session.feed import watch_of
 from explorer.app.session.worker import Channel
 from explorer.errors import ExplorerError
 from explorer.mechanism.design import Design

@@ -8,10 +8,10 @@ from functools import partial
 import viser
 
 from explorer.app.features.feature import Feature, Feed, Services, Tab
-from explorer.app.features.orientation.feeds import RangeFeed, ShareFeed, TiltsFeed
+from explorer.app.features.orientation.feeds import PositionFeed, RangeFeed, TiltsFeed
 from explorer.app.features.orientation.panel import OrientationPanel
 from explorer.app.features.orientation.scene import OrientationScene
-from explorer.app.features.orientation.tasks import range_solids, share_at, tilts_at_nodes
+from explorer.app.features.orientation.tasks import orientations_at, range_solid, tilts_at_nodes
 
 
 def _of_kind(kind: Callable[[Services], Feed], services: Services) -> Feed:
@@ -23,6 +23,7 @@ ORIENTATION = Feature(
     "orientation",
     tabs=(Tab("analyse", "Tilt", OrientationPanel, viser.Icon.COMPASS),),
     scene=(OrientationScene,),
-    later_feeds=tuple(partial(_of_kind, kind) for kind in (ShareFeed, TiltsFeed, RangeFeed)),
-    tasks=(share_at, tilts_at_nodes, range_solids),
+    later_feeds=tuple(partial(_of_kind, kind) for kind in (PositionFeed, TiltsFeed, RangeFeed)),
+    tasks=(orientations_at, tilts_at_nodes, range_solid),
+    lists=("Solid over tilts",),
 )

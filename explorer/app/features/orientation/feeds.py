@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from explorer.app.features.feature import Services
 from explorer.app.features.orientation.tasks import (
+    PositionDrawing,
+    PositionRequest,
     RangeDrawing,
     RangeRequest,
-    ShareDrawing,
-    ShareRequest,
     TiltsDrawing,
     TiltsRequest,
-    range_solids,
-    share_at,
+    orientations_at,
+    range_solid,
     tilts_at_nodes,
 )
 from explorer.app.session.feed import Feed
@@ -23,14 +23,14 @@ from explorer.mechanism.tilt_torsion import tilt_torsion_of
 DIGITS = 3
 
 
-class ShareFeed(Feed[ShareRequest, ShareDrawing]):
-    """Shares of all orientations at the present position."""
+class PositionFeed(Feed[PositionRequest, PositionDrawing]):
+    """Orientations that the present position can have."""
 
     def __init__(self, services: Services) -> None:
         super().__init__(
             services.worker,
-            share_at,
-            lambda frame: ShareRequest(frame.state.design, frame.state.pose.position),
+            orientations_at,
+            lambda frame: PositionRequest(frame.state.design, frame.state.pose.position),
             services.session.redraw,
         )
 
@@ -39,7 +39,9 @@ class TiltsFeed(Feed[TiltsRequest, TiltsDrawing]):
     """Greatest tilts over the workspace, while they are shown."""
 
     def __init__(self, services: Services) -> None:
-        super().__init__(services.worker, tilts_at_nodes, _tilts_of, services.session.redraw)
+        super().__init__(
+            services.worker, tilts_at_nodes, _tilts_of, services.session.redraw, has_stages=True
+        )
 
 
 def _tilts_of(frame: Frame) -> TiltsRequest | None:
@@ -50,14 +52,14 @@ def _tilts_of(frame: Frame) -> TiltsRequest | None:
 
 
 class RangeFeed(Feed[RangeRequest, RangeDrawing]):
-    """Workspaces over a range of tilts, while one is shown."""
+    """The workspace over a range of tilts, while one is shown."""
 
     def __init__(self, services: Services) -> None:
-        super().__init__(services.worker, range_solids, _range_of, services.session.redraw)
+        super().__init__(services.worker, range_solid, _range_of, services.session.redraw)
 
 
 def _range_of(frame: Frame) -> RangeRequest | None:
     view, design = frame.state.view.orientation, frame.state.design
     if view.over == "none":
         return None
-    return RangeRequest(design, home_pose(design), view.range)
+    return RangeRequest(design, home_pose(design), view.range, view.over)

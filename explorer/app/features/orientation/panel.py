@@ -13,9 +13,11 @@ import viser
 from explorer.app.browser.viser_gaps import run_script
 from explorer.app.features.feature import Services
 from explorer.app.features.orientation.actions import ANGLES, GoToTilt, SetTiltTorsion
-from explorer.app.features.orientation.feeds import RangeFeed, ShareFeed, TiltsFeed
+from explorer.app.features.orientation.feeds import PositionFeed, RangeFeed, TiltsFeed
 from explorer.app.features.orientation.polar_map import legend, polar_map
 from explorer.app.features.orientation.scale import scale_of_tilts
+from explorer.app.features.orientation.tasks import ORIENTATIONS
+from explorer.app.features.orientation.torsion_strip import torsion_strip
 from explorer.app.inputs.bindings import Bound
 from explorer.app.inputs.controls import Controls
 from explorer.app.inputs.tracks import Span
@@ -25,6 +27,7 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.markup import alert, box, caption, dim, format_number, row, table
+from explorer.app.widgets.under_way import UnderWay, problem, progress
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.tilt_torsion import TiltTorsion, tilt_torsion_of
 from explorer.numerics.number_text import format_decimals
@@ -32,17 +35,19 @@ from explorer.workspace.orientations.tilts import (
     GreatestTilt,
     greatest_tilt,
     tilt_map,
-    torsion_range,
 )
-from explorer.workspace.solids.solid import Solid
+from explorer.workspace.orientations.torsions import torsion_range
 
-OVER = {"nothing": "none", "some of the tilts": "reachable", "all of the tilts": "dexterous"}
+OVER = {"none": "none", "reachable": "reachable", "dexterous": "dexterous"}
 SPANS = (Span(-180.0, 180.0, 0.1), Span(0.0, 180.0, 0.1), Span(-180.0, 180.0, 0.1))
 HINTS = (
     "Direction in the base's xy-plane, from x towards y, that the platform's z-axis tilts towards.",
     "Angle between the z-axes of platform and base.",
     "Turn of the platform about its own z-axis; at tilt 0 it is the yaw.",
 )
+VOLUME_HINT = f"Volume of the solid as it is drawn, over {ORIENTATIONS} orientations"
+# Difference of tilts in degrees that is not told.
+SAME_TILT = 0.05
 # Tilt below which the azimuth has no effect, in degrees.
 LEVEL = 1e-6
 
@@ -53,13 +58,15 @@ _TILT = msgspec.json.Decoder(
     ]
 )
 
+_TORSION = msgspec.json.Decoder(Annotated[float, msgspec.Meta(ge=-360.0, le=360.0)])
+
 
 class OrientationPanel:
     """The map of tilts with its figures and angles, and what is drawn over the workspace."""
 
     def __init__(self, services: Services) -> None:
         gui, self._session = services.gui, services.session
-        self._shares = services.get(ShareFeed)
+        self._here = services.get(PositionFeed)
         self._tilts, self._ranges = services.get(TiltsFeed), services.get(RangeFeed)
         self._controls = controls = Controls(gui, services.session)
         self._top = gui.add_html("")
@@ -67,18 +74,20 @@ class OrientationPanel:
         self._legend = gui.add_html("")
         for axis, name in enumerate(ANGLES):
             self._add_angle(axis, name)
+        self._strip = gui.add_html("")
         with gui.add_folder("Over the workspace"):
             controls.checkbox(
                 "Greatest tilts",
                 "Draw the greatest tilt in every azimuth, at the present torsion, at nodes over "
-                "the workspace.",
+                "the workspace. The cut of the workspace opens them too.",
                 "view.orientation.tilts",
             )
             self._scale = gui.add_html("", visible=False)
+            self._tilts_under_way = UnderWay(gui, "tilts", self._tilts)
             controls.dropdown(
-                "Positions with",
-                "Draw the positions that have some or all orientations which a tilt from the "
-                "orientation of home leads to: the reachable and the dexterous workspace.",
+                "Solid over tilts",
+                "Draw the positions that have at least one (reachable) or all (dexterous) of the "
+                "orientations to which a tilt from the orientation of home leads.",
                 OVER,
                 "view.orientation.over",
             )
@@ -90,8 +99,9 @@ class OrientationPanel:
                 step=1.0,
                 visible=lambda state: state.view.orientation.over != "none",
             )
-            self._volumes = gui.add_html("", visible=False)
+            self._volume = gui.add_html("", visible=False)
         services.buttons.on("orientation.go", self._go)
+        services.buttons.on("orientation.torsion", self._turn)
         run_script(services.server, read_script("tilts"))
 
     def _add_angle(self, axis: int, name: str) -> None:
@@ -120,22 +130,18 @@ class OrientationPanel:
         yield self._map, "content", box(polar_map(tilts, here, home))
         yield self._legend, "content", box(caption("What ends the tilts"), legend(tilts))
         yield from self._controls.updates(frame)
-        drawing = self._tilts.drawing
-        yield self._scale, "visible", drawing is not None
-        if drawing is not None:
-            yield self._scale, "content", box(scale_of_tilts(drawing))
-        ranged = self._ranges.drawing
-        waits = frame.state.view.orientation.over != "none"
-        yield self._volumes, "visible", waits
-        if waits:
-            words = dim("computing …")
-            if ranged is not None and ranged.problem:
-                words = alert("There is no such workspace", ranged.problem)
-            elif ranged is not None:
-                look = "" if self._ranges.is_current else "is-outdated"
-                rows = table(_volume_rows(ranged.reachable, ranged.dexterous))
-                words = f'<div class="{look}">{rows}</div>'
-            yield self._volumes, "content", box(words)
+        found = self._here.drawing
+        yield self._strip, "visible", found is not None
+        if found is not None:
+            yield self._strip, "content", box(torsion_strip(found.by_torsion, here.torsion))
+        yield from self._tilts_under_way.updates()
+        view = frame.state.view.orientation
+        yield self._scale, "visible", view.tilts
+        if view.tilts:
+            yield self._scale, "content", box(tilts_words(self._tilts))
+        yield self._volume, "visible", view.over != "none"
+        if view.over != "none":
+            yield self._volume, "content", box(range_words(self._ranges))
 
     def _summary(self, frame: Frame, here: TiltTorsion, least: GreatestTilt) -> Iterator[str]:
         """Yield the greatest tilt, the share of orientations and the range of torsions."""
@@ -149,11 +155,12 @@ class OrientationPanel:
                 f"{dim('in every azimuth')}</div>"
                 + caption(f"Greatest tilt at torsion {_degrees(here.torsion)}{why}")
             )
-        drawing = self._shares.drawing
-        share = "…"
-        if drawing is not None:
-            value, error = drawing.share.share, drawing.share.standard_error
+        found = self._here.drawing
+        share = best = "…"
+        if found is not None:
+            value, error = found.share.share, found.share.standard_error
             share = f"{100.0 * value:.2f} % ± {100.0 * error:.2f} %"
+            best = best_words(found.by_torsion.best, least)
         torsions = torsion_range(design, position, here.torsion, here.azimuth, here.tilt)
         span = "none here"
         if not math.isnan(torsions.low):
@@ -163,13 +170,18 @@ class OrientationPanel:
         yield table(
             (
                 row(
-                    dim("of all orientations"),
+                    dim("Largest at any torsion"),
+                    best,
+                    hint="The greatest tilt in every azimuth at the torsion that allows the most",
+                ),
+                row(
+                    dim("Share of all orientations"),
                     share,
                     hint="Share of all orientations that this position can have within the limits, "
                     "with its standard error",
                 ),
                 row(
-                    dim("torsions"),
+                    dim("Torsions without a gap"),
                     span,
                     hint="Torsions that a turn about the platform's z-axis leads to, at the "
                     "present azimuth and tilt",
@@ -183,20 +195,47 @@ class OrientationPanel:
         if angles is not None:
             self._session.do(GoToTilt(*angles), who=client.client_id)
 
+    def _turn(self, text: str, client: viser.ClientHandle) -> None:
+        """Turn the platform to a torsion that a page sent, in degrees."""
+        torsion: float | None = decode_text(text, _TORSION)
+        if torsion is not None:
+            self._session.do(SetTiltTorsion(ANGLES.index("torsion"), torsion), who=client.client_id)
+
+
+def best_words(best: GreatestTilt, least: GreatestTilt) -> str:
+    """Return the greatest tilt at any torsion in words, beside that at the present one."""
+    if math.isnan(best.tilt):
+        return "none"
+    if best.tilt - least.tilt < SAME_TILT:
+        return f"{_degrees(best.tilt)}, as here"
+    return f"{_degrees(best.tilt)} at {_degrees(best.torsion)}"
+
+
+def tilts_words(feed: TiltsFeed) -> str:
+    """Return the scale of the colours of tilts, or how far they are, as HTML."""
+    if feed.problem is not None:
+        return problem(feed, "The tilts could not be computed", "Compute the tilts")
+    if feed.drawing is None:
+        return dim(progress(feed).capitalize())
+    look = "" if feed.is_current else "is-outdated"
+    return f'<div class="{look}">{scale_of_tilts(feed.drawing)}</div>'
+
+
+def range_words(feed: RangeFeed) -> str:
+    """Return the volume over a range of tilts, as HTML."""
+    if feed.problem is not None:
+        return problem(feed, "The solid could not be made", "Compute the solid")
+    drawing = feed.drawing
+    if drawing is None:
+        return dim("Computing …")
+    solid, design = drawing.solid, drawing.request.design
+    look = "" if feed.is_current else "is-outdated"
+    if solid.is_empty:
+        return alert("This workspace is empty", f"Emptied by: {', '.join(solid.empty_because)}.")
+    text = f"{format_number(solid.volume, 5, size=design.reach**3)} units³"
+    name = dim(f"{drawing.request.over.capitalize()} volume")
+    return f'<div class="{look}">{table((row(name, text, hint=VOLUME_HINT),))}</div>'
+
 
 def _degrees(angle: float) -> str:
     return f"{format_decimals(angle, 1)}°"
-
-
-def _volume_rows(reachable: Solid | None, dexterous: Solid | None) -> Iterator[str]:
-    """Yield the volumes of both workspaces over a range."""
-    for name, hint, solid in (
-        ("reachable", "Positions that have one of the orientations at least", reachable),
-        ("dexterous", "Positions that have all of them", dexterous),
-    ):
-        if solid is None:
-            continue
-        text = f"{format_number(solid.volume, 6)} units³"
-        if solid.is_empty:
-            text = f"empty: {', '.join(solid.empty_because)}"
-        yield row(dim(name), escape(text), hint=hint)

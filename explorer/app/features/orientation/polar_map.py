@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections import Counter
 from collections.abc import Iterator
@@ -9,7 +10,7 @@ from html import escape
 
 import msgspec
 
-from explorer.app.widgets.colours import Rgb, css
+from explorer.app.widgets.colours import MARGIN_COLOURS, Rgb, css
 from explorer.app.widgets.markup import row, swatch, table
 from explorer.mechanism.tilt_torsion import TiltTorsion
 from explorer.workspace.orientations.tilts import TiltMap
@@ -26,19 +27,19 @@ FREE: Rgb = (140, 150, 160)
 """Colour where the platform tilts by 180° without a limit, and of limits without their own."""
 
 COLOURS: dict[str, Rgb] = {
-    "margin δ1": (213, 94, 0),
-    "margin δ2": (204, 121, 167),
-    "margin δ3": (230, 159, 0),
-    "carriage order": (0, 158, 115),
-    "gap": (90, 190, 150),
-    "l1": (0, 114, 178),
-    "d2": (86, 180, 233),
-    "d4": (64, 110, 220),
-    "l4": (120, 94, 200),
-    "guide": (110, 120, 60),
-    "swing": (150, 80, 60),
+    "margin δ1": MARGIN_COLOURS[0],
+    "margin δ2": MARGIN_COLOURS[1],
+    "margin δ3": MARGIN_COLOURS[2],
+    "carriage order": (0, 150, 150),
+    "gap": (120, 200, 200),
+    "l1": (24, 74, 150),
+    "d2": (60, 150, 230),
+    "d4": (140, 190, 240),
+    "l4": (70, 80, 200),
+    "guide": (150, 120, 50),
+    "swing": (120, 70, 40),
 }
-"""Colours of limits by the beginning of their names, apart for those with faulty colour vision."""
+"""Colours of limits by the beginning of their names; those of margins are theirs in the scene."""
 
 
 def colour_of(limit: str | None) -> Rgb:
@@ -75,7 +76,7 @@ def polar_map(tilts: TiltMap, here: TiltTorsion, home: TiltTorsion) -> str:
         f'<svg class="ex-map ex-tilts" viewBox="0 0 {WIDTH:g} {HEIGHT:g}" role="img" '
         'aria-label="Greatest tilt by azimuth" '
         f'data-tilts="{escape(msgspec.json.encode(facts).decode())}">{"".join(pieces)}</svg>'
-        f'<div class="ex-reading ex-dim">{HINT}</div>'
+        f'<div class="ex-reading ex-dim" data-hint="{HINT}">{HINT}</div>'
     )
 
 
@@ -130,11 +131,11 @@ def _region(tilts: TiltMap, edge: float) -> Iterator[str]:
     points = [_place(a, t, edge) for a, t in zip(tilts.azimuths.tolist(), values, strict=True)]
     outline = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
     yield f'<polygon class="possible" points="{outline}"/>'
-    for index, limit in enumerate(tilts.limits):
-        x, y = points[index]
-        before, after = (
-            f"{0.5 * (x + u):.1f} {0.5 * (y + v):.1f}"
-            for u, v in (points[index - 1], points[(index + 1) % len(points)])
-        )
-        path = f"M{before}L{x:.1f} {y:.1f}L{after}"
-        yield f'<path class="border" stroke="{css(colour_of(limit))}" d="{path}"/>'
+    middles = [
+        (0.5 * (x + u), 0.5 * (y + v))
+        for (x, y), (u, v) in zip(points, [*points[1:], points[0]], strict=True)
+    ]
+    for limit, group in itertools.groupby(range(len(points)), lambda k: tilts.limits[k]):
+        part = [at for k in group for at in (middles[k - 1], points[k], middles[k])]
+        path = "L".join(f"{x:.1f} {y:.1f}" for x, y in part)
+        yield f'<path class="border" stroke="{css(colour_of(limit))}" d="M{path}"/>'

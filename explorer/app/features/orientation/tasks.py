@@ -1,12 +1,15 @@
-"""The worker's tasks: the share of orientations, tilts over the workspace, ranges of tilts."""
+"""The worker's tasks: orientations of a position, tilts over the workspace, ranges of tilts."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
-from explorer.errors import ExplorerError
+from explorer.app.features.workspace.tasks import LIVE_TOLERANCE
+from explorer.app.session.feed import watch_of
+from explorer.app.session.worker import Channel
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose, Triple
 from explorer.mechanism.tilt_torsion import rotation_from_tilt_torsion
@@ -15,35 +18,48 @@ from explorer.workspace.extremes import extent_of
 from explorer.workspace.orientations.sets import cone_of_directions
 from explorer.workspace.orientations.share import OrientationShare, orientation_share
 from explorer.workspace.orientations.tilts import greatest_tilts
+from explorer.workspace.orientations.torsions import TiltByTorsion, tilt_by_torsion
 from explorer.workspace.solids.solid import Solid
 from explorer.workspace.solids.solids import dexterous_solid, reachable_solid, workspace_solid
 
 NODES = 20
 """Number of nodes on each axis of the extent, at which tilts are computed."""
 
+# Number of parts of the nodes, between which progress is reported.
+PARTS = 10
+
 ORIENTATIONS = 33
 """Number of orientations that stand for a range of tilts."""
 
 
 @dataclass(frozen=True)
-class ShareRequest:
-    """A request for the share of all orientations that a position can have."""
+class PositionRequest:
+    """A request for the orientations that a position can have."""
 
     design: Design
     position: Triple
 
 
 @dataclass(frozen=True)
-class ShareDrawing:
-    """The share of all orientations that a position can have."""
+class PositionDrawing:
+    """The orientations that a position can have.
 
-    request: ShareRequest
+    Attributes:
+        request: The request.
+        share: Share of all orientations.
+        by_torsion: Greatest tilt in every azimuth at each torsion.
+    """
+
+    request: PositionRequest
     share: OrientationShare
+    by_torsion: TiltByTorsion
 
 
-def share_at(request: ShareRequest) -> ShareDrawing:
-    """Return the share of all orientations that a position can have."""
-    return ShareDrawing(request, orientation_share(request.design, request.position))
+def orientations_at(request: PositionRequest) -> PositionDrawing:
+    """Return the orientations that a position can have."""
+    design, position = request.design, request.position
+    share = orientation_share(design, position)
+    return PositionDrawing(request, share, tilt_by_torsion(design, position))
 
 
 @dataclass(frozen=True)
@@ -71,9 +87,14 @@ class TiltsDrawing:
     step: float
 
 
-def tilts_at_nodes(request: TiltsRequest) -> TiltsDrawing:
-    """Return the greatest tilts at nodes over the workspace of tilt zero."""
-    design = request.design
+def tilts_at_nodes(request: TiltsRequest, channel: Channel | None = None) -> TiltsDrawing:
+    """Return the greatest tilts at nodes over the workspace of tilt zero.
+
+    Args:
+        request: The request.
+        channel: Channel to the parent, which gets each `Stage` and may cancel; None for neither.
+    """
+    design, watch = request.design, watch_of(channel)
     rotation = rotation_from_tilt_torsion((0.0, 0.0, request.torsion))
     solid = workspace_solid(design, rotation)
     if solid.is_empty:
@@ -83,7 +104,11 @@ def tilts_at_nodes(request: TiltsRequest) -> TiltsDrawing:
     shares = (np.arange(NODES) + 0.5) / NODES
     axes = [low + shares * (high - low) for low, high in zip(lows, highs, strict=True)]
     nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    tilts = greatest_tilts(design, nodes, request.torsion)
+    parts: list[FloatArray] = []
+    for index, part in enumerate(np.array_split(nodes, PARTS)):
+        watch("greatest tilts", index / PARTS)
+        parts.append(greatest_tilts(design, part, request.torsion))
+    tilts = np.concatenate(parts)
     known = np.isfinite(tilts)
     step = float((highs - lows).max()) / NODES
     return TiltsDrawing(request, nodes[known], tilts[known], step)
@@ -91,44 +116,32 @@ def tilts_at_nodes(request: TiltsRequest) -> TiltsDrawing:
 
 @dataclass(frozen=True)
 class RangeRequest:
-    """A request for the workspaces over a range of tilts from the orientation of home.
+    """A request for a workspace over a range of tilts from the orientation of home.
 
     Attributes:
         design: The manipulator.
         home: Its home pose.
         tilt: Largest tilt, in degrees.
+        over: Whether positions have one of the orientations at least, or all of them.
     """
 
     design: Design
     home: Pose
     tilt: float
+    over: Literal["reachable", "dexterous"]
 
 
 @dataclass(frozen=True)
 class RangeDrawing:
-    """The workspaces over a range of tilts.
-
-    Attributes:
-        request: The request.
-        reachable: Positions that have one of the orientations at least.
-        dexterous: Positions that have all of them.
-        problem: Why there are none; "" if there are.
-    """
+    """A workspace over a range of tilts."""
 
     request: RangeRequest
-    reachable: Solid | None
-    dexterous: Solid | None
-    problem: str = ""
+    solid: Solid
 
 
-def range_solids(request: RangeRequest) -> RangeDrawing:
-    """Return the reachable and the dexterous workspace over a range of tilts."""
-    try:
-        rotations = cone_of_directions(request.home.rotation, request.tilt, ORIENTATIONS)
-        return RangeDrawing(
-            request,
-            reachable_solid(request.design, rotations),
-            dexterous_solid(request.design, rotations),
-        )
-    except ExplorerError as error:
-        return RangeDrawing(request, None, None, str(error))
+def range_solid(request: RangeRequest) -> RangeDrawing:
+    """Return the workspace over a range of tilts."""
+    design = request.design
+    rotations = cone_of_directions(request.home.rotation, request.tilt, ORIENTATIONS)
+    make = reachable_solid if request.over == "reachable" else dexterous_solid
+    return RangeDrawing(request, make(design, rotations, LIVE_TOLERANCE * design.reach))

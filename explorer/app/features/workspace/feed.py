@@ -22,7 +22,11 @@ class WorkspaceFeed(Feed[WorkspaceRequest, WorkspaceDrawing]):
 
     def __init__(self, services: Services) -> None:
         super().__init__(
-            services.worker, draw_workspace, _request_for, services.session.redraw, has_stages=True
+            services.worker,
+            draw_workspace,
+            workspace_request,
+            services.session.redraw,
+            has_stages=True,
         )
 
     @property
@@ -33,7 +37,8 @@ class WorkspaceFeed(Feed[WorkspaceRequest, WorkspaceDrawing]):
         return None if self.drawing is None else self.drawing.surface
 
 
-def _request_for(frame: Frame) -> WorkspaceRequest | None:
+def workspace_request(frame: Frame) -> WorkspaceRequest | None:
+    """Return the request for the workspace of a frame; None if none is shown."""
     view = frame.state.view.workspace
     if not (view.solid or view.hull):
         return None

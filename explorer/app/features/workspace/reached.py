@@ -7,13 +7,11 @@ from typing import TypeAlias
 
 import numpy as np
 
-from explorer.app.session.feed import Stage
-from explorer.app.session.worker import Channel
 from explorer.errors import ExplorerError
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.stages import Watch, unwatched
+from explorer.numerics.stages import Watch
 from explorer.workspace.accessible.start import StartError
 from explorer.workspace.accessible.workspace import (
     PairCost,
@@ -90,18 +88,6 @@ def reach_workspace(
     if len(_cache) > CACHED:
         del _cache[next(iter(_cache))]
     return result
-
-
-def watch_of(channel: Channel | None) -> Watch:
-    """Return a watch that sends each stage to the parent and ends the task when it cancels."""
-    if channel is None:
-        return unwatched
-
-    def watch(words: str, share: float) -> None:
-        channel.raise_if_cancelled()
-        channel.send(Stage(words, share))
-
-    return watch
 
 
 def trouble_of(error: ExplorerError) -> Trouble:

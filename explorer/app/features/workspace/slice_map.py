@@ -73,6 +73,14 @@ def level_within(low: float, high: float, level: float | None) -> float:
     return level if level is not None and low <= level <= high else 0.5 * (low + high)
 
 
+def keeps_above(axis: Axis, flipped: bool) -> bool:
+    """Return whether a cut keeps what lies above its level.
+
+    The half that faces the isometric camera is cut away, or kept if the cut is flipped.
+    """
+    return (axis == "y") != flipped
+
+
 def slice_map(
     colouring: Colouring,
     extent: tuple[FloatArray, FloatArray],

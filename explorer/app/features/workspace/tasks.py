@@ -13,19 +13,20 @@ from explorer.app.features.workspace.reached import (
     Trouble,
     reach_workspace,
     reached_of,
-    watch_of,
 )
 from explorer.app.features.workspace.slice_map import (
     AXES,
     CUT,
     Axis,
     SliceMap,
+    keeps_above,
     level_within,
     slice_map,
 )
 from explorer.app.features.workspace.volume import exact_volume
 from explorer.app.scene.bands import PLAIN, Colouring, Measure, Shell
 from explorer.app.scene.creases import creased_faces
+from explorer.app.session.feed import watch_of
 from explorer.app.session.worker import Channel
 from explorer.errors import InputError
 from explorer.mechanism.design import Design
@@ -177,8 +178,7 @@ def draw_workspace(request: WorkspaceRequest, channel: Channel | None = None) ->
     if request.cut is not None and extent is not None and whole_extent is not None:
         axis = AXES.index(request.cut)
         level = level_within(float(extent[0][axis]), float(extent[1][axis]), request.level)
-        # The half that faces the isometric camera is cut away.
-        side = -1.0 if (request.cut == "y") != request.flipped else 1.0
+        side = -1.0 if keeps_above(request.cut, request.flipped) else 1.0
         cut = request.cut, level, HalfSpace(CUT, side * np.eye(3)[axis], side * level)
         limits = (*limits, cut[2])
         shown = solid if reached is None else cut_solid(solid, cut[2])

@@ -1,0 +1,160 @@
+"""The torsions that a position can have, and the greatest tilt at each of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from explorer.mechanism.design import Design
+from explorer.mechanism.tilt_torsion import rotation_from_tilt_torsion
+from explorer.numerics.arrays import FloatArray
+from explorer.workspace.limits.valid_poses import Rules
+from explorer.workspace.orientations.tilts import (
+    GreatestTilt,
+    checked_torsion,
+    even_angles,
+    greatest_tilt,
+    greatest_tilts,
+    in_degrees,
+    names_of,
+    one_position,
+)
+from explorer.workspace.orientations.turns import turn_rows
+
+TORSIONS = 72
+"""Number of torsions at which the greatest tilt is measured."""
+
+# Number of azimuths between which the least tilt is searched at each torsion.
+AZIMUTHS = 36
+# Width in degrees of the interval of torsions at which the search for the best one ends.
+TORSION_WIDTH = 1e-3
+
+
+@dataclass(frozen=True)
+class TorsionRange:
+    """The torsions that lead on from one without a gap, at a tilt; angles in degrees.
+
+    Attributes:
+        low: Least torsion; NaN if the torsion that the range starts from violates a limit.
+        high: Largest torsion, at most 360° above the least one; NaN as `low`.
+        low_limit: Name of the limit at the least torsion, or that the start violates; None if
+            every torsion is possible.
+        high_limit: Name of the limit at the largest torsion, as `low_limit`.
+    """
+
+    low: float
+    high: float
+    low_limit: str | None
+    high_limit: str | None
+
+
+@dataclass(frozen=True)
+class TiltByTorsion:
+    """The greatest tilt in every azimuth of a position at each of n torsions; angles in degrees.
+
+    Attributes:
+        torsions: Torsions at equal distances once around from −180 on, shape (n,).
+        tilts: Greatest tilts in every azimuth, shape (n,); NaN where tilt zero violates a limit.
+        best: The largest of all; its tilt is NaN if no torsion is possible.
+    """
+
+    torsions: FloatArray
+    tilts: FloatArray
+    best: GreatestTilt
+
+
+def torsion_range(
+    design: Design,
+    position: ArrayLike,
+    torsion: float | None = None,
+    azimuth: float = 0.0,
+    tilt: float = 0.0,
+) -> TorsionRange:
+    """Return the torsions that a position can have without a gap from one torsion, at a tilt.
+
+    Args:
+        design: The manipulator.
+        position: Position of b4 in the base frame, in design units, shape (3,).
+        torsion: Torsion in degrees that the range starts from; that of the home pose if None.
+        azimuth: Azimuth in degrees, which stays the same.
+        tilt: Tilt in degrees, which stays the same.
+
+    Raises:
+        InputError: not a position, or angles that are not finite.
+    """
+    p, sigma = one_position(position), checked_torsion(design, torsion)
+    r = rotation_from_tilt_torsion([azimuth, tilt, sigma])
+    # Downwards the platform's y-axis turns towards the negative x-axis.
+    turns = np.stack([_turn_about_z(r, -1.0), _turn_about_z(r, 1.0)])
+    angles, limits = _end_of_turns(design, p, turns)
+    down, up = in_degrees(angles).tolist()
+    names = names_of(design, limits)
+    if names[0] is None and names[1] is None:
+        return TorsionRange(sigma - 180.0, sigma + 180.0, None, None)
+    if names[0] is None or names[1] is None:
+        # Half a turn one way ends where the other way ends, beyond that half turn.
+        rest = np.stack([_turn_about_z(_turned_half(r), -1.0), _turn_about_z(_turned_half(r), 1.0)])
+        angles, limits = _end_of_turns(design, p, rest)
+        more, rest_names = in_degrees(angles).tolist(), names_of(design, limits)
+        if names[0] is None:
+            down, names = 180.0 + more[0], (rest_names[0], names[1])
+        else:
+            up, names = 180.0 + more[1], (names[0], rest_names[1])
+    return TorsionRange(sigma - down, sigma + up, *names)
+
+
+def tilt_by_torsion(design: Design, position: ArrayLike, torsions: int = TORSIONS) -> TiltByTorsion:
+    """Return the greatest tilt in every azimuth of a position at torsions once around.
+
+    The best of them is searched between the neighbours of the best one of the row.
+
+    Args:
+        design: The manipulator.
+        position: Position of b4 in the base frame, in design units, shape (3,).
+        torsions: Number of torsions, 3 or more.
+
+    Raises:
+        InputError: not a position, or no usable number of torsions.
+    """
+    p = one_position(position)
+    angles = even_angles("torsions", torsions) - 180.0
+    tilts = greatest_tilts(design, p, angles, AZIMUTHS)
+    if np.isnan(tilts).all():
+        return TiltByTorsion(angles, tilts, greatest_tilt(design, p, float(angles[0])))
+    step, middle = 360.0 / len(angles), float(angles[np.nanargmax(tilts)])
+    best = greatest_tilt(design, p, middle)
+    low, high = middle - step, middle + step
+    while high - low > TORSION_WIDTH:
+        tried = np.linspace(low, high, 9)
+        found = np.nan_to_num(greatest_tilts(design, p, tried, AZIMUTHS), nan=-1.0)
+        top = int(found.argmax())
+        if found[top] > best.tilt:
+            best = greatest_tilt(design, p, float(tried[top]))
+        low, high = float(tried[max(top - 1, 0)]), float(tried[min(top + 1, 8)])
+    return TiltByTorsion(angles, tilts, best)
+
+
+def _end_of_turns(
+    design: Design, position: FloatArray, turns: FloatArray
+) -> tuple[FloatArray, list[int]]:
+    """Return the angles (n,) in radians at which turns (n, 3, 3, 3) end, and their limits."""
+    angles, limits = np.empty(len(turns)), np.empty(len(turns), dtype=np.int64)
+    rules = Rules.of(design).without_clearances()
+    positions = np.full((len(turns), 3), position)
+    turn_rows(len(turns), rules.row, rules.cones, positions, turns, angles, limits)
+    return angles, limits.tolist()
+
+
+def _turn_about_z(rotation: FloatArray, sign: float) -> FloatArray:
+    """Return the turn from a rotation about the platform's z-axis, shape (3, 3, 3)."""
+    x, y, z = rotation.T
+    still = np.column_stack([0.0 * x, 0.0 * y, z])
+    cosine = np.column_stack([x, y, 0.0 * z])
+    sine = sign * np.column_stack([y, -x, 0.0 * z])
+    return np.stack([still + cosine, 2.0 * sine, still - cosine], axis=-1)
+
+
+def _turned_half(rotation: FloatArray) -> FloatArray:
+    return rotation * np.array([-1.0, -1.0, 1.0])
