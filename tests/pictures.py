@@ -33,7 +33,13 @@ from explorer.app.state.actions import Open, Set, SetJoint, SetVariable
 from explorer.app.state.compared import Look
 from explorer.app.state.optimisation import OptimisationRequest
 from explorer.app.state.studies import Brush, within
-from explorer.app.state.view import PrototypeView, SingularView, View, WorkspaceView
+from explorer.app.state.view import (
+    OrientationView,
+    PrototypeView,
+    SingularView,
+    View,
+    WorkspaceView,
+)
 from explorer.app.storage.study_folders import StudyFolders
 from explorer.mechanism.design import JOINTS
 from explorer.mechanism.design_file import PRESETS
@@ -131,6 +137,22 @@ SCENES = {
                 ),
             ),
         ),
+    ),
+    # Cut open as above, so that the tilts inside are seen.
+    "tilt": Scene(
+        actions=(
+            Set(
+                "view",
+                replace(
+                    BARE,
+                    orientation=OrientationView(tilts=True),
+                    workspace=WorkspaceView(cut="y", level=5.0),
+                ),
+            ),
+        ),
+        panels=True,
+        tab="Tilt",
+        size=(1280, 900),
     ),
     # Where legs 2 and 4 collide, low on both sides, shows through the solid.
     "reachable": Scene(

@@ -6,7 +6,15 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from types import MappingProxyType
 
 from explorer.errors import InputError
-from explorer.reproduce import comparison, flags, kinematics, singularities, table_one
+from explorer.reproduce import (
+    comparison,
+    flags,
+    interference,
+    kinematics,
+    mode_paths,
+    singularities,
+    table_one,
+)
 from explorer.reproduce.claim import Claim, Result
 
 OUR_READING = (
@@ -38,7 +46,7 @@ CLAIMS: Mapping[str, Claim] = MappingProxyType(
                 "The paper gives no measure of the risk and no place of a2; here it is the "
                 "clearance of legs over the workspace of the optimum, for a range of a2.",
                 "explorer interference --design paper-optimal --position 10 5 9",
-                comparison.interference,
+                interference.interference,
             ),
             Claim(
                 "flat-tetrahedra",
@@ -82,8 +90,8 @@ CLAIMS: Mapping[str, Claim] = MappingProxyType(
                 "Any path connecting two assembly modes passes through a singularity (note that "
                 "this assertion is not true in general).",
                 "",
-                "explorer path --design paper-optimal --to 10 5 12",
-                flags.paths,
+                "explorer path --design paper-optimal --to 10 5 -9  # ends with status 1",
+                mode_paths.paths,
             ),
             Claim(
                 "table-1",

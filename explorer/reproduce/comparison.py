@@ -1,4 +1,4 @@
-"""Claims that compare the 4-4 with others: interference, workspace, orientations, simplicity."""
+"""Claims that compare the 4-4 with others: workspace, orientations, simplicity, cost."""
 
 from __future__ import annotations
 
@@ -8,8 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from explorer.legs.clearance import leg_clearances
-from explorer.legs.interference import step_overlaps
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.kinematics import inverse
@@ -17,111 +15,11 @@ from explorer.mechanism.margins import margins
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.reproduce.claim import Measured, Verdict
 from explorer.reproduce.six_legs import SixLegs, octahedral, six_four_twin
-from explorer.workspace.limits.constraints import constraints, satisfies
 
 OPTIMAL = PRESETS["paper-optimal"]
-ROTATION = home_pose(OPTIMAL).rotation
-A2X = (5.0, 10.0, 15.0, 20.0)
-"""Positions of a2 at which the twin is measured, in design units."""
-
-STEP, LOWEST = 1.0, 2.0
-RADII = (0.05, 0.1, 0.2, 0.3, 0.4, 0.6, 0.8)
 POSITIONS, ORIENTATIONS, AZIMUTHS, MOST_TILT = 150, 2000, 24, 90
 
 Holds = Callable[[FloatArray, FloatArray], BoolArray]
-
-
-def interference() -> Measured:
-    """Compare clearances of the 4-4 and its 6-4 twin over the workspace of the optimum."""
-    nodes = _nodes()
-    four = leg_clearances(OPTIMAL, nodes, ROTATION).clearance.min(axis=1)
-    moves = nodes + [0.0, 0.0, STEP]
-    within = _within(moves)
-    swept = step_overlaps(OPTIMAL, nodes[within], ROTATION, moves[within], ROTATION)
-    four_steps = float(swept.reshape(len(swept), -1).any(axis=1).mean())
-    rows: list[tuple[float, ...]] = []
-    lines = [
-        f"{'':14}{'least':>8}{'median':>8}{'clearer':>9}{'steps':>8}",
-        f"{'4-4':14}{four.min():8.3f}{np.median(four):8.3f}{'':9}{four_steps:8.1%}",
-    ]
-    for a2x in A2X:
-        twin = six_four_twin(OPTIMAL, a2x)
-        six = twin.clearances(nodes, ROTATION).min(axis=1)
-        steps = float(twin.step_overlaps(nodes[within], moves[within], ROTATION).mean())
-        clearer = float((six > four).mean())
-        rows.append((a2x, float(six.min()), float(np.median(six)), clearer, steps))
-        lines.append(
-            f"{twin.name:14}{six.min():8.3f}{np.median(six):8.3f}{clearer:9.1%}{steps:8.1%}"
-        )
-    lines.append("share of nodes without a collision, by the radius of all legs")
-    lines.append(f"{'':14}" + "".join(f"{radius:8g}" for radius in RADII))
-    shares = {"4-4": [float((four > 2.0 * radius).mean()) for radius in RADII]}
-    for a2x in A2X:
-        twin = six_four_twin(OPTIMAL, a2x)
-        six = twin.clearances(nodes, ROTATION).min(axis=1)
-        shares[twin.name] = [float((six > 2.0 * radius).mean()) for radius in RADII]
-    lines += [
-        f"{name:14}" + "".join(f"{share:8.1%}" for share in values)
-        for name, values in shares.items()
-    ]
-    worse = sum(least < four.min() for _, least, *_ in rows)
-    clearer = [row[3] for row in rows]
-    thin = [radius for k, radius in enumerate(RADII) if shares["4-4"][k] == 1.0]
-    better = [radius for k, radius in enumerate(RADII) if _beats(shares, k)]
-    always = max(thin, default=0.0)
-    legs23 = leg_clearances(OPTIMAL, nodes, ROTATION).clearance[:, 3]
-    text = (
-        f"At {len(nodes)} nodes of the optimum's workspace with z ≥ {LOWEST:g}, for a2x from "
-        f"{A2X[0]:g} to {A2X[-1]:g}: the least clearance of thin legs is {four.min():.3f} units "
-        f"for the 4-4 and {min(r[1] for r in rows):.3f} to {max(r[1] for r in rows):.3f} for the "
-        f"6-4, smaller for {worse} of {len(rows)} of them. Yet at {min(clearer):.0%} to "
-        f"{max(clearer):.0%} of the nodes the 6-4 is the clearer one, since legs 2 and 3 of the "
-        f"4-4 stand at most {legs23.max():.3f} apart everywhere. Legs with radii "
-        f"up to {always:g} collide nowhere in the 4-4."
-    )
-    if better:
-        text += (
-            " It has more positions free of collisions than every twin for radii of "
-            f"{', '.join(f'{radius:g}' for radius in better)}, not for the others tried."
-        )
-    verdict: Verdict = "not confirmed"
-    if worse == len(rows) and max(clearer) < 0.5:
-        verdict = "confirmed"
-    elif worse == len(rows) or better:
-        verdict = "confirmed within"
-    figures = {
-        "nodes": len(nodes),
-        "least_clearance": float(four.min()),
-        "median_clearance": float(np.median(four)),
-        "steps_with_overlap": four_steps,
-        "twins": [
-            dict(zip(("a2x", "least", "median", "clearer", "steps"), row, strict=True))
-            for row in rows
-        ],
-        "radii": RADII,
-        "free_shares": shares,
-    }
-    return Measured(text, verdict, figures, tuple(lines))
-
-
-def _beats(shares: dict[str, list[float]], index: int) -> bool:
-    """Whether the 4-4 has a larger share than every twin, and than none of them the same."""
-    others = [values[index] for name, values in shares.items() if name != "4-4"]
-    return all(shares["4-4"][index] > other for other in others)
-
-
-def _nodes() -> FloatArray:
-    """Return the nodes of a grid in the workspace of the optimum, off the base plane."""
-    reach = OPTIMAL.reach
-    lows, highs = OPTIMAL.limits.box or ((-reach,) * 3, (reach,) * 3)
-    axes = [np.arange(low, high + 0.5 * STEP, STEP) for low, high in zip(lows, highs, strict=True)]
-    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    grid = grid[grid[:, 2] >= LOWEST]
-    return grid[_within(grid)]
-
-
-def _within(positions: FloatArray) -> BoolArray:
-    return np.asarray(satisfies(OPTIMAL, constraints(OPTIMAL, ROTATION), positions).all(axis=-1))
 
 
 @dataclass(frozen=True)
@@ -155,10 +53,10 @@ def orientations() -> Measured:
         _abilities(other.name, other.holds, other.home[1]),
     ]
     lines = [
-        f"{'':16}{'volume/reach³':>14}{'mean share':>12}{'best':>8}{'mean tilt':>11}{'best':>8}"
+        f"{'':18}{'volume/reach³':>14}{'mean share':>12}{'best':>8}{'mean tilt':>11}{'best':>8}"
     ]
     lines += [
-        f"{a.name:16}{a.volume:14.3f}{a.share:12.2%}{a.best:8.2%}{a.tilt:10.1f}°{a.best_tilt:7.1f}°"
+        f"{a.name:18}{a.volume:14.3f}{a.share:12.2%}{a.best:8.2%}{a.tilt:10.1f}°{a.best_tilt:7.1f}°"
         for a in found
     ]
     ours, rivals = found[0], found[1:]

@@ -128,7 +128,7 @@ def six_four_twin(design: Design, a2x: float) -> SixLegs:
     }
     home = home_pose(design)
     return SixLegs(
-        f"6-4, a2x = {a2x:g}",
+        f"6-4, a2x = {a2x:.4g}",
         np.array([points[base] for base, _ in TWIN]),
         np.array([points[tip] for _, tip in TWIN]),
         design.reach,

@@ -17,13 +17,14 @@ from explorer import PRESETS, InputError
 from explorer.files.manual import read_page
 from explorer.files.packaged import packaged_file
 from explorer.mechanism.home import home_pose
-from explorer.mechanism.kinematics import attachment_points
+from explorer.mechanism.kinematics import attachment_points, inverse
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
-from explorer.reproduce import comparison, flags
+from explorer.reproduce import comparison
 from explorer.reproduce.claim import VERDICTS, Result
 from explorer.reproduce.claims import CLAIMS, measure_claims
+from explorer.reproduce.mode_paths import Paths, least_condition_on, random_paths
 from explorer.reproduce.six_legs import SixLegs, octahedral, six_four_twin
 from explorer.singularity.uncoupled import UNCOUPLED
 from explorer.workspace.orientations.share import orientation_share
@@ -169,7 +170,7 @@ def test_octahedral_platform_has_the_areas_of_the_design() -> None:
     assert area == pytest.approx(0.5 * OPTIMAL.a2x * OPTIMAL.a3[1], rel=1e-12)
 
 
-def test_share_of_thefour_four_is_that_of_its_own_measure() -> None:
+def test_share_of_the_four_four_is_that_of_its_own_measure() -> None:
     design = OPTIMAL
     position = np.array([10.0, 5.0, 9.0])
     turns = np.asarray(Rotation.random(40_000, rng=np.random.default_rng(2)).as_matrix())
@@ -183,8 +184,21 @@ def test_mobility_of_all_mechanisms_is_six() -> None:
         assert 6 * (parts["bodies"] - parts["joints"]) + parts["freedoms"] == 6
 
 
-def test_paths_within_a_mode_are_not_counted() -> None:
-    assert flags.paths().figures == {"paths": flags.PATHS, "without": 0}
+def test_paths_join_two_modes_of_the_same_joints() -> None:
+    count = 200
+    found = random_paths(np.random.default_rng(3), count)
+    which = np.arange(count)
+    (p, r), (q, s) = (found.poses(which, np.full(count, share)) for share in (0.0, 1.0))
+    np.testing.assert_allclose(inverse(OPTIMAL, p, r), inverse(OPTIMAL, q, s), atol=1e-6)
+    assert (np.sign(margins(p, r)) != np.sign(margins(q, s))).any(axis=1).all()
+
+
+def test_path_that_stays_in_a_mode_has_no_singular_pose() -> None:
+    home = home_pose(OPTIMAL)
+    points = np.tile(home.position, (1, 3, 1)) + [[[0.0] * 3, [0.5] * 3, [1.0, 0.0, 0.0]]]
+    still = np.zeros((1, 3))
+    path = Paths(points, home.rotation[None], still, still)
+    assert least_condition_on(path).tolist() == [np.inf]
 
 
 def test_unknown_claim_is_refused() -> None:

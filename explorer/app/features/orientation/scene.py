@@ -78,13 +78,14 @@ class OrientationScene(ScenePart):
             yield solid, "faces", self._mesh[1]
 
     def corners(self, placed: Placed) -> FloatArray:
-        """Return the corners of the box about the solid of the range."""
-        ranged = self._ranges.drawing
-        if ranged is None or ranged.solid.is_empty:
+        """Return the corners of the boxes about the nodes and about the solid of the range."""
+        tilts, ranged = self._tilts.drawing, self._ranges.drawing
+        drawn = [tilts.positions] if tilts is not None else []
+        drawn += [ranged.solid.vertices] if ranged is not None else []
+        ends = [np.array([p.min(axis=0), p.max(axis=0)]) for p in drawn if len(p)]
+        if not ends:
             return NO_POINTS
-        vertices = ranged.solid.vertices
-        ends = vertices.min(axis=0), vertices.max(axis=0)
-        return corners_of(placed.scale * np.array(ends))
+        return placed.scale * np.concatenate([corners_of(box) for box in ends])
 
 
 def kept_nodes(drawing: TiltsDrawing, view: WorkspaceView) -> BoolArray:
