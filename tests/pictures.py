@@ -44,7 +44,7 @@ from explorer.app.storage.study_folders import StudyFolders
 from explorer.mechanism.design import JOINTS
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
-from explorer.optimise.findings import CLEARANCE, PAPER_VOLUME, paper_start
+from explorer.optimise.paper import CLEARANCE, PAPER_VOLUME, paper_start
 from explorer.sweep.results import load_results
 from explorer.sweep.run import run_study
 from explorer.sweep.study import STUDIES, Sampling

@@ -12,6 +12,7 @@ from explorer.reproduce import (
     interference,
     kinematics,
     mode_paths,
+    search,
     singularities,
     table_one,
 )
@@ -109,7 +110,7 @@ CLAIMS: Mapping[str, Claim] = MappingProxyType(
                 OUR_READING,
                 "explorer optimise --design paper-initial --target-volume 8000 "
                 "--box 0 -12 0 20 22 18",
-                table_one.search,
+                search.search,
             ),
             Claim(
                 "orientations",

@@ -1,4 +1,4 @@
-"""Claims of Table 1: the two designs, the extents and volume of their workspaces, the search."""
+"""The claim of Table 1: the extents and volumes of the workspaces of its two designs."""
 
 from __future__ import annotations
 
@@ -13,8 +13,6 @@ from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import Pose
-from explorer.optimise.findings import PAPER_VOLUME, paper_problem
-from explorer.optimise.solver import optimise_design
 from explorer.reproduce.claim import Measured, Verdict
 from explorer.workspace.slices.volume import NodeCount, workspace_nodes, workspace_volume
 
@@ -24,8 +22,6 @@ Extent = tuple[tuple[float, float, float], tuple[float, float, float]]
 PRINTED_TO = 1e-3
 YAWS = (-72.6, -73.0, -73.1, -73.2, -73.6, -75.0, -90.0)
 """Yaws at which the nodes of the optimum are counted, in degrees."""
-
-PAPER_ITERATIONS = 220
 
 WHY_THEY_DIFFER = (
     "The paper counts grid nodes, those on the boundary included, and takes each for a whole "
@@ -129,32 +125,3 @@ def _turned(design: Design, yaw: float) -> Design:
     return msgspec.structs.replace(
         design, home=Pose.of_yaw_pitch_roll(home.position, (yaw, 0.0, 0.0))
     )
-
-
-def search() -> Measured:
-    """Match the paper's volume from its initial design, with and without interference."""
-    nodes = workspace_nodes(PRESETS["paper-optimal"]).volume
-    exact = workspace_volume(PRESETS["paper-optimal"]).volume
-    paper, ours = abs(1.0 - nodes / PAPER_VOLUME), abs(1.0 - exact / PAPER_VOLUME)
-    free, clear = (optimise_design(paper_problem(clearance)) for clearance in (None, 0.2))
-    found = [
-        ("interference off", free),
-        ("clearance 0.2 demanded", clear),
-    ]
-    text = (
-        f"The paper's optimum has F = {paper:.1e} by its nodes and {ours:.3f} by the exact volume. "
-        "From its initial design, in its box, the exact volume is matched to "
-        + " and to ".join(
-            f"F = {outcome.best.objective:.0e} in {outcome.iterations} iterations ({name})"
-            for name, outcome in found
-        )
-        + f", where the paper takes {PAPER_ITERATIONS}."
-    )
-    is_so = all(outcome.converged for _, outcome in found) and paper <= 1e-3 * (1.0 + 1e-9)
-    figures = {
-        "paper_objective_by_nodes": paper,
-        "paper_objective_exact": ours,
-        "iterations": {name: outcome.iterations for name, outcome in found},
-        "objective": {name: outcome.best.objective for name, outcome in found},
-    }
-    return Measured(text, "confirmed within" if is_so else "not confirmed", figures)

@@ -88,8 +88,8 @@ from explorer.mechanism.design import VARIABLES, Design, Swing
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import Pose
-from explorer.optimise.findings import paper_problem, paper_start
 from explorer.optimise.outcome import Iterate
+from explorer.optimise.paper import paper_problem, paper_start
 from explorer.optimise.problem import OBJECTIVES, YAW
 from explorer.optimise.record import decode_record, encode_record, record_of
 from explorer.optimise.refutation.lifting import MAXIMA, SWING_LIMIT

@@ -18,10 +18,9 @@ from explorer.errors import DesignError
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.numerics.compiled import warm
 from explorer.optimise.defaults import make_problem
-from explorer.optimise.findings import (
+from explorer.optimise.paper import (
     CLEARANCE,
     PAPER_VOLUME,
-    STARTS,
     paper_problem,
     reach_problem,
 )
@@ -29,6 +28,7 @@ from explorer.optimise.problem import Problem
 from explorer.optimise.search.model import Evaluation, Model
 from explorer.optimise.search.starts import more_starts
 from explorer.optimise.solver import optimise_design
+from explorer.reproduce.search import STARTS
 
 ROUNDS = 5
 # The other solvers end once they have what ours has, or after this many evaluations.

@@ -15,12 +15,7 @@ import pytest
 from command_line import CommandLine
 
 import explorer
-from explorer.cli.answers.optimisation import findings_table
-from explorer.measures.case import Case
-from explorer.measures.catalogue import measures_in
-from explorer.measures.measurements import measure_design
 from explorer.numerics.compiled import warm
-from explorer.optimise.findings import Finding
 from explorer.optimise.record import load_record
 
 COMMAND = ("optimise",)
@@ -197,13 +192,3 @@ def test_optimise_interrupt_leaves_files_unchanged(tmp_path: Path) -> None:
     assert "Traceback" not in complaint
     assert out.read_text() == "as it was"
     assert [path.name for path in tmp_path.iterdir()] == ["design.json"]
-
-
-def test_findings_table_has_a_row_per_finding() -> None:
-    case = Case(explorer.PRESETS["paper-optimal"], box=((8.0, 3.0, 7.0), (12.0, 7.0, 11.0)))
-    measured = measure_design(case, (*measures_in("optimise"), "reach"))
-    found = [Finding("given", None, None, None, measured), Finding("ours", 5, 1e-13, 0.1, measured)]
-    page = findings_table(found).splitlines()
-    assert [line.split()[0] for line in page[1:3]] == ["given", "ours"]
-    assert page[1].split()[1:3] == ["–", "–"]
-    assert {"5", "1.0e-13", "7053.044", "999", "20.4223"} <= {*page[2].split()}

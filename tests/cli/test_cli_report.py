@@ -14,7 +14,7 @@ from report_page import read, table_of
 
 import explorer
 from explorer.mechanism.design_file import encode_design
-from explorer.optimise.findings import paper_problem
+from explorer.optimise.paper import paper_problem
 from explorer.optimise.record import Record, RunRecord, Settings, Step, encode_record
 
 COMMAND = ("report",)

@@ -22,7 +22,7 @@ from explorer.measures.measurements import measure_design
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS, encode_design
 from explorer.optimise.defaults import make_problem
-from explorer.optimise.findings import paper_start
+from explorer.optimise.paper import paper_start
 from explorer.optimise.problem import Problem
 
 pytestmark = pytest.mark.usefixtures("warm_kernels")

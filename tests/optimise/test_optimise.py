@@ -35,7 +35,7 @@ from explorer.measures.case import Case
 from explorer.measures.size import corners_of, longest_leg
 from explorer.measures.statics import BoxStatics
 from explorer.mechanism.pose import yaw_pitch_roll_from_rotation
-from explorer.optimise.findings import paper_problem, paper_start, reach_problem
+from explorer.optimise.paper import paper_problem, paper_start, reach_problem
 from explorer.optimise.problem import AZIMUTHS, DISTANCES, ObjectiveName, distance_of
 from explorer.optimise.record import (
     Settings,

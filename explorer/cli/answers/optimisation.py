@@ -16,7 +16,6 @@ from explorer.measures.size import longest_leg
 from explorer.mechanism.design import VARIABLES, Design
 
 if TYPE_CHECKING:
-    from explorer.optimise.findings import Finding
     from explorer.optimise.outcome import Outcome
     from explorer.optimise.problem import Problem
 
@@ -130,65 +129,3 @@ def measure_rows(
         if "demanded_margin" in measure.needs:
             label += f", margins ≥ {after.demanded_margin:.4g}"
         yield label, (before[name], value)
-
-
-def finding_json(finding: Finding) -> dict[str, object]:
-    """Return a finding as plain values; null is not available."""
-    measured = finding.measured
-    names = ("volume", "node_step", "node_count", "node_volume", "reach", "box_margin")
-    return {
-        "name": finding.name,
-        "design": measured.design,
-        **attributes(finding, "iterations objective seconds"),
-        **{name: measured[name] for name in names},
-        "clearance": measured["least_clearance"],
-        "nearest_legs": measured.nearest,
-        "demanded_margin": measured.demanded_margin,
-        "demanded_clearance": measured["demanded_clearance"],
-    }
-
-
-def findings_table(findings: Sequence[Finding]) -> str:
-    """Return the table of findings with notes."""
-    from explorer.optimise.findings import BOX, CLEARANCE, PAPER_VOLUME, STARTS, STEP
-
-    demanded = findings[0].measured.demanded_margin or 0.0
-    clearance = f"clearance, margins ≥ {demanded:.4g}"
-    heads = ("", "iterations", "F", "exact volume", f"nodes, step {STEP:g}", "reach")
-    rows: list[tuple[str, ...]] = [(*heads, "margin / reach", clearance, "seconds")]
-    for finding in findings:
-        measured = finding.measured
-        reach, margin = measured["reach"], measured["box_margin"]
-        rows.append(
-            (
-                finding.name,
-                _cell(finding.iterations, "d"),
-                _cell(finding.objective, ".1e"),
-                _cell(measured["volume"], ".3f"),
-                _cell(measured["node_count"], "d"),
-                _cell(reach, ".4f"),
-                _cell(margin and reach and margin / reach, ".4f"),
-                _cell(measured["demanded_clearance"], ".4f"),
-                _cell(finding.seconds, ".2f"),
-            )
-        )
-    lows, highs = BOX
-    notes = (
-        f"F = |1 − V / {PAPER_VOLUME:g}|: the paper counts nodes (step {STEP:g}), here V is the "
-        "exact volume.\n"
-        f"Interference on: every pair of legs keeps {CLEARANCE:g} wherever every margin is at "
-        f"least {demanded:.4g}; clearance: the least of these.\n"
-        f"Margin: the worst over the box {_point_text(lows)} to {_point_text(highs)}. It depends "
-        "on the pose alone, so that it is larger relative to a smaller reach.\n"
-        f"The smallest reach: the best of {STARTS} starts, with |b1y|, a3y and |b3 − b2| at "
-        "least 1 and b within ±10."
-    )
-    return f"{table(rows, '<>>>>>>>>')}\n\n{notes}"
-
-
-def _cell(value: float | None, form: str) -> str:
-    return "–" if value is None else format(value, form)
-
-
-def _point_text(p: tuple[float, float, float]) -> str:
-    return f"({', '.join(f'{value:g}' for value in p)})"

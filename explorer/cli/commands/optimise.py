@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import msgspec
 
 from explorer.cli.answers.optimisation import (
-    finding_json,
-    findings_table,
     infeasible_json,
     optimised_design,
     outcome_json,
@@ -20,7 +18,6 @@ from explorer.cli.answers.optimisation import (
 from explorer.cli.options import DesignOptions, JsonOptions
 from explorer.cli.output import heading, write_json
 from explorer.cli.progress import SearchMeter
-from explorer.cli.streams import write_error
 from explorer.cli.usage import UsageError
 from explorer.cli.values import (
     FILE,
@@ -152,7 +149,7 @@ class Optimise(JsonOptions, DesignOptions):
     """Record whose problem to solve again, instead of one given by options."""
 
     findings: Flag = False
-    """Compare our optima with the paper's instead; `explorer reproduce` measures all its claims."""
+    """Measure the claim search of `explorer reproduce` instead: our optima beside the paper's."""
 
     def run(self) -> None:
         """Write the outcome of the search.
@@ -161,7 +158,11 @@ class Optimise(JsonOptions, DesignOptions):
             NoAnswerError: The search did not converge; the best iterate has been written.
         """
         if self.findings:
-            self._write_findings()
+            from explorer.cli.commands.reproduce import claim_lines
+            from explorer.reproduce.claims import measure_claims
+
+            (result,) = measure_claims(["search"])
+            self.write(lambda: dict(result.measured.figures), lambda: claim_lines(result))
             return
         from explorer.files.writing import check_writable
 
@@ -270,17 +271,6 @@ class Optimise(JsonOptions, DesignOptions):
             write_whole(record, encode_record(record_of(outcome, settings)))
             written.append(record)
         return written
-
-    def _write_findings(self) -> None:
-        from explorer.numerics.compiled import warm
-        from explorer.optimise.findings import findings
-
-        warm()
-        optima = list(findings(lambda name: write_error(f"computing: {name}")))
-        self.write(
-            lambda: {"findings": [finding_json(optimum) for optimum in optima]},
-            lambda: [findings_table(optima), "", "explorer reproduce measures all claims"],
-        )
 
 
 def _search(problem: Problem, settings: Settings) -> Outcome:

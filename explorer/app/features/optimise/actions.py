@@ -24,8 +24,8 @@ from explorer.errors import InputError, NoAnswerError
 from explorer.mechanism.design import Design
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import Pose
-from explorer.optimise.findings import CLEARANCE, PAPER_VOLUME, paper_start
 from explorer.optimise.outcome import Iterate
+from explorer.optimise.paper import CLEARANCE, PAPER_VOLUME, paper_start
 from explorer.optimise.problem import YAW
 from explorer.optimise.refutation.lifting import MAXIMA, SWING_LIMIT, lift
 from explorer.optimise.refutation.refutation import PAPER_BOX, with_box, words_of
