@@ -18,32 +18,40 @@ ASSETS = SOURCES / "assets"
 HEAD = """\
 # The paper's claims
 
-`explorer reproduce` measures every claim of the paper again and judges it; this page is made from
-its output. *Confirmed within* holds under what the measured values state. *Our reading* marks what
-the paper leaves open. `--claim NAME` measures one of them, `--json` writes all figures.
+`explorer reproduce` measures these claims of the paper again and judges each; this page is made
+from its output. *Confirmed within* states the condition under which a claim is confirmed. *Our
+reading* is how the explorer reads what the paper leaves open. `--claim NAME` measures one claim,
+`--json` writes all values.
 
 | claim | verdict |
 |---|---|
 """
 
 
+def verdict_of(result: Result) -> str:
+    """Return the verdict with its condition."""
+    measurement = result.measurement
+    return ": ".join(filter(None, (measurement.verdict, measurement.condition)))
+
+
 def page(results: list[Result]) -> str:
     """Return the page in Markdown."""
     parts = [HEAD]
-    parts += [f"| {result.claim.title} | {result.measured.verdict} |\n" for result in results]
+    parts += [f"| {result.claim.title} | {verdict_of(result)} |\n" for result in results]
     for result in results:
-        claim, measured = result.claim, result.measured
+        claim, measurement = result.claim, result.measurement
+        verdict = verdict_of(result)
         parts.append(f"\n## {claim.title}\n\n> {claim.paper}\n\n")
-        parts.append(f"**{measured.verdict[:1].upper()}{measured.verdict[1:]}.** ")
-        parts.append(f"{measured.text}\n")
+        parts.append(f"**{verdict[:1].upper()}{verdict[1:]}.** {measurement.text}\n")
         if claim.reading:
-            parts.append(f"\n*Our reading.* {claim.reading.removeprefix('Our reading: ')}\n")
-        if measured.table:
+            parts.append(f"\n*Our reading.* {claim.reading}\n")
+        own = f"explorer reproduce --claim {claim.name}"
+        if measurement.table:
             # As the command prints it, which a test compares.
-            table = "\n".join(f"    {line}".rstrip() for line in measured.table)
-            parts.append(f"\n```sh\nexplorer reproduce --claim {claim.name}\n```\n")
-            parts.append(f"\n```text\n{table}\n```\n")
-        parts.append(f"\n```sh\n{claim.command}\n```\n")
+            table = "\n".join(f"    {line}".rstrip() for line in measurement.table)
+            parts.append(f"\n```sh\n{own}\n```\n\n```text\n{table}\n```\n")
+        if claim.command != own or not measurement.table:
+            parts.append(f"\n```sh\n{claim.command}\n```\n")
     return "".join(parts)
 
 
@@ -52,8 +60,8 @@ def data(results: list[Result]) -> str:
     rows = [
         {
             "claim": result.claim.title,
-            "verdict": result.measured.verdict,
-            "measured": result.measured.text,
+            "verdict": verdict_of(result),
+            "reading": result.claim.reading,
         }
         for result in results
     ]

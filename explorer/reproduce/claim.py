@@ -1,4 +1,4 @@
-"""The types of a claim of the paper and of what is measured for it."""
+"""The types of a claim of the paper and of its measurement."""
 
 from __future__ import annotations
 
@@ -9,28 +9,30 @@ from typing import Literal, get_args
 Verdict = Literal["confirmed", "confirmed within", "not confirmed", "not testable from the paper"]
 
 VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
-"""Confirmed: the measured values show it as the paper says it. Confirmed within: they show it under
-a condition that the measured text states. Not confirmed: they show the contrary, or a
+"""Confirmed: the values show the claim as the paper states it. Confirmed within: the values show it
+under the condition of the measurement. Not confirmed: the values show the contrary, or a
 counterexample. Not testable: the paper does not print what a test would need."""
 
-Figures = Mapping[str, object]
+Values = Mapping[str, object]
 
 
 @dataclass(frozen=True)
-class Measured:
-    """What is measured for a claim.
+class Measurement:
+    """The measurement of a claim.
 
     Attributes:
         text: The measured values, in sentences.
         verdict: Judgement, which follows from the values.
-        figures: The values by name.
+        values: The values by name.
         table: Lines of a table with more of them.
+        condition: Condition under which the claim is confirmed; "" for the other verdicts.
     """
 
     text: str
     verdict: Verdict
-    figures: Figures = field(default_factory=dict[str, object])
+    values: Values = field(default_factory=dict[str, object])
     table: tuple[str, ...] = ()
+    condition: str = ""
 
 
 @dataclass(frozen=True)
@@ -40,9 +42,9 @@ class Claim:
     Attributes:
         name: Name on the command line.
         title: The claim, one sentence.
-        paper: Words of the paper.
+        paper: Words of the paper; … marks what is left out, [] what the scan lost.
         reading: What the paper leaves open, and how it is read here; "" if nothing.
-        command: Command that shows it.
+        command: Command that shows a part of it.
         measure: Function that measures it; random cases have fixed seeds.
     """
 
@@ -51,12 +53,18 @@ class Claim:
     paper: str
     reading: str
     command: str
-    measure: Callable[[], Measured]
+    measure: Callable[[], Measurement]
 
 
 @dataclass(frozen=True)
 class Result:
-    """A claim with what is measured for it."""
+    """A claim with its measurement."""
 
     claim: Claim
-    measured: Measured
+    measurement: Measurement
+
+
+def below(value: float, bound: float) -> str:
+    """Return an error in words that are the same on every machine, while it is below a bound."""
+    text = f"less than {bound:.0e}" if value < bound else f"{value:.0e}"
+    return text.replace("e-0", "e-")

@@ -1,4 +1,4 @@
-"""The claims of the paper, in its order, and their measurement."""
+"""The claims of the paper, in its order."""
 
 from __future__ import annotations
 
@@ -6,22 +6,27 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from types import MappingProxyType
 
 from explorer.errors import InputError
-from explorer.reproduce import (
-    comparison,
-    flags,
-    interference,
-    kinematics,
-    mode_paths,
-    search,
-    singularities,
-    table_one,
-)
 from explorer.reproduce.claim import Claim, Result
+from explorer.reproduce.comparison import large_workspace, orientations
+from explorer.reproduce.flags import chart, strata, uncoupled
+from explorer.reproduce.interference import clear_optimum, lower_risk
+from explorer.reproduce.kinematics import closed_form, same_kinematics
+from explorer.reproduce.mode_paths import mode_paths
+from explorer.reproduce.search import search
+from explorer.reproduce.simplicity import cost, simplicity
+from explorer.reproduce.singularities import flat_tetrahedra
+from explorer.reproduce.table_one import extents
 
 OUR_READING = (
-    "Our reading: the platform has a yaw of −73.1°, every length is at most the reach |a3| and has "
-    "no minimum, and nodes are multiples of a step, the boundary included. The initial b3, 15 in "
-    "the scan, is 1.5. The paper prints none of these."
+    "The platform has a yaw of −73.1°. Every length is at most the reach |a3| and has no minimum. "
+    "Nodes are multiples of a step, 2 for the optimum and a 15th of the reach for the initial "
+    "design, the boundary included. The paper prints none of these; yaw and steps are fitted to "
+    "what it prints. The initial b3, 15 in the scan, is read as 1.5."
+)
+SIX_LEGS = (
+    "The paper compares with no design. Here it is the 6-4 twin with a2 at two places, and an "
+    "octahedral Stewart-Gough platform of the same reach, whose base and platform are equilateral "
+    "triangles with the areas of a1 a2 a3 and b1 b2 b3 for a2x at the reach."
 )
 
 CLAIMS: Mapping[str, Claim] = MappingProxyType(
@@ -29,70 +34,92 @@ CLAIMS: Mapping[str, Claim] = MappingProxyType(
         claim.name: claim
         for claim in (
             Claim(
-                "closed-form",
-                "Three trilaterations solve the forward kinematics in closed form, with eight "
-                "assembly modes.",
-                "Its forward kinematics can be solved by a sequence of three trilaterations … a "
-                "total of 8 assembly modes.",
-                "The system of quadratic equations of [6] is not printed; here it is that of the "
-                "nine squared distances.",
+                "same-kinematics",
+                "The 4-4 has the kinematic properties of the 6-4.",
+                "The original 6-4 parallel robot becomes a simpler 4-legged parallel robot with "
+                "the same kinematic properties …",
+                "",
                 "explorer forward --joints 11.7 10.8 9.3 11.4 9.0 13.0",
-                kinematics.closed_form,
+                same_kinematics,
             ),
             Claim(
                 "interference",
                 "The 4-4 has a lower risk of leg interference than the 6-4.",
-                "The original 6-4 parallel robot becomes a simpler 4-legged parallel robot with "
-                "the same kinematic properties and a lower risk of leg interference.",
-                "The paper gives no measure of the risk and no place of a2; here it is the "
-                "clearance of legs over the workspace of the optimum, for a range of a2.",
+                "… and a lower risk of leg interference.",
+                "The paper gives no measure of the risk and no place of a2. Here it is clearances "
+                "and swept tetrahedra over the workspace of the optimum, for a range of a2.",
                 "explorer interference --design paper-optimal --position 10 5 9",
-                interference.interference,
+                lower_risk,
+            ),
+            Claim(
+                "closed-form",
+                "Three trilaterations solve the forward kinematics in closed form, with eight "
+                "assembly modes.",
+                "Its forward kinematics can be solved by a sequence of three trilaterations … so "
+                "that they give a total of 8 assembly modes.",
+                "The system of quadratic equations of [6] is not printed; here it is that of the "
+                "nine squared distances.",
+                "explorer forward --joints 11.7 10.8 9.3 11.4 9.0 13.0",
+                closed_form,
             ),
             Claim(
                 "flat-tetrahedra",
                 "The mechanism is singular exactly where one of three tetrahedra is flat.",
                 "If, and only if, the points … form non-degenerate tetrahedra, there are eight "
-                "possible configurations. Otherwise, the manipulator is in a singularity.",
-                "",
+                "possible configurations … Otherwise, the parallel manipulator is in a "
+                "singularity.",
+                "Singular is read as a loss of rank of the actuator Jacobian J.",
                 "explorer singularity --design paper-optimal --position 10 5 0",
-                singularities.flat_tetrahedra,
+                flat_tetrahedra,
             ),
             Claim(
                 "strata",
                 "The singularities have the stratification of the flag manifold.",
-                "The topology of its singularity spaces is the same for all members of the family; "
-                "they can be easily decomposed into manifolds, or cells, forming a stratification.",
+                "The topology of their singularity spaces is the same for all members of the "
+                "family … their singularity spaces can be easily decomposed into manifolds, or "
+                "cells, forming what in algebraic geometry is called a stratification, derived "
+                "from that of the flag manifold.",
                 "",
                 "explorer singularity --design paper-optimal --position 10 5 9",
-                flags.strata,
+                strata,
             ),
             Claim(
                 "uncoupled-motions",
                 "The singularities correspond to uncoupled translations and rotations.",
                 "The singularities of flagged manipulators correspond to uncoupled translations "
-                "and/or rotations in the workspace.",
-                "",
-                "explorer singularity --design paper-optimal --position 10 5 9",
-                flags.uncoupled,
+                "and/or rotations in the workspace of the manipulator.",
+                "A motion is uncoupled if it changes one of the three margins alone.",
+                "explorer reproduce --claim uncoupled-motions",
+                uncoupled,
             ),
             Claim(
                 "charts",
                 "Each cell has one chart of uncoupled translations and rotations.",
                 "Each cell can be characterized using a single local chart whose coordinates "
-                "directly correspond to uncoupled translations and/or rotations.",
-                "The coordinates are read as the travels of the six uncoupled motions.",
-                "explorer singularity --design paper-optimal --position 10 5 9",
-                flags.chart,
+                "directly correspond to uncoupled translations and/or rotations in the workspace "
+                "of the manipulator.",
+                "The charts are those of another paper, which is not at hand. Here the "
+                "coordinates are the amounts of the six uncoupled motions, and the cell is an "
+                "assembly mode.",
+                "explorer reproduce --claim charts",
+                chart,
             ),
             Claim(
                 "paths",
                 "Every path between two assembly modes passes through a singularity.",
                 "Any path connecting two assembly modes passes through a singularity (note that "
-                "this assertion is not true in general).",
+                "this assertion is not true in general …).",
                 "",
                 "explorer path --design paper-optimal --to 10 5 -9  # ends with status 1",
-                mode_paths.paths,
+                mode_paths,
+            ),
+            Claim(
+                "clear-optimum",
+                "The optimum keeps the swept tetrahedra of its legs apart.",
+                "The optimum design algorithm takes into account interferences among legs …",
+                "The orientation stays that of home; a step leads from a node along x, y or z.",
+                "explorer workspace --design paper-optimal --interference",
+                clear_optimum,
             ),
             Claim(
                 "table-1",
@@ -100,44 +127,50 @@ CLAIMS: Mapping[str, Claim] = MappingProxyType(
                 "The workspace volume of the optimal solution is 7992.",
                 OUR_READING,
                 "explorer workspace --design paper-optimal",
-                table_one.extents,
+                extents,
             ),
             Claim(
                 "search",
                 "Sequential quadratic programming matches a volume of 8000.",
                 "The proposed optimum design algorithm takes 220 iterations to converge to an "
-                "optimal solution.",
+                "optim[al] solution.",
                 OUR_READING,
                 "explorer optimise --design paper-initial --target-volume 8000 "
                 "--box 0 -12 0 20 22 18",
-                search.search,
+                search,
+            ),
+            Claim(
+                "workspace",
+                "The workspace is large.",
+                "It possesses a large workspace …",
+                SIX_LEGS,
+                "explorer workspace --design paper-optimal",
+                large_workspace,
             ),
             Claim(
                 "orientations",
-                "The workspace is large, with great orientation abilities.",
-                "It possesses a large workspace, with great orientation abilities.",
-                "The paper compares with no design. Here it is the 6-4 twin and an octahedral "
-                "Stewart-Gough platform of the same reach, whose base and platform are equilateral "
-                "triangles with the areas of a1 a2 a3 and b1 b2 b3.",
+                "The 4-4 has great orientation abilities.",
+                "… with great orientation [abilities].",
+                SIX_LEGS,
                 "explorer orientation --design paper-optimal --position 10 5 9",
-                comparison.orientations,
+                orientations,
             ),
             Claim(
                 "simpler",
                 "It is simpler in structure than most other designs.",
-                "It is simpler in structure (it possesses four legs) and consequently cheaper than "
-                "most other designs.",
-                "Counted against the 6-4 and an octahedral Stewart-Gough platform.",
-                "explorer export mechanism --out mechanism.zip",
-                comparison.simplicity,
+                "It is simpler in structure (it posses four legs) …",
+                "“Most other designs” are read as the 6-4 and an octahedral Stewart-Gough "
+                "platform.",
+                "explorer reproduce --claim simpler",
+                simplicity,
             ),
             Claim(
                 "cheaper",
                 "It is cheaper than most other designs.",
                 "… and consequently cheaper than most other designs.",
                 "",
-                "explorer reproduce --claim simpler",
-                comparison.cost,
+                "explorer reproduce --claim cheaper",
+                cost,
             ),
         )
     }
@@ -146,13 +179,13 @@ CLAIMS: Mapping[str, Claim] = MappingProxyType(
 
 
 def measure_claims(
-    names: Iterable[str] | None = None, tell: Callable[[str], None] | None = None
+    names: Iterable[str] | None = None, report: Callable[[str], None] | None = None
 ) -> Iterator[Result]:
-    """Yield claims of the paper with what is measured for them.
+    """Yield claims of the paper with their measurements.
 
     Args:
         names: Names of claims, out of `CLAIMS`; None for all.
-        tell: Called with the title of each claim before it is measured.
+        report: Called with the title of each claim before it is measured.
 
     Raises:
         InputError: No such claim.
@@ -163,6 +196,6 @@ def measure_claims(
             raise InputError(f"no claim {name!r}; there are {', '.join(CLAIMS)}")
     for name in chosen:
         claim = CLAIMS[name]
-        if tell is not None:
-            tell(claim.title)
+        if report is not None:
+            report(claim.title)
         yield Result(claim, claim.measure())

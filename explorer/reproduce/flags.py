@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import asdict, dataclass
 
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
@@ -11,52 +12,64 @@ from explorer.mechanism.design import JOINTS
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.kinematics import forward, inverse
-from explorer.mechanism.margins import margins
+from explorer.mechanism.margins import margins, mode_of
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
-from explorer.reproduce.claim import Measured
+from explorer.reproduce.claim import Measurement, below
 from explorer.reproduce.samples import random_poses
 from explorer.singularity.bruhat import is_below
 from explorer.singularity.nearest_stratum import nearest_in_strata
 from explorer.singularity.strata import STRATA, inversions, stratum
 from explorer.singularity.uncoupled import UNCOUPLED
+from explorer.workspace.limits.valid_poses import poses_are_valid
 
 OPTIMAL = PRESETS["paper-optimal"]
 NEIGHBOURS, NEAR = 200, 1e-3
-POSES, ON_PATH = 300, 400
-SAME = 1e-10
-HALVINGS = 60
+POSES, SAME = 300, 1e-10
+# Number of random poses, of pairs of them, and of poses on a path between a pair.
+CHART_POSES, CHART_PAIRS, ON_PATH, HALVINGS = 20_000, 200, 400, 60
+# Ratio of singular values up to which screws are dependent.
+DEPENDENT = 1e-9
 
 
-def strata() -> Measured:
-    """Realise each of the 24 strata by a pose, and compare their closure order with its covers."""
+def strata() -> Measurement:
+    """Find a pose in each of the 24 strata, and compare their neighbours with the closure order."""
     poses = {w: found.pose for w, found in nearest_in_strata(OPTIMAL, home_pose(OPTIMAL)).items()}
-    realised, outside = 0, 0
+    found, outside = 0, 0
     random = np.random.default_rng(6)
     for w, pose in poses.items():
-        realised += tuple(stratum(pose.position, pose.rotation, OPTIMAL.reach).tolist()) == w
+        found += tuple(stratum(pose.position, pose.rotation, OPTIMAL.reach).tolist()) == w
         shifts = NEAR * OPTIMAL.reach * random.normal(size=(NEIGHBOURS, 3))
         turns = Rotation.from_rotvec(NEAR * random.normal(size=(NEIGHBOURS, 3))).as_matrix()
         # A third of the neighbours are only shifted, and a third only turned.
         shifts[::3], turns[1::3] = 0.0, np.eye(3)
-        near = np.array(pose.position) + shifts
-        found = stratum(near, turns @ pose.rotation, OPTIMAL.reach).tolist()
-        outside += sum(not is_below(w, tuple(other)) for other in found)
+        near = stratum(np.array(pose.position) + shifts, turns @ pose.rotation, OPTIMAL.reach)
+        outside += sum(not is_below(w, tuple(other)) for other in near.tolist())
     order = {(a, b) for a in STRATA for b in STRATA if is_below(a, b)}
-    agrees = order == _order_by_covers()
+    return judge_strata(found, outside, order == _order_by_covers())
+
+
+def judge_strata(found: int, outside: int, is_bruhat: bool) -> Measurement:
+    """Return the measurement of the strata.
+
+    Args:
+        found: Number of strata in which a pose was found.
+        outside: Number of neighbouring poses whose stratum's closure does not hold the first pose.
+        is_bruhat: Whether the closure order is the Bruhat order generated from its covers.
+    """
     counts = [sum(inversions(w) == k for w in STRATA) for k in range(7)]
     text = (
-        f"{realised} of {len(STRATA)} strata are realised by poses of the mechanism; by dimension "
-        f"0 to 6 there are {', '.join(map(str, counts))}. Of {len(STRATA) * NEIGHBOURS:,} "
-        f"neighbouring poses {outside} lie in a stratum whose closure does not hold the first. The "
-        f"closure order has {len(order)} pairs, {'the same' if agrees else 'not the same'} as the "
-        "Bruhat order generated from its covers."
+        f"Poses are found in {found} of the {len(STRATA)} strata, {', '.join(map(str, counts))} of "
+        f"which have the dimensions 0 to 6. Of {len(STRATA) * NEIGHBOURS:,} neighbours of these "
+        f"poses {outside} lie in a stratum whose closure does not hold the pose. The closure order "
+        f"is {'' if is_bruhat else 'not '}the Bruhat order generated from its covers. A stratum "
+        "depends on the relative position of the flags alone, and on no parameter of the design."
     )
-    is_so = realised == len(STRATA) and outside == 0 and agrees
-    return Measured(
+    is_so = found == len(STRATA) and outside == 0 and is_bruhat
+    return Measurement(
         text,
         "confirmed" if is_so else "not confirmed",
-        {"realised": realised, "by_dimension": counts, "outside": outside, "pairs": len(order)},
+        {"found": found, "by_dimension": counts, "outside": outside, "is_bruhat": is_bruhat},
     )
 
 
@@ -72,32 +85,45 @@ def _order_by_covers() -> set[tuple[tuple[int, ...], tuple[int, ...]]]:
     return {(w, other) for w, others in above.items() for other in others}
 
 
-def uncoupled() -> Measured:
+def uncoupled() -> Measurement:
     """Move random poses along the six uncoupled motions, and by one actuator at a time."""
     random = np.random.default_rng(7)
     positions, rotations = random_poses(random, POSES, OPTIMAL.reach)
-    worst = 0.0
+    own, others = np.inf, 0.0
     for position, rotation in zip(positions, rotations, strict=True):
         pose = Pose.of(tuple(position.tolist()), rotation)
         before = margins(pose.position, pose.rotation)
         for motion in UNCOUPLED:
-            moved = motion.moved(pose, float(random.uniform(-1.0, 1.0)))
-            change = np.abs(margins(moved.position, moved.rotation) - before)
-            worst = max(worst, float(np.delete(change, motion.incidence - 1).max()))
-    moves = _margins_of_actuators(positions, rotations, random)
-    single = [name for name, which in moves.items() if len(which) == 1]
-    each = "; ".join(f"{name}: {', '.join(which)}" for name, which in moves.items())
+            moved = motion.moved(pose, float(random.uniform(0.5, 1.0)))
+            change = np.abs(margins(moved.position, moved.rotation) - before) / OPTIMAL.reach
+            own = min(own, float(change[motion.incidence - 1]))
+            others = max(others, float(np.delete(change, motion.incidence - 1).max()))
+    return judge_uncoupled(own, others, _margins_of_actuators(positions, rotations, random))
+
+
+def judge_uncoupled(
+    own: float, others: float, of_actuators: dict[str, tuple[str, ...]]
+) -> Measurement:
+    """Return the measurement of the uncoupled motions.
+
+    Args:
+        own: Least change of the margin that a motion moves, over the reach.
+        others: Largest change of the two others, over the reach.
+        of_actuators: Margins that change with each actuator alone.
+    """
+    single = [f"{name} moves {which[0]}" for name, which in of_actuators.items() if len(which) == 1]
     text = (
-        f"Each of the six motions leaves the other two margins the same within "
-        f"{worst / OPTIMAL.reach:.1e} of the reach, over {POSES} random poses. Of the actuators "
-        f"only {' and '.join(single)} move one margin alone ({each})."
+        f"Over {POSES} random poses each of six motions, four of them rotations and two "
+        f"translations, changes its margin and leaves the other two to {below(others, SAME)} of "
+        f"the reach. As single actuators {' and '.join(single)} alone; d1 to d4 move all three."
     )
-    is_so = worst < SAME * OPTIMAL.reach
-    return Measured(
-        text,
-        "confirmed" if is_so else "not confirmed",
-        {"largest_other_change": worst / OPTIMAL.reach, "margins_of_actuators": moves},
-    )
+    values = {
+        "least_own_change": own,
+        "largest_other_change": others,
+        "margins_of_actuators": of_actuators,
+    }
+    is_so = others < SAME < own
+    return Measurement(text, "confirmed" if is_so else "not confirmed", values)
 
 
 def _margins_of_actuators(
@@ -106,9 +132,8 @@ def _margins_of_actuators(
     """Return which margins change with each actuator alone, over random poses."""
     reach = OPTIMAL.reach
     before = margins(positions, rotations)
-    mode = (before > 0.0) @ np.array([4, 2, 1])
     joints = inverse(OPTIMAL, positions, rotations)
-    rows = np.arange(len(positions))
+    rows, mode = np.arange(len(positions)), mode_of(before)
     moves: dict[str, tuple[str, ...]] = {}
     for index, name in enumerate(JOINTS):
         changed = joints.copy()
@@ -120,53 +145,83 @@ def _margins_of_actuators(
     return moves
 
 
-def chart() -> Measured:
-    """Look for a pose within a mode in which the screws of the six uncoupled motions lose rank."""
+@dataclass(frozen=True)
+class DependentScrews:
+    """A pose within the limits at which the screws of the six uncoupled motions are dependent.
+
+    Attributes:
+        position, quaternion: The pose.
+        least_margin: Least |δi| over the reach.
+        ratio: Ratio of the least singular value of the six screws to the largest.
+    """
+
+    position: tuple[float, ...]
+    quaternion: tuple[float, ...]
+    least_margin: float
+    ratio: float
+
+
+def chart() -> Measurement:
+    """Look for a pose within the limits at which the screws of the six motions are dependent."""
     random = np.random.default_rng(9)
-    while True:
-        p, r = random_poses(random, 2, OPTIMAL.reach)
-        low, high = (_screws_determinant(p[k], r[k]) for k in (0, 1))
-        if low * high >= 0.0:
-            continue
-        turn = Slerp([0.0, 1.0], Rotation.from_matrix(r))
-        shares = np.linspace(0.0, 1.0, ON_PATH)
-        on_way = margins(
-            p[0] + shares[:, None] * (p[1] - p[0]), np.asarray(turn(shares).as_matrix())
+    lows, highs = OPTIMAL.limits.box or ((-OPTIMAL.reach,) * 3, (OPTIMAL.reach,) * 3)
+    p = random.uniform(lows, highs, (CHART_POSES, 3))
+    r = np.asarray(Rotation.random(CHART_POSES, rng=random).as_matrix())
+    valid = poses_are_valid(OPTIMAL, p, r)
+    p, r = p[valid], r[valid]
+    signs = np.array([_screws_determinant(*pose) > 0.0 for pose in zip(p, r, strict=True)])
+    pairs = zip(np.flatnonzero(signs), np.flatnonzero(~signs), strict=False)
+    for one, other in itertools.islice(pairs, CHART_PAIRS):
+        found = _dependent_between(p[[one, other]], r[[one, other]])
+        if found is not None:
+            return judge_chart(found)
+    return judge_chart(None)
+
+
+def judge_chart(found: DependentScrews | None) -> Measurement:
+    """Return the measurement of the charts, given a pose with dependent screws or none."""
+    text = (
+        "Platform and base have a translation and a rotation that change δ1 alone, the same for "
+        "δ3, and two rotations for δ2. Amounts of these six motions, made one after the other "
+        "from a pose, are coordinates near it if and only if the six screws are independent. "
+    )
+    if found is None or found.ratio >= DEPENDENT:
+        return Measurement(
+            f"{text}No pose with dependent screws was found.", "not testable from the paper"
         )
-        if (np.sign(on_way) == np.sign(on_way[0])).all():
-            break
+    position = ", ".join(f"{x:.3f}" for x in found.position)
+    quaternion = ", ".join(f"{x:.4f}" for x in found.quaternion)
+    text += (
+        f"They are dependent at b4 = ({position}), quaternion ({quaternion}), a pose within all "
+        f"limits of the optimum, with every |δi| at least {found.least_margin:.3f} of the reach. "
+        "The six sliders of the explorer are therefore motions, and no chart of an assembly mode."
+    )
+    return Measurement(text, "not confirmed", asdict(found))
+
+
+def _dependent_between(p: FloatArray, r: FloatArray) -> DependentScrews | None:
+    """Return the pose with dependent screws on a path of valid poses between two, or None.
+
+    The determinants of the screws at the two poses have different signs.
+    """
+    turn = Slerp([0.0, 1.0], Rotation.from_matrix(r))
+
+    def at(shares: FloatArray) -> tuple[FloatArray, FloatArray]:
+        return p[0] + shares[..., None] * (p[1] - p[0]), np.asarray(turn(shares).as_matrix())
+
+    if not poses_are_valid(OPTIMAL, *at(np.linspace(0.0, 1.0, ON_PATH))).all():
+        return None
     start, end = 0.0, 1.0
     for _ in range(HALVINGS):
         middle = 0.5 * (start + end)
-        value = _screws_determinant(
-            p[0] + middle * (p[1] - p[0]), np.asarray(turn(middle).as_matrix())
-        )
-        start, end = (middle, end) if value * low > 0.0 else (start, middle)
-    position, rotation = p[0] + start * (p[1] - p[0]), np.asarray(turn(start).as_matrix())
-    screws = _screws(position, rotation)
-    values = np.linalg.svd(screws, compute_uv=False)
-    least = np.abs(margins(position, rotation)).min() / OPTIMAL.reach
-    ratio = float(values[-1] / values[0])
+        is_first = _screws_determinant(*at(np.array(middle))) > 0.0
+        start, end = (middle, end) if is_first else (start, middle)
+    position, rotation = at(np.array(start))
+    values = np.linalg.svd(_screws(position, rotation), compute_uv=False)
     pose = Pose.of(tuple(position.tolist()), rotation)
-    text = (
-        "Each singular plane is crossed by a translation and a rotation that change its margin "
-        "alone, so that near it the margins are coordinates. The six motions together are no chart "
-        f"of a mode: at b4 = ({', '.join(f'{x:.3f}' for x in pose.position)}), quaternion "
-        f"({', '.join(f'{x:.4f}' for x in pose.quaternion)}), inside a mode, with every |δi| at "
-        f"least {least:.3f} of the reach, their six screws are dependent (singular values in the "
-        f"ratio {ratio:.0e}). The three margins of the platform's motions and those of the base's "
-        "are the same three functions."
-    )
-    is_counterexample = ratio < 1e-9 and least > 1e-3
-    return Measured(
-        text,
-        "not confirmed" if is_counterexample else "confirmed",
-        {
-            "position": pose.position,
-            "quaternion": pose.quaternion,
-            "least_margin": float(least),
-            "ratio_of_singular_values": ratio,
-        },
+    least = np.abs(margins(position, rotation)).min() / OPTIMAL.reach
+    return DependentScrews(
+        pose.position, pose.quaternion, float(least), float(values[-1] / values[0])
     )
 
 

@@ -9,66 +9,80 @@ from scipy.spatial.transform import Rotation
 
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.kinematics import forward, inverse
-from explorer.mechanism.margins import margins
 from explorer.numerics.arrays import FloatArray, IntArray
-from explorer.reproduce.claim import Measured
+from explorer.reproduce.claim import Measurement, below
 from explorer.reproduce.samples import random_poses
 from explorer.singularity.jacobian import inverse_condition, jacobian
 
 OPTIMAL = PRESETS["paper-optimal"]
-PATHS, ON_PATH = 2000, 400
-HALVINGS = 60
+PATHS, ON_PATH = 500, 400
+# Number of the lowest minima of a sampled path that are searched, and of steps of each search.
+MINIMA, SECTIONS = 3, 60
+# Share of a bracket that the search by the golden section keeps.
+GOLDEN_SECTION = 0.5 * (5.0**0.5 - 1.0)
 # Inverse condition of J up to which a pose counts as singular.
-SINGULAR = 1e-12
+SINGULAR = 1e-9
 
 
-def paths() -> Measured:
-    """Follow random paths between two modes of one joint vector, and find their singular poses.
+def mode_paths() -> Measurement:
+    """Search random paths between two modes of one joint vector for their most singular poses.
 
-    Whether a pose is singular is judged by the singular values of J, which know nothing of the
-    margins that name the modes.
+    The search is by the singular values of J alone; it uses neither margins nor tetrahedra.
     """
-    least = least_condition_on(random_paths(np.random.default_rng(8), PATHS))
+    return judge_paths(least_condition_on(random_paths(np.random.default_rng(8), PATHS)))
+
+
+def judge_paths(least: FloatArray) -> Measurement:
+    """Return the measurement of paths, given the least inverse condition on each, shape (n,)."""
     free, worst = int((least > SINGULAR).sum()), float(least.max())
     text = (
-        f"Of {PATHS:,} random curved paths between two modes of the same joints {free} have no "
-        f"singular pose: the inverse condition of J falls to at most {worst:.1e} on each. None "
-        "can: a mode is a triple of signs of δ1, δ2 and δ3, these are continuous along a path, and "
-        "by the intermediate value theorem one that changes its sign vanishes on the way."
+        f"Of {len(least):,} random curved paths between two modes of the same joints {free} have "
+        f"no singular pose: on each the inverse condition of J falls to {below(worst, SINGULAR)}. "
+        "None can: a mode is a triple of signs of δ1, δ2 and δ3, these are continuous along a "
+        "path, and by the intermediate value theorem one that changes its sign vanishes on the "
+        "way."
     )
-    return Measured(
+    return Measurement(
         text,
         "confirmed" if free == 0 else "not confirmed",
-        {"paths": PATHS, "without": free, "largest_inverse_condition": worst},
+        {"paths": len(least), "without": free, "largest_inverse_condition": worst},
     )
 
 
 @dataclass(frozen=True)
 class Paths:
-    """Curved paths between two poses: quadratic curves of b4, and turns that swing out.
+    """Curved paths between two poses: quadratic curves of b4, and turns with a detour.
 
     Attributes:
         points: Positions of start, middle and end, shape (n, 3, 3).
         start: Rotations at the start, shape (n, 3, 3).
         turn: Rotation vector from start to end, shape (n, 3).
-        swing: Rotation vector that is added in the middle, shape (n, 3).
+        detour: Rotation vector that is added in the middle of the way, shape (n, 3).
     """
 
     points: FloatArray
     start: FloatArray
     turn: FloatArray
-    swing: FloatArray
-
-    def margins(self, which: IntArray, shares: FloatArray) -> FloatArray:
-        """Return margins (m, 3) on the paths with these numbers (m,) at shares of them (m,)."""
-        return margins(*self.poses(which, shares))
+    detour: FloatArray
 
     def poses(self, which: IntArray, shares: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return positions (m, 3) and rotations (m, 3, 3), as `margins` those of them."""
+        """Return poses on paths.
+
+        Args:
+            which: Numbers of the paths, shape (m,).
+            shares: Share of the way on each, 0 to 1, shape (m,).
+
+        Returns:
+            Positions, shape (m, 3), and rotations, shape (m, 3, 3).
+        """
         s, points = shares[:, None], self.points[which]
         curve = (1 - s) ** 2 * points[:, 0] + 2 * s * (1 - s) * points[:, 1] + s**2 * points[:, 2]
-        vectors = s * self.turn[which] + np.sin(np.pi * s) * self.swing[which]
+        vectors = s * self.turn[which] + np.sin(np.pi * s) * self.detour[which]
         return curve, np.asarray(Rotation.from_rotvec(vectors).as_matrix()) @ self.start[which]
+
+    def conditions(self, which: IntArray, shares: FloatArray) -> FloatArray:
+        """Return the inverse condition of J at poses as in `poses`, shape (m,)."""
+        return inverse_condition(jacobian(OPTIMAL, *self.poses(which, shares)), OPTIMAL.reach)
 
 
 def random_paths(random: np.random.Generator, count: int) -> Paths:
@@ -86,22 +100,23 @@ def random_paths(random: np.random.Generator, count: int) -> Paths:
 
 
 def least_condition_on(paths: Paths) -> FloatArray:
-    """Return the least inverse condition of J where a margin changes its sign, shape (n,).
+    """Return the least inverse condition of J on each path, shape (n,).
 
-    It is infinite on a path on which none does.
+    The lowest minima of a sampled path are narrowed down by the golden section.
     """
     count = len(paths.points)
     shares = np.linspace(0.0, 1.0, ON_PATH)
-    of, at = np.divmod(np.arange(count * ON_PATH), ON_PATH)
-    signs = np.sign(paths.margins(of, shares[at])).reshape(count, ON_PATH, 3)
-    which, steps, index = np.nonzero(signs[:, 1:] != signs[:, :-1])
-    low, high, before = shares[steps], shares[steps + 1], signs[which, steps, index]
-    rows = np.arange(len(which))
-    for _ in range(HALVINGS):
-        middle = 0.5 * (low + high)
-        is_before = np.sign(paths.margins(which, middle)[rows, index]) == before
-        low, high = np.where(is_before, middle, low), np.where(is_before, high, middle)
-    least = np.full(count, np.inf)
-    j = jacobian(OPTIMAL, *paths.poses(which, low))
-    np.minimum.at(least, which, inverse_condition(j, OPTIMAL.reach))
-    return least
+    number, place = np.divmod(np.arange(count * ON_PATH), ON_PATH)
+    sampled = paths.conditions(number, shares[place]).reshape(count, ON_PATH)
+    inner = sampled[:, 1:-1]
+    is_minimum = (inner <= sampled[:, :-2]) & (inner <= sampled[:, 2:])
+    lowest = np.argsort(np.where(is_minimum, inner, np.inf), axis=1)[:, :MINIMA] + 1
+    which, at = np.repeat(np.arange(count), MINIMA), lowest.ravel()
+    low, high = shares[at - 1], shares[at + 1]
+    for _ in range(SECTIONS):
+        span = GOLDEN_SECTION * (high - low)
+        first, second = high - span, low + span
+        is_left = paths.conditions(which, first) < paths.conditions(which, second)
+        low, high = np.where(is_left, low, first), np.where(is_left, second, high)
+    found = paths.conditions(which, 0.5 * (low + high)).reshape(count, MINIMA)
+    return np.minimum(found.min(axis=1), sampled.min(axis=1))

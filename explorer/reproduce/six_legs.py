@@ -14,7 +14,7 @@ from explorer.legs.tetrahedra import tetrahedra_overlap
 from explorer.mechanism.design import Design
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.margins import margins
-from explorer.numerics.arrays import BoolArray, FloatArray, for_kernel
+from explorer.numerics.arrays import BoolArray, FloatArray, IntArray, for_kernel
 from explorer.numerics.compiled import kernel
 
 TWIN = (("a1", "b1"), ("a1", "b2"), ("a1", "b3"), ("a2", "b2"), ("a2", "b3"), ("a3", "b4"))
@@ -22,7 +22,7 @@ TWIN = (("a1", "b1"), ("a1", "b2"), ("a1", "b3"), ("a2", "b2"), ("a2", "b3"), ("
 
 
 @kernel("void(f8[:,:,:,::1], i8[:,::1], f8[:,:,::1], f8[:,::1])")
-def distance_rows(axes: FloatArray, pairs: FloatArray, points: FloatArray, out: FloatArray) -> None:
+def distance_rows(axes: FloatArray, pairs: IntArray, points: FloatArray, out: FloatArray) -> None:
     """Write the distances of pairs of segments, shape (n, m), of axes (n, legs, 2, 3).
 
     `points` is a place to work in, shape (1, 2, 3).
@@ -52,8 +52,14 @@ class SixLegs:
     flags: bool
     home: tuple[FloatArray, FloatArray]
 
+    @property
+    def box(self) -> tuple[FloatArray, FloatArray]:
+        """(lows, highs) of a box about the workspace at the orientation of home, each (3,)."""
+        centres = self.base - self.platform @ self.home[1].T
+        return (centres - self.longest).max(axis=0), (centres + self.longest).min(axis=0)
+
     @cached_property
-    def pairs(self) -> FloatArray:
+    def pairs(self) -> IntArray:
         """The pairs of legs that share no joint, shape (m, 2)."""
         return np.array(
             [
@@ -65,6 +71,11 @@ class SixLegs:
                 )
             ]
         )
+
+    def lengths(self, position: FloatArray, rotation: FloatArray) -> FloatArray:
+        """Return the lengths of the legs, shape (n, 6)."""
+        axes = self.axes(position, rotation)
+        return np.linalg.norm(axes[:, :, 1] - axes[:, :, 0], axis=-1)
 
     def axes(self, position: FloatArray, rotation: FloatArray) -> FloatArray:
         """Return both ends of each leg, shape (n, 6, 2, 3)."""
@@ -91,9 +102,7 @@ class SixLegs:
 
         Without flags the sign of det J stands for the mode, which may hold several.
         """
-        axes = self.axes(position, rotation)
-        lengths = np.linalg.norm(axes[:, :, 1] - axes[:, :, 0], axis=-1)
-        within = (lengths <= self.longest).all(axis=1)
+        within = (self.lengths(position, rotation) <= self.longest).all(axis=1)
         home, turned = self.home
         if self.flags:
             signs = np.sign(margins(home, turned))

@@ -162,7 +162,7 @@ class Optimise(JsonOptions, DesignOptions):
             from explorer.reproduce.claims import measure_claims
 
             (result,) = measure_claims(["search"])
-            self.write(lambda: dict(result.measured.figures), lambda: claim_lines(result))
+            self.write(lambda: dict(result.measurement.values), lambda: claim_lines(result))
             return
         from explorer.files.writing import check_writable
 

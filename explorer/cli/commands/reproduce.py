@@ -20,11 +20,10 @@ WIDTH = 96
 
 @dataclass(frozen=True, kw_only=True)
 class Reproduce(JsonOptions):
-    """Measure every claim of the paper again, and judge it.
+    """Measure the claims of the paper again, and judge each.
 
-    A claim is confirmed, confirmed within what the measured values state, not confirmed, or not
-    testable from the paper. What the paper leaves open is marked as our reading. All random cases
-    have fixed seeds.
+    A claim is confirmed, confirmed within a condition, not confirmed, or not testable from the
+    paper. What the paper leaves open is marked as our reading. All random cases have fixed seeds.
     """
 
     claim: Annotated[tuple[str, ...], texts("--claim", "NAME …"), OPTIONAL] = ()
@@ -45,17 +44,18 @@ class Reproduce(JsonOptions):
 
 
 def claim_json(result: Result) -> dict[str, object]:
-    """Return a claim and what is measured for it as plain values."""
-    claim, measured = result.claim, result.measured
+    """Return a claim and its measurement as plain values."""
+    claim, measurement = result.claim, result.measurement
     return {
         "name": claim.name,
         "claim": claim.title,
         "reading": claim.reading,
         "paper": claim.paper,
-        "measured": measured.text,
-        "verdict": measured.verdict,
+        "measured": measurement.text,
+        "verdict": measurement.verdict,
+        "condition": measurement.condition,
         "command": claim.command,
-        "figures": measured.figures,
+        "values": measurement.values,
     }
 
 
@@ -64,29 +64,30 @@ def lines(results: Sequence[Result]) -> Iterator[str]:
     for result in results:
         yield from claim_lines(result)
     if len(results) > 1:
-        counts = Counter(result.measured.verdict for result in results)
+        counts = Counter(result.measurement.verdict for result in results)
         yield "; ".join(f"{count} {verdict}" for verdict, count in counts.items())
 
 
 def claim_lines(result: Result) -> Iterator[str]:
-    """Yield a claim with what is measured for it as lines of text."""
-    claim, measured = result.claim, result.measured
-    yield f"{measured.verdict.upper()}: {claim.title}"
+    """Yield a claim and its measurement as lines of text."""
+    claim, measurement = result.claim, result.measurement
+    yield f"{measurement.verdict.upper()}: {claim.title}"
     for name, text in (
+        ("condition", measurement.condition),
         ("paper", f"“{claim.paper}”"),
-        ("reading", claim.reading),
-        ("measured", measured.text),
+        ("our reading", claim.reading),
+        ("measured", measurement.text),
         ("see", claim.command),
     ):
         if text:
             yield fill(
                 text,
                 WIDTH,
-                initial_indent=f"  {name:9} ",
-                subsequent_indent=" " * 12,
+                initial_indent=f"  {name:12} ",
+                subsequent_indent=" " * 15,
                 break_on_hyphens=False,
             )
-    if measured.table:
+    if measurement.table:
         yield ""
-        yield from (f"    {line}".rstrip() for line in measured.table)
+        yield from (f"    {line}".rstrip() for line in measurement.table)
     yield ""

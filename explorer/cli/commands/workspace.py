@@ -101,7 +101,7 @@ class Workspace(JsonOptions, RadiiOptions, OrientationOptions, DesignOptions):
             from explorer.reproduce.claims import measure_claims
 
             (result,) = measure_claims(["table-1"])
-            self.write(lambda: dict(result.measured.figures), lambda: claim_lines(result))
+            self.write(lambda: dict(result.measurement.values), lambda: claim_lines(result))
             return
         design = self.with_radii(self.read_design())
         pose = self.oriented_home(design)

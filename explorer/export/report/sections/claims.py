@@ -13,15 +13,24 @@ from explorer.mechanism.design_file import PRESETS
 
 
 def claims_section(data: ReportData) -> Iterator[Element]:
-    """Yield the section on the paper's claims; nothing for other designs."""
-    of_paper = {preset.variables for preset in PRESETS.values()}
-    if data.design.variables not in of_paper:
+    """Yield the section on the paper's claims; nothing for designs other than the paper's."""
+    if data.design not in PRESETS.values():
         return
     claims = json.loads(packaged_file("claims", "claims.json").read_text("utf-8"))
     yield element("h2", "The paper’s claims")
     yield paragraph(
-        "The command explorer reproduce measures them again, with the paper’s words and our "
-        "reading of what it leaves open."
+        "The command explorer reproduce measures them again, with the paper’s words and the values "
+        "behind each verdict. Numbers mark our reading of what the paper leaves open."
     )
-    rows = [(claim["claim"], claim["verdict"]) for claim in claims]
-    yield table(("claim", "verdict"), rows, align="<<")
+    readings = list(dict.fromkeys(claim["reading"] for claim in claims if claim["reading"]))
+    rows = [
+        (
+            claim["claim"],
+            claim["verdict"],
+            str(readings.index(claim["reading"]) + 1) if claim["reading"] else "",
+        )
+        for claim in claims
+    ]
+    yield table(("claim", "verdict", "our reading"), rows, align="<<<")
+    for number, reading in enumerate(readings, start=1):
+        yield paragraph(f"{number}. {reading}")
