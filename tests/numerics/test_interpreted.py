@@ -48,9 +48,25 @@ def regions() -> FloatArray:
     return np.concatenate([values, parts.astype(np.float64), settled.ravel()])
 
 
+def dips() -> FloatArray:
+    """Return greatest tilts that the worst orientations for lengths and guide end."""
+    limits = msgspec.structs.replace(
+        OPTIMAL.limits,
+        l1=(8.7, 20.1),
+        d2=(7.7, 12.9),
+        d4=(5.4, 15.2),
+        guide=(5.1, 14.9),
+        margin=None,
+        carriage_order="any",
+    )
+    design = msgspec.structs.replace(OPTIMAL, limits=limits)
+    return greatest_tilts(design, POSITION, [-180.0, -75.0, 0.0, 83.0, 103.0], azimuths=5)
+
+
 CASES: dict[str, Callable[[], FloatArray]] = {
     "tilts": tilts,
     "greatest tilts": lambda: greatest_tilts(OPTIMAL, positions()[:2], azimuths=5),
+    "dips of tilts": dips,
     "share": lambda: np.array([orientation_share(OPTIMAL, POSITION, 200).share]),
     "regions": regions,
     "slopes": lambda: twist_slopes(LOADED, positions(), ROTATION).by,

@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 from explorer import PRESETS, Design, InputError, Limits, evaluate, home_pose, margins
 from explorer.mechanism.design import LENGTHS, Swing
 from explorer.mechanism.pose import Pose
-from explorer.workspace.orientations.share import orientation_share
+from explorer.workspace.orientations.share import orientation_capability, orientation_share
 
 pytestmark = pytest.mark.usefixtures("warm_kernels")
 
@@ -106,6 +106,16 @@ def test_unusable_positions_numbers_and_seeds_are_refused() -> None:
             orientation_share(OPTIMAL, p, n)
     with pytest.raises(InputError, match="seed"):
         orientation_share(OPTIMAL, p, seed=-1)
+    refused: list[tuple[str, dict[str, Any]]] = [
+        ("number of orientations must be a whole number", {"n": 2.5}),
+        ("number of orientations must be a whole number", {"n": math.nan}),
+        ("seed must be a whole number", {"seed": 0.5}),
+    ]
+    for message, given in refused:
+        with pytest.raises(InputError, match=message):
+            orientation_share(OPTIMAL, p, **given)
+    with pytest.raises(InputError, match="whole number"):
+        orientation_capability(OPTIMAL, p, math.nan)
     with pytest.raises(InputError, match="one position"):
         orientation_share(OPTIMAL, [p])
     with pytest.raises(InputError, match="position"):

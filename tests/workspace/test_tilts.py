@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import decimal
 import math
+from collections.abc import Callable
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 from limited_designs import limited, ordinary_case, troubled_case
 from scipy.spatial.transform import Rotation
 
-from explorer import PRESETS, Design, InputError, evaluate, home_pose
+from explorer import PRESETS, Design, InputError, evaluate, home_pose, inverse
 from explorer.mechanism.design import Swing
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
@@ -18,7 +21,12 @@ from explorer.workspace.limits.constraints import CARRIAGE_ORDER
 from explorer.workspace.orientations.connected import is_connected
 from explorer.workspace.orientations.share import orientations_within
 from explorer.workspace.orientations.tilts import greatest_tilt, greatest_tilts, tilt_map
-from explorer.workspace.orientations.torsions import tilt_by_torsion, torsion_range
+from explorer.workspace.orientations.torsions import (
+    TorsionRange,
+    tilt_by_torsion,
+    torsion_range,
+)
+from explorer.workspace.orientations.turn_polynomials import START_IS_INVALID, nearer_linear_end
 
 pytestmark = pytest.mark.usefixtures("warm_kernels")
 
@@ -222,3 +230,147 @@ def test_tilts_with_unusable_input_are_refused() -> None:
             tilt_map(design, p, torsion)
     with pytest.raises(InputError, match="rotation"):
         is_connected(design, p, np.zeros((3, 3)))
+
+
+def dips() -> list[tuple[Design, float]]:
+    """Return designs at whose home one limit leaves out a narrow range of azimuths."""
+    design = PRESETS["paper-optimal"]
+    free = limited(design, margin=None, carriage_order="any", box=None)
+    p = np.array(home_pose(design).position)
+    far, radius = float(np.linalg.norm(p)), math.hypot(p[1], p[2])
+    arm, small = math.hypot(*design.b1), 3e-4
+    return [
+        (limited(free, l1=(0.0, (far + arm) * (1.0 - small))), -180.0),
+        (limited(free, l1=((far - arm) * (1.0 + small), None)), 0.0),
+        (limited(free, d2=(0.0, radius + design.b2 * (1.0 - small))), 83.0),
+        (limited(free, d2=(radius - design.b2 * (1.0 - small), None)), -97.0),
+        (limited(free, d4=(0.0, radius + design.b3 * (1.0 - small))), 83.0),
+        (limited(free, guide=(p[0] - design.b3 * (1.0 - small), 1e3)), -75.0),
+        (limited(free, guide=(-1e3, p[0] + design.b3 * (1.0 - small))), 103.0),
+    ]
+
+
+@pytest.mark.parametrize("index", range(len(dips())))
+def test_greatest_tilt_finds_a_dip_between_azimuths(index: int) -> None:
+    design, torsion = dips()[index]
+    p = home_pose(design).position
+    least = tilt_map(design, p, torsion, 14_400).tilts.min()
+    assert least < 179.0
+    for azimuths in (5, 36, 72):
+        found = float(greatest_tilts(design, p, torsion, azimuths))
+        assert least - 0.05 <= found <= least + 1e-6
+    assert greatest_tilt(design, p, torsion).tilt == pytest.approx(least, abs=0.05)
+
+
+def exact_place(a: float, b: float, c: float) -> float:
+    """Return the first place where a (1 − u)² + b (1 − u) u + c u² turns negative, to 700 digits."""
+    with decimal.localcontext(prec=700):
+        x, y, z = decimal.Decimal(a), decimal.Decimal(b), decimal.Decimal(c)
+        square = y * y / 4 - x * z
+        if (b >= 0.0 and c >= 0.0) or square < 0:
+            return 1.0
+        root = square.sqrt()
+        roots = [(-y / 2 - root) / z, (-y / 2 + root) / z] if z else [-x / y]
+        t = min(t for t in roots if t > 0 or (t == 0 and (b < 0.0 or b == 0.0 > c)))
+        return float(t / (1 + t))
+
+
+def test_nearer_linear_end_is_the_exact_root_however_small_the_start_is() -> None:
+    assert nearer_linear_end(0.0, 1.0, -1.0, 1.0) == 0.5
+    assert nearer_linear_end(0.0, 0.0, -1.0, 1.0) == 0.0
+    assert nearer_linear_end(-1e-300, 1.0, 1.0, 1.0) == START_IS_INVALID
+    rng = np.random.default_rng(0)
+    for a in (0.0, 1e-300, 1e-30, 1e-16, 1e-9, 1e-3, 1.0, 1e3):
+        for b, c in [(1.0, -1.0), (-1.0, 1.0), *rng.normal(size=(40, 2)).tolist()]:
+            if b * b == 4.0 * a * c:
+                continue
+            expected = exact_place(a, b, c)
+            assert nearer_linear_end(a, b, c, 1.0) == pytest.approx(expected, rel=1e-11, abs=1e-300)
+            assert nearer_linear_end(a, b, c, 0.3) == min(0.3, nearer_linear_end(a, b, c, 1.0))
+
+
+def test_orientations_of_two_torsions_are_connected_within_the_range_of_torsions() -> None:
+    design = PRESETS["paper-optimal"]
+    p = home_pose(design).position
+    span = torsion_range(design, p)
+    assert span.high - span.low < 359.0
+
+    def turned_to(torsion: float) -> FloatArray:
+        return tilted(0.0, np.zeros(1), torsion)[0]
+
+    middle = turned_to(0.5 * (span.low + span.high))
+    for torsion in (span.low, span.high):
+        for beside in (-1e-14, -1e-9, 0.0, 1e-9, 1e-14):
+            other = torsion + beside
+            # The torsion itself may be a rounding error beyond its limit.
+            if math.isnan(greatest_tilt(design, p, other).tilt):
+                continue
+            assert is_connected(design, p, middle, turned_to(other))
+            assert is_connected(design, p, turned_to(other), middle)
+    for torsion in np.linspace(span.low + 0.01, span.high - 0.01, 9).tolist():
+        assert is_connected(design, p, middle, turned_to(torsion))
+    for torsion in np.linspace(span.high + 0.01, span.low + 359.99, 9).tolist():
+        assert not is_connected(design, p, middle, turned_to(torsion))
+
+
+def test_torsion_at_the_end_of_the_range_is_connected_despite_rounding(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    design = PRESETS["paper-optimal"]
+    p, here = home_pose(design).position, home_pose(design).rotation
+    module = "explorer.workspace.orientations.connected.torsion_range"
+    torsion = tilt_map(design, p).torsion
+    for low, high, expected in (
+        (torsion + 1e-9, torsion + 90.0, True),
+        (torsion - 90.0, torsion - 1e-9, True),
+        (torsion + 1e-3, torsion + 90.0, False),
+        (torsion - 90.0, torsion - 1e-3, False),
+        (math.nan, math.nan, False),
+    ):
+        span = TorsionRange(low, high, "gap", "gap")
+        monkeypatch.setattr(module, Mock(return_value=span))
+        assert is_connected(design, p, here, here) is expected
+
+
+def test_torsion_range_whose_half_turn_ends_on_a_limit_has_both_ends() -> None:
+    design = PRESETS["paper-optimal"]
+    free = limited(design, margin=None, carriage_order="any", box=None)
+    p = home_pose(design).position
+    rng = np.random.default_rng(0)
+    for torsion in rng.uniform(-180.0, 180.0, 60).tolist():
+        longest = float(inverse(free, p, tilted(0.0, np.zeros(1), torsion + 180.0)[0])[0])
+        for bound in longest + 1e-15 * longest * np.arange(-3, 4):
+            found = torsion_range(limited(free, l1=(0.0, float(bound))), p, torsion)
+            assert math.isnan(found.low) == math.isnan(found.high)
+            if not math.isnan(found.low):
+                assert torsion - 360.0 <= found.low <= torsion <= found.high <= torsion + 360.0
+                assert found.high - found.low <= 360.0 + 1e-9
+                assert (found.low_limit is None) == (found.high_limit is None)
+
+
+def test_input_that_is_not_a_whole_number_or_not_one_angle_is_refused() -> None:
+    design = PRESETS["paper-optimal"]
+    p = home_pose(design).position
+    for count in (math.nan, 3.5, math.inf, "many", None, True):
+        with pytest.raises(InputError, match="number of azimuths must be a whole number"):
+            tilt_map(design, p, azimuths=count)  # pyright: ignore[reportArgumentType]
+    whole: Any = tilt_map(design, p, azimuths=5.0)  # pyright: ignore[reportArgumentType]
+    assert len(whole.tilts) == 5
+    refused: list[tuple[str, Callable[[Any], object], Any]] = [
+        ("number of azimuths", lambda x: greatest_tilts(design, p, azimuths=x), 3.5),
+        ("number of torsions", lambda x: tilt_by_torsion(design, p, x), 3.5),
+        ("one torsion", lambda x: tilt_map(design, p, x), [1.0, 2.0]),
+        ("one torsion", lambda x: greatest_tilt(design, p, x), [1.0]),
+        ("one azimuth", lambda x: torsion_range(design, p, azimuth=x), [1.0, 2.0]),
+        ("one tilt", lambda x: torsion_range(design, p, tilt=x), [1.0, 2.0]),
+        ("tilt must be finite", lambda x: torsion_range(design, p, tilt=x), math.nan),
+    ]
+    for message, call, value in refused:
+        with pytest.raises(InputError, match=message):
+            call(value)
+
+
+def test_azimuth_of_the_greatest_tilt_is_within_half_a_turn() -> None:
+    design = PRESETS["paper-optimal"]
+    found = greatest_tilt(design, home_pose(design).position)
+    assert -180.0 <= found.azimuth < 0.0

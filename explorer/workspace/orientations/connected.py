@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 from numpy.typing import ArrayLike
 
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import checked_rotation
 from explorer.mechanism.tilt_torsion import tilt_torsion_of
-from explorer.workspace.orientations.tilts import one_position, tilt_map
+from explorer.workspace.orientations.inputs import one_position
+from explorer.workspace.orientations.tilts import tilt_map
 from explorer.workspace.orientations.torsions import torsion_range
 
 # Error of an angle that is computed in two ways, in degrees.
@@ -44,5 +47,7 @@ def is_connected(
     if other is None:
         return True
     span = torsion_range(design, p, ends[0].torsion)
-    turn = (ends[1].torsion - span.low) % 360.0
-    return span.high - span.low >= min(turn, 360.0 - ANGLE_TOLERANCE) - ANGLE_TOLERANCE
+    if math.isnan(span.low):
+        return False
+    turn = (ends[1].torsion - span.low + ANGLE_TOLERANCE) % 360.0 - ANGLE_TOLERANCE
+    return turn <= span.high - span.low + ANGLE_TOLERANCE

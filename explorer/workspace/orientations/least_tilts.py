@@ -8,13 +8,25 @@ import numpy as np
 
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.numerics.compiled import helper, kernel
+from explorer.workspace.limits.valid_poses import (
+    B1,
+    B2,
+    B3,
+    GUIDE_HIGH,
+    GUIDE_LOW,
+    LENGTH_HIGHS,
+    LENGTH_LOWS,
+)
 from explorer.workspace.orientations.turn_polynomials import SCRATCH, write_tilt
 from explorer.workspace.orientations.turns import HALF_TURN, NO_LIMIT, first_limit
 
-# Share of a bracket that the search by the golden section keeps, and the width at which it ends,
-# in radians.
+# Share of a bracket that the search by the golden section keeps.
 GOLDEN_SECTION = 0.5 * (math.sqrt(5.0) - 1.0)
-AZIMUTH_WIDTH = 1e-4
+# Widths of the bracket at which the search ends, in radians: about an azimuth of the row, and about
+# a worst azimuth, where the dip may be narrow.
+AZIMUTH_WIDTH, NARROW_WIDTH = 1e-4, 1e-6
+# Largest number of worst azimuths: two of l1, three each of d2 and d4, and two for each carriage.
+WORST = 12
 
 
 @helper
@@ -33,37 +45,109 @@ def tilt_in(
 
 
 @helper
-def lowest_between(
+def lowest_about(
     row: FloatArray,
     cones: FloatArray,
     p: FloatArray,
     torsion: float,
-    low: float,
-    high: float,
+    bracket: tuple[float, float, float],
+    width: float,
     turn: FloatArray,
     scratch: FloatArray,
 ) -> tuple[float, float, int]:
-    """Return the least of the greatest tilts between two azimuths, its azimuth and its limit.
+    """Return the least of the greatest tilts about an azimuth, its own azimuth and its limit.
 
-    The search by the golden section narrows the bracket to `AZIMUTH_WIDTH`, at which the tilt of
-    a smooth minimum is good to rounding.
+    The search by the golden section keeps the lowest azimuth that it knows within the bracket, so
+    it does not leave a dip that the first azimuth lies in.
+
+    Args:
+        row: Row of `Rules`.
+        cones: Cones of `Rules`.
+        p: Position of b4, shape (3,).
+        torsion: Torsion in radians.
+        bracket: Low end, first azimuth and high end, in radians.
+        width: Width of the bracket at which the search ends, in radians.
+        turn: Scratch array, shape (3, 3, 3).
+        scratch: Array of the shape `SCRATCH`.
     """
-    span = GOLDEN_SECTION * (high - low)
-    first, second = high - span, low + span
+    low, first, high = bracket
+    second = first + (1.0 - GOLDEN_SECTION) * (high - first)
     at_first, limit_first = tilt_in(row, cones, p, first, torsion, turn, scratch)
     at_second, limit_second = tilt_in(row, cones, p, second, torsion, turn, scratch)
-    while high - low > AZIMUTH_WIDTH:
+    while high - low > width:
         if at_first <= at_second:
             high, second, at_second, limit_second = second, first, at_first, limit_first
-            first = high - GOLDEN_SECTION * (high - low)
+            first = GOLDEN_SECTION * second + (1.0 - GOLDEN_SECTION) * low
             at_first, limit_first = tilt_in(row, cones, p, first, torsion, turn, scratch)
         else:
             low, first, at_first, limit_first = first, second, at_second, limit_second
-            second = low + GOLDEN_SECTION * (high - low)
+            second = GOLDEN_SECTION * first + (1.0 - GOLDEN_SECTION) * high
             at_second, limit_second = tilt_in(row, cones, p, second, torsion, turn, scratch)
     if at_first <= at_second:
         return at_first, first, limit_first
     return at_second, second, limit_second
+
+
+@helper
+def azimuth_towards(vx: float, vy: float, wx: float, wy: float, wz: float) -> float:
+    """Return the azimuth of the tilt that takes a horizontal vector v to a vector w as long.
+
+    The axis of a tilt is horizontal and keeps what v has along it, so it is perpendicular to the
+    difference of v and the horizontal part of w.
+    """
+    sign = -1.0 if wz > 0.0 else 1.0
+    return math.atan2(sign * (vy - wy), sign * (vx - wx))
+
+
+@helper
+def write_worst_azimuths(row: FloatArray, p: FloatArray, torsion: float, worst: FloatArray) -> int:
+    """Write the azimuths of tilts to which l1, d2, d4, d1 and d3 are largest or smallest.
+
+    Only those that violate a bound count. Beyond such a bound the region of tilts may be small, so
+    that azimuths at equal distances pass by it.
+
+    Args:
+        row: Row of `Rules`.
+        p: Position of b4, shape (3,).
+        torsion: Torsion in radians.
+        worst: Azimuths in radians, shape (`WORST`,).
+
+    Returns:
+        The number of azimuths.
+    """
+    count = 0
+    c, s = math.cos(torsion), math.sin(torsion)
+    distance = math.sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2])
+    radius = math.hypot(p[1], p[2])
+    for leg in range(3):
+        bx = row[B1] if leg == 0 else (row[B2] if leg == 1 else row[B3])
+        by = row[B1 + 1] if leg == 0 else 0.0
+        arm = math.hypot(bx, by)
+        vx, vy = c * bx - s * by, s * bx + c * by
+        # b1 turns to the line through a1, b2 and b3 to the plane across the guide.
+        far = distance if leg == 0 else radius
+        x = p[0] if leg == 0 else 0.0
+        if far > 0.0 and far + arm > row[LENGTH_HIGHS + leg]:
+            share = arm / far
+            worst[count] = azimuth_towards(vx, vy, share * x, share * p[1], share * p[2])
+            count += 1
+        if leg > 0 and arm > far and row[LENGTH_LOWS + leg] > 0.0:
+            # The leg's end can lie on the guide, at one of two places.
+            along = math.sqrt(arm * arm - far * far)
+            worst[count] = azimuth_towards(vx, vy, along, -p[1], -p[2])
+            worst[count + 1] = azimuth_towards(vx, vy, -along, -p[1], -p[2])
+            count += 2
+        elif far > 0.0 and abs(far - arm) < row[LENGTH_LOWS + leg]:
+            share = -arm / far
+            worst[count] = azimuth_towards(vx, vy, share * x, share * p[1], share * p[2])
+            count += 1
+        if leg > 0 and p[0] + arm > row[GUIDE_HIGH]:
+            worst[count] = azimuth_towards(vx, vy, arm, 0.0, 0.0)
+            count += 1
+        if leg > 0 and p[0] - arm < row[GUIDE_LOW]:
+            worst[count] = azimuth_towards(vx, vy, -arm, 0.0, 0.0)
+            count += 1
+    return count
 
 
 @kernel("void(f8[::1], f8[:,::1], f8[:,::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], i8[::1])")
@@ -91,7 +175,7 @@ def least_tilt_rows(
         towards: Azimuth of the least tilt, shape (n,).
         limits: Number of the limit that ends it, shape (n,).
     """
-    scratch, turn = np.zeros(SCRATCH), np.zeros((3, 3, 3))
+    scratch, turn, worst = np.zeros(SCRATCH), np.zeros((3, 3, 3)), np.zeros(WORST)
     count = azimuths.shape[0]
     step = 2.0 * math.pi / count
     for index in range(positions.shape[0]):
@@ -103,24 +187,35 @@ def least_tilt_rows(
                 best, towards[index], limits[index] = tilts[k], azimuths[k], limit
             if best < 0.0:
                 break
-        if best > 0.0:
-            for k in range(count):
-                before, after = tilts[k - 1], tilts[(k + 1) % count]
-                # Between its neighbours a smooth minimum is lower by an eighth of the rise at most.
-                rise = max(before, after) - tilts[k]
-                is_lowest = tilts[k] <= before and tilts[k] <= after and rise > 0.0
-                if not is_lowest or tilts[k] - 0.25 * rise > best:
-                    continue
-                found, azimuth, limit = lowest_between(
-                    row,
-                    cones,
-                    p,
-                    torsion,
-                    azimuths[k] - step,
-                    azimuths[k] + step,
-                    turn,
-                    scratch,
-                )
-                if found < best:
-                    best, towards[index], limits[index] = found, azimuth, limit
+        if best <= 0.0:
+            least[index] = best
+            continue
+        for k in range(count):
+            before, after = tilts[k - 1], tilts[(k + 1) % count]
+            # Where limits meet, the first of them counts, so a minimum is one of a single smooth
+            # limit. That of a parabola is lower than the azimuth by an eighth of the rise to its
+            # neighbours at most; a quarter leaves room for other limits.
+            rise = max(before, after) - tilts[k]
+            is_lowest = tilts[k] <= before and tilts[k] <= after and rise > 0.0
+            if not is_lowest or tilts[k] - 0.25 * rise > best:
+                continue
+            bracket = (azimuths[k] - step, azimuths[k], azimuths[k] + step)
+            found, azimuth, limit = lowest_about(
+                row, cones, p, torsion, bracket, AZIMUTH_WIDTH, turn, scratch
+            )
+            if found < best:
+                best, towards[index], limits[index] = found, azimuth, limit
+        for k in range(write_worst_azimuths(row, p, torsion, worst)):
+            place = (worst[k] - azimuths[0]) % (2.0 * math.pi)
+            left = int(place / step) % count
+            tilt, _ = tilt_in(row, cones, p, worst[k], torsion, turn, scratch)
+            if not (tilt < tilts[left] and tilt < tilts[(left + 1) % count]):
+                continue
+            low = worst[k] - (place - left * step)
+            bracket = (low, worst[k], low + step)
+            found, azimuth, limit = lowest_about(
+                row, cones, p, torsion, bracket, NARROW_WIDTH, turn, scratch
+            )
+            if found < best:
+                best, towards[index], limits[index] = found, azimuth, limit
         least[index] = best

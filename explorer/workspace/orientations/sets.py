@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from explorer.errors import InputError
 from explorer.mechanism.pose import checked_rotation, rotation_from_yaw_pitch_roll
 from explorer.numerics.arrays import FloatArray, finite_array
+from explorer.workspace.orientations.inputs import whole_number
 
 MOST_ORIENTATIONS = 1_000_000
 """Largest number of orientations in a set."""
@@ -81,5 +82,4 @@ def cone_of_directions(rotation: ArrayLike, half_angle: float, count: int) -> Fl
 
 
 def _check_count(name: str, count: int) -> None:
-    if not 1 <= count <= MOST_ORIENTATIONS:
-        raise InputError(f"{name} must lie within 1 to {MOST_ORIENTATIONS:,}; got {count}")
+    whole_number(name, count, 1, MOST_ORIENTATIONS)

@@ -20,9 +20,10 @@ from scipy.spatial.transform import Rotation
 from explorer.errors import InputError
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import checked_rotation
-from explorer.numerics.arrays import BoolArray, FloatArray, IntArray, finite_array, for_kernel
+from explorer.numerics.arrays import BoolArray, FloatArray, IntArray, for_kernel
 from explorer.numerics.compiled import kernel
 from explorer.workspace.limits.valid_poses import Rules, is_valid, valid_rows
+from explorer.workspace.orientations.inputs import one_position, whole_number
 from explorer.workspace.orientations.sets import MOST_ORIENTATIONS
 
 CAPABILITY_ORIENTATIONS = 100_000
@@ -68,17 +69,11 @@ def orientation_share(
         seed: Seed of the random rotations; the same seed gives the same result.
 
     Raises:
-        InputError: not a position, no usable number of orientations, or a negative seed.
+        InputError: not a position, no usable number of orientations, or no usable seed.
     """
-    p = finite_array("position", position, (3,))
-    if p.ndim != 1:
-        raise InputError(f"give one position, three numbers; got the shape {p.shape}")
-    if not 2 <= n <= MOST_ORIENTATIONS:
-        raise InputError(
-            f"the number of orientations must lie within 2 to {MOST_ORIENTATIONS:,}; got {n}"
-        )
-    if seed < 0:
-        raise InputError(f"the seed must not be negative; got {seed}")
+    p = one_position(position)
+    n = whole_number("the number of orientations", n, 2, MOST_ORIENTATIONS)
+    seed = whole_number("the seed", seed, 0)
     sets = min(SETS, n)
     sizes = np.full(sets, n // sets, dtype=np.int64)
     sizes[: n % sets] += 1
@@ -110,7 +105,8 @@ def orientation_capability(
     """
     array = np.asarray(orientations)
     if array.ndim == 0:
-        return orientation_share(design, position, int(array)).share
+        n = whole_number("the number of orientations", array, 2, MOST_ORIENTATIONS)
+        return orientation_share(design, position, n).share
     return float(orientations_within(design, position, array).mean())
 
 
@@ -128,9 +124,7 @@ def orientations_within(design: Design, position: ArrayLike, rotations: ArrayLik
     Raises:
         InputError: not a position, or not rotations.
     """
-    p, r = finite_array("position", position, (3,)), checked_rotation(rotations)
-    if p.ndim != 1:
-        raise InputError(f"give one position, three numbers; got the shape {p.shape}")
+    p, r = one_position(position), checked_rotation(rotations)
     if r.ndim != 3 or not len(r):
         raise InputError(f"rotations must have the shape (n, 3, 3); got {r.shape}")
     within = np.empty(len(r), dtype=np.bool_)

@@ -20,14 +20,21 @@ from explorer.mechanism.home import home_pose
 from explorer.mechanism.tilt_torsion import tilt_torsion_of
 from explorer.numerics.arrays import FloatArray, finite_array, for_kernel
 from explorer.workspace.limits.valid_poses import Rules
+from explorer.workspace.orientations.inputs import (
+    MOST_ANGLES,
+    even_angles,
+    one_angle,
+    one_position,
+)
 from explorer.workspace.orientations.least_tilts import least_tilt_rows
 from explorer.workspace.orientations.turns import NO_LIMIT, limit_names, tilt_rows
 
 AZIMUTHS = 72
-"""Number of azimuths of a map of tilts, and of those between which the least tilt is searched."""
+"""Number of azimuths of a map of tilts, and of those between which the least tilt of each of many
+positions is searched."""
 
-# Largest number of azimuths or torsions.
-MOST_ANGLES = 100_000
+# Number of azimuths between which the least tilt of a single position is searched.
+AZIMUTHS_OF_ONE = 360
 # Number of rows of a kernel that a single turn is worth.
 ROWS_OF_TURN = 20
 
@@ -58,7 +65,7 @@ class GreatestTilt:
     Attributes:
         torsion: Torsion.
         tilt: Least of the greatest tilts over all azimuths; NaN if tilt zero violates a limit.
-        azimuth: Azimuth in which the tilt ends, 0 to 360; NaN if none ends it.
+        azimuth: Azimuth in which the tilt ends, −180 to 180; NaN if none ends it.
         limit: Name of the limit that ends the tilt, or that tilt zero violates; None if the
             platform can tilt by 180° in every azimuth.
     """
@@ -89,7 +96,7 @@ def tilt_map(
     p, sigma = one_position(position), checked_torsion(design, torsion)
     array = np.asarray(azimuths)
     if array.ndim == 0:
-        directions = even_angles("azimuths", int(array), fewest=1)
+        directions = even_angles("azimuths", array, fewest=1)
     else:
         directions = finite_array("azimuths", array, ())
         if directions.ndim != 1 or not 1 <= len(directions) <= MOST_ANGLES:
@@ -117,8 +124,10 @@ def greatest_tilt(
 ) -> GreatestTilt:
     """Return the greatest tilt of a position in every azimuth.
 
-    It is the least over all azimuths of the tilts of `tilt_map`. The search starts from
-    `AZIMUTHS` azimuths and narrows down every minimum among them that can be the least.
+    It is the least over all azimuths of the tilts of `tilt_map`. The search starts from 360
+    azimuths, and from those of the worst orientations for lengths and guide, and narrows down
+    every minimum among them that can be the least. A dip by the swing of a joint that is narrower
+    than the distance of the azimuths, 1°, can be missed.
 
     Args:
         design: The manipulator.
@@ -129,10 +138,10 @@ def greatest_tilt(
         InputError: not a position, or a torsion that is not finite.
     """
     p, sigma = one_position(position), checked_torsion(design, torsion)
-    tilts, towards, limits = _least_tilts(design, p[None], np.array([sigma]), AZIMUTHS)
+    tilts, towards, limits = _least_tilts(design, p[None], np.array([sigma]), AZIMUTHS_OF_ONE)
     tilt = float(tilts[0])
     is_ended = not math.isnan(tilt) and limits[0] != NO_LIMIT
-    azimuth = float(towards[0]) % 360.0 if is_ended else math.nan
+    azimuth = math.remainder(float(towards[0]), 360.0) if is_ended else math.nan
     return GreatestTilt(sigma, tilt, azimuth, names_of(design, limits)[0])
 
 
@@ -144,7 +153,8 @@ def greatest_tilts(
 ) -> FloatArray:
     """Return the greatest tilts of positions in every azimuth, in degrees, shape (...).
 
-    A position whose tilt zero violates a limit has NaN.
+    A position whose tilt zero violates a limit has NaN. The search is that of `greatest_tilt`, from
+    fewer azimuths: with 72, a dip by the swing of a joint that is narrower than 5° can be missed.
 
     Args:
         design: The manipulator.
@@ -176,41 +186,11 @@ def checked_torsion(design: Design, torsion: float | None) -> float:
     """Return a torsion in degrees after checking it; that of the home pose if None.
 
     Raises:
-        InputError: The torsion is not finite.
+        InputError: The torsion is not finite, or there are several.
     """
     if torsion is None:
         return tilt_torsion_of(home_pose(design).rotation).torsion
-    return float(finite_array("torsion", torsion, ()))
-
-
-def one_position(position: ArrayLike) -> FloatArray:
-    """Return one position (3,) after checking it.
-
-    Raises:
-        InputError: The position is not finite, or there are several.
-    """
-    p = finite_array("position", position, (3,))
-    if p.ndim != 1:
-        raise InputError(f"give one position, three numbers; got the shape {p.shape}")
-    return p
-
-
-def even_angles(name: str, count: int, fewest: int = 3) -> FloatArray:
-    """Return angles in degrees at equal distances once around from 0 on, shape (count,).
-
-    Args:
-        name: Name of the angles in messages.
-        count: Their number.
-        fewest: Least allowed number.
-
-    Raises:
-        InputError: Too few or too many angles.
-    """
-    if not fewest <= count <= MOST_ANGLES:
-        raise InputError(
-            f"the number of {name} must lie within {fewest} to {MOST_ANGLES:,}; got {count}"
-        )
-    return np.asarray(np.arange(count) * (360.0 / count), dtype=np.float64)
+    return one_angle("torsion", torsion)
 
 
 def _least_tilts(
@@ -218,16 +198,17 @@ def _least_tilts(
 ) -> tuple[FloatArray, FloatArray, list[int]]:
     """Return least tilts and their azimuths in degrees, and the numbers of their limits."""
     n, directions = len(positions), np.radians(even_angles("azimuths", azimuths))
+    count = len(directions)
     least, towards, limits = np.empty(n), np.empty(n), np.empty(n, dtype=np.int64)
     rules = Rules.of(design).without_clearances()
     least_tilt_rows(
-        ROWS_OF_TURN * n * azimuths,
+        ROWS_OF_TURN * n * count,
         rules.row,
         rules.cones,
         for_kernel(positions),
         np.radians(torsions),
         directions,
-        np.empty(azimuths),
+        np.empty(count),
         least,
         towards,
         limits,

@@ -11,23 +11,21 @@ from explorer.mechanism.design import Design
 from explorer.mechanism.tilt_torsion import rotation_from_tilt_torsion
 from explorer.numerics.arrays import FloatArray
 from explorer.workspace.limits.valid_poses import Rules
+from explorer.workspace.orientations.inputs import even_angles, one_angle, one_position
 from explorer.workspace.orientations.tilts import (
+    AZIMUTHS_OF_ONE,
     GreatestTilt,
     checked_torsion,
-    even_angles,
     greatest_tilt,
     greatest_tilts,
     in_degrees,
     names_of,
-    one_position,
 )
 from explorer.workspace.orientations.turns import turn_rows
 
 TORSIONS = 72
 """Number of torsions at which the greatest tilt is measured."""
 
-# Number of azimuths between which the least tilt is searched at each torsion.
-AZIMUTHS = 36
 # Width in degrees of the interval of torsions at which the search for the best one ends.
 TORSION_WIDTH = 1e-3
 
@@ -37,8 +35,10 @@ class TorsionRange:
     """The torsions that lead on from one without a gap, at a tilt; angles in degrees.
 
     Attributes:
-        low: Least torsion; NaN if the torsion that the range starts from violates a limit.
-        high: Largest torsion, at most 360° above the least one; NaN as `low`.
+        low: Least torsion, at most 360° below the one that the range starts from; NaN if that one
+            violates a limit.
+        high: Largest torsion, at most 360° above the one that the range starts from, and above
+            the least one; NaN as `low`. If every torsion is possible, both are 180° away.
         low_limit: Name of the limit at the least torsion, or that the start violates; None if
             every torsion is possible.
         high_limit: Name of the limit at the largest torsion, as `low_limit`.
@@ -85,8 +85,8 @@ def torsion_range(
         InputError: not a position, or angles that are not finite.
     """
     p, sigma = one_position(position), checked_torsion(design, torsion)
-    r = rotation_from_tilt_torsion([azimuth, tilt, sigma])
-    # Downwards the platform's y-axis turns towards the negative x-axis.
+    r = rotation_from_tilt_torsion([one_angle("azimuth", azimuth), one_angle("tilt", tilt), sigma])
+    # For a decreasing torsion the platform's x-axis turns towards its negative y-axis.
     turns = np.stack([_turn_about_z(r, -1.0), _turn_about_z(r, 1.0)])
     angles, limits = _end_of_turns(design, p, turns)
     down, up = in_degrees(angles).tolist()
@@ -95,13 +95,17 @@ def torsion_range(
         return TorsionRange(sigma - 180.0, sigma + 180.0, None, None)
     if names[0] is None or names[1] is None:
         # Half a turn one way ends where the other way ends, beyond that half turn.
-        rest = np.stack([_turn_about_z(_turned_half(r), -1.0), _turn_about_z(_turned_half(r), 1.0)])
+        half = _turned_half(r)
+        rest = np.stack([_turn_about_z(half, -1.0), _turn_about_z(half, 1.0)])
         angles, limits = _end_of_turns(design, p, rest)
-        more, rest_names = in_degrees(angles).tolist(), names_of(design, limits)
+        # Where the half turn ends on a limit, rounding may make the start of the rest invalid.
+        more, rest_names = np.maximum(np.degrees(angles), 0.0).tolist(), names_of(design, limits)
         if names[0] is None:
-            down, names = 180.0 + more[0], (rest_names[0], names[1])
+            down = min(180.0 + more[0], 360.0 - up)
+            names = rest_names[0] or names[1], names[1]
         else:
-            up, names = 180.0 + more[1], (names[0], rest_names[1])
+            up = min(180.0 + more[1], 360.0 - down)
+            names = names[0], rest_names[1] or names[0]
     return TorsionRange(sigma - down, sigma + up, *names)
 
 
@@ -120,7 +124,7 @@ def tilt_by_torsion(design: Design, position: ArrayLike, torsions: int = TORSION
     """
     p = one_position(position)
     angles = even_angles("torsions", torsions) - 180.0
-    tilts = greatest_tilts(design, p, angles, AZIMUTHS)
+    tilts = greatest_tilts(design, p, angles, AZIMUTHS_OF_ONE)
     if np.isnan(tilts).all():
         return TiltByTorsion(angles, tilts, greatest_tilt(design, p, float(angles[0])))
     step, middle = 360.0 / len(angles), float(angles[np.nanargmax(tilts)])
@@ -128,7 +132,7 @@ def tilt_by_torsion(design: Design, position: ArrayLike, torsions: int = TORSION
     low, high = middle - step, middle + step
     while high - low > TORSION_WIDTH:
         tried = np.linspace(low, high, 9)
-        found = np.nan_to_num(greatest_tilts(design, p, tried, AZIMUTHS), nan=-1.0)
+        found = np.nan_to_num(greatest_tilts(design, p, tried, AZIMUTHS_OF_ONE), nan=-1.0)
         top = int(found.argmax())
         if found[top] > best.tilt:
             best = greatest_tilt(design, p, float(tried[top]))

@@ -23,10 +23,10 @@ from explorer.workspace.orientations.turn_polynomials import (
     BINOMIALS_8,
     LEG_ROW,
     LEG_SQUARE,
-    NOT_EVEN_THE_START,
     POLYNOMIAL,
     ROWS,
     SQUARE,
+    START_IS_INVALID,
     add_product,
     nearer_end,
     write_leg,
@@ -52,7 +52,7 @@ def end_in_cone(
     """
     leg = int(cone[LEG]) - 1
     if leg < 0:
-        return NOT_EVEN_THE_START
+        return START_IS_INVALID
     if cone[SINE] == 0.0:
         return end
     write_leg(row, leg, p, turn, scratch)
@@ -108,7 +108,7 @@ def first_outside_wide_cone(end: float, scratch: FloatArray) -> float:
     keep_left(pieces[0], 8, end)
     keep_left(others[0], 4, end)
     if pieces[0, 0] < 0.0 and others[0, 0] < 0.0:
-        return NOT_EVEN_THE_START
+        return START_IS_INVALID
     low, width = MOST_DEGREE + 1, MOST_DEGREE + 2
     pieces[0, low], pieces[0, width] = 0.0, end
     top = 0

@@ -21,7 +21,7 @@ from explorer.numerics.bernstein import (
 from explorer.numerics.compiled import helper
 from explorer.workspace.limits.valid_poses import A3, B1, B2, B3
 
-NOT_EVEN_THE_START = -1.0
+START_IS_INVALID = -1.0
 """Angle or place that means that the start of the turn already violates a limit."""
 
 # Rows of the scratch array: the polynomial that is searched, the three coordinates of a leg, and
@@ -115,7 +115,7 @@ def nearer_end(degree: int, end: float, scratch: FloatArray) -> float:
     if is_negative_nowhere(b, degree):
         return end
     if not b[0] >= 0.0:
-        return NOT_EVEN_THE_START
+        return START_IS_INVALID
     if end < 1.0:
         keep_left(b, degree, end)
         if is_negative_nowhere(b, degree):
@@ -128,12 +128,16 @@ def nearer_end(degree: int, end: float, scratch: FloatArray) -> float:
 def nearer_linear_end(a: float, b: float, c: float, end: float) -> float:
     """Return what `nearer_end` does for a (1 − u)² + b (1 − u) u + c u², in closed form."""
     if not a >= 0.0:
-        return NOT_EVEN_THE_START
-    square = 0.25 * b * b - a * c
+        return START_IS_INVALID
+    half = 0.5 * b
+    square = half * half - a * c
     if (b >= 0.0 and c >= 0.0) or square < 0.0:
         return end
-    # The first positive root of a + b t + c t², with t = u / (1 − u).
-    below = math.sqrt(square) - 0.5 * b
-    if below <= 0.0:
-        return end
+    # The first positive root of a + b t + c t², with t = u / (1 − u). Of its two forms each is
+    # taken where its sum has terms of one sign, so that nothing cancels.
+    root = math.sqrt(square)
+    if b >= 0.0:
+        above = half + root
+        return min(end, above / (above - c))
+    below = root - half
     return min(end, a / (a + below))

@@ -1,7 +1,8 @@
 """The first limit that a turn of the platform about one axis meets, b4 held in its place.
 
 Each limit is a polynomial along the turn (`explorer.workspace.orientations.turn_polynomials`): of
-degree 2 for l1, the guide, the gap, the carriage order and the margins, of degree 4 for d2 and d4.
+degree 2 for l1, the guide, the gap, the carriage order and the margins, of degree 4 for d2 and d4,
+and of degree 8 for the cones of joints. l4 and the box are constant, since b4 stays in its place.
 """
 
 from __future__ import annotations
@@ -35,9 +36,9 @@ from explorer.workspace.orientations.turn_cones import end_in_cone
 from explorer.workspace.orientations.turn_polynomials import (
     BINOMIALS_4,
     LEG_ROW,
-    NOT_EVEN_THE_START,
     POLYNOMIAL,
     SCRATCH,
+    START_IS_INVALID,
     add_product,
     angle_at,
     nearer_end,
@@ -102,7 +103,7 @@ def nearer_end_of_length(
     if leg == 3:
         x, y = p[0] - row[A3], p[1] - row[A3 + 1]
         is_kept = sign * (limit - x * x - y * y - p[2] * p[2]) >= 0.0
-        return end if is_kept else NOT_EVEN_THE_START
+        return end if is_kept else START_IS_INVALID
     arm = row[B2] if leg == 1 else row[B3]
     radius = math.hypot(p[1], p[2])
     # Most bounds are beyond what any orientation needs.
@@ -267,7 +268,7 @@ def first_limit(
     if end >= 0.0:
         found = broken_side_of_box(row, p)
         if found >= 0:
-            end, limit = NOT_EVEN_THE_START, found
+            end, limit = START_IS_INVALID, found
     if end >= 0.0:
         end, found = end_by_margins(row, p, turn, end)
         limit = found if found >= 0 else limit
@@ -277,7 +278,7 @@ def first_limit(
             if place < end:
                 end, limit = place, CONE_LIMITS + index
     if end < 0.0:
-        return NOT_EVEN_THE_START, limit
+        return START_IS_INVALID, limit
     return (most if limit == NO_LIMIT else angle_at(end)), limit
 
 
