@@ -6,6 +6,8 @@ import json
 from collections.abc import Iterator
 from xml.etree.ElementTree import Element
 
+import msgspec
+
 from explorer.export.report.data import ReportData
 from explorer.export.report.markup import element, paragraph, table
 from explorer.files.packaged import packaged_file
@@ -14,7 +16,12 @@ from explorer.mechanism.design_file import PRESETS
 
 def claims_section(data: ReportData) -> Iterator[Element]:
     """Yield the section on the paper's claims; nothing for designs other than the paper's."""
-    if data.design not in PRESETS.values():
+    design = data.design
+    is_of_paper = any(
+        msgspec.structs.replace(preset, name=design.name, unit_mm=design.unit_mm) == design
+        for preset in PRESETS.values()
+    )
+    if not is_of_paper:
         return
     claims = json.loads(packaged_file("claims", "claims.json").read_text("utf-8"))
     yield element("h2", "The paper’s claims")
