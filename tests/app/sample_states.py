@@ -48,6 +48,7 @@ from explorer.measures.measurements import measure_design
 from explorer.mechanism.design import VARIABLES, Limits
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.pose import Pose
+from explorer.mechanism.tilt_torsion import TiltTorsion
 from explorer.optimise.outcome import Iterate
 from explorer.optimise.problem import YAW
 from explorer.optimise.record import Record, RunRecord, Settings, step_of
@@ -261,6 +262,7 @@ def rich_state() -> State:
         Pin(OPTIMAL),
         Change("compared", {"look": varied(Look())}),
         Change("", {"studies": varied(Studies())}),
+        Change("", {"set_tilt_torsion": TiltTorsion(1 / 3, 20.0, -50.0)}),
         BrushAxis("volume", ((1 / 3, 10.0),)),
         Change("optimisation.request", {"held": True, "error": 1 / 3}),
         SetJoint(0, 99.1),

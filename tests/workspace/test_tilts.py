@@ -263,7 +263,7 @@ def test_greatest_tilt_finds_a_dip_between_azimuths(index: int) -> None:
 
 
 def exact_place(a: float, b: float, c: float) -> float:
-    """Return the first place where a (1 − u)² + b (1 − u) u + c u² turns negative, to 700 digits."""
+    """Return the first place where a (1 − u)² + b (1 − u) u + c u² is negative, to 700 digits."""
     with decimal.localcontext(prec=700):
         x, y, z = decimal.Decimal(a), decimal.Decimal(b), decimal.Decimal(c)
         square = y * y / 4 - x * z

@@ -62,8 +62,9 @@ window.explorer.tilts ??= (() => {
   }).observe(document.body, { childList: true, subtree: true });
   addEventListener("click", (event) => {
     const chart = chartAt(event.target),
-      // A click tells whole pixels, other than the pointer that read the chart.
-      found = chart && read(chart, last ?? event);
+      // A click tells whole pixels, other than the pointer that read the same chart.
+      isRead = last && chartAt(last.target) === chart,
+      found = chart && read(chart, isRead ? last : event);
     if (found) window.explorer.press(found.button, JSON.stringify(found.value));
   });
   return { read };

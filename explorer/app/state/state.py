@@ -26,6 +26,11 @@ from explorer.mechanism.home import home_pose
 from explorer.mechanism.kinematics import inverse
 from explorer.mechanism.margins import TETRAHEDRA, margins, mode_of
 from explorer.mechanism.pose import Pose, Triple, yaw_pitch_roll_from_rotation
+from explorer.mechanism.tilt_torsion import (
+    TiltTorsion,
+    rotation_from_tilt_torsion,
+    tilt_torsion_of,
+)
 from explorer.numerics.number_text import format_number
 from explorer.optimise.outcome import Iterate
 from explorer.optimise.problem import Problem
@@ -34,6 +39,8 @@ from explorer.singularity.colours import WARN_SHARE
 
 Joints = tuple[float, float, float, float, float, float]
 Hold = Literal["pose", "legs"]
+# Difference of the entries of rotation matrices up to which they are the same but for rounding.
+SAME_ROTATION = 1e-12
 Count = Annotated[int, msgspec.Meta(ge=0)]
 
 
@@ -205,6 +212,8 @@ class State:
         optimisation: The request for an optimisation, and its last run.
         compared: The designs that this one is compared with.
         studies: The open study of designs, and how it is shown.
+        set_tilt_torsion: Azimuth, tilt and torsion in degrees as the user last set them, which
+            count while they give the rotation of the pose; None if none were set.
     """
 
     design: Design
@@ -225,6 +234,7 @@ class State:
     )
     compared: Compared = field(default_factory=Compared, metadata=STAYS)
     studies: Studies = field(default_factory=Studies, metadata=STAYS)
+    set_tilt_torsion: TiltTorsion | None = None
 
     def for_file(self) -> State:
         """Return the state as a file holds it: while a run goes on, the state before the run."""
@@ -237,6 +247,19 @@ class State:
     def jog_in_use(self) -> Jog | None:
         """The uncoupled motion that brought the platform here; None once it is elsewhere."""
         return self.jog if self.jog is not None and self.jog.pose == self.pose else None
+
+    @property
+    def tilt_torsion(self) -> TiltTorsion:
+        """Azimuth, tilt and torsion of the pose in degrees, as the user set them if known.
+
+        At tilt 0 and 180° the rotation does not determine all three.
+        """
+        given, rotation = self.set_tilt_torsion, self.pose.rotation
+        if given is not None and np.allclose(
+            rotation_from_tilt_torsion(given), rotation, rtol=0.0, atol=SAME_ROTATION
+        ):
+            return given
+        return tilt_torsion_of(rotation)
 
     @property
     def remark(self) -> str | None:

@@ -105,14 +105,10 @@ class _Orientations:
 
     def as_lines(self) -> Iterator[str]:
         """Yield the answer as lines of text."""
-        share, least = self.share, self.least
+        least = self.least
         yield from (heading(self.design), f"position  {'  '.join(figures(self.position))}", "")
-        error = f"standard error {figure(share.standard_error)}"
         rows = [
-            (
-                "share of all orientations",
-                f"{figure(share.share)} ({error}, {share.orientations} orientations)",
-            ),
+            ("share of all orientations", self._share()),
             ("torsion", *degrees([least.torsion])),
             ("greatest tilt in every azimuth", self._greatest()),
             ("largest at any torsion", self._best()),
@@ -129,6 +125,13 @@ class _Orientations:
             towards, most = degrees([azimuth, tilt])
             listed.append((towards, most, limit or "no limit"))
         yield table(listed, ">><")
+
+    def _share(self) -> str:
+        share = self.share
+        if share.share in (0.0, 1.0):
+            return f"{'all' if share.share else 'none'} of {share.orientations:,} orientations"
+        error = f"standard error {figure(share.standard_error)}"
+        return f"{figure(share.share)} ({error}, {share.orientations:,} orientations)"
 
     def _greatest(self) -> str:
         least = self.least

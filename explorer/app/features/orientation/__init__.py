@@ -1,1 +1,1 @@
-"""The tab Orientation: what orientations a position can have, and positions over orientations."""
+"""The tab Tilt: what orientations a position can have, and positions over orientations."""

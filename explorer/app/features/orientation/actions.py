@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from explorer.app.state.action import Action
 from explorer.app.state.actions import moved
 from explorer.app.state.state import State
-from explorer.mechanism.tilt_torsion import pose_of_tilt_torsion, tilt_torsion_of
+from explorer.mechanism.tilt_torsion import TiltTorsion, pose_of_tilt_torsion
 from explorer.numerics.number_text import format_number
 
 ANGLES = ("azimuth", "tilt", "torsion")
@@ -23,9 +23,9 @@ class SetTiltTorsion(Action):
 
     def apply(self, state: State) -> State:
         """Return the next state."""
-        angles = list(tilt_torsion_of(state.pose.rotation))
+        angles = list(state.tilt_torsion)
         angles[self.axis] = self.value
-        return moved(state, pose_of_tilt_torsion(state.pose.position, angles))
+        return _tilted(state, TiltTorsion(*angles))
 
     def words(self) -> str:
         """Return what the action does."""
@@ -41,11 +41,15 @@ class GoToTilt(Action):
 
     def apply(self, state: State) -> State:
         """Return the next state."""
-        torsion = tilt_torsion_of(state.pose.rotation).torsion
-        angles = (self.azimuth, self.tilt, torsion)
-        return moved(state, pose_of_tilt_torsion(state.pose.position, angles))
+        return _tilted(state, TiltTorsion(self.azimuth, self.tilt, state.tilt_torsion.torsion))
 
     def words(self) -> str:
         """Return what the action does."""
         tilt, azimuth = (format_number(angle, 4) for angle in (self.tilt, self.azimuth))
         return f"Tilt {tilt}° towards {azimuth}°"
+
+
+def _tilted(state: State, angles: TiltTorsion) -> State:
+    """Return the state with azimuth, tilt and torsion in degrees, which it keeps as they are."""
+    pose = pose_of_tilt_torsion(state.pose.position, angles)
+    return replace(moved(state, pose), set_tilt_torsion=angles)

@@ -17,7 +17,6 @@ from explorer.app.features.orientation.tasks import (
 from explorer.app.session.feed import Feed
 from explorer.app.state.frame import Frame
 from explorer.mechanism.home import home_pose
-from explorer.mechanism.tilt_torsion import tilt_torsion_of
 
 # Digits of a torsion in degrees beyond which tilts are not computed again.
 DIGITS = 3
@@ -47,8 +46,7 @@ class TiltsFeed(Feed[TiltsRequest, TiltsDrawing]):
 def _tilts_of(frame: Frame) -> TiltsRequest | None:
     if not frame.state.view.orientation.tilts:
         return None
-    torsion = tilt_torsion_of(frame.state.pose.rotation).torsion
-    return TiltsRequest(frame.state.design, round(torsion, DIGITS))
+    return TiltsRequest(frame.state.design, round(frame.state.tilt_torsion.torsion, DIGITS))
 
 
 class RangeFeed(Feed[RangeRequest, RangeDrawing]):

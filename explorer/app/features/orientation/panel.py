@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from html import escape
 from typing import Annotated
 
 import msgspec
@@ -17,7 +16,7 @@ from explorer.app.features.orientation.feeds import PositionFeed, RangeFeed, Til
 from explorer.app.features.orientation.polar_map import legend, polar_map
 from explorer.app.features.orientation.scale import scale_of_tilts
 from explorer.app.features.orientation.tasks import ORIENTATIONS
-from explorer.app.features.orientation.torsion_strip import torsion_strip
+from explorer.app.features.orientation.torsion_strip import SAME_TILT, tilt_at, torsion_strip
 from explorer.app.inputs.bindings import Bound
 from explorer.app.inputs.controls import Controls
 from explorer.app.inputs.tracks import Span
@@ -31,6 +30,7 @@ from explorer.app.widgets.under_way import UnderWay, problem, progress
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.tilt_torsion import TiltTorsion, tilt_torsion_of
 from explorer.numerics.number_text import format_decimals
+from explorer.workspace.orientations.share import OrientationShare
 from explorer.workspace.orientations.tilts import (
     GreatestTilt,
     greatest_tilt,
@@ -45,9 +45,11 @@ HINTS = (
     "Angle between the z-axes of platform and base.",
     "Turn of the platform about its own z-axis; at tilt 0 it is the yaw.",
 )
-VOLUME_HINT = f"Volume of the solid as it is drawn, over {ORIENTATIONS} orientations"
-# Difference of tilts in degrees that is not told.
-SAME_TILT = 0.05
+VOLUME_HINT = f"Volume of the solid as drawn. {ORIENTATIONS} orientations stand for the range:"
+BOUNDS = {
+    "reachable": ("at least", "positions that have only others of the range are left out."),
+    "dexterous": ("at most", "positions that lack only others of the range are in it."),
+}
 # Tilt below which the azimuth has no effect, in degrees.
 LEVEL = 1e-6
 
@@ -92,7 +94,7 @@ class OrientationPanel:
                 "view.orientation.over",
             )
             controls.number(
-                "Tilts up to (°)",
+                "Tilts from home up to (°)",
                 "Largest tilt from the orientation of home, in degrees.",
                 "view.orientation.range",
                 least=0.0,
@@ -106,13 +108,13 @@ class OrientationPanel:
 
     def _add_angle(self, axis: int, name: str) -> None:
         def is_level(state: State) -> bool:
-            return tilt_torsion_of(state.pose.rotation).tilt < LEVEL
+            return state.tilt_torsion.tilt < LEVEL
 
         self._controls.slider(
             f"{name.capitalize()} (°)",
             HINTS[axis],
             Bound(
-                lambda frame: tilt_torsion_of(frame.state.pose.rotation)[axis],
+                lambda frame: frame.state.tilt_torsion[axis],
                 lambda _, value: SetTiltTorsion(axis, value),
             ),
             SPANS[axis],
@@ -122,18 +124,18 @@ class OrientationPanel:
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that show a frame."""
         design, pose = frame.state.design, frame.state.pose
-        here = tilt_torsion_of(pose.rotation)
+        here = frame.state.tilt_torsion
         tilts = tilt_map(design, pose.position, here.torsion)
         least = greatest_tilt(design, pose.position, here.torsion)
-        yield self._top, "content", box(*self._summary(frame, here, least))
+        yield self._top, "content", box(*summary(frame, here, least, self._here))
         home = tilt_torsion_of(home_pose(design).rotation)
-        yield self._map, "content", box(polar_map(tilts, here, home))
-        yield self._legend, "content", box(caption("What ends the tilts"), legend(tilts))
+        yield self._map, "content", box(polar_map(tilts, least, here, home))
+        title = caption("What ends the tilts, by share of azimuths")
+        yield self._legend, "content", box(title, legend(tilts))
         yield from self._controls.updates(frame)
-        found = self._here.drawing
-        yield self._strip, "visible", found is not None
-        if found is not None:
-            yield self._strip, "content", box(torsion_strip(found.by_torsion, here.torsion))
+        strip = strip_words(self._here, here, least)
+        yield self._strip, "visible", strip != ""
+        yield self._strip, "content", box(strip)
         yield from self._tilts_under_way.updates()
         view = frame.state.view.orientation
         yield self._scale, "visible", view.tilts
@@ -142,52 +144,6 @@ class OrientationPanel:
         yield self._volume, "visible", view.over != "none"
         if view.over != "none":
             yield self._volume, "content", box(range_words(self._ranges))
-
-    def _summary(self, frame: Frame, here: TiltTorsion, least: GreatestTilt) -> Iterator[str]:
-        """Yield the greatest tilt, the share of orientations and the range of torsions."""
-        design, position = frame.state.design, frame.state.pose.position
-        if math.isnan(least.tilt):
-            yield alert("Tilt zero is beyond a limit here", f"It violates {least.limit}.")
-        else:
-            why = "" if least.limit is None else f", ended by {escape(least.limit)}"
-            yield (
-                f'<div class="ex-line"><span class="ex-large">{_degrees(least.tilt)}</span>'
-                f"{dim('in every azimuth')}</div>"
-                + caption(f"Greatest tilt at torsion {_degrees(here.torsion)}{why}")
-            )
-        found = self._here.drawing
-        share = best = "…"
-        if found is not None:
-            value, error = found.share.share, found.share.standard_error
-            share = f"{100.0 * value:.2f} % ± {100.0 * error:.2f} %"
-            best = best_words(found.by_torsion.best, least)
-        torsions = torsion_range(design, position, here.torsion, here.azimuth, here.tilt)
-        span = "none here"
-        if not math.isnan(torsions.low):
-            span = f"{_degrees(torsions.low)} to {_degrees(torsions.high)}"
-            if torsions.low_limit is None:
-                span = "all"
-        yield table(
-            (
-                row(
-                    dim("Largest at any torsion"),
-                    best,
-                    hint="The greatest tilt in every azimuth at the torsion that allows the most",
-                ),
-                row(
-                    dim("Share of all orientations"),
-                    share,
-                    hint="Share of all orientations that this position can have within the limits, "
-                    "with its standard error",
-                ),
-                row(
-                    dim("Torsions without a gap"),
-                    span,
-                    hint="Torsions that a turn about the platform's z-axis leads to, at the "
-                    "present azimuth and tilt",
-                ),
-            )
-        )
 
     def _go(self, text: str, client: viser.ClientHandle) -> None:
         """Tilt the platform as a page sent it, (azimuth, tilt) in degrees."""
@@ -202,11 +158,95 @@ class OrientationPanel:
             self._session.do(SetTiltTorsion(ANGLES.index("torsion"), torsion), who=client.client_id)
 
 
-def best_words(best: GreatestTilt, least: GreatestTilt) -> str:
+def summary(
+    frame: Frame, here: TiltTorsion, least: GreatestTilt, feed: PositionFeed
+) -> Iterator[str]:
+    """Yield the greatest tilt, the share of orientations and the range of torsions."""
+    design, position = frame.state.design, frame.state.pose.position
+    if math.isnan(least.tilt):
+        yield alert("Tilt zero is beyond a limit here", f"It violates {least.limit}.")
+    else:
+        why = ""
+        if least.limit is not None:
+            azimuth = f"{format_decimals(least.azimuth, 0)}°"
+            why = f", ended by {least.limit} at azimuth {azimuth}"
+        yield (
+            f'<div><span class="ex-large">{_degrees(least.tilt)}</span> '
+            f"{dim('greatest tilt in every azimuth')}</div>"
+            + caption(f"at torsion {_degrees(here.torsion)}{why}")
+        )
+    found = feed.drawing
+    share = best = "…"
+    if found is not None:
+        share = share_words(found.share)
+        best = best_words(found.by_torsion.best, tilt_here(feed, here, least))
+    if feed.problem is not None:
+        share = best = "unknown"
+        yield problem(feed, "The share and the largest tilt could not be computed", "")
+    torsions = torsion_range(design, position, here.torsion, here.azimuth, here.tilt)
+    span = "none here"
+    if not math.isnan(torsions.low):
+        span = f"{_degrees(torsions.low)} to {_degrees(torsions.high)}"
+        if torsions.low_limit is None:
+            span = "all"
+    yield table(
+        (
+            row(
+                dim("Largest at any torsion"),
+                best,
+                look=look_of(feed),
+                hint="The greatest tilt in every azimuth at the torsion that allows the most",
+            ),
+            row(
+                dim("Share of all orientations"),
+                share,
+                look=look_of(feed),
+                hint="Share of all orientations that this position can have within the limits, "
+                "with its standard error",
+            ),
+            row(
+                dim("Torsions without a gap"),
+                span,
+                hint="Torsions that a turn about the platform's z-axis leads to, at the "
+                "present azimuth and tilt",
+            ),
+        )
+    )
+
+
+def strip_words(feed: PositionFeed, here: TiltTorsion, least: GreatestTilt) -> str:
+    """Return the strip of torsions as HTML; "" before the first drawing."""
+    if feed.drawing is None:
+        return ""
+    tilt = tilt_here(feed, here, least)
+    strip = torsion_strip(feed.drawing.by_torsion, here.torsion, tilt)
+    return f'<div class="{look_of(feed)}">{strip}</div>'
+
+
+def look_of(feed: PositionFeed) -> str:
+    """Return the class of what belongs to the drawing of a feed."""
+    return "" if feed.drawing is None or feed.is_current else "is-outdated"
+
+
+def tilt_here(feed: PositionFeed, here: TiltTorsion, least: GreatestTilt) -> float:
+    """Return the greatest tilt at the present torsion, at the position of the drawing."""
+    if feed.drawing is None or feed.is_current:
+        return least.tilt
+    return tilt_at(feed.drawing.by_torsion, here.torsion)
+
+
+def share_words(share: OrientationShare) -> str:
+    """Return a share of all orientations in words."""
+    if share.share in (0.0, 1.0):
+        return f"{'all' if share.share else 'none'} of {share.orientations:,}"
+    return f"{100.0 * share.share:.2f} % ± {100.0 * share.standard_error:.2f} %"
+
+
+def best_words(best: GreatestTilt, tilt: float) -> str:
     """Return the greatest tilt at any torsion in words, beside that at the present one."""
     if math.isnan(best.tilt):
         return "none"
-    if best.tilt - least.tilt < SAME_TILT:
+    if best.tilt - tilt <= SAME_TILT:
         return f"{_degrees(best.tilt)}, as here"
     return f"{_degrees(best.tilt)} at {_degrees(best.torsion)}"
 
@@ -232,9 +272,10 @@ def range_words(feed: RangeFeed) -> str:
     look = "" if feed.is_current else "is-outdated"
     if solid.is_empty:
         return alert("This workspace is empty", f"Emptied by: {', '.join(solid.empty_because)}.")
-    text = f"{format_number(solid.volume, 5, size=design.reach**3)} units³"
+    bound, hint = BOUNDS[drawing.request.over]
+    text = f"{bound} {format_number(solid.volume, 5, size=design.reach**3)} units³"
     name = dim(f"{drawing.request.over.capitalize()} volume")
-    return f'<div class="{look}">{table((row(name, text, hint=VOLUME_HINT),))}</div>'
+    return f'<div class="{look}">{table((row(name, text, hint=f"{VOLUME_HINT} {hint}"),))}</div>'
 
 
 def _degrees(angle: float) -> str:

@@ -13,18 +13,18 @@ import msgspec
 from explorer.app.widgets.colours import MARGIN_COLOURS, Rgb, css
 from explorer.app.widgets.markup import row, swatch, table
 from explorer.mechanism.tilt_torsion import TiltTorsion
-from explorer.workspace.orientations.tilts import TiltMap
+from explorer.workspace.orientations.tilts import GreatestTilt, TiltMap
 
 WIDTH, HEIGHT = 316.0, 268.0
 CENTRE, RADIUS = (158.0, 134.0), 112.0
 RING = 30.0
 # The map shows at least this tilt at its edge, in degrees.
 LEAST_EDGE = 60.0
-# Difference of torsions up to which home is drawn in the map, in degrees.
+# Difference of torsions in degrees up to which the torsion of home is that of the map.
 SAME_TORSION = 0.05
 
 FREE: Rgb = (140, 150, 160)
-"""Colour where the platform tilts by 180° without a limit, and of limits without their own."""
+"""Colour where the platform tilts by 180° without a limit."""
 
 COLOURS: dict[str, Rgb] = {
     "margin δ1": MARGIN_COLOURS[0],
@@ -36,7 +36,9 @@ COLOURS: dict[str, Rgb] = {
     "d2": (60, 150, 230),
     "d4": (140, 190, 240),
     "l4": (70, 80, 200),
-    "guide": (150, 120, 50),
+    "d1": (150, 120, 50),
+    "d3": (205, 170, 80),
+    "box": (90, 98, 110),
     "swing": (120, 70, 40),
 }
 """Colours of limits by the beginning of their names; those of margins are theirs in the scene."""
@@ -46,29 +48,32 @@ def colour_of(limit: str | None) -> Rgb:
     """Return the colour of a limit; None for no limit."""
     if limit is None:
         return FREE
-    return next((colour for name, colour in COLOURS.items() if limit.startswith(name)), FREE)
+    return next(colour for name, colour in COLOURS.items() if limit.startswith(name))
 
 
-def edge_of(tilts: TiltMap, here: TiltTorsion) -> float:
+def edge_of(tilts: TiltMap, here: TiltTorsion, home: TiltTorsion) -> float:
     """Return the tilt at the edge of the map, in degrees."""
-    largest = max([LEAST_EDGE, here.tilt, *(t for t in tilts.tilts.tolist() if math.isfinite(t))])
+    finite = [tilt for tilt in tilts.tilts.tolist() if math.isfinite(tilt)]
+    largest = max([LEAST_EDGE, here.tilt, home.tilt, *finite])
     return min(180.0, RING * math.ceil(largest / RING - 1e-9))
 
 
-def polar_map(tilts: TiltMap, here: TiltTorsion, home: TiltTorsion) -> str:
+def polar_map(tilts: TiltMap, least: GreatestTilt, here: TiltTorsion, home: TiltTorsion) -> str:
     """Return the map as SVG: azimuth as the direction, tilt as the distance from the centre.
 
     Args:
         tilts: Greatest tilts in azimuths at equal distances.
+        least: The greatest tilt in every azimuth, at the same torsion.
         here: The present orientation.
         home: The orientation of home.
     """
-    edge = edge_of(tilts, here)
+    edge = edge_of(tilts, here, home)
     facts = {"centre": CENTRE, "radius": RADIUS, "edge": edge}
-    pieces = [*_rings(edge), *_region(tilts, edge)]
-    if abs((home.torsion - here.torsion + 180.0) % 360.0 - 180.0) <= SAME_TORSION:
-        x, y = _place(home.azimuth, home.tilt, edge)
-        pieces.append(f'<circle class="home" cx="{x:.1f}" cy="{y:.1f}" r="5"/>')
+    pieces = [*_rings(edge), *_region(tilts, edge), *_least(least, edge), *_labels(edge)]
+    is_other = abs(math.remainder(home.torsion - here.torsion, 360.0)) > SAME_TORSION
+    look = "home is-other" if is_other else "home"
+    x, y = _place(home.azimuth, home.tilt, edge)
+    pieces.append(f'<circle class="{look}" cx="{x:.1f}" cy="{y:.1f}" r="5"/>')
     x, y = _place(here.azimuth, here.tilt, edge)
     arms = f"M{x - 6:.1f} {y:.1f}h12M{x:.1f} {y - 6:.1f}v12"
     pieces.append(f'<path class="cross casing" d="{arms}"/><path class="cross" d="{arms}"/>')
@@ -76,10 +81,13 @@ def polar_map(tilts: TiltMap, here: TiltTorsion, home: TiltTorsion) -> str:
         f'<svg class="ex-map ex-tilts" viewBox="0 0 {WIDTH:g} {HEIGHT:g}" role="img" '
         'aria-label="Greatest tilt by azimuth" '
         f'data-tilts="{escape(msgspec.json.encode(facts).decode())}">{"".join(pieces)}</svg>'
+        f'<div class="ex-key ex-dim">{KEY_OF_OTHER if is_other else KEY}</div>'
         f'<div class="ex-reading ex-dim" data-hint="{HINT}">{HINT}</div>'
     )
 
 
+KEY = "+ present orientation, ○ home"
+KEY_OF_OTHER = f"{KEY}, at another torsion"
 HINT = "Point at the map to read it, click to tilt there."
 
 
@@ -102,7 +110,7 @@ def _place(azimuth: float, tilt: float, edge: float) -> tuple[float, float]:
 
 
 def _rings(edge: float) -> Iterator[str]:
-    """Yield the circles of tilts, the axes x and y, and their labels."""
+    """Yield the circles of tilts and the axes x and y."""
     x, y = CENTRE
     count = round(edge / RING)
     for ring in range(1, count + 1):
@@ -110,6 +118,12 @@ def _rings(edge: float) -> Iterator[str]:
         look = "frame" if ring == count else "ring"
         yield f'<circle class="{look}" cx="{x}" cy="{y}" r="{radius:.1f}"/>'
     yield f'<path class="ring" d="M{x - RADIUS} {y}h{2 * RADIUS}M{x} {y - RADIUS}v{2 * RADIUS}"/>'
+
+
+def _labels(edge: float) -> Iterator[str]:
+    """Yield the labels of the circles and axes."""
+    x, y = CENTRE
+    count = round(edge / RING)
     for ring in range(1, count + 1):
         at = RADIUS * ring / count * math.sqrt(0.5)
         yield (
@@ -123,6 +137,17 @@ def _rings(edge: float) -> Iterator[str]:
         ("−y", 0, RADIUS + 15, "middle"),
     ):
         yield f'<text class="axis" x="{x + dx}" y="{y + dy}" text-anchor="{anchor}">{words}</text>'
+
+
+def _least(least: GreatestTilt, edge: float) -> Iterator[str]:
+    """Yield the circle of the greatest tilt in every azimuth, and a dot where it ends."""
+    if math.isnan(least.tilt):
+        return
+    x, y = CENTRE
+    yield f'<circle class="least" cx="{x}" cy="{y}" r="{RADIUS * least.tilt / edge:.1f}"/>'
+    if least.limit is not None:
+        x, y = _place(least.azimuth, least.tilt, edge)
+        yield f'<circle class="dot" cx="{x:.1f}" cy="{y:.1f}" r="3"/>'
 
 
 def _region(tilts: TiltMap, edge: float) -> Iterator[str]:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from explorer.app.features.orientation.tasks import TiltsDrawing
 from explorer.app.widgets.colours import Rgb, css
-from explorer.app.widgets.markup import dim, ticks
+from explorer.app.widgets.markup import caption, dim, ticks
 from explorer.numerics.arrays import FloatArray
 
 STOPS: tuple[Rgb, ...] = (
@@ -49,6 +49,7 @@ def scale_of_tilts(drawing: TiltsDrawing) -> str:
     places = ticks((0.0, "0°"), (50.0, f"{0.5 * most:g}°"), (100.0, f"{most:g}°"))
     least, largest = drawing.tilts.min(), drawing.tilts.max()
     return (
+        f"{caption('Greatest tilt in every azimuth')}"
         f'<div class="ex-legend" style="--colours:{stops}"></div>{places}'
         f"{dim(f'{len(drawing.tilts):,} nodes, {least:.1f}° to {largest:.1f}°')}"
     )
