@@ -37,7 +37,11 @@ from explorer.app.features.orientation.polar_map import (
 )
 from explorer.app.features.orientation.scale import STOPS, colours_of, most_of, scale_of_tilts
 from explorer.app.features.orientation.scene import kept_nodes
-from explorer.app.features.orientation.tasks import ORIENTATIONS
+from explorer.app.features.orientation.tasks import (
+    ORIENTATIONS,
+    RangeRequest,
+    orientations_over,
+)
 from explorer.app.features.orientation.torsion_strip import LEFT, RIGHT, tilt_at, torsion_strip
 from explorer.app.features.workspace.feed import workspace_request
 from explorer.app.features.workspace.slice_map import AXES
@@ -52,7 +56,11 @@ from explorer.errors import InputError
 from explorer.mechanism.design import Swing
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.home import home_pose
-from explorer.mechanism.tilt_torsion import TiltTorsion, tilt_torsion_of
+from explorer.mechanism.tilt_torsion import (
+    TiltTorsion,
+    tilt_torsion_from_rotation,
+    tilt_torsion_of,
+)
 from explorer.workspace.limits.constraints import GAP
 from explorer.workspace.orientations.sets import cone_of_directions
 from explorer.workspace.orientations.share import OrientationShare, orientation_share
@@ -194,6 +202,24 @@ def test_feeds_compute_what_is_shown_and_nothing_else() -> None:
         volumes[over] = ranged.solid.volume
         assert volumes[over] == pytest.approx(make(OPTIMAL, rotations).volume, rel=1e-3)
     assert volumes["dexterous"] < volumes["reachable"]
+
+
+def test_range_turns_the_tilted_orientations_either_way() -> None:
+    home = home_pose(OPTIMAL)
+    tilted = orientations_over(RangeRequest(OPTIMAL, home, 15.0, 0.0, "dexterous"))
+    np.testing.assert_array_equal(tilted, cone_of_directions(home.rotation, 15.0, ORIENTATIONS))
+    turned = orientations_over(RangeRequest(OPTIMAL, home, 15.0, 10.0, "dexterous"))
+    angles = tilt_torsion_from_rotation(home.rotation.T @ turned)
+    assert angles[:, 1].max() == pytest.approx(15.0, abs=1e-9)
+    torsions, counts = np.unique(angles[:, 2].round(6), return_counts=True)
+    assert torsions.tolist() == [-10.0, 0.0, 10.0]
+    assert len(set(counts.tolist())) == 1
+
+
+@pytest.mark.parametrize("turn", [-1.0, 181.0])
+def test_turns_beyond_half_a_turn_are_refused(turn: float) -> None:
+    with pytest.raises(InputError, match="turns must be 0° to 180°"):
+        shown(opened(OPTIMAL), turn=turn)
 
 
 def test_strip_of_torsions_has_the_tilts_and_a_mark_at_the_torsion() -> None:

@@ -52,22 +52,26 @@ class OrientationView:
 
     Attributes:
         tilts: Whether the greatest tilts at nodes are drawn.
-        over: Which workspace over a range of tilts is drawn.
-        range: Largest tilt of that range, in degrees.
+        over: Which workspace over a range of orientations is drawn.
+        range: Largest tilt from the orientation of home in that range, in degrees.
+        turn: Largest change of torsion either way in that range, in degrees.
 
     Raises:
-        InputError: the range is not from 0 to 180.
+        InputError: a tilt that is not above 0 and up to 180, or a turn that is not 0 to 180.
     """
 
     tilts: bool = False
     over: Literal["none", "reachable", "dexterous"] = "none"
     range: float = 20.0
+    turn: float = 0.0
 
     def __post_init__(self) -> None:
         if not 0.0 < self.range <= 180.0:
             raise InputError(
                 f"the tilts must be above 0° and up to 180°; got {format_number(self.range)}°"
             )
+        if not 0.0 <= self.turn <= 180.0:
+            raise InputError(f"the turns must be 0° to 180°; got {format_number(self.turn)}°")
 
 
 @dataclass(frozen=True)

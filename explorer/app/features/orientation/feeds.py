@@ -60,4 +60,4 @@ def _range_of(frame: Frame) -> RangeRequest | None:
     view, design = frame.state.view.orientation, frame.state.design
     if view.over == "none":
         return None
-    return RangeRequest(design, home_pose(design), view.range, view.over)
+    return RangeRequest(design, home_pose(design), view.range, view.turn, view.over)

@@ -15,7 +15,6 @@ from explorer.app.features.orientation.actions import ANGLES, GoToTilt, SetTiltT
 from explorer.app.features.orientation.feeds import PositionFeed, RangeFeed, TiltsFeed
 from explorer.app.features.orientation.polar_map import legend, polar_map
 from explorer.app.features.orientation.scale import scale_of_tilts
-from explorer.app.features.orientation.tasks import ORIENTATIONS
 from explorer.app.features.orientation.torsion_strip import SAME_TILT, tilt_at, torsion_strip
 from explorer.app.inputs.bindings import Bound
 from explorer.app.inputs.controls import Controls
@@ -45,7 +44,7 @@ HINTS = (
     "Angle between the z-axes of platform and base.",
     "Turn of the platform about its own z-axis; at tilt 0 it is the yaw.",
 )
-VOLUME_HINT = f"Volume of the solid as drawn. {ORIENTATIONS} orientations stand for the range:"
+VOLUME_HINT = "Volume of the solid as drawn. A sample of orientations stands for the range:"
 BOUNDS = {
     "reachable": ("at least", "positions that have only others of the range are left out."),
     "dexterous": ("at most", "positions that lack only others of the range are in it."),
@@ -89,7 +88,7 @@ class OrientationPanel:
             controls.dropdown(
                 "Solid over tilts",
                 "Draw the positions that have at least one (reachable) or all (dexterous) of the "
-                "orientations to which a tilt from the orientation of home leads.",
+                "orientations to which a tilt and a turn from the orientation of home lead.",
                 OVER,
                 "view.orientation.over",
             )
@@ -97,6 +96,14 @@ class OrientationPanel:
                 "Tilts from home up to (°)",
                 "Largest tilt from the orientation of home, in degrees.",
                 "view.orientation.range",
+                least=0.0,
+                step=1.0,
+                visible=lambda state: state.view.orientation.over != "none",
+            )
+            controls.number(
+                "Torsions from home ± (°)",
+                "Largest change of the torsion from that of home, either way, in degrees.",
+                "view.orientation.turn",
                 least=0.0,
                 step=1.0,
                 visible=lambda state: state.view.orientation.over != "none",

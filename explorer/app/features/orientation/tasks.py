@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from explorer.app.features.workspace.tasks import LIVE_TOLERANCE
 from explorer.app.session.feed import watch_of
@@ -30,6 +32,9 @@ PARTS = 10
 
 ORIENTATIONS = 33
 """Number of orientations that stand for a range of tilts."""
+
+TURNED_ORIENTATIONS = 17
+"""The same for each of three torsions, if the range has several."""
 
 
 @dataclass(frozen=True)
@@ -122,12 +127,14 @@ class RangeRequest:
         design: The manipulator.
         home: Its home pose.
         tilt: Largest tilt, in degrees.
+        turn: Largest change of the torsion either way, in degrees.
         over: Whether positions have one of the orientations at least, or all of them.
     """
 
     design: Design
     home: Pose
     tilt: float
+    turn: float
     over: Literal["reachable", "dexterous"]
 
 
@@ -139,9 +146,19 @@ class RangeDrawing:
     solid: Solid
 
 
+def orientations_over(request: RangeRequest) -> FloatArray:
+    """Return the orientations that stand for a range, shape (n, 3, 3)."""
+    rotation, turn = request.home.rotation, math.radians(request.turn)
+    if turn == 0.0:
+        return cone_of_directions(rotation, request.tilt, ORIENTATIONS)
+    tilted = cone_of_directions(rotation, request.tilt, TURNED_ORIENTATIONS)
+    turns = Rotation.from_rotvec([[0.0, 0.0, angle] for angle in (-turn, 0.0, turn)]).as_matrix()
+    return (tilted[:, None] @ turns).reshape(-1, 3, 3)
+
+
 def range_solid(request: RangeRequest) -> RangeDrawing:
-    """Return the workspace over a range of tilts."""
+    """Return the workspace over a range of orientations."""
     design = request.design
-    rotations = cone_of_directions(request.home.rotation, request.tilt, ORIENTATIONS)
     make = reachable_solid if request.over == "reachable" else dexterous_solid
-    return RangeDrawing(request, make(design, rotations, LIVE_TOLERANCE * design.reach))
+    solid = make(design, orientations_over(request), LIVE_TOLERANCE * design.reach)
+    return RangeDrawing(request, solid)
