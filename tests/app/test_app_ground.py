@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
+from explorer.app.features.ground.ground import CORNERS, OUTLINES, shadow_outlines
+from explorer.app.features.ground.lighting import TO_SUN
 from explorer.app.features.mechanism.bodies import BASE_RADIUS, PLATE_THICKNESS, platform_plate
-from explorer.app.features.mechanism.ground import CORNERS, OUTLINES, shadow_outlines
 from explorer.app.features.mechanism.legs import PLATE_TOP
-from explorer.app.features.mechanism.lighting import TO_SUN
 from explorer.app.scene.placing import Placed
 from explorer.app.scene.shapes import plate
 from explorer.app.state.frame import Frame

@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from explorer.app.features.mechanism.ground import GRID
+from explorer.app.features.ground.ground import GRID
 from explorer.app.look import read_stylesheet
 from explorer.app.server import Running
 from explorer.app.widgets import charts

@@ -8,7 +8,7 @@ from typing import TypedDict
 import numpy as np
 from tab import Tab
 
-from explorer.app.features.mechanism.ground import ground_of, shadow_outlines
+from explorer.app.features.ground.ground import ground_of, shadow_outlines
 from explorer.app.features.mechanism.tetrahedra import EDGES, INSET
 from explorer.app.scene.placing import Placed
 from explorer.app.state.actions import SetPose

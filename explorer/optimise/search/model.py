@@ -15,8 +15,8 @@ import numpy as np
 from explorer.errors import DesignError
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.optimise.problem import OVER_BOX, Problem
-from explorer.optimise.search.clearances import ClearanceDemand
-from explorer.optimise.search.demands import (
+from explorer.optimise.search.demands.clearances import ClearanceDemand
+from explorer.optimise.search.demands.geometry import (
     MET,
     BoxDemand,
     DegenerateDemand,
@@ -27,15 +27,15 @@ from explorer.optimise.search.demands import (
     VolumeDemand,
     box_margins,
 )
-from explorer.optimise.search.loads import (
+from explorer.optimise.search.demands.loads import (
     ErrorDemand,
     LoadDemand,
     largest_error,
     largest_share,
 )
+from explorer.optimise.search.demands.tilts import tilt_demands
 from explorer.optimise.search.starts import first_positions
 from explorer.optimise.search.state import State, scales
-from explorer.optimise.search.tilts import tilt_demands
 
 
 @dataclass(frozen=True)

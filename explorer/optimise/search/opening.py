@@ -14,7 +14,7 @@ import numpy as np
 from explorer.errors import DesignError
 from explorer.numerics.arrays import FloatArray
 from explorer.optimise.problem import Problem
-from explorer.optimise.search.demands import DegenerateDemand, GapDemand
+from explorer.optimise.search.demands.geometry import DegenerateDemand, GapDemand
 from explorer.optimise.search.sqp import slsqp
 from explorer.optimise.search.state import State, scales
 from explorer.workspace.limits.constraints import BallOrCylinder, HalfSpace

@@ -15,19 +15,18 @@ from __future__ import annotations
 import contextlib
 import itertools
 from collections.abc import Callable, Iterator, Sequence
-from typing import NamedTuple
 
 import msgspec
 import numpy as np
 
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.number_text import format_ascii, format_number
-from explorer.optimise.curves import CALLED
-from explorer.optimise.outcome import Iterate, Phase, Run, Status
+from explorer.numerics.number_text import format_number
+from explorer.optimise.outcome import Iterate, Phase, Run
 from explorer.optimise.problem import OVER_BOX, Problem
 from explorer.optimise.refutation.binding import BindingLimit, find_binding_limit
+from explorer.optimise.search.attempt import Attempt, default_message
 from explorer.optimise.search.crossings import crossings
-from explorer.optimise.search.demands import MET
+from explorer.optimise.search.demands.geometry import MET
 from explorer.optimise.search.elsewhere import promising_starts
 from explorer.optimise.search.feasible import nearest_feasible
 from explorer.optimise.search.model import Evaluation, Model
@@ -60,15 +59,6 @@ BETWEEN, ANYWHERE = 0.1, 0.001
 ENDED = ("converged", "outdone", "cancelled")
 # Objectives that differ by less than this share are the same.
 SAME = 1e-6
-
-
-class Attempt(NamedTuple):
-    """Result of one attempt."""
-
-    status: Status
-    holding: str
-    message: str
-    best: Iterate
 
 
 class Search:
@@ -160,7 +150,7 @@ class Search:
                 f"{format_number(missed, 6)}{without}; the largest found is "
                 f"{format_number(self.largest_volume, 6)}"
             )
-        return chosen.message or _default_message(self.problem, chosen, self.steps)
+        return chosen.message or default_message(self.problem, chosen, self.steps)
 
     def _attempt(self, values: Sequence[float], *, is_relaxed: bool = False) -> Attempt:
         """Search from some values of the variables.
@@ -381,29 +371,6 @@ class Search:
             words = f"the workspace of the best design found is empty because of {because}"
             return Attempt("infeasible", because, words, best)
         return Attempt("stalled", holding, "", best)
-
-
-def _default_message(problem: Problem, attempt: Attempt, steps: int) -> str:
-    """Return the message of a run."""
-    name = CALLED[problem.objective]
-    # F compares numbers of unit size.
-    size = 1.0 if problem.objective == "match-volume" else 0.0
-    value = format_ascii(attempt.best.objective, 6, size=size)
-    end = f"{name} = {value} after {steps} iterations"
-    held = f", held by {attempt.holding}" if attempt.holding else ""
-    match attempt.status:
-        case "converged":
-            return f"converged: {end}{held}"
-        case "infeasible":
-            return f"no design was found that meets all demands: {end}{held}"
-        case "not converged":
-            return f"not converged: {end}{held}; allow more iterations or start elsewhere"
-        case "stalled":
-            return f"stalled: {end}{held}; try several starts"
-        case "outdone":
-            return f"no better than an earlier start, even without the clearance: {end}"
-        case "cancelled":
-            return f"cancelled: {end}"
 
 
 def _coordinates(p: FloatArray) -> str:

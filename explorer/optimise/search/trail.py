@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from explorer.optimise.outcome import Iterate, Phase
 from explorer.optimise.problem import Problem
-from explorer.optimise.search.demands import MET
+from explorer.optimise.search.demands.geometry import MET
 from explorer.optimise.search.model import Evaluation, Model, reported_objective
 from explorer.optimise.search.sqp import Stop
 from explorer.optimise.search.state import State

@@ -11,9 +11,7 @@ from explorer.app.features.mechanism.design_panel import DesignPanel
 from explorer.app.features.mechanism.figures import limits_figure
 from explorer.app.features.mechanism.flags import Flags
 from explorer.app.features.mechanism.gaps import Gaps
-from explorer.app.features.mechanism.ground import Ground
 from explorer.app.features.mechanism.legs import Legs, TwinLegs
-from explorer.app.features.mechanism.lighting import Lighting
 from explorer.app.features.mechanism.marks import DragHandle, Ghosts, Labels
 from explorer.app.features.mechanism.modes import MODES
 from explorer.app.features.mechanism.pose_panel import MovePanel
@@ -30,9 +28,7 @@ MECHANISM = Feature(
     bar=(InBar("left", DesignName), InBar("middle", lambda _: limits_figure)),
     # Bodies come first: they make the platform's frame, to which others attach.
     scene=(
-        Lighting,
         Bodies,
-        Ground,
         Flags,
         Legs,
         TwinLegs,

@@ -15,7 +15,7 @@ import numpy as np
 
 from explorer.legs.clearance import PAIRS, joined_pairs, leg_axes, pair_rows, radii_of_pairs
 from explorer.numerics.arrays import FloatArray
-from explorer.optimise.search.demands import Measured
+from explorer.optimise.search.demands.geometry import Measured
 from explorer.optimise.search.state import State
 from explorer.workspace.limits.constraints import YAW, BallOrCylinder, HalfSpace
 

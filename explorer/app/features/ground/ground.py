@@ -11,6 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from explorer.app.features.feature import Services
+from explorer.app.features.ground.lighting import TO_SUN
 from explorer.app.features.mechanism.bodies import (
     BASE_RADIUS,
     PLATE_THICKNESS,
@@ -18,7 +19,6 @@ from explorer.app.features.mechanism.bodies import (
     PLATFORM_SHIFT,
 )
 from explorer.app.features.mechanism.legs import PLATE_TOP, ROD_RADIUS, TUBE_RADIUS, TWIN
-from explorer.app.features.mechanism.lighting import TO_SUN
 from explorer.app.scene.part import ScenePart
 from explorer.app.scene.placing import Placed
 from explorer.app.widgets.assigning import Update

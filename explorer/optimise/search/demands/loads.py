@@ -13,7 +13,7 @@ from explorer.measures.statics import BoxStatics
 from explorer.mechanism.design import JOINTS, VARIABLES
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 from explorer.optimise.problem import SHIFTS
-from explorer.optimise.search.demands import Measured
+from explorer.optimise.search.demands.geometry import Measured
 from explorer.optimise.search.state import State
 from explorer.statics.accuracy import actuator_errors
 from explorer.statics.equilibrium import twists_of_actuators

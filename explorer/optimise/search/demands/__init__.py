@@ -1,0 +1,1 @@
+"""The demands of a problem as functions of its variables, with their derivatives."""
