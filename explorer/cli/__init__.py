@@ -28,7 +28,7 @@ COMMANDS: Mapping[str, str] = {
     "path": "Plan a path between two poses within limits, margins and clearances.",
     "workspace": "Measure the workspace: exact volume and gradient, the paper's nodes, a mesh.",
     "orientation": "Measure the orientations of a position: share of all, greatest tilts, torsion.",
-    "reproduce": "Measure every claim of the paper again, and judge it.",
+    "reproduce": "Measure the claims of the paper again, and judge each.",
     "optimise": "Optimise a design by SQP: match a volume, shorten the longest leg, or others.",
     "sweep": "Measure the designs of a study, on every core or a cluster; list the Pareto front.",
     "export": "Write the workspace as a mesh, the mechanism as parts or simulation, or the scene.",

@@ -81,7 +81,7 @@ def polar_map(tilts: TiltMap, least: GreatestTilt, here: TiltTorsion, home: Tilt
         f'<svg class="ex-map ex-tilts" viewBox="0 0 {WIDTH:g} {HEIGHT:g}" role="img" '
         'aria-label="Greatest tilt by azimuth" '
         f'data-tilts="{escape(msgspec.json.encode(facts).decode())}">{"".join(pieces)}</svg>'
-        f'<div class="ex-key ex-dim">{KEY_OF_OTHER if is_other else KEY}</div>'
+        f'<div class="ex-dim">{KEY_OF_OTHER if is_other else KEY}</div>'
         f'<div class="ex-reading ex-dim" data-hint="{HINT}">{HINT}</div>'
     )
 
