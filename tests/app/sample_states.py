@@ -244,6 +244,7 @@ def rich_state() -> State:
         # The design has no load and no errors to search with.
         "held": False,
         "error": 0.0,
+        "tilt": 0.0,
     }
     actions: list[Action | Callable[[State], Action]] = [
         Change("optimisation.request", request),
@@ -264,7 +265,7 @@ def rich_state() -> State:
         Change("", {"studies": varied(Studies())}),
         Change("", {"set_tilt_torsion": TiltTorsion(1 / 3, 20.0, -50.0)}),
         BrushAxis("volume", ((1 / 3, 10.0),)),
-        Change("optimisation.request", {"held": True, "error": 1 / 3}),
+        Change("optimisation.request", {"held": True, "error": 1 / 3, "tilt": 10 / 3}),
         SetJoint(0, 99.1),
     ]
     for action in actions:

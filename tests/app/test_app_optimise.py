@@ -778,6 +778,16 @@ def test_lifting_a_limit_that_is_not_there_is_refused() -> None:
             LiftLimit(limit).apply(opened(OPTIMAL))
 
 
+def test_tilt_is_demanded_over_the_required_box() -> None:
+    state = SetRequest("optimisation.request.tilt", 20.0).apply(opened(OPTIMAL))
+    problem = problem_of(state)
+    assert problem.demands.tilt == 20.0
+    assert problem.demands.required_box == requested_box(state)
+    state = SetRequest("optimisation.request.tilt", 95.0).apply(state)
+    (refutation,) = refuted(state)
+    assert "the tilt demanded must be below 90°" in refutation.message
+
+
 @pytest.mark.parametrize("name", PRESETS)
 @pytest.mark.parametrize("objective", OBJECTIVES)
 def test_demands_by_default_can_be_kept_by_every_preset(name: str, objective: Any) -> None:

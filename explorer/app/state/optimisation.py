@@ -41,6 +41,7 @@ class OptimisationRequest:
         box: The required box; None for one that suits the design.
         held: Whether the design's load must be held over the required box.
         error: Worst error of the tool over the required box; 0 for no demand.
+        tilt: Tilt in every azimuth that the required box must allow, in degrees; 0 for no demand.
 
     Raises:
         InputError: a volume or reach that is not positive, a clearance below zero, too few or too
@@ -57,6 +58,7 @@ class OptimisationRequest:
     box: Box | None = None
     held: bool = False
     error: float = 0.0
+    tilt: float = 0.0
 
     def __post_init__(self) -> None:
         unknown = {*self.free} - {*VARIABLES, YAW, PLACE}
@@ -68,6 +70,7 @@ class OptimisationRequest:
             reach=self.reach,
             clearance=self.clearance or None,
             error=self.error or None,
+            tilt=self.tilt or None,
         )
 
     @property
@@ -83,7 +86,8 @@ class OptimisationRequest:
     @property
     def needs_box(self) -> bool:
         """Whether a box is required."""
-        return self.with_box or self.held or self.error > 0.0 or self.objective in OVER_BOX
+        demands = self.held or self.error > 0.0 or self.tilt > 0.0
+        return self.with_box or demands or self.objective in OVER_BOX
 
 
 @dataclass(frozen=True)

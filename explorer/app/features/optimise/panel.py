@@ -136,6 +136,14 @@ class OptimisePanel:
             step=STEP,
             visible=lambda state: any(state.design.actuators.error_mm),
         )
+        controls.number(
+            f"{_label('box_tilt')} (°)",
+            "The tilt from the orientation of home that every position of the required box must "
+            "allow in every azimuth, in degrees; 0 for no demand.",
+            At("optimisation.request.tilt", action=SetRequest),
+            least=0.0,
+            step=1.0,
+        )
         for end, word in enumerate(("from", "to")):
             self._add_corner(end, f"Box {word}")
 

@@ -86,6 +86,7 @@ def _problem(design: Design, base: Design, request: OptimisationRequest) -> Prob
         required_box=_requested_box(base, request) if request.needs_box else None,
         held=request.held,
         error=request.error or None,
+        tilt=request.tilt or None,
         free=[name for name in free if name not in VARIABLES],
     )
     variables = tuple(variable for variable in problem.variables if variable.name in free)
