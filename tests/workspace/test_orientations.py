@@ -15,9 +15,12 @@ from explorer.mechanism.design import Swing
 from explorer.mechanism.pose import checked_rotation, yaw_pitch_roll_from_rotation
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import warm
+from explorer.workspace.limits.constraints import constraints
+from explorer.workspace.limits.region import region_of
 from explorer.workspace.limits.valid_poses import valid_rows
 from explorer.workspace.orientations.sets import cone_of_directions, yaw_pitch_roll_range
 from explorer.workspace.orientations.share import orientation_capability, orientations_within
+from explorer.workspace.slices.volume import volume_within
 
 OPTIMAL = PRESETS["paper-optimal"]
 HOME = home_pose(OPTIMAL)
@@ -168,3 +171,10 @@ def test_orientations_with_reversed_ranges_or_unusable_counts_are_refused() -> N
         orientations_within(OPTIMAL, HOME.position, np.eye(3))
     with pytest.raises(InputError, match="one position"):
         orientations_within(OPTIMAL, [HOME.position], np.eye(3)[None])
+
+
+def test_volume_of_too_many_surfaces_is_refused() -> None:
+    rotations = cone_of_directions(HOME.rotation, 10.0, 33)
+    limits = [limit for rotation in rotations for limit in constraints(OPTIMAL, rotation)]
+    with pytest.raises(InputError, match="a volume takes at most 32 surfaces; the region has"):
+        volume_within(region_of(limits))

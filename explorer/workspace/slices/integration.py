@@ -24,6 +24,8 @@ from explorer.workspace.slices.breaks import find_breaks
 MOST_BREAKS, MOST_PIECES = 1000, 1100
 # The most arcs that other curves forbid on one curve; an arc through angle zero counts twice.
 MOST_ARCS = 64
+# Largest number of surfaces of a region, each of which covers a circle in two arcs at most.
+MOST_SURFACES = MOST_ARCS // 2
 # The count of slices from which on no piece is halved.
 MOST_SLICES = 2000
 # Pieces are halved down to these errors, as shares of the volume and of the surface.

@@ -35,6 +35,7 @@ from explorer.workspace.slices import nodes
 from explorer.workspace.slices.integration import (
     AREA_AT_HIGH,
     AREA_AT_LOW,
+    MOST_SURFACES,
     RESULTS,
     TOTAL,
     TOTAL_ERROR,
@@ -253,6 +254,10 @@ def _volume_of_slices(region: Region) -> tuple[float, float, dict[str, float]]:
     if region.is_empty or not (lows < highs).all():
         return 0.0, 0.0, {}
     surfaces = (*region.circle_limits, *region.plane_limits)
+    if len(surfaces) > MOST_SURFACES:
+        raise InputError(
+            f"a volume takes at most {MOST_SURFACES} surfaces; the region has {len(surfaces)}"
+        )
     result, rates = np.zeros(RESULTS), np.zeros((len(surfaces), 4))
     ends = region.low, region.high
     integrate_slices(1, region.circles, region.planes, *ends, quadrature(), result, rates)
