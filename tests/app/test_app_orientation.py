@@ -40,6 +40,7 @@ from explorer.app.features.orientation.scene import kept_nodes
 from explorer.app.features.orientation.tasks import (
     ORIENTATIONS,
     RangeRequest,
+    TiltsDrawing,
     orientations_over,
 )
 from explorer.app.features.orientation.torsion_strip import LEFT, RIGHT, tilt_at, torsion_strip
@@ -344,15 +345,20 @@ def test_volume_over_sampled_orientations_is_a_bound(over: str, bound: str) -> N
     assert f"{bound} " in range_words(services.get(RangeFeed))
 
 
-def test_cut_of_the_workspace_opens_the_tilts_on_the_same_side() -> None:
-    services, state = services_for(), shown(opened(OPTIMAL), tilts=True)
-    feed = services.get(TiltsFeed)
+def tilts_over(state: State) -> TiltsDrawing:
+    """Return the tilts over the workspace that the worker draws for a state."""
+    services = services_for()
+    feed, worker = services.get(TiltsFeed), services.worker
     feed.follow(Frame(state))
-    worker = services.worker
     assert isinstance(worker, StubWorker)
     worker.work()
-    drawing = feed.drawing
-    assert drawing is not None
+    assert feed.drawing is not None
+    return feed.drawing
+
+
+def test_cut_of_the_workspace_opens_the_tilts_on_the_same_side() -> None:
+    state = shown(opened(OPTIMAL), tilts=True)
+    drawing = tilts_over(state)
     assert kept_nodes(drawing, WorkspaceView()).all()
     for axis, cut in enumerate(AXES):
         for flipped in (False, True):
@@ -369,14 +375,7 @@ def test_cut_of_the_workspace_opens_the_tilts_on_the_same_side() -> None:
 
 
 def test_scale_ends_at_a_round_tilt_with_the_colours_of_its_stops() -> None:
-    services, state = services_for(), shown(opened(OPTIMAL), tilts=True)
-    feed = services.get(TiltsFeed)
-    feed.follow(Frame(state))
-    worker = services.worker
-    assert isinstance(worker, StubWorker)
-    worker.work()
-    drawing = feed.drawing
-    assert drawing is not None
+    drawing = tilts_over(shown(opened(OPTIMAL), tilts=True))
     most = most_of(drawing)
     assert most - 10.0 < drawing.tilts.max() <= most
     places = np.linspace(0.0, most, len(STOPS))

@@ -105,8 +105,7 @@ def orientation_capability(
     """
     array = np.asarray(orientations)
     if array.ndim == 0:
-        n = whole_number("the number of orientations", array, 2, MOST_ORIENTATIONS)
-        return orientation_share(design, position, n).share
+        return orientation_share(design, position, array.item()).share
     return float(orientations_within(design, position, array).mean())
 
 
