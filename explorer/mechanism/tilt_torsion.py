@@ -45,7 +45,9 @@ def rotation_from_tilt_torsion(tilt_torsion: ArrayLike) -> FloatArray:
     Raises:
         InputError: An angle is not finite.
     """
-    angles = np.radians(finite_array("azimuth, tilt and torsion", tilt_torsion, (3,)))
+    degrees = finite_array("azimuth, tilt and torsion", tilt_torsion, (3,))
+    # Without full turns, exactly: angles near the largest number have no finite difference.
+    angles = np.radians(np.fmod(degrees, 360.0))
     azimuth, tilt, torsion = angles[..., 0], angles[..., 1], angles[..., 2]
     c, s = np.cos(azimuth), np.sin(azimuth)
     a, b = np.cos(torsion - azimuth), np.sin(torsion - azimuth)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from dataclasses import replace
 from html import unescape
@@ -260,6 +261,10 @@ def test_strip_of_torsions_has_gaps_and_marks_the_best_torsion_unless_it_is_no_b
     middle = 0.5 * float(found.torsions[20] + found.torsions[21])
     assert tilt_at(found, middle) == pytest.approx(found.tilts[20:22].mean(), nan_ok=True)
     assert tilt_at(found, 540.0) == pytest.approx(found.tilts[0], nan_ok=True)
+    for torsion in (1e308, -1e308):
+        # A torsion of any size is one of the row.
+        same = math.remainder(torsion, 360.0)
+        assert tilt_at(found, torsion) == pytest.approx(tilt_at(found, same), nan_ok=True)
 
 
 def test_share_of_none_or_all_names_the_number_of_orientations() -> None:

@@ -61,6 +61,13 @@ def test_pose_has_the_position_and_the_rotation() -> None:
     np.testing.assert_allclose(pose.rotation, rotation_from_tilt_torsion([30.0, 20.0, -70.0]))
 
 
+def test_angles_of_any_size_are_those_without_full_turns() -> None:
+    for angles in ([-1.7e308, 20.0, 1.7e308], [1e17, -1e25, 3e300], [360.0, -720.0, 1080.0]):
+        found = rotation_from_tilt_torsion(angles)
+        expected = rotation_from_tilt_torsion([math.fmod(angle, 360.0) for angle in angles])
+        np.testing.assert_allclose(found, expected, atol=1e-12)
+
+
 def test_unusable_angles_are_refused() -> None:
     for angles in ([math.nan, 0.0, 0.0], [1.0, 2.0], "x"):
         with pytest.raises(InputError, match="azimuth, tilt and torsion"):

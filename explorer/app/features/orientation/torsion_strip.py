@@ -27,7 +27,9 @@ SAME_TILT = 0.05
 def tilt_at(found: TiltByTorsion, torsion: float) -> float:
     """Return the tilt at a torsion between those of the row; NaN where no tilt is possible."""
     count = len(found.tilts)
-    place = (torsion - float(found.torsions[0])) * count / 360.0 % count
+    # Without full turns first, since a torsion may be as large as any number.
+    turned = math.remainder(torsion, 360.0) - float(found.torsions[0])
+    place = turned * count / 360.0 % count
     left, share = int(place), place % 1.0
     tilts = found.tilts.tolist()
     return (1.0 - share) * tilts[left % count] + share * tilts[(left + 1) % count]
