@@ -292,8 +292,10 @@ def _varied(value: Any, kind: Any) -> Any:
     if isinstance(value, int | float):
         return value + (1 if isinstance(value, int) else 1 / 3)
     if isinstance(value, tuple):
-        entries = reversed(cast("tuple[Any, ...]", value))
-        return tuple(not each if each is True else each for each in entries)
+        entries = cast("tuple[Any, ...]", value)
+        if all(isinstance(each, float) for each in entries):
+            return tuple(each + 1 / 3 for each in entries)
+        return tuple(not each if each is True else each for each in reversed(entries))
     kinds = get_args(kind) if type(None) in get_args(kind) else (kind,)
     samples = {str: "another", int: 7, float: 1 / 3}
     choices = [each for one in kinds for each in (get_args(one) or (samples.get(one),))]

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from explorer.errors import InputError
+from explorer.mechanism.pose import Triple
+from explorer.mechanism.tool_point import Point
 from explorer.numerics.number_text import format_number
 
 ALUMINIUM = 2700.0
@@ -99,6 +101,41 @@ class PrototypeView:
             )
 
 
+Weighed = Literal["none", "payload", "payload and legs"]
+
+
+@dataclass(frozen=True)
+class ForcesView:
+    """The load besides the payload, and how forces are shown.
+
+    Attributes:
+        shown: Whether the forces are drawn.
+        force: Force at the tool, along the axes of the base, in N.
+        moment: Moment on the platform, along the axes of the base, in N m.
+        weighed: The bodies whose weights count.
+        scale: Force whose arrow is as long as the reach, in N.
+
+    Raises:
+        InputError: a number that is not finite, or a scale that is not positive.
+    """
+
+    shown: bool = False
+    force: Triple = (0.0, 0.0, -10.0)
+    moment: Triple = (0.0, 0.0, 0.0)
+    weighed: Weighed = "payload"
+    scale: float = 20.0
+
+    def __post_init__(self) -> None:
+        for name, unit in (("force", "N"), ("moment", "N m")):
+            if not all(map(math.isfinite, getattr(self, name))):
+                raise InputError(f"the {name} must be three finite numbers, in {unit}")
+        if not (math.isfinite(self.scale) and self.scale > 0.0):
+            raise InputError(
+                f"the force whose arrow is as long as the reach must be positive, in N; got "
+                f"{format_number(self.scale)}"
+            )
+
+
 DrawnAs = Literal["schematic", "prototype", "6-4 twin"]
 Ghost = Literal["none", "δ1 = 0", "δ2 = 0", "δ3 = 0", "nearest"]
 Arrows = Literal["one in use", "all six", "none"]
@@ -129,6 +166,7 @@ class View:
     """What is shown, and how.
 
     Attributes:
+        at: The point whose position is shown and set, and about which the platform turns.
         drawn_as: What is drawn: the schematic mechanism, the parts of its prototype in place of
             legs and bodies, or its 6-4 twin, with six legs in place of the four.
         flags, bodies, legs, labels, grid, handle: Whether each is drawn.
@@ -142,12 +180,15 @@ class View:
             the reach.
         prototype: How the prototype is shown.
         workspace: How the workspace is shown.
+        orientation: What is drawn of the orientations over the workspace.
         singular: How singularities are shown.
+        forces: The load besides the payload, and how forces are shown.
 
     Raises:
         InputError: the warning length is not positive.
     """
 
+    at: Point = "b4"
     drawn_as: DrawnAs = "schematic"
     flags: bool = True
     bodies: bool = True
@@ -165,6 +206,7 @@ class View:
     workspace: WorkspaceView = field(default_factory=WorkspaceView)
     orientation: OrientationView = field(default_factory=OrientationView)
     singular: SingularView = field(default_factory=SingularView)
+    forces: ForcesView = field(default_factory=ForcesView)
 
     @property
     def is_twin(self) -> bool:

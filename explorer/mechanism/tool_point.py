@@ -1,0 +1,54 @@
+"""The point of the platform whose position is meant: b4, or the point of the tool."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from explorer.mechanism.design import Design
+from explorer.mechanism.pose import Pose, Triple
+from explorer.numerics.arrays import FloatArray
+
+Point = Literal["b4", "tool"]
+"""The point whose position is meant."""
+
+
+def point_of(design: Design, at: Point) -> Triple:
+    """Return a point in the platform frame, in design units; zeros for b4."""
+    return design.tool.position if at == "tool" else (0.0, 0.0, 0.0)
+
+
+def position_of(design: Design, pose: Pose, at: Point) -> Triple:
+    """Return the position of a point in the base frame, in design units."""
+    if at == "b4":
+        return pose.position
+    x, y, z = (np.array(pose.position) + offset_of(design, pose.rotation, at)).tolist()
+    return x, y, z
+
+
+def pose_with(design: Design, at: Point, position: Triple, pose: Pose) -> Pose:
+    """Return the pose with the orientation of a pose and a point at a position.
+
+    Args:
+        design: The manipulator.
+        at: The point that has the position.
+        position: Its position in the base frame, in design units.
+        pose: The pose with the orientation.
+
+    Raises:
+        InputError: The position is not finite, or too far away.
+    """
+    x, y, z = (np.array(position) - offset_of(design, pose.rotation, at)).tolist()
+    return Pose((x, y, z), pose.quaternion)
+
+
+def offset_of(design: Design, rotation: FloatArray, at: Point) -> FloatArray:
+    """Return the vector from b4 to a point along the axes of the base, shape (..., 3).
+
+    Args:
+        design: The manipulator.
+        rotation: Platform to base, shape (..., 3, 3).
+        at: The point.
+    """
+    return np.asarray(rotation @ np.array(point_of(design, at)))
