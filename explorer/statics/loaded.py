@@ -1,0 +1,131 @@
+"""A design in one pose under a load and weights: forces, shares of the limits, and the largest."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from explorer.mechanism.design import Design
+from explorer.mechanism.machine import Payload
+from explorer.mechanism.pose import Pose
+from explorer.numerics.arrays import FloatArray
+from explorer.statics.equilibrium import twists_of_actuators
+from explorer.statics.forces import largest_force
+from explorer.statics.reactions import Reactions, largest_payload, limit_shares, reactions
+from explorer.statics.weights import Weights
+
+
+class WorstForce(NamedTuple):
+    """The direction in which a force uses the largest share of a limit.
+
+    Attributes:
+        direction: Unit vector along the axes of the base, shape (3,); NaN in a singular pose, and
+            if no part has a limit.
+        part: Index in `explorer.statics.reactions.LIMITED` of the part with this share.
+        share: The share, of which 1 is the limit; infinite in a singular pose.
+    """
+
+    direction: FloatArray
+    part: int
+    share: float
+
+
+@dataclass(frozen=True)
+class LoadedPose:
+    """A design in one pose, under a load at the tool point, its payload and other weights.
+
+    Attributes:
+        design: The manipulator, with its tool, payload and limits.
+        pose: The pose.
+        load: (F; M) at the tool point, base axes, shape (6,), in N and N × unit.
+        own: Masses of the bodies besides the payload; None for none.
+        weighs_payload: Whether the payload has its weight.
+    """
+
+    design: Design
+    pose: Pose
+    load: FloatArray
+    own: Weights | None = None
+    weighs_payload: bool = True
+
+    @cached_property
+    def weights(self) -> Weights:
+        """All masses."""
+        own = self.own or Weights()
+        payload: tuple[Payload, ...] = (self.design.payload,) if self.weighs_payload else ()
+        return replace(own, on_platform=(*own.on_platform, *payload))
+
+    @cached_property
+    def held(self) -> Reactions:
+        """All that holds the load and the weights."""
+        return self._held(self.load)
+
+    @cached_property
+    def shares(self) -> FloatArray:
+        """Shares of the limits, shape (12,), in the order of `LIMITED`; 0 without a limit."""
+        return limit_shares(self.design, self.held)
+
+    @property
+    def is_regular(self) -> bool:
+        """Whether forces hold the load: whether the pose is not singular."""
+        return bool(np.isfinite(self.held.actuators).all())
+
+    @property
+    def worst(self) -> int:
+        """Index in `LIMITED` of the part with the largest share."""
+        return int(self.shares.argmax())
+
+    @property
+    def share(self) -> float:
+        """The largest share of a limit; infinite in a singular pose."""
+        return float(self.shares.max())
+
+    @cached_property
+    def largest_payload(self) -> float:
+        """The largest mass in place of the payload that keeps all limits, in kg."""
+        given = self.design, self.pose.position, self.pose.rotation, self.load
+        return float(largest_payload(*given, self.design.tool.position, self.own))
+
+    @cached_property
+    def largest_force(self) -> float:
+        """The largest force at the tool that the actuators alone hold in every direction, in N.
+
+        It is infinite if no actuator has a limit. Neither the load nor weights act besides.
+        """
+        most = np.minimum(*self.design.actuators.limits)
+        given = self.design, self.pose.position, self.pose.rotation, most
+        return float(largest_force(*given, self.design.tool.position))
+
+    def worst_force(self, force: float) -> WorstForce:
+        """Return the direction of an added force at the tool that uses the largest share.
+
+        What a limit bounds is linear in the force, or the length of a vector that is, and changes
+        with one component of the force only: that along the row of an actuator in J⁻ᵀ. So the
+        largest share is that of one of these six directions or of their opposites.
+
+        Args:
+            force: Size of the force, in N.
+        """
+        design, pose = self.design, self.pose
+        twists = twists_of_actuators(design, pose.position, pose.rotation, design.tool.position)
+        rows = twists[:3].T
+        if not np.isfinite(rows).all():
+            return WorstForce(np.full(3, np.nan), self.worst, np.inf)
+        sizes = np.linalg.norm(rows, axis=1)
+        units = rows[sizes > 0.0] / sizes[sizes > 0.0, None]
+        directions = np.concatenate([units, -units])
+        loads = np.tile(self.load, (len(directions), 1))
+        loads[:, :3] += force * directions
+        shares = limit_shares(design, self._held(loads))
+        row, part = (int(i) for i in np.unravel_index(shares.argmax(), shares.shape))
+        share = float(shares[row, part])
+        direction = directions[row] if share > 0.0 else np.full(3, np.nan)
+        return WorstForce(direction, part, share)
+
+    def _held(self, load: FloatArray) -> Reactions:
+        design, pose = self.design, self.pose
+        tool = design.tool.position
+        return reactions(design, pose.position, pose.rotation, load, tool, self.weights)

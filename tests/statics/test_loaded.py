@@ -1,0 +1,117 @@
+"""A loaded pose: worst directions beside many sampled ones, and its largest payload and force."""
+
+from __future__ import annotations
+
+import msgspec
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from explorer import PRESETS, Actuators, Design, Guide, Payload, Struts, Tool, Weights
+from explorer.mechanism.home import home_pose
+from explorer.mechanism.pose import Pose
+from explorer.statics.loaded import LoadedPose
+from explorer.statics.reactions import limit_shares, reactions
+
+OPTIMAL = PRESETS["paper-optimal"]
+HOME = home_pose(OPTIMAL)
+OWN = Weights(cylinders=(0.1, 0.2, 0.15, 0.1), cylinder_centres=(1.0, 1.0, 2.0, 3.0))
+
+
+def limited(**changes: object) -> Design:
+    """Return a design with a tool, a payload and limits of all its parts."""
+    parts: dict[str, object] = {
+        "tool": Tool((1.0, -1.0, 2.0)),
+        "payload": Payload(0.5, (1.0, 2.0, 3.0), 2.0),
+        "actuators": Actuators(push_n=(60, 50, 40, 50, 45, 70), pull_n=(30, 40, 50, 60, 70, 80)),
+        "struts": Struts(moment_nm=4.0),
+        "guide": Guide(force_n=40.0, moment_nm=5.0),
+    }
+    return msgspec.structs.replace(OPTIMAL, **(parts | changes))
+
+
+def loaded_poses(design: Design, count: int, seed: int = 3) -> list[LoadedPose]:
+    """Return a design in random poses about home, under random loads."""
+    rng = np.random.default_rng(seed)
+    poses = [
+        Pose.of_yaw_pitch_roll(
+            rng.uniform((4, 1, 2), (16, 9, 14)), rng.uniform((-110, -20, -20), (-40, 20, 20))
+        )
+        for _ in range(count)
+    ]
+    return [LoadedPose(design, pose, rng.normal(size=6) * 5.0, OWN) for pose in poses]
+
+
+@pytest.mark.parametrize("limits", ["all", "guide"])
+def test_no_sampled_direction_uses_a_larger_share_than_the_worst(limits: str) -> None:
+    none = {"actuators": Actuators(), "struts": Struts()}
+    design = limited(**(none if limits == "guide" else {}))
+    directions = np.random.default_rng(4).normal(size=(40_000, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    for loaded in loaded_poses(design, 6):
+        worst = loaded.worst_force(12.0)
+        loads = np.tile(loaded.load, (len(directions), 1))
+        loads[:, :3] += 12.0 * directions
+        pose = loaded.pose
+        held = reactions(
+            design, pose.position, pose.rotation, loads, design.tool.position, loaded.weights
+        )
+        sampled = float(limit_shares(design, held).max())
+        assert sampled <= worst.share * (1.0 + 1e-12)
+        assert sampled >= worst.share * 0.998
+        # The direction reaches it, and the part is the one that does.
+        load = loaded.load + [*(12.0 * worst.direction), 0.0, 0.0, 0.0]
+        there = LoadedPose(design, pose, load, OWN)
+        assert there.share == pytest.approx(worst.share, rel=1e-12)
+        assert there.worst == worst.part
+
+
+def test_the_largest_payload_takes_a_part_to_its_limit() -> None:
+    for loaded in loaded_poses(limited(), 8):
+        mass = loaded.largest_payload
+        if mass == 0.0:
+            # The load and the other weights alone exceed a limit.
+            free = LoadedPose(limited(payload=Payload(0.0, (1.0, 2.0, 3.0), 2.0)), loaded.pose,
+                              loaded.load, OWN)  # fmt: skip
+            assert free.share > 1.0
+            continue
+        design = limited(payload=Payload(mass, (1.0, 2.0, 3.0), 2.0))
+        share = LoadedPose(design, loaded.pose, loaded.load, OWN).share
+        assert share == pytest.approx(1.0, rel=1e-9)
+
+
+def test_the_largest_force_takes_an_actuator_to_its_limit_in_its_worst_direction() -> None:
+    design = limited(
+        payload=Payload(), struts=Struts(), guide=Guide(), actuators=Actuators(push_n=(50.0,) * 6)
+    )
+    for loaded in loaded_poses(design, 5):
+        free = LoadedPose(design, loaded.pose, np.zeros(6))
+        assert free.worst_force(free.largest_force).share == pytest.approx(1.0, rel=1e-12)
+
+
+def test_the_weight_of_the_payload_can_be_left_out() -> None:
+    design = limited()
+    with_weight = LoadedPose(design, HOME, np.zeros(6))
+    without = LoadedPose(design, HOME, np.zeros(6), weighs_payload=False)
+    assert_allclose(without.held.actuators, 0.0, atol=1e-12)
+    assert np.abs(with_weight.held.actuators).max() > 1.0
+
+
+def test_without_limits_no_share_is_used_and_no_direction_is_worst() -> None:
+    loaded = LoadedPose(OPTIMAL, HOME, np.array([0.0, 0.0, -10.0, 0.0, 0.0, 0.0]))
+    assert loaded.share == 0.0
+    assert np.isinf([loaded.largest_payload, loaded.largest_force]).all()
+    worst = loaded.worst_force(10.0)
+    assert worst.share == 0.0
+    assert np.isnan(worst.direction).all()
+
+
+def test_in_a_singular_pose_nothing_holds_a_load() -> None:
+    pose = Pose((10.0, 5.0, 0.0), HOME.quaternion)
+    loaded = LoadedPose(limited(), pose, np.array([0.0, 0.0, -10.0, 0.0, 0.0, 0.0]))
+    assert not loaded.is_regular
+    assert np.isinf(loaded.share)
+    assert (loaded.largest_payload, loaded.largest_force) == (0.0, 0.0)
+    worst = loaded.worst_force(10.0)
+    assert np.isinf(worst.share)
+    assert np.isnan(worst.direction).all()

@@ -1,0 +1,86 @@
+"""The nearest position that holds a load, beside dense random positions."""
+
+from __future__ import annotations
+
+import msgspec
+import numpy as np
+import pytest
+
+from explorer import PRESETS, Actuators, Design, Limits, Payload, Struts, Tool
+from explorer.mechanism.home import home_pose
+from explorer.mechanism.margins import margins
+from explorer.mechanism.pose import Pose
+from explorer.numerics.arrays import FloatArray
+from explorer.statics.loaded import LoadedPose
+from explorer.statics.reactions import limit_shares, reactions
+from explorer.workspace.limits.valid_poses import poses_are_valid
+from explorer.workspace.nearest_held import nearest_held
+
+OPTIMAL = PRESETS["paper-optimal"]
+HOME = home_pose(OPTIMAL)
+LIMITED = msgspec.structs.replace(
+    OPTIMAL,
+    tool=Tool((1.0, -1.0, 2.0)),
+    payload=Payload(2.0, (1.0, 2.0, 3.0), 5.0),
+    actuators=Actuators(push_n=(60.0,) * 6),
+    struts=Struts(moment_nm=3.0),
+)
+LOAD = np.array([0.0, 0.0, -10.0, 0.0, 0.0, 0.0])
+
+
+def distances_held(loaded: LoadedPose, positions: FloatArray) -> FloatArray:
+    """Return the distances of those positions that hold the load in the mode of the pose."""
+    design, pose = loaded.design, loaded.pose
+    signs = np.sign(margins(positions, pose.rotation)) == np.sign(
+        margins(pose.position, pose.rotation)
+    )
+    kept = positions[signs.all(axis=1) & poses_are_valid(design, positions, pose.rotation)]
+    tool, weights = design.tool.position, loaded.weights
+    held = reactions(design, kept, pose.rotation, loaded.load, tool, weights)
+    kept = kept[(limit_shares(design, held) <= 1.0).all(axis=1)]
+    return np.linalg.norm(kept - np.array(pose.position), axis=1)
+
+
+@pytest.mark.parametrize("at", [(10.0, 5.0, 9.0), (10.0, 5.0, 2.0), (4.0, 2.0, 3.0), (12, -3, 5)])
+def test_no_random_position_that_holds_the_load_is_nearer(at: tuple[float, float, float]) -> None:
+    loaded = LoadedPose(LIMITED, Pose(at, HOME.quaternion), LOAD)
+    assert loaded.share > 1.0
+    found = nearest_held(loaded)
+    assert found is not None
+    assert found.quaternion == HOME.quaternion
+    distance = float(np.linalg.norm(np.subtract(found.position, at)))
+    assert len(distances_held(loaded, np.array([found.position]))) == 1
+    rng = np.random.default_rng(5)
+    ball = rng.normal(size=(400_000, 3))
+    radii = distance * rng.uniform(size=len(ball)) ** (1 / 3)
+    ball *= (radii / np.linalg.norm(ball, axis=1))[:, None]
+    nearer = distances_held(loaded, np.array(at) + ball)
+    assert (nearer >= distance - 1e-5 * LIMITED.reach).all()
+
+
+def test_a_position_that_holds_the_load_is_its_own_nearest() -> None:
+    loaded = LoadedPose(OPTIMAL, HOME, LOAD)
+    found = nearest_held(loaded)
+    assert found is not None
+    assert found.position == pytest.approx(HOME.position, abs=1e-12)
+
+
+def test_none_is_found_where_no_position_holds_the_load() -> None:
+    weak = msgspec.structs.replace(LIMITED, actuators=Actuators(push_n=(1.0,) * 6))
+    assert nearest_held(LoadedPose(weak, HOME, 10.0 * LOAD)) is None
+
+
+def test_none_is_found_where_the_limits_leave_no_position() -> None:
+    def boxed(design: Design) -> Design:
+        far = Limits(box=((90.0, 90.0, 90.0), (91.0, 91.0, 91.0)))
+        return msgspec.structs.replace(design, limits=far)
+
+    assert nearest_held(LoadedPose(boxed(LIMITED), HOME, LOAD)) is None
+
+
+def test_from_a_singular_pose_it_is_in_the_mode_of_home() -> None:
+    loaded = LoadedPose(LIMITED, Pose((10.0, 5.0, 0.0), HOME.quaternion), 0.1 * LOAD)
+    found = nearest_held(loaded)
+    assert found is not None
+    signs = np.sign(margins(found.position, found.rotation))
+    assert signs.tolist() == np.sign(margins(HOME.position, HOME.rotation)).tolist()
