@@ -13,6 +13,7 @@ from explorer.app.inputs.tracks import Span, round_span
 from explorer.app.state.state import State
 from explorer.mechanism.design import JOINTS, LENGTHS, Design, Pair
 from explorer.mechanism.possible_ranges import possible_ranges, without_box, without_guide
+from explorer.mechanism.tool_point import Point, point_of
 
 # Ends of sliders over the size of what they change, so that users run into limits.
 BEYOND = 1.5
@@ -40,13 +41,17 @@ def _joint_spans(design: Design) -> tuple[Span, ...]:
 
 
 def position_span(state: State, axis: int) -> Span:
-    """Return the range of a coordinate of b4."""
-    return _position_spans(state.design)[axis]
+    """Return the range of a coordinate of b4, or of the tool point at any orientation."""
+    return _position_spans(state.design, state.view.at)[axis]
 
 
 @functools.lru_cache(64)
-def _position_spans(design: Design) -> tuple[Span, ...]:
-    return tuple(_around(ends, design.reach) for ends in possible_ranges(design).position)
+def _position_spans(design: Design, at: Point) -> tuple[Span, ...]:
+    room = math.hypot(*point_of(design, at))
+    return tuple(
+        _around((low - room, high + room), design.reach)
+        for low, high in possible_ranges(design).position
+    )
 
 
 def length_limit_span(state: State) -> Span:

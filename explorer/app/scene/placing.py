@@ -95,6 +95,16 @@ class Placed:
         return {name: self.scale * np.array(point) for name, point in local.items()}
 
     @cached_property
+    def point(self) -> FloatArray:
+        """The point whose position is shown, b4 or the tool point, in scene units, (3,)."""
+        return self.points["b4"] + self.offset
+
+    @cached_property
+    def offset(self) -> FloatArray:
+        """The vector from b4 to that point in scene units, (3,)."""
+        return self.scale * self.frame.state.offset(self.frame.snapshot.rotation)
+
+    @cached_property
     def reach(self) -> float:
         """The reach |a3| in scene units."""
         return self.scale * self.frame.state.design.reach

@@ -125,7 +125,7 @@ class UseNearest(Action):
 
 @dataclass(frozen=True)
 class SetPosition(Action):
-    """Set one coordinate of b4, 0 to 2."""
+    """Set one coordinate of b4 or of the tool point, 0 to 2."""
 
     axis: int
     value: float
@@ -133,19 +133,23 @@ class SetPosition(Action):
     def apply(self, state: State) -> State:
         """Return the next state."""
         position = list(state.pose.position)
-        position[self.axis] = self.value
+        # The other coordinates are kept to the last bit.
+        position[self.axis] = self.value - float(state.offset(state.pose.rotation)[self.axis])
         x, y, z = position
         return moved(state, Pose((x, y, z), state.pose.quaternion), state.yaw_pitch_roll)
 
     def describe(self, before: State, after: State) -> str:
         """Return which coordinate has which value."""
         del before
-        return f"{'xyz'[self.axis]} = {format_number(self.value, 6, size=after.design.reach)}"
+        name = "xyz"[self.axis]
+        if after.view.at != "b4":
+            name += f" of {after.point}"
+        return f"{name} = {format_number(self.value, 6, size=after.design.reach)}"
 
 
 @dataclass(frozen=True)
 class SetAngle(Action):
-    """Set yaw, pitch or roll, 0 to 2, in degrees."""
+    """Set yaw, pitch or roll, 0 to 2, in degrees; the point that the position is of stays."""
 
     axis: int
     value: float
@@ -155,8 +159,8 @@ class SetAngle(Action):
         angles = list(state.yaw_pitch_roll)
         angles[self.axis] = self.value
         yaw, pitch, roll = angles
-        pose = Pose.of_yaw_pitch_roll(state.pose.position, angles)
-        return moved(state, pose, (yaw, pitch, roll))
+        orientation = Pose.of_yaw_pitch_roll(state.pose.position, angles)
+        return moved(state, state.pose_at(state.position, orientation), (yaw, pitch, roll))
 
     def words(self) -> str:
         """Return what the action does."""
@@ -177,8 +181,8 @@ class SetPose(Action):
     def describe(self, before: State, after: State) -> str:
         """Return where the platform is."""
         del before
-        p, size = self.pose.position, after.design.reach
-        return f"Move b4 to {', '.join(format_number(x, 4, size=size) for x in p)}"
+        p, size = after.position, after.design.reach
+        return f"Move {after.point} to {', '.join(format_number(x, 4, size=size) for x in p)}"
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from typing import Annotated, Literal
 
 import msgspec
 import numpy as np
+from numpy.typing import ArrayLike
 
 from explorer.app.state.compared import Compared
 from explorer.app.state.jog import Jog
@@ -31,6 +32,8 @@ from explorer.mechanism.tilt_torsion import (
     rotation_from_tilt_torsion,
     tilt_torsion_of,
 )
+from explorer.mechanism.tool_point import Point, offset_of, pose_with, position_of
+from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
 from explorer.optimise.outcome import Iterate
 from explorer.optimise.problem import Problem
@@ -41,6 +44,9 @@ Joints = tuple[float, float, float, float, float, float]
 Hold = Literal["pose", "legs"]
 # Difference of the entries of rotation matrices up to which they are the same but for rounding.
 SAME_ROTATION = 1e-12
+POINTS: dict[Point, str] = {"b4": "b4", "tool": "the tool"}
+"""Words for the point whose position is meant."""
+
 Count = Annotated[int, msgspec.Meta(ge=0)]
 
 
@@ -260,6 +266,32 @@ class State:
         ):
             return given
         return tilt_torsion_of(rotation)
+
+    @property
+    def point(self) -> str:
+        """The words for the point whose position is shown and set."""
+        return POINTS[self.view.at]
+
+    @property
+    def position(self) -> Triple:
+        """The position of that point in the base frame, in design units."""
+        return position_of(self.design, self.pose, self.view.at)
+
+    def offset(self, rotation: ArrayLike) -> FloatArray:
+        """Return the vector from b4 to that point in the base frame, shape (..., 3).
+
+        Args:
+            rotation: Platform to base, shape (..., 3, 3).
+        """
+        return offset_of(self.design, np.asarray(rotation), self.view.at)
+
+    def pose_at(self, position: Triple, orientation: Pose) -> Pose:
+        """Return the pose with the orientation of a pose, and that point at a position.
+
+        Raises:
+            InputError: the position is not finite, or too far away.
+        """
+        return pose_with(self.design, self.view.at, position, orientation)
 
     @property
     def remark(self) -> str | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -42,7 +43,7 @@ def _is_moved(before: Frame, now: Frame) -> bool:
 
 
 def _move(frame: Frame) -> Action:
-    return SetPosition(1, frame.state.pose.position[1] + STRIDE * frame.state.design.reach)
+    return SetPosition(1, frame.state.position[1] + STRIDE * frame.state.design.reach)
 
 
 def _is_near(_: Frame, now: Frame) -> bool:
@@ -51,8 +52,9 @@ def _is_near(_: Frame, now: Frame) -> bool:
 
 def _approach(frame: Frame) -> Action:
     """Lower b4 towards the base plane: δ3 is its height."""
-    height = NEAR * frame.state.warn_below
-    return SetPosition(2, height if frame.state.pose.position[2] >= 0.0 else -height)
+    state = frame.state
+    height = math.copysign(NEAR * state.warn_below, state.pose.position[2])
+    return SetPosition(2, height + float(state.offset(state.pose.rotation)[2]))
 
 
 def _is_changed(before: Frame, now: Frame) -> bool:

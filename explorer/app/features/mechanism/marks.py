@@ -131,7 +131,7 @@ def ghost_points(placed: Placed, modes: list[int]) -> FloatArray:
 
 
 class DragHandle(ScenePart):
-    """The gizmo at b4: arrows move the platform, arcs turn it.
+    """The gizmo at b4 or at the tool point: arrows move the platform, arcs turn it about the point.
 
     It is small and faint where it would hide the end of a gap to a near incidence.
     """
@@ -155,7 +155,7 @@ class DragHandle(ScenePart):
         """
         x, y, z = (np.asarray(self.handle.position) / scene_scale(state)).tolist()
         w, i, j, k = np.asarray(self.handle.wxyz, dtype=np.float64).tolist()
-        return Pose((x, y, z), (w, i, j, k))
+        return state.pose_at((x, y, z), Pose(state.pose.position, (w, i, j, k)))
 
     def updates(self, placed: Placed) -> Iterator[Update]:
         """Yield the updates that keep the gizmo on the platform."""
@@ -168,14 +168,14 @@ class DragHandle(ScenePart):
             # A pose that was written back during a drag would move the gizmo under the pointer.
             if self.pose(state) == state.pose:
                 return
-        yield self.handle, "position", tuple(placed.points["b4"].tolist())
+        yield self.handle, "position", tuple(placed.point.tolist())
         yield self.handle, "wxyz", state.pose.quaternion
 
     def corners(self, placed: Placed) -> FloatArray:
         """Return the tips of the three arrows."""
         if not _is_handle_visible(placed):
             return NO_POINTS
-        return placed.points["b4"] + ARROW_LENGTH * placed.frame.snapshot.rotation.T
+        return placed.point + ARROW_LENGTH * placed.frame.snapshot.rotation.T
 
     def _look(self, placed: Placed) -> tuple[float, float]:
         """Return size and opacity for a frame, or the present ones while the gizmo moves."""
@@ -209,9 +209,8 @@ class DragHandle(ScenePart):
 
 def hides_a_gap(placed: Placed) -> bool:
     """Whether an end of the gap to a near incidence lies within the gizmo."""
-    b4 = placed.points["b4"]
     return any(
-        float(np.linalg.norm(each.ends - b4, axis=1).min()) < ARROW_LENGTH
+        float(np.linalg.norm(each.ends - placed.point, axis=1).min()) < ARROW_LENGTH
         for each in approaches(placed, None)
         if each.ends is not None and each.has_gap
     )

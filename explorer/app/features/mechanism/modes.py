@@ -94,9 +94,8 @@ def _row(frame: Frame, mode: int) -> str:
     solution, reach = frame.snapshot.modes, frame.state.design.reach
     is_here = mode in frame.snapshot.bordering_modes
     if solution.feasible:
-        place = "".join(
-            f"<span>{fitted(value, reach, 3)}</span>" for value in solution.position[mode].tolist()
-        )
+        there = solution.position[mode] + frame.state.offset(solution.rotation[mode])
+        place = "".join(f"<span>{fitted(value, reach, 3)}</span>" for value in there.tolist())
         limits, hint = _limits(frame.snapshot.mode_violations[mode])
     else:
         place, hint = '<span class="ex-dim is-wide">does not close</span>', ""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import viser
 
@@ -12,8 +12,10 @@ from explorer.app.inputs.bindings import Bound
 from explorer.app.inputs.controls import Controls
 from explorer.app.inputs.ranges import joint_span, position_span
 from explorer.app.inputs.tracks import Span
+from explorer.app.session.session import Session
 from explorer.app.state.actions import (
     GoHome,
+    Set,
     SetAngle,
     SetJoint,
     SetPosition,
@@ -22,8 +24,11 @@ from explorer.app.state.actions import (
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.markup import alert, note, remark
+from explorer.app.widgets.buttons import Buttons
+from explorer.app.widgets.chips import Chip, Chips, Effect
+from explorer.app.widgets.markup import alert, box, note, remark
 from explorer.mechanism.design import JOINTS
+from explorer.mechanism.tool_point import Point
 
 JOINT_HINTS = {
     "l1": "Leg 1: length of the actuator from a1 to b1 (U joint, actuator, ball joint).",
@@ -66,7 +71,10 @@ class MovePanel:
                 icon=viser.Icon.MAGNET,
                 main=True,
             )
-        with gui.add_folder("Pose of b4 (design units, degrees)"):
+        self._points = point_chips(services.buttons, services.session)
+        self._pose = gui.add_folder("")
+        with self._pose:
+            self._point = gui.add_html("")
             for axis, name in enumerate("xyz"):
                 self._add_position(axis, name)
             for axis, (name, order, edge) in enumerate(ANGLES):
@@ -77,7 +85,8 @@ class MovePanel:
                 GoHome,
                 icon=viser.Icon.HOME,
             )
-        with gui.add_folder("Assembly modes: b4 (design units)"):
+        self._mode_folder = gui.add_folder("")
+        with self._mode_folder:
             self._modes = ModesPanel(services)
 
     def _add_joint(self, joint: int, name: str) -> None:
@@ -93,9 +102,9 @@ class MovePanel:
     def _add_position(self, axis: int, name: str) -> None:
         self._controls.slider(
             name,
-            f"The {name} coordinate of b4 in the base frame.",
+            f"The {name} coordinate of b4 or of the tool point in the base frame.",
             Bound(
-                lambda frame: frame.state.pose.position[axis],
+                lambda frame: frame.state.position[axis],
                 lambda _, value: SetPosition(axis, value),
             ),
             lambda state: position_span(state, axis),
@@ -114,11 +123,40 @@ class MovePanel:
 
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that make the panel show the frame."""
-        unclosed = frame.state.unclosed
-        yield self._message, "content", message(frame.state)
+        state, unclosed = frame.state, frame.state.unclosed
+        yield self._pose, "label", f"Pose of {state.point} (design units, degrees)"
+        yield self._mode_folder, "label", f"Assembly modes: {state.point} (design units)"
+        yield self._point, "content", box(self._points.html(state))
+        yield self._message, "content", message(state)
         yield self._nearest, "disabled", unclosed is None or unclosed.nearest is None
         yield from self._controls.updates(frame)
         yield from self._modes.updates(frame)
+
+
+def point_chips(buttons: Buttons, session: Session) -> Chips:
+    """Return the choice of the point whose position is shown and set."""
+
+    def chip(at: Point, words: str, hint: str, is_ready: Callable[[State], bool]) -> Chip:
+        return Chip(
+            words,
+            f"Pose › Position of › {words}",
+            hint,
+            Effect(
+                lambda _: Set("view.at", at, "Position of", words),
+                lambda state: state.view.at == at,
+            ),
+            is_ready,
+        )
+
+    b4 = chip("b4", "b4", "Show and set the position of b4, and turn about it.", lambda _: True)
+    tool = chip(
+        "tool",
+        "tool point",
+        "Show and set the position of the tool point, and turn about it. It is b4 until the "
+        "design has a tool elsewhere.",
+        lambda state: any(state.design.tool.position),
+    )
+    return Chips(buttons, session, "pose.point", "Position of", {"b4": b4, "tool": tool})
 
 
 def message(state: State) -> str:

@@ -1,4 +1,7 @@
-"""Actions on the orientation in azimuth, tilt and torsion."""
+"""Actions on the orientation in azimuth, tilt and torsion.
+
+The platform turns about the point whose position is shown, which stays in its place.
+"""
 
 from __future__ import annotations
 
@@ -51,5 +54,6 @@ class GoToTilt(Action):
 
 def _tilted(state: State, angles: TiltTorsion) -> State:
     """Return the state with azimuth, tilt and torsion in degrees, which it keeps as they are."""
-    pose = pose_of_tilt_torsion(state.pose.position, angles)
+    orientation = pose_of_tilt_torsion(state.pose.position, angles)
+    pose = state.pose_at(state.position, orientation)
     return replace(moved(state, pose), set_tilt_torsion=angles)
