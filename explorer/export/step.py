@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,7 @@ from explorer.errors import ExplorerError, InputError, NoAnswerError
 from explorer.export.mesh import colour_of
 from explorer.export.opencascade import (
     Document,
+    ExactShape,
     coordinates,
     direction,
     faces_of,
@@ -69,6 +70,11 @@ class ExactSolid:
     def volume(self) -> float:
         """The volume in cubic millimetres, integrated over the exact faces."""
         return volume_of(self.shape)
+
+    def shifted(self, offset: FloatArray) -> ExactSolid:
+        """Return the solid moved by a vector in millimetres, shape (3,)."""
+        x, y, z = offset.tolist()
+        return replace(self, shape=ExactShape(self.shape).translate((x, y, z)).shape)
 
 
 def exact_workspace(design: Design, rotation: ArrayLike | None = None) -> ExactSolid:

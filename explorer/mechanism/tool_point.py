@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose, Triple
-from explorer.numerics.arrays import FloatArray
+from explorer.numerics.arrays import FloatArray, finite_array
 
 Point = Literal["b4", "tool"]
 """The point whose position is meant."""
@@ -51,4 +52,18 @@ def offset_of(design: Design, rotation: FloatArray, at: Point) -> FloatArray:
         rotation: Platform to base, shape (..., 3, 3).
         at: The point.
     """
-    return np.asarray(rotation @ np.array(point_of(design, at)))
+    return tool_offset(rotation, point_of(design, at))
+
+
+def tool_offset(rotation: FloatArray, tool: ArrayLike | None) -> FloatArray:
+    """Return the vector from b4 to a tool point along the axes of the base, shape (..., 3).
+
+    Args:
+        rotation: Platform to base, shape (..., 3, 3).
+        tool: Tool point in the platform frame, shape (..., 3), in design units; None for b4.
+
+    Raises:
+        InputError: The tool is not finite.
+    """
+    t = np.zeros(3) if tool is None else finite_array("tool", tool, (3,))
+    return np.asarray((rotation @ t[..., None])[..., 0])

@@ -1,9 +1,10 @@
 """Velocity and force ellipsoids of a pose, and its distance from the singular poses.
 
-Since joint rates = J · twist, actuator forces J⁻ᵀ · wrench balance a wrench. So the speed of b4
-per unit of actuator speed and the actuator force per unit of force at b4 are the same three
-numbers along the same three directions: the faster the platform, the weaker it is. The reach
-makes rotations comparable: it multiplies angular velocities and divides moments.
+Since joint rates = J · twist, actuator forces J⁻ᵀ · wrench balance a wrench. So the speed of a
+point (b4, or that of the tool) per unit of actuator speed and the actuator force per unit of force
+at that point are the same three numbers along the same three directions: the faster the platform,
+the weaker it is. The reach makes rotations comparable: it multiplies angular velocities and divides
+moments.
 """
 
 from __future__ import annotations
@@ -56,9 +57,9 @@ class Performance:
     """The ellipsoids of a pose.
 
     Attributes:
-        translation: Velocities of b4 and forces at b4; dimensionless.
+        translation: Velocities of the point and forces at it; dimensionless.
         rotation: Angular velocities times the reach, and moments over the reach;
-            dimensionless.
+            dimensionless. It does not depend on the point.
     """
 
     translation: Ellipsoid
@@ -83,10 +84,20 @@ class SingularityFreeBall:
     distances: FloatArray
 
 
-def performance(design: Design, pose: Pose) -> Performance:
-    """Return the ellipsoids of a pose; some axes are infinite if it is singular."""
-    length = design.reach
-    rates = jacobian(design, pose.position, pose.rotation) / np.array([1.0] * 3 + [length] * 3)
+def performance(design: Design, pose: Pose, tool: ArrayLike | None = None) -> Performance:
+    """Return the ellipsoids of a pose; some axes are infinite if it is singular.
+
+    Args:
+        design: The manipulator.
+        pose: The pose.
+        tool: Point of the velocities and forces in the platform frame, shape (3,), in design
+            units; None for b4.
+
+    Raises:
+        InputError: The tool is not finite.
+    """
+    scale = np.array([1.0] * 3 + [design.reach] * 3)
+    rates = jacobian(design, pose.position, pose.rotation, tool) / scale
     _, values, rows = np.linalg.svd(rates)
     is_lost = values <= SINGULAR * values[0]
     inverse = np.divide(1.0, values, out=np.zeros(6), where=~is_lost)

@@ -7,6 +7,8 @@ from numpy.typing import ArrayLike
 
 from explorer.mechanism.design import Design
 from explorer.mechanism.kinematics import attachment_points
+from explorer.mechanism.pose import checked_rotation
+from explorer.mechanism.tool_point import tool_offset
 from explorer.numerics.arrays import FloatArray, dot
 
 
@@ -21,35 +23,41 @@ def tetrahedron_volumes(design: Design, margin: FloatArray) -> FloatArray:
     return np.abs(margin * factors) / 6.0
 
 
-def jacobian(design: Design, position: ArrayLike, rotation: ArrayLike) -> FloatArray:
+def jacobian(
+    design: Design, position: ArrayLike, rotation: ArrayLike, tool: ArrayLike | None = None
+) -> FloatArray:
     """Return the actuator Jacobian J, shape (..., 6, 6): joint rates = J @ twist.
 
     J maps the platform's twist to the joint rates; Merlet ("Parallel Robots", 2006) calls this
-    matrix the inverse Jacobian. The twist is (v; ω): the velocity v of the reference point b4, in
+    matrix the inverse Jacobian. The twist is (v; ω): the velocity v of b4 or of the tool point, in
     design units per unit of time, and the angular velocity ω, in radians per unit of time, both
     along the axes of the base frame. The rows are the rates of (l1, d1, d2, d3, d4, l4), the order
     of `JOINTS`, in design units per unit of time; so columns 1 to 3 are dimensionless and columns
-    4 to 6 are lengths in design units.
+    4 to 6 are lengths in design units. The determinant does not depend on the tool point.
 
     A joint of length zero has no direction, and its row is zero: such a pose is singular.
 
     Args:
         design: The manipulator.
-        position: b4 in the base frame, shape (..., 3), in design units.
+        position: b4 in the base frame, shape (..., 3), in design units, also if a tool is given.
         rotation: Platform to base, shape (..., 3, 3).
+        tool: Point of the velocity v in the platform frame, shape (..., 3), in design units; None
+            for b4.
 
     Raises:
-        InputError: The position is not finite, or the rotation is not one.
+        InputError: The position or the tool is not finite, or the rotation is not one.
     """
-    points = attachment_points(design, position, rotation)
+    r = checked_rotation(rotation)
+    points = attachment_points(design, position, r)
     p = points.b4
+    c = p + tool_offset(r, tool)
     radial = np.array([0.0, 1.0, 1.0])
     actuators = [points.b1, points.b2 * radial, points.b3 * radial, p - points.a3]
-    out = np.zeros((*p.shape[:-1], 6, 6))
+    out = np.zeros((*c.shape[:-1], 6, 6))
     out[..., [0, 2, 4, 5], :3] = _unit(np.stack(actuators, axis=-2))
     out[..., [1, 3], 0] = 1.0
-    b1, b2, b3 = points.b1 - p, points.b2 - p, points.b3 - p
-    arms = np.stack([b1, b2, b2, b3, b3, np.zeros_like(p)], axis=-2)
+    b1, b2, b3, b4 = points.b1 - c, points.b2 - c, points.b3 - c, p - c
+    arms = np.stack([b1, b2, b2, b3, b3, b4], axis=-2)
     # The moment arm × direction of every row; np.cross takes three times as long.
     dx, dy, dz = (out[..., i] for i in range(3))
     ax, ay, az = (arms[..., i] for i in range(3))

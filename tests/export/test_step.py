@@ -116,6 +116,22 @@ def test_step_file_reads_back_names_colours_and_volume(tmp_path: Path) -> None:
     assert reds <= written | {0, 255}
 
 
+def test_step_workspace_shifted_to_the_tool_keeps_faces_and_volume() -> None:
+    solid = exact_workspace(OPTIMAL)
+    offset = np.array([31.0, -17.5, 120.0])
+    shifted = solid.shifted(offset)
+    assert shifted.limit_of_face == solid.limit_of_face
+    assert face_kinds(shifted.shape) == face_kinds(solid.shape)
+    assert shifted.volume == pytest.approx(solid.volume, rel=1e-9)
+    assert occ("BRepCheck_Analyzer")(shifted.shape).IsValid()
+    for face, moved in zip(faces_of(solid.shape), faces_of(shifted.shape), strict=True):
+        before, after = occ("BRepAdaptor_Surface")(face), occ("BRepAdaptor_Surface")(moved)
+        u, v = before.FirstUParameter(), before.FirstVParameter()
+        assert (after.FirstUParameter(), after.FirstVParameter()) == (u, v)
+        expected = coordinates(before.Value(u, v)) + offset
+        np.testing.assert_allclose(coordinates(after.Value(u, v)), expected, atol=1e-9)
+
+
 def test_step_empty_or_oversized_workspace_is_refused() -> None:
     with pytest.raises(NoAnswerError, match=r"empty: margin δ2"):
         workspace_step(OPTIMAL, np.eye(3))

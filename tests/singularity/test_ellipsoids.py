@@ -72,6 +72,39 @@ def test_unit_force_on_an_axis_takes_the_gain_of_actuator_force(case: Case) -> N
             assert ellipsoid.force[index] == pytest.approx(1.0 / ellipsoid.gain[index])
 
 
+@given(ordinary_cases(), st.tuples(*[st.floats(-1.0, 1.0)] * 3), st.integers(0, 2**32))
+def test_ellipsoids_at_the_tool_hold_its_speeds_and_its_forces(
+    case: Case, direction: tuple[float, float, float], seed: int
+) -> None:
+    tool, inverse_rates = case.size * np.array(direction), np.linalg.inv(rates_of(case))
+    found, at_b4 = performance(case.design, case.pose, tool), performance(case.design, case.pose)
+    drive = np.random.default_rng(seed).normal(size=(100, 6))
+    drive /= np.linalg.norm(drive, axis=-1, keepdims=True)
+    twists = drive @ inverse_rates.T
+    speeds = twists[:, :3] + np.cross(twists[:, 3:], case.rotation @ tool)
+    shares = np.linalg.norm(speeds @ found.translation.axes / found.translation.velocity, axis=-1)
+    assert shares.max() <= 1.0 + 1e-6
+    for axis, gain in zip(found.translation.axes.T, found.translation.gain, strict=True):
+        # A unit force at the tool is that force at b4 and its moment.
+        wrench = np.concatenate([axis, np.cross(case.rotation @ tool, axis)])
+        assert np.linalg.norm(inverse_rates.T @ wrench) == pytest.approx(gain, rel=1e-6)
+    assert_allclose(found.rotation.gain, at_b4.rotation.gain, rtol=1e-6)
+
+
+@given(singular_cases(), st.tuples(*[st.floats(-1.0, 1.0)] * 3))
+def test_singular_poses_stay_singular_at_every_tool(
+    case: Case, direction: tuple[float, float, float]
+) -> None:
+    scale = np.array([1.0] * 3 + [case.size] * 3)
+    rates = jacobian(case.design, case.position, case.rotation, case.size * np.array(direction))
+    values = np.linalg.svd(rates / scale, compute_uv=False)
+    at_b4 = jacobian(case.design, case.position, case.rotation)
+    here = np.linalg.svd(at_b4 / scale, compute_uv=False)
+    # A change of the point multiplies the values by 3 at the most.
+    assert values[-1] <= 3.0 * here[-1] + 1e-13 * values[0]
+    assert here[-1] <= 3.0 * values[-1] + 1e-13 * here[0]
+
+
 @given(singular_cases())
 def test_ellipsoids_of_singular_poses_have_finite_axes(case: Case) -> None:
     found = performance(case.design, case.pose)

@@ -8,9 +8,10 @@ import msgspec
 import numpy as np
 import pytest
 from differences import assert_is_jacobian
-from hypothesis import assume, given
+from hypothesis import assume, given, strategies as st
 from incidence import distance_of_lines, distance_to_plane, tetrahedron_volume
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy.spatial.transform import Rotation
 from strategies import (
     EPSILON,
     WAYS,
@@ -27,6 +28,7 @@ from strategies import (
 from explorer import (
     PRESETS,
     Design,
+    InputError,
     attachment_points,
     evaluate,
     inverse,
@@ -76,6 +78,41 @@ def test_jacobian_is_the_derivative_of_inverse(case: Case) -> None:
     assert_is_jacobian(
         lambda p, r: inverse(case.design, p, r), jacobian_of(case), p, r, case.size, tolerance=1e-6
     )
+
+
+@given(ordinary_cases(), st.tuples(*[st.floats(-1.0, 1.0)] * 3))
+def test_jacobian_at_the_tool_is_the_derivative_of_inverse_by_its_twists(
+    case: Case, direction: tuple[float, float, float]
+) -> None:
+    assume(shortest_length(case) > 0.05 * case.size)
+    p, r = case.position, case.rotation
+    tool = case.size * np.array(direction)
+
+    def joints_of(point: FloatArray, rotation: FloatArray) -> FloatArray:
+        return inverse(case.design, point - rotation @ tool, rotation)
+
+    matrix = jacobian(case.design, p, r, tool)
+    assert_is_jacobian(joints_of, matrix, p + r @ tool, r, case.size, tolerance=2e-6)
+    at_b4 = jacobian_of(case)
+    # The rows are forces at b4 and their moments about the tool; the moments alone differ.
+    assert_array_equal(matrix[:, :3], at_b4[:, :3])
+    values = np.linalg.slogdet(at_b4), np.linalg.slogdet(matrix)
+    assume(condition_of(case) > 1e-6)
+    assert values[1][0] == values[0][0]
+    assert values[1][1] == pytest.approx(values[0][1], abs=1e-6)
+
+
+def test_jacobian_at_tools_of_a_batch_is_that_of_each() -> None:
+    rng = np.random.default_rng(1)
+    design, tools = PRESETS["paper-optimal"], rng.normal(size=(5, 3))
+    r = Rotation.random(4, random_state=rng).as_matrix()[:, None]
+    p = rng.uniform(1.0, 9.0, (4, 1, 3))
+    matrices = jacobian(design, p, r, tools)
+    assert matrices.shape == (4, 5, 6, 6)
+    assert_allclose(matrices[2, 3], jacobian(design, p[2, 0], r[2, 0], tools[3]), atol=1e-13)
+    assert_array_equal(jacobian(design, p, r, np.zeros(3)), jacobian(design, p, r))
+    with pytest.raises(InputError, match="tool must be finite"):
+        jacobian(design, p, r, (0.0, np.nan, 0.0))
 
 
 @given(ordinary_cases())

@@ -10,10 +10,12 @@ import pytest
 from limited_designs import ordinary_case
 from meshes import assert_lies_on_its_limits, corners_of, euler_characteristic
 
-from explorer import PRESETS, ExplorerError
+from explorer import PRESETS, ExplorerError, InputError, poses_are_valid
 from explorer.mechanism.pose import rotation_from_yaw_pitch_roll
-from explorer.numerics.arrays import FloatArray
-from explorer.workspace.limits.constraints import HalfSpace, constraints
+from explorer.mechanism.tool_point import tool_offset
+from explorer.numerics.arrays import BoolArray, FloatArray
+from explorer.workspace.limits.constraints import HalfSpace, constraints, constraints_over
+from explorer.workspace.orientations.sets import cone_of_directions
 from explorer.workspace.slices.volume import home_rotation
 from explorer.workspace.solids.solids import (
     HULL,
@@ -106,6 +108,81 @@ def test_reachable_and_dexterous_solids_are_union_and_intersection() -> None:
     assert dexterous.volume < min(volumes)
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_shifted_workspace_holds_the_positions_of_the_tool(seed: int) -> None:
+    design, rotation = ordinary_case(seed)
+    solid = workspace_solid(design, rotation)
+    tool = np.random.default_rng(seed).uniform(-0.5, 0.5, 3) * design.reach
+    shifted = solid.shifted(tool_offset(rotation, tool))
+    np.testing.assert_array_equal(shifted.vertices, solid.vertices + rotation @ tool)
+    assert shifted.volume == pytest.approx(solid.volume, rel=1e-12)
+    assert shifted.is_watertight
+    assert (shifted.limits, shifted.tolerance) == (solid.limits, solid.tolerance)
+    hull = convex_hull(shifted)
+    assert hull.volume == pytest.approx(convex_hull(solid).volume, rel=1e-9)
+    exact = constraints_over(design, rotation[None], tool)[0]
+    for index, name in enumerate(shifted.limits):
+        corners = shifted.vertices[shifted.faces[shifted.limit_of_face == index]]
+        if len(corners):
+            off = [x.distance(corners).max(axis=1) for x in exact if x.name == name]
+            assert np.min(off, axis=0).max() <= shifted.tolerance * (1.0 + 1e-6)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_shifted_limits_have_the_slacks_and_rates_of_their_positions(seed: int) -> None:
+    design, rotation = ordinary_case(seed)
+    rng = np.random.default_rng(seed)
+    points, offset = design.reach * rng.normal(size=(20, 3)), design.reach * rng.normal(size=3)
+    for limit in constraints(design, rotation):
+        moved = limit.shifted(offset)
+        np.testing.assert_allclose(
+            moved.slack(points + offset), limit.slack(points), atol=1e-12 * design.reach
+        )
+        if isinstance(limit, HalfSpace) and isinstance(moved, HalfSpace):
+            for name, rate in limit.rates.items():
+                before = rate[3] - points @ rate[:3]
+                after = moved.rates[name][3] - (points + offset) @ moved.rates[name][:3]
+                np.testing.assert_allclose(after, before, atol=1e-10 * design.reach)
+
+
+@pytest.mark.parametrize("tool", [(0.0, 0.0, 6.0), (3.0, -2.0, -5.0)])
+def test_reachable_and_dexterous_solids_of_the_tool_hold_its_positions(
+    tool: tuple[float, float, float],
+) -> None:
+    tolerance = 0.1
+    rotations = cone_of_directions(home_rotation(OPTIMAL), 12.0, 7)
+    reachable = reachable_solid(OPTIMAL, rotations, tolerance, tool)
+    dexterous = dexterous_solid(OPTIMAL, rotations, tolerance, tool)
+    low, high = reachable.vertices.min(axis=0) - 1.0, reachable.vertices.max(axis=0) + 1.0
+    points = np.random.default_rng(0).uniform(low, high, (1500, 3))
+    offsets = rotations @ np.array(tool)
+    # Membership from the poses themselves: those of b4 that put the tool at a point.
+    poses = points[:, None] - offsets
+
+    def allowed(moves: FloatArray) -> BoolArray:
+        return poses_are_valid(OPTIMAL, poses + moves, rotations)
+
+    within = allowed(np.zeros(3))
+    steps = 2.0 * tolerance * np.vstack([np.eye(3), -np.eye(3)])
+    clear: BoolArray = np.ones(len(points), dtype=np.bool_)
+    for step in steps:
+        clear &= (allowed(step) == within).all(axis=1)
+    any_of, all_of = (np.asarray(reduce(within, axis=1)) for reduce in (np.any, np.all))
+    for solid, expected in ((reachable, any_of), (dexterous, all_of)):
+        assert solid.is_watertight
+        assert 20 < expected[clear].sum() < clear.sum() - 20
+        windings = np.array([solid.winding(point) for point in points[clear]])
+        np.testing.assert_allclose(windings, expected[clear], atol=1e-6)
+    at_b4 = reachable_solid(OPTIMAL, rotations, tolerance)
+    assert abs(reachable.volume - at_b4.volume) > 0.01 * at_b4.volume
+
+
+def test_reachable_and_dexterous_solids_of_a_tool_at_b4_are_those_of_b4() -> None:
+    for make in (reachable_solid, dexterous_solid):
+        ours, b4 = make(OPTIMAL, YAWS, 0.2, (0.0, 0.0, 0.0)), make(OPTIMAL, YAWS, 0.2)
+        np.testing.assert_array_equal(ours.vertices, b4.vertices)
+
+
 def test_reachable_and_dexterous_solids_of_one_orientation_are_its_workspace() -> None:
     one = workspace_solid(OPTIMAL)
     same = np.array([home_rotation(OPTIMAL)] * 3)
@@ -146,6 +223,9 @@ def test_reachable_and_dexterous_solids_empty_name_limits() -> None:
 
 
 def test_solids_over_invalid_rotations_are_refused() -> None:
+    for make in (reachable_solid, dexterous_solid):
+        with pytest.raises(InputError, match="tool must be finite"):
+            make(OPTIMAL, YAWS, None, (0.0, 0.0, np.inf))
     for rotations in (np.eye(3), np.zeros((0, 3, 3)), 2.0 * np.eye(3)[None], "x"):
         for make in (reachable_solid, dexterous_solid):
             with pytest.raises(ExplorerError):

@@ -10,16 +10,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from explorer.errors import InputError
 from explorer.mechanism.design import TOLERANCE, Design
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.margins import margins, mode_of, signs_of
 from explorer.mechanism.pose import checked_rotation
+from explorer.mechanism.tool_point import tool_offset
 from explorer.numerics.arrays import BoolArray, FloatArray, finite_array
 from explorer.workspace.limits.joint_cones import angle_between, joint_cones
 
@@ -68,6 +70,10 @@ class BallOrCylinder:
         """Return the distances of positions (..., 3) from the surface."""
         return np.abs(self.slack(p))
 
+    def shifted(self, offset: FloatArray) -> BallOrCylinder:
+        """Return the limit of positions that are moved by a constant vector, shape (3,)."""
+        return replace(self, centre=self.centre + offset)
+
 
 @dataclass(frozen=True)
 class HalfSpace:
@@ -92,6 +98,14 @@ class HalfSpace:
     def distance(self, p: FloatArray) -> FloatArray:
         """Return the distances of positions (..., 3) from the surface."""
         return np.abs(self.slack(p)) / float(np.linalg.norm(self.normal))
+
+    def shifted(self, offset: FloatArray) -> HalfSpace:
+        """Return the limit of positions that are moved by a constant vector, shape (3,)."""
+        rates = {
+            name: np.array([*rate[:3], rate[3] + rate[:3] @ offset])
+            for name, rate in self.rates.items()
+        }
+        return replace(self, offset=self.offset + float(self.normal @ offset), rates=rates)
 
 
 @dataclass(frozen=True)
@@ -120,6 +134,10 @@ class Cone:
         """Return the distances of positions (..., 3) from the nearby surface, to first order."""
         return np.abs(self.slack(p)) * np.linalg.norm(self._leg(p), axis=-1)
 
+    def shifted(self, offset: FloatArray) -> Cone:
+        """Return the limit of positions that are moved by a constant vector, shape (3,)."""
+        return replace(self, apex=self.apex + offset)
+
     def _leg(self, p: FloatArray) -> FloatArray:
         return (p - self.apex) * (np.array([0.0, 1.0, 1.0]) if self.flat else 1.0)
 
@@ -137,6 +155,10 @@ class Never:
     def distance(self, p: FloatArray) -> FloatArray:
         """Return infinity for positions (..., 3), since the limit has no surface."""
         return np.full(p.shape[:-1], math.inf)
+
+    def shifted(self, _: FloatArray) -> Never:
+        """Return the limit itself."""
+        return self
 
 
 Constraint: TypeAlias = BallOrCylinder | HalfSpace | Cone | Never
@@ -160,6 +182,32 @@ def constraints(design: Design, rotation: ArrayLike) -> tuple[Constraint, ...]:
         *_margins(design, r),
         *_swings(design, r),
     )
+
+
+def constraints_over(
+    design: Design, rotations: ArrayLike, tool: ArrayLike | None = None
+) -> list[tuple[Constraint, ...]]:
+    """Return the limits of a design at each of n orientations as solids of positions of a point.
+
+    Args:
+        design: The manipulator.
+        rotations: Platform to base, shape (n, 3, 3).
+        tool: The point in the platform frame, shape (3,), in design units; None for b4.
+
+    Raises:
+        InputError: not rotations, or not a point.
+    """
+    matrices = checked_rotation(rotations)
+    if matrices.ndim != 3 or not len(matrices):
+        raise InputError(f"rotations must have the shape (n, 3, 3); got {matrices.shape}")
+    families = [constraints(design, r) for r in matrices]
+    if tool is None:
+        return families
+    offsets = tool_offset(matrices, tool)
+    return [
+        tuple(limit.shifted(offset) for limit in family)
+        for family, offset in zip(families, offsets, strict=True)
+    ]
 
 
 def slacks(limits: tuple[Constraint, ...], position: ArrayLike) -> FloatArray:

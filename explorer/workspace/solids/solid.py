@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -36,6 +36,14 @@ class Solid:
     tolerance: float
     empty_because: tuple[str, ...] = ()
     agrees: bool | None = None
+
+    def shifted(self, offset: FloatArray) -> Solid:
+        """Return the solid moved by a vector in design units, shape (3,).
+
+        A constant-orientation workspace moved by `explorer.mechanism.tool_point.offset_of` is that
+        of the tool point.
+        """
+        return replace(self, vertices=self.vertices + offset)
 
     @property
     def is_empty(self) -> bool:

@@ -18,7 +18,12 @@ from explorer.mechanism.design import Design
 from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.numerics.isosurface import surface_below_zero
-from explorer.workspace.limits.constraints import Constraint, HalfSpace, constraints
+from explorer.workspace.limits.constraints import (
+    Constraint,
+    HalfSpace,
+    constraints,
+    constraints_over,
+)
 from explorer.workspace.slices.volume import Volume, find_emptying_limits, home_rotation
 from explorer.workspace.solids.agreement import ExactVolume, exact_volume, exact_volume_within
 from explorer.workspace.solids.booleans import manifold_of, mesh_of, union
@@ -163,16 +168,26 @@ def _below_zero(surface: Surface, frame: Frame, face_id: int) -> Manifold:
     return manifold_of((frame.to_frame(points), faces), (face_id,), (len(faces),))
 
 
-def reachable_solid(design: Design, rotations: ArrayLike, tolerance: float | None = None) -> Solid:
-    """Return the reachable workspace of n orientations (n, 3, 3), their union, as a mesh.
+def reachable_solid(
+    design: Design,
+    rotations: ArrayLike,
+    tolerance: float | None = None,
+    tool: ArrayLike | None = None,
+) -> Solid:
+    """Return the reachable workspace of n orientations, the union over them, as a mesh.
 
-    For the tolerance see `workspace_solid`.
+    Args:
+        design: The manipulator.
+        rotations: Platform to base, shape (n, 3, 3).
+        tolerance: As in `workspace_solid`.
+        tool: Point of the platform whose positions count, shape (3,), in design units; None for
+            b4. The workspace of each orientation is moved by its own vector.
 
     Raises:
-        InputError: not rotations, or a tolerance that is not positive or too small.
+        InputError: not rotations, not a point, or no usable tolerance.
         ExplorerError: a boolean fails.
     """
-    families = _families(design, rotations)
+    families = constraints_over(design, rotations, tool)
     frame = frame_of(families, design.reach, tolerance)
     names = _names(families)
     bodies, _ = _make_bodies(families, frame, names)
@@ -188,16 +203,17 @@ def reachable_solid(design: Design, rotations: ArrayLike, tolerance: float | Non
     return replace(solid, empty_because=tuple(because))
 
 
-def dexterous_solid(design: Design, rotations: ArrayLike, tolerance: float | None = None) -> Solid:
-    """Return the dexterous workspace of n orientations (n, 3, 3), their intersection, as a mesh.
+def dexterous_solid(
+    design: Design,
+    rotations: ArrayLike,
+    tolerance: float | None = None,
+    tool: ArrayLike | None = None,
+) -> Solid:
+    """Return the dexterous workspace of n orientations, the intersection over them, as a mesh.
 
-    For the tolerance see `workspace_solid`.
-
-    Raises:
-        InputError: not rotations, or a tolerance that is not positive or too small.
-        ExplorerError: a boolean fails.
+    Arguments and errors are those of `reachable_solid`.
     """
-    limits = [limit for family in _families(design, rotations) for limit in family]
+    limits = [limit for family in constraints_over(design, rotations, tool) for limit in family]
 
     def make_without(name: str) -> Solid:
         others = [limit for limit in limits if limit.name != name]
@@ -263,13 +279,6 @@ def _body_of(solid: Solid) -> tuple[Manifold, Frame, dict[int, int]]:
     ids = tuple(range(first, first + len(used)))
     body = manifold_of(shape, ids, tuple(counts.tolist()))
     return body, frame, dict(zip(ids, used.tolist(), strict=True))
-
-
-def _families(design: Design, rotations: ArrayLike) -> list[tuple[Constraint, ...]]:
-    matrices = checked_rotation(rotations)
-    if matrices.ndim != 3 or not len(matrices):
-        raise InputError(f"rotations must have the shape (n, 3, 3); got {matrices.shape}")
-    return [constraints(design, r) for r in matrices]
 
 
 def _names(families: Sequence[Sequence[Constraint]]) -> tuple[str, ...]:
