@@ -3,7 +3,8 @@
 A step is one gesture with one control, from press to release, so that a drag of many events is
 one step; without a press, as with keys, a pause ends it. A change that happens by itself, such as
 a path that plays on, belongs to the step before it, and so does what is shown and how: undo leaves
-it as it is. Steps hold whole states, which share all that did not change.
+it as it is, but for the point whose position is shown and set. Steps hold whole states, which share
+all that did not change.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from dataclasses import dataclass, replace
 from explorer.app.session.gestures import UserAction
 from explorer.app.state.presses import Press
 from explorer.app.state.state import State
+from explorer.app.state.view import View
 from explorer.errors import InputError
 
 # Number of steps beyond which the oldest are dropped.
@@ -68,7 +70,8 @@ class History:
         if state.optimisation.is_on or settled == present.state:
             return self
         earlier = self.steps[: self.at]
-        if event.action.continues or replace(settled, view=present.state.view) == present.state:
+        shown = replace(settled, view=_with_point_of(present.state.view, settled.view))
+        if event.action.continues or shown == present.state:
             return self.with_state(settled)
         if self.is_open and event.continues(present.source, present.last, present.press):
             if earlier and earlier[-1].state == settled:
@@ -132,7 +135,7 @@ def settle(state: State) -> State:
 def restore(history: History, present: State) -> tuple[State, History]:
     """Return the state of the step of a history, and the history with this state in its step.
 
-    The view and the counts of requests are those of the present state.
+    The view, but for its point, and the counts of requests are those of the present state.
 
     Raises:
         InputError: a design is being optimised.
@@ -141,7 +144,8 @@ def restore(history: History, present: State) -> tuple[State, History]:
         raise InputError(
             "the design is being optimised: cancel that first, then undo what led to it"
         )
-    state = replace(history.step.state, view=present.view)
+    step = history.step.state
+    state = replace(step, view=_with_point_of(present.view, step.view))
     # No number of a request is used twice.
     request = max(state.paths.request, present.paths.request)
     count = max(state.optimisation.count, present.optimisation.count)
@@ -151,3 +155,8 @@ def restore(history: History, present: State) -> tuple[State, History]:
         optimisation=replace(state.optimisation, count=count),
     )
     return restored, history.with_state(restored)
+
+
+def _with_point_of(view: View, other: View) -> View:
+    """Return a view with the point whose position is shown and set in another one."""
+    return view if view.at == other.at else replace(view, at=other.at)

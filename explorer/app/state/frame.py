@@ -10,6 +10,7 @@ from explorer.errors import InputError
 from explorer.legs.moves import MoveClearance, move_clearance
 from explorer.measures.snapshot import Snapshot, evaluate
 from explorer.measures.verdict import Verdict, verdict
+from explorer.mechanism.tool_point import point_of
 from explorer.singularity.ellipsoids import (
     Performance,
     SingularityFreeBall,
@@ -37,8 +38,9 @@ class Frame:
 
     @cached_property
     def performance(self) -> Performance:
-        """How fast and how strong the platform is in its pose."""
-        return performance(self.state.design, self.state.pose)
+        """How fast and how strong the platform is in its pose, at the point that is shown."""
+        design = self.state.design
+        return performance(design, self.state.pose, point_of(design, self.state.view.at))
 
     @cached_property
     def travels(self) -> tuple[Travel, ...]:

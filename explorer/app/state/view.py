@@ -150,7 +150,7 @@ class SingularView:
         ghost: Which of the nearest singular poses is drawn.
         strata: Whether the diagram of the strata is drawn.
         arrows: Which of the six uncoupled motions are drawn.
-        ellipsoid: Which ellipsoid is drawn at b4, that of speeds or that of forces.
+        ellipsoid: Which ellipsoid is drawn at the point, that of speeds or that of forces.
         ball: Whether the largest ball without singular positions is drawn.
     """
 

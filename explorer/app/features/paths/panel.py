@@ -37,7 +37,8 @@ from explorer.errors import InputError
 from explorer.export.trajectory import trajectory_csv
 from explorer.mechanism.margins import margins, mode_name, mode_of
 from explorer.mechanism.pose import Pose, Triple
-from explorer.numerics.number_text import format_number
+from explorer.mechanism.tool_point import position_of
+from explorer.numerics.number_text import drop_rounding, format_number
 
 EndName = Literal["start", "goal"]
 ENDS: tuple[EndName, ...] = ("start", "goal")
@@ -67,8 +68,8 @@ KINDS: dict[PathKind, tuple[str, str]] = {
         "Search for a path that keeps all limits, margins and clearances.",
     ),
 }
-# Decimals at which typed angles stop: beyond them is rounding.
-ANGLE_DECIMALS = 9
+# Decimals at which typed angles and coordinates stop: beyond them is rounding.
+DECIMALS = 9
 
 
 class PathsPanel:
@@ -149,7 +150,7 @@ class PathsPanel:
         numbers = gui.add_html("")
         self._controls.triple(
             f"{title} x, y, z",
-            "Coordinates of b4 in the base frame, in design units.",
+            "Coordinates of b4 or of the tool point in the base frame, in design units.",
             Bound(
                 lambda frame: typed_numbers(frame.state, end)[0],
                 lambda state, position: _set_typed(state, end, position, None),
@@ -205,9 +206,10 @@ def end_numbers(state: State, end: EndName) -> str:
         pose = state.pose if chosen is None else pose_of_end(state, chosen)
     except InputError as error:
         return f'<div class="ex-note ex-close">{escape(sentence(str(error)))}</div>'
-    position = ", ".join(signed(coordinate, 2) for coordinate in pose.position)
+    there = position_of(state.design, pose, state.view.at)
+    position = ", ".join(signed(coordinate, 2) for coordinate in there)
     angles = ", ".join(f"{signed(angle, 1)}°" for angle in angles_of(pose))
-    hint = "x, y, z of b4 in design units; yaw, pitch, roll"
+    hint = f"x, y, z of {state.point} in design units; yaw, pitch, roll"
     return note(f'<span title="{hint}">{position} · {angles}</span>')
 
 
@@ -295,12 +297,24 @@ def _is_typed(state: State, end: EndName) -> bool:
 
 
 def typed_numbers(state: State, end: EndName) -> tuple[Triple, Triple]:
-    """Return position and angles in degrees of an end that is typed; zeros for another."""
+    """Return position and angles in degrees of an end that is typed; zeros for another.
+
+    The position is that of b4 or of the tool point.
+    """
     chosen = _end(state, end)
     if not isinstance(chosen, Pose):
         return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    yaw, pitch, roll = (round(angle, ANGLE_DECIMALS) for angle in angles_of(chosen))
-    return chosen.position, (yaw, pitch, roll)
+    yaw, pitch, roll = (round(angle, DECIMALS) for angle in angles_of(chosen))
+    x, y, z = position_of(state.design, chosen, state.view.at)
+    if state.view.at == "tool":
+        x, y, z = (_as_typed(value, state.design.reach) for value in (x, y, z))
+    return (x, y, z), (yaw, pitch, roll)
+
+
+def _as_typed(value: float, size: float) -> float:
+    """Return the round number that a coordinate was typed as, if it differs by rounding."""
+    typed = round(value, DECIMALS)
+    return typed + drop_rounding(value - typed, size)
 
 
 def _set_typed(
@@ -308,10 +322,10 @@ def _set_typed(
 ) -> Action:
     before = _end(state, end)
     pose = before if isinstance(before, Pose) else state.pose
+    there = position_of(state.design, pose, state.view.at) if position is None else position
     if angles is not None:
         pose = Pose.of_yaw_pitch_roll(pose.position, angles)
-    elif position is not None:
-        pose = Pose(position, pose.quaternion)
+    pose = state.pose_at(there, pose)
     return Set(f"paths.{end}", pose, end.capitalize(), "typed numbers")
 
 

@@ -123,14 +123,14 @@ def shown(messages: Iterable[SceneMessage]) -> list[SceneMessage]:
 
 def caption_of(state: State, date: dt.date) -> str:
     """Return design, unit, pose and date of a scene as HTML."""
-    x, y, z = (signed(value) for value in state.pose.position)
+    x, y, z = (signed(value) for value in state.position)
     angles = " · ".join(
         f"{name} {signed(value, 2)}°"
         for name, value in zip(("yaw", "pitch", "roll"), state.yaw_pitch_roll, strict=True)
     )
     return (
         f'<b style="font-size:14px">{escape(state.design.name)}</b><br>'
-        f"b4 at ({x}, {y}, {z}) · {angles} · mode {Frame(state).snapshot.sign_words}<br>"
+        f"{state.point} at ({x}, {y}, {z}) · {angles} · mode {Frame(state).snapshot.sign_words}<br>"
         f"1 unit = {format_number(state.design.unit_mm, 6)} mm · {date.isoformat()}"
     )
 

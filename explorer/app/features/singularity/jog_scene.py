@@ -1,8 +1,9 @@
 """The uncoupled motions as arrows and arcs between their singular poses.
 
-A motion has the colour of the margin that it changes. It is drawn as the path of b4; a rotation
-about a platform axis, which leaves b4 in place, as an arc about b4. An end has a disc if the margin
-is zero there, an arrowhead if the motion goes on.
+A motion has the colour of the margin that it changes. It is drawn as the path of the point whose
+position is shown, b4 or the tool point; a rotation about an axis through it, which leaves it in
+place, as an arc about it. An end has a disc if the margin is zero there, an arrowhead if the motion
+goes on.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ from explorer.singularity.uncoupled import UNCOUPLED, Travel, UncoupledMotion
 # Number of points along a motion, and thickness of its line in pixels.
 POINTS = 49
 THICKNESS = 3.0
-# Radius of an arc about an axis through b4, as a share of the reach.
+# Radius of an arc about an axis through the point, as a share of the reach.
 ARC = 0.32
 # Longest part of a translation that is drawn either way, as a share of the reach.
 FARTHEST = 0.75
@@ -125,14 +126,14 @@ def shown_motions(placed: Placed) -> tuple[int, ...]:
 def motion_line(placed: Placed, motion: UncoupledMotion, travel: Travel) -> MotionLine:
     """Return the line of a motion, from the backward end of its travel to the forward end."""
     point, along = motion.line(placed.frame.state.pose)
-    centre, here = placed.scale * point, placed.points["b4"]
+    centre, here = placed.scale * point, placed.point
     if motion.kind == "translation":
         far = FARTHEST * placed.reach
         low, high = placed.scale * travel.low, placed.scale * travel.high
         ends = max(low, -far), min(high, far)
         points = here + np.linspace(*ends, POINTS)[:, None] * along
         return MotionLine(points, (low >= -far, high <= far), np.stack([here, here]))
-    # Foot of the perpendicular from b4 to the axis.
+    # Foot of the perpendicular from the point that moves to the axis.
     foot = centre + float((here - centre) @ along) * along
     spoke = here - foot
     if float(np.linalg.norm(spoke)) < 1e-6 * placed.reach:

@@ -28,15 +28,15 @@ class PerformancePanel:
         self._controls = Controls(gui, services.session)
         self._controls.dropdown(
             "Ellipsoid",
-            "Draw at b4 all velocities that unit actuator speeds reach, or all forces that unit "
-            "actuator forces hold.",
+            "Draw at b4 or at the tool point all velocities that unit actuator speeds reach, or "
+            "all forces that unit actuator forces hold.",
             GAINS,
             "view.singular.ellipsoid",
         )
         self._controls.checkbox(
             "Singularity-free ball",
-            "Draw the largest ball of positions of b4 without a singular one at this orientation, "
-            "and the point where it touches the singular plane.",
+            "Draw the largest ball of positions without a singular one at this orientation, and "
+            "the point where it touches the singular plane.",
             "view.singular.ball",
         )
 
@@ -49,11 +49,11 @@ class PerformancePanel:
 def performance_table(frame: Frame) -> str:
     """Return the gains and the radius of the ball in this pose as HTML."""
     gains, ball = frame.performance, frame.free_ball
-    unit = frame.state.design.unit_mm
+    unit, point = frame.state.design.unit_mm, frame.state.point
     moves, turns = gains.translation, gains.rotation
     rows = (
-        ("speed of b4", _range(moves.velocity), "Speed of b4 per unit of actuator speed"),
-        ("force at b4", _range(moves.force), "Force at b4 per unit of actuator force"),
+        (f"speed of {point}", _range(moves.velocity), "Its speed per unit of actuator speed"),
+        (f"force at {point}", _range(moves.force), "Force there per unit of actuator force"),
         (
             "angular velocity",
             _range(turns.velocity),
@@ -72,8 +72,8 @@ def performance_table(frame: Frame) -> str:
             (row(dim(name), low, high, hint=hint) for name, (low, high), hint in rows),
             ("per unit of the actuators", "min", "max"),
         ),
-        '<div class="ex-after" title="No position of b4 within this radius is singular at this '
-        f'orientation">{dim("singularity-free radius")} {radius}</div>',
+        f'<div class="ex-after" title="No position of {point} within this radius is singular at '
+        f'this orientation">{dim("singularity-free radius")} {radius}</div>',
     )
 
 

@@ -83,7 +83,7 @@ def chosen_ghost(placed: Placed) -> NearestSingularity | None:
 
 
 class EllipsoidScene(ScenePart):
-    """The ellipsoid of velocities, or of forces, of unit actuators at b4."""
+    """The ellipsoid of velocities, or of forces, of unit actuators at b4 or at the tool point."""
 
     def __init__(self, services: Services) -> None:
         scene = services.scene
@@ -113,7 +113,7 @@ class EllipsoidScene(ScenePart):
         gains = placed.frame.performance.translation
         gain = gains.velocity if kind == "speed" else gains.force
         lengths = drawn_axes(gain, SPEED_UNIT if kind == "speed" else FORCE_UNIT)
-        centre = placed.points["b4"]
+        centre = placed.point
         body = self._bodies[kind]
         yield body, "position", tuple(centre.tolist())
         yield body, "wxyz", tuple(quaternion_from_rotation(gains.axes).tolist())
@@ -137,7 +137,10 @@ def drawn_axes(gain: FloatArray, unit: float) -> FloatArray:
 
 
 class BallScene(ScenePart):
-    """The largest singularity-free ball of positions, and where it touches the singular plane."""
+    """The largest singularity-free ball of positions, and where it touches the singular plane.
+
+    The positions are those of b4, or of the tool point, whose planes are as far away.
+    """
 
     def __init__(self, services: Services) -> None:
         scene = services.scene
@@ -159,7 +162,7 @@ class BallScene(ScenePart):
         if not shown:
             return
         ball = frame.free_ball
-        centre, touch = placed.points["b4"], placed.scale * ball.touches
+        centre, touch = placed.point, placed.scale * ball.touches + placed.offset
         colour = proximity_colour(frame.verdict.levels[ball.incidence - 1])
         yield self._ball, "position", tuple(centre.tolist())
         yield self._ball, "scale", placed.scale * ball.radius
