@@ -264,6 +264,7 @@ def rich_state() -> State:
         Change("compared", {"look": varied(Look())}),
         Change("", {"studies": varied(Studies())}),
         Change("", {"set_tilt_torsion": TiltTorsion(1 / 3, 20.0, -50.0)}),
+        Change("", {"set_tool_angles": (1 / 3, 90.0, -50.0)}),
         BrushAxis("volume", ((1 / 3, 10.0),)),
         Change("optimisation.request", {"held": True, "error": 1 / 3, "tilt": 10 / 3}),
         SetJoint(0, 99.1),

@@ -23,6 +23,7 @@ import explorer.app
 from explorer.app.browser.viser_server import start_viser, stop_viser
 from explorer.app.features.designs.saved_designs import SavedDesigns
 from explorer.app.features.listed import FEATURES
+from explorer.app.features.machine.actions import SetToolAngle
 from explorer.app.features.optimise.actions import (
     Advance as ShowIterates,
     Compare,
@@ -73,6 +74,7 @@ OF_VALUES = {
     SetPose: "the handle at b4",
     Jog: "sliders of one margin",
     SetTiltTorsion: "sliders of tilt and torsion",
+    SetToolAngle: "sliders of the tool",
     GoToTilt: "the map of tilts",
     SetVariable: "sliders of the design",
     SetName: "the name of a design",

@@ -11,6 +11,7 @@ import viser
 from desk import Desk
 
 from explorer.app.features.feature import Services
+from explorer.app.features.machine.panel import MachinePanel
 from explorer.app.features.mechanism.design_panel import DesignPanel
 from explorer.app.features.mechanism.pose_panel import MovePanel
 from explorer.app.session.field_words import FIELD_WORDS, message_of
@@ -42,6 +43,7 @@ def test_refusals_of_the_page_hold_no_names_of_the_code(
     before = set(gui._gui_input_handle_from_uuid)
     DesignPanel(services)
     MovePanel(services)
+    MachinePanel(services)
     handles = [h for u, h in gui._gui_input_handle_from_uuid.items() if u not in before]
     start, said = desk.state, list[str]()
     for handle in handles:

@@ -20,7 +20,7 @@ DARK = {"panel": "#242424", "scene": "#141414", "field": "#2e2e2e"}
 
 UNITS = re.compile(
     r"design units|units³|\bunits\b|\bmm\b|millimetres|pixels|\(px\)|°|degrees|\(s\)|seconds"
-    r"|kg/m³|\bstep\b"
+    r"|kg/m³|\bstep\b|\bkg\b|\bN( m)?\b|\bGPa\b|\bMPa\b"
 )
 
 WITHOUT_UNIT = {
@@ -29,6 +29,7 @@ WITHOUT_UNIT = {
     "Go to step": "the number of a step",
     "Number of designs": "a count of designs",
     "Name": "a name",
+    "Direction x y z": "a direction, of length 1",
 }
 """Controls of values that have no unit, and what they are."""
 

@@ -285,12 +285,14 @@ def test_file_of_an_earlier_schema_opens_to_the_state_it_was_written_from(schema
     first, state = (step.state for step in read.steps)
     if schema == 2:
         expected = with_value(saved(RICH), "set_tilt_torsion", None)
+        expected = with_value(expected, "set_tool_angles", None)
         for view in ("view", "optimisation.run.own.view"):
             # Fields that came later are as in a new state.
             expected = with_value(expected, f"{view}.workspace.flipped", False)
             expected = with_value(expected, f"{view}.orientation", OrientationView())
             expected = with_value(expected, f"{view}.forces", ForcesView())
             expected = with_value(expected, f"{view}.at", "b4")
+            expected = with_value(expected, f"{view}.machine", True)
             # Twin and prototype were both switched on.
             expected = with_value(expected, f"{view}.drawn_as", "6-4 twin")
         for request in ("optimisation.request", "optimisation.run.own.optimisation.request"):

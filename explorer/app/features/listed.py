@@ -10,6 +10,7 @@ from explorer.app.features.ground.feature import GROUND
 from explorer.app.features.help.feature import HELP
 from explorer.app.features.history.feature import HISTORY
 from explorer.app.features.legs.feature import LEGS
+from explorer.app.features.machine.feature import MACHINE
 from explorer.app.features.mechanism.feature import MECHANISM
 from explorer.app.features.optimise.feature import OPTIMISE
 from explorer.app.features.orientation.feature import ORIENTATION
@@ -24,6 +25,7 @@ from explorer.app.features.workspace.feature import WORKSPACE
 FEATURES: tuple[Feature, ...] = (
     DESIGNS,
     MECHANISM,
+    MACHINE,
     GROUND,
     HISTORY,
     VIEW,

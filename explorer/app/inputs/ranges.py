@@ -114,6 +114,13 @@ def coordinate_span(state: State) -> Span:
     return _coordinate_span(state.base.reach)
 
 
+def platform_span(state: State) -> Span:
+    """Return the range of a coordinate of a point of the platform, such as that of the tool."""
+    reach = state.base.reach
+    edge = round_up(0.5 * reach)
+    return Span(-edge, edge, fine_step(reach, 2e3))
+
+
 @functools.lru_cache(64)
 def _coordinate_span(reach: float) -> Span:
     edge = round_up(BEYOND * reach)

@@ -26,7 +26,12 @@ from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.kinematics import inverse
 from explorer.mechanism.margins import TETRAHEDRA, margins, mode_of
-from explorer.mechanism.pose import Pose, Triple, yaw_pitch_roll_from_rotation
+from explorer.mechanism.pose import (
+    Pose,
+    Triple,
+    rotation_from_yaw_pitch_roll,
+    yaw_pitch_roll_from_rotation,
+)
 from explorer.mechanism.tilt_torsion import (
     TiltTorsion,
     rotation_from_tilt_torsion,
@@ -220,6 +225,8 @@ class State:
         studies: The open study of designs, and how it is shown.
         set_tilt_torsion: Azimuth, tilt and torsion in degrees as the user last set them, which
             count while they give the rotation of the pose; None if none were set.
+        set_tool_angles: Yaw, pitch and roll of the tool in degrees as the user last set them, which
+            count while they give the tool's orientation; None if none were set.
     """
 
     design: Design
@@ -241,6 +248,7 @@ class State:
     compared: Compared = field(default_factory=Compared, metadata=STAYS)
     studies: Studies = field(default_factory=Studies, metadata=STAYS)
     set_tilt_torsion: TiltTorsion | None = None
+    set_tool_angles: Triple | None = None
 
     def for_file(self) -> State:
         """Return the state as a file holds it: while a run goes on, the state before the run."""
@@ -266,6 +274,19 @@ class State:
         ):
             return given
         return tilt_torsion_of(rotation)
+
+    @property
+    def tool_angles(self) -> Triple:
+        """Yaw, pitch and roll of the tool on the platform, in degrees, as set if known.
+
+        At a pitch of ±90° the orientation does not determine all three.
+        """
+        given, tool = self.set_tool_angles, Pose((0.0, 0.0, 0.0), self.design.tool.quaternion)
+        if given is not None and np.allclose(
+            rotation_from_yaw_pitch_roll(given), tool.rotation, rtol=0.0, atol=SAME_ROTATION
+        ):
+            return given
+        return angles_of(tool)
 
     @property
     def point(self) -> str:

@@ -172,6 +172,7 @@ class View:
         flags, bodies, legs, labels, grid, handle: Whether each is drawn.
         tetrahedra: Whether each of the three is drawn, and the gap that is left to its incidence.
         clearance: Whether the closest pair of legs is marked.
+        machine: Whether the tool and the payload of the design are drawn.
         swept: Whether the tetrahedra are drawn that the legs swept in the last move.
         radius_curve: Whether the accessible volume is drawn against the radius of the legs.
         ghosts: Whether the seven other assembly modes are drawn.
@@ -198,6 +199,7 @@ class View:
     handle: bool = True
     tetrahedra: tuple[bool, bool, bool] = (True, True, True)
     clearance: bool = False
+    machine: bool = True
     swept: bool = False
     radius_curve: bool = False
     ghosts: bool = False

@@ -52,6 +52,11 @@ LAYERS = (
         "Closest pair",
         "Mark the two legs that are closest to each other, and their clearance.",
     ),
+    (
+        "machine",
+        "Tool and payload",
+        "The axes of the tool and a ball for the payload; the tab Machine sets both.",
+    ),
 )
 
 

@@ -1,0 +1,361 @@
+"""The panel of the machine: tool, payload, gravity, actuators, struts and guide."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from html import escape
+from typing import Literal
+
+import msgspec
+
+from explorer.app.features.feature import Services
+from explorer.app.features.machine.actions import ANGLES, MakeAlike, SetToolAngle
+from explorer.app.features.machine.words import DIRECTIONS, direction_name, machine_words
+from explorer.app.inputs.bindings import At, Bound
+from explorer.app.inputs.controls import Condition, Controls
+from explorer.app.inputs.ranges import platform_span
+from explorer.app.inputs.tracks import Span
+from explorer.app.state.action import Action
+from explorer.app.state.actions import Set
+from explorer.app.state.frame import Frame
+from explorer.app.state.state import State
+from explorer.app.state.values import value_at
+from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.commands import NO_OPTION
+from explorer.app.widgets.markup import box, note
+from explorer.mechanism.design import JOINTS
+from explorer.mechanism.machine import STANDARD_GRAVITY, Six, Struts
+from explorer.numerics.number_text import format_number
+
+Side = Literal["push", "pull"]
+SIDES: tuple[Side, ...] = ("push", "pull")
+
+# Limits that are switched on begin with these: N, N m and MPa; the tube in mm.
+FORCE, MOMENT, STRESS = 100.0, 10.0, 200.0
+OUTER, INNER = 12.0, 10.0
+FORCES: Six = (FORCE, FORCE, FORCE, FORCE, FORCE, FORCE)
+# Steps of the number fields, which show no more decimals.
+FINE, MEDIUM = 0.001, 0.01
+# What each angle of the tool turns about, and its edge in degrees.
+TURNS = (
+    ("about the platform's z, the first of three", 180.0),
+    ("about the y that yaw turned, the second of three", 90.0),
+    ("about the tool's x, the third of three", 180.0),
+)
+
+
+class MachinePanel:
+    """The controls for the machine around the mechanism, under a line that describes it."""
+
+    def __init__(self, services: Services) -> None:
+        gui = services.gui
+        self._controls = controls = Controls(gui, services.session)
+        self._summary = gui.add_html("")
+        with gui.add_folder("Tool on the platform (design units, degrees)"):
+            self._add_tool()
+        with gui.add_folder("Payload (design units, kg, N)"):
+            controls.number(
+                "Mass (kg)",
+                "Mass that the platform carries.",
+                "design.payload.mass_kg",
+                least=0.0,
+                step=FINE,
+            )
+            self._weight = gui.add_html("", visible=False)
+            self._add_payload()
+        with gui.add_folder("Gravity", expand_by_default=False):
+            self._add_gravity()
+        with gui.add_folder("Actuators (N)", expand_by_default=False):
+            self._add_forces()
+            self._each = gui.add_folder("Each of the six (N)", expand_by_default=False)
+            with self._each:
+                for side in SIDES:
+                    for index, name in enumerate(JOINTS):
+                        self._add_force(side, index, name)
+            self._alike = controls.button(
+                "Make all six alike",
+                "Give each of the six actuators the least push, and the least pull, of them all.",
+                MakeAlike,
+            )
+        with gui.add_folder("Struts of legs 2 and 3", expand_by_default=False):
+            self._add_struts()
+            self._moment = gui.add_html("")
+        with gui.add_folder("Guide", expand_by_default=False):
+            self._add_guide()
+
+    def updates(self, frame: Frame) -> Iterator[Update]:
+        """Yield the updates that make the panel show the frame."""
+        state = frame.state
+        design = state.design
+        yield self._summary, "content", box(escape(machine_words(design)))
+        mass = design.payload.mass_kg
+        yield self._weight, "visible", mass > 0.0
+        yield (
+            self._weight,
+            "content",
+            note(f"Its weight is {format_number(mass * STANDARD_GRAVITY)} N."),
+        )
+        yield self._alike, "visible", not (_are_alike(state, "push") and _are_alike(state, "pull"))
+        yield self._each, "visible", _is_limited(state)
+        yield self._moment, "content", note(moment_words(design.struts))
+        yield from self._controls.updates(frame)
+
+    def _add_tool(self) -> None:
+        for axis, name in enumerate("xyz"):
+            self._controls.slider(
+                f"tool {name}",
+                f"The {name} coordinate of the tool point in the platform frame, from b4.",
+                f"design.tool.position.{axis}",
+                platform_span,
+            )
+        for axis, (about, edge) in enumerate(TURNS):
+            self._add_angle(axis, about, edge)
+
+    def _add_angle(self, axis: int, about: str, edge: float) -> None:
+        self._controls.slider(
+            f"tool {ANGLES[axis]} (°)",
+            f"Rotation of the tool on the platform {about}, in degrees.",
+            Bound(
+                lambda frame: frame.state.tool_angles[axis],
+                lambda _, value: SetToolAngle(axis, value),
+            ),
+            Span(-edge, edge, 0.1),
+        )
+
+    def _add_payload(self) -> None:
+        for axis, name in enumerate("xyz"):
+            self._controls.slider(
+                f"centre {name}",
+                f"The {name} coordinate of the payload's centre in the platform frame, from b4.",
+                f"design.payload.centre.{axis}",
+                platform_span,
+            )
+        self._controls.number(
+            "Force on the tool (N)",
+            "Largest force of the process, which acts at the tool point in any direction.",
+            "design.payload.force_n",
+            least=0.0,
+            step=MEDIUM,
+        )
+
+    def _add_gravity(self) -> None:
+        self._controls.dropdown(
+            "Gravity",
+            "Direction of gravity along an axis of the base, for a machine on a wall or overhead.",
+            (*DIRECTIONS, NO_OPTION),
+            Bound(
+                lambda frame: direction_name(frame.state.design.gravity) or NO_OPTION,
+                lambda state, name: Set(
+                    "design.gravity", DIRECTIONS.get(name, state.design.gravity), "Gravity", name
+                ),
+            ),
+        )
+        self._controls.triple(
+            "Direction x y z",
+            "Any other direction of gravity along the axes of the base; its length is kept at 1.",
+            Bound(
+                lambda frame: frame.state.design.gravity,
+                lambda _, direction: Set("design.gravity", direction, "Gravity"),
+            ),
+            step=FINE,
+        )
+
+    def _add_forces(self) -> None:
+        self._controls.checkbox(
+            "Limited forces",
+            "Limit the forces of the actuators; off, they push and pull without limit.",
+            Bound(lambda frame: _is_limited(frame.state), _limit_forces),
+        )
+        self._add_common_force("push", "Largest force that increases a joint's value")
+        self._controls.checkbox(
+            "Pull of its own",
+            "Give the pull a limit of its own; off, the largest pull is the largest push.",
+            Bound(
+                lambda frame: _forces(frame.state, "pull") is not None,
+                _give_own_pull,
+            ),
+            disabled=lambda state: not _is_limited(state),
+        )
+        self._add_common_force("pull", "Largest force that decreases a joint's value")
+
+    def _add_common_force(self, side: Side, meaning: str) -> None:
+        label = f"{side.capitalize()} of each (N)"
+        self._controls.number(
+            label,
+            f"{meaning}, the same for all six.",
+            Bound(
+                lambda frame: _shown_forces(frame.state, side)[0],
+                lambda _, value: Set(
+                    f"design.actuators.{side}_n", (value,) * 6, label, format_number(value, 6)
+                ),
+            ),
+            least=0.0,
+            step=MEDIUM,
+            visible=lambda state: _forces(state, side) is not None and _are_alike(state, side),
+        )
+
+    def _add_force(self, side: Side, index: int, joint: str) -> None:
+        def write(state: State, value: float) -> Action:
+            forces = list(_shown_forces(state, side))
+            forces[index] = value
+            text = format_number(value, 6)
+            return Set(f"design.actuators.{side}_n", tuple(forces), f"{side} of {joint} (N)", text)
+
+        self._controls.number(
+            f"{side} of {joint}",
+            f"Largest {side} of the actuator of {joint}, in N.",
+            Bound(lambda frame: _shown_forces(frame.state, side)[index], write),
+            least=0.0,
+            step=MEDIUM,
+            visible=lambda state: _forces(state, side) is not None,
+        )
+
+    def _add_struts(self) -> None:
+        controls = self._controls
+        controls.checkbox(
+            "Tubes",
+            "Give the struts the size of a tube; off, they are rigid.",
+            Bound(lambda frame: _is_tube(frame.state), _make_tubes),
+        )
+        self._add_size("Outer diameter (mm)", "Outer diameter of the tube.", "outer_mm")
+        self._add_size("Inner diameter (mm)", "Inner diameter of the tube; 0 is a bar.", "inner_mm")
+        self._add_size(
+            "Young's modulus (GPa)", "Aluminium 70, steel 210, carbon 130.", "modulus_gpa"
+        )
+        self._add_limit(
+            "Limited stress",
+            "Limit the bending stress of the tube, and with it the moment.",
+            At("design.struts.stress_mpa", default=lambda _: STRESS),
+            ("Largest stress (MPa)", "Largest bending stress of the tube."),
+            is_possible=_is_tube,
+        )
+        self._add_limit(
+            "Moment given directly",
+            "Give the largest bending moment itself, in place of that of tube and stress.",
+            At("design.struts.moment_nm", default=_first_moment),
+            ("Largest moment (N m)", "Largest bending moment of a strut."),
+        )
+
+    def _add_size(self, label: str, hint: str, name: str) -> None:
+        self._controls.number(
+            label,
+            hint,
+            At(f"design.struts.{name}", default=lambda _: OUTER),
+            least=0.0,
+            step=MEDIUM,
+            visible=_is_tube,
+        )
+
+    def _add_guide(self) -> None:
+        self._add_limit(
+            "Limited guide force",
+            "Limit the force across the guide on each of its two carriages.",
+            At("design.guide.force_n", default=lambda _: FORCE),
+            ("Largest force (N)", "Largest force across the guide on a carriage."),
+        )
+        self._add_limit(
+            "Limited guide moment",
+            "Limit the moment on the guide at each of its two carriages.",
+            At("design.guide.moment_nm", default=lambda _: MOMENT),
+            ("Largest moment on it (N m)", "Largest moment on the guide at a carriage."),
+        )
+
+    def _add_limit(
+        self,
+        switch: str,
+        hint: str,
+        at: At,
+        number: tuple[str, str],
+        *,
+        is_possible: Condition | None = None,
+    ) -> None:
+        """Add a switch for a limit, and a field for its value while it is on.
+
+        Args:
+            switch: Words beside the switch.
+            hint: Sentence on what it does.
+            at: The limit, which the state has as None for none; its default is what it begins with.
+            number: Words beside the field, and its hint.
+            is_possible: Condition in which there can be a limit; None for always.
+        """
+
+        def is_on(state: State) -> bool:
+            return value_at(state, at.path) is not None
+
+        def write(state: State, on: bool) -> Action:
+            first = None if at.default is None else at.default(state)
+            return Set(at.path, first if on else None, switch, "on" if on else "off")
+
+        def can_be(state: State) -> bool:
+            return is_possible is None or is_possible(state)
+
+        self._controls.checkbox(
+            switch,
+            hint,
+            Bound(lambda frame: is_on(frame.state), write),
+            disabled=lambda state: not can_be(state),
+        )
+        self._controls.number(
+            *number,
+            at,
+            least=0.0,
+            step=MEDIUM,
+            visible=lambda state: is_on(state) and can_be(state),
+        )
+
+
+def moment_words(struts: Struts) -> str:
+    """Return the largest bending moment of the struts in words, and what it comes from."""
+    if struts.moment_nm is not None:
+        return f"Their largest moment is {format_number(struts.moment_nm)} N m, as given."
+    if math.isfinite(struts.largest_moment):
+        moment = format_number(struts.largest_moment)
+        return f"Their largest moment is {moment} N m, that of the tube at its largest stress."
+    return "Their moment has no limit."
+
+
+def _is_tube(state: State) -> bool:
+    return state.design.struts.outer_mm is not None
+
+
+def _make_tubes(state: State, on: bool) -> Action:
+    outer, inner = (OUTER, INNER) if on else (None, 0.0)
+    struts = msgspec.structs.replace(state.design.struts, outer_mm=outer, inner_mm=inner)
+    return Set("design.struts", struts, "Tubes", "on" if on else "off")
+
+
+def _first_moment(state: State) -> float:
+    """Return the moment to begin with: that of tube and stress, if there is one."""
+    moment = state.design.struts.largest_moment
+    return moment if math.isfinite(moment) else MOMENT
+
+
+def _forces(state: State, side: Side) -> Six | None:
+    """Return the largest forces to one side; None for no limit, or a pull like the push."""
+    actuators = state.design.actuators
+    return actuators.push_n if side == "push" else actuators.pull_n
+
+
+def _shown_forces(state: State, side: Side) -> Six:
+    """Return the forces that the fields hold; where there are none, those to begin with."""
+    return _forces(state, side) or state.design.actuators.push_n or FORCES
+
+
+def _are_alike(state: State, side: Side) -> bool:
+    return len(set(_shown_forces(state, side))) == 1
+
+
+def _is_limited(state: State) -> bool:
+    return any(_forces(state, side) is not None for side in SIDES)
+
+
+def _limit_forces(state: State, on: bool) -> Action:
+    push = _shown_forces(state, "push") if on else None
+    actuators = msgspec.structs.replace(state.design.actuators, push_n=push, pull_n=None)
+    return Set("design.actuators", actuators, "Limited forces", "on" if on else "off")
+
+
+def _give_own_pull(state: State, on: bool) -> Action:
+    pull = _shown_forces(state, "push") if on else None
+    return Set("design.actuators.pull_n", pull, "Pull of its own", "on" if on else "off")

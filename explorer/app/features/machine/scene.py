@@ -1,0 +1,126 @@
+"""The tool and the payload on the platform; nothing of a design that has neither."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from explorer.app.features.feature import Services
+from explorer.app.features.machine.words import turn_of
+from explorer.app.scene.labels import add_label
+from explorer.app.scene.part import NO_POINTS, ScenePart, around
+from explorer.app.scene.placing import Placed
+from explorer.app.scene.shapes import Rods, add_lines, add_translucent, linear_colour, sphere
+from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.colours import GHOST, Rgb
+from explorer.mechanism.pose import Triple
+from explorer.numerics.arrays import FloatArray
+from explorer.numerics.number_text import format_number
+
+# Length and radius of the axes of the tool, in scene units, and thickness of its line in pixels.
+AXIS_LENGTH, AXIS_RADIUS, THICKNESS = 0.9, 0.035, 2.5
+# Colours of the axes x, y and z, those of the corner of the scene, and of the payload: brass.
+AXIS_COLOURS: tuple[Rgb, ...] = ((255, 32, 96), (32, 176, 96), (32, 128, 255))
+BRASS: Rgb = (190, 154, 92)
+# Radius of the ball of one kilogram in scene units, and those of the smallest and the largest ball.
+KILOGRAM_RADIUS, LEAST_RADIUS, LARGEST_RADIUS = 0.5, 0.12, 2.0
+BALL_OPACITY = 0.6
+
+
+class ToolScene(ScenePart):
+    """A line from b4 to the tool point, and the axes of the tool there."""
+
+    def __init__(self, services: Services) -> None:
+        scene = services.scene
+        self._line = add_lines(scene, "/platform/tool-line", 1, GHOST, THICKNESS)
+        # The frame's own axes are too dark for a dark page.
+        self._frame = scene.add_frame("/platform/tool", show_axes=False, visible=False)
+        self._axes = Rods(scene, "/platform/tool/axes", list(map(linear_colour, AXIS_COLOURS)))
+        self._label = add_label(scene, "/platform/tool-label", "tool", visible=False)
+
+    def updates(self, placed: Placed) -> Iterator[Update]:
+        """Yield the updates that draw the tool of this frame."""
+        shown, tool = is_tool_shown(placed), placed.frame.state.design.tool
+        yield self._line, "visible", shown and any(tool.position)
+        for handle in (self._frame, self._label):
+            yield handle, "visible", shown
+        if not shown:
+            return
+        tip = placed.scale * np.array(tool.position)
+        yield self._line, "points", np.stack([np.zeros(3), tip])[None].astype(np.float32)
+        yield self._frame, "position", tuple(tip.tolist())
+        yield self._frame, "wxyz", tool.quaternion
+        yield from self._axes.between(
+            np.zeros((3, 3)), AXIS_LENGTH * np.eye(3), np.full(3, AXIS_RADIUS)
+        )
+        yield self._label, "position", tuple(tip.tolist())
+
+    def corners(self, placed: Placed) -> FloatArray:
+        """Return the corners of a cube about the tool point."""
+        if not is_tool_shown(placed):
+            return NO_POINTS
+        return around(in_scene(placed, placed.frame.state.design.tool.position)[None])
+
+
+class PayloadScene(ScenePart):
+    """A ball at the centre of the payload, whose volume is in proportion to the mass."""
+
+    def __init__(self, services: Services) -> None:
+        scene = services.scene
+        self._ball = add_translucent(
+            scene, "/platform/payload", sphere(), BALL_OPACITY, colour=BRASS, side="front"
+        )
+        self._label = add_label(
+            scene, "/platform/payload-label", "1 kg", fades=False, visible=False
+        )
+
+    def updates(self, placed: Placed) -> Iterator[Update]:
+        """Yield the updates that draw the payload of this frame."""
+        shown, payload = is_payload_shown(placed), placed.frame.state.design.payload
+        for handle in (self._ball, self._label):
+            yield handle, "visible", shown
+        if not shown:
+            return
+        centre = tuple((placed.scale * np.array(payload.centre)).tolist())
+        yield self._ball, "position", centre
+        yield self._ball, "scale", ball_radius(payload.mass_kg)
+        yield self._label, "position", centre
+        yield self._label, "text", f"{format_number(payload.mass_kg)} kg"
+
+    def corners(self, placed: Placed) -> FloatArray:
+        """Return the ends of the ball along the axes of the base."""
+        if not is_payload_shown(placed):
+            return NO_POINTS
+        payload = placed.frame.state.design.payload
+        radius = ball_radius(payload.mass_kg)
+        ends = radius * np.concatenate([np.eye(3), -np.eye(3)])
+        return in_scene(placed, payload.centre) + ends
+
+
+def ball_radius(mass: float) -> float:
+    """Return the radius of the ball of a mass in kilograms, in scene units."""
+    return min(max(KILOGRAM_RADIUS * math.cbrt(mass), LEAST_RADIUS), LARGEST_RADIUS)
+
+
+def is_tool_shown(placed: Placed) -> bool:
+    """Whether the design has a tool, and it is drawn."""
+    tool = placed.frame.state.design.tool
+    return _is_shown(placed) and (any(tool.position) or turn_of(tool) > 0.0)
+
+
+def is_payload_shown(placed: Placed) -> bool:
+    """Whether the design has a payload with a mass, and it is drawn."""
+    return _is_shown(placed) and placed.frame.state.design.payload.mass_kg > 0.0
+
+
+def in_scene(placed: Placed, point: Triple) -> FloatArray:
+    """Return a point (3,) in scene units of one in the platform frame in design units."""
+    turned = placed.frame.snapshot.rotation @ np.array(point)
+    return placed.points["b4"] + placed.scale * turned
+
+
+def _is_shown(placed: Placed) -> bool:
+    # Apart, the platform is not where its points are.
+    return placed.frame.state.view.machine and not placed.is_apart

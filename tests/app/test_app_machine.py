@@ -1,0 +1,460 @@
+"""The machine on the page: values that are set, refused and told, and what the scene has of it."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+import viser
+from desk import Desk, by_name, viewed
+from hypothesis import given, strategies as st
+from scipy.spatial.transform import Rotation
+
+from explorer.app.features.feature import Services
+from explorer.app.features.machine.actions import MakeAlike, SetToolAngle
+from explorer.app.features.machine.panel import MachinePanel
+from explorer.app.features.machine.scene import PayloadScene, ToolScene, ball_radius
+from explorer.app.features.machine.words import machine_words
+from explorer.app.scene.part import HALF_JOINT
+from explorer.app.scene.placing import Placed
+from explorer.app.session.session import UNDO
+from explorer.app.state.actions import Open, Set, SetPose
+from explorer.app.state.frame import Frame
+from explorer.app.state.state import State, opened
+from explorer.app.state.view import PrototypeView
+from explorer.errors import InputError
+from explorer.mechanism.design import Design
+from explorer.mechanism.design_file import PRESETS, decode_design, encode_design
+from explorer.mechanism.machine import Actuators, Guide, Payload, Six, Struts, Tool
+from explorer.mechanism.pose import Pose, rotation_from_quaternion
+from explorer.numerics.arrays import FloatArray
+
+OPTIMAL = PRESETS["paper-optimal"]
+TURNED = Tool((1.0, -0.5, 2.5), (0.5, 0.5, -0.5, 0.5))
+PRESS = msgspec.structs.replace(
+    OPTIMAL,
+    tool=TURNED,
+    payload=Payload(2.0, (1.0, 0.5, 1.5), 20.0),
+    actuators=Actuators((150.0, 200.0, 150.0, 200.0, 150.0, 150.0)),
+    struts=Struts(8.0, 6.0, stress_mpa=200.0),
+    guide=Guide(200.0, 6.0),
+)
+ANGLE = st.floats(-180.0, 180.0)
+
+
+class Hand:
+    """A hand that uses the controls of the panel by their labels."""
+
+    def __init__(self, services: Services, desk: Desk) -> None:
+        gui: Any = services.gui
+        before = set(gui._gui_input_handle_from_uuid)
+        self._desk, self._panel = desk, MachinePanel(services)
+        new = {u: h for u, h in gui._gui_input_handle_from_uuid.items() if u not in before}
+        self.controls: dict[str, Any] = {handle.label: handle for handle in new.values()}
+        assert len(self.controls) == len(new)
+        self.show()
+
+    def show(self) -> dict[str, str]:
+        """Show the state, and return the markup of the panel by the names of its attributes."""
+        for handle, name, value in self._panel.updates(Frame(self._desk.state)):
+            setattr(handle, name, value)
+        held = vars(self._panel).items()
+        return {n: h.content for n, h in held if isinstance(h, viser.GuiHtmlHandle)}
+
+    def set(self, label: str, value: object) -> Design:
+        """Set a control, and return the design after it is shown."""
+        self._desk.use(self.controls[label], value)
+        self.show()
+        return self._desk.state.design
+
+
+@pytest.fixture
+def hand(services: Services, desk: Desk) -> Hand:
+    return Hand(services, desk)
+
+
+def six(value: float) -> Six:
+    return (value, value, value, value, value, value)
+
+
+def design_with(**machine: Any) -> Design:
+    return msgspec.structs.replace(OPTIMAL, **machine)
+
+
+# Controls
+
+
+PLAIN: list[tuple[str, object, Callable[[Design], object]]] = [
+    ("tool z", 3.25, lambda design: design.tool.position[2]),
+    ("Mass (kg)", 2.5, lambda design: design.payload.mass_kg),
+    ("centre y", -1.5, lambda design: design.payload.centre[1]),
+    ("Force on the tool (N)", 20.0, lambda design: design.payload.force_n),
+    ("Gravity", "along −y", lambda design: design.gravity[1] == -1.0),
+    ("Limited forces", True, lambda design: design.actuators.push_n),
+    ("Tubes", True, lambda design: design.struts.outer_mm),
+    ("Moment given directly", True, lambda design: design.struts.moment_nm),
+    ("Limited guide force", True, lambda design: design.guide.force_n),
+    ("Limited guide moment", True, lambda design: design.guide.moment_nm),
+]
+
+
+@pytest.mark.parametrize(("label", "value", "read"), PLAIN, ids=[label for label, *_ in PLAIN])
+def test_control_changes_the_design_in_one_step_that_is_undone_and_saved(
+    hand: Hand, desk: Desk, label: str, value: object, read: Callable[[Design], object]
+) -> None:
+    start = desk.state
+    design = hand.set(label, value)
+    assert read(design)
+    assert read(design) == value or value is True or isinstance(value, str)
+    assert hand.controls[label].value == value
+    assert decode_design(encode_design(design), "mine.json") == design
+    assert (desk.session.history.at, desk.complaints) == (1, [])
+    desk.session.travel(UNDO)
+    assert desk.state == start
+
+
+def test_limits_are_switched_on_set_and_switched_off(hand: Hand) -> None:
+    hand.set("Limited forces", True)
+    design = hand.set("Push of each (N)", 400.0)
+    assert design.actuators == Actuators(six(400.0))
+    assert hand.set("Pull of its own", True).actuators.pull_n == six(400.0)
+    design = hand.set("Pull of each (N)", 300.0)
+    assert design.actuators == Actuators(six(400.0), six(300.0))
+    assert hand.set("Pull of its own", False).actuators == Actuators(six(400.0))
+    assert hand.set("Limited forces", False).actuators == Actuators()
+    hand.set("Tubes", True)
+    hand.set("Inner diameter (mm)", 6.0)
+    hand.set("Outer diameter (mm)", 8.0)
+    hand.set("Young's modulus (GPa)", 210.0)
+    hand.set("Limited stress", True)
+    design = hand.set("Largest stress (MPa)", 150.0)
+    assert design.struts == Struts(8.0, 6.0, 210.0, 150.0)
+    # The moment begins with that of the tube.
+    moment = design.struts.largest_moment
+    assert hand.set("Moment given directly", True).struts.moment_nm == moment
+    assert hand.set("Largest moment (N m)", 5.0).struts.largest_moment == 5.0
+    assert hand.set("Moment given directly", False).struts == design.struts
+    assert hand.set("Tubes", False).struts == Struts(modulus_gpa=210.0, stress_mpa=150.0)
+    for label, field in (
+        ("Limited guide force", "Largest force (N)"),
+        ("Limited guide moment", "Largest moment on it (N m)"),
+    ):
+        hand.set(label, True)
+        hand.set(field, 7.0)
+    assert hand.set("Mass (kg)", 1.0).guide == Guide(7.0, 7.0)
+    hand.set("Limited guide force", False)
+    assert hand.set("Limited guide moment", False).guide == Guide()
+
+
+def test_field_of_a_limit_is_visible_only_while_the_limit_is_on(hand: Hand, desk: Desk) -> None:
+    fields = {
+        "Push of each (N)": "Limited forces",
+        "Pull of each (N)": "Pull of its own",
+        "Outer diameter (mm)": "Tubes",
+        "Largest stress (MPa)": "Limited stress",
+        "Largest moment (N m)": "Moment given directly",
+        "Largest force (N)": "Limited guide force",
+        "Largest moment on it (N m)": "Limited guide moment",
+    }
+    for field, switch in fields.items():
+        assert not hand.controls[field].visible
+        assert not hand.controls[switch].value
+    for switch in fields.values():
+        hand.set(switch, True)
+    assert all(hand.controls[field].visible for field in fields)
+    # A rigid strut has no stress.
+    hand.set("Tubes", False)
+    assert hand.controls["Limited stress"].disabled
+    assert not hand.controls["Largest stress (MPa)"].visible
+    assert desk.complaints == []
+
+
+def test_forces_of_single_actuators_differ_until_they_are_made_alike(
+    hand: Hand, desk: Desk
+) -> None:
+    alike, common = hand.controls["Make all six alike"], hand.controls["Push of each (N)"]
+    hand.set("Limited forces", True)
+    assert (common.visible, alike.visible) == (True, False)
+    hand.set("push of d1", 250.0)
+    design = hand.set("push of l4", 80.0)
+    assert design.actuators == Actuators((100.0, 250.0, 100.0, 100.0, 100.0, 80.0))
+    assert (common.visible, alike.visible) == (False, True)
+    desk.click(alike)
+    hand.show()
+    assert desk.state.design.actuators == Actuators(six(80.0))
+    assert (common.visible, common.value, alike.visible) == (True, 80.0, False)
+    hand.set("Pull of its own", True)
+    design = hand.set("pull of d3", 60.0)
+    assert design.actuators.pull_n == (80.0, 80.0, 80.0, 60.0, 80.0, 80.0)
+    assert hand.controls["Push of each (N)"].visible
+    assert not hand.controls["Pull of each (N)"].visible
+
+
+def test_limit_of_the_pull_alone_is_shown_and_kept(services: Services, desk: Desk) -> None:
+    desk.session.do(Open(design_with(actuators=Actuators(pull_n=six(90.0)))))
+    hand = Hand(services, desk)
+    assert hand.controls["Limited forces"].value
+    assert not hand.controls["Push of each (N)"].visible
+    assert hand.controls["Pull of each (N)"].value == 90.0
+    assert "actuators pull up to 90 N" in machine_words(desk.state.design)
+    assert hand.set("Limited forces", False).actuators == Actuators()
+
+
+def test_direction_of_gravity_keeps_length_one(hand: Hand) -> None:
+    assert hand.controls["Gravity"].value == "down, −z"
+    assert hand.set("Gravity", "along +x").gravity == (1.0, 0.0, 0.0)
+    design = hand.set("Direction x y z", (3.0, 0.0, -4.0))
+    assert design.gravity == pytest.approx((0.6, 0.0, -0.8))
+    assert hand.controls["Gravity"].value == "—"
+    assert hand.controls["Direction x y z"].value == design.gravity
+    # The empty option of the list changes nothing.
+    assert hand.set("Gravity", "—") == design
+    assert hand.set("Direction x y z", (0.0, 0.0, -2.0)) == OPTIMAL
+    assert hand.controls["Gravity"].value == "down, −z"
+
+
+# What is refused
+
+
+IMPOSSIBLE = [
+    ("Mass (kg)", -1.0, "The mass of the payload must not be negative; got -1"),
+    ("Force on the tool (N)", -2.0, "The force on the tool must not be negative; got -2"),
+    (
+        "tool x",
+        20422.3,
+        "The tool point must lie within 100 reaches (2042.23) of b4; got a distance of 20422.3",
+    ),
+    (
+        "centre z",
+        -1e5,
+        (
+            "The centre of the payload must lie within 100 reaches (2042.23) of b4; "
+            "got a distance of 100000"
+        ),
+    ),
+    ("Direction x y z", (0.0, 0.0, 0.0), "The direction of gravity must not be all zeros"),
+    ("push of d1", 0.0, "The push of an actuator must be positive; got 0"),
+    ("pull of l4", -3.0, "The pull of an actuator must be positive; got -3"),
+    ("Push of each (N)", 0.0, "The push of an actuator must be positive; got 0"),
+    ("Outer diameter (mm)", 0.0, "The outer diameter of the struts must be positive; got 0"),
+    (
+        "Inner diameter (mm)",
+        9.0,
+        "The inner diameter of the struts must be below the outer diameter 8; got 9",
+    ),
+    (
+        "Outer diameter (mm)",
+        5.0,
+        "The inner diameter of the struts must be below the outer diameter 5; got 6",
+    ),
+    ("Young's modulus (GPa)", 0.0, "Young’s modulus of the struts must be positive; got 0"),
+    ("Largest stress (MPa)", -1.0, "The largest stress of the struts must be positive; got -1"),
+    ("Largest moment (N m)", 0.0, "The largest moment of the struts must be positive; got 0"),
+    ("Largest force (N)", 0.0, "The largest force on the guide must be positive; got 0"),
+    ("Largest moment on it (N m)", 0.0, "The largest moment on the guide must be positive; got 0"),
+]
+
+
+@pytest.mark.parametrize(("label", "value", "message"), IMPOSSIBLE)
+def test_impossible_value_gets_one_line_and_changes_nothing(
+    services: Services, desk: Desk, label: str, value: object, message: str
+) -> None:
+    desk.session.do(Open(PRESS))
+    hand = Hand(services, desk)
+    before, shown, steps = desk.state, hand.controls[label].value, desk.session.history.at
+    hand.set(label, value)
+    assert (desk.state, desk.session.history.at) == (before, steps)
+    assert desk.complaints == [message]
+    assert hand.controls[label].value == shown
+
+
+# The angles of the tool
+
+
+@given(st.lists(st.tuples(st.integers(0, 2), st.one_of(ANGLE, st.sampled_from((90.0, -90.0))))))
+def test_tool_angles_are_kept_as_set_and_turn_as_the_pose_does(
+    turns: list[tuple[int, float]],
+) -> None:
+    state, angles = opened(OPTIMAL), [0.0, 0.0, 0.0]
+    for axis, angle in turns:
+        state = SetToolAngle(axis, angle).apply(state)
+        angles[axis] = angle
+        # Also at a pitch of 90°, where yaw and roll turn about one axis.
+        assert state.tool_angles == tuple(angles)
+    turned = Rotation.from_euler("ZYX", angles, degrees=True).as_matrix()
+    rotation = rotation_from_quaternion(state.design.tool.quaternion)
+    assert np.allclose(rotation, turned, rtol=0.0, atol=1e-14)
+
+
+def test_tool_angles_of_a_design_that_is_opened_are_its_own(desk: Desk) -> None:
+    desk.session.do(SetToolAngle(0, 30.0))
+    desk.session.do(SetToolAngle(1, 120.0))
+    assert desk.state.tool_angles == (30.0, 120.0, 0.0)
+    # The same orientation with a pitch within 90°.
+    reopened = opened(desk.state.design)
+    assert reopened.tool_angles == pytest.approx((-150.0, 60.0, 180.0))
+    # Angles of another orientation do not count.
+    other = replace(reopened, set_tool_angles=(1.0, 2.0, 3.0))
+    assert other.tool_angles == reopened.tool_angles
+
+
+def test_angle_of_the_tool_that_is_not_finite_is_refused() -> None:
+    with pytest.raises(InputError, match="finite"):
+        SetToolAngle(2, math.inf).apply(opened(OPTIMAL))
+
+
+def test_alike_actuators_without_limits_stay_so() -> None:
+    state = opened(OPTIMAL)
+    assert MakeAlike().apply(state) == state
+
+
+# Words
+
+
+@pytest.mark.parametrize(
+    ("design", "words"),
+    [
+        (OPTIMAL, "No tool; carries nothing; no force is limited."),
+        (
+            PRESS,
+            (
+                "Tool 2.74 units from b4, turned by 120°; carries 2 kg and a force of 20 N; "
+                "actuators up to 150–200 N; struts up to 6.87 N m; guide up to 200 N and 6 N m."
+            ),
+        ),
+        (
+            design_with(
+                tool=Tool((0.0, 0.0, 3.0)),
+                payload=Payload(2.0),
+                actuators=Actuators(six(400.0)),
+                struts=Struts(moment_nm=12.0),
+            ),
+            (
+                "Tool 3 units from b4; carries 2 kg; actuators up to 400 N; struts up to 12 N m; "
+                "the guide has no limit."
+            ),
+        ),
+        (
+            design_with(
+                tool=Tool(quaternion=(0.0, 0.0, -1.0, 0.0)),
+                payload=Payload(force_n=5.0),
+                gravity=(0.0, 1.0, 0.0),
+                actuators=Actuators(six(9.0), six(7.0)),
+            ),
+            (
+                "Tool at b4, turned by 180°; carries a force of 5 N; gravity along +y; actuators "
+                "push up to 9 N and pull up to 7 N; the struts and the guide have no limit."
+            ),
+        ),
+        (
+            design_with(gravity=(3.0, 0.0, -4.0), guide=Guide(moment_nm=3.0)),
+            (
+                "No tool; carries nothing; gravity along (0.6, 0, −0.8); guide up to 3 N m; "
+                "the actuators and the struts have no limit."
+            ),
+        ),
+    ],
+)
+def test_machine_words_tell_what_it_carries_and_what_is_limited(design: Design, words: str) -> None:
+    assert machine_words(design) == words
+
+
+def test_panel_tells_the_machine_the_weight_and_the_moment(hand: Hand, desk: Desk) -> None:
+    assert "no force is limited" in hand.show()["_summary"]
+    assert "Their moment has no limit." in hand.show()["_moment"]
+    desk.session.do(Open(PRESS))
+    shown = hand.show()
+    assert machine_words(PRESS) in shown["_summary"]
+    assert "19.61 N" in shown["_weight"]
+    # Of a tube of 8 and 6 mm at 200 MPa: σ π (D⁴ − d⁴) / (32 D).
+    moment = 200e6 * math.pi * (0.008**4 - 0.006**4) / (32.0 * 0.008)
+    assert f"{moment:.3f} N m, that of the tube" in shown["_moment"]
+    desk.session.do(Set("design.struts.moment_nm", 5.0))
+    assert "5 N m, as given" in hand.show()["_moment"]
+
+
+# The scene
+
+
+def placed(design: Design, pose: Pose | None = None, **view: Any) -> Placed:
+    return Placed(Frame(viewed(opened(design, pose), **view)))
+
+
+def visible(nodes: dict[str, dict[str, Any]]) -> set[str]:
+    return {name for name, node in nodes.items() if node.get("visible")}
+
+
+def in_base(scene: Placed, point: tuple[float, ...]) -> FloatArray:
+    """Return a point of the platform in the base, in scene units, by another way."""
+    pose = scene.frame.state.pose
+    turned = Rotation.from_quat(pose.quaternion, scalar_first=True).apply(point)
+    return scene.scale * (np.array(pose.position) + turned)
+
+
+def test_scene_has_nothing_of_a_design_without_tool_and_payload(services: Services) -> None:
+    tool, payload, scene = ToolScene(services), PayloadScene(services), placed(OPTIMAL)
+    nodes = by_name(itertools.chain(tool.updates(scene), payload.updates(scene)))
+    assert visible(nodes) == set()
+    assert len(tool.corners(scene)) == len(payload.corners(scene)) == 0
+
+
+def test_tool_and_payload_hang_on_the_platform_and_are_in_the_picture(services: Services) -> None:
+    tool, payload = ToolScene(services), PayloadScene(services)
+    for pose in (None, Pose.of_yaw_pitch_roll((9.0, 8.0, 7.5), (-38.0, 24.0, 8.0))):
+        scene = placed(PRESS, pose)
+        nodes = by_name(itertools.chain(tool.updates(scene), payload.updates(scene)))
+        assert len(visible(nodes)) == 5
+        # All are children of the platform's frame, and so move with it.
+        assert all(name.startswith("/platform/") for name in nodes)
+        tip = scene.scale * np.array(TURNED.position)
+        frame = nodes["/platform/tool"]
+        assert frame["position"] == pytest.approx(tip.tolist())
+        assert frame["wxyz"] == TURNED.quaternion
+        assert np.allclose(
+            nodes["/platform/tool-line"]["points"], np.stack([np.zeros(3), tip])[None]
+        )
+        assert nodes["/platform/payload-label"]["text"] == "2 kg"
+        corners = tool.corners(scene)
+        middle = in_base(scene, TURNED.position)
+        assert np.allclose(0.5 * (corners.min(axis=0) + corners.max(axis=0)), middle)
+        assert np.allclose(np.ptp(corners, axis=0), 2.0 * HALF_JOINT)
+        ball = payload.corners(scene)
+        assert np.allclose(ball.mean(axis=0), in_base(scene, PRESS.payload.centre))
+        assert np.allclose(np.ptp(ball, axis=0), 2.0 * nodes["/platform/payload"]["scale"])
+
+
+def test_tool_at_b4_has_axes_and_no_line(services: Services) -> None:
+    scene = placed(design_with(tool=Tool(quaternion=TURNED.quaternion)))
+    nodes = by_name(ToolScene(services).updates(scene))
+    assert visible(nodes) == {"/platform/tool", "/platform/tool-label"}
+
+
+@pytest.mark.parametrize("view", [{"machine": False}, {"prototype": PrototypeView(exploded=0.5)}])
+def test_switch_and_exploded_view_hide_tool_and_payload(
+    services: Services, view: dict[str, Any]
+) -> None:
+    scene = replace(placed(PRESS, **view), floor=0.0)
+    tool, payload = ToolScene(services), PayloadScene(services)
+    assert visible(by_name(itertools.chain(tool.updates(scene), payload.updates(scene)))) == set()
+    assert len(tool.corners(scene)) == len(payload.corners(scene)) == 0
+
+
+def test_volume_of_the_ball_is_in_proportion_to_the_mass() -> None:
+    rng = np.random.default_rng(5)
+    for mass, factor in rng.uniform((0.05, 0.2), (10.0, 5.0), (100, 2)):
+        ratio = (ball_radius(factor * mass) / ball_radius(mass)) ** 3
+        assert ratio == pytest.approx(factor)
+    assert 0.0 < ball_radius(1e-9) < ball_radius(0.1) < ball_radius(10.0) < ball_radius(1e9) < 3.0
+
+
+def test_camera_follows_a_tool_far_away(services: Services) -> None:
+    far = design_with(tool=Tool((0.0, 0.0, 90.0)))
+    state: State = SetPose(opened(far).pose).apply(opened(far))
+    corners = ToolScene(services).corners(Placed(Frame(state)))
+    assert corners[:, 2].max() > 40.0
