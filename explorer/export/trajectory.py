@@ -13,16 +13,22 @@ from explorer.paths.trajectory import Trajectory
 COLUMNS = ("time_s", *JOINTS, "x", "y", "z", "qw", "qx", "qy", "qz")
 """The names of the columns; lengths are in design units."""
 
+TOOL_COLUMNS = ("tool_x", "tool_y", "tool_z")
+"""The names of the columns that follow if the tool point moves straight."""
+
 
 def trajectory_csv(trajectory: Trajectory) -> str:
     """Return a trajectory as CSV: a header, then a line per sample.
 
     Numbers round-trip to the last bit.
     """
-    rows = np.column_stack(
-        [trajectory.time, trajectory.joints, trajectory.position, trajectory.quaternion]
-    )
-    lines = [",".join(COLUMNS), *(",".join(map(repr, row)) for row in rows.tolist())]
+    columns = [trajectory.time, trajectory.joints, trajectory.position, trajectory.quaternion]
+    names = COLUMNS
+    if trajectory.tool_position is not None:
+        columns.append(trajectory.tool_position)
+        names += TOOL_COLUMNS
+    rows = np.column_stack(columns)
+    lines = [",".join(names), *(",".join(map(repr, row)) for row in rows.tolist())]
     return "\n".join(lines) + "\n"
 
 

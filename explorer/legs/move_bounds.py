@@ -162,8 +162,8 @@ def least_rows(
     """Write the least distance of each pair of legs over each move, and a lower bound of it.
 
     Args:
-        start: b4 at the start, shape (n, 3).
-        step: Displacement of b4, shape (n, 3).
+        start: Point that moves straight at the start, shape (n, 3).
+        step: Its displacement, shape (n, 3).
         angle: Rotation of the platform, in radians, shape (n,).
         parts: Parts of each leg's platform end, see `explorer.legs.moves`, shape
             (n, 4, 3, 3).

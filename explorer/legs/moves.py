@@ -1,9 +1,10 @@
 """Clearances of the legs over a whole straight move, with a bound between all poses.
 
-Over a straight move the position goes along a line and the platform turns about one fixed axis
-(slerp). An interval of the move is halved until a lower bound over all of it is within the
-tolerance of the least evaluated distance, see `explorer.legs.move_bounds`. The bound holds for
-every pose of the move, not only for those that were evaluated.
+Over a straight move one point of the platform, b4 or the tool point, goes along a line and the
+platform turns about one fixed axis (slerp). An interval of the move is halved until a lower bound
+over all of it is within the tolerance of the least evaluated distance, see
+`explorer.legs.move_bounds`. The bound holds for every pose of the move, not only for those that
+were evaluated.
 """
 
 from __future__ import annotations
@@ -22,7 +23,8 @@ from explorer.legs.interference import step_overlaps
 from explorer.legs.move_bounds import least_rows
 from explorer.mechanism.design import Design
 from explorer.mechanism.kinematics import platform_points
-from explorer.mechanism.pose import Pose, checked_rotation
+from explorer.mechanism.pose import Pose, Triple, checked_rotation
+from explorer.mechanism.tool_point import tool_offset
 from explorer.numerics.arrays import BoolArray, FloatArray, batch_shape, finite_array
 
 # Tolerances as shares of the reach, or of the longest travel of a leg's end if that is longer.
@@ -64,6 +66,7 @@ class MoveClearance:
         tolerance: Largest difference of `clearance` and `bound`, in design units.
         steps: Number of steps of the paper's test.
         overlaps: Whether the swept tetrahedra of each pair overlap in a step, shape (6,).
+        tool: Point that moves straight in the platform frame, in design units; None for b4.
     """
 
     start: Pose
@@ -75,6 +78,7 @@ class MoveClearance:
     tolerance: float
     steps: int
     overlaps: BoolArray
+    tool: Triple | None = None
 
     @property
     def closest(self) -> int:
@@ -92,23 +96,32 @@ class MoveClearance:
         return not self.overlaps.any()
 
 
-def poses_between(start: Pose, end: Pose, shares: ArrayLike) -> tuple[FloatArray, FloatArray]:
+def poses_between(
+    start: Pose, end: Pose, shares: ArrayLike, tool: ArrayLike | None = None
+) -> tuple[FloatArray, FloatArray]:
     """Return the poses of a straight move.
 
     Args:
         start: Pose at the start of the move.
         end: Pose at its end; the platform turns the shorter way.
         shares: Shares of the move, from 0 to 1, shape (...).
+        tool: Point that moves straight in the platform frame, shape (3,), in design units; None
+            for b4.
 
     Returns:
-        Positions, shape (..., 3), and rotations, shape (..., 3, 3).
+        Positions of b4, shape (..., 3), and rotations, shape (..., 3, 3).
+
+    Raises:
+        InputError: Shares or the tool are not finite.
     """
     share = finite_array("shares of the move", shares, ())[..., None]
     first, last = np.array(start.position), np.array(end.position)
     turn = Rotation.from_matrix(end.rotation @ start.rotation.T).as_rotvec()
-    return first + share * (last - first), Rotation.from_rotvec(share * turn).as_matrix() @ (
-        start.rotation
-    )
+    rotations = Rotation.from_rotvec(share * turn).as_matrix() @ start.rotation
+    if tool is None:
+        return first + share * (last - first), rotations
+    first, last = first + tool_offset(start.rotation, tool), last + tool_offset(end.rotation, tool)
+    return first + share * (last - first) - tool_offset(rotations, tool), rotations
 
 
 def move_clearances(
@@ -119,6 +132,7 @@ def move_clearances(
     end_rotation: ArrayLike,
     *,
     tolerance: float | None = None,
+    tool: ArrayLike | None = None,
 ) -> MoveClearances:
     """Return the least clearances over straight moves; those of no length are allowed.
 
@@ -130,11 +144,14 @@ def move_clearances(
         end_rotation: Platform to base at the end, shape (..., 3, 3); the platform turns the
             shorter way.
         tolerance: As for `move_clearance`.
+        tool: Point that moves straight in the platform frame, shape (3,), in design units; None
+            for b4.
 
     Raises:
-        InputError: a pose is not finite or not a rotation, or the tolerance is too small.
+        InputError: a pose or the tool is not finite, not a rotation, or the tolerance is too small.
     """
-    moves = _Moves.of(design, start_position, start_rotation, end_position, end_rotation)
+    arrays = (start_position, start_rotation, end_position, end_rotation)
+    moves = _Moves.of(design, *arrays, tool=tool)
     bound, least, share = moves.least(design, moves.tolerance(design, tolerance), math.nan)
     radii = radii_of_pairs(design)
     return MoveClearances(bound - radii, least - radii, share)
@@ -148,13 +165,14 @@ def moves_are_clear(
     end_rotation: ArrayLike,
     *,
     clearance: float = 0.0,
+    tool: ArrayLike | None = None,
 ) -> BoolArray:
     """Return whether all pairs have more than a clearance over whole moves, shape (...).
 
     Arguments and errors are those of `move_clearances`; see `pairs_are_clear` for the accuracy.
     """
     arrays = (start_position, start_rotation, end_position, end_rotation)
-    return np.asarray(pairs_are_clear(design, *arrays, clearance=clearance).all(axis=-1))
+    return np.asarray(pairs_are_clear(design, *arrays, clearance=clearance, tool=tool).all(axis=-1))
 
 
 def pairs_are_clear(
@@ -165,6 +183,7 @@ def pairs_are_clear(
     end_rotation: ArrayLike,
     *,
     clearance: float = 0.0,
+    tool: ArrayLike | None = None,
 ) -> BoolArray:
     """Return which pairs have more than a clearance over whole moves, shape (..., 6).
 
@@ -173,13 +192,20 @@ def pairs_are_clear(
     the default tolerance of `move_clearance`. It is True for a pair that shares a joint. Other
     arguments and errors are those of `move_clearances`.
     """
-    moves = _Moves.of(design, start_position, start_rotation, end_position, end_rotation)
+    arrays = (start_position, start_rotation, end_position, end_rotation)
+    moves = _Moves.of(design, *arrays, tool=tool)
     bound, _, _ = moves.least(design, moves.tolerance(design, None), clearance)
     return np.asarray(bound > radii_of_pairs(design) + clearance)
 
 
 def move_clearance(
-    design: Design, start: Pose, end: Pose, *, steps: int = 1, tolerance: float | None = None
+    design: Design,
+    start: Pose,
+    end: Pose,
+    *,
+    steps: int = 1,
+    tolerance: float | None = None,
+    tool: Triple | None = None,
 ) -> MoveClearance:
     """Return the least clearances over a straight move, with the paper's test beside them.
 
@@ -190,6 +216,7 @@ def move_clearance(
         steps: Number of steps of the paper's test.
         tolerance: Tolerance of the least clearances, in design units; by default a millionth
             of the reach, or of the longest travel of a leg's end if that is longer.
+        tool: Point that moves straight in the platform frame, in design units; None for b4.
 
     Raises:
         InputError: The move has no length or no steps, or the tolerance is too small.
@@ -197,7 +224,7 @@ def move_clearance(
     if steps < 1:
         raise InputError(f"a move has at least one step; got {steps}")
     arrays = (np.array(start.position), start.rotation, np.array(end.position), end.rotation)
-    moves = _Moves.of(design, *arrays)
+    moves = _Moves.of(design, *arrays, tool=tool)
     if float(moves.travel[0]) <= NO_LENGTH * max(design.reach, *map(abs, start.position)):
         shown = ", ".join(f"{x:g}" for x in start.position)
         raise InputError(
@@ -205,10 +232,10 @@ def move_clearance(
             "same orientation"
         )
     tolerances = moves.tolerance(design, tolerance)
-    least = move_clearances(design, *arrays, tolerance=float(tolerances[0]))
-    positions, rotations = poses_between(start, end, np.linspace(0.0, 1.0, steps + 1))
+    least = move_clearances(design, *arrays, tolerance=float(tolerances[0]), tool=tool)
+    positions, rotations = poses_between(start, end, np.linspace(0.0, 1.0, steps + 1), tool)
     overlaps = step_overlaps(design, positions[:-1], rotations[:-1], positions[1:], rotations[1:])
-    closest = leg_clearances(design, *poses_between(start, end, least.share))
+    closest = leg_clearances(design, *poses_between(start, end, least.share, tool))
     pairs = np.arange(len(PAIRS))
     return MoveClearance(
         start=start,
@@ -220,6 +247,7 @@ def move_clearance(
         tolerance=float(tolerances[0]),
         steps=steps,
         overlaps=np.asarray(overlaps.any(axis=0)),
+        tool=tool,
     )
 
 
@@ -232,8 +260,8 @@ class _Moves:
 
     Attributes:
         batch: The batch axes.
-        start: b4 at the start, shape (n, 3).
-        step: Displacement of b4, shape (n, 3).
+        start: Point that moves straight at the start, shape (n, 3).
+        step: Its displacement, shape (n, 3).
         angle: Rotation of the platform, in radians, shape (n,).
         parts: fixed, across and up of each leg's platform end, shape (n, 4, 3, 3).
         travel: Upper bound of the longest travel of a leg's end, shape (n,).
@@ -247,7 +275,7 @@ class _Moves:
     travel: FloatArray
 
     @staticmethod
-    def of(design: Design, *arrays: ArrayLike) -> _Moves:
+    def of(design: Design, *arrays: ArrayLike, tool: ArrayLike | None = None) -> _Moves:
         """Return the moves of the positions and rotations of `move_clearances`, broadcast."""
         p, q = (
             finite_array(f"{end} position", position, (3,))
@@ -260,7 +288,11 @@ class _Moves:
         turn = Rotation.from_matrix(last @ np.swapaxes(first, -1, -2)).as_rotvec()
         angle = np.linalg.norm(turn, axis=-1)
         axis = turn / np.where(angle > 0.0, angle, 1.0)[:, None]
-        arms = platform_points(design) @ np.swapaxes(first, -1, -2)
+        points = platform_points(design)
+        if tool is not None:
+            points = points - finite_array("tool", tool, (3,))
+            start, end = start + tool_offset(first, tool), end + tool_offset(last, tool)
+        arms = points @ np.swapaxes(first, -1, -2)
         fixed = (arms @ axis[:, :, None]) * axis[:, None, :]
         up = np.cross(axis[:, None, :], arms)
         across = np.where(angle[:, None, None] > 0.0, arms - fixed, 0.0)

@@ -1,9 +1,9 @@
 """Singular poses on a path: all of them, however close together.
 
-Over a straight move the position goes along a line and the platform turns about one axis, so
-a margin is (a + a' t) + (b + b' t) cos ωt + (c + c' t) sin ωt. Its roots are isolated by
-halving intervals until a bound of the second derivative proves that an interval has no root,
-or one at most.
+Over a straight move one point of the platform, b4 or the tool point, goes along a line and the
+platform turns about one axis, so a margin is (a + a' t) + (b + b' t) cos ωt + (c + c' t) sin ωt.
+Its roots are isolated by halving intervals until a bound of the second derivative proves that an
+interval has no root, or one at most.
 """
 
 from __future__ import annotations
@@ -15,13 +15,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from explorer.errors import InputError
 from explorer.legs.moves import poses_between
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose
-from explorer.numerics.arrays import FloatArray
+from explorer.numerics.arrays import FloatArray, finite_array
 
 # A margin is zero at a pose, and over a whole move, below these shares of |position| + |way|.
 ROUNDING, ALL_ALONG = 1e-14, 1e-12
@@ -77,15 +78,19 @@ class PathMargins:
     lies_in: tuple[int, ...]
 
 
-def path_margins(poses: Sequence[Pose], samples: int = SAMPLES) -> PathMargins:
+def path_margins(
+    poses: Sequence[Pose], samples: int = SAMPLES, tool: ArrayLike | None = None
+) -> PathMargins:
     """Return the margins over a path of straight moves, and its singular poses.
 
     Args:
         poses: Corners of the path, two or more.
         samples: Number of samples of a move, both ends included.
+        tool: Point that moves straight in the platform frame, shape (3,), in design units; None
+            for b4.
 
     Raises:
-        InputError: there are fewer than two poses or samples.
+        InputError: there are fewer than two poses or samples, or the tool is not finite.
     """
     if len(poses) < 2 or samples < 2:
         raise InputError("a path has at least two poses and at least two samples of a move")
@@ -98,8 +103,8 @@ def path_margins(poses: Sequence[Pose], samples: int = SAMPLES) -> PathMargins:
         # A corner is a sample of the move that ends there.
         new_shares = shares if index == 0 else shares[1:]
         at.append(index + new_shares)
-        values.append(margins(*poses_between(start, end, new_shares)))
-        of_move, lasting = _find_crossings_of_move(start, end, index)
+        values.append(margins(*poses_between(start, end, new_shares, tool)))
+        of_move, lasting = _find_crossings_of_move(start, end, index, tool)
         crossings += of_move
         lies_in.update(lasting)
     merged = tuple(_merge_corners(crossings))
@@ -127,16 +132,18 @@ def _merge_corners(crossings: list[Crossing]) -> list[Crossing]:
     return merged
 
 
-def _find_crossings_of_move(start: Pose, end: Pose, index: int) -> tuple[list[Crossing], list[int]]:
+def _find_crossings_of_move(
+    start: Pose, end: Pose, index: int, tool: ArrayLike | None
+) -> tuple[list[Crossing], list[int]]:
     """Return the crossings of a move in order, and the incidences that hold all along it."""
     crossings: list[Crossing] = []
     lasting: list[int] = []
-    for number, margin in enumerate(_move_margins(start, end)):
+    for number, margin in enumerate(_move_margins(start, end, tool)):
         if margin.is_zero:
             lasting.append(number + 1)
             continue
         for share, changes in margin.roots():
-            position, rotation = poses_between(start, end, share)
+            position, rotation = poses_between(start, end, share, tool)
             aside = share - ASIDE if share > NEAREST_ROOTS else share + ASIDE
             side = 1 if margin.at(aside)[0] > 0.0 else -1
             pose = Pose.of(position, rotation)
@@ -238,27 +245,36 @@ def _merge_roots(roots: list[tuple[float, bool]]) -> list[tuple[float, bool]]:
     return merged
 
 
-def _move_margins(start: Pose, end: Pose) -> tuple[_MoveMargin, _MoveMargin, _MoveMargin]:
-    """Return the three margins of a move."""
-    p, first = np.array(start.position), start.rotation
-    step = np.array(end.position) - p
+def _move_margins(
+    start: Pose, end: Pose, tool: ArrayLike | None
+) -> tuple[_MoveMargin, _MoveMargin, _MoveMargin]:
+    """Return the three margins of a move of a tool point t.
+
+    With c its position, δ1 = t z − R ẑ·c, δ2 = (x̂ × R x̂)·c − x̂·R (x̂ × t) and δ3 = ẑ·c − ẑ·R t.
+    """
+    t = np.zeros(3) if tool is None else finite_array("tool", tool, (3,))
+    first = start.rotation
+    p = np.array(start.position) + first @ t
+    step = np.array(end.position) + end.rotation @ t - p
     turn = Rotation.from_matrix(end.rotation @ first.T).as_rotvec()
     angle = float(np.linalg.norm(turn))
     axis = turn / angle if angle > 0.0 else np.array([1.0, 0.0, 0.0])
-    size = float(np.linalg.norm(p) + np.linalg.norm(step)) or 1.0
+    size = float(np.linalg.norm(p) + np.linalg.norm(step) + np.linalg.norm(t)) or 1.0
 
     def parts_of(direction: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return the constant, cosine and sine parts of a direction that turns."""
         stays = axis * float(axis @ direction)
         return stays, direction - stays, np.cross(axis, direction)
 
-    def margin_along(directions: Sequence[FloatArray]) -> _MoveMargin:
-        terms = [x for d in directions for x in (float(d @ p), float(d @ step))]
-        a, da, b, db, c, dc = terms
+    def margin_along(directions: Sequence[FloatArray], less: Sequence[float]) -> _MoveMargin:
+        terms = [(float(d @ p) - x, float(d @ step)) for d, x in zip(directions, less, strict=True)]
+        (a, da), (b, db), (c, dc) = terms
         return _MoveMargin(a, da, b, db, c, dc, angle, size)
 
-    x, zero = np.array([1.0, 0.0, 0.0]), np.zeros(3)
-    delta1 = margin_along([-part for part in parts_of(first[:, 2])])
-    delta2 = margin_along([np.cross(x, part) for part in parts_of(first[:, 0])])
-    delta3 = margin_along([np.array([0.0, 0.0, 1.0]), zero, zero])
+    x, z, zero = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]), np.zeros(3)
+    around = [float(part[0]) for part in parts_of(first @ np.cross(x, t))]
+    above = [float(part[2]) for part in parts_of(first @ t)]
+    delta1 = margin_along([-part for part in parts_of(first[:, 2])], [-float(t[2]), 0.0, 0.0])
+    delta2 = margin_along([np.cross(x, part) for part in parts_of(first[:, 0])], around)
+    delta3 = margin_along([z, zero, zero], above)
     return delta1, delta2, delta3

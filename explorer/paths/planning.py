@@ -20,7 +20,7 @@ from explorer.legs.clearance import PAIRS
 from explorer.measures.snapshot import Snapshot, evaluate
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.margins import INCIDENCES, mode_name
-from explorer.mechanism.pose import Pose
+from explorer.mechanism.pose import Pose, Triple
 from explorer.paths.smoothing import Smoother
 from explorer.paths.tree_search import TreeSearch, compile_checks, search_is_possible
 from explorer.singularity.bruhat import incidences
@@ -76,6 +76,7 @@ class PlannedPath:
             units.
         seconds: Time for search and smoothing.
         checked: Number of moves checked in the search.
+        tool: Point that moves straight in the platform frame, in design units; None for b4.
     """
 
     poses: tuple[Pose, ...]
@@ -85,6 +86,7 @@ class PlannedPath:
     clearance: float
     seconds: float
     checked: int
+    tool: Triple | None = None
 
 
 def plan_path(
@@ -94,6 +96,7 @@ def plan_path(
     *,
     seconds: float = DEFAULT_SECONDS,
     seed: int = 0,
+    tool: Triple | None = None,
 ) -> PlannedPath:
     """Return a path from a pose to another that keeps limits, margins and clearances.
 
@@ -107,6 +110,8 @@ def plan_path(
         goal: Pose at the end.
         seconds: Time for the search; smoothing takes some tenths of a second more.
         seed: Seed of the random shortcuts in smoothing.
+        tool: Point that each move moves straight in the platform frame, in design units; None for
+            b4. If the platform turns, b4 goes along a curve.
 
     Raises:
         EndError: the start or the goal is singular or outside the limits.
@@ -125,7 +130,7 @@ def plan_path(
         _check_within(name, snapshot, ends[0].signs)
     _check_same_order(*ends)
     started = time.perf_counter()
-    planner = _Planner(design, start, goal, seed)
+    planner = _Planner(design, start, goal, seed, tool)
     demanded = Rules.of(design, ends[0].signs, _order(ends[0]))
     margin, clearance = _preferred(*ends)
     preferred = demanded.tighten(margin, clearance)
@@ -155,16 +160,19 @@ class _Planner:
         checked: Number of moves checked so far.
     """
 
-    def __init__(self, design: Design, start: Pose, goal: Pose, seed: int) -> None:
+    def __init__(
+        self, design: Design, start: Pose, goal: Pose, seed: int, tool: Triple | None
+    ) -> None:
         self.checked = 0
         self._design = design
         self._ends = start, goal
         self._seed = seed
+        self._tool = tool
 
     def plan_straight(self, rules: Rules, margin: float, clearance: float) -> PlannedPath | None:
         """Return the straight move if it is valid."""
         self.checked += 1
-        smoother = Smoother(self._design, rules, self._seed)
+        smoother = Smoother(self._design, rules, self._seed, self._tool)
         if not smoother.is_valid(*self._ends):
             return None
         return self._path(smoother, self._ends, self._ends, margin, clearance)
@@ -173,12 +181,12 @@ class _Planner:
         self, rules: Rules, margin: float, clearance: float, seconds: float
     ) -> PlannedPath | None:
         """Return a smoothed path of OMPL's search, or None if the time was too short."""
-        tree = TreeSearch(self._design, rules)
+        tree = TreeSearch(self._design, rules, self._tool)
         unsmoothed = tree.path(*self._ends, seconds)
         self.checked += tree.checked
         if unsmoothed is None:
             return None
-        smoother = Smoother(self._design, rules, self._seed)
+        smoother = Smoother(self._design, rules, self._seed, self._tool)
         return self._path(smoother, unsmoothed, smoother.smooth(unsmoothed), margin, clearance)
 
     def _path(
@@ -197,6 +205,7 @@ class _Planner:
             clearance=clearance,
             seconds=0.0,
             checked=0,
+            tool=self._tool,
         )
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from explorer.legs.moves import poses_between
 from explorer.mechanism.design import Design
 from explorer.mechanism.displacement import displacement
-from explorer.mechanism.pose import Pose
+from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.workspace.limits.valid_moves import moves_are_valid
 from explorer.workspace.limits.valid_poses import Rules
@@ -36,11 +36,13 @@ class Smoother:
         design: The manipulator.
         rules: Rules that every pose keeps.
         seed: Seed of the random shortcuts.
+        tool: Point that moves straight in the platform frame, in design units; None for b4.
     """
 
     design: Design
     rules: Rules
     seed: int = 0
+    tool: Triple | None = None
 
     def smooth(self, poses: Sequence[Pose]) -> tuple[Pose, ...]:
         """Return a path with the same ends, shorter and with its corners cut off."""
@@ -57,7 +59,8 @@ class Smoother:
 
     def _are_valid(self, pieces: Sequence[tuple[Pose, Pose]]) -> list[bool]:
         (p, r), (q, s) = (_positions_and_rotations(ends) for ends in zip(*pieces, strict=True))
-        return moves_are_valid(self.design, p, r, q, s, rules=self.rules).tolist()
+        valid = moves_are_valid(self.design, p, r, q, s, rules=self.rules, tool=self.tool)
+        return valid.tolist()
 
     def _shorten(self, poses: list[Pose]) -> list[Pose]:
         rng = np.random.default_rng(self.seed)
@@ -101,9 +104,12 @@ class Smoother:
             return len(poses) - 2, poses[-1]
         length = float(ends[index + 1] - ends[index])
         share = (distance - float(ends[index])) / length
-        return index, poses[index] if share == 0.0 else _pose_between(
+        return index, poses[index] if share == 0.0 else self._pose_between(
             poses[index], poses[index + 1], share
         )
+
+    def _pose_between(self, start: Pose, end: Pose, share: float) -> Pose:
+        return Pose.of(*poses_between(start, end, share, self.tool))
 
     def _cut_corners(self, poses: list[Pose]) -> list[Pose]:
         for _ in range(CUT_ROUNDS):
@@ -111,7 +117,10 @@ class Smoother:
                 break
             corners = list(zip(poses, poses[1:], poses[2:], strict=False))
             cuts = [
-                [(_pose_between(b, a, share), _pose_between(b, c, share)) for share in CUTS]
+                [
+                    (self._pose_between(b, a, share), self._pose_between(b, c, share))
+                    for share in CUTS
+                ]
                 for a, b, c in corners
             ]
             valid = iter(self._are_valid([cut for choices in cuts for cut in choices]))
@@ -134,10 +143,6 @@ class _Shortcut:
 
 def _positions_and_rotations(poses: Sequence[Pose]) -> tuple[FloatArray, FloatArray]:
     return np.array([pose.position for pose in poses]), np.array([pose.rotation for pose in poses])
-
-
-def _pose_between(start: Pose, end: Pose, share: float) -> Pose:
-    return Pose.of(*poses_between(start, end, share))
 
 
 def _without_repeats(poses: list[Pose]) -> list[Pose]:

@@ -12,12 +12,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from explorer.errors import InputError
 from explorer.legs.moves import poses_between
 from explorer.mechanism.design import Design
 from explorer.mechanism.kinematics import inverse
 from explorer.mechanism.pose import Pose, quaternion_from_rotation
+from explorer.mechanism.tool_point import tool_offset
 from explorer.numerics.arrays import FloatArray
 
 # The default speed of the fastest actuator, as a share of the reach per second.
@@ -38,6 +40,8 @@ class Trajectory:
         position: b4 in the base frame, in design units, shape (n, 3).
         quaternion: (w, x, y, z), without changes of sign between samples, shape (n, 4).
         at: Place on the path: number of the move plus the share of it, shape (n,).
+        tool_position: Tool point in the base frame, in design units, shape (n, 3); None if b4
+            moves straight.
     """
 
     time: FloatArray
@@ -45,6 +49,7 @@ class Trajectory:
     position: FloatArray
     quaternion: FloatArray
     at: FloatArray
+    tool_position: FloatArray | None = None
 
     @property
     def duration(self) -> float:
@@ -65,6 +70,7 @@ def trajectory(
     *,
     speed: float | None = None,
     samples: int = DEFAULT_SAMPLES,
+    tool: ArrayLike | None = None,
 ) -> Trajectory:
     """Return the trajectory along a path of straight moves.
 
@@ -74,10 +80,12 @@ def trajectory(
         speed: Speed of the fastest actuator, in design units per second; by default a tenth
             of the reach.
         samples: Number of samples, both ends included.
+        tool: Point that moves straight in the platform frame, shape (3,), in design units; None
+            for b4.
 
     Raises:
-        InputError: there are too few poses, too few or too many samples, or the speed is not
-            positive.
+        InputError: there are too few poses, too few or too many samples, the speed is not
+            positive, or the tool is not finite.
     """
     if len(poses) < 2:
         raise InputError("a trajectory needs a path of at least two poses")
@@ -90,7 +98,7 @@ def trajectory(
     shares = np.linspace(0.0, 1.0, STEPS + 1, dtype=np.float64)
     time: list[FloatArray] = [np.zeros(1)]
     for start, end in moves:
-        joints = inverse(design, *poses_between(start, end, shares))
+        joints = inverse(design, *poses_between(start, end, shares, tool))
         travels = np.abs(np.diff(joints, axis=0)).max(axis=-1)
         time.append(time[-1][-1] + np.cumsum(travels) / actuator_speed)
     times = np.concatenate(time)
@@ -102,9 +110,10 @@ def trajectory(
     position, rotation = np.empty((samples, 3)), np.empty((samples, 3, 3))
     for index, (start, end) in enumerate(moves):
         on_move = number == index
-        position[on_move], rotation[on_move] = poses_between(start, end, at[on_move] - index)
+        position[on_move], rotation[on_move] = poses_between(start, end, at[on_move] - index, tool)
     quaternion = quaternion_from_rotation(rotation)
     flips = (quaternion[1:] * quaternion[:-1]).sum(axis=-1) < 0.0
     signs = np.cumprod(np.where(np.concatenate([[False], flips]), -1.0, 1.0))
     joints = inverse(design, position, rotation)
-    return Trajectory(sampled, joints, position, quaternion * signs[:, None], at)
+    of_tool = None if tool is None else position + tool_offset(rotation, tool)
+    return Trajectory(sampled, joints, position, quaternion * signs[:, None], at, of_tool)

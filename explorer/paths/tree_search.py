@@ -16,7 +16,7 @@ import numpy as np
 
 from explorer.errors import MissingExtraError
 from explorer.mechanism.design import Design
-from explorer.mechanism.pose import Pose
+from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.workspace.limits.valid_moves import DEFAULT_TOLERANCE, valid_move_rows
 from explorer.workspace.limits.valid_poses import Rules, valid_rows
@@ -81,15 +81,17 @@ class TreeSearch:
     Args:
         design: The manipulator.
         rules: Rules that every pose of the path keeps.
+        tool: Point that moves straight in the platform frame, in design units; None for b4.
 
     Attributes:
         checked: Number of moves checked so far.
     """
 
-    def __init__(self, design: Design, rules: Rules) -> None:
+    def __init__(self, design: Design, rules: Rules, tool: Triple | None = None) -> None:
         self.checked = 0
         self._design = design
         self._rules = rules
+        self._tool = np.array(tool or (0.0, 0.0, 0.0))
         self._tolerance = DEFAULT_TOLERANCE * design.reach
         self._positions: FloatArray = np.empty((2, 1, 3))
         self._rotations: FloatArray = np.empty((2, 1, 3, 3))
@@ -148,7 +150,8 @@ class TreeSearch:
         self._read(0, start)
         self._read(1, end)
         (p, q), (r, s), rules = self._positions, self._rotations, self._rules
-        valid_move_rows(1, rules.row, rules.cones, p, r, q, s, self._tolerance, self._valid)
+        given = (p, r, q, s, self._tool)
+        valid_move_rows(1, rules.row, rules.cones, *given, self._tolerance, self._valid)
         return bool(self._valid[0])
 
 

@@ -13,6 +13,7 @@ from limited_designs import limited
 from numpy.typing import ArrayLike
 from refusals import refusal
 from strategies import ordinary_designs, positions, rotations
+from tool_moves import tool_move
 
 from explorer import (
     PAIRS,
@@ -200,6 +201,41 @@ def test_move_clearances_batch_meets_the_tolerance() -> None:
             assert (found.clearance[row] <= least + tolerance).all()
 
 
+@given(moves(), positions(), st.sampled_from((None, 1e-2)))
+def test_move_clearance_of_the_tool_bounds_the_move_that_it_makes(
+    move: tuple[Design, Pose, Pose], tool: FloatArray, share: float | None
+) -> None:
+    design, start, end = move
+    tool = design.reach * tool
+    tolerance = None if share is None else share * 10.0 * design.reach
+    x, y, z = tool.tolist()
+    found = move_clearance(design, start, end, tolerance=tolerance, tool=(x, y, z))
+    pairs = ~joined_pairs(design)
+    poses = tool_move(start, end, np.linspace(0.0, 1.0, 1001), tool)
+    least = leg_clearances(design, *poses).clearance.min(axis=0)[pairs]
+    bound, clearance = found.bound[pairs], found.clearance[pairs]
+    assert (bound <= least + 1e-11 * design.reach).all()
+    assert (clearance <= least + found.tolerance).all()
+    assert (clearance <= bound + found.tolerance * (1.0 + 1e-9)).all()
+    at = leg_clearances(design, *tool_move(start, end, found.share, tool))
+    attained = at.clearance[np.arange(6), np.arange(6)][pairs]
+    np.testing.assert_allclose(attained, clearance, atol=1e-11 * design.reach)
+
+
+def test_move_clearances_of_a_tool_at_b4_are_those_of_b4() -> None:
+    many = random_moves(3, 300)
+    at_b4, same = (move_clearances(OPTIMAL, *many, tool=t) for t in (None, (0.0, 0.0, 0.0)))
+    np.testing.assert_array_equal(at_b4.bound, same.bound)
+    # Elsewhere a turn moves the legs in another way.
+    far = move_clearances(OPTIMAL, *many, tool=(0.0, 0.0, 9.0))
+    turned = np.arange(300) % 3 > 0
+    assert (np.abs(far.clearance - at_b4.clearance)[turned].max(axis=-1) > 1e-3).mean() > 0.5
+    np.testing.assert_allclose(far.clearance[~turned], at_b4.clearance[~turned], atol=3e-5)
+    clear = moves_are_clear(OPTIMAL, *many, tool=(0.0, 0.0, 9.0), clearance=0.3)
+    decided = np.abs(far.bound.min(axis=-1) - 0.3) > 1e-4
+    np.testing.assert_array_equal(clear[decided], far.bound.min(axis=-1)[decided] > 0.3)
+
+
 def test_moves_are_clear_any_clearance_agrees_with_the_least() -> None:
     design = limited(OPTIMAL, leg_radii=(0.1, 0.2, 0.2, 0.3))
     many = random_moves(4, 2000)
@@ -229,6 +265,19 @@ def test_move_clearances_reversed_moves_are_unchanged() -> None:
     there = move_clearances(OPTIMAL, first, turn, last, turned, tolerance=1e-6)
     back = move_clearances(OPTIMAL, last, turned, first, turn, tolerance=1e-6)
     np.testing.assert_allclose(there.clearance, back.clearance, atol=2e-6)
+
+
+@given(moves(), positions())
+def test_poses_between_move_the_tool_straight(
+    move: tuple[Design, Pose, Pose], tool: FloatArray
+) -> None:
+    _, start, end = move
+    shares = np.linspace(0.0, 1.0, 7)
+    found, expected = poses_between(start, end, shares, tool), tool_move(start, end, shares, tool)
+    np.testing.assert_allclose(found[0], expected[0], atol=1e-9 * (1.0 + np.abs(found[0]).max()))
+    tools = found[0] + found[1] @ tool
+    line = tools[0] + shares[:, None] * (tools[-1] - tools[0])
+    np.testing.assert_allclose(tools, line, atol=1e-12 * (1.0 + np.abs(tools).max()))
 
 
 def test_poses_between_shares_zero_and_one_are_the_ends() -> None:

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import assume, given, strategies as st
 from scipy.spatial.transform import Rotation
 from strategies import WAYS, Case, cases, ordinary_cases, singular_cases
+from tool_moves import tool_move
 
 from explorer import PRESETS, InputError, Pose, forward, home_pose, inverse, margins, poses_between
 from explorer.mechanism.margins import mode_of
@@ -44,6 +45,35 @@ def test_path_margins_random_move_has_all_crossings(seed: int) -> None:
         np.testing.assert_allclose(each.pose.rotation, rotation, atol=1e-12)
     crossed = [sum(c.incidence == k for c in found.crossings) for k in (1, 2, 3)]
     assert crossed == sign_changes(start, end).tolist()
+
+
+@given(st.integers(0, 2**32), st.sampled_from((0.1, 3.0, 20.0)))
+def test_path_margins_move_of_the_tool_has_all_crossings(seed: int, size: float) -> None:
+    rng = np.random.default_rng(seed)
+    start, end, tool = random_pose(rng), random_pose(rng), size * rng.uniform(-1.0, 1.0, 3)
+    found = path_margins([start, end], tool=tool)
+    for each in found.crossings:
+        position, rotation = tool_move(start, end, each.share, tool)
+        assert abs(margins(position, rotation)[0, each.incidence - 1]) < 1e-12 * (5.0 + size)
+        np.testing.assert_allclose(each.pose.position, position[0], atol=1e-12 * (5.0 + size))
+    samples = margins(*tool_move(start, end, np.linspace(0.0, 1.0, len(found.at)), tool))
+    np.testing.assert_allclose(found.margins, samples, atol=1e-12 * (5.0 + size))
+    signs = margins(*tool_move(start, end, np.linspace(0.0, 1.0, 4001), tool)) > 0.0
+    changes = (signs[1:] != signs[:-1]).sum(axis=0).tolist()
+    crossed = [sum(c.incidence == k for c in found.crossings) for k in (1, 2, 3)]
+    assert crossed == changes
+
+
+def test_path_margins_of_the_tool_can_touch_the_base_plane_twice() -> None:
+    # The tool stays while the platform turns by 160° about it: b4 dips below the base and returns.
+    low, high = (Pose.of_yaw_pitch_roll((0, 0, 0), (10.0, pitch, 0.0)) for pitch in (-80.0, 80.0))
+    tool = (0.0, 0.0, 4.0)
+    start, end = (
+        Pose.of(np.array([9.0, 5.0, 2.0]) - r @ tool, r) for r in (low.rotation, high.rotation)
+    )
+    crossings = path_margins([start, end], tool=tool).crossings
+    assert [c.incidence for c in crossings].count(3) == 2
+    assert [c.incidence for c in path_margins([start, end]).crossings].count(3) == 0
 
 
 def test_path_margins_one_move_can_cross_a_margin_twice() -> None:

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from limited_designs import limited
 from scipy.spatial.transform import Rotation
+from tool_moves import tool_move
 
 from explorer import (
     PRESETS,
@@ -26,7 +27,7 @@ from explorer import (
     inverse,
     move_clearances,
     moves_are_clear,
-    poses_between,
+    yaw_pitch_roll_from_rotation,
 )
 from explorer.mechanism.displacement import displacement
 from explorer.paths.crossings import path_margins
@@ -68,13 +69,14 @@ def pairs() -> tuple[tuple[Pose, Pose], ...]:
 
 def assert_keeps_everything(path: PlannedPath, poses: tuple[Pose, ...]) -> None:
     room = (path.margin - 2e-4 * DESIGN.reach, path.clearance - 1e-4 * DESIGN.reach)
+    tool = np.array(path.tool or (0.0, 0.0, 0.0))
     for start, end in itertools.pairwise(poses):
-        positions, rotations = poses_between(start, end, np.linspace(0.0, 1.0, 50))
+        positions, rotations = tool_move(start, end, np.linspace(0.0, 1.0, 50), tool)
         assert poses_are_valid(DESIGN, positions, rotations).all()
-        ends = (positions[0], rotations[0], positions[-1], rotations[-1])
-        assert moves_are_clear(DESIGN, *ends)
-        assert moves_are_clear(DESIGN, *ends, clearance=room[1]) or room[1] < 0.0
-    margins = path_margins(poses)
+        ends = (start.position, start.rotation, end.position, end.rotation)
+        assert moves_are_clear(DESIGN, *ends, tool=tool)
+        assert moves_are_clear(DESIGN, *ends, clearance=room[1], tool=tool) or room[1] < 0.0
+    margins = path_margins(poses, tool=tool)
     assert margins.crossings == ()
     assert margins.lies_in == ()
     assert np.abs(margins.margins).min() >= room[0]
@@ -91,6 +93,27 @@ def test_plan_path_between_valid_ends_keeps_limits_margins_and_clearances(index:
         assert poses[0] is start
         assert poses[-1] is goal
         assert_keeps_everything(path, poses)
+
+
+@needs_ompl
+@pytest.mark.parametrize("index", range(6))
+def test_plan_path_of_the_tool_keeps_limits_margins_and_clearances(index: int) -> None:
+    start, goal = pairs()[index]
+    path = plan_path(DESIGN, start, goal, seconds=20.0, tool=(1.0, -0.5, 3.0))
+    assert path.tool == (1.0, -0.5, 3.0)
+    for poses in (path.poses, path.unsmoothed):
+        assert poses[0] is start
+        assert poses[-1] is goal
+        assert_keeps_everything(path, poses)
+
+
+def test_plan_path_of_a_tool_in_free_space_is_one_straight_move() -> None:
+    x, y, z = HOME.position
+    angles = yaw_pitch_roll_from_rotation(HOME.rotation)
+    goal = Pose.of_yaw_pitch_roll((x + 1.0, y, z - 1.0), (angles[0] + 5.0, 3.0, 4.0))
+    path = plan_path(DESIGN, HOME, goal, tool=(0.0, 0.0, 4.0))
+    assert path.poses == (HOME, goal)
+    assert_keeps_everything(path, path.poses)
 
 
 @needs_ompl

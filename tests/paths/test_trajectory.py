@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given, strategies as st
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
+from tool_moves import tool_move
 
 from explorer import (
     PRESETS,
@@ -56,6 +57,22 @@ def test_trajectory_random_path_has_even_samples_on_it(
     assert_allclose(found.joints, joints, atol=1e-9)
     # No sudden change of sign.
     assert ((found.quaternion[1:] * found.quaternion[:-1]).sum(axis=-1) >= 0.0).all()
+
+
+@given(st.integers(0, 2**32), st.integers(2, 4))
+def test_trajectory_of_the_tool_goes_straight_from_corner_to_corner(
+    seed: int, corners: int
+) -> None:
+    path, tool = random_path(seed, corners), np.array([1.0, -2.0, 6.0])
+    found = trajectory(DESIGN, path, samples=101, tool=tool)
+    for index in range(0, 101, 10):
+        move = min(int(found.at[index]), corners - 2)
+        p, r = tool_move(path[move], path[move + 1], found.at[index] - move, tool)
+        assert_allclose(found.position[index], p[0], atol=1e-11)
+        assert found.tool_position is not None
+        assert_allclose(found.tool_position[index], p[0] + r[0] @ tool, atol=1e-11)
+    assert_allclose(found.joints, inverse(DESIGN, found.position, rotation_of(found.quaternion)))
+    assert trajectory(DESIGN, path, samples=101).tool_position is None
 
 
 @given(st.integers(0, 2**32), st.sampled_from((0.1, 2.0)))
@@ -105,6 +122,14 @@ def test_trajectory_csv_reads_back_to_the_last_bit(tmp_path: Path) -> None:
     assert (values == np.concatenate(expected, axis=1)).all()
     for earlier, later in itertools.pairwise(values[:, 0].tolist()):
         assert earlier < later
+
+
+def test_trajectory_csv_of_the_tool_has_its_positions_last() -> None:
+    found = trajectory(DESIGN, random_path(2, 3), samples=9, tool=(0.0, 1.0, 2.0))
+    head, *rows = csv.reader(trajectory_csv(found).splitlines())
+    assert tuple(head) == (*COLUMNS, "tool_x", "tool_y", "tool_z")
+    assert found.tool_position is not None
+    assert [[float(word) for word in row[-3:]] for row in rows] == found.tool_position.tolist()
 
 
 def test_trajectory_bad_input_is_refused() -> None:

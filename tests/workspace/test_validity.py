@@ -11,6 +11,7 @@ from hypothesis import given, strategies as st
 from limited_designs import limited, ordinary_case, troubled_case
 from scipy.spatial.transform import Rotation
 from strategies import positions, uniform_rotations
+from tool_moves import tool_move
 
 from explorer import (
     JOINTS,
@@ -18,14 +19,24 @@ from explorer import (
     Design,
     InputError,
     Pose,
+    attachment_points,
     evaluate,
     home_pose,
+    margins,
     moves_are_clear,
     poses_between,
 )
 from explorer.mechanism.design import Swing
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.compiled import MANY_ROWS
+from explorer.workspace.limits.safe_shares import (
+    BOX_SPEEDS,
+    GAP_SPEED,
+    LEG_SPEEDS,
+    MARGIN_SPEEDS,
+    SPEEDS,
+    write_speeds,
+)
 from explorer.workspace.limits.valid_moves import moves_are_valid, write_pose_at, write_turn
 from explorer.workspace.limits.valid_poses import Rules, poses_are_valid
 
@@ -132,6 +143,70 @@ def test_move_valid_has_valid_poses_all_along(share: float) -> None:
     # What is refused for being too near to a collision or a singularity is rare.
     assert agree >= 0.98 * len(found)
     assert found.any()
+
+
+TOOLS = [(0.0, 0.0, 4.0), (3.0, -2.0, -1.0), (0.0, 0.0, 30.0)]
+
+
+@pytest.mark.parametrize("share", [1.0, 0.2])
+@pytest.mark.parametrize("tool", TOOLS)
+def test_move_of_the_tool_valid_has_valid_poses_all_along(
+    tool: tuple[float, float, float], share: float
+) -> None:
+    point = np.array(tool)
+    starts = random_moves(7, 300, 1.0)
+    moves: list[tuple[FloatArray, ...]] = []
+    for p, r, q, s in zip(*starts, strict=True):
+        position, rotation = tool_move(Pose.of(p, r), Pose.of(q, s), share, point)
+        moves.append((p, r, position[0], rotation[0]))
+    arrays = [np.array(column) for column in zip(*moves, strict=True)]
+    found = moves_are_valid(THICK, *arrays, tool=tool)
+    agree = 0
+    for valid, (p, r, q, s) in zip(found.tolist(), moves, strict=True):
+        poses = tool_move(Pose.of(p, r), Pose.of(q, s), np.linspace(0.0, 1.0, 200), point)
+        along = poses_are_valid(THICK, *poses)
+        assert along.all() or not valid
+        agree += int(along.all()) == valid
+    assert agree >= 0.98 * len(found)
+    assert found.any()
+    assert moves_are_clear(THICK, *arrays, tool=tool)[found].all()
+    # The move of b4 between the same poses is another one.
+    assert share < 1.0 or (moves_are_valid(THICK, *arrays) != found).any()
+
+
+def test_move_of_a_tool_at_b4_is_that_of_b4() -> None:
+    moves = random_moves(5, 300, 0.5)
+    found = moves_are_valid(THICK, *moves, tool=(0.0, 0.0, 0.0))
+    assert np.array_equal(found, moves_are_valid(THICK, *moves))
+
+
+@given(uniform_rotations(), uniform_rotations(), positions(), positions(), positions())
+def test_speeds_of_a_move_of_the_tool_bound_those_of_its_points(
+    r: FloatArray, s: FloatArray, first: FloatArray, last: FloatArray, tool: FloatArray
+) -> None:
+    start, end = Pose.of(9.0 * first, r), Pose.of(9.0 * last, s)
+    point = 5.0 * tool
+    row = Rules.of(THICK).row
+    c, d = (np.array(pose.position) + pose.rotation @ point for pose in (start, end))
+    axis, speeds = np.zeros(3), np.zeros(SPEEDS)
+    angle = write_turn(start.rotation, end.rotation, axis)
+    write_speeds(row, c, start.rotation, d - c, axis, angle, point, speeds)
+    shares = np.linspace(0.0, 1.0, 401)
+    p, turned = tool_move(start, end, shares, point)
+    at = attachment_points(THICK, p, turned)
+
+    def fastest(values: FloatArray) -> FloatArray:
+        return np.abs(np.diff(values, axis=0)).max(axis=0) * (len(shares) - 1)
+
+    ends = [np.linalg.norm(np.diff(b, axis=0), axis=-1).max() * 400 for b in (at.b1, at.b2, at.b3)]
+    ends.append(np.linalg.norm(np.diff(at.b4, axis=0), axis=-1).max() * 400)
+    rounding = 1e-9
+    assert (np.array(ends) <= speeds[LEG_SPEEDS : LEG_SPEEDS + 4] + rounding).all()
+    assert (
+        fastest(margins(p, turned)) <= speeds[MARGIN_SPEEDS : MARGIN_SPEEDS + 3] + rounding
+    ).all()
+    assert (fastest(p) <= speeds[BOX_SPEEDS : BOX_SPEEDS + 3] + rounding).all()
+    assert fastest((at.b3 - at.b2)[:, :1])[0] <= speeds[GAP_SPEED] + rounding
 
 
 @given(positions(), uniform_rotations(), st.sampled_from((0.0, 1e-12, 1e-6, 1.0, 3.0, 3.14159265)))

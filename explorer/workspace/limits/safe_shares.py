@@ -191,29 +191,41 @@ def write_speeds(
     step: FloatArray,
     axis: FloatArray,
     angle: float,
+    tool: FloatArray,
     speeds: FloatArray,
 ) -> None:
-    """Write upper bounds of the speeds over a move, per share of it, shape (SPEEDS,)."""
+    """Write upper bounds of the speeds over a move, per share of it, shape (SPEEDS,).
+
+    The point of the platform that moves straight is `tool`, in platform coordinates; it starts at
+    p and moves by `step`.
+    """
     forward = math.sqrt(step[0] ** 2 + step[1] ** 2 + step[2] ** 2)
     ends = ((row[B1], row[B1 + 1]), (row[B2], 0.0), (row[B3], 0.0), (0.0, 0.0))
+    swing = 0.0
     for leg in range(4):
-        x = ends[leg][0] * r[0, 0] + ends[leg][1] * r[0, 1]
-        y = ends[leg][0] * r[1, 0] + ends[leg][1] * r[1, 1]
-        z = ends[leg][0] * r[2, 0] + ends[leg][1] * r[2, 1]
+        u, v, w = ends[leg][0] - tool[0], ends[leg][1] - tool[1], -tool[2]
+        x = u * r[0, 0] + v * r[0, 1] + w * r[0, 2]
+        y = u * r[1, 0] + v * r[1, 1] + w * r[1, 2]
+        z = u * r[2, 0] + v * r[2, 1] + w * r[2, 2]
         a = axis[1] * z - axis[2] * y
         b = axis[2] * x - axis[0] * z
         c = axis[0] * y - axis[1] * x
-        speeds[LEG_SPEEDS + leg] = forward + angle * math.sqrt(a * a + b * b + c * c)
+        swing = angle * math.sqrt(a * a + b * b + c * c)
+        speeds[LEG_SPEEDS + leg] = forward + swing
     speeds[TURN_SPEED] = angle
-    # On its line b4 is farthest from a1 at one of the ends.
+    # On its line the tool is farthest from a1 at one of the ends.
     farthest = 0.0
     for end in range(2):
         square = 0.0
         for i in range(3):
             square += (p[i] + end * step[i]) ** 2
         farthest = max(farthest, math.sqrt(square))
-    speeds[MARGIN_SPEEDS] = speeds[MARGIN_SPEEDS + 1] = forward + angle * farthest
+    # With c the position of the tool, δ1 = tool z − R ẑ·c and δ2 = (x̂ × R x̂)·c − x̂·R (x̂ × tool).
+    speeds[MARGIN_SPEEDS] = forward + angle * farthest
+    speeds[MARGIN_SPEEDS + 1] = speeds[MARGIN_SPEEDS] + angle * math.hypot(tool[1], tool[2])
+    # b4 comes last of the ends; it swings about the tool, perpendicular to the axis of the turn.
     for i in range(3):
-        speeds[BOX_SPEEDS + i] = abs(step[i])
+        share = math.sqrt(max(0.0, 1.0 - axis[i] * axis[i]))
+        speeds[BOX_SPEEDS + i] = abs(step[i]) + swing * share
     speeds[MARGIN_SPEEDS + 2] = speeds[BOX_SPEEDS + 2]
     speeds[GAP_SPEED] = angle * abs(row[B3] - row[B2])

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import checked_rotation
-from explorer.numerics.arrays import BoolArray, FloatArray, batch_shape, finite_array
+from explorer.numerics.arrays import BoolArray, FloatArray, batch_shape, finite_array, for_kernel
 from explorer.numerics.compiled import helper, kernel
 from explorer.workspace.limits.safe_shares import (
     LEAST_SHARE,
@@ -43,11 +43,12 @@ def moves_are_valid(
     *,
     rules: Rules | None = None,
     tolerance: float | None = None,
+    tool: ArrayLike | None = None,
 ) -> BoolArray:
     """Return whether straight moves satisfy all limits, margins and clearances, shape (...).
 
-    The position moves on a straight line and the platform turns about one axis the shorter way,
-    as in `explorer.legs.moves`. True is a proof, but for the tolerance. A move whose
+    One point of the platform moves on a straight line and the platform turns about one axis the
+    shorter way, as in `explorer.legs.moves`. True is a proof, but for the tolerance. A move whose
     clearances or signs hold by less than a 100th of the tolerance may be refused.
 
     Args:
@@ -59,9 +60,11 @@ def moves_are_valid(
         rules: Rules of the design, if they have been computed before.
         tolerance: Length by which limits may be exceeded on the way, in design units; a
             10,000th of the reach if None.
+        tool: Point that moves straight in the platform frame, shape (3,), in design units; None
+            for b4.
 
     Raises:
-        InputError: a pose that is not finite or not a rotation.
+        InputError: a pose that is not finite or not a rotation, or not a point.
     """
     p, q = (
         finite_array(name, value, (3,))
@@ -76,6 +79,7 @@ def moves_are_valid(
     valid = np.empty(len(rows[0]), dtype=np.bool_)
     design_rules = rules or Rules.of(design)
     limit_tolerance = DEFAULT_TOLERANCE * design.reach if tolerance is None else tolerance
+    point = np.zeros(3) if tool is None else for_kernel(finite_array("tool", tool, (3,)))
     valid_move_rows(
         20 * len(rows[0]),
         design_rules.row,
@@ -84,6 +88,7 @@ def moves_are_valid(
         rows[1],
         rows[2],
         rows[3],
+        point,
         limit_tolerance,
         valid,
     )
@@ -151,7 +156,16 @@ def write_pose_at(
         p_out[i] = p[i] + t * step[i]
 
 
-@kernel("void(f8[::1], f8[:,::1], f8[:,::1], f8[:,:,::1], f8[:,::1], f8[:,:,::1], f8, b1[::1])")
+@helper
+def move_by_arm(share: float, r: FloatArray, arm: FloatArray, p: FloatArray) -> None:
+    """Add a share of a vector in platform coordinates to a position."""
+    for i in range(3):
+        p[i] += share * (r[i, 0] * arm[0] + r[i, 1] * arm[1] + r[i, 2] * arm[2])
+
+
+@kernel(
+    "void(f8[::1], f8[:,::1], f8[:,::1], f8[:,:,::1], f8[:,::1], f8[:,:,::1], f8[::1], f8, b1[::1])"
+)
 def valid_move_rows(
     row: FloatArray,
     cones: FloatArray,
@@ -159,12 +173,17 @@ def valid_move_rows(
     start_rotation: FloatArray,
     end: FloatArray,
     end_rotation: FloatArray,
+    tool: FloatArray,
     tolerance: float,
     valid: BoolArray,
 ) -> None:
-    """Write whether n moves satisfy all rules, limits to a tolerance in design units."""
+    """Write whether n moves satisfy all rules, limits to a tolerance in design units.
+
+    Starts and ends are positions of b4; the tool, in platform coordinates, moves straight.
+    """
     base, ends, p, r = np.zeros((4, 3)), np.zeros((4, 3)), np.zeros(3), np.zeros((3, 3))
     step, axis, speeds = np.zeros(3), np.zeros(3), np.zeros(SPEEDS)
+    first, last = np.zeros(3), np.zeros(3)
     reach, least = math.hypot(row[0], row[1]), LEAST_SHARE * tolerance
     for index in range(start.shape[0]):
         valid[index] = False
@@ -173,12 +192,17 @@ def valid_move_rows(
         if not is_valid(row, cones, start[index], start_rotation[index], base, ends):
             continue
         for i in range(3):
-            step[i] = end[index, i] - start[index, i]
+            first[i], last[i] = start[index, i], end[index, i]
+        move_by_arm(1.0, start_rotation[index], tool, first)
+        move_by_arm(1.0, end_rotation[index], tool, last)
+        for i in range(3):
+            step[i] = last[i] - first[i]
         angle = write_turn(start_rotation[index], end_rotation[index], axis)
-        write_speeds(row, start[index], start_rotation[index], step, axis, angle, speeds)
+        write_speeds(row, first, start_rotation[index], step, axis, angle, tool, speeds)
         t = 0.0
         for _ in range(MOST_STEPS):
-            write_pose_at(t, start[index], start_rotation[index], step, axis, angle, p, r)
+            write_pose_at(t, first, start_rotation[index], step, axis, angle, p, r)
+            move_by_arm(-1.0, r, tool, p)
             write_ends(row, p, r, base, ends)
             share = safe_share_of_limits(row, p, r, base, ends, speeds, tolerance)
             if share > 0.0:
