@@ -22,6 +22,7 @@ from page_props import shown_by
 import explorer.app
 from explorer.app.browser.viser_server import start_viser, stop_viser
 from explorer.app.features.designs.saved_designs import SavedDesigns
+from explorer.app.features.forces.actions import SetForce
 from explorer.app.features.listed import FEATURES
 from explorer.app.features.machine.actions import SetToolAngle
 from explorer.app.features.optimise.actions import (
@@ -76,6 +77,7 @@ OF_VALUES = {
     SetTiltTorsion: "sliders of tilt and torsion",
     SetToolAngle: "sliders of the tool",
     GoToTilt: "the map of tilts",
+    SetForce: "fields and arrow of the load",
     SetVariable: "sliders of the design",
     SetName: "the name of a design",
     SetPathTime: "slider of the time",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -54,6 +54,8 @@ class BoundByPath:
         if self.widget.kind == "list":
             return next(each for each in handle.options if each != handle.value)
         step = handle.step
+        if isinstance(handle.value, tuple):
+            return tuple(value + step for value in cast("tuple[float, ...]", handle.value))
         return handle.value + (step if handle.max is None or handle.value < handle.max else -step)
 
     def meant(self, value: Any) -> object:

@@ -81,9 +81,8 @@ def test_the_largest_payload_takes_a_part_to_its_limit() -> None:
 
 
 def test_the_largest_force_takes_an_actuator_to_its_limit_in_its_worst_direction() -> None:
-    design = limited(
-        payload=Payload(), struts=Struts(), guide=Guide(), actuators=Actuators(push_n=(50.0,) * 6)
-    )
+    actuators = Actuators(push_n=(50, 50, 50, 50, 50, 50))
+    design = limited(payload=Payload(), struts=Struts(), guide=Guide(), actuators=actuators)
     for loaded in loaded_poses(design, 5):
         free = LoadedPose(design, loaded.pose, np.zeros(6))
         assert free.worst_force(free.largest_force).share == pytest.approx(1.0, rel=1e-12)

@@ -22,7 +22,7 @@ LIMITED = msgspec.structs.replace(
     OPTIMAL,
     tool=Tool((1.0, -1.0, 2.0)),
     payload=Payload(2.0, (1.0, 2.0, 3.0), 5.0),
-    actuators=Actuators(push_n=(60.0,) * 6),
+    actuators=Actuators(push_n=(60, 60, 60, 60, 60, 60)),
     struts=Struts(moment_nm=3.0),
 )
 LOAD = np.array([0.0, 0.0, -10.0, 0.0, 0.0, 0.0])
@@ -66,7 +66,7 @@ def test_a_position_that_holds_the_load_is_its_own_nearest() -> None:
 
 
 def test_none_is_found_where_no_position_holds_the_load() -> None:
-    weak = msgspec.structs.replace(LIMITED, actuators=Actuators(push_n=(1.0,) * 6))
+    weak = msgspec.structs.replace(LIMITED, actuators=Actuators(push_n=(1, 1, 1, 1, 1, 1)))
     assert nearest_held(LoadedPose(weak, HOME, 10.0 * LOAD)) is None
 
 

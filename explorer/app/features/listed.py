@@ -6,6 +6,7 @@ from explorer.app.features.change.feature import CHANGE
 from explorer.app.features.compare.feature import COMPARE
 from explorer.app.features.designs.feature import DESIGNS
 from explorer.app.features.feature import Feature
+from explorer.app.features.forces.feature import FORCES
 from explorer.app.features.ground.feature import GROUND
 from explorer.app.features.help.feature import HELP
 from explorer.app.features.history.feature import HISTORY
@@ -34,6 +35,7 @@ FEATURES: tuple[Feature, ...] = (
     ORIENTATION,
     CHANGE,
     LEGS,
+    FORCES,
     PROTOTYPE,
     OPTIMISE,
     STUDIES,

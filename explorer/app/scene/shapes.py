@@ -293,6 +293,15 @@ def cylinder() -> Mesh:
 
 
 @functools.cache
+def cone() -> Mesh:
+    """Return the cone of radius one from z = 0 to z = 1."""
+    vertices, faces = cylinder()
+    vertices = vertices.copy()
+    vertices[vertices[:, 2] > 0.5, :2] = 0.0
+    return vertices, faces
+
+
+@functools.cache
 def sphere() -> Mesh:
     """Return the sphere of radius one, an icosahedron whose faces are split three times."""
     # The corners are those of three golden rectangles; the faces are those of their hull.

@@ -20,8 +20,8 @@ from explorer.app.scene.part import ScenePart
 from explorer.app.scene.placing import Placed
 from explorer.app.scene.shapes import (
     Instances,
-    Mesh,
     add_lines,
+    cone,
     cylinder,
     of_one_colour,
     turned_to,
@@ -72,7 +72,7 @@ class JogScene(ScenePart):
             for index in range(len(UNCOUPLED))
         ]
         count = 2 * len(UNCOUPLED)
-        self._heads = Instances(scene, "/motion/heads", _cone(), [SINGULAR] * count)
+        self._heads = Instances(scene, "/motion/heads", cone(), [SINGULAR] * count)
         self._stops = Instances(scene, "/motion/stops", cylinder(), [SINGULAR] * count)
 
     def updates(self, placed: Placed) -> Iterator[Update]:
@@ -149,11 +149,3 @@ def motion_line(placed: Placed, motion: UncoupledMotion, travel: Travel) -> Moti
         foot + np.cos(angles)[:, None] * spoke + np.sin(angles)[:, None] * np.cross(along, spoke)
     )
     return MotionLine(points, (True, True), np.stack([foot, foot + spoke]))
-
-
-def _cone() -> Mesh:
-    """Return the cone of radius one from z = 0 to z = 1."""
-    vertices, faces = cylinder()
-    vertices = vertices.copy()
-    vertices[vertices[:, 2] > 0.5, :2] = 0.0
-    return vertices, faces

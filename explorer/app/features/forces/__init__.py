@@ -1,0 +1,1 @@
+"""The load on the platform, and what holds it."""

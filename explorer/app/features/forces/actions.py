@@ -1,0 +1,62 @@
+"""The action that sets the force at the tool."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from explorer.app.scene.placing import round_step
+from explorer.app.state.action import Action
+from explorer.app.state.state import State
+from explorer.mechanism.pose import Triple
+from explorer.numerics.number_text import format_number
+
+# Share of the reach below which and above which the arrow of a typed force has another scale.
+SHORTEST, LONGEST = 0.1, 1.0
+# Length of the arrow at the new scale, as a share of the reach.
+FITTING = 0.45
+
+
+@dataclass(frozen=True)
+class SetForce(Action):
+    """Set the force at the tool, along the axes of the base, in newtons.
+
+    Attributes:
+        force: The force.
+        keeps_scale: Whether its arrow keeps its scale, as while it is dragged.
+        title: Words of the step in the history; the force if empty.
+    """
+
+    force: Triple
+    keeps_scale: bool = False
+    title: str = ""
+
+    def apply(self, state: State) -> State:
+        """Return the next state.
+
+        Raises:
+            InputError: a force that is not finite.
+        """
+        forces = replace(state.view.forces, force=self.force)
+        if not self.keeps_scale:
+            forces = replace(forces, scale=fitting_scale(math.hypot(*self.force), forces.scale))
+        return replace(state, view=replace(state.view, forces=forces))
+
+    def words(self) -> str:
+        """Return what the action does."""
+        if self.title:
+            return self.title
+        numbers = ", ".join(format_number(value, 3) for value in self.force)
+        return f"Force {numbers} N"
+
+
+def fitting_scale(force: float, scale: float) -> float:
+    """Return the force whose arrow is as long as the reach, with which a force can be seen.
+
+    Args:
+        force: Size of the force, in newtons.
+        scale: The present one, which stays while the arrow is neither short nor long.
+    """
+    if force == 0.0 or SHORTEST <= force / scale <= LONGEST:
+        return scale
+    return round_step(force / FITTING)

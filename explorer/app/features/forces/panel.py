@@ -1,0 +1,261 @@
+"""The load, the verdict on it, and tables of what holds it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from html import escape
+from typing import get_args
+
+import numpy as np
+import viser
+
+from explorer.app.features.feature import Services
+from explorer.app.features.forces.actions import SetForce
+from explorer.app.features.forces.loads import Loads, NearestFeed, has_limits
+from explorer.app.features.forces.words import (
+    PARTS,
+    newtons,
+    share_colour,
+    share_look,
+    share_words,
+)
+from explorer.app.inputs.bindings import Bound
+from explorer.app.inputs.controls import Controls
+from explorer.app.state.actions import SetPose
+from explorer.app.state.frame import Frame
+from explorer.app.state.view import Weighed
+from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.buttons import press_button
+from explorer.app.widgets.markup import (
+    box,
+    caption,
+    dim,
+    format_number,
+    meter,
+    note,
+    row,
+    status,
+    table,
+)
+from explorer.app.widgets.under_way import problem
+from explorer.mechanism.design import JOINTS
+from explorer.mechanism.tool_point import position_of
+from explorer.numerics.number_text import format_column, format_decimals
+from explorer.statics.loaded import LoadedPose
+
+WEIGHED: tuple[Weighed, ...] = get_args(Weighed)
+GO, WORST = "forces.go", "forces.worst"
+GO_HINT = "Move the platform to the nearest position that holds the load, turned as it is."
+WORST_HINT = "Turn the force into the direction that uses the largest share of a limit here."
+SENSES = {True: "pushes", False: "pulls"}
+# Digits of forces and moments.
+DIGITS = 4
+
+
+class ForcesPanel:
+    """The verdict on the load, its controls, and tables of what holds it."""
+
+    def __init__(self, services: Services) -> None:
+        gui, self._session = services.gui, services.session
+        self._loads, self._nearest = services.get(Loads), services.get(NearestFeed)
+        self._controls = controls = Controls(gui, services.session)
+        self._top = gui.add_html("")
+        with gui.add_folder("Load at the tool (axes of the base)"):
+            controls.triple(
+                "Force (N)",
+                "Force on the platform at the tool point, along x, y and z of the base; its arrow "
+                "in the scene can be dragged.",
+                Bound(
+                    lambda frame: frame.state.view.forces.force, lambda _, force: SetForce(force)
+                ),
+                step=0.1,
+            )
+            controls.triple(
+                "Moment (N m)",
+                "Moment on the platform, about x, y and z of the base.",
+                "view.forces.moment",
+                step=0.01,
+            )
+            controls.dropdown(
+                "Weights",
+                "The bodies whose weights act besides: none, the payload of the tab Machine, or "
+                "also the platform and the legs, as parts of the prototype.",
+                WEIGHED,
+                "view.forces.weighed",
+            )
+            controls.checkbox(
+                "Forces in the scene",
+                "Draw the load, the forces of the legs on the platform, the forces along the "
+                "guide, and the bending of the struts, in colours of their shares.",
+                "view.forces.shown",
+            )
+        self._tables = gui.add_html("")
+        self._most = gui.add_html("")
+        services.buttons.on(GO, self._go)
+        services.buttons.on(WORST, self._turn)
+        services.buttons.offer(
+            "Forces › Go to the nearest position that holds",
+            GO_HINT,
+            GO,
+            is_ready=lambda: self._nearest.drawing is not None,
+        )
+        services.buttons.offer(
+            "Forces › Turn the force to its worst direction",
+            WORST_HINT,
+            WORST,
+            is_ready=lambda: any(self._session.state.view.forces.force),
+        )
+
+    def updates(self, frame: Frame) -> Iterator[Update]:
+        """Yield the updates that make the panel show the frame."""
+        loaded = self._loads.of(frame)
+        yield self._top, "content", box(*self._summary(frame, loaded))
+        yield self._tables, "content", box(*tables(loaded))
+        yield self._most, "content", box(*largest(frame, loaded))
+        yield from self._controls.updates(frame)
+
+    def _summary(self, frame: Frame, loaded: LoadedPose) -> Iterator[str]:
+        yield from verdict(loaded)
+        if frame.state.view.is_twin:
+            yield note("These are the forces of the 4-4, not of the 6-4 twin that is drawn.")
+        if self._nearest.request is not None:
+            yield f'<div class="ex-line"><span>{self._nearest_words(frame)}</span></div>'
+        weights = self._loads.weights
+        if weights.problem is not None:
+            yield problem(weights, "The legs have no weights", "")
+        elif weights.request is not None and weights.weights is None:
+            yield note("computing the weights of the parts …")
+
+    def _nearest_words(self, frame: Frame) -> str:
+        """Return where the nearest position is that holds the load, as HTML."""
+        feed = self._nearest
+        if feed.problem is not None:
+            return escape(feed.problem)
+        if feed.drawing is None or (not feed.is_current and feed.drawing.pose is None):
+            return dim("searching the nearest position that holds it …")
+        pose = feed.drawing.pose
+        if pose is None:
+            return "No position in this orientation and mode holds it."
+        design, at = frame.state.design, frame.state.view.at
+        there = position_of(design, pose, at)
+        apart = design.unit_mm * math.dist(pose.position, frame.state.pose.position)
+        size = design.reach
+        numbers = ", ".join(format_number(value, DIGITS, size=size) for value in there)
+        go = press_button(GO, "", "Go", hint=GO_HINT, class_name="ex-link")
+        far = format_number(apart, 3, size=design.unit_mm * size)
+        return f"Held {far} mm from here, with {at} at {numbers} {go}"
+
+    def _go(self, _: str, client: viser.ClientHandle) -> None:
+        drawing = self._nearest.drawing
+        if drawing is not None and drawing.pose is not None:
+            self._session.do(SetPose(drawing.pose), who=client.client_id)
+
+    def _turn(self, _: str, client: viser.ClientHandle) -> None:
+        frame = Frame(self._session.settled())
+        size = math.hypot(*frame.state.view.forces.force)
+        direction = without_force(self._loads.of(frame)).worst_force(size).direction
+        if size > 0.0 and np.isfinite(direction).all():
+            x, y, z = (size * direction).tolist()
+            action = SetForce((x, y, z), title="Force in its worst direction")
+            self._session.do(action, who=client.client_id)
+
+
+def verdict(loaded: LoadedPose) -> Iterator[str]:
+    """Yield whether the load is held, and which part is nearest to its limit, as HTML."""
+    if not loaded.is_regular:
+        yield status("Nothing holds a load here", "beyond")
+        yield '<div class="ex-beyond">The pose is singular: the forces are infinite.</div>'
+        return
+    if not has_limits(loaded):
+        yield '<div class="ex-status">No limits are given</div>'
+        yield dim(
+            "Give actuators, struts or the guide limits in the tab Machine to see their shares."
+        )
+        return
+    share, part = loaded.share, PARTS[loaded.worst]
+    look = share_look(share)
+    titles = {"within": "Holds the load", "close": "Holds the load, close to a limit"}
+    yield status(titles.get(look, "Does not hold the load"), look)
+    verb = "gives way: it needs" if share > 1.0 else "needs most:"
+    yield f"<div>{escape(part.capitalize())} {verb} {share_words(share)} of its limit</div>"
+
+
+def tables(loaded: LoadedPose) -> Iterator[str]:
+    """Yield the forces of the actuators, the struts and the guide beside their limits, as HTML."""
+    held, shares = loaded.held, loaded.shares.tolist()
+    forces = format_column(held.actuators.tolist(), DIGITS, infinite="∞")
+    rows = [
+        row(
+            dim(name),
+            f"{force} N",
+            dim(SENSES[value > 0.0] if value else ""),
+            *_share_cells(share),
+        )
+        for name, force, value, share in zip(
+            JOINTS, forces, held.actuators.tolist(), shares[:6], strict=True
+        )
+    ]
+    yield caption("Forces of the actuators", "A positive force pushes the value of its joint up.")
+    yield f'<div class="ex-shares">{table(rows)}</div>'
+    metres = 1e-3 * loaded.design.unit_mm
+    bending = [*(metres * held.bending).tolist(), *(metres * held.guide_moment).tolist()]
+    moments = format_column(bending, DIGITS, infinite="∞")
+    across = format_column(held.guide_force.tolist(), DIGITS, infinite="∞")
+    parts: list[str] = []
+    for index, leg in enumerate((2, 3)):
+        parts += [
+            row(dim(f"strut {leg}"), f"{moments[index]} N m", dim("bends"),
+                *_share_cells(max(shares[6 + index], shares[10 + index]))),
+            row(dim(f"carriage {leg}"), f"{across[index]} N", dim("on guide"),
+                *_share_cells(shares[8 + index])),
+        ]  # fmt: skip
+    yield caption(
+        "Struts and guide",
+        "The bending moment of a strut at its carriage, which the guide takes, and the force of "
+        "the carriage across the guide.",
+    )
+    yield f'<div class="ex-shares">{table(parts)}</div>'
+
+
+def _share_cells(share: float) -> tuple[str, str]:
+    if share == 0.0:
+        return "", dim(share_words(share))
+    bar = meter(min(100.0, 100.0 * share), share_colour(share))
+    return bar, f'<span class="ex-{share_look(share)}">{share_words(share)}</span>'
+
+
+def largest(frame: Frame, loaded: LoadedPose) -> Iterator[str]:
+    """Yield the largest payload and force, and the worst direction of the force, as HTML."""
+    yield caption("Most that is held here")
+    payload = loaded.largest_payload
+    rows = [
+        row(
+            dim("payload"),
+            f"{format_number(payload, DIGITS)} kg" if math.isfinite(payload) else "no limit",
+            hint="Largest mass at the centre of the payload, besides the load above, that keeps "
+            "all limits",
+        ),
+        row(
+            dim("force in every direction"),
+            newtons(loaded.largest_force) if math.isfinite(loaded.largest_force) else "no limit",
+            hint="Largest force at the tool, alone, that the actuators hold in every direction",
+        ),
+    ]
+    yield table(rows)
+    size = math.hypot(*frame.state.view.forces.force)
+    worst = without_force(loaded).worst_force(size)
+    if not (size > 0.0 and np.isfinite(worst.direction).all()):
+        return
+    numbers = ", ".join(format_decimals(value, 2) for value in worst.direction.tolist())
+    turn = press_button(WORST, "", "Turn", hint=WORST_HINT, class_name="ex-link")
+    yield (
+        f'<div class="ex-after">{dim("worst direction of this force")} {numbers}: '
+        f"{escape(PARTS[worst.part])} at {share_words(worst.share)} {turn}</div>"
+    )
+
+
+def without_force(loaded: LoadedPose) -> LoadedPose:
+    """Return the pose under its moment and weights, without the force at the tool."""
+    load = np.concatenate([np.zeros(3), loaded.load[3:]])
+    return LoadedPose(loaded.design, loaded.pose, load, loaded.own, loaded.weighs_payload)

@@ -1,0 +1,251 @@
+"""The load as an arrow to drag, the forces of the legs, and the bending of the struts.
+
+The arrow of the load is as long as its force asks by a fixed scale. Those of the reactions become
+ever shorter beside theirs, since they have no bound near singular poses; a label tells each force.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+import viser
+
+from explorer.app.features.feature import Services
+from explorer.app.features.forces.actions import SetForce
+from explorer.app.features.forces.arrows import ForceArrows
+from explorer.app.features.forces.loads import Loads
+from explorer.app.features.forces.words import newtons, share_colour, share_words
+from explorer.app.scene.labels import add_label
+from explorer.app.scene.part import NO_POINTS, ScenePart
+from explorer.app.scene.placing import Placed, scene_scale
+from explorer.app.scene.shapes import NO_MESH, Rods, add_lines, add_translucent, of_one_colour
+from explorer.app.state.state import State
+from explorer.app.widgets.assigning import Update
+from explorer.app.widgets.colours import GHOST, Rgb
+from explorer.mechanism.design import JOINTS
+from explorer.mechanism.machine import STANDARD_GRAVITY
+from explorer.mechanism.pose import Triple
+from explorer.mechanism.tool_point import position_of
+from explorer.numerics.arrays import FloatArray
+from explorer.numerics.number_text import format_number
+from explorer.statics.loaded import LoadedPose
+
+LOAD: Rgb = (150, 40, 160)
+# Largest lengths of the arrows of load and reactions and of a bending moment, over the reach.
+LONGEST_LOAD, LONGEST_REACTION, LONGEST_BENDING = 1.2, 0.4, 0.3
+# Moment over the force of the scale and the reach at which a drawn moment is half its largest.
+HALF_MOMENT = 0.25
+SLEEVE_RADIUS, SLEEVE_OPACITY = 0.3, 0.45
+# Number of ordinates of a drawn bending moment.
+ORDINATES = 9
+HANDLE_NAME, HANDLE_SCALE = "/forces/handle", 0.8
+# Difference of forces that is rounding, over the scale.
+SAME_FORCE = 1e-9
+
+
+class ForcesScene(ScenePart):
+    """The load and the weight of the payload, forces of legs and carriages, and bending."""
+
+    def __init__(self, services: Services) -> None:
+        scene, self._loads = services.scene, services.get(Loads)
+        self._arrows = ForceArrows(scene, "/forces/arrows", 8, LOAD)
+        self._sleeves = Rods(scene, "/forces/sleeves", [GHOST] * 4, opacity=SLEEVE_OPACITY)
+        self._bending = [
+            add_translucent(scene, f"/forces/bending/{leg}", NO_MESH, 0.35) for leg in (2, 3)
+        ]
+        self._ordinates = [
+            add_lines(scene, f"/forces/ordinates/{leg}", ORDINATES + 1, None, 1.5) for leg in (2, 3)
+        ]
+        self._labels = {
+            name: add_label(scene, f"/forces/label/{name}", name, visible=False)
+            for name in ("load", "weight", *JOINTS, "strut 2", "strut 3")
+        }
+
+    def updates(self, placed: Placed) -> Iterator[Update]:
+        """Yield the updates that draw the forces of this frame."""
+        loaded = self._loads.of(placed.frame)
+        shown = is_shown(placed)
+        holds = shown and loaded.is_regular
+        yield from self._arrows.show(shown)
+        yield from self._sleeves.show(holds)
+        for handle in (*self._bending, *self._ordinates):
+            yield handle, "visible", holds
+        for name, label in self._labels.items():
+            force = {"load": has_force(placed), "weight": weight_of(loaded) > 0.0}
+            yield label, "visible", shown and force.get(name, holds)
+        if not shown:
+            return
+        yield from self._draw_arrows(placed, loaded)
+        if not holds:
+            return
+        p = placed.points
+        feet = _feet(placed)
+        tips = np.array([p["b1"], p["b2"], p["b3"], p["b4"]])
+        radius = np.full(4, SLEEVE_RADIUS * placed.thickness)
+        shares = loaded.shares
+        yield from self._sleeves.between(feet, tips, radius)
+        yield from self._sleeves.colour([share_colour(shares[i]) for i in (0, 2, 4, 5)])
+        for index, leg in enumerate((2, 3)):
+            yield from self._draw_bending(placed, loaded, index, leg)
+        middles = 0.5 * (feet + tips)
+        places = (middles[0], feet[1], middles[1], feet[2], middles[2], middles[3])
+        for index, joint in enumerate(JOINTS):
+            force, label = float(loaded.held.actuators[index]), self._labels[joint]
+            words = f"{joint} {newtons(force, 3)}"
+            if shares[index] > 0.0:
+                words += f" · {share_words(float(shares[index]))}"
+            yield label, "text", words
+            yield label, "position", tuple(places[index].tolist())
+
+    def corners(self, placed: Placed) -> FloatArray:
+        """Return the tip of the load's arrow."""
+        if not (is_shown(placed) and has_force(placed)):
+            return NO_POINTS
+        return load_tip(placed)[None]
+
+    def _draw_arrows(self, placed: Placed, loaded: LoadedPose) -> Iterator[Update]:
+        state, p = placed.frame.state, placed.points
+        tails, vectors = np.zeros((8, 3)), np.zeros((8, 3))
+        colours: list[Rgb] = [LOAD] * 8
+        tool = tool_point(placed)
+        tails[0], vectors[0] = tool, load_tip(placed) - tool
+        force = math.hypot(*state.view.forces.force)
+        yield self._labels["load"], "text", newtons(force, 3)
+        yield self._labels["load"], "position", tuple((tails[0] + vectors[0]).tolist())
+        weight = weight_of(loaded)
+        if weight > 0.0:
+            centre = placed.frame.snapshot.rotation @ np.array(state.design.payload.centre)
+            tails[1] = p["b4"] + placed.scale * centre
+            vectors[1] = length_of(placed, weight) * np.array(state.design.gravity)
+            yield self._labels["weight"], "text", f"weight {newtons(weight, 3)}"
+            yield self._labels["weight"], "position", tuple((tails[1] + vectors[1]).tolist())
+        if loaded.is_regular:
+            tips, feet = np.array([p["b1"], p["b2"], p["b3"], p["b4"]]), _feet(placed)
+            tails[2:6], tails[6:8] = tips, feet[1:3]
+            forces = np.zeros((6, 3))
+            forces[:4] = loaded.held.joints
+            forces[4:, 0] = loaded.held.actuators[[1, 3]]
+            vectors[2:] = reaction_vectors(placed, forces)
+            shares = loaded.shares
+            # A leg has the larger share of its actuators.
+            legs = (shares[0], shares[1:3].max(), shares[3:5].max(), shares[5])
+            colours[2:] = [share_colour(float(each)) for each in (*legs, shares[1], shares[3])]
+        yield from self._arrows.draw(tails, vectors, colours, placed.thickness)
+
+    def _draw_bending(
+        self, placed: Placed, loaded: LoadedPose, index: int, leg: int
+    ) -> Iterator[Update]:
+        """Yield the updates that draw the bending moment of strut 2 or 3 beside it."""
+        design = placed.frame.state.design
+        foot, tip = _feet(placed)[leg - 1], placed.points[f"b{leg}"]
+        moment = float(loaded.held.bending[index])
+        half = HALF_MOMENT * placed.frame.state.view.forces.scale * design.reach
+        height = LONGEST_BENDING * placed.reach * moment / (moment + half)
+        towards = math.copysign(1.0, float(loaded.held.actuators[1 + 2 * index]))
+        top = foot + np.array([towards * height, 0.0, 0.0])
+        share = float(max(loaded.shares[6 + index], loaded.shares[10 + index]))
+        colour = share_colour(share)
+        yield self._bending[index], "vertices", np.array([foot, tip, top], dtype=np.float32)
+        yield self._bending[index], "faces", np.array([[0, 1, 2]], dtype=np.uint32)
+        yield self._bending[index], "color", colour
+        # The moment falls from the carriage to nothing at the platform's joint.
+        along = np.linspace(0.0, 1.0, ORDINATES)[:, None]
+        lines = np.stack([foot + along * (tip - foot), top + along * (tip - top)], axis=1)
+        lines = np.concatenate([lines, [[top, tip]]])
+        yield self._ordinates[index], "points", lines.astype(np.float32)
+        yield self._ordinates[index], "colors", of_one_colour(colour, ORDINATES + 1)
+        label = self._labels[f"strut {leg}"]
+        words = f"{format_number(moment * 1e-3 * design.unit_mm, 3)} N m"
+        yield label, "text", words + (f" · {share_words(share)}" if share > 0.0 else "")
+        yield label, "position", tuple(top.tolist())
+
+
+class LoadHandle(ScenePart):
+    """The gizmo at the tip of the load's arrow, which moves it."""
+
+    def __init__(self, services: Services) -> None:
+        self.handle = services.scene.add_transform_controls(
+            HANDLE_NAME,
+            scale=HANDLE_SCALE,
+            line_width=2.0,
+            disable_rotations=True,
+            depth_test=False,
+            visible=False,
+        )
+        self._session = services.session
+        self.handle.on_update(self._pull)
+
+    def force(self, state: State) -> Triple:
+        """Return the force whose arrow ends where the gizmo is."""
+        tool = scene_scale(state) * np.array(position_of(state.design, state.pose, "tool"))
+        per_length = state.view.forces.scale / (scene_scale(state) * state.design.reach)
+        x, y, z = (per_length * (np.asarray(self.handle.position) - tool)).tolist()
+        return x, y, z
+
+    def updates(self, placed: Placed) -> Iterator[Update]:
+        """Yield the updates that keep the gizmo at the tip of the arrow."""
+        state = placed.frame.state
+        visible = is_shown(placed) and state.view.handle and has_force(placed)
+        yield self.handle, "visible", visible
+        # A place that was written back during a drag would move the gizmo under the pointer.
+        same = SAME_FORCE * state.view.forces.scale
+        if not visible or np.allclose(self.force(state), state.view.forces.force, 0.0, same):
+            return
+        yield self.handle, "position", tuple(load_tip(placed).tolist())
+
+    async def _pull(self, event: viser.TransformControlsEvent) -> None:
+        if event.client_id is not None:
+            self._session.post(
+                "pull",
+                lambda state: SetForce(self.force(state), keeps_scale=True),
+                stamp=self.handle.update_timestamp,
+                who=event.client_id,
+            )
+
+
+def is_shown(placed: Placed) -> bool:
+    """Return whether forces are drawn: of the mechanism itself, whose parts are in place."""
+    view = placed.frame.state.view
+    return view.forces.shown and not view.is_twin and not placed.is_apart
+
+
+def has_force(placed: Placed) -> bool:
+    """Return whether there is a force at the tool to draw."""
+    return any(placed.frame.state.view.forces.force)
+
+
+def tool_point(placed: Placed) -> FloatArray:
+    """Return the tool point in the scene, shape (3,)."""
+    state = placed.frame.state
+    return placed.scale * np.array(position_of(state.design, state.pose, "tool"))
+
+
+def load_tip(placed: Placed) -> FloatArray:
+    """Return the tip of the load's arrow in the scene, shape (3,)."""
+    forces = placed.frame.state.view.forces
+    return tool_point(placed) + placed.reach / forces.scale * np.array(forces.force)
+
+
+def length_of(placed: Placed, force: float) -> float:
+    """Return the length of the arrow of a weight in the scene, by the scale of the load."""
+    return placed.reach * min(force / placed.frame.state.view.forces.scale, LONGEST_LOAD)
+
+
+def weight_of(loaded: LoadedPose) -> float:
+    """Return the weight of the payload, in N, that counts."""
+    return loaded.design.payload.mass_kg * STANDARD_GRAVITY if loaded.weighs_payload else 0.0
+
+
+def reaction_vectors(placed: Placed, forces: FloatArray) -> FloatArray:
+    """Return the arrows of forces (n, 3) in N, shape (n, 3), none longer than the largest."""
+    sizes = np.linalg.norm(forces, axis=1, keepdims=True)
+    longest = LONGEST_REACTION * placed.reach
+    return np.asarray(longest * forces / (sizes + placed.frame.state.view.forces.scale))
+
+
+def _feet(placed: Placed) -> FloatArray:
+    """Return where the four struts begin in the scene, shape (4, 3)."""
+    p, on_guide = placed.points, np.array([1.0, 0.0, 0.0])
+    return np.array([p["a1"], on_guide * p["b2"], on_guide * p["b3"], p["a3"]])

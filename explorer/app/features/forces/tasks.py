@@ -1,0 +1,98 @@
+"""The worker's tasks for loads: the weights of the parts, and the nearest position that holds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from explorer.mechanism.design import Design
+from explorer.mechanism.pose import Pose
+from explorer.statics.loaded import LoadedPose
+from explorer.statics.weights import Weights
+from explorer.workspace.nearest_held import nearest_held
+
+Six = tuple[float, float, float, float, float, float]
+
+
+@dataclass(frozen=True)
+class WeightsRequest:
+    """A request for the weights of platform and legs.
+
+    Attributes:
+        design: The manipulator.
+        density: Density of all parts, in kg/m³.
+    """
+
+    design: Design
+    density: float
+
+
+@dataclass(frozen=True)
+class WeightsDrawing:
+    """The weights of platform and legs, without the payload.
+
+    Attributes:
+        request: The request.
+        weights: Weights of the prototype's parts.
+    """
+
+    request: WeightsRequest
+    weights: Weights
+
+
+def weights_of_parts(request: WeightsRequest) -> WeightsDrawing:
+    """Return the weights of the prototype's parts.
+
+    Raises:
+        ExplorerError: the design has no prototype.
+    """
+    from explorer.prototype.assembly import make_prototype
+    from explorer.prototype.weights import machine_weights
+
+    masses = make_prototype(request.design).masses(request.density)
+    return WeightsDrawing(request, machine_weights(request.design, masses, payload=False))
+
+
+@dataclass(frozen=True)
+class NearestRequest:
+    """A request for the nearest position that holds a load.
+
+    Attributes:
+        design: The manipulator.
+        pose: The present pose.
+        load: (F; M) at the tool point, base axes, in N and N × unit.
+        own: Weights of platform and legs; None for none.
+        weighs_payload: Whether the payload has its weight.
+    """
+
+    design: Design
+    pose: Pose
+    load: Six
+    own: Weights | None
+    weighs_payload: bool
+
+
+@dataclass(frozen=True)
+class NearestDrawing:
+    """The nearest position that holds a load.
+
+    Attributes:
+        request: The request.
+        pose: The pose there; None if none was found.
+    """
+
+    request: NearestRequest
+    pose: Pose | None
+
+
+def nearest_position(request: NearestRequest) -> NearestDrawing:
+    """Return the nearest position that holds a load."""
+    loaded = LoadedPose(
+        request.design,
+        request.pose,
+        np.array(request.load),
+        request.own,
+        request.weighs_payload,
+    )
+    return NearestDrawing(request, nearest_held(loaded))
