@@ -54,8 +54,9 @@ class BoundByPath:
         if self.widget.kind == "list":
             return next(each for each in handle.options if each != handle.value)
         step = handle.step
-        if isinstance(handle.value, tuple):
-            return tuple(value + step for value in cast("tuple[float, ...]", handle.value))
+        if self.widget.kind == "value" and isinstance(cast("object", handle.value), tuple):
+            values = cast("tuple[float, ...]", handle.value)
+            return tuple(value + step for value in values)
         return handle.value + (step if handle.max is None or handle.value < handle.max else -step)
 
     def meant(self, value: Any) -> object:

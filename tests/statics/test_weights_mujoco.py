@@ -13,7 +13,7 @@ from statics_cases import random_poses
 
 from explorer import PRESETS, Design, Payload, actuator_forces
 from explorer.export.simulation import DENSITY, simulation_joints, simulation_mjcf
-from explorer.mechanism.design import DOWN
+from explorer.mechanism.design import DOWN, VARIABLES
 from explorer.mechanism.machine import STANDARD_GRAVITY
 from explorer.numerics.arrays import FloatArray
 from explorer.prototype.chains import ACTUATED
@@ -78,7 +78,26 @@ def loops_of(model: Any, data: Any) -> FloatArray:
     return dense[own]
 
 
-@pytest.mark.parametrize("design", [THICK, TILTED])
+def random_design(seed: int) -> Design:
+    """Return a design about the optimum, with random payload, gravity and radii of the legs."""
+    rng = np.random.default_rng(seed)
+    design = OPTIMAL
+    for name, value in zip(VARIABLES, design.variables, strict=True):
+        design = design.with_variable(name, value * rng.uniform(0.8, 1.2))
+    limits = msgspec.structs.replace(design.limits, leg_radii=tuple(rng.uniform(0.1, 0.6, 4)))
+    return msgspec.structs.replace(
+        design,
+        limits=limits,
+        unit_mm=float(rng.choice([5.0, 10.0, 40.0])),
+        payload=Payload(rng.uniform(0.1, 3.0), tuple(rng.normal(size=3) * 2.0)),
+        gravity=tuple(rng.normal(size=3)),
+    )
+
+
+TEN = [THICK, TILTED, *map(random_design, range(8))]
+
+
+@pytest.mark.parametrize("design", TEN, ids=range(len(TEN)))
 def test_forces_with_weights_are_those_of_the_models_equilibrium(design: Design) -> None:
     model = loaded_model(design)
     data = engine.MjData(model)
