@@ -29,7 +29,7 @@ WITHOUT_UNIT = {
     "Go to step": "the number of a step",
     "Number of designs": "a count of designs",
     "Name": "a name",
-    "Direction x y z": "a direction, of length 1",
+    "Direction": "a direction, of length 1",
 }
 """Controls of values that have no unit, and what they are."""
 

@@ -23,7 +23,7 @@ from explorer.mechanism.design_file import PRESETS
 SIZES = ((1280, 720), (1024, 768), (768, 1024))
 LEAST_SHARE = 0.4
 TABS = {
-    *("Pose", "Design", "Show"),
+    *("Pose", "Design", "Machine", "Show"),
     *("Singularity", "Workspace", "Tilt", "Legs", "Prototype"),
     *("Optimise", "Compare", "Paths"),
 }

@@ -41,7 +41,7 @@ FIELD_WORDS = {
     "actuators.pull_n": "The pull of an actuator",
     "struts.outer_mm": "The outer diameter of the struts",
     "struts.inner_mm": "The inner diameter of the struts",
-    "struts.modulus_gpa": "Young’s modulus of the struts",
+    "struts.modulus_gpa": "Young's modulus of the struts",
     "struts.stress_mpa": "The largest stress of the struts",
     "struts.moment_nm": "The largest moment of the struts",
     "guide.force_n": "The largest force on the guide",

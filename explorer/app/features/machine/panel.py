@@ -152,7 +152,7 @@ class MachinePanel:
             ),
         )
         self._controls.triple(
-            "Direction x y z",
+            "Direction",
             "Any other direction of gravity along the axes of the base; its length is kept at 1.",
             Bound(
                 lambda frame: frame.state.design.gravity,
