@@ -19,7 +19,11 @@ from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.workspace.limits.constraints import CARRIAGE_ORDER
 from explorer.workspace.orientations.connected import is_connected
-from explorer.workspace.orientations.share import orientations_within
+from explorer.workspace.orientations.share import (
+    orientation_capability,
+    orientation_share,
+    orientations_within,
+)
 from explorer.workspace.orientations.tilts import greatest_tilt, greatest_tilts, tilt_map
 from explorer.workspace.orientations.torsions import (
     TorsionRange,
@@ -39,10 +43,12 @@ def tilted(azimuth: float, tilts: FloatArray, torsion: float) -> FloatArray:
     return Rotation.from_euler("ZYZ", angles, degrees=True).as_matrix()
 
 
-def sampled_tilt(design: Design, position: Any, azimuth: float, torsion: float) -> float:
+def sampled_tilt(
+    design: Design, position: Any, azimuth: float, torsion: float, tool: FloatArray
+) -> float:
     """Return the last of many tilts up to which all poses are allowed; NaN if none is."""
     tilts = np.arange(0.0, 180.0 + 0.5 * STEP, STEP)
-    within = orientations_within(design, position, tilted(azimuth, tilts, torsion))
+    within = orientations_within(design, position, tilted(azimuth, tilts, torsion), tool)
     if not within[0]:
         return math.nan
     return float(tilts[-1] if within.all() else tilts[within.argmin() - 1])
@@ -65,12 +71,58 @@ def case_of(seed: int) -> tuple[Design, FloatArray, float]:
     return design, position, torsion
 
 
-@pytest.mark.parametrize("seed", range(40))
-def test_tilt_map_agrees_with_dense_turns(seed: int) -> None:
+def tool_case_of(seed: int, share: float) -> tuple[Design, FloatArray, float, FloatArray]:
+    """Return a case with a tool at a share of the reach from b4, and the position of the tool."""
     design, position, torsion = case_of(seed)
-    found = tilt_map(design, position, torsion, 12)
+    direction = np.random.default_rng([4, seed]).normal(size=3)
+    tool = share * design.reach * direction / np.linalg.norm(direction)
+    return design, position + home_pose(design).rotation @ tool, torsion, tool
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_orientations_of_the_tool_are_those_of_its_poses(seed: int) -> None:
+    design, position, _, tool = tool_case_of(seed, 0.3)
+    rng = np.random.default_rng(seed)
+    turns = Rotation.from_rotvec(rng.normal(scale=0.3, size=(150, 3))).as_matrix()
+    rotations = turns @ home_pose(design).rotation
+    poses = [Pose.of(position - r @ tool, r) for r in rotations]
+    expected = [not evaluate(design, pose).violations for pose in poses]
+    assert orientations_within(design, position, rotations, tool).tolist() == expected
+    share = orientation_capability(design, position, rotations, tool)
+    assert share == pytest.approx(np.mean(expected))
+
+
+@pytest.mark.parametrize("seed", range(0, 12, 4))
+def test_orientation_share_of_the_tool_is_that_of_random_orientations(seed: int) -> None:
+    design, position, _, tool = tool_case_of(seed, 0.1)
+    found = orientation_share(design, position, 200_000, tool=tool)
+    rotations = Rotation.random(200_000, random_state=np.random.default_rng(1)).as_matrix()
+    expected = orientations_within(design, position, rotations, tool).mean()
+    error = math.sqrt(expected * (1.0 - expected) / 200_000)
+    assert found.share == pytest.approx(expected, abs=5.0 * error + 5.0 * found.standard_error)
+    assert found.share > 0.0
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_orientations_of_a_tool_at_b4_are_those_of_b4(seed: int) -> None:
+    design, position, torsion = case_of(seed)
+    zero = np.zeros(3)
+    one, other = (tilt_map(design, position, torsion, 24, t) for t in (None, zero))
+    np.testing.assert_array_equal(one.tilts, other.tilts)
+    assert greatest_tilts(design, position, torsion, tool=zero) == pytest.approx(
+        greatest_tilts(design, position, torsion), nan_ok=True, abs=0.0
+    )
+    shares = [orientation_share(design, position, 5000, tool=t) for t in (None, zero)]
+    assert shares[0] == shares[1]
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3])
+@pytest.mark.parametrize("seed", range(40))
+def test_tilt_map_agrees_with_dense_turns(seed: int, share: float) -> None:
+    design, position, torsion, tool = tool_case_of(seed, share)
+    found = tilt_map(design, position, torsion, 12, tool)
     for azimuth, tilt, limit in zip(found.azimuths, found.tilts, found.limits, strict=True):
-        expected = sampled_tilt(design, position, float(azimuth), torsion)
+        expected = sampled_tilt(design, position, float(azimuth), torsion, tool)
         if math.isnan(expected):
             assert math.isnan(tilt)
             assert limit is not None
@@ -78,17 +130,19 @@ def test_tilt_map_agrees_with_dense_turns(seed: int) -> None:
             assert expected - 1e-6 <= tilt <= expected + STEP + 1e-6
 
 
+@pytest.mark.parametrize("share", [0.0, 0.3])
 @pytest.mark.parametrize("seed", range(40))
-def test_tilt_map_names_the_limit_that_is_violated_beyond(seed: int) -> None:
-    design, position, torsion = case_of(seed)
-    found = tilt_map(design, position, torsion, 12)
+def test_tilt_map_names_the_limit_that_is_violated_beyond(seed: int, share: float) -> None:
+    design, position, torsion, tool = tool_case_of(seed, share)
+    found = tilt_map(design, position, torsion, 12, tool)
     for azimuth, tilt, limit in zip(found.azimuths, found.tilts, found.limits, strict=True):
         if limit is None:
             assert tilt == 180.0
             continue
         beyond = 0.0 if math.isnan(tilt) else float(tilt) + 1e-3
         rotation = tilted(float(azimuth), np.array([beyond]), torsion)[0]
-        broken = {each.limit for each in evaluate(design, Pose.of(position, rotation)).violations}
+        pose = Pose.of(position - rotation @ tool, rotation)
+        broken = {each.limit for each in evaluate(design, pose).violations}
         names = {limit, limit.removesuffix(" minimum").removesuffix(" maximum")}
         assert names & broken, (limit, broken)
 
@@ -102,18 +156,19 @@ def test_tilt_map_of_the_paper_ends_at_margins_and_the_carriage_order() -> None:
     assert found.tilts[0] == pytest.approx(90.0, abs=1e-6)
 
 
+@pytest.mark.parametrize("share", [0.0, 0.2])
 @pytest.mark.parametrize("seed", range(12))
-def test_greatest_tilt_is_the_least_of_a_fine_map(seed: int) -> None:
-    design, position, torsion = case_of(seed)
-    found = greatest_tilt(design, position, torsion)
-    fine = tilt_map(design, position, torsion, 7200)
+def test_greatest_tilt_is_the_least_of_a_fine_map(seed: int, share: float) -> None:
+    design, position, torsion, tool = tool_case_of(seed, share)
+    found = greatest_tilt(design, position, torsion, tool)
+    fine = tilt_map(design, position, torsion, 7200, tool)
     if math.isnan(found.tilt):
         assert np.isnan(fine.tilts).all()
         return
     assert found.tilt <= fine.tilts.min() + 1e-9
     assert found.tilt >= fine.tilts.min() - 0.02
     if found.limit is not None:
-        there = tilt_map(design, position, torsion, [found.azimuth])
+        there = tilt_map(design, position, torsion, [found.azimuth], tool)
         assert there.tilts[0] == pytest.approx(found.tilt, abs=1e-6)
         assert there.limits[0] == found.limit
 
@@ -158,18 +213,19 @@ def test_greatest_tilts_of_many_positions_are_those_of_each() -> None:
     assert greatest_tilts(design, np.zeros((0, 3))).shape == (0,)
 
 
+@pytest.mark.parametrize("share", [0.0, 0.2])
 @pytest.mark.parametrize("seed", range(16))
-def test_torsion_range_agrees_with_dense_turns(seed: int) -> None:
-    design, position, torsion = case_of(seed)
+def test_torsion_range_agrees_with_dense_turns(seed: int, share: float) -> None:
+    design, position, torsion, tool = tool_case_of(seed, share)
     for azimuth, tilt in ((0.0, 0.0), (40.0, 15.0)):
-        found = torsion_range(design, position, torsion, azimuth, tilt)
+        found = torsion_range(design, position, torsion, azimuth, tilt, tool)
         turns = np.arange(0.0, 360.0, STEP)
         angles = [
             np.array([[azimuth, tilt, s - azimuth] for s in torsion + k * turns]) for k in (-1, 1)
         ]
         down, up = (
             orientations_within(
-                design, position, Rotation.from_euler("ZYZ", each, degrees=True).as_matrix()
+                design, position, Rotation.from_euler("ZYZ", each, degrees=True).as_matrix(), tool
             )
             for each in angles
         )
@@ -185,20 +241,24 @@ def test_torsion_range_agrees_with_dense_turns(seed: int) -> None:
                 assert last - 1e-6 <= end <= last + STEP + 1e-6
 
 
+@pytest.mark.parametrize("share", [0.0, 0.2])
 @pytest.mark.parametrize("seed", range(12))
-def test_orientation_is_connected_to_tilt_zero_up_to_the_tilt_of_the_map(seed: int) -> None:
-    design, position, torsion = case_of(seed)
-    found = tilt_map(design, position, torsion, 8)
+def test_orientation_is_connected_to_tilt_zero_up_to_the_tilt_of_the_map(
+    seed: int, share: float
+) -> None:
+    design, position, torsion, tool = tool_case_of(seed, share)
+    found = tilt_map(design, position, torsion, 8, tool)
     for azimuth, tilt in zip(found.azimuths.tolist(), found.tilts.tolist(), strict=True):
         if math.isnan(tilt):
-            assert not is_connected(design, position, tilted(azimuth, np.zeros(1), torsion)[0])
+            start = tilted(azimuth, np.zeros(1), torsion)[0]
+            assert not is_connected(design, position, start, tool=tool)
             continue
         inside, outside = tilted(azimuth, np.array([0.99 * tilt, tilt + 0.01]), torsion)
         level = tilted(0.0, np.zeros(1), torsion)[0]
-        assert is_connected(design, position, inside)
-        assert is_connected(design, position, inside, level)
+        assert is_connected(design, position, inside, tool=tool)
+        assert is_connected(design, position, inside, level, tool)
         if tilt < 179.9:
-            assert not is_connected(design, position, outside)
+            assert not is_connected(design, position, outside, tool=tool)
 
 
 def test_tilt_zero_that_violates_a_limit_has_no_tilt() -> None:
@@ -230,6 +290,10 @@ def test_tilts_with_unusable_input_are_refused() -> None:
             tilt_map(design, p, torsion)
     with pytest.raises(InputError, match="rotation"):
         is_connected(design, p, np.zeros((3, 3)))
+    with pytest.raises(InputError, match="one tool point"):
+        greatest_tilt(design, p, tool=[(0.0, 0.0, 1.0)])
+    with pytest.raises(InputError, match="tool must be finite"):
+        tilt_map(design, p, tool=(0.0, 0.0, math.nan))
 
 
 def dips() -> list[tuple[Design, float]]:
@@ -260,6 +324,51 @@ def test_greatest_tilt_finds_a_dip_between_azimuths(index: int) -> None:
         found = float(greatest_tilts(design, p, torsion, azimuths))
         assert least - 0.05 <= found <= least + 1e-6
     assert greatest_tilt(design, p, torsion).tilt == pytest.approx(least, abs=0.05)
+
+
+def tool_dips() -> list[tuple[Design, FloatArray, FloatArray]]:
+    """Return designs, positions and tools at which one limit leaves out a narrow range."""
+    design = PRESETS["paper-optimal"]
+    wide: dict[str, Any] = dict.fromkeys(("l1", "d2", "d4", "l4"), (0.0, 500.0))
+    free = limited(design, margin=None, carriage_order="any", box=None, **wide)
+    c, small = np.array(home_pose(design).position), 1.0 - 3e-4
+    cases: list[tuple[Design, FloatArray, FloatArray]] = []
+    for tool in ((0.0, 0.3, 3.0), (1.5, -1.0, 2.0)):
+        t = np.array(tool)
+        arm, far = float(np.linalg.norm(t)), float(np.linalg.norm(c - [*design.a3, 0.0]))
+        to_b1, to_b2, to_b3 = (
+            float(np.linalg.norm(np.array(b) - t))
+            for b in ((*design.b1, 0.0), (design.b2, 0.0, 0.0), (design.b3, 0.0, 0.0))
+        )
+        distance, radius = float(np.linalg.norm(c)), math.hypot(c[1], c[2])
+        sides: list[dict[str, Any]] = [
+            {"l4": (0.0, far + arm * small)},
+            {"l4": (far - arm * small, 500.0)},
+            {"l1": (0.0, distance + to_b1 * small)},
+            {"l1": (distance - to_b1 * small, 500.0)},
+            {"d2": (0.0, radius + to_b2 * small)},
+            {"d4": (radius - to_b3 * small, 500.0)},
+            {"guide": (-1e3, float(c[0]) + max(to_b2, to_b3) * small)},
+        ]
+        for axis in np.eye(3):
+            high = np.where(axis > 0.0, c + arm * small, 99.0)
+            low = np.where(axis > 0.0, c - arm * small, -99.0)
+            sides += [{"box": ((-99.0,) * 3, (*high,))}, {"box": ((*low,), (99.0,) * 3)}]
+        cases += [(limited(free, **side), c, t) for side in sides]
+    return cases
+
+
+@pytest.mark.parametrize("index", range(len(tool_dips())))
+def test_greatest_tilt_of_the_tool_finds_a_dip_between_azimuths(index: int) -> None:
+    design, position, tool = tool_dips()[index]
+    fine = tilt_map(design, position, -40.0, 14_400, tool)
+    least = fine.tilts.min()
+    assert least < 179.0
+    # The dip is narrow: most azimuths are free.
+    assert (fine.tilts == 180.0).sum() > 13_000
+    for azimuths in (5, 36, 72):
+        found = float(greatest_tilts(design, position, -40.0, azimuths, tool))
+        assert least - 0.05 <= found <= least + 1e-6
 
 
 def exact_place(a: float, b: float, c: float) -> float:

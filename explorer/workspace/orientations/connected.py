@@ -18,7 +18,11 @@ ANGLE_TOLERANCE = 1e-7
 
 
 def is_connected(
-    design: Design, position: ArrayLike, rotation: ArrayLike, other: ArrayLike | None = None
+    design: Design,
+    position: ArrayLike,
+    rotation: ArrayLike,
+    other: ArrayLike | None = None,
+    tool: ArrayLike | None = None,
 ) -> bool:
     """Return whether an orientation is connected to tilt zero by a tilt without a gap.
 
@@ -27,26 +31,28 @@ def is_connected(
 
     Args:
         design: The manipulator.
-        position: Position of b4 in the base frame, in design units, shape (3,).
+        position: Position of b4 or the tool in the base frame, in design units, shape (3,).
         rotation: Orientation, platform to base, shape (3, 3).
         other: Second orientation, shape (3, 3). If given, the question is whether a tilt from the
             first one to tilt zero, a change of the torsion there and a tilt to the second one
             connect the two.
+        tool: Point of the platform that has the position, in the platform frame, shape (3,), in
+            design units; None for b4.
 
     Raises:
-        InputError: not a position, or not a rotation.
+        InputError: not a position, not a rotation, or not a tool point.
     """
     p = one_position(position)
     ends = [
         tilt_torsion_of(checked_rotation(each)) for each in (rotation, other) if each is not None
     ]
     for azimuth, tilt, torsion in ends:
-        reached = tilt_map(design, p, torsion, [azimuth]).tilts[0]
+        reached = tilt_map(design, p, torsion, [azimuth], tool).tilts[0]
         if not reached >= tilt - ANGLE_TOLERANCE:
             return False
     if other is None:
         return True
-    span = torsion_range(design, p, ends[0].torsion)
+    span = torsion_range(design, p, ends[0].torsion, tool=tool)
     if math.isnan(span.low):
         return False
     turn = (ends[1].torsion - span.low + ANGLE_TOLERANCE) % 360.0 - ANGLE_TOLERANCE

@@ -6,18 +6,19 @@ import math
 
 import numpy as np
 
+from explorer.legs.segments import Vector
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.numerics.compiled import helper, kernel
 from explorer.workspace.limits.valid_poses import (
-    B1,
-    B2,
-    B3,
+    A3,
+    BOX_HIGHS,
+    BOX_LOWS,
     GUIDE_HIGH,
     GUIDE_LOW,
     LENGTH_HIGHS,
     LENGTH_LOWS,
 )
-from explorer.workspace.orientations.turn_polynomials import SCRATCH, write_tilt
+from explorer.workspace.orientations.turn_polynomials import SCRATCH, arm_of, write_tilt
 from explorer.workspace.orientations.turns import HALF_TURN, NO_LIMIT, first_limit
 
 # Share of a bracket that the search by the golden section keeps.
@@ -25,8 +26,9 @@ GOLDEN_SECTION = 0.5 * (math.sqrt(5.0) - 1.0)
 # Widths of the bracket at which the search ends, in radians: about an azimuth of the row, and about
 # a worst azimuth, where the dip may be narrow.
 AZIMUTH_WIDTH, NARROW_WIDTH = 1e-4, 1e-6
-# Largest number of worst azimuths: two of l1, three each of d2 and d4, and two for each carriage.
-WORST = 12
+# Largest number of worst azimuths: two each of l1 and l4, three each of d2 and d4, two for each
+# carriage, and six of the box.
+WORST = 20
 
 
 @helper
@@ -34,6 +36,7 @@ def tilt_in(
     row: FloatArray,
     cones: FloatArray,
     p: FloatArray,
+    tool: FloatArray,
     azimuth: float,
     torsion: float,
     turn: FloatArray,
@@ -41,7 +44,7 @@ def tilt_in(
 ) -> tuple[float, int]:
     """Return the greatest tilt of a position in one azimuth and its limit, in radians."""
     write_tilt(azimuth, torsion, turn)
-    return first_limit(row, cones, p, turn, HALF_TURN, scratch)
+    return first_limit(row, cones, p, tool, turn, HALF_TURN, scratch)
 
 
 @helper
@@ -49,6 +52,7 @@ def lowest_about(
     row: FloatArray,
     cones: FloatArray,
     p: FloatArray,
+    tool: FloatArray,
     torsion: float,
     bracket: tuple[float, float, float],
     width: float,
@@ -63,7 +67,8 @@ def lowest_about(
     Args:
         row: Row of `Rules`.
         cones: Cones of `Rules`.
-        p: Position of b4, shape (3,).
+        p: Position of the tool, shape (3,).
+        tool: Tool point in platform coordinates, shape (3,).
         torsion: Torsion in radians.
         bracket: Low end, first azimuth and high end, in radians.
         width: Width of the bracket at which the search ends, in radians.
@@ -72,43 +77,51 @@ def lowest_about(
     """
     low, first, high = bracket
     second = first + (1.0 - GOLDEN_SECTION) * (high - first)
-    at_first, limit_first = tilt_in(row, cones, p, first, torsion, turn, scratch)
-    at_second, limit_second = tilt_in(row, cones, p, second, torsion, turn, scratch)
+    at_first, limit_first = tilt_in(row, cones, p, tool, first, torsion, turn, scratch)
+    at_second, limit_second = tilt_in(row, cones, p, tool, second, torsion, turn, scratch)
     while high - low > width:
         if at_first <= at_second:
             high, second, at_second, limit_second = second, first, at_first, limit_first
             first = GOLDEN_SECTION * second + (1.0 - GOLDEN_SECTION) * low
-            at_first, limit_first = tilt_in(row, cones, p, first, torsion, turn, scratch)
+            at_first, limit_first = tilt_in(row, cones, p, tool, first, torsion, turn, scratch)
         else:
             low, first, at_first, limit_first = first, second, at_second, limit_second
             second = GOLDEN_SECTION * first + (1.0 - GOLDEN_SECTION) * high
-            at_second, limit_second = tilt_in(row, cones, p, second, torsion, turn, scratch)
+            at_second, limit_second = tilt_in(row, cones, p, tool, second, torsion, turn, scratch)
     if at_first <= at_second:
         return at_first, first, limit_first
     return at_second, second, limit_second
 
 
 @helper
-def azimuth_towards(vx: float, vy: float, wx: float, wy: float, wz: float) -> float:
-    """Return the azimuth of the tilt that takes a horizontal vector v to a vector w as long.
+def azimuth_towards(v: Vector, wx: float, wy: float, wz: float) -> float:
+    """Return the azimuth of the tilt that takes a vector v to a vector w as long.
 
     The axis of a tilt is horizontal and keeps what v has along it, so it is perpendicular to the
-    difference of v and the horizontal part of w.
+    horizontal part of the difference of v and w.
     """
-    sign = -1.0 if wz > 0.0 else 1.0
-    return math.atan2(sign * (vy - wy), sign * (vx - wx))
+    x, y = v[0] - wx, v[1] - wy
+    # The tilt is less than half a turn, from the axis z towards its azimuth.
+    rise = wz
+    if v[2] != 0.0:
+        rise = wz * (x * v[0] + y * v[1]) - v[2] * (x * wx + y * wy)
+    sign = -1.0 if rise > 0.0 else 1.0
+    return math.atan2(sign * y, sign * x)
 
 
 @helper
-def write_worst_azimuths(row: FloatArray, p: FloatArray, torsion: float, worst: FloatArray) -> int:
-    """Write the azimuths of tilts to which l1, d2, d4, d1 and d3 are largest or smallest.
+def write_worst_azimuths(
+    row: FloatArray, p: FloatArray, tool: FloatArray, torsion: float, worst: FloatArray
+) -> int:
+    """Write the azimuths of tilts to which lengths, carriages and b4 in the box are at extremes.
 
     Only those that violate a bound count. Beyond such a bound the region of tilts may be small, so
     that azimuths at equal distances pass by it.
 
     Args:
         row: Row of `Rules`.
-        p: Position of b4, shape (3,).
+        p: Position of the tool, shape (3,).
+        tool: Tool point in platform coordinates, shape (3,).
         torsion: Torsion in radians.
         worst: Azimuths in radians, shape (`WORST`,).
 
@@ -117,44 +130,66 @@ def write_worst_azimuths(row: FloatArray, p: FloatArray, torsion: float, worst: 
     """
     count = 0
     c, s = math.cos(torsion), math.sin(torsion)
-    distance = math.sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2])
-    radius = math.hypot(p[1], p[2])
-    for leg in range(3):
-        bx = row[B1] if leg == 0 else (row[B2] if leg == 1 else row[B3])
-        by = row[B1 + 1] if leg == 0 else 0.0
-        arm = math.hypot(bx, by)
-        vx, vy = c * bx - s * by, s * bx + c * by
-        # b1 turns to the line through a1, b2 and b3 to the plane across the guide.
-        far = distance if leg == 0 else radius
-        x = p[0] if leg == 0 else 0.0
+    for leg in range(4):
+        bx, by, bz = arm_of(row, leg, tool)
+        arm = math.hypot(math.hypot(bx, by), bz)
+        if leg == 3 and arm == 0.0:
+            continue
+        v = (c * bx - s * by, s * bx + c * by, bz)
+        on_guide = 0 < leg < 3
+        # b1 turns to the line through a1, b4 to that through a3, b2 and b3 to the plane across the
+        # guide.
+        x = 0.0 if on_guide else p[0]
+        y, z = p[1], p[2]
+        if leg == 3:
+            x, y = p[0] - row[A3], p[1] - row[A3 + 1]
+        far = math.hypot(y, z) if on_guide else math.sqrt(x * x + y * y + z * z)
         if far > 0.0 and far + arm > row[LENGTH_HIGHS + leg]:
             share = arm / far
-            worst[count] = azimuth_towards(vx, vy, share * x, share * p[1], share * p[2])
+            worst[count] = azimuth_towards(v, share * x, share * y, share * z)
             count += 1
-        if leg > 0 and arm > far and row[LENGTH_LOWS + leg] > 0.0:
+        if on_guide and arm > far and row[LENGTH_LOWS + leg] > 0.0:
             # The leg's end can lie on the guide, at one of two places.
             along = math.sqrt(arm * arm - far * far)
-            worst[count] = azimuth_towards(vx, vy, along, -p[1], -p[2])
-            worst[count + 1] = azimuth_towards(vx, vy, -along, -p[1], -p[2])
+            worst[count] = azimuth_towards(v, along, -p[1], -p[2])
+            worst[count + 1] = azimuth_towards(v, -along, -p[1], -p[2])
             count += 2
         elif far > 0.0 and abs(far - arm) < row[LENGTH_LOWS + leg]:
             share = -arm / far
-            worst[count] = azimuth_towards(vx, vy, share * x, share * p[1], share * p[2])
+            worst[count] = azimuth_towards(v, share * x, share * y, share * z)
             count += 1
-        if leg > 0 and p[0] + arm > row[GUIDE_HIGH]:
-            worst[count] = azimuth_towards(vx, vy, arm, 0.0, 0.0)
+        if on_guide and p[0] + arm > row[GUIDE_HIGH]:
+            worst[count] = azimuth_towards(v, arm, 0.0, 0.0)
             count += 1
-        if leg > 0 and p[0] - arm < row[GUIDE_LOW]:
-            worst[count] = azimuth_towards(vx, vy, -arm, 0.0, 0.0)
+        if on_guide and p[0] - arm < row[GUIDE_LOW]:
+            worst[count] = azimuth_towards(v, -arm, 0.0, 0.0)
             count += 1
+        if leg < 3:
+            continue
+        for i in range(3):
+            for sign in (-1.0, 1.0):
+                bound = row[BOX_HIGHS + i] if sign > 0.0 else -row[BOX_LOWS + i]
+                if sign * p[i] + arm > bound:
+                    end = sign * arm
+                    worst[count] = azimuth_towards(
+                        v,
+                        end if i == 0 else 0.0,
+                        end if i == 1 else 0.0,
+                        end if i == 2 else 0.0,
+                    )
+                    count += 1
     return count
 
 
-@kernel("void(f8[::1], f8[:,::1], f8[:,::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], i8[::1])")
+@kernel(
+    "void(f8[::1], f8[:,::1], f8[:,::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1], f8[::1],"
+    " i8[::1])"
+)
 def least_tilt_rows(
     row: FloatArray,
     cones: FloatArray,
     positions: FloatArray,
+    tool: FloatArray,
     torsions: FloatArray,
     azimuths: FloatArray,
     tilts: FloatArray,
@@ -167,7 +202,8 @@ def least_tilt_rows(
     Args:
         row: Row of `Rules`.
         cones: Cones of `Rules`.
-        positions: Positions of b4, shape (n, 3).
+        positions: Positions of the tool, shape (n, 3).
+        tool: Tool point in platform coordinates, shape (3,).
         torsions: Torsion of each position in radians, shape (n,).
         azimuths: Azimuths in radians at equal distances once around, shape (m,).
         tilts: Scratch array, shape (m,).
@@ -182,7 +218,7 @@ def least_tilt_rows(
         p, torsion = positions[index], torsions[index]
         best, towards[index], limits[index] = HALF_TURN, 0.0, NO_LIMIT
         for k in range(count):
-            tilts[k], limit = tilt_in(row, cones, p, azimuths[k], torsion, turn, scratch)
+            tilts[k], limit = tilt_in(row, cones, p, tool, azimuths[k], torsion, turn, scratch)
             if tilts[k] < best:
                 best, towards[index], limits[index] = tilts[k], azimuths[k], limit
             if best < 0.0:
@@ -201,20 +237,20 @@ def least_tilt_rows(
                 continue
             bracket = (azimuths[k] - step, azimuths[k], azimuths[k] + step)
             found, azimuth, limit = lowest_about(
-                row, cones, p, torsion, bracket, AZIMUTH_WIDTH, turn, scratch
+                row, cones, p, tool, torsion, bracket, AZIMUTH_WIDTH, turn, scratch
             )
             if found < best:
                 best, towards[index], limits[index] = found, azimuth, limit
-        for k in range(write_worst_azimuths(row, p, torsion, worst)):
+        for k in range(write_worst_azimuths(row, p, tool, torsion, worst)):
             place = (worst[k] - azimuths[0]) % (2.0 * math.pi)
             left = int(place / step) % count
-            tilt, _ = tilt_in(row, cones, p, worst[k], torsion, turn, scratch)
+            tilt, _ = tilt_in(row, cones, p, tool, worst[k], torsion, turn, scratch)
             if not (tilt < tilts[left] and tilt < tilts[(left + 1) % count]):
                 continue
             low = worst[k] - (place - left * step)
             bracket = (low, worst[k], low + step)
             found, azimuth, limit = lowest_about(
-                row, cones, p, torsion, bracket, NARROW_WIDTH, turn, scratch
+                row, cones, p, tool, torsion, bracket, NARROW_WIDTH, turn, scratch
             )
             if found < best:
                 best, towards[index], limits[index] = found, azimuth, limit

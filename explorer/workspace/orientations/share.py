@@ -20,10 +20,11 @@ from scipy.spatial.transform import Rotation
 from explorer.errors import InputError
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import checked_rotation
+from explorer.mechanism.tool_point import tool_offset
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray, for_kernel
 from explorer.numerics.compiled import kernel
 from explorer.workspace.limits.valid_poses import Rules, is_valid, valid_rows
-from explorer.workspace.orientations.inputs import one_position, whole_number
+from explorer.workspace.orientations.inputs import one_position, one_tool, whole_number
 from explorer.workspace.orientations.sets import MOST_ORIENTATIONS
 
 CAPABILITY_ORIENTATIONS = 100_000
@@ -56,6 +57,7 @@ def orientation_share(
     position: ArrayLike,
     n: int = CAPABILITY_ORIENTATIONS,
     seed: int = 0,
+    tool: ArrayLike | None = None,
 ) -> OrientationShare:
     """Return the share of all orientations that a position can have within the limits.
 
@@ -64,14 +66,17 @@ def orientation_share(
 
     Args:
         design: The manipulator.
-        position: Position of b4 in the base frame, in design units, shape (3,).
+        position: Position of b4 or the tool in the base frame, in design units, shape (3,).
         n: Number of orientations.
         seed: Seed of the random rotations; the same seed gives the same result.
+        tool: Point of the platform that has the position, in the platform frame, shape (3,), in
+            design units; None for b4.
 
     Raises:
-        InputError: not a position, no usable number of orientations, or no usable seed.
+        InputError: not a position or a tool point, no usable number of orientations, or no usable
+            seed.
     """
-    p = one_position(position)
+    p, t = one_position(position), one_tool(tool)
     n = whole_number("the number of orientations", n, 2, MOST_ORIENTATIONS)
     seed = whole_number("the seed", seed, 0)
     sets = min(SETS, n)
@@ -81,7 +86,7 @@ def orientation_share(
     quaternions = for_kernel(turns.as_quat(scalar_first=True).reshape(sets, 4))
     counts = np.zeros(sets, dtype=np.int64)
     rules = Rules.of(design).without_clearances()
-    share_rows(n, rules.row, rules.cones, for_kernel(p), quaternions, sizes, counts)
+    share_rows(n, rules.row, rules.cones, for_kernel(p), t, quaternions, sizes, counts)
     share = float(counts.sum()) / n
     weights = sizes / n
     # The sets differ in size by one orientation at the most.
@@ -90,26 +95,33 @@ def orientation_share(
 
 
 def orientation_capability(
-    design: Design, position: ArrayLike, orientations: ArrayLike | int = CAPABILITY_ORIENTATIONS
+    design: Design,
+    position: ArrayLike,
+    orientations: ArrayLike | int = CAPABILITY_ORIENTATIONS,
+    tool: ArrayLike | None = None,
 ) -> float:
     """Return the share of orientations that a position can have within all limits, 0 to 1.
 
     Args:
         design: The manipulator.
-        position: Position of b4 in the base frame, in design units, shape (3,).
+        position: Position of b4 or the tool in the base frame, in design units, shape (3,).
         orientations: Rotations from platform to base, shape (n, 3, 3), or their number for
             `orientation_share`, which gives the standard error too.
+        tool: Point of the platform that has the position, in the platform frame, shape (3,), in
+            design units; None for b4.
 
     Raises:
-        InputError: not a position, not rotations, or no usable count.
+        InputError: not a position, not a tool point, not rotations, or no usable count.
     """
     array = np.asarray(orientations)
     if array.ndim == 0:
-        return orientation_share(design, position, array.item()).share
-    return float(orientations_within(design, position, array).mean())
+        return orientation_share(design, position, array.item(), tool=tool).share
+    return float(orientations_within(design, position, array, tool).mean())
 
 
-def orientations_within(design: Design, position: ArrayLike, rotations: ArrayLike) -> BoolArray:
+def orientations_within(
+    design: Design, position: ArrayLike, rotations: ArrayLike, tool: ArrayLike | None = None
+) -> BoolArray:
     """Return which orientations a position can have within all limits, shape (n,).
 
     The limits are those of `explorer.workspace.limits.broken.violations`: lengths, guide, gap,
@@ -117,26 +129,30 @@ def orientations_within(design: Design, position: ArrayLike, rotations: ArrayLik
 
     Args:
         design: The manipulator.
-        position: Position of b4 in the base frame, in design units, shape (3,).
+        position: Position of b4 or the tool in the base frame, in design units, shape (3,).
         rotations: Rotations from platform to base, shape (n, 3, 3).
+        tool: Point of the platform that has the position, in the platform frame, shape (3,), in
+            design units; None for b4.
 
     Raises:
-        InputError: not a position, or not rotations.
+        InputError: not a position, not rotations, or not a tool point.
     """
-    p, r = one_position(position), checked_rotation(rotations)
+    p, r, t = one_position(position), checked_rotation(rotations), one_tool(tool)
     if r.ndim != 3 or not len(r):
         raise InputError(f"rotations must have the shape (n, 3, 3); got {r.shape}")
     within = np.empty(len(r), dtype=np.bool_)
     rules = Rules.of(design).without_clearances()
-    valid_rows(len(r), rules.row, rules.cones, np.full((len(r), 3), p), for_kernel(r), within)
+    positions = p - tool_offset(r, t)
+    valid_rows(len(r), rules.row, rules.cones, positions, for_kernel(r), within)
     return within
 
 
-@kernel("void(f8[::1], f8[:,::1], f8[::1], f8[:,::1], i8[::1], i8[::1])")
+@kernel("void(f8[::1], f8[:,::1], f8[::1], f8[::1], f8[:,::1], i8[::1], i8[::1])")
 def share_rows(
     row: FloatArray,
     cones: FloatArray,
     position: FloatArray,
+    tool: FloatArray,
     turns: FloatArray,
     sizes: IntArray,
     counts: IntArray,
@@ -146,12 +162,14 @@ def share_rows(
     Args:
         row: Row of `Rules`.
         cones: Cones of `Rules`.
-        position: Position of b4, shape (3,).
+        position: Position of the tool, shape (3,).
+        tool: Tool point in platform coordinates, shape (3,).
         turns: Unit quaternions (w, x, y, z) that turn the sets, shape (m, 4).
         sizes: Number of orientations of each set, shape (m,).
         counts: Numbers of orientations that are allowed, shape (m,).
     """
     base, ends, r = np.zeros((4, 3)), np.zeros((4, 3)), np.zeros((3, 3))
+    p = np.zeros(3)
     for index in range(turns.shape[0]):
         a, b, c, d = turns[index, 0], turns[index, 1], turns[index, 2], turns[index, 3]
         size = sizes[index]
@@ -169,6 +187,9 @@ def share_rows(
             r[1, 1], r[1, 2] = 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)
             r[2, 0], r[2, 1] = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x)
             r[2, 2] = 1.0 - 2.0 * (x * x + y * y)
-            if is_valid(row, cones, position, r, base, ends):
+            for i in range(3):
+                arm = r[i, 0] * tool[0] + r[i, 1] * tool[1] + r[i, 2] * tool[2]
+                p[i] = position[i] - arm
+            if is_valid(row, cones, p, r, base, ends):
                 count += 1
         counts[index] = count

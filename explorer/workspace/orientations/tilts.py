@@ -1,8 +1,8 @@
 """The tilts that a position can have: how far the platform tilts before a limit stops it.
 
 The angles are those of `explorer.mechanism.tilt_torsion`. At a torsion the platform tilts from
-tilt zero in each azimuth, b4 held in its place, until it meets the first limit. That tilt is exact
-but for rounding (`explorer.workspace.orientations.turns`). The limits are those of
+tilt zero in each azimuth, b4 or the tool held in its place, until it meets the first limit. That
+tilt is exact but for rounding (`explorer.workspace.orientations.turns`). The limits are those of
 `explorer.workspace.limits.broken.violations`; collisions of legs are not among them.
 """
 
@@ -25,6 +25,7 @@ from explorer.workspace.orientations.inputs import (
     even_angles,
     one_angle,
     one_position,
+    one_tool,
 )
 from explorer.workspace.orientations.least_tilts import least_tilt_rows
 from explorer.workspace.orientations.turns import NO_LIMIT, limit_names, tilt_rows
@@ -81,17 +82,21 @@ def tilt_map(
     position: ArrayLike,
     torsion: float | None = None,
     azimuths: ArrayLike | int = AZIMUTHS,
+    tool: ArrayLike | None = None,
 ) -> TiltMap:
     """Return the greatest tilt of a position in each azimuth, and the limit that ends it.
 
     Args:
         design: The manipulator.
-        position: Position of b4 in the base frame, in design units, shape (3,).
+        position: Position of b4 or the tool in the base frame, in design units, shape (3,).
         torsion: Torsion in degrees; that of the home pose if None.
         azimuths: Azimuths in degrees, shape (n,), or their number, at equal distances from 0 on.
+        tool: Point of the platform that has the position, in the platform frame, shape (3,), in
+            design units; None for b4.
 
     Raises:
-        InputError: not a position, angles that are not finite, or no usable number of azimuths.
+        InputError: not a position or a tool point, angles that are not finite, or no usable
+            number of azimuths.
     """
     p, sigma = one_position(position), checked_torsion(design, torsion)
     array = np.asarray(azimuths)
@@ -111,6 +116,7 @@ def tilt_map(
         rules.row,
         rules.cones,
         for_kernel(p[None]),
+        one_tool(tool),
         math.radians(sigma),
         np.radians(directions),
         tilts,
@@ -120,25 +126,31 @@ def tilt_map(
 
 
 def greatest_tilt(
-    design: Design, position: ArrayLike, torsion: float | None = None
+    design: Design,
+    position: ArrayLike,
+    torsion: float | None = None,
+    tool: ArrayLike | None = None,
 ) -> GreatestTilt:
     """Return the greatest tilt of a position in every azimuth.
 
     It is the least over all azimuths of the tilts of `tilt_map`. The search starts from 360
-    azimuths, and from those of the worst orientations for lengths and guide, and narrows down
+    azimuths, and from those of the worst orientations for lengths, guide and box, and narrows down
     every minimum among them that can be the least. A dip by the swing of a joint that is narrower
     than the distance of the azimuths, 1°, can be missed.
 
     Args:
         design: The manipulator.
-        position: Position of b4 in the base frame, in design units, shape (3,).
+        position: Position of b4 or the tool in the base frame, in design units, shape (3,).
         torsion: Torsion in degrees; that of the home pose if None.
+        tool: Point of the platform that has the position, in the platform frame, shape (3,), in
+            design units; None for b4.
 
     Raises:
-        InputError: not a position, or a torsion that is not finite.
+        InputError: not a position, not a tool point, or a torsion that is not finite.
     """
     p, sigma = one_position(position), checked_torsion(design, torsion)
-    tilts, towards, limits = _least_tilts(design, p[None], np.array([sigma]), AZIMUTHS_OF_ONE)
+    sigmas = np.array([sigma])
+    tilts, towards, limits = _least_tilts(design, p[None], sigmas, AZIMUTHS_OF_ONE, tool)
     tilt = float(tilts[0])
     is_ended = not math.isnan(tilt) and limits[0] != NO_LIMIT
     azimuth = math.remainder(float(towards[0]), 360.0) if is_ended else math.nan
@@ -150,6 +162,7 @@ def greatest_tilts(
     position: ArrayLike,
     torsion: ArrayLike | None = None,
     azimuths: int = AZIMUTHS,
+    tool: ArrayLike | None = None,
 ) -> FloatArray:
     """Return the greatest tilts of positions in every azimuth, in degrees, shape (...).
 
@@ -158,13 +171,15 @@ def greatest_tilts(
 
     Args:
         design: The manipulator.
-        position: Positions of b4 in the base frame, in design units, shape (..., 3).
+        position: Positions of b4 or the tool in the base frame, in design units, shape (..., 3).
         torsion: Torsions in degrees, shape (...); that of the home pose if None.
         azimuths: Number of azimuths from which the least tilt is searched, 3 or more.
+        tool: Point of the platform that has the positions, in the platform frame, shape (3,), in
+            design units; None for b4.
 
     Raises:
-        InputError: not positions, torsions that are not finite or do not broadcast with the
-            positions, or no usable number of azimuths.
+        InputError: not positions or a tool point, torsions that are not finite or do not broadcast
+            with the positions, or no usable number of azimuths.
     """
     p = finite_array("position", position, (3,))
     sigma = np.asarray(checked_torsion(design, None))
@@ -179,7 +194,7 @@ def greatest_tilts(
         ) from None
     positions = np.broadcast_to(p, (*shape, 3)).reshape(-1, 3)
     torsions = np.broadcast_to(sigma, shape).reshape(-1)
-    return _least_tilts(design, positions, torsions, azimuths)[0].reshape(shape)
+    return _least_tilts(design, positions, torsions, azimuths, tool)[0].reshape(shape)
 
 
 def checked_torsion(design: Design, torsion: float | None) -> float:
@@ -194,7 +209,11 @@ def checked_torsion(design: Design, torsion: float | None) -> float:
 
 
 def _least_tilts(
-    design: Design, positions: FloatArray, torsions: FloatArray, azimuths: int
+    design: Design,
+    positions: FloatArray,
+    torsions: FloatArray,
+    azimuths: int,
+    tool: ArrayLike | None,
 ) -> tuple[FloatArray, FloatArray, list[int]]:
     """Return least tilts and their azimuths in degrees, and the numbers of their limits."""
     n, directions = len(positions), np.radians(even_angles("azimuths", azimuths))
@@ -206,6 +225,7 @@ def _least_tilts(
         rules.row,
         rules.cones,
         for_kernel(positions),
+        one_tool(tool),
         np.radians(torsions),
         directions,
         np.empty(count),

@@ -11,7 +11,7 @@ from explorer.mechanism.design import Design
 from explorer.mechanism.tilt_torsion import rotation_from_tilt_torsion
 from explorer.numerics.arrays import FloatArray
 from explorer.workspace.limits.valid_poses import Rules
-from explorer.workspace.orientations.inputs import even_angles, one_angle, one_position
+from explorer.workspace.orientations.inputs import even_angles, one_angle, one_position, one_tool
 from explorer.workspace.orientations.tilts import (
     AZIMUTHS_OF_ONE,
     GreatestTilt,
@@ -71,24 +71,27 @@ def torsion_range(
     torsion: float | None = None,
     azimuth: float = 0.0,
     tilt: float = 0.0,
+    tool: ArrayLike | None = None,
 ) -> TorsionRange:
     """Return the torsions that a position can have without a gap from one torsion, at a tilt.
 
     Args:
         design: The manipulator.
-        position: Position of b4 in the base frame, in design units, shape (3,).
+        position: Position of b4 or the tool in the base frame, in design units, shape (3,).
         torsion: Torsion in degrees that the range starts from; that of the home pose if None.
         azimuth: Azimuth in degrees, which stays the same.
         tilt: Tilt in degrees, which stays the same.
+        tool: Point of the platform that has the position, in the platform frame, shape (3,), in
+            design units; None for b4.
 
     Raises:
-        InputError: not a position, or angles that are not finite.
+        InputError: not a position, not a tool point, or angles that are not finite.
     """
     p, sigma = one_position(position), checked_torsion(design, torsion)
     r = rotation_from_tilt_torsion([one_angle("azimuth", azimuth), one_angle("tilt", tilt), sigma])
     # For a decreasing torsion the platform's x-axis turns towards its negative y-axis.
     turns = np.stack([_turn_about_z(r, -1.0), _turn_about_z(r, 1.0)])
-    angles, limits = _end_of_turns(design, p, turns)
+    angles, limits = _end_of_turns(design, p, turns, tool)
     down, up = in_degrees(angles).tolist()
     names = names_of(design, limits)
     if names[0] is None and names[1] is None:
@@ -97,7 +100,7 @@ def torsion_range(
         # Half a turn one way ends where the other way ends, beyond that half turn.
         half = _turned_half(r)
         rest = np.stack([_turn_about_z(half, -1.0), _turn_about_z(half, 1.0)])
-        angles, limits = _end_of_turns(design, p, rest)
+        angles, limits = _end_of_turns(design, p, rest, tool)
         # Where the half turn ends on a limit, rounding may make the start of the rest invalid.
         more, rest_names = np.maximum(np.degrees(angles), 0.0).tolist(), names_of(design, limits)
         if names[0] is None:
@@ -109,45 +112,53 @@ def torsion_range(
     return TorsionRange(sigma - down, sigma + up, *names)
 
 
-def tilt_by_torsion(design: Design, position: ArrayLike, torsions: int = TORSIONS) -> TiltByTorsion:
+def tilt_by_torsion(
+    design: Design,
+    position: ArrayLike,
+    torsions: int = TORSIONS,
+    tool: ArrayLike | None = None,
+) -> TiltByTorsion:
     """Return the greatest tilt in every azimuth of a position at torsions once around.
 
     The best of them is searched between the neighbours of the best one of the row.
 
     Args:
         design: The manipulator.
-        position: Position of b4 in the base frame, in design units, shape (3,).
+        position: Position of b4 or the tool in the base frame, in design units, shape (3,).
         torsions: Number of torsions, 3 or more.
+        tool: Point of the platform that has the position, in the platform frame, shape (3,), in
+            design units; None for b4.
 
     Raises:
-        InputError: not a position, or no usable number of torsions.
+        InputError: not a position, not a tool point, or no usable number of torsions.
     """
     p = one_position(position)
     angles = even_angles("torsions", torsions) - 180.0
-    tilts = greatest_tilts(design, p, angles, AZIMUTHS_OF_ONE)
+    tilts = greatest_tilts(design, p, angles, AZIMUTHS_OF_ONE, tool)
     if np.isnan(tilts).all():
-        return TiltByTorsion(angles, tilts, greatest_tilt(design, p, float(angles[0])))
+        return TiltByTorsion(angles, tilts, greatest_tilt(design, p, float(angles[0]), tool))
     step, middle = 360.0 / len(angles), float(angles[np.nanargmax(tilts)])
-    best = greatest_tilt(design, p, middle)
+    best = greatest_tilt(design, p, middle, tool)
     low, high = middle - step, middle + step
     while high - low > TORSION_WIDTH:
         tried = np.linspace(low, high, 9)
-        found = np.nan_to_num(greatest_tilts(design, p, tried, AZIMUTHS_OF_ONE), nan=-1.0)
+        found = np.nan_to_num(greatest_tilts(design, p, tried, AZIMUTHS_OF_ONE, tool), nan=-1.0)
         top = int(found.argmax())
         if found[top] > best.tilt:
-            best = greatest_tilt(design, p, float(tried[top]))
+            best = greatest_tilt(design, p, float(tried[top]), tool)
         low, high = float(tried[max(top - 1, 0)]), float(tried[min(top + 1, 8)])
     return TiltByTorsion(angles, tilts, best)
 
 
 def _end_of_turns(
-    design: Design, position: FloatArray, turns: FloatArray
+    design: Design, position: FloatArray, turns: FloatArray, tool: ArrayLike | None
 ) -> tuple[FloatArray, list[int]]:
     """Return the angles (n,) in radians at which turns (n, 3, 3, 3) end, and their limits."""
     angles, limits = np.empty(len(turns)), np.empty(len(turns), dtype=np.int64)
     rules = Rules.of(design).without_clearances()
     positions = np.full((len(turns), 3), position)
-    turn_rows(len(turns), rules.row, rules.cones, positions, turns, angles, limits)
+    given = (positions, one_tool(tool), turns)
+    turn_rows(len(turns), rules.row, rules.cones, *given, angles, limits)
     return angles, limits.tolist()
 
 

@@ -28,6 +28,7 @@ from explorer.workspace.orientations.turn_polynomials import (
     SQUARE,
     START_IS_INVALID,
     add_product,
+    arm_of,
     nearer_end,
     write_leg,
 )
@@ -41,6 +42,7 @@ def end_in_cone(
     row: FloatArray,
     cone: FloatArray,
     p: FloatArray,
+    tool: FloatArray,
     turn: FloatArray,
     end: float,
     scratch: FloatArray,
@@ -55,7 +57,7 @@ def end_in_cone(
         return START_IS_INVALID
     if cone[SINE] == 0.0:
         return end
-    write_leg(row, leg, p, turn, scratch)
+    write_leg(row, leg, p, arm_of(row, leg, tool), turn, scratch)
     for index in range(ALONG, LEG_SQUARE + 1):
         for k in range(MOST_DEGREE + 1):
             scratch[index, k] = 0.0

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 
+from explorer.legs.segments import Vector
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.bernstein import (
     NOWHERE,
@@ -71,8 +72,27 @@ def write_tilt(azimuth: float, torsion: float, turn: FloatArray) -> None:
 
 
 @helper
+def arm_of(row: FloatArray, leg: int, tool: FloatArray) -> Vector:
+    """Return the vector from the tool to the platform end of a leg, numbered from 0 on."""
+    x, y = 0.0, 0.0
+    if leg == 0:
+        x, y = row[B1], row[B1 + 1]
+    elif leg == 1:
+        x = row[B2]
+    elif leg == 2:
+        x = row[B3]
+    return (x - tool[0], y - tool[1], -tool[2])
+
+
+@helper
+def turned(turn: FloatArray, i: int, k: int, arm: Vector) -> float:
+    """Return a coefficient of a coordinate of a vector of the platform that turns."""
+    return arm[0] * turn[i, 0, k] + arm[1] * turn[i, 1, k] + arm[2] * turn[i, 2, k]
+
+
+@helper
 def write_leg(
-    row: FloatArray, leg: int, p: FloatArray, turn: FloatArray, scratch: FloatArray
+    row: FloatArray, leg: int, p: FloatArray, arm: Vector, turn: FloatArray, scratch: FloatArray
 ) -> None:
     """Write the coordinates of a leg from base to platform, polynomials of degree 2 each.
 
@@ -80,13 +100,7 @@ def write_leg(
     """
     for i in range(3):
         for k in range(3):
-            value = 0.0
-            if leg == 0:
-                value = row[B1] * turn[i, 0, k] + row[B1 + 1] * turn[i, 1, k]
-            elif leg == 1:
-                value = row[B2] * turn[i, 0, k]
-            elif leg == 2:
-                value = row[B3] * turn[i, 0, k]
+            value = turned(turn, i, k, arm)
             if k != 1:
                 value += p[i]
                 if leg == 3 and i < 2:

@@ -1,8 +1,9 @@
-"""The first limit that a turn of the platform about one axis meets, b4 held in its place.
+"""The first limit that a turn of the platform about one axis meets, the tool held in its place.
 
 Each limit is a polynomial along the turn (`explorer.workspace.orientations.turn_polynomials`): of
-degree 2 for l1, the guide, the gap, the carriage order and the margins, of degree 4 for d2 and d4,
-and of degree 8 for the cones of joints. l4 and the box are constant, since b4 stays in its place.
+degree 2 for l1, l4, the guide, the gap, the carriage order, the box and the margins, of degree 4
+for d2 and d4, and of degree 8 for the cones of joints. With the tool at b4, l4 and the box are
+constant.
 """
 
 from __future__ import annotations
@@ -18,7 +19,6 @@ from explorer.workspace.limits.constraints import CARRIAGE_ORDER, GAP as GAP_NAM
 from explorer.workspace.limits.joint_cones import joint_cones
 from explorer.workspace.limits.valid_poses import (
     A3,
-    B1,
     B2,
     B3,
     BOX_HIGHS,
@@ -41,9 +41,11 @@ from explorer.workspace.orientations.turn_polynomials import (
     START_IS_INVALID,
     add_product,
     angle_at,
+    arm_of,
     nearer_end,
     nearer_linear_end,
     place_of,
+    turned,
     write_tilt,
 )
 
@@ -80,6 +82,7 @@ def nearer_end_of_length(
     row: FloatArray,
     leg: int,
     p: FloatArray,
+    tool: FloatArray,
     turn: FloatArray,
     bound: float,
     sign: float,
@@ -87,54 +90,60 @@ def nearer_end_of_length(
     scratch: FloatArray,
 ) -> float:
     """Return what `nearer_end` does for a bound of a length, with sign 1 for a maximum."""
-    limit = bound * bound
-    if leg == 0:
-        x, y = row[B1], row[B1 + 1]
-        sum_of_squares = p[0] * p[0] + p[1] * p[1] + p[2] * p[2] + x * x + y * y
+    limit, arm = bound * bound, arm_of(row, leg, tool)
+    if leg % 3 == 0:
+        # The square of the length of q + R arm is that of q, that of the arm, and 2 q·(R arm).
+        q = (p[0], p[1], p[2])
+        if leg == 3:
+            q = (p[0] - row[A3], p[1] - row[A3 + 1], p[2])
         a = b = c = 0.0
         for i in range(3):
-            a += p[i] * (x * turn[i, 0, 0] + y * turn[i, 1, 0])
-            b += p[i] * (x * turn[i, 0, 1] + y * turn[i, 1, 1])
-            c += p[i] * (x * turn[i, 0, 2] + y * turn[i, 1, 2])
-        offset = limit - sum_of_squares
+            a += q[i] * turned(turn, i, 0, arm)
+            b += q[i] * turned(turn, i, 1, arm)
+            c += q[i] * turned(turn, i, 2, arm)
+        square = q[0] * q[0] + q[1] * q[1] + q[2] * q[2]
+        offset = limit - (square + arm[0] * arm[0] + arm[1] * arm[1] + arm[2] * arm[2])
         return nearer_linear_end(
             sign * (offset - 2.0 * a), -2.0 * sign * b, sign * (offset - 2.0 * c), end
         )
-    if leg == 3:
-        x, y = p[0] - row[A3], p[1] - row[A3 + 1]
-        is_kept = sign * (limit - x * x - y * y - p[2] * p[2]) >= 0.0
-        return end if is_kept else START_IS_INVALID
-    arm = row[B2] if leg == 1 else row[B3]
-    radius = math.hypot(p[1], p[2])
+    length, radius = math.hypot(math.hypot(arm[0], arm[1]), arm[2]), math.hypot(p[1], p[2])
     # Most bounds are beyond what any orientation needs.
-    if radius + abs(arm) <= bound if sign > 0.0 else radius - abs(arm) >= bound:
+    if radius + length <= bound if sign > 0.0 else radius - length >= bound:
         return end
-    square = scratch[POLYNOMIAL]
+    polynomial = scratch[POLYNOMIAL]
     for k in range(5):
-        square[k] = -limit * (1.0 if k % 4 == 0 else (2.0 if k == 2 else 0.0))
+        polynomial[k] = -limit * (1.0 if k % 4 == 0 else (2.0 if k == 2 else 0.0))
     for i in range(1, 3):
         leg_row = scratch[LEG_ROW + i]
         for k in range(3):
-            leg_row[k] = arm * turn[i, 0, k] + (0.0 if k == 1 else p[i])
-        add_product(leg_row, leg_row, 2, square)
+            leg_row[k] = turned(turn, i, k, arm) + (0.0 if k == 1 else p[i])
+        add_product(leg_row, leg_row, 2, polynomial)
     for k in range(5):
-        square[k] *= -sign / BINOMIALS_4[k]
+        polynomial[k] *= -sign / BINOMIALS_4[k]
     return nearer_end(4, end, scratch)
 
 
 @helper
-def margin_at(index: int, k: int, p: FloatArray, turn: FloatArray) -> float:
+def margin_at(index: int, k: int, p: FloatArray, tool: FloatArray, turn: FloatArray) -> float:
     """Return a coefficient of a margin's polynomial."""
+    constant = 0.0 if k == 1 else 1.0
     if index == 0:
-        return -(p[0] * turn[0, 2, k] + p[1] * turn[1, 2, k] + p[2] * turn[2, 2, k])
+        normal = p[0] * turn[0, 2, k] + p[1] * turn[1, 2, k] + p[2] * turn[2, 2, k]
+        return constant * tool[2] - normal
     if index == 1:
-        return turn[1, 0, k] * p[2] - turn[2, 0, k] * p[1]
-    return 0.0 if k == 1 else p[2]
+        across = tool[1] * turn[0, 2, k] - tool[2] * turn[0, 1, k]
+        return turn[1, 0, k] * p[2] - turn[2, 0, k] * p[1] - across
+    return constant * p[2] - turned(turn, 2, k, (tool[0], tool[1], tool[2]))
 
 
 @helper
 def end_by_lengths(
-    row: FloatArray, p: FloatArray, turn: FloatArray, end: float, scratch: FloatArray
+    row: FloatArray,
+    p: FloatArray,
+    tool: FloatArray,
+    turn: FloatArray,
+    end: float,
+    scratch: FloatArray,
 ) -> tuple[float, int]:
     """Return what `first_limit` does as a place, for the lengths alone."""
     limit = NO_LIMIT
@@ -144,7 +153,7 @@ def end_by_lengths(
             if side == 0 and low <= 0.0:
                 continue
             bound, sign = (high, 1.0) if side else (low, -1.0)
-            found = nearer_end_of_length(row, leg, p, turn, bound, sign, end, scratch)
+            found = nearer_end_of_length(row, leg, p, tool, turn, bound, sign, end, scratch)
             if found < end:
                 end, limit = found, LENGTH_LIMITS + 2 * leg + side
             if found < 0.0:
@@ -153,11 +162,13 @@ def end_by_lengths(
 
 
 @helper
-def end_by_guide(row: FloatArray, p: FloatArray, turn: FloatArray, end: float) -> tuple[float, int]:
+def end_by_guide(
+    row: FloatArray, p: FloatArray, tool: FloatArray, turn: FloatArray, end: float
+) -> tuple[float, int]:
     """Return what `first_limit` does as a place, for the ends of the guide alone."""
     limit = NO_LIMIT
     for carriage in range(2):
-        b = row[B3] if carriage else row[B2]
+        arm = arm_of(row, 1 + carriage, tool)
         for side in range(2):
             bound = row[GUIDE_HIGH] if side else row[GUIDE_LOW]
             if math.isinf(bound):
@@ -165,9 +176,9 @@ def end_by_guide(row: FloatArray, p: FloatArray, turn: FloatArray, end: float) -
             sign = -1.0 if side else 1.0
             offset = p[0] - bound
             found = nearer_linear_end(
-                sign * (offset + b * turn[0, 0, 0]),
-                sign * b * turn[0, 0, 1],
-                sign * (offset + b * turn[0, 0, 2]),
+                sign * (offset + turned(turn, 0, 0, arm)),
+                sign * turned(turn, 0, 1, arm),
+                sign * (offset + turned(turn, 0, 2, arm)),
                 end,
             )
             if found < end:
@@ -200,19 +211,34 @@ def end_by_carriages(row: FloatArray, turn: FloatArray, end: float) -> tuple[flo
 
 
 @helper
-def broken_side_of_box(row: FloatArray, p: FloatArray) -> int:
-    """Return the number of the first side of the box that a position violates, or `NO_LIMIT`."""
+def end_by_box(
+    row: FloatArray, p: FloatArray, tool: FloatArray, turn: FloatArray, end: float
+) -> tuple[float, int]:
+    """Return what `first_limit` does as a place, for the box alone."""
+    arm, limit = arm_of(row, 3, tool), NO_LIMIT
     for i in range(3):
-        if p[i] < row[BOX_LOWS + i]:
-            return BOX_LIMITS + 2 * i
-        if p[i] > row[BOX_HIGHS + i]:
-            return BOX_LIMITS + 2 * i + 1
-    return NO_LIMIT
+        for side in range(2):
+            bound = row[BOX_HIGHS + i] if side else row[BOX_LOWS + i]
+            if math.isinf(bound):
+                continue
+            sign = -1.0 if side else 1.0
+            offset = p[i] - bound
+            found = nearer_linear_end(
+                sign * (offset + turned(turn, i, 0, arm)),
+                sign * turned(turn, i, 1, arm),
+                sign * (offset + turned(turn, i, 2, arm)),
+                end,
+            )
+            if found < end:
+                end, limit = found, BOX_LIMITS + 2 * i + side
+            if found < 0.0:
+                return end, limit
+    return end, limit
 
 
 @helper
 def end_by_margins(
-    row: FloatArray, p: FloatArray, turn: FloatArray, end: float
+    row: FloatArray, p: FloatArray, tool: FloatArray, turn: FloatArray, end: float
 ) -> tuple[float, int]:
     """Return what `first_limit` does as a place, for the margins alone."""
     least, limit = row[MARGIN], NO_LIMIT
@@ -221,9 +247,9 @@ def end_by_margins(
     for index in range(3):
         sign = row[SIGNS + index]
         found = nearer_linear_end(
-            sign * margin_at(index, 0, p, turn) - least,
-            sign * margin_at(index, 1, p, turn),
-            sign * margin_at(index, 2, p, turn) - least,
+            sign * margin_at(index, 0, p, tool, turn) - least,
+            sign * margin_at(index, 1, p, tool, turn),
+            sign * margin_at(index, 2, p, tool, turn) - least,
             end,
         )
         if found < end:
@@ -238,6 +264,7 @@ def first_limit(
     row: FloatArray,
     cones: FloatArray,
     p: FloatArray,
+    tool: FloatArray,
     turn: FloatArray,
     most: float,
     scratch: FloatArray,
@@ -247,7 +274,8 @@ def first_limit(
     Args:
         row: Row of `Rules`.
         cones: Cones of `Rules`.
-        p: Position of b4, shape (3,).
+        p: Position of the tool, shape (3,).
+        tool: Tool point in platform coordinates, shape (3,).
         turn: Coefficients of the rotation, shape (3, 3, 3): those of (1 − u)², (1 − u) u and u².
         most: Angle in radians, at most half a turn, beyond which limits do not count.
         scratch: Array of the shape `SCRATCH`.
@@ -257,24 +285,23 @@ def first_limit(
         negative angle and the first limit of the list if its start violates one.
     """
     limit = NO_LIMIT
-    end, found = end_by_lengths(row, p, turn, place_of(most), scratch)
+    end, found = end_by_lengths(row, p, tool, turn, place_of(most), scratch)
     limit = found if found >= 0 else limit
     if end >= 0.0:
-        end, found = end_by_guide(row, p, turn, end)
+        end, found = end_by_guide(row, p, tool, turn, end)
         limit = found if found >= 0 else limit
     if end >= 0.0:
         end, found = end_by_carriages(row, turn, end)
         limit = found if found >= 0 else limit
     if end >= 0.0:
-        found = broken_side_of_box(row, p)
-        if found >= 0:
-            end, limit = START_IS_INVALID, found
+        end, found = end_by_box(row, p, tool, turn, end)
+        limit = found if found >= 0 else limit
     if end >= 0.0:
-        end, found = end_by_margins(row, p, turn, end)
+        end, found = end_by_margins(row, p, tool, turn, end)
         limit = found if found >= 0 else limit
     for index in range(cones.shape[0]):
         if end >= 0.0:
-            place = end_in_cone(row, cones[index], p, turn, end, scratch)
+            place = end_in_cone(row, cones[index], p, tool, turn, end, scratch)
             if place < end:
                 end, limit = place, CONE_LIMITS + index
     if end < 0.0:
@@ -282,11 +309,12 @@ def first_limit(
     return (most if limit == NO_LIMIT else angle_at(end)), limit
 
 
-@kernel("void(f8[::1], f8[:,::1], f8[:,::1], f8[:,:,:,::1], f8[::1], i8[::1])")
+@kernel("void(f8[::1], f8[:,::1], f8[:,::1], f8[::1], f8[:,:,:,::1], f8[::1], i8[::1])")
 def turn_rows(
     row: FloatArray,
     cones: FloatArray,
     positions: FloatArray,
+    tool: FloatArray,
     turns: FloatArray,
     angles: FloatArray,
     limits: IntArray,
@@ -295,15 +323,16 @@ def turn_rows(
     scratch = np.zeros(SCRATCH)
     for index in range(positions.shape[0]):
         angles[index], limits[index] = first_limit(
-            row, cones, positions[index], turns[index], HALF_TURN, scratch
+            row, cones, positions[index], tool, turns[index], HALF_TURN, scratch
         )
 
 
-@kernel("void(f8[::1], f8[:,::1], f8[:,::1], f8, f8[::1], f8[:,::1], i8[:,::1])")
+@kernel("void(f8[::1], f8[:,::1], f8[:,::1], f8[::1], f8, f8[::1], f8[:,::1], i8[:,::1])")
 def tilt_rows(
     row: FloatArray,
     cones: FloatArray,
     positions: FloatArray,
+    tool: FloatArray,
     torsion: float,
     azimuths: FloatArray,
     tilts: FloatArray,
@@ -315,5 +344,5 @@ def tilt_rows(
         for k in range(azimuths.shape[0]):
             write_tilt(azimuths[k], torsion, turn)
             tilts[index, k], limits[index, k] = first_limit(
-                row, cones, positions[index], turn, HALF_TURN, scratch
+                row, cones, positions[index], tool, turn, HALF_TURN, scratch
             )
