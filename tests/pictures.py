@@ -29,11 +29,12 @@ from explorer.app.scene.camera import ViewName
 from explorer.app.screenshot import open_page, picture, settle, stable_picture
 from explorer.app.server import Running, start
 from explorer.app.state.action import Action
-from explorer.app.state.actions import Open, Set, SetJoint, SetVariable
+from explorer.app.state.actions import Open, Set, SetJoint, SetPosition, SetVariable
 from explorer.app.state.compared import Look
 from explorer.app.state.optimisation import OptimisationRequest
 from explorer.app.state.studies import Brush, within
 from explorer.app.state.view import (
+    ForcesView,
     OrientationView,
     PrototypeView,
     SingularView,
@@ -43,6 +44,7 @@ from explorer.app.state.view import (
 from explorer.app.storage.study_folders import StudyFolders
 from explorer.mechanism.design import JOINTS
 from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.machine import Actuators, Guide, Payload, Struts, Tool
 from explorer.mechanism.pose import Pose
 from explorer.optimise.paper import CLEARANCE, PAPER_VOLUME, paper_start
 from explorer.sweep.results import load_results
@@ -60,6 +62,20 @@ REPORT_STYLE = (
     "body{margin:0;padding:20px;display:flex;gap:20px;background:#dfe3e8}"
     "img{width:400px;box-shadow:0 1px 6px rgb(28 37 48/.25)}"
 )
+
+# The same with a machine around it, such as that of the manual's page on loads.
+LOADED = msgspec.structs.replace(
+    DESIGN,
+    tool=Tool((1.0, 0.0, 2.0)),
+    payload=Payload(0.5, (1.0, 0.0, 1.0)),
+    actuators=Actuators(
+        push_n=(150.0, 200.0, 150.0, 200.0, 150.0, 150.0),
+        pull_n=(120.0, 200.0, 120.0, 200.0, 120.0, 120.0),
+    ),
+    struts=Struts(outer_mm=8.0, inner_mm=6.0, stress_mpa=200.0),
+    guide=Guide(force_n=200.0, moment_nm=6.0),
+)
+LOAD = ForcesView(force=(0.0, 0.0, -40.0))
 
 # The mechanism without what would hide the workspace, or hide in it.
 BARE = View(handle=False, tetrahedra=(False, False, False))
@@ -160,6 +176,51 @@ SCENES = {
             Set("design.limits", with_radius(DESIGN, 0.2).limits),
             Set("view", replace(BARE, workspace=WorkspaceView(solid=True, region="reachable"))),
         ),
+    ),
+    "forces": Scene(
+        actions=(
+            Open(LOADED),
+            SetPosition(2, 6.0),
+            Set(
+                "view",
+                replace(
+                    BARE,
+                    flags=False,
+                    grid=False,
+                    forces=ForcesView(shown=True, force=(-6.0, 14.0, -9.0), scale=30.0),
+                ),
+            ),
+        ),
+        panels=True,
+        tab="Forces",
+    ),
+    # Shares grow beyond all bounds towards the base plane.
+    "load-share": Scene(
+        actions=(
+            Open(LOADED),
+            Set(
+                "view",
+                replace(
+                    BARE,
+                    forces=LOAD,
+                    workspace=WorkspaceView(solid=True, colour="share", cut="y", level=5.0),
+                ),
+            ),
+        ),
+        panels=True,
+        tab="Workspace",
+        size=(1280, 900),
+    ),
+    "held": Scene(
+        actions=(
+            Open(LOADED),
+            Set(
+                "view",
+                replace(BARE, forces=LOAD, workspace=WorkspaceView(solid=True, region="held")),
+            ),
+        ),
+        panels=True,
+        tab="Workspace",
     ),
     # Half apart, so that each part is seen and where it belongs too.
     "prototype": Scene(

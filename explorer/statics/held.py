@@ -1,8 +1,9 @@
-"""Where a load is held at one orientation, as a function of the position that is zero at the limit.
+"""The largest share of a limit that a load uses at positions of one orientation.
 
-The function is 1 / s − 1 with s the largest share of a limit. Towards a singular plane s grows
-beyond all bounds, and the function falls linearly to −1; beyond the plane it goes on falling, so
-that it has no fold there. It is bounded above, where nothing loads a part.
+Where the load is held, this share s is at most 1. A function that is zero at this limit tells it:
+1 / s − 1. Towards a singular plane s grows beyond all bounds, and the function falls linearly to
+−1; beyond the plane it goes on falling, so that it has no fold there. It is bounded above, where
+nothing loads a part.
 """
 
 from __future__ import annotations
@@ -33,17 +34,20 @@ PARTS = 10
 TOOL, WRENCH, FORCE, LIMITS, SIGNS, END = 6, 9, 15, 16, 36, 39
 
 
-def held_load(design: Design, rotation: FloatArray, load: FloatArray) -> FloatArray:
+def held_load(
+    design: Design, rotation: FloatArray, load: FloatArray, limits: FloatArray | None = None
+) -> FloatArray:
     """Return what the kernels need of a design, an orientation and a load, shape (39,).
 
     It is the design variables, the tool from b4 along the axes of the base, the load
-    about b4, the force of any direction, the limits of `part_limits`, and the signs of z_R · p, δ2
-    and δ3 at home.
+    about b4, the force of any direction, the limits of the parts, and the signs of z_R · p, δ2 and
+    δ3 at home.
 
     Args:
         design: The manipulator, with its payload and limits.
         rotation: Platform to base, shape (3, 3).
         load: (F; M) at the tool besides the payload, base axes, shape (6,), in N and N × unit.
+        limits: Limits as of `part_limits`, shape (2, 10); those of the design if None.
     """
     tool = rotation @ np.array(design.tool.position)
     wrench = payload_wrench(design, rotation) + load
@@ -51,21 +55,19 @@ def held_load(design: Design, rotation: FloatArray, load: FloatArray) -> FloatAr
     home = np.array(home_pose(design).position)
     delta2 = rotation[1, 0] * home[2] - rotation[2, 0] * home[1]
     signs = np.sign([rotation[:, 2] @ home, delta2, home[2]])
-    parts = (design.variables, tool, wrench, design.payload.force_n)
-    return np.concatenate([np.ravel(part) for part in (*parts, part_limits(design), signs)])
+    bounds = part_limits(design) if limits is None else limits
+    parts = (design.variables, tool, wrench, design.payload.force_n, bounds, signs)
+    return np.concatenate([np.ravel(part) for part in parts])
 
 
 @helper
-def held_at(held: FloatArray, r: FloatArray, p: FloatArray) -> tuple[float, int]:
-    """Return the function at a position, and the part with the largest share of its limit."""
+def share_at(held: FloatArray, r: FloatArray, p: FloatArray) -> tuple[float, int]:
+    """Return the largest share of a limit at a position, infinite if singular, and its part."""
     x = held[:TOOL]
     if is_singular(p, r):
-        return -1.0, 0
+        return math.inf, 0
     t, w = held[TOOL:WRENCH], held[WRENCH:FORCE]
-    force, limits, signs = held[FORCE], held[LIMITS:SIGNS], held[SIGNS:END]
-    delta1 = r[0, 2] * p[0] + r[1, 2] * p[1] + r[2, 2] * p[2]
-    delta2 = r[1, 0] * p[2] - r[2, 0] * p[1]
-    is_beyond = signs[0] * delta1 < 0.0 or signs[1] * delta2 < 0.0 or signs[2] * p[2] < 0.0
+    force, limits = held[FORCE], held[LIMITS:SIGNS]
     f = holding_forces(x, p, r, (w[0], w[1], w[2]), (w[3], w[4], w[5]))
     e = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     if force > 0.0:
@@ -90,6 +92,17 @@ def held_at(held: FloatArray, r: FloatArray, p: FloatArray) -> tuple[float, int]
         down = (spreads[i] - values[i]) / limits[PARTS + i]
         if max(up, down) > share:
             share, part = max(up, down), i
+    return share, part
+
+
+@helper
+def held_at(held: FloatArray, r: FloatArray, p: FloatArray) -> tuple[float, int]:
+    """Return the function at a position, and the part with the largest share of its limit."""
+    signs = held[SIGNS:END]
+    delta1 = r[0, 2] * p[0] + r[1, 2] * p[1] + r[2, 2] * p[2]
+    delta2 = r[1, 0] * p[2] - r[2, 0] * p[1]
+    is_beyond = signs[0] * delta1 < 0.0 or signs[1] * delta2 < 0.0 or signs[2] * p[2] < 0.0
+    share, part = share_at(held, r, p)
     reciprocal = min(1.0 / share if share > 0.0 else math.inf, 1.0 + HIGHEST)
     return (-reciprocal if is_beyond else reciprocal) - 1.0, part
 
@@ -159,6 +172,13 @@ def halve(
             high = middle
 
 
+@kernel("void(f8[::1], f8[:,::1], f8[:,::1], f8[::1])")
+def share_rows(held: FloatArray, r: FloatArray, positions: FloatArray, out: FloatArray) -> None:
+    """Write the largest shares of a limit at n positions."""
+    for k in range(positions.shape[0]):
+        out[k] = share_at(held, r, positions[k])[0]
+
+
 @kernel("void(f8[::1], f8[:,::1], f8[:,::1], f8[::1], i8[::1])")
 def held_rows(
     held: FloatArray, r: FloatArray, positions: FloatArray, out: FloatArray, parts: IntArray
@@ -194,6 +214,19 @@ def settle_rows(
                 is_there = is_there and abs(at[i] - points[k, i]) <= MOST_OF_CELL * step[i]
             if not is_there:
                 halve(held, r, at, points[k], beside[k])
+
+
+def largest_shares(held: FloatArray, rotation: FloatArray, positions: FloatArray) -> FloatArray:
+    """Return the largest shares of a limit at positions (n, 3), shape (n,); infinite if singular.
+
+    Args:
+        held: What `held_load` returns; with a limit of 1 a share is the value itself.
+        rotation: Platform to base, shape (3, 3).
+        positions: b4 in the base frame, in design units.
+    """
+    out = np.empty(len(positions))
+    share_rows(len(positions), held, for_kernel(rotation), for_kernel(positions), out)
+    return out
 
 
 def held_values(

@@ -8,6 +8,7 @@ between vertices is approximate.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
@@ -18,8 +19,8 @@ from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.pose import checked_rotation
 from explorer.numerics.arrays import FloatArray, IntArray, finite_array
 from explorer.statics.held import HIGHEST, held_load, held_values, settle_on_limit
-from explorer.workspace.accessible.nodes import make_grid
-from explorer.workspace.limits.constraints import HalfSpace
+from explorer.workspace.accessible.nodes import Grid, make_grid
+from explorer.workspace.limits.constraints import Constraint, HalfSpace, constraints, slacks
 from explorer.workspace.slices.volume import home_rotation, workspace_volume
 from explorer.workspace.solids.solid import Solid
 from explorer.workspace.solids.solids import Surface, carved_solid, cut_solid, workspace_solid
@@ -30,6 +31,8 @@ FEWEST_NODES, MOST_NODES = 8, 160
 BEYOND = 2
 # Nodes on each axis of the grid that finds the box of the part.
 COARSE = 20
+# Nodes on each axis of finer grids about the best position, and the number of rounds.
+ZOOM, ZOOMS = 7, 8
 NEAR = "near the load's limit"
 
 PART_NAMES = (
@@ -48,11 +51,16 @@ class HeldWorkspace:
         volume: Exact volume of the workspace with the signs of home, in cubed design units.
         held_volume: Volume of the part, in cubed design units.
         solid: The part.
+        best: If the part is empty, the position found with the least share of a limit, shape (3,).
+        factor: The factor of the load, the payload's weight and its force that this position
+            holds, 0 to 1; above 1 if the positions that hold them are too few for a solid.
     """
 
     volume: float
     held_volume: float
     solid: Solid
+    best: FloatArray | None = None
+    factor: float | None = None
 
 
 def held_workspace(
@@ -96,9 +104,35 @@ def held_workspace(
     if whole.is_empty:
         return HeldWorkspace(exact.volume, 0.0, whole)
     held = held_load(design, r, w)
-    near, best = _part_near(whole, held, r)
-    if near.is_empty:
-        return HeldWorkspace(exact.volume, 0.0, replace(near, empty_because=(best,)))
+    limits = constraints(design, r)
+    near = _part_near(whole, held, r, limits)
+    solid = near if near.is_empty else _carve(near, held, r, nodes)
+    if solid.is_empty:
+        best = _best_within(whole, held, r, limits)
+        factor = max(0.0, 1.0 + best.value)
+        return HeldWorkspace(
+            exact.volume, 0.0, replace(solid, empty_because=(best.part,)), best.position, factor
+        )
+    # The mesh of the whole lacks a share of the exact volume, and so does its part.
+    return HeldWorkspace(exact.volume, solid.volume * exact.volume / whole.volume, solid)
+
+
+class _Best(NamedTuple):
+    """The position where the largest share of a limit is least, of those that were tried.
+
+    Attributes:
+        position: b4 in the base frame, shape (3,).
+        value: Value there of the function of `explorer.statics.held`.
+        part: Name of the part of the machine with that share.
+    """
+
+    position: FloatArray
+    value: float
+    part: str
+
+
+def _carve(near: Solid, held: FloatArray, r: FloatArray, nodes: int) -> Solid:
+    """Return the positions of a solid that hold a load, by a grid of nodes on each axis."""
     lows, highs = near.vertices.min(axis=0), near.vertices.max(axis=0)
     grid = make_grid(lows, highs, nodes, BEYOND)
     values = held_values(held, r, grid.positions.reshape(-1, 3))[0].reshape(grid.counts)
@@ -113,28 +147,49 @@ def held_workspace(
         return held_values(held, r, points)[1]
 
     surface = Surface(values, grid.lows, grid.step, settle, PART_NAMES, part_at)
-    solid = carved_solid(near, surface)
-    if solid.is_empty:
-        return HeldWorkspace(exact.volume, 0.0, replace(solid, empty_because=(best,)))
-    # The mesh of the whole lacks a share of the exact volume, and so does its part.
-    return HeldWorkspace(exact.volume, solid.volume * exact.volume / whole.volume, solid)
+    return carved_solid(near, surface)
 
 
-def _part_near(whole: Solid, held: FloatArray, r: FloatArray) -> tuple[Solid, str]:
+def _part_near(
+    whole: Solid, held: FloatArray, r: FloatArray, limits: tuple[Constraint, ...]
+) -> Solid:
     """Return the part of a workspace near the nodes of a coarse grid that hold the load.
 
-    It is a box that extends beyond them by a step, empty if there are none. The second value is
-    the name of the part of the machine with the largest share where that is least.
+    It is a box that extends beyond them by a step. If no node holds the load, the best position
+    within the limits counts; the part is empty if that does not hold it either.
     """
-    grid = make_grid(whole.vertices.min(axis=0), whole.vertices.max(axis=0), COARSE, 0)
+    grid = _coarse_grid(whole)
     positions = np.vstack([grid.positions.reshape(-1, 3), whole.vertices])
-    values, parts = held_values(held, r, positions)
-    best = PART_NAMES[int(parts[values.argmax()])]
-    kept = positions[values >= 0.0]
+    kept = positions[held_values(held, r, positions)[0] >= 0.0]
     if not len(kept):
-        return replace(whole, vertices=kept, faces=whole.faces[:0]), best
+        best = _best_within(whole, held, r, limits)
+        if best.value < 0.0:
+            return replace(whole, vertices=kept, faces=whole.faces[:0])
+        kept = best.position[None]
     lows, highs = kept.min(axis=0) - grid.step, kept.max(axis=0) + grid.step
     for axis, unit in enumerate(np.eye(3)):
         whole = cut_solid(whole, HalfSpace(NEAR, unit, float(highs[axis])))
         whole = cut_solid(whole, HalfSpace(NEAR, -unit, -float(lows[axis])))
-    return whole, best
+    return whole
+
+
+def _best_within(
+    whole: Solid, held: FloatArray, r: FloatArray, limits: tuple[Constraint, ...]
+) -> _Best:
+    """Return the best position within the limits, by the coarse grid and finer ones about it."""
+    grid = _coarse_grid(whole)
+    at, near, reach = whole.vertices, grid.positions.reshape(-1, 3), grid.step
+    cube = np.stack(np.meshgrid(*[np.linspace(-1.0, 1.0, ZOOM)] * 3), axis=-1).reshape(-1, 3)
+    best = _Best(at[0], -1.0, PART_NAMES[0])
+    for _ in range(ZOOMS):
+        at = np.vstack([at, near[(slacks(limits, near) >= 0.0).all(axis=-1)]])
+        values, parts = held_values(held, r, at)
+        index = int(values.argmax())
+        best = _Best(at[index], float(values[index]), PART_NAMES[int(parts[index])])
+        at, near = best.position[None], best.position + reach * cube
+        reach = reach * (2.0 / (ZOOM - 1))
+    return best
+
+
+def _coarse_grid(whole: Solid) -> Grid:
+    return make_grid(whole.vertices.min(axis=0), whole.vertices.max(axis=0), COARSE, 0)

@@ -133,6 +133,8 @@ def surface(drawing: WorkspaceDrawing) -> float:
     return sum(area(shell.vertices[shell.faces]) for shell in drawing.surface.shells)
 
 
+# Forces and moments of no load.
+UNLOADED = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 THICK = shown(thick(opened(OPTIMAL), RADIUS))
 
 
@@ -469,7 +471,7 @@ def test_what_is_reached_is_exported(what: str) -> None:
     drawing = drawing_of(shown(THICK, hull=True))
     rows = drawing.request.rotation
     tolerance = REACHED_TOLERANCE * OPTIMAL.reach
-    data = export_mesh(THICK.design, rows, tolerance, "reachable", None, what, "stl")
+    data = export_mesh(THICK.design, rows, tolerance, "reachable", None, UNLOADED, what, "stl")
     import trimesh
 
     untyped: Any = trimesh
@@ -485,13 +487,13 @@ def test_where_nothing_is_reached_nothing_is_exported() -> None:
     state = shown(beyond_its_limits())
     rows = drawing_of(state).request.rotation
     with pytest.raises(InputError, match="no position is accessible from"):
-        export_mesh(state.design, rows, 0.1, "reachable", None, "workspace", "stl")
+        export_mesh(state.design, rows, 0.1, "reachable", None, UNLOADED, "workspace", "stl")
 
 
 def test_step_of_the_workspace_has_its_exact_volume_and_its_faces() -> None:
     state = shown(opened(OPTIMAL), region="limits")
     rows = drawing_of(state).request.rotation
-    data = export_mesh(state.design, rows, 0.1, "limits", None, "workspace", STEP)
+    data = export_mesh(state.design, rows, 0.1, "limits", None, UNLOADED, "workspace", STEP)
     # The head tells the time.
     head, _, body = data.partition(b"DATA;")
     assert body == workspace_step(state.design, np.array(rows)).partition(b"DATA;")[2]
@@ -509,7 +511,7 @@ def test_step_of_what_has_facets_is_refused_with_what_would_work(
 ) -> None:
     rows = drawing_of(shown(THICK, region="limits")).request.rotation
     with pytest.raises(InputError, match=reason) as refusal:
-        export_mesh(THICK.design, rows, 0.1, region, None, what, STEP)
+        export_mesh(THICK.design, rows, 0.1, region, None, UNLOADED, what, STEP)
     assert "export it as 3mf, stl, glb, obj or ply" in str(refusal.value)
 
 
@@ -517,7 +519,7 @@ def test_step_without_its_extra_says_how_to_get_it(monkeypatch: pytest.MonkeyPat
     monkeypatch.setitem(sys.modules, "OCP.gp", None)
     rows = drawing_of(shown(opened(OPTIMAL), region="limits")).request.rotation
     with pytest.raises(MissingExtraError, match=r"flagged-explorer\[cad\]"):
-        export_mesh(OPTIMAL, rows, 0.1, "limits", None, "workspace", STEP)
+        export_mesh(OPTIMAL, rows, 0.1, "limits", None, UNLOADED, "workspace", STEP)
 
 
 # The radius curve

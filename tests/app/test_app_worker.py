@@ -252,7 +252,7 @@ def test_bands_meet_where_the_measure_is_their_level(colour: Any, cut: Any) -> N
         if lower is None:
             continue
         common = {*map(tuple, lower.vertices.tolist())} & {*map(tuple, upper.vertices.tolist())}
-        values = colouring.values(np.array(sorted(common)))
+        values = colouring.bands.values(np.array(sorted(common)))
         assert values == pytest.approx(BAND_EDGES[index], abs=1e-5)
         met += len(common)
     assert met > 100

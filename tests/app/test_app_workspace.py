@@ -39,6 +39,7 @@ from explorer.numerics.number_text import format_number
 from explorer.singularity.colours import WARN_CONDITION
 from explorer.singularity.jacobian import inverse_condition, jacobian
 from explorer.workspace.limits.constraints import HalfSpace
+from explorer.workspace.position_bands import position_bands
 from explorer.workspace.slices.outline import slice_outline
 from explorer.workspace.slices.volume import workspace_volume
 from explorer.workspace.solids.solids import cut_solid, workspace_solid
@@ -401,7 +402,8 @@ def test_bands_of_the_condition_number_end_at_its_levels(
     rotation = rotation_from_yaw_pitch_roll(angles)
     solid = workspace_solid(OPTIMAL, rotation, 0.1)
     extent = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
-    slices = Slices.of(OPTIMAL, rotation, extent, measure="condition")
+    bands = position_bands(OPTIMAL, rotation, "condition", warn_below=1.0)
+    slices = Slices.of(OPTIMAL, rotation, extent, bands)
     level, ends = 5.0, (slices.lows[[0, 2]], slices.highs[[0, 2]])
     beyond = slices.beyond("y", level)
     errors: list[float] = []

@@ -407,14 +407,14 @@ def test_slice_bands_hold_the_positions_of_their_margins() -> None:
     extent = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
     slices = Slices.of(OPTIMAL, home.rotation, extent)
     rng = np.random.default_rng(1)
-    level, share = 5.0, 1.5
+    level, index = 5.0, 5
     points = rng.uniform(slices.lows, slices.highs, (400, 3))
     points[:, 1] = level
-    polygons = list(slices.beyond("y", level)(share))
+    polygons = list(slices.beyond("y", level)(slices.bands.edges[index]))
     least = np.abs(explorer.margins(points, home.rotation)).min(axis=-1)
     for point, margin in zip(points[:, [0, 2]], least.tolist(), strict=True):
         within = any(_holds(polygon, point) for polygon in polygons)
-        assert within == (margin >= share * slices.warn_below)
+        assert within == (margin >= slices.bands.levels[index])
 
 
 def _holds(polygon: Any, point: Any) -> bool:

@@ -2,6 +2,8 @@
 // is there; a click goes there, as a press of "workspace.go".
 window.explorer.map ??= (() => {
   const AXES = ["x", "y", "z"],
+    // Share of the distance from a1 up to which a margin is zero.
+    SINGULAR = 1e-13,
     HINT = "Point at the map to read it, click to go there.";
   const dot = (a, b) => a.reduce((sum, value, k) => sum + value * b[k], 0);
   const plus = (a, b) => a.map((value, k) => value + b[k]);
@@ -60,6 +62,62 @@ window.explorer.map ??= (() => {
     return largest ? Math.min(...lengths) / largest : 0;
   };
 
+  // The forces of the actuators that hold each of several loads (F; M about b4): the rows of the
+  // Jacobian times these forces add up to minus the load. By elimination with pivots.
+  const holdingForces = (facts, p, loads) => {
+    const rows = jacobian(facts, p);
+    const table = rows.map((_, k) =>
+      rows.map((row) => row[k]).concat(loads.map((load) => -load[k] / (k < 3 ? 1 : facts.reach))),
+    );
+    for (let k = 0; k < table.length; k += 1) {
+      let pivot = k;
+      for (let i = k; i < table.length; i += 1) {
+        if (Math.abs(table[i][k]) > Math.abs(table[pivot][k])) pivot = i;
+      }
+      [table[k], table[pivot]] = [table[pivot], table[k]];
+      for (let i = 0; i < table.length; i += 1) {
+        if (i === k) continue;
+        const factor = table[i][k] / table[k][k];
+        table[i] = table[i].map((value, j) => value - factor * table[k][j]);
+      }
+    }
+    return table.map((row, k) => row.slice(table.length).map((value) => value / row[k]));
+  };
+
+  // The largest share of a limit that the load uses at a position, and the part of the machine; see
+  // statics/held.py. It is infinite on a singular plane.
+  const largestShare = (facts, p) => {
+    const { wrench, tool, anyForce, overLimits, parts } = facts.load;
+    if (leastMargin(facts, p).least <= SINGULAR * Math.hypot(...p)) {
+      return { share: Infinity, part: "" };
+    }
+    const units = [0, 1, 2].map((axis) => {
+      const force = [0, 1, 2].map((k) => (k === axis ? 1 : 0));
+      return force.concat(cross(tool, force));
+    });
+    const forces = holdingForces(facts, p, [wrench, ...units]).map(([value, ...rates]) => ({
+      value,
+      spread: anyForce * Math.hypot(...rates),
+    }));
+    const bending = ({ value, spread }, arm) => {
+      const length = Math.hypot(p[1] + arm[1], p[2] + arm[2]);
+      return { value: value * length, spread: spread * length };
+    };
+    const [, b2, b3] = facts.arms;
+    const loaded = [
+      ...forces,
+      bending(forces[1], b2),
+      bending(forces[3], b3),
+      forces[2],
+      forces[4],
+    ];
+    const shares = loaded.map(({ value, spread }, k) =>
+      Math.max((spread + value) * overLimits[0][k], (spread - value) * overLimits[1][k]),
+    );
+    const share = Math.max(0, ...shares);
+    return { share, part: share ? parts[shares.indexOf(share)] : "" };
+  };
+
   const number = (value, decimals) =>
     value
       .toLocaleString("en", {
@@ -69,6 +127,14 @@ window.explorer.map ??= (() => {
       })
       .replace("-", "\u2212");
   const measure = (facts, p) => {
+    if (facts.load) {
+      const { words, unitName, factor } = facts.load;
+      const { share, part } = largestShare(facts, p);
+      const value = Number.isFinite(share)
+        ? (factor * share).toLocaleString("en", { maximumSignificantDigits: 3 })
+        : "\u221e";
+      return `${words} ${value} ${unitName}${part && ` (${part})`}`;
+    }
     if (facts.arms) {
       const value = inverseCondition(jacobian(facts, p));
       return `1 / cond J ${number(value, 5)}`;
@@ -93,9 +159,9 @@ window.explorer.map ??= (() => {
     p.splice(facts.axis, 0, facts.level);
     return p;
   };
-  const place = (target) => {
+  const place = (facts, target) => {
     if (target.classList?.contains("is-colliding")) return ", legs collide";
-    if (target.classList?.contains("is-blocked")) return ", not accessible";
+    if (target.classList?.contains("is-blocked")) return `, ${facts.leftOut}`;
     return target.closest("[data-within]") ? "" : ", beyond the limits";
   };
   const read = (map, event) => {
@@ -104,7 +170,7 @@ window.explorer.map ??= (() => {
     if (!p) return HINT;
     const axes = [0, 1, 2].filter((k) => k !== facts.axis);
     const words = axes.map((k) => `${AXES[k]} ${number(p[k], facts.decimals)}`).join(", ");
-    return `${words} units: ${measure(facts, p)}${place(event.target)}`;
+    return `${words} units: ${measure(facts, p)}${place(facts, event.target)}`;
   };
   const mapAt = (target) => target.closest?.("[data-map]") ?? null;
   const readingOf = (map) => map.parentElement?.querySelector(".ex-reading");
@@ -144,5 +210,5 @@ window.explorer.map ??= (() => {
     const rounded = p.map((value) => Number(value.toFixed(facts.decimals)));
     window.explorer.press("workspace.go", JSON.stringify(rounded));
   });
-  return { leastMargin, inverseCondition, jacobian };
+  return { leastMargin, inverseCondition, jacobian, largestShare };
 })();

@@ -1,8 +1,9 @@
-"""Surfaces in bands of colour: by the proximity to singularities, or by what bounds them.
+"""Surfaces in bands of colour: by the proximity to singularities, a load, or what bounds them.
 
 At one orientation margins are linear in the position, so that bands of the smallest margin are
-exact on each triangle. The condition number is not linear: bands of it end at points that are
-found on the edges of small triangles. It is signed, so that it is smooth where it is zero.
+exact on each triangle. Other measures are not linear: their bands end at points that are found on
+the edges of small triangles. These are split along the singular planes, where all measures are
+zero and have a fold.
 """
 
 from __future__ import annotations
@@ -10,28 +11,31 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from explorer.mechanism.design import Design
-from explorer.mechanism.margins import margins
 from explorer.numerics.arrays import FloatArray, IntArray
-from explorer.singularity.colours import BAND_EDGES, OUTLINE, WARN_CONDITION, Rgb, band_colours
+from explorer.singularity.colours import OUTLINE, SINGULAR, WARNED, Rgb, mix
 from explorer.singularity.ellipsoids import planes_of_singularity
-from explorer.singularity.jacobian import inverse_condition, jacobian
 from explorer.workspace.accessible.workspace import PAIR_NAMES
 from explorer.workspace.faces.divide import divide, find_roots
 from explorer.workspace.faces.faces import Faces
+from explorer.workspace.held import PART_NAMES
+from explorer.workspace.position_bands import PositionBands, PositionMeasure, position_bands
 
-Measure = Literal["plain", "margin", "condition"]
+Measure = Literal["plain"] | PositionMeasure
 
 PLAIN: Rgb = (110, 150, 196)
 # Where legs begin to collide: what collides has this colour all over the page.
 COLLIDING: Rgb = OUTLINE
-# Longest edge of a triangle that is coloured by the condition number, as a share of the reach,
-# unless that takes too many triangles.
+# Where a part takes its limit under the load.
+AT_LIMIT: Rgb = mix(WARNED, SINGULAR, 0.4)
+# Longest edge of a triangle whose measure is not linear, as a share of the reach, unless that
+# takes too many triangles.
 COLOURED_EDGE = 0.06
 # Largest error of a value at the end of a band.
 BAND_ERROR = 1e-5
@@ -57,61 +61,59 @@ class Colouring:
         rotation: Rotation from platform to base, shape (3, 3).
         measure: Measure that gives the colours.
         warn_below: Length below which margins raise a warning, in design units.
+        load: (F; M) at the tool point besides the payload, base axes, shape (6,), in N and
+            N × unit; None for none.
     """
 
     design: Design
     rotation: FloatArray
     measure: Measure
     warn_below: float
+    load: FloatArray | None = None
 
-    def values(self, points: FloatArray) -> FloatArray:
-        """Return the measure at points (n, 3), as multiples of its value for a warning."""
-        if self.measure != "condition":
-            return np.abs(margins(points, self.rotation)).min(axis=-1) / self.warn_below
-        rates = jacobian(self.design, points, self.rotation)
-        return inverse_condition(rates, self.design.reach) / WARN_CONDITION
+    @cached_property
+    def bands(self) -> PositionBands:
+        """The bands of the measure; those of the smallest margin for one colour."""
+        measure = "margin" if self.measure == "plain" else self.measure
+        return position_bands(
+            self.design, self.rotation, measure, warn_below=self.warn_below, load=self.load
+        )
 
     def shells(self, faces: Faces) -> tuple[tuple[Shell, ...], float | None]:
         """Return the parts of a surface, one for each colour, and its longest edge.
 
-        The longest edge of a triangle that is coloured by the condition number, in design units,
-        is given if it is longer than usual, because the surface is large beside the reach; it is
-        None otherwise.
+        The longest edge of a triangle whose measure is not linear, in design units, is given if it
+        is longer than usual, because the surface is large beside the reach; it is None otherwise.
         """
         if not len(faces.triangles):
             return (), None
         if self.measure == "plain":
             return _by_cause(faces), None
-        coarse_edge = None
-        if self.measure == "condition":
-            vertices, triangles = cut_to_size(
-                faces.vertices, faces.triangles, COLOURED_EDGE * self.design.reach
-            )
+        bands, coarse_edge, is_linear = self.bands, None, self.measure == "margin"
+        vertices, triangles = faces.vertices, faces.triangles
+        if not is_linear:
+            usual = COLOURED_EDGE * self.design.reach
+            vertices, triangles = cut_to_size(vertices, triangles, usual)
             longest = float(edge_lengths(vertices, triangles).max())
-            coarse_edge = longest if longest > COLOURED_EDGE * self.design.reach else None
-            bands = _Bands(vertices, triangles, self._signed(vertices), self._signed)
-            levels = (*(-edge for edge in BAND_EDGES[:0:-1]), *BAND_EDGES)
-        else:
-            vertices, triangles = self._split_at_margins(faces.vertices, faces.triangles)
-            bands = _Bands(vertices, triangles, self.values(vertices), None)
-            levels = BAND_EDGES[1:]
-        for level in levels:
-            bands.split(level)
-        return bands.shells(), coarse_edge
+            coarse_edge = longest if longest > usual else None
+        vertices, triangles = self._split_at_folds(vertices, triangles)
+        value = None if is_linear else bands.values
+        parts = _Bands(vertices, triangles, bands.values(vertices), value)
+        for edge in bands.edges[1:]:
+            parts.split(edge)
+        return parts.shells(bands), coarse_edge
 
-    def _signed(self, points: FloatArray) -> FloatArray:
-        """Return the measure at points (n, 3) with the sign of the determinant."""
-        sign = np.where(margins(points, self.rotation).prod(axis=-1) < 0.0, -1.0, 1.0)
-        return sign * self.values(points)
-
-    def _split_at_margins(
+    def _split_at_folds(
         self, vertices: FloatArray, triangles: IntArray
     ) -> tuple[FloatArray, IntArray]:
-        """Return vertices and triangles, split where the smallest margin is not linear."""
+        """Return vertices and triangles, split where the measure has a fold that is a plane."""
         planes = planes_of_singularity(self.rotation)
-        # Where two margins are equal, another one becomes the smallest.
-        pairs = itertools.combinations(planes, 2)
-        for normal in (*planes, *(a + sign * b for a, b in pairs for sign in (-1.0, 1.0))):
+        folds = list(planes)
+        if self.measure == "margin":
+            # Where two margins are equal, another one becomes the smallest.
+            pairs = itertools.combinations(planes, 2)
+            folds += [a + sign * b for a, b in pairs for sign in (-1.0, 1.0)]
+        for normal in folds:
             parts = _Bands(vertices, triangles, vertices @ normal, None)
             parts.split(0.0)
             vertices, triangles = parts.vertices, parts.triangles
@@ -157,13 +159,13 @@ class _Bands:
         self._values = np.concatenate([self._values, np.full(len(a), level)])
         self.triangles = division.faces
 
-    def shells(self) -> tuple[Shell, ...]:
-        """Return the bands of colour of the values' sizes."""
-        middle = np.abs(self._values[self.triangles].mean(axis=1))
-        band: IntArray = (middle[:, None] >= BAND_EDGES[1:]).sum(axis=1)
+    def shells(self, bands: PositionBands) -> tuple[Shell, ...]:
+        """Return the triangles in the colours of bands."""
+        middle = self._values[self.triangles].mean(axis=1)
+        band: IntArray = (middle[:, None] >= bands.edges[1:]).sum(axis=1)
         return tuple(
             _shell(colour, self.vertices, self.triangles[band == index])
-            for index, colour in enumerate(band_colours())
+            for index, colour in enumerate(bands.colours)
             if (band == index).any()
         )
 
@@ -208,8 +210,16 @@ def edge_lengths(vertices: FloatArray, faces: IntArray) -> FloatArray:
 
 
 def _by_cause(faces: Faces) -> tuple[Shell, ...]:
-    """Return the surface along limits in one colour, and that along collisions in another."""
-    pairs = [index for index, name in enumerate(faces.limits) if name in PAIR_NAMES]
-    collide = np.isin(faces.limit_of_triangle, pairs)
-    parts = ((PLAIN, faces.triangles[~collide]), (COLLIDING, faces.triangles[collide]))
-    return tuple(_shell(colour, faces.vertices, part) for colour, part in parts if len(part))
+    """Return the surface in colours: along limits, collisions of legs, and limits of a load."""
+    causes = ((COLLIDING, PAIR_NAMES), (AT_LIMIT, PART_NAMES))
+    parts: list[Shell] = []
+    is_plain = np.ones(len(faces.triangles), dtype=np.bool_)
+    for colour, names in causes:
+        of_cause = [index for index, name in enumerate(faces.limits) if name in names]
+        is_of_cause = np.isin(faces.limit_of_triangle, of_cause)
+        is_plain &= ~is_of_cause
+        if is_of_cause.any():
+            parts.append(_shell(colour, faces.vertices, faces.triangles[is_of_cause]))
+    if is_plain.any():
+        parts.insert(0, _shell(PLAIN, faces.vertices, faces.triangles[is_plain]))
+    return tuple(parts)

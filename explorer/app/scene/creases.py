@@ -17,6 +17,7 @@ from scipy.sparse import csgraph
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray, dot
 from explorer.workspace.accessible.workspace import PAIR_NAMES
 from explorer.workspace.faces.faces import Faces
+from explorer.workspace.held import PART_NAMES
 from explorer.workspace.solids.solid import Solid
 
 Drawn: TypeAlias = tuple[NDArray[np.float32], NDArray[np.uint32]]
@@ -42,13 +43,15 @@ def creased(vertices: FloatArray, faces: NDArray[np.int32]) -> Drawn:
 def creased_faces(solid: Solid) -> Faces:
     """Return the faces of a solid, one for each limit.
 
-    Surfaces along which legs begin to collide are one face wherever they meet smoothly.
+    Surfaces along which legs begin to collide are one face wherever they meet smoothly, and so are
+    those where parts take their limits under a load.
     """
     faces = solid.faces.astype(np.int64)
     first, second, sides = _neighbours(faces)
     owner = solid.limit_of_face
-    collide = np.array([name in PAIR_NAMES for name in solid.limits], dtype=np.bool_)[owner]
-    both = collide[first] & collide[second]
+    names = (*PAIR_NAMES, *PART_NAMES)
+    is_found = np.array([name in names for name in solid.limits], dtype=np.bool_)[owner]
+    both = is_found[first] & is_found[second]
     same = owner[first] == owner[second]
     joined = same | (both & _is_smooth(solid.vertices, faces, first, second))
     vertices, triangles = _split(solid.vertices, faces, first[joined], second[joined])

@@ -21,7 +21,8 @@ class WorkspaceView:
 
     Attributes:
         solid: Whether the solid is drawn.
-        region: Whether the solid is all that is within the limits, or its accessible part alone.
+        region: Whether the solid is all that is within the limits, its accessible part alone, or
+            the part that holds the load.
         start: Whether the accessible part starts at the home position, or at the present one.
         hull: Whether its convex hull is drawn.
         planes: Whether the three singularity planes are drawn.
@@ -36,12 +37,12 @@ class WorkspaceView:
     """
 
     solid: bool = False
-    region: Literal["limits", "reachable"] = "limits"
+    region: Literal["limits", "reachable", "held"] = "limits"
     start: Literal["home", "pose"] = "home"
     hull: bool = False
     planes: bool = False
     orientation: Literal["pose", "home"] = "pose"
-    colour: Literal["plain", "margin", "condition"] = "plain"
+    colour: Literal["plain", "margin", "condition", "share", "force", "bending"] = "plain"
     cut: Literal["x", "y", "z"] | None = None
     level: float | None = None
     flipped: bool = False

@@ -6,6 +6,8 @@ While one drawing is computed, only the newest request waits.
 from __future__ import annotations
 
 from explorer.app.features.feature import Services
+from explorer.app.features.forces.loads import load_of
+from explorer.app.features.workspace.load import has_limits, loaded_design
 from explorer.app.features.workspace.orientation import workspace_rows, workspace_start
 from explorer.app.features.workspace.tasks import (
     WorkspaceDrawing,
@@ -15,6 +17,7 @@ from explorer.app.features.workspace.tasks import (
 )
 from explorer.app.session.feed import Feed
 from explorer.app.state.frame import Frame
+from explorer.workspace.position_bands import LOAD_WORDS
 
 
 class WorkspaceFeed(Feed[WorkspaceRequest, WorkspaceDrawing]):
@@ -44,12 +47,17 @@ def workspace_request(frame: Frame) -> WorkspaceRequest | None:
         return None
     is_cut = view.cut is not None
     coloured = view.colour == "margin" or is_cut
+    # Without limits all shares are zero.
+    is_shareless = view.colour == "share" and not has_limits(frame.state.design)
+    colour = "plain" if is_shareless else view.colour
+    # The load changes no drawing that does not show it.
+    is_loaded = colour in LOAD_WORDS or view.region == "held"
     return WorkspaceRequest(
-        design=frame.state.design,
+        design=loaded_design(frame.state) if is_loaded else frame.state.design,
         rotation=workspace_rows(frame),
         region=view.region,
         start=workspace_start(frame) if view.region == "reachable" else None,
-        colour=view.colour,
+        colour=colour,
         cut=view.cut,
         level=view.level if is_cut else None,
         flipped=is_cut and view.flipped,
@@ -57,4 +65,5 @@ def workspace_request(frame: Frame) -> WorkspaceRequest | None:
         hull=view.hull,
         # The length changes no drawing that is not coloured by it.
         warn_below=frame.state.warn_below if coloured else 1.0,
+        load=load_of(frame.state) if is_loaded else None,
     )

@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import Literal
 
 from explorer.app.features.feature import Services
+from explorer.app.features.forces.loads import load_of
+from explorer.app.features.workspace.load import loaded_design
 from explorer.app.features.workspace.orientation import workspace_rows, workspace_start
 from explorer.app.features.workspace.reached import Rows, rows_of
 from explorer.app.features.workspace.tasks import (
@@ -56,10 +58,10 @@ class WorkspaceFiles:
         rows: Rows,
         start: Triple | None,
     ) -> None:
-        design, tolerance = state.design, tolerance_of(state)
+        design = loaded_design(state) if region == "held" else state.design
         name = f"{design.name}-{exported_name(region, what).replace(' ', '-')}.{file_format}"
-        arguments = (design, rows, tolerance, region, start, what, file_format)
-        self._downloads.compute(who, name, export_mesh, arguments)
+        place = design, rows, tolerance_of(state), region, start, load_of(state)
+        self._downloads.compute(who, name, export_mesh, (*place, what, file_format))
 
 
 def tolerance_of(state: State) -> float:

@@ -14,14 +14,18 @@ from explorer.app.browser.viser_gaps import run_script
 from explorer.app.features.feature import Services
 from explorer.app.features.workspace.feed import WorkspaceFeed
 from explorer.app.features.workspace.files import tolerance_of
+from explorer.app.features.workspace.load import has_limits
 from explorer.app.features.workspace.orientation import workspace_pose
 from explorer.app.features.workspace.slice_map import Axis, level_within, map_picture
-from explorer.app.features.workspace.tasks import WorkspaceDrawing
+from explorer.app.features.workspace.tasks import Region, WorkspaceDrawing
 from explorer.app.features.workspace.volume import VolumeFeed
 from explorer.app.features.workspace.words import (
     drawing_words,
     legend,
+    load_words,
+    nothing_words,
     volume_headline,
+    without_limits,
     workspace_details,
 )
 from explorer.app.inputs.bindings import At, Bound
@@ -29,6 +33,7 @@ from explorer.app.inputs.controls import Controls
 from explorer.app.inputs.ranges import coordinate_span, fine_step, round_up
 from explorer.app.inputs.tracks import Span
 from explorer.app.look import read_script
+from explorer.app.scene.bands import Measure
 from explorer.app.security.client_messages import decode_text
 from explorer.app.session.session import Session
 from explorer.app.state.action import Action
@@ -37,12 +42,13 @@ from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.state.view import WorkspaceView
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.buttons import Buttons
+from explorer.app.widgets.buttons import Buttons, press_button
 from explorer.app.widgets.chips import Chip, Chips, Effect, turn
 from explorer.app.widgets.commands import Key, shift
-from explorer.app.widgets.markup import alert, box, sentence
+from explorer.app.widgets.markup import alert, box, note, sentence
 from explorer.app.widgets.under_way import UnderWay
 from explorer.mechanism.pose import Pose, Triple
+from explorer.workspace.position_bands import LOAD_WORDS
 
 KEYS: Mapping[str, tuple[Key, ...]] = {
     "Workspace › Solid": (Key("V"),),
@@ -65,14 +71,23 @@ SHOWN = {
 }
 """Words and hint of each part that can be shown."""
 
-REGIONS: dict[str, tuple[Literal["limits", "reachable"], Literal["home", "pose"]]] = {
+REGIONS: dict[str, tuple[Region, Literal["home", "pose"]]] = {
     "within the limits": ("limits", "home"),
     "accessible from home": ("reachable", "home"),
     "accessible from the present position": ("reachable", "pose"),
+    "holds the load": ("held", "home"),
 }
 """Region and start of the paths."""
 
-COLOURINGS = {"one colour": "plain", "smallest margin": "margin", "1 / cond J": "condition"}
+COLOURINGS: dict[str, Measure] = {
+    "one colour": "plain",
+    "smallest margin": "margin",
+    "1 / cond J": "condition",
+    **{words: measure for measure, (words, _, _) in LOAD_WORDS.items()},
+}
+NEED_NO_LIMITS = [LOAD_WORDS[measure][0] for measure in ("force", "bending")]
+# The button of a colouring that needs no limits.
+COLOUR = "workspace.colour"
 ORIENTATIONS = {"of the present pose": "pose", "of the home pose": "home"}
 CUTS: dict[str, Axis | None] = {"none": None, "x": "x", "y": "y", "z": "z"}
 """Axis of the cut by the words on its button."""
@@ -102,8 +117,9 @@ class WorkspacePanel:
         self._top = gui.add_html("")
         controls.dropdown(
             "Region",
-            "All positions within the limits, or those that a path without a collision of legs "
-            "leads to, from home or from the present position.",
+            "All positions within the limits, those that a path without a collision of legs leads "
+            "to, from home or from the present position, or those at which the load of the tab "
+            "Forces is held.",
             REGIONS,
             Bound(_region, _set_region),
         )
@@ -124,7 +140,8 @@ class WorkspacePanel:
         )
         controls.dropdown(
             "Colour by",
-            "One colour, the smallest margin |δ|, or the inverse condition number.",
+            "One colour, the smallest margin |δ|, the inverse condition number, or what the load "
+            "of the tab Forces asks of actuators and struts.",
             COLOURINGS,
             "view.workspace.colour",
         )
@@ -150,6 +167,7 @@ class WorkspacePanel:
                 _tolerance_span,
             )
         buttons.on("workspace.go", self._go_to)
+        buttons.on(COLOUR, self._colour_by, values=COLOURINGS)
         run_script(services.server, read_script("map"))
 
     def updates(self, frame: Frame) -> Iterator[Update]:
@@ -169,10 +187,15 @@ class WorkspacePanel:
         yield from self._under_way.updates()
         yield from self._show_trouble(drawing)
         mapped = None if drawing is None or view.cut is None else drawing.slice_map
-        has_legend = view.colour != "plain" or mapped is not None
-        yield self._legend, "visible", has_legend
-        if has_legend:
-            yield self._legend, "content", legend(view.colour, state.warn_below, drawing)
+        is_shareless = view.colour == "share" and not has_limits(state.design)
+        colour = "plain" if is_shareless else view.colour
+        yield self._legend, "visible", view.colour != "plain" or mapped is not None
+        words = without_limits(map(_colour_button, NEED_NO_LIMITS)) if is_shareless else ""
+        if colour != "plain" or mapped is not None:
+            words += legend(colour, state.warn_below, drawing)
+        if colour in LOAD_WORDS and view.region != "held":
+            words += note(f"{load_words(state)}.")
+        yield self._legend, "content", words
         yield self._cut, "content", box(self._cuts.html(state))
         yield self._map, "visible", mapped is not None
         if mapped is not None:
@@ -210,14 +233,18 @@ class WorkspacePanel:
         if drawing is not None and trouble is not None:
             if trouble.nearest is not None:
                 self._nearest_start = Pose.of(trouble.nearest, drawing.request.rotation)
-            which = "home" if drawing.request.start is None else "present"
-            title = f"Nothing is accessible from the {which} position"
+            title = nothing_words(drawing)
             yield self._trouble, "content", alert(title, sentence(trouble.reason))
         yield self._go, "visible", self._nearest_start is not None
 
     def _go_there(self, event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
         if self._nearest_start is not None:
             self._session.do(StartThere(self._nearest_start), who=event.client_id)
+
+    def _colour_by(self, words: str, client: viser.ClientHandle) -> None:
+        """Colour by what a button in the legend names."""
+        action = Set("view.workspace.colour", COLOURINGS[words], "Colour by", words)
+        self._session.do(action, who=client.client_id)
 
     def _go_to(self, text: str, client: viser.ClientHandle) -> None:
         """Move b4 to a position that a page sent, in the orientation of the map."""
@@ -281,12 +308,18 @@ def _set_cut(view: WorkspaceView, axis: Axis | None, words: str) -> Action:
     return Set("view.workspace", new, "Cut open", words)
 
 
+def _colour_button(words: str) -> str:
+    """Return the button of a colouring as HTML."""
+    hint = f"Colour by the {words}."
+    return press_button(COLOUR, words, words, hint=hint, class_name="ex-link")
+
+
 def _region(frame: Frame) -> str:
     view = frame.state.view.workspace
     return next(
         words
         for words, (region, start) in REGIONS.items()
-        if region == view.region and (region == "limits" or start == view.start)
+        if region == view.region and (region != "reachable" or start == view.start)
     )
 
 

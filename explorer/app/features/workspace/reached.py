@@ -1,16 +1,19 @@
-"""The accessible part of a workspace, computed in stages in the worker, and a cache of it."""
+"""The accessible part of a workspace, and the part that holds a load: computed and cached."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TypeAlias
 
 import numpy as np
 
 from explorer.errors import ExplorerError
 from explorer.mechanism.design import Design
+from explorer.mechanism.machine import Six
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
+from explorer.numerics.number_text import format_number
 from explorer.numerics.stages import Watch
 from explorer.workspace.accessible.start import StartError
 from explorer.workspace.accessible.workspace import (
@@ -18,6 +21,7 @@ from explorer.workspace.accessible.workspace import (
     ReachableWorkspace,
     reachable_workspace,
 )
+from explorer.workspace.held import HeldWorkspace, held_workspace
 
 Rows: TypeAlias = tuple[tuple[float, ...], ...]
 """Rows of a matrix."""
@@ -35,7 +39,7 @@ def rows_of(matrix: FloatArray) -> Rows:
 
 @dataclass(frozen=True)
 class Trouble:
-    """Why nothing is accessible.
+    """Why nothing is accessible, or holds the load.
 
     Attributes:
         reason: Words for the page.
@@ -106,4 +110,23 @@ def reached_of(workspace: ReachableWorkspace) -> Reached:
         workspace.reachable_node_count,
         workspace.pairs,
         workspace.harmless_radius,
+    )
+
+
+@lru_cache(CACHED)
+def hold_load(design: Design, rotation: Rows, load: Six, tolerance: float) -> HeldWorkspace:
+    """Return the part of a workspace that holds a load; cache the newest few."""
+    return held_workspace(design, np.array(rotation), load, tolerance=tolerance)
+
+
+def trouble_holding(held: HeldWorkspace) -> Trouble | None:
+    """Return why nothing holds a load; None if something does, or the workspace is empty."""
+    if held.factor is None:
+        return None
+    (part,) = held.solid.empty_because
+    if held.factor >= 1.0:
+        return Trouble("the positions that hold it are too few to be drawn", None)
+    percent = format_number(100.0 * held.factor, 3)
+    return Trouble(
+        f"at most {percent} % of load and payload are held, where the {part} takes its limit", None
     )

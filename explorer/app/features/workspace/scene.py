@@ -12,7 +12,7 @@ from explorer.app.features.feature import Services
 from explorer.app.features.workspace.feed import WorkspaceFeed
 from explorer.app.features.workspace.orientation import workspace_rotation
 from explorer.app.features.workspace.tasks import WorkspaceDrawing, WorkspaceSurface
-from explorer.app.scene.bands import COLLIDING, PLAIN, Shell
+from explorer.app.scene.bands import AT_LIMIT, COLLIDING, PLAIN, Shell
 from explorer.app.scene.creases import Drawn
 from explorer.app.scene.labels import add_label
 from explorer.app.scene.part import NO_POINTS, ScenePart
@@ -31,6 +31,7 @@ from explorer.workspace.limits.constraints import (
     Never,
     constraints,
 )
+from explorer.workspace.position_bands import SHARE_COLOURS, STEP_COLOURS
 
 # Each ray passes at least two faces: the mechanism stays readable within the solid.
 PLAIN_OPACITY = 0.125
@@ -38,6 +39,8 @@ PLAIN_OPACITY = 0.125
 BAND_OPACITY = 0.4
 # Opacity where legs collide, so that this is visible through the rest.
 COLLIDING_OPACITY = 0.6
+# Opacity where a part takes its limit, which can be most of the surface.
+AT_LIMIT_OPACITY = 0.3
 # Colour of the edges on a light page and on a dark one, and their thickness in pixels.
 EDGE_COLOURS: tuple[Rgb, Rgb] = (58, 86, 126), (138, 164, 200)
 EDGE_THICKNESS = 1.3
@@ -55,7 +58,8 @@ class WorkspaceScene(ScenePart):
         scene = services.scene
         self._feed = services.get(WorkspaceFeed)
         # Collisions are added first and so drawn first: surfaces before them let them through.
-        self._colours: tuple[Rgb, ...] = (COLLIDING, PLAIN, *band_colours())
+        colours = (COLLIDING, AT_LIMIT, PLAIN, *band_colours(), *SHARE_COLOURS, *STEP_COLOURS)
+        self._colours: tuple[Rgb, ...] = tuple(dict.fromkeys(colours))
         self._shells = [
             add_translucent(
                 scene,
@@ -200,12 +204,13 @@ class _SingularPlane:
 def _opacity(colour: Rgb, *, is_cut: bool) -> float | None:
     if is_cut:
         return None
-    return {PLAIN: PLAIN_OPACITY, COLLIDING: COLLIDING_OPACITY}.get(colour, BAND_OPACITY)
+    opacities = {PLAIN: PLAIN_OPACITY, COLLIDING: COLLIDING_OPACITY, AT_LIMIT: AT_LIMIT_OPACITY}
+    return opacities.get(colour, BAND_OPACITY)
 
 
 def _side(colour: Rgb, *, is_cut: bool) -> str:
     """Return which sides of faces are drawn: of translucent bands only those in front."""
-    return "double" if is_cut or colour in (PLAIN, COLLIDING) else "front"
+    return "double" if is_cut or colour in (PLAIN, COLLIDING, AT_LIMIT) else "front"
 
 
 def _scaled(shell: Shell, scale: float) -> Drawn:

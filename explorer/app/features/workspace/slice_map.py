@@ -23,6 +23,9 @@ from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.numerics.number_text import format_number
 from explorer.singularity.ellipsoids import planes_of_singularity
+from explorer.statics.held import FORCE, LIMITS, SIGNS, TOOL, WRENCH
+from explorer.workspace.held import PART_NAMES
+from explorer.workspace.position_bands import LOAD_WORDS
 from explorer.workspace.solids.solid import Solid
 
 Axis = Literal["x", "y", "z"]
@@ -87,7 +90,8 @@ def slice_map(
     axis: Axis,
     level: float,
     whole: Solid | None,
-    accessible: Solid | None,
+    part: Solid | None,
+    left_out: str,
 ) -> SliceMap:
     """Return the map of a slice through a workspace that is not empty.
 
@@ -96,18 +100,16 @@ def slice_map(
         extent: Lows and highs of the workspace within the limits.
         axis: Axis across which the workspace is cut.
         level: Coordinate of the cut on that axis.
-        whole: Cut solid of the workspace within the limits; None if collisions do not count.
-        accessible: Cut solid of its accessible part; None likewise.
+        whole: Cut solid of the workspace within the limits; None if all of it is drawn.
+        part: Cut solid of the part that is drawn; None likewise.
+        left_out: What the page says of positions within the limits beyond that part.
     """
-    measure = "condition" if colouring.measure == "condition" else "margin"
-    slices = Slices.of(colouring.design, colouring.rotation, extent, colouring.warn_below, measure)
+    slices = Slices.of(colouring.design, colouring.rotation, extent, colouring.bands)
     first, second = in_plane(axis)
     loops: list[FloatArray] = []
-    if whole is not None and accessible is not None:
+    if whole is not None and part is not None:
         # By the even-odd rule, the one without the other.
-        loops = [
-            loop for solid in (whole, accessible) for loop in cut_loops(solid, (first, second))
-        ]
+        loops = [loop for solid in (whole, part) for loop in cut_loops(solid, (first, second))]
     drawn = slices.map(axis, level, "workspace-slice", loops)
     (u0, v0), (u1, v1) = (ends[[first, second]].tolist() for ends in (slices.lows, slices.highs))
     return SliceMap(
@@ -117,19 +119,38 @@ def slice_map(
         (u1, v1),
         slices.own_scale,
         as_html(drawn),
-        _facts(colouring, measure),
+        {"leftOut": left_out, **map_facts(colouring)},
     )
 
 
-def _facts(colouring: Colouring, measure: str) -> dict[str, Any]:
-    """Return the gradients of the margins, and for the condition number the arms of the joints."""
-    facts: dict[str, Any] = {"gradients": planes_of_singularity(colouring.rotation).tolist()}
-    if measure == "condition":
-        design, rotation = colouring.design, colouring.rotation
-        platform = np.array([[*design.b1, 0.0], [design.b2, 0.0, 0.0], [design.b3, 0.0, 0.0]])
-        facts["arms"] = (platform @ rotation.T).tolist()
-        facts["a3"] = [*design.a3, 0.0]
-        facts["reach"] = design.reach
+def map_facts(colouring: Colouring) -> dict[str, Any]:
+    """Return what `look/map.js` needs to compute the measure at a position.
+
+    It is the gradients of the margins; the arms of the joints for other measures; and the load, its
+    limits and the words for what it asks, for a measure of a load.
+    """
+    design, rotation, bands = colouring.design, colouring.rotation, colouring.bands
+    facts: dict[str, Any] = {"gradients": planes_of_singularity(rotation).tolist()}
+    if bands.measure == "margin":
+        return facts
+    platform = np.array([[*design.b1, 0.0], [design.b2, 0.0, 0.0], [design.b3, 0.0, 0.0]])
+    facts["arms"] = (platform @ rotation.T).tolist()
+    facts["a3"] = [*design.a3, 0.0]
+    facts["reach"] = design.reach
+    if bands.held is None or bands.measure == "condition":
+        return facts
+    name, unit, factor = LOAD_WORDS[bands.measure]
+    facts["load"] = {
+        "wrench": bands.held[WRENCH:FORCE].tolist(),
+        "tool": bands.held[TOOL:WRENCH].tolist(),
+        "anyForce": float(bands.held[FORCE]),
+        # Over limits that are infinite shares are zero.
+        "overLimits": (1.0 / bands.held[LIMITS:SIGNS]).reshape(2, -1).tolist(),
+        "parts": PART_NAMES,
+        "words": name,
+        "unitName": unit,
+        "factor": factor,
+    }
     return facts
 
 

@@ -11,8 +11,10 @@ from explorer.app.features.workspace.reached import (
     Reached,
     Rows,
     Trouble,
+    hold_load,
     reach_workspace,
     reached_of,
+    trouble_holding,
 )
 from explorer.app.features.workspace.slice_map import (
     AXES,
@@ -30,6 +32,7 @@ from explorer.app.session.feed import watch_of
 from explorer.app.session.worker import Channel
 from explorer.errors import InputError
 from explorer.mechanism.design import Design
+from explorer.mechanism.machine import Six
 from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.stages import unwatched
@@ -40,11 +43,11 @@ from explorer.workspace.slices.volume import NodeCount, workspace_nodes
 from explorer.workspace.solids.solid import Solid
 from explorer.workspace.solids.solids import convex_hull, cut_solid, workspace_solid
 
-Region = Literal["limits", "reachable"]
+Region = Literal["limits", "reachable", "held"]
 
 # Chord tolerance of a live solid, as a share of the reach.
 LIVE_TOLERANCE = 0.004
-# The same for an accessible part, whose triangles are those that are drawn.
+# The same for a part of it, whose triangles are those that are drawn.
 REACHED_TOLERANCE = 0.001
 # The format with exact faces rather than facets.
 STEP = "step"
@@ -57,7 +60,7 @@ class WorkspaceRequest:
     Attributes:
         design: The manipulator.
         rotation: Rows of the matrix, platform to base.
-        region: All that is within the limits, or its accessible part.
+        region: All that is within the limits, its accessible part, or the part that holds the load.
         start: Position where paths start; None for home.
         colour: Measure that colours the surface.
         cut: Axis across which the solid is cut open, or None.
@@ -66,6 +69,8 @@ class WorkspaceRequest:
         tolerance: Chord tolerance; None for a share of the reach.
         hull: Whether to make the convex hull.
         warn_below: Length below which margins raise a warning.
+        load: (F; M) at the tool point besides the payload, base axes, in N and N × unit; None if
+            it does not matter.
     """
 
     design: Design
@@ -79,6 +84,7 @@ class WorkspaceRequest:
     tolerance: float | None
     hull: bool
     warn_below: float
+    load: Six | None = None
 
 
 @dataclass(frozen=True)
@@ -112,13 +118,17 @@ class WorkspaceDrawing:
         volume: Exact volume within the limits, see `explorer.workspace.slices.volume`.
         error: Bound of the error of that volume.
         reached: Numbers of the accessible part, if requested and there is no trouble.
-        trouble: Why nothing is accessible, if all within the limits is drawn instead.
+        held_volume: Volume of the part that holds the load, likewise.
+        trouble: Why nothing is accessible or holds the load, if all within the limits is drawn
+            instead.
         mesh_volume: Volume of the uncut solid.
         mesh_agrees: Whether the volume of the solid within the limits agrees with the exact one.
         hull_volume: Volume of the hull, if requested.
         extent: (lows, highs) of the solid; None if it is empty.
         nodes: The paper's node count within the limits; None if the grid is too fine.
         empty_because: Names of the limits that empty the workspace.
+        levels: The measure that colours the map and the surface at the edge of each band, see
+            `explorer.workspace.position_bands.PositionBands`.
     """
 
     request: WorkspaceRequest
@@ -129,6 +139,7 @@ class WorkspaceDrawing:
     volume: float
     error: float
     reached: Reached | None
+    held_volume: float | None
     trouble: Trouble | None
     mesh_volume: float
     mesh_agrees: bool | None
@@ -136,6 +147,12 @@ class WorkspaceDrawing:
     extent: tuple[FloatArray, FloatArray] | None
     nodes: NodeCount | None
     empty_because: tuple[str, ...]
+    levels: tuple[float, ...]
+
+    @property
+    def part_volume(self) -> float | None:
+        """Volume of the part that is drawn; None for all within the limits."""
+        return self.held_volume if self.reached is None else self.reached.volume
 
 
 def draw_workspace(request: WorkspaceRequest, channel: Channel | None = None) -> WorkspaceDrawing:
@@ -147,10 +164,11 @@ def draw_workspace(request: WorkspaceRequest, channel: Channel | None = None) ->
             as it is known, and may cancel; None for neither.
     """
     design, rotation = request.design, np.array(request.rotation)
-    share = REACHED_TOLERANCE if request.region == "reachable" else LIVE_TOLERANCE
+    share = LIVE_TOLERANCE if request.region == "limits" else REACHED_TOLERANCE
     tolerance = request.tolerance or share * design.reach
     watch = watch_of(channel)
-    colouring = Colouring(design, rotation, request.colour, request.warn_below)
+    load = (0.0,) * 6 if request.load is None else request.load
+    colouring = Colouring(design, rotation, request.colour, request.warn_below, np.array(load))
     limits = constraints(design, rotation)
 
     def draw(faces: Faces) -> WorkspaceSurface:
@@ -166,14 +184,19 @@ def draw_workspace(request: WorkspaceRequest, channel: Channel | None = None) ->
         # It is waited for; it needs none of what follows.
         surface = draw(workspace_faces(limits))
     whole = workspace_solid(design, rotation, tolerance, volume=measured)
-    reached = trouble = None
+    reached = trouble = held_volume = part = None
     if request.region == "reachable":
         result = reach_workspace(design, request.rotation, request.start, tolerance, watch)
         reached, trouble = (None, result) if isinstance(result, Trouble) else (result, None)
-    solid = whole if reached is None else reached.solid
+        part = None if reached is None else reached.solid
+    elif request.region == "held":
+        held = hold_load(design, request.rotation, load, tolerance)
+        trouble = trouble_holding(held)
+        held_volume, part = (held.held_volume, held.solid) if trouble is None else (None, None)
+    solid = whole if part is None else part
     shown, mapped, level = solid, None, None
     whole_extent = None if whole.is_empty else extent_of(design, rotation, whole)
-    extent = whole_extent if reached is None else _extent(solid)
+    extent = whole_extent if part is None else _extent(solid)
     cut = None
     if request.cut is not None and extent is not None and whole_extent is not None:
         axis = AXES.index(request.cut)
@@ -181,12 +204,13 @@ def draw_workspace(request: WorkspaceRequest, channel: Channel | None = None) ->
         side = -1.0 if keeps_above(request.cut, request.flipped) else 1.0
         cut = request.cut, level, HalfSpace(CUT, side * np.eye(3)[axis], side * level)
         limits = (*limits, cut[2])
-        shown = solid if reached is None else cut_solid(solid, cut[2])
+        shown = solid if part is None else cut_solid(solid, cut[2])
     if surface is None:
-        surface = draw(workspace_faces(limits) if reached is None else creased_faces(shown))
+        surface = draw(workspace_faces(limits) if part is None else creased_faces(shown))
     if cut is not None and whole_extent is not None:
-        cut_solids = (None, None) if reached is None else (cut_solid(whole, cut[2]), shown)
-        mapped = slice_map(colouring, whole_extent, *cut[:2], *cut_solids)
+        cut_solids = (None, None) if part is None else (cut_solid(whole, cut[2]), shown)
+        left_out = "load not held" if request.region == "held" else "not accessible"
+        mapped = slice_map(colouring, whole_extent, *cut[:2], *cut_solids, left_out)
     hull = convex_hull(solid) if request.hull and not solid.is_empty else None
     try:
         nodes = workspace_nodes(design, rotation)
@@ -201,6 +225,7 @@ def draw_workspace(request: WorkspaceRequest, channel: Channel | None = None) ->
         volume=measured.volume,
         error=measured.error,
         reached=None if reached is None else reached_of(reached),
+        held_volume=held_volume,
         trouble=trouble,
         mesh_volume=solid.volume,
         mesh_agrees=solid.agrees,
@@ -208,6 +233,7 @@ def draw_workspace(request: WorkspaceRequest, channel: Channel | None = None) ->
         extent=extent,
         nodes=nodes,
         empty_because=measured.empty_because,
+        levels=colouring.bands.levels,
     )
 
 
@@ -217,6 +243,7 @@ def export_mesh(
     tolerance: float,
     region: Region,
     start: Triple | None,
+    load: Six,
     what: str,
     file_format: str,
 ) -> bytes:
@@ -226,14 +253,15 @@ def export_mesh(
         design: The manipulator.
         rotation: Rows of the matrix, platform to base.
         tolerance: Chord tolerance, in design units.
-        region: All that is within the limits, or its accessible part.
+        region: All that is within the limits, its accessible part, or the part that holds the load.
         start: Position where paths start; None for home.
+        load: The load of that part, as in `WorkspaceRequest`.
         what: "workspace" or "hull".
         file_format: A format of `explorer.export.mesh`, or `STEP`.
 
     Raises:
-        ExplorerError: an empty workspace, nothing accessible, a missing library, or STEP of a solid
-            without exact faces.
+        ExplorerError: an empty workspace, nothing accessible, a load that nothing holds, a missing
+            library, or STEP of a solid without exact faces.
     """
     if file_format == STEP:
         return _exact_file(design, rotation, region, what)
@@ -241,6 +269,12 @@ def export_mesh(
 
     if region == "limits":
         solid = workspace_solid(design, np.array(rotation), tolerance)
+    elif region == "held":
+        held = hold_load(design, rotation, load, tolerance)
+        trouble = trouble_holding(held)
+        if trouble is not None:
+            raise InputError(f"nothing holds the load: {trouble.reason}")
+        solid = held.solid
     else:
         reached = reach_workspace(design, rotation, start, tolerance, unwatched)
         if isinstance(reached, Trouble):
@@ -254,16 +288,17 @@ def _exact_file(design: Design, rotation: Rows, region: Region, what: str) -> by
     """Return a STEP file of the workspace within the limits.
 
     Raises:
-        InputError: a hull or the accessible part; neither has exact faces.
+        InputError: a hull, or a part of the workspace; neither has exact faces.
         ExplorerError: as of `explorer.export.step.workspace_step`.
     """
     meshes = "export it as 3mf, stl, glb, obj or ply"
     if what == "hull":
         raise InputError(f"STEP takes exact faces, and a convex hull consists of facets; {meshes}")
     if region != "limits":
+        cause = "legs begin to collide" if region == "reachable" else "a part takes its limit"
         raise InputError(
-            "STEP takes exact faces, and the surface along which legs begin to collide consists of "
-            f'facets; {meshes}, or choose the region "within the limits"'
+            f"STEP takes exact faces, and the surface along which {cause} consists of facets; "
+            f'{meshes}, or choose the region "within the limits"'
         )
     from explorer.export.step import workspace_step
 
@@ -272,7 +307,13 @@ def _exact_file(design: Design, rotation: Rows, region: Region, what: str) -> by
 
 def exported_name(region: Region, what: str) -> str:
     """Return the name of a file with a "workspace" or a "hull"."""
-    return what if region == "limits" else f"accessible {what}"
+    match region:
+        case "limits":
+            return what
+        case "reachable":
+            return f"accessible {what}"
+        case "held":
+            return f"{what} that holds the load"
 
 
 def _extent(solid: Solid) -> tuple[FloatArray, FloatArray] | None:

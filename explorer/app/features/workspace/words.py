@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 from explorer.app.features.workspace.feed import WorkspaceFeed
+from explorer.app.features.workspace.load import has_limits
 from explorer.app.features.workspace.orientation import orientation_word, turned_suffix
 from explorer.app.features.workspace.reached import Reached
 from explorer.app.features.workspace.tasks import WorkspaceDrawing
 from explorer.app.features.workspace.volume import MeasuredVolume, VolumeFeed, volume_text
-from explorer.app.scene.bands import COLLIDING, PLAIN
+from explorer.app.scene.bands import AT_LIMIT, COLLIDING, PLAIN, Measure
 from explorer.app.state.frame import Frame
+from explorer.app.state.state import State
 from explorer.app.widgets.colours import css
 from explorer.app.widgets.markup import (
     alert,
@@ -29,8 +32,10 @@ from explorer.app.widgets.under_way import problem, progress
 from explorer.export.report.drawings.slices import NOT_ACCESSIBLE, NOT_ACCESSIBLE_OPACITY
 from explorer.legs.clearance import pair_name
 from explorer.mechanism.design import Design
+from explorer.mechanism.pose import Triple
 from explorer.singularity.colours import BAND_EDGES, WARN_CONDITION, band_colours
 from explorer.workspace.accessible.workspace import PairCost
+from explorer.workspace.position_bands import LOAD_WORDS, SHARE_COLOURS, SHARES, STEP_COLOURS
 
 # Bounds of a deviation that are told, in percent.
 DEVIATIONS = (0.001, 0.01, 0.1, 1.0)
@@ -48,30 +53,66 @@ def volume_headline(frame: Frame, feed: VolumeFeed) -> str:
 
 
 def drawing_words(frame: Frame, feed: WorkspaceFeed) -> str:
-    """Return why there is no drawing, or the volume of the accessible part, as HTML; "" for none.
+    """Return why nothing is drawn, or the volume of the part that is drawn, as HTML; "" for none.
 
-    While the accessible part is computed, its progress is told.
+    While that part is computed, its progress is told.
     """
     if feed.problem is not None:
         return problem(feed, "The workspace could not be drawn", "Compute the workspace")
-    if frame.state.view.workspace.region == "limits" or feed.request is None:
+    region = frame.state.view.workspace.region
+    if region == "limits" or feed.request is None:
         return ""
     drawing = feed.drawing
     waiting = "" if feed.is_current else progress(feed)
-    if drawing is None or drawing.request.region == "limits":
+    if drawing is None or drawing.request.region != region:
         return dim(waiting.capitalize())
-    reached = drawing.reached
-    if reached is None:
-        which = "home" if drawing.request.start is None else "present"
-        return f'<div class="ex-beyond">Nothing is accessible from the {which} position.</div>'
+    return _part_words(frame.state, drawing, waiting)
+
+
+def _part_words(state: State, drawing: WorkspaceDrawing, waiting: str) -> str:
+    """Return the volume of the part of the workspace that is drawn, as HTML."""
+    region, volume = drawing.request.region, drawing.part_volume
+    if volume is None:
+        return f'<div class="ex-beyond">{nothing_words(drawing)}.</div>'
     if drawing.volume <= 0.0:
         return ""
-    percent = 100.0 * reached.volume / drawing.volume
-    return (
-        f'<div class="ex-line"><span>{format_number(reached.volume, 6)} units³ accessible, '
-        f"{format_number(percent, 4)} %</span>{dim(waiting)}</div>"
-        + meter(percent, PLAIN, COLLIDING)
+    percent = 100.0 * volume / drawing.volume
+    does, rest = ("accessible", COLLIDING) if region == "reachable" else ("hold the load", AT_LIMIT)
+    words = (
+        f'<div class="ex-line"><span>{format_number(volume, 6)} units³ {does}, '
+        f"{format_number(percent, 4)} %</span>{dim(waiting)}</div>" + meter(percent, PLAIN, rest)
     )
+    if region == "reachable":
+        return words
+    if not has_limits(state.design):
+        return words + caption("The design has no limits of forces, so that it holds any load.")
+    return words + caption(f"{load_words(state)}.")
+
+
+def nothing_words(drawing: WorkspaceDrawing) -> str:
+    """Return that the region of a drawing is empty, without a full stop."""
+    if drawing.request.region == "held":
+        return "No position holds the load"
+    which = "home" if drawing.request.start is None else "present"
+    return f"Nothing is accessible from the {which} position"
+
+
+def load_words(state: State) -> str:
+    """Return what loads the platform over the workspace, without a full stop."""
+    forces, payload = state.view.forces, state.design.payload
+
+    def vector(numbers: Triple, unit: str) -> str:
+        return f"({', '.join(format_number(number, 4) for number in numbers)}) {unit}"
+
+    parts = [f"{vector(forces.force, 'N')} at the tool"]
+    if any(forces.moment):
+        parts.append(vector(forces.moment, "N m"))
+    if forces.weighed != "none" and payload.mass_kg:
+        parts.append(f"{format_number(payload.mass_kg, 4)} kg of payload")
+    if payload.force_n:
+        parts.append(f"{format_number(payload.force_n, 4)} N in any direction")
+    weightless = "; legs count as weightless" if forces.weighed == "payload and legs" else ""
+    return f"Load: {', '.join(parts)}{weightless}"
 
 
 def _volume(newest: MeasuredVolume, frame: Frame) -> str:
@@ -156,7 +197,7 @@ def _numbers(drawing: WorkspaceDrawing) -> str:
         rows.append(
             ("Hull volume", format_number(drawing.hull_volume, 6), "Volume of the convex hull")
         )
-    volume = drawing.volume if reached is None else reached.volume
+    volume = drawing.volume if drawing.part_volume is None else drawing.part_volume
     if volume > 0.0:
         rows.append(
             (
@@ -210,32 +251,62 @@ def _pair(pair: PairCost) -> str:
     return row(pair_name(pair.legs), clearance, "–")
 
 
-def legend(measure: str, warn_below: float, drawing: WorkspaceDrawing | None) -> str:
+def legend(measure: Measure, warn_below: float, drawing: WorkspaceDrawing | None) -> str:
     """Return the bands of colours with the values at their edges, and the colours of the map."""
-    unit, name = (
-        (WARN_CONDITION, "1 / cond J")
-        if measure == "condition"
-        else (warn_below, "Smallest |δ| (units)")
-    )
-    # All bands are drawn equally wide, so the values at their edges are not evenly spaced.
-    width = 100.0 / len(BAND_EDGES)
-    colours = ",".join(
-        f"{css(band)} 0 {width * (index + 1):g}%" for index, band in enumerate(band_colours())
-    )
-    edges = (
-        (width * index, format_number(BAND_EDGES[index] * unit, 2)) for index in (0, 2, 4, 6, 9)
+    if measure in LOAD_WORDS:
+        words, unit, factor = LOAD_WORDS[measure]
+        name = f"{words.capitalize()} ({unit})"
+        colours = SHARE_COLOURS if measure == "share" else STEP_COLOURS
+        levels = _levels(measure, drawing)
+        texts = ("0", *(format_number(factor * level, 3) for level in levels), "∞")
+        # The ends of bands, and the infinity of singular planes.
+        edges = [(100.0 * k / len(colours), text) for k, text in enumerate(texts)]
+    else:
+        unit, name = (
+            (WARN_CONDITION, "1 / cond J")
+            if measure == "condition"
+            else (warn_below, "Smallest |δ| (units)")
+        )
+        colours = band_colours()
+        # All bands are drawn equally wide, so the values at their edges are not evenly spaced.
+        edges = [
+            (100.0 * index / len(colours), format_number(BAND_EDGES[index] * unit, 2))
+            for index in (0, 2, 4, 6, 9)
+        ]
+    width = 100.0 / len(colours)
+    stops = ",".join(
+        f"{css(band)} 0 {width * (index + 1):g}%" for index, band in enumerate(colours)
     )
     marks = ""
     if drawing is not None and drawing.slice_map is not None:
         if any(drawing.request.design.limits.leg_radii):
             marks += f"<span>{swatch(COLLIDING)}legs collide</span>"
-        if drawing.reached is not None:
+        if drawing.part_volume is not None:
             faint = f"opacity:{NOT_ACCESSIBLE_OPACITY:g}"
-            marks += (
-                f'<span><span style="{faint}">{swatch(NOT_ACCESSIBLE)}</span>not accessible</span>'
-            )
+            left_out = "not held" if drawing.request.region == "held" else "not accessible"
+            marks += f'<span><span style="{faint}">{swatch(NOT_ACCESSIBLE)}</span>{left_out}</span>'
     return box(
         f'<div class="ex-line"><span class="ex-dim">{name}</span>'
         f'<span class="ex-flow ex-dim">{marks}</span></div>'
-        f'<div class="ex-legend" style="--colours:{colours}"></div>{ticks(*edges)}'
+        f'<div class="ex-legend" style="--colours:{stops}"></div>{ticks(*edges)}'
+    )
+
+
+def _levels(measure: Measure, drawing: WorkspaceDrawing | None) -> tuple[float, ...]:
+    """Return the ends of the bands of what a load asks, ascending; () if none are known yet."""
+    if measure == "share":
+        return SHARES
+    if drawing is None or drawing.request.colour != measure:
+        return ()
+    return drawing.levels[:0:-1]
+
+
+def without_limits(buttons: Iterable[str]) -> str:
+    """Return that a design has no limit of which a load could use a share, and what helps.
+
+    Args:
+        buttons: Buttons of the colourings that need no limit, HTML.
+    """
+    return note(
+        f"The design has no limits of forces: colour by the {' or the '.join(buttons)} instead."
     )

@@ -10,7 +10,8 @@ from explorer.export.report.drawings.mechanism import WIDTH, round_length, svg_d
 from explorer.export.report.drawings.slices import Slices, in_plane
 from explorer.export.report.markup import coordinate, drawing_text, element
 from explorer.numerics.number_text import format_number
-from explorer.singularity.colours import BAND_EDGES, OUTLINE, band_colours, css
+from explorer.singularity.colours import OUTLINE, css
+from explorer.workspace.position_bands import LOAD_WORDS
 from explorer.workspace.slices.axes import AXES
 
 # The space around a map that has ticks, and between maps.
@@ -19,8 +20,14 @@ MOST_HEIGHT = 290.0
 _TICKS = 5
 
 
-def slices_through(slices: Slices, position: Sequence[float]) -> Element:
-    """Return the three maps of the slices through a position, side by side at one scale."""
+def slices_through(slices: Slices, position: Sequence[float], name: str = "slice") -> Element:
+    """Return the three maps of the slices through a position, side by side at one scale.
+
+    Args:
+        slices: The slices.
+        position: The position, shape (3,), in design units.
+        name: First part of the names of the maps, unique in the document.
+    """
     spans = slices.highs - slices.lows
     wide = float(2.0 * spans[0] + spans[1])
     high = float(max(spans[1], spans[2]))
@@ -33,7 +40,7 @@ def slices_through(slices: Slices, position: Sequence[float]) -> Element:
         level = float(position[AXES.index(axis)])
         width, tall = (float(scale * spans[k]) for k in (first, second))
         x, y = left + LEFT, TOP + tall
-        maps.append(_placed(slices, axis, level, x, y, scale, f"slice-{axis}"))
+        maps.append(_placed(slices, axis, level, x, y, scale, f"{name}-{axis}"))
         for k, low, across in ((first, x, y), (second, y, x)):
             ends = float(slices.lows[k]), float(slices.highs[k])
             maps.append(ruler(AXES[k], ends, low, scale, across=across, up=k == second))
@@ -69,23 +76,30 @@ def slice_strip(
 
 
 def legend(slices: Slices, unit_mm: float) -> Element:
-    """Return the legend of the maps' colours."""
-    colours, warn = band_colours(), slices.warn_below
-    step, left, pieces = 46.0, 130.0, list[Element]()
-    pieces.append(drawing_text("smallest margin", left - 12.0, 15.0, anchor="end"))
-    pieces.append(drawing_text("units", left - 12.0, 33.0, anchor="end"))
-    pieces.append(drawing_text("mm", left - 12.0, 47.0, anchor="end"))
-    for index, (edge, colour) in enumerate(zip(BAND_EDGES, colours, strict=True)):
+    """Return the legend of the colours of maps of the smallest margin, or of what a load asks."""
+    bands, step, left, pieces = slices.bands, 46.0, 130.0, list[Element]()
+    colours, levels = bands.colours, bands.levels
+    title, rows = "smallest margin", [("units", 1.0), ("mm", unit_mm)]
+    words = LOAD_WORDS.get(bands.measure)
+    if words is not None:
+        title, rows = words[0], [words[1:]]
+        # Of a load, less is better; the last band goes on without end.
+        colours, levels = colours[::-1], (0.0, *levels[:0:-1])
+        left += 30.0
+    pieces.append(drawing_text(title, left - 12.0, 15.0, anchor="end"))
+    for row, (unit, factor) in enumerate(rows):
+        y = 33.0 + 14.0 * row
+        pieces.append(drawing_text(unit, left - 12.0, y, anchor="end"))
+        for index, level in enumerate(levels):
+            pieces.append(drawing_text(format_number(level * factor, 3), left + step * index, y))
+    for index, colour in enumerate(colours):
         x = left + step * index
         pieces.append(element("rect", x=x, y=4.0, width=step, height=14.0, fill=css(colour)))
-        for factor, y in ((1.0, 33.0), (unit_mm, 47.0)):
-            words = format_number(edge * warn * factor, 3)
-            pieces.append(drawing_text(words, x, y))
     if any(slices.design.limits.leg_radii):
         x = left + step * len(colours) + 18.0
         pieces.append(element("rect", x=x, y=4.0, width=14.0, height=14.0, fill=css(OUTLINE)))
         pieces.append(element("text", "legs collide", x=x + 19.0, y=15.0, class_="small"))
-    return svg_drawing(52.0, "The colours of the maps", *pieces)
+    return svg_drawing(24.0 + 14.0 * len(rows), "The colours of the maps", *pieces)
 
 
 def _placed(

@@ -1,8 +1,8 @@
 """Maps of slices as drawings, for the report and the page: exact outlines, filled in bands.
 
 At one orientation each margin is linear in the position, so the positions of a slice at which
-every margin is at least a level are polygons: these bands are as exact as the outline. Bands of the
-condition number, limits on swings and collisions of legs are outlined on a fine grid.
+every margin is at least a level are polygons: these bands are as exact as the outline. Bands of
+other measures, limits on swings and collisions of legs are outlined on a fine grid.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Literal
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -23,18 +22,11 @@ from explorer.legs.clearance import leg_clearances
 from explorer.mechanism.design import Design, Swing
 from explorer.mechanism.margins import margins
 from explorer.numerics.arrays import FloatArray
-from explorer.singularity.colours import (
-    BAND_EDGES,
-    OUTLINE,
-    WARN_CONDITION,
-    WARN_SHARE,
-    band_colours,
-    css,
-)
+from explorer.singularity.colours import OUTLINE, WARN_SHARE, css
 from explorer.singularity.ellipsoids import planes_of_singularity
-from explorer.singularity.jacobian import inverse_condition, jacobian
 from explorer.workspace.limits.constraints import constraints, slacks
 from explorer.workspace.limits.region import region_of
+from explorer.workspace.position_bands import PositionBands, position_bands
 from explorer.workspace.slices.axes import AXES
 from explorer.workspace.slices.level_loops import level_loops
 from explorer.workspace.slices.outline import Edge, Outline, slice_outline
@@ -49,8 +41,6 @@ CONTOURS = 60
 # Colour and opacity of positions within the limits that are not accessible.
 NOT_ACCESSIBLE, NOT_ACCESSIBLE_OPACITY = OUTLINE, 0.38
 
-BandMeasure = Literal["margin", "condition"]
-
 
 @dataclass(frozen=True)
 class Slices:
@@ -60,37 +50,36 @@ class Slices:
         design: The manipulator.
         rotation: Rotation from platform to base, shape (3, 3).
         lows, highs: Corners of a box that holds the workspace, each of shape (3,).
-        warn_below: The warning length of margins, in design units.
-        measure: The measure of the bands: the smallest margin |δ|, or the inverse condition number.
+        bands: The measure that is drawn, in bands.
     """
 
     design: Design
     rotation: FloatArray
     lows: FloatArray
     highs: FloatArray
-    warn_below: float
-    measure: BandMeasure = "margin"
+    bands: PositionBands
 
     @staticmethod
     def of(
         design: Design,
         rotation: FloatArray,
         extent: tuple[FloatArray, FloatArray],
-        warn_below: float | None = None,
-        measure: BandMeasure = "margin",
+        bands: PositionBands | None = None,
     ) -> Slices:
         """Return the slices of a workspace that is not empty, of known extent.
 
-        Without a warning length, that of a new page counts.
+        Without bands, those of the smallest margin on a new page are drawn.
         """
+        if bands is None:
+            warn_below = WARN_SHARE * design.reach
+            bands = position_bands(design, rotation, "margin", warn_below=warn_below)
         lows, highs = bounds(region_of(constraints(design, rotation)))
         return Slices(
             design,
             rotation,
             np.maximum(lows, extent[0]),
             np.minimum(highs, extent[1]),
-            WARN_SHARE * design.reach if warn_below is None else warn_below,
-            measure,
+            bands,
         )
 
     @property
@@ -144,16 +133,17 @@ class Slices:
             if paths:
                 filled.append(element("path", d="".join(paths), **look))
 
-        first, *others = band_colours()
+        first, *others = self.bands.colours
         add([self._corners(axis)], fill=css(first))
         beyond = self.beyond(axis, level)
-        for share, colour in zip(BAND_EDGES[1:], others, strict=True):
-            add(beyond(share), fill=css(colour), fill_rule="evenodd")
-        if self.measure == "margin":
+        for edge, colour in zip(self.bands.edges[1:], others, strict=True):
+            add(beyond(edge), fill=css(colour), fill_rule="evenodd")
+        if self.bands.measure == "margin":
+            last, furthest = self.bands.edges[-1], self.bands.levels[-1]
             for number in range(1, CONTOURS):
-                share = number * self.contour_step / self.warn_below
-                if share > BAND_EDGES[-1]:
-                    add(beyond(share), class_="contour")
+                level_of_margin = number * self.contour_step
+                if level_of_margin > furthest:
+                    add(beyond(last * level_of_margin / furthest), class_="contour")
         add(
             not_accessible,
             fill=css(NOT_ACCESSIBLE),
@@ -187,23 +177,28 @@ class Slices:
         return np.array([[u0, v0], [u1, v0], [u1, v1], [u0, v1]])
 
     def beyond(self, axis: str, level: float) -> Callable[[float], Iterable[FloatArray]]:
-        """Return the function from levels of the measure to the polygons of a slice beyond them.
+        """Return the function from values of the bands to the polygons of a slice beyond them.
 
-        Levels are multiples of the measure's value for a warning. The polygons, each of shape
-        (n, 2) in design units, are filled by the even-odd rule; they may go beyond the limits.
+        The polygons, each of shape (n, 2) in design units, are filled by the even-odd rule; they
+        may go beyond the limits.
         """
-        if self.measure == "margin":
-            return lambda share: self._beyond_margin(axis, level, share)
-        grid = self._grid(axis, level, CONDITION_CELLS)
-        return _beyond_condition(self.design, self.rotation, grid)
+        if self.bands.measure == "margin":
+            unit = self.bands.levels[-1] / self.bands.edges[-1]
+            return lambda value: self._beyond_margin(axis, level, value * unit)
+        cells = CONDITION_CELLS if self.bands.measure == "condition" else CELLS
+        grid = self._grid(axis, level, cells)
+        values = self.bands.values(grid.points.reshape(-1, 3)).reshape(grid.points.shape[:2])
+        # With the sign of the determinant the field is smooth where it is zero.
+        field = np.sign(margins(grid.points, self.rotation).prod(axis=-1)) * values
+        return lambda value: [*grid.loops(field, value), *grid.loops(-field, value)]
 
-    def _beyond_margin(self, axis: str, level: float, share: float) -> Iterator[FloatArray]:
+    def _beyond_margin(self, axis: str, level: float, margin: float) -> Iterator[FloatArray]:
         gradients = planes_of_singularity(self.rotation)
         for signs in itertools.product((-1.0, 1.0), repeat=3):
             polygon = self._corners(axis)
             for sign, gradient in zip(signs, gradients, strict=True):
                 beyond = float(gradient[AXES.index(axis)]) * level
-                least = share * self.warn_below - sign * beyond
+                least = margin - sign * beyond
                 polygon = _clipped(polygon, sign * (polygon @ gradient[in_plane(axis)]) - least)
                 if not len(polygon):
                     break
@@ -234,16 +229,6 @@ class _Grid:
     def loops(self, values: FloatArray, level: float) -> list[FloatArray]:
         """Return the polygons around the parts in which values (m, n) are at least a level."""
         return level_loops(self.columns, self.rows, values, level)
-
-
-def _beyond_condition(
-    design: Design, rotation: FloatArray, grid: _Grid
-) -> Callable[[float], list[FloatArray]]:
-    # With the sign of the determinant the field is smooth where it is zero.
-    sign = np.sign(margins(grid.points, rotation).prod(axis=-1))
-    condition = inverse_condition(jacobian(design, grid.points, rotation), design.reach)
-    field = sign * condition / WARN_CONDITION
-    return lambda share: [*grid.loops(field, share), *grid.loops(-field, share)]
 
 
 def in_plane(axis: str) -> list[int]:
