@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -11,7 +12,7 @@ import numpy as np
 from explorer.mechanism.design import Design
 from explorer.mechanism.machine import Payload
 from explorer.mechanism.pose import Pose
-from explorer.numerics.arrays import FloatArray
+from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.statics.equilibrium import twists_of_actuators
 from explorer.statics.forces import largest_force
 from explorer.statics.reactions import Reactions, largest_payload, limit_shares, reactions
@@ -67,6 +68,16 @@ class LoadedPose:
     def shares(self) -> FloatArray:
         """Shares of the limits, shape (12,), in the order of `LIMITED`; 0 without a limit."""
         return limit_shares(self.design, self.held)
+
+    @cached_property
+    def limited(self) -> BoolArray:
+        """Whether each part has a limit, shape (12,), in the order of `LIMITED`."""
+        struts, guide = self.design.struts, self.design.guide
+        bending = math.isfinite(struts.largest_moment)
+        force, moment = guide.force_n is not None, guide.moment_nm is not None
+        push, pull = self.design.actuators.limits
+        actuators: list[bool] = np.isfinite(np.minimum(push, pull)).tolist()
+        return np.array([*actuators, bending, bending, force, force, moment, moment])
 
     @property
     def is_regular(self) -> bool:

@@ -17,7 +17,8 @@ from services import StubWorker, services_for
 from explorer import Actuators, Guide, Payload, Struts, Tool
 from explorer.app.features.feature import Services
 from explorer.app.features.forces.actions import FITTING, SetForce, fitting_scale
-from explorer.app.features.forces.loads import Loads, NearestFeed, WeightsFeed, has_limits, load_of
+from explorer.app.features.forces.load_figure import LoadFigure
+from explorer.app.features.forces.loads import Loads, NearestFeed, WeightsFeed, load_of
 from explorer.app.features.forces.panel import GO, WORST, ForcesPanel, largest, tables, verdict
 from explorer.app.features.forces.scene import (
     LONGEST_REACTION,
@@ -127,10 +128,20 @@ def test_the_verdict_tells_the_part_that_is_nearest_to_its_limit(
 
 def test_without_limits_forces_are_told_and_no_shares() -> None:
     state = loaded_state(OPTIMAL)
-    assert not has_limits(loaded(state))
+    assert not loaded(state).limited.any()
     assert "Machine" in words_of(state)
     assert "%" not in "".join(tables(loaded(state)))
     assert "".join(largest(Frame(state), loaded(state))).count("no limit") == 2
+
+
+def test_a_part_with_a_limit_and_no_force_uses_none_of_it() -> None:
+    state = loaded_state(force=(0.0, 0.0, 0.0), weighed="none")
+    assert "Holds the load" in words_of(state)
+    text = "".join(tables(loaded(state)))
+    assert (text.count(">0 %<"), text.count("no limit")) == (10, 0)
+    free = msgspec.structs.replace(LIMITED, guide=Guide(), struts=Struts())
+    text = "".join(tables(loaded(loaded_state(free))))
+    assert text.count("no limit") == 4
 
 
 def test_in_a_singular_pose_the_page_says_that_forces_are_infinite() -> None:
@@ -204,6 +215,15 @@ def test_a_press_turns_the_force_into_its_worst_direction(server: viser.ViserSer
         x, y, z = (10.0 * direction / np.linalg.norm(direction)).tolist()
         other = services.get(Loads).of(Frame(SetForce((x, y, z)).apply(state)))
         assert other.share <= after * (1.0 + 1e-12)
+
+
+def test_the_bar_tells_the_largest_share_where_there_are_limits() -> None:
+    shown = services_for().get(LoadFigure)
+    assert shown(Frame(loaded_state(OPTIMAL))) == ""
+    state = loaded_state()
+    assert share_words(loaded(state).share) in shown(Frame(state))
+    assert "ex-beyond" in shown(Frame(SetForce((0.0, 0.0, -90.0)).apply(state)))
+    assert "∞" in shown(Frame(moved_to(state, 10.0, 5.0, 0.0)))
 
 
 # The scene
@@ -294,7 +314,7 @@ def test_a_force_that_is_not_finite_is_refused_in_one_line(force: tuple[float, .
 
 
 def test_shares_have_words_and_looks() -> None:
-    assert [share_words(each) for each in (0.0, 0.004, 0.5, 1.234, 1e5, math.inf)] == [
+    assert [share_words(each) for each in (None, 0.004, 0.5, 1.234, 1e5, math.inf)] == [
         "no limit",
         "0 %",
         "50 %",

@@ -114,3 +114,13 @@ def test_in_a_singular_pose_nothing_holds_a_load() -> None:
     worst = loaded.worst_force(10.0)
     assert np.isinf(worst.share)
     assert np.isnan(worst.direction).all()
+
+
+def test_parts_with_a_limit_are_those_whose_share_a_load_changes() -> None:
+    load = np.array([3.0, -4.0, -10.0, 5.0, 7.0, -3.0])
+    for change in ("actuators", "struts", "guide"):
+        none = {"actuators": Actuators(), "struts": Struts(), "guide": Guide()}
+        kept = getattr(limited(), change)
+        loaded = LoadedPose(limited(**(none | {change: kept})), HOME, load)
+        assert (loaded.limited == (loaded.shares > 0.0)).all()
+        assert loaded.limited.any()

@@ -7,7 +7,8 @@ from functools import partial
 
 import viser
 
-from explorer.app.features.feature import Feature, Feed, Services, Tab
+from explorer.app.features.feature import Feature, Feed, InBar, Services, Tab
+from explorer.app.features.forces.load_figure import LoadFigure
 from explorer.app.features.forces.loads import NearestFeed, WeightsFeed
 from explorer.app.features.forces.panel import ForcesPanel
 from explorer.app.features.forces.scene import ForcesScene, LoadHandle
@@ -22,6 +23,7 @@ def _of_kind(kind: Callable[[Services], Feed], services: Services) -> Feed:
 FORCES = Feature(
     "forces",
     tabs=(Tab("analyse", "Forces", ForcesPanel, viser.Icon.ARROW_DOWN_CIRCLE),),
+    bar=(InBar("middle", LoadFigure),),
     scene=(ForcesScene, LoadHandle),
     later_feeds=tuple(partial(_of_kind, kind) for kind in (WeightsFeed, NearestFeed)),
     tasks=(weights_of_parts, nearest_position),

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import msgspec
 import numpy as np
 
@@ -73,7 +71,7 @@ class NearestFeed(Feed[NearestRequest, NearestDrawing]):
 
         def request_of(frame: Frame) -> NearestRequest | None:
             loaded = loads.of(frame)
-            if loaded.share <= 1.0 or not has_limits(loaded):
+            if loaded.share <= 1.0 or not loaded.limited.any():
                 return None
             return NearestRequest(
                 loaded.design,
@@ -92,11 +90,3 @@ def load_of(state: State) -> Six:
     fx, fy, fz = forces.force
     mx, my, mz = (units * each for each in forces.moment)
     return fx, fy, fz, mx, my, mz
-
-
-def has_limits(loaded: LoadedPose) -> bool:
-    """Return whether an actuator, a strut or the guide of the design has a limit."""
-    design = loaded.design
-    actuators, guide = design.actuators, design.guide
-    given = (actuators.push_n, actuators.pull_n, guide.force_n, guide.moment_nm)
-    return any(each is not None for each in given) or math.isfinite(design.struts.largest_moment)

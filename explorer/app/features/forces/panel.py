@@ -12,13 +12,16 @@ import viser
 
 from explorer.app.features.feature import Services
 from explorer.app.features.forces.actions import SetForce
-from explorer.app.features.forces.loads import Loads, NearestFeed, has_limits
+from explorer.app.features.forces.loads import Loads, NearestFeed
 from explorer.app.features.forces.words import (
     PARTS,
+    Share,
+    larger,
     newtons,
     share_colour,
     share_look,
     share_words,
+    shares_of,
 )
 from explorer.app.inputs.bindings import Bound
 from explorer.app.inputs.controls import Controls
@@ -167,7 +170,7 @@ def verdict(loaded: LoadedPose) -> Iterator[str]:
         yield status("Nothing holds a load here", "beyond")
         yield '<div class="ex-beyond">The pose is singular: the forces are infinite.</div>'
         return
-    if not has_limits(loaded):
+    if not loaded.limited.any():
         yield '<div class="ex-status">No limits are given</div>'
         yield dim(
             "Give actuators, struts or the guide limits in the tab Machine to see their shares."
@@ -183,7 +186,7 @@ def verdict(loaded: LoadedPose) -> Iterator[str]:
 
 def tables(loaded: LoadedPose) -> Iterator[str]:
     """Yield the forces of the actuators, the struts and the guide beside their limits, as HTML."""
-    held, shares = loaded.held, loaded.shares.tolist()
+    held, shares = loaded.held, shares_of(loaded)
     forces = format_column(held.actuators.tolist(), DIGITS, infinite="∞")
     rows = [
         row(
@@ -206,7 +209,7 @@ def tables(loaded: LoadedPose) -> Iterator[str]:
     for index, leg in enumerate((2, 3)):
         parts += [
             row(dim(f"strut {leg}"), f"{moments[index]} N m", dim("bends"),
-                *_share_cells(max(shares[6 + index], shares[10 + index]))),
+                *_share_cells(larger(shares[6 + index], shares[10 + index]))),
             row(dim(f"carriage {leg}"), f"{across[index]} N", dim("on guide"),
                 *_share_cells(shares[8 + index])),
         ]  # fmt: skip
@@ -218,8 +221,8 @@ def tables(loaded: LoadedPose) -> Iterator[str]:
     yield f'<div class="ex-shares">{table(parts)}</div>'
 
 
-def _share_cells(share: float) -> tuple[str, str]:
-    if share == 0.0:
+def _share_cells(share: Share) -> tuple[str, str]:
+    if share is None:
         return "", dim(share_words(share))
     bar = meter(min(100.0, 100.0 * share), share_colour(share))
     return bar, f'<span class="ex-{share_look(share)}">{share_words(share)}</span>'

@@ -16,7 +16,14 @@ from explorer.app.features.feature import Services
 from explorer.app.features.forces.actions import SetForce
 from explorer.app.features.forces.arrows import ForceArrows
 from explorer.app.features.forces.loads import Loads
-from explorer.app.features.forces.words import newtons, share_colour, share_words
+from explorer.app.features.forces.words import (
+    Share,
+    larger,
+    newtons,
+    share_colour,
+    share_words,
+    shares_of,
+)
 from explorer.app.scene.labels import add_label
 from explorer.app.scene.part import NO_POINTS, ScenePart
 from explorer.app.scene.placing import Placed, scene_scale
@@ -84,7 +91,7 @@ class ForcesScene(ScenePart):
         feet = _feet(placed)
         tips = np.array([p["b1"], p["b2"], p["b3"], p["b4"]])
         radius = np.full(4, SLEEVE_RADIUS * placed.thickness)
-        shares = loaded.shares
+        shares = shares_of(loaded)
         yield from self._sleeves.between(feet, tips, radius)
         yield from self._sleeves.colour([share_colour(shares[i]) for i in (0, 2, 4, 5)])
         for index, leg in enumerate((2, 3)):
@@ -93,10 +100,7 @@ class ForcesScene(ScenePart):
         places = (middles[0], feet[1], middles[1], feet[2], middles[2], middles[3])
         for index, joint in enumerate(JOINTS):
             force, label = float(loaded.held.actuators[index]), self._labels[joint]
-            words = f"{joint} {newtons(force, 3)}"
-            if shares[index] > 0.0:
-                words += f" · {share_words(float(shares[index]))}"
-            yield label, "text", words
+            yield label, "text", f"{joint} {newtons(force, 3)}{_told(shares[index])}"
             yield label, "position", tuple(places[index].tolist())
 
     def corners(self, placed: Placed) -> FloatArray:
@@ -128,10 +132,10 @@ class ForcesScene(ScenePart):
             forces[:4] = loaded.held.joints
             forces[4:, 0] = loaded.held.actuators[[1, 3]]
             vectors[2:] = reaction_vectors(placed, forces)
-            shares = loaded.shares
-            # A leg has the larger share of its actuators.
-            legs = (shares[0], shares[1:3].max(), shares[3:5].max(), shares[5])
-            colours[2:] = [share_colour(float(each)) for each in (*legs, shares[1], shares[3])]
+            l1, d1, d2, d3, d4, l4, *_ = shares_of(loaded)
+            colours[2:] = [
+                share_colour(e) for e in (l1, larger(d1, d2), larger(d3, d4), l4, d1, d3)
+            ]
         yield from self._arrows.draw(tails, vectors, colours, placed.thickness)
 
     def _draw_bending(
@@ -145,7 +149,8 @@ class ForcesScene(ScenePart):
         height = LONGEST_BENDING * placed.reach * moment / (moment + half)
         towards = math.copysign(1.0, float(loaded.held.actuators[1 + 2 * index]))
         top = foot + np.array([towards * height, 0.0, 0.0])
-        share = float(max(loaded.shares[6 + index], loaded.shares[10 + index]))
+        shares = shares_of(loaded)
+        share = larger(shares[6 + index], shares[10 + index])
         colour = share_colour(share)
         yield self._bending[index], "vertices", np.array([foot, tip, top], dtype=np.float32)
         yield self._bending[index], "faces", np.array([[0, 1, 2]], dtype=np.uint32)
@@ -158,7 +163,7 @@ class ForcesScene(ScenePart):
         yield self._ordinates[index], "colors", of_one_colour(colour, ORDINATES + 1)
         label = self._labels[f"strut {leg}"]
         words = f"{format_number(moment * 1e-3 * design.unit_mm, 3)} N m"
-        yield label, "text", words + (f" · {share_words(share)}" if share > 0.0 else "")
+        yield label, "text", words + _told(share)
         yield label, "position", tuple(top.tolist())
 
 
@@ -243,6 +248,11 @@ def reaction_vectors(placed: Placed, forces: FloatArray) -> FloatArray:
     sizes = np.linalg.norm(forces, axis=1, keepdims=True)
     longest = LONGEST_REACTION * placed.reach
     return np.asarray(longest * forces / (sizes + placed.frame.state.view.forces.scale))
+
+
+def _told(share: Share) -> str:
+    """Return what a label adds of a share."""
+    return "" if share is None else f" · {share_words(share)}"
 
 
 def _feet(placed: Placed) -> FloatArray:

@@ -8,6 +8,7 @@ from explorer.app.widgets.colours import CLEAR, FAR, GHOST, SINGULAR, WARNED, Rg
 from explorer.app.widgets.markup import Look
 from explorer.mechanism.design import JOINTS
 from explorer.numerics.number_text import format_decimals, format_number
+from explorer.statics.loaded import LoadedPose
 
 PARTS = (
     *(f"actuator {joint}" for joint in JOINTS),
@@ -24,13 +25,26 @@ HALF = 0.5
 MOST = 1e4
 
 
-def share_words(share: float) -> str:
-    """Return a share of a limit in words; "no limit" for 0."""
-    if share == 0.0:
+Share = float | None
+"""A share of a limit; None without a limit."""
+
+
+def shares_of(loaded: LoadedPose) -> list[Share]:
+    """Return the shares of the limits in the order of `PARTS`."""
+    pairs = zip(loaded.shares.tolist(), loaded.limited.tolist(), strict=True)
+    return [share if is_limited else None for share, is_limited in pairs]
+
+
+def larger(*shares: Share) -> Share:
+    """Return the largest of some shares."""
+    return max((each for each in shares if each is not None), default=None)
+
+
+def share_words(share: Share) -> str:
+    """Return a share of a limit in words."""
+    if share is None:
         return "no limit"
-    if not share < MOST:
-        return "∞"
-    return f"{format_decimals(100.0 * share, 0)} %"
+    return f"{format_decimals(100.0 * share, 0)} %" if share < MOST else "∞"
 
 
 def share_look(share: float) -> Look:
@@ -38,9 +52,9 @@ def share_look(share: float) -> Look:
     return "beyond" if share > 1.0 else "close" if share > CLOSE else "within"
 
 
-def share_colour(share: float) -> Rgb:
-    """Return the colour of a share of a limit; grey for 0, which stands for no limit."""
-    if share == 0.0:
+def share_colour(share: Share) -> Rgb:
+    """Return the colour of a share of a limit; grey without a limit."""
+    if share is None:
         return GHOST
     for end, colour in ((HALF, FAR), (CLOSE, CLEAR), (1.0, WARNED)):
         if share <= end:

@@ -1,0 +1,25 @@
+"""The largest share of a limit under the load, for the bar."""
+
+from __future__ import annotations
+
+from explorer.app.features.feature import Services
+from explorer.app.features.forces.loads import Loads
+from explorer.app.features.forces.words import PARTS, share_look, share_words
+from explorer.app.state.frame import Frame
+from explorer.app.widgets.buttons import figure
+
+
+class LoadFigure:
+    """The largest share of a limit; nothing for a design without limits."""
+
+    def __init__(self, services: Services) -> None:
+        self._loads = services.get(Loads)
+
+    def __call__(self, frame: Frame) -> str:
+        """Return the figure for a frame, as HTML."""
+        loaded = self._loads.of(frame)
+        if not loaded.limited.any():
+            return ""
+        hint = f"Largest share of a limit under the load of this tab: {PARTS[loaded.worst]}."
+        look = f"ex-{share_look(loaded.share)}"
+        return figure("Forces", "Load here", share_words(loaded.share), hint=hint, look=look)
