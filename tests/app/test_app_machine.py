@@ -409,7 +409,7 @@ def test_tool_and_payload_hang_on_the_platform_and_are_in_the_picture(services: 
     for pose in (None, Pose.of_yaw_pitch_roll((9.0, 8.0, 7.5), (-38.0, 24.0, 8.0))):
         scene = placed(PRESS, pose)
         nodes = by_name(itertools.chain(tool.updates(scene), payload.updates(scene)))
-        assert len(visible(nodes)) == 5
+        assert len(visible(nodes)) == 6
         # All are children of the platform's frame, and so move with it.
         assert all(name.startswith("/platform/") for name in nodes)
         tip = scene.scale * np.array(TURNED.position)
@@ -432,7 +432,7 @@ def test_tool_and_payload_hang_on_the_platform_and_are_in_the_picture(services: 
 def test_tool_at_b4_has_axes_and_no_line(services: Services) -> None:
     scene = placed(design_with(tool=Tool(quaternion=TURNED.quaternion)))
     nodes = by_name(ToolScene(services).updates(scene))
-    assert visible(nodes) == {"/platform/tool", "/platform/tool-label"}
+    assert visible(nodes) == {f"/platform/tool{part}" for part in ("", "/axes", "-label")}
 
 
 @pytest.mark.parametrize("view", [{"machine": False}, {"prototype": PrototypeView(exploded=0.5)}])

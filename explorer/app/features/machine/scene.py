@@ -46,6 +46,7 @@ class ToolScene(ScenePart):
         yield self._line, "visible", shown and any(tool.position)
         for handle in (self._frame, self._label):
             yield handle, "visible", shown
+        yield from self._axes.show(shown)
         if not shown:
             return
         tip = placed.scale * np.array(tool.position)
