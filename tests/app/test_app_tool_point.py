@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import datetime as dt
+import html
+import io
+import json
 import re
 from dataclasses import replace
-from typing import Any
+from typing import Any, Literal
 
 import msgspec
 import numpy as np
 import pytest
+import trimesh
+import viser
 from desk import Desk, by_name, number, rows_of
 from hypothesis import given, strategies as st
+from services import StubDownloads, StubWorker
 from strategies import Case, all_cases
 
 from explorer.app.features.feature import Services
@@ -19,6 +25,10 @@ from explorer.app.features.mechanism.marks import DragHandle
 from explorer.app.features.mechanism.modes import modes_table
 from explorer.app.features.mechanism.pose_panel import MovePanel
 from explorer.app.features.orientation.actions import GoToTilt, SetTiltTorsion
+from explorer.app.features.orientation.feeds import RangeFeed, TiltsFeed
+from explorer.app.features.orientation.panel import point_words
+from explorer.app.features.orientation.scene import OrientationScene
+from explorer.app.features.orientation.tasks import orientations_over
 from explorer.app.features.paths.actions import Go
 from explorer.app.features.paths.panel import TYPED, PathsPanel, end_numbers
 from explorer.app.features.paths.scene import PathScene
@@ -26,25 +36,44 @@ from explorer.app.features.sharing.scene_html import caption_of
 from explorer.app.features.singularity.jog_scene import motion_line
 from explorer.app.features.singularity.performance import performance_table
 from explorer.app.features.singularity.scene import BallScene, EllipsoidScene
+from explorer.app.features.workspace.feed import WorkspaceFeed, workspace_request
+from explorer.app.features.workspace.files import WorkspaceFiles
+from explorer.app.features.workspace.orientation import workspace_pose, workspace_start
+from explorer.app.features.workspace.panel import WorkspacePanel
+from explorer.app.features.workspace.reached import rows_of as matrix_rows
+from explorer.app.features.workspace.scene import WorkspaceScene
+from explorer.app.features.workspace.tasks import (
+    STEP,
+    WorkspaceDrawing,
+    export_mesh,
+    exported_name,
+)
+from explorer.app.features.workspace.words import workspace_details
 from explorer.app.inputs.ranges import position_span
 from explorer.app.scene.placing import Placed, scene_scale
 from explorer.app.session.session import UNDO
 from explorer.app.state.actions import GoHome, Set, SetAngle, SetMode, SetPose, SetPosition
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, angles_of, opened
+from explorer.app.state.view import OrientationView
 from explorer.app.widgets.assigning import Assigner
 from explorer.app.widgets.pieces import widgets
+from explorer.export.step import exact_workspace, step_bytes
+from explorer.measures.snapshot import evaluate
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.machine import Tool
+from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose, Triple, rotation_from_quaternion
 from explorer.mechanism.tool_point import Point
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.jacobian import jacobian
 from explorer.singularity.uncoupled import UNCOUPLED
+from explorer.workspace.limits.constraints import constraints
 
 OPTIMAL = PRESETS["paper-optimal"]
 TOOL: Triple = (1.0, 0.0, 3.0)
+NO_LOAD = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 TILTED = Pose.of_yaw_pitch_roll((9.0, 4.0, 8.0), (-60.0, 15.0, 10.0))
 
 
@@ -362,3 +391,343 @@ def test_undo_leads_back_to_the_point_of_each_step_and_leaves_the_rest_of_the_vi
         assert not desk.state.view.grid
         desk.session.travel(UNDO)
     assert ats == ["b4", "tool", "tool", "b4"]
+
+
+# The workspace
+
+
+def workspace_drawn(
+    services: Services, state: State
+) -> tuple[dict[str, dict[str, Any]], WorkspaceDrawing]:
+    """Return the nodes of the workspace of a state, and its drawing."""
+    feed = services.get(WorkspaceFeed)
+    feed.follow(Frame(state))
+    assert isinstance(services.worker, StubWorker)
+    services.worker.work()
+    assert feed.drawing is not None
+    return by_name(WorkspaceScene(services).updates(Placed(Frame(state)))), feed.drawing
+
+
+def triangles_in(nodes: dict[str, dict[str, Any]], state: State) -> FloatArray:
+    """Return the triangles of the drawn solid in design units, shape (n, 3, 3)."""
+    shells = [
+        np.asarray(node["vertices"], dtype=np.float64)[node["faces"]] + node["position"]
+        for name, node in nodes.items()
+        if name.startswith("/workspace/shell/") and node["visible"]
+    ]
+    return np.concatenate(shells) / scene_scale(state)
+
+
+def winding(triangles: FloatArray, point: FloatArray) -> float:
+    """Return how often a closed surface goes around a point (Van Oosterom and Strackee)."""
+    a, b, c = np.moveaxis(triangles - point, 1, 0)
+    la, lb, lc = (np.linalg.norm(each, axis=1) for each in (a, b, c))
+    volume = (a * np.cross(b, c)).sum(axis=1)
+    rest = la * lb * lc
+    for one, other, length in ((a, b, lc), (b, c, la), (c, a, lb)):
+        rest = rest + (one * other).sum(axis=1) * length
+    return float(2.0 * np.arctan2(volume, rest).sum() / (4.0 * np.pi))
+
+
+def is_within(state: State, tool: FloatArray, orientation: Pose) -> bool:
+    """Return whether the limits let the tool be at a position, in an orientation."""
+    x, y, z = (tool - orientation.rotation @ np.array(state.design.tool.position)).tolist()
+    return not evaluate(state.design, Pose((x, y, z), orientation.quaternion)).violations
+
+
+def in_workspace(state: State, **changes: Any) -> State:
+    return Set("view.workspace", replace(state.view.workspace, **changes)).apply(state)
+
+
+@pytest.mark.parametrize("orientation", ["pose", "home"])
+def test_drawn_solid_is_of_the_positions_of_the_tool(services: Services, orientation: str) -> None:
+    state = in_workspace(opened_at(), solid=True, orientation=orientation)
+    nodes, drawing = workspace_drawn(services, state)
+    triangles = triangles_in(nodes, state)
+    turned = workspace_pose(Frame(state))
+    corners = triangles.reshape(-1, 3)
+    lows, highs = corners.min(axis=0), corners.max(axis=0)
+    rng = np.random.default_rng(5)
+    seen: list[bool] = []
+    for point in rng.uniform(lows, highs, (150, 3)):
+        expected = is_within(state, point, turned)
+        ring = point + 0.1 * np.concatenate([np.eye(3), -np.eye(3)])
+        if any(is_within(state, near, turned) != expected for near in ring):
+            # Facets are chords of the surface.
+            continue
+        assert round(winding(triangles, point)) == expected
+        seen.append(expected)
+    assert {*seen} == {True, False}
+    # The box that the camera frames holds it, and the numbers tell its extent.
+    box = WorkspaceScene(services).corners(Placed(Frame(state))) / scene_scale(state)
+    np.testing.assert_allclose([box.min(axis=0), box.max(axis=0)], [lows, highs], atol=0.05)
+    rows = rows_of(workspace_details(Frame(state), services.get(WorkspaceFeed)))
+    extents = [row[1] for row in rows if row[0].startswith("Extent of the tool")]
+    ends = np.array([[number(end) for end in text.split(" … ")] for text in extents])
+    np.testing.assert_allclose(ends, np.stack([lows, highs], axis=1), atol=0.05)
+    # It is the drawing of b4: the choice of the point computes nothing anew.
+    of_b4 = Set("view.at", "b4").apply(state)
+    assert workspace_request(Frame(of_b4)) == drawing.request
+
+
+def test_hull_is_about_the_solid(services: Services) -> None:
+    state = in_workspace(opened_at(), solid=True, hull=True)
+    nodes, _ = workspace_drawn(services, state)
+    hull = nodes["/workspace/hull"]
+    corners = triangles_in(nodes, state).reshape(-1, 3)
+    around = (np.asarray(hull["vertices"]) + hull["position"]) / scene_scale(state)
+    np.testing.assert_allclose(around.min(axis=0), corners.min(axis=0), atol=0.05)
+    np.testing.assert_allclose(around.max(axis=0), corners.max(axis=0), atol=0.05)
+
+
+def facts_of(picture: str) -> dict[str, Any]:
+    (data,) = re.findall(r'data-map="([^"]*)"', picture)
+    return json.loads(html.unescape(data))
+
+
+@pytest.mark.parametrize("axis", ["x", "y", "z"])
+@pytest.mark.parametrize("flipped", [False, True])
+def test_cut_is_at_the_coordinate_of_the_tool(services: Services, axis: str, flipped: bool) -> None:
+    index, level = "xyz".index(axis), 6.5
+    state = in_workspace(opened_at(), solid=True, cut=axis, level=level, flipped=flipped)
+    nodes, drawing = workspace_drawn(services, state)
+    along = triangles_in(nodes, state)[..., index]
+    ends = float(along.min()), float(along.max())
+    cut, other = ends if (axis == "y") != flipped else ends[::-1]
+    assert cut == pytest.approx(level, abs=1e-5)
+    assert abs(other - level) > 1.0
+    updates = [*WorkspacePanel(services).updates(Frame(state))]
+    shown: dict[str, Any] = {
+        name: value
+        for handle, name, value in updates
+        if isinstance(handle, viser.GuiSliderHandle) and handle.label == "Cut at"
+    }
+    assert shown["value"] == pytest.approx(level)
+    assert shown["min"] <= level <= shown["max"]
+    # The map is read in coordinates of the tool, and its margins are those of poses there.
+    (picture,) = (str(value) for _, _, value in updates if "data-map" in str(value))
+    facts = facts_of(picture)
+    assert facts["level"] == pytest.approx(level)
+    for point in np.random.default_rng(6).normal(0.0, 8.0, (20, 3)):
+        x, y, z = point.tolist()
+        there = state.pose_at((x, y, z), state.pose)
+        np.testing.assert_allclose(
+            np.array(facts["gradients"]) @ (point - facts["offset"]),
+            margins(there.position, there.rotation),
+            atol=1e-12,
+        )
+    first, second = (k for k in range(3) if k != index)
+    assert drawing.slice_map is not None
+    for k, (one, at) in enumerate(((first, "lows"), (second, "lows"))):
+        moved = drawing.slice_map.lows[k] + (tool_of(state) - state.pose.position)[one]
+        assert facts[at][k] == pytest.approx(moved)
+    # The cross is where the tool is.
+    left, bottom, scale = facts["place"]
+    (x, y) = re.findall(r'd="M([\d.]+),([\d.]+)h10m-5,-5v10"', picture)[0]
+    tool = tool_of(state)
+    assert float(x) + 5.0 == pytest.approx(
+        left + scale * (tool[first] - facts["lows"][0]), abs=0.01
+    )
+    assert float(y) == pytest.approx(bottom - scale * (tool[second] - facts["lows"][1]), abs=0.01)
+
+
+@pytest.mark.parametrize("orientation", ["pose", "home"])
+def test_click_on_the_map_puts_the_tool_there(
+    services: Services, desk: Desk, orientation: str
+) -> None:
+    WorkspacePanel(services)
+    for action in (
+        Set("design", with_tool(OPTIMAL)),
+        Set("view.at", "tool"),
+        SetAngle(1, 15.0),
+        Set("view.workspace.orientation", orientation),
+    ):
+        desk.session.do(action)
+    turned = workspace_pose(Frame(desk.state))
+    desk.press(services.buttons, "workspace.go", "[12.5,-3,7.25]")
+    np.testing.assert_allclose(tool_of(desk.state), (12.5, -3.0, 7.25), atol=1e-12)
+    np.testing.assert_allclose(desk.state.pose.rotation, turned.rotation, atol=1e-12)
+    assert desk.session.history.step.words == "Move the tool to 12.5, −3, 7.25"
+    assert desk.complaints == []
+
+
+@pytest.mark.parametrize("index", range(3))
+def test_singular_planes_are_where_the_tool_is_singular(services: Services, index: int) -> None:
+    state = in_workspace(opened_at(), planes=True)
+    nodes = by_name(WorkspaceScene(services).updates(Placed(Frame(state))))
+    corners = nodes[f"/singular/{index + 1}/plane"]["vertices"] / scene_scale(state)
+    for shares in np.random.default_rng(7).dirichlet(np.ones(4), 5):
+        x, y, z = (shares @ corners).tolist()
+        there = state.pose_at((x, y, z), state.pose)
+        assert margins(there.position, there.rotation)[index] == pytest.approx(0.0, abs=1e-5)
+
+
+@pytest.mark.parametrize("orientation", ["pose", "home"])
+def test_broken_limit_is_marked_from_the_tool_on(services: Services, orientation: str) -> None:
+    state = in_workspace(opened_at(), solid=True, orientation=orientation)
+    x, y, z = (2.5 * tool_of(state)).tolist()
+    state = SetPose(state.pose_at((x, y, z), state.pose)).apply(state)
+    nodes, _ = workspace_drawn(services, state)
+    line = nodes["/workspace/broken/lines"]
+    assert line["visible"]
+    (start, end) = line["points"][0] / scene_scale(state)
+    np.testing.assert_allclose(start, tool_of(state), atol=1e-5)
+    name = nodes["/workspace/broken/label"]["text"].partition(":")[0]
+    # On the surface of the limit the pose breaks it by nothing.
+    turned = workspace_pose(Frame(state))
+    (limit,) = (each for each in constraints(OPTIMAL, turned.rotation) if each.name == name)
+    b4 = end - turned.rotation @ np.array(TOOL)
+    assert float(limit.slack(b4)) == pytest.approx(0.0, abs=1e-4)
+
+
+def test_paths_start_where_the_tool_is() -> None:
+    state = in_workspace(opened_at(), solid=True, region="reachable", start="pose")
+    assert workspace_start(Frame(state)) == state.pose.position
+    at_home = in_workspace(state, orientation="home")
+    start = workspace_start(Frame(at_home))
+    turned = workspace_pose(Frame(at_home))
+    there = np.array(start) + turned.rotation @ np.array(TOOL)
+    np.testing.assert_allclose(there, tool_of(state), atol=1e-12)
+    of_b4 = Set("view.at", "b4").apply(at_home)
+    assert workspace_start(Frame(of_b4)) == state.pose.position
+
+
+@pytest.mark.parametrize("what", ["workspace", "hull"])
+def test_file_holds_the_positions_of_the_tool(what: str) -> None:
+    rows = matrix_rows(TILTED.rotation)
+    design, offset = with_tool(OPTIMAL), TILTED.rotation @ np.array(TOOL)
+    x, y, z = offset.tolist()
+    read: list[FloatArray] = []
+    for moved in (None, (x, y, z)):
+        data = export_mesh(design, rows, 0.2, "limits", None, NO_LOAD, what, "stl", moved)
+        untyped: Any = trimesh
+        mesh = untyped.load(io.BytesIO(data), file_type="stl")
+        read.append(np.array(mesh.bounds) / design.unit_mm)
+    np.testing.assert_allclose(read[1], read[0] + offset, atol=1e-4)
+    assert exported_name("limits", what, (x, y, z)) == f"{what} of the tool"
+    assert exported_name("reachable", what, (x, y, z)) == f"accessible {what} of the tool"
+
+
+def test_step_file_holds_the_positions_of_the_tool() -> None:
+    rows = matrix_rows(TILTED.rotation)
+    design, offset = with_tool(OPTIMAL), TILTED.rotation @ np.array(TOOL)
+    x, y, z = offset.tolist()
+    data = export_mesh(design, rows, 0.2, "limits", None, NO_LOAD, "workspace", STEP, (x, y, z))
+    solid = exact_workspace(design, TILTED.rotation).shifted(design.unit_mm * offset)
+    # The head tells the time.
+    expected = step_bytes(solid, f"workspace of the tool of {design.name}")
+    assert data.partition(b"DATA;")[2] == expected.partition(b"DATA;")[2]
+
+
+def test_sent_file_is_named_after_the_tool(services: Services, desk: Desk) -> None:
+    files = WorkspaceFiles(services)
+    desk.session.do(Set("design", with_tool(OPTIMAL)))
+    downloads = services.downloads
+    assert isinstance(downloads, StubDownloads)
+    for at in ("b4", "tool"):
+        desk.session.do(Set("view.at", at))
+        files.send("workspace", "stl", 1)
+        files.send_hull_at_home("stl", 1)
+    names = [name.removeprefix(f"{OPTIMAL.name}-") for _, name in downloads.sent]
+    assert names == [
+        "workspace.stl",
+        "hull.stl",
+        "workspace-of-the-tool.stl",
+        "hull-of-the-tool.stl",
+    ]
+
+
+# Orientations
+
+
+def test_nodes_of_tilts_are_where_the_tool_is_at_tilt_zero(services: Services) -> None:
+    state = Set("view.orientation.tilts", True).apply(opened_at())
+    feed = services.get(TiltsFeed)
+    feed.follow(Frame(state))
+    assert isinstance(services.worker, StubWorker)
+    services.worker.work()
+    assert feed.drawing is not None
+    scene, scale = OrientationScene(services), scene_scale(state)
+
+    def nodes(state: State) -> FloatArray:
+        drawn = by_name(scene.updates(Placed(Frame(state))))["/orientation/tilts"]["points"]
+        return np.asarray(drawn, dtype=np.float64) / scale
+
+    upright = SetTiltTorsion(1, 0.0).apply(state)
+    tools = nodes(state)
+    assert len(tools) == len(feed.drawing.positions)
+    for point in tools[:: len(tools) // 40]:
+        assert is_within(state, point, upright.pose)
+    box = scene.corners(Placed(Frame(state))) / scale
+    np.testing.assert_allclose(
+        [box.min(axis=0), box.max(axis=0)], [tools.min(axis=0), tools.max(axis=0)], atol=1e-5
+    )
+    # The cut is at the coordinate of the tool.
+    level = float(np.median(tools[:, 0])) + 0.01
+    parts = [
+        nodes(in_workspace(state, cut="x", level=level, flipped=flipped))[:, 0]
+        for flipped in (False, True)
+    ]
+    below, above = sorted(parts, key=lambda part: float(part.max()))
+    assert below.max() < level < above.min()
+    assert len(below) + len(above) == len(tools)
+
+
+@pytest.mark.parametrize("over", ["reachable", "dexterous"])
+def test_solid_over_tilts_is_of_the_positions_of_the_tool(
+    services: Services, over: Literal["reachable", "dexterous"]
+) -> None:
+    state = opened_at(orientation=OrientationView(over=over, range=12.0))
+    feed = services.get(RangeFeed)
+    feed.follow(Frame(state))
+    assert isinstance(services.worker, StubWorker)
+    services.worker.work()
+    assert feed.drawing is not None
+    solid, turned = feed.drawing.solid, orientations_over(feed.drawing.request)
+    triangles = np.asarray(solid.vertices)[solid.faces]
+    poses = [Pose.of((0.0, 0.0, 0.0), rotation) for rotation in turned]
+    has = any if over == "reachable" else all
+    lows, highs = solid.vertices.min(axis=0) - 1.0, solid.vertices.max(axis=0) + 1.0
+    seen: list[bool] = []
+    for point in np.random.default_rng(9).uniform(lows, highs, (25, 3)):
+        ring = point + np.concatenate([np.zeros((1, 3)), 0.3 * np.eye(3), -0.3 * np.eye(3)])
+        near = {has(is_within(state, each, pose) for pose in poses) for each in ring}
+        if len(near) == 1:
+            (expected,) = near
+            assert round(winding(triangles, point)) == expected
+            seen.append(expected)
+    assert {*seen} == {True, False}
+
+
+def test_tab_of_tilts_tells_that_its_map_is_of_b4() -> None:
+    assert "hold b4 in its place" in point_words(opened_at())
+    assert point_words(opened_at("b4")) == ""
+    assert point_words(opened_at(tool=(0.0, 0.0, 0.0))) == ""
+
+
+# A tool at b4
+
+
+def test_tool_at_b4_shows_what_b4_shows(services: Services) -> None:
+    shown: list[list[object]] = []
+    for at in ("b4", "tool"):
+        state = opened_at(at, (0.0, 0.0, 0.0))
+        state = in_workspace(state, solid=True, planes=True, cut="y")
+        workspace_drawn(services, state)
+        placed = Placed(Frame(state))
+        shown.append(
+            [
+                state.position,
+                [position_span(state, axis) for axis in range(3)],
+                SetAngle(0, 20.0).apply(state).pose,
+                modes_table(placed.frame, ""),
+                workspace_request(placed.frame),
+                placed.frame.performance.translation.gain.tolist(),
+                [
+                    (name, key, np.asarray(value).tolist())
+                    for name, node in by_name(WorkspaceScene(services).updates(placed)).items()
+                    for key, value in node.items()
+                ],
+            ]
+        )
+    assert shown[0] == shown[1]

@@ -339,7 +339,7 @@ def test_map_tells_the_page_where_it_is_and_what_its_margins_are(
     state = shown(opened(OPTIMAL, pose), solid=True, cut=axis)
     drawing = drawing_of(state)
     assert drawing.slice_map is not None
-    picture = map_picture(drawing.slice_map, pose, OPTIMAL.reach)
+    picture = map_picture(drawing.slice_map, pose.position, OPTIMAL.reach)
     facts = facts_of(picture)
     assert facts["axis"] == "xyz".index(axis)
     assert facts["level"] == drawing.level
@@ -385,14 +385,14 @@ def test_b4_is_a_cross_where_it_is_and_faint_beside_the_slice() -> None:
     assert drawn is not None
     for y, look in ((drawn.level, "ex-here"), (drawn.level + 1.0, "ex-here is-off")):
         pose = Pose((7.0, y, 6.0), state.pose.quaternion)
-        picture = map_picture(drawn, pose, OPTIMAL.reach)
+        picture = map_picture(drawn, pose.position, OPTIMAL.reach)
         assert f'class="{look}"' in picture
         left, bottom, scale = facts_of(picture)["place"]
         (x, across) = re.findall(r'd="M([\d.]+),([\d.]+)h10m-5,-5v10"', picture)[0]
         assert float(x) + 5.0 == pytest.approx(left + scale * (7.0 - drawn.lows[0]), abs=0.01)
         assert float(across) == pytest.approx(bottom - scale * (6.0 - drawn.lows[1]), abs=0.01)
     away = Pose((70.0, drawn.level, 6.0), state.pose.quaternion)
-    assert "ex-here" not in map_picture(drawn, away, OPTIMAL.reach)
+    assert "ex-here" not in map_picture(drawn, away.position, OPTIMAL.reach)
 
 
 @pytest.mark.parametrize("angles", ORIENTATIONS)

@@ -126,7 +126,9 @@ window.explorer.map ??= (() => {
         signDisplay: "negative",
       })
       .replace("-", "\u2212");
-  const measure = (facts, p) => {
+  // The measures are those of b4, from which the point of the map is at an offset.
+  const measure = (facts, point) => {
+    const p = facts.offset ? point.map((value, k) => value - facts.offset[k]) : point;
     if (facts.load) {
       const { words, unitName, factor } = facts.load;
       const { share, part } = largestShare(facts, p);

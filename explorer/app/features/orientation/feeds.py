@@ -17,6 +17,7 @@ from explorer.app.features.orientation.tasks import (
 from explorer.app.session.feed import Feed
 from explorer.app.state.frame import Frame
 from explorer.mechanism.home import home_pose
+from explorer.mechanism.tool_point import point_of
 
 # Digits of a torsion in degrees beyond which tilts are not computed again.
 DIGITS = 3
@@ -60,4 +61,5 @@ def _range_of(frame: Frame) -> RangeRequest | None:
     view, design = frame.state.view.orientation, frame.state.design
     if view.over == "none":
         return None
-    return RangeRequest(design, home_pose(design), view.range, view.turn, view.over)
+    tool = point_of(design, frame.state.view.at)
+    return RangeRequest(design, home_pose(design), view.range, view.turn, view.over, tool)

@@ -24,10 +24,20 @@ from explorer.app.security.client_messages import decode_text
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.markup import alert, box, caption, dim, format_number, row, table
+from explorer.app.widgets.markup import (
+    alert,
+    box,
+    caption,
+    dim,
+    format_number,
+    note,
+    row,
+    table,
+)
 from explorer.app.widgets.under_way import UnderWay, problem, progress
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.tilt_torsion import TiltTorsion, tilt_torsion_of
+from explorer.mechanism.tool_point import point_of
 from explorer.numerics.number_text import format_decimals
 from explorer.workspace.orientations.share import OrientationShare
 from explorer.workspace.orientations.tilts import (
@@ -134,7 +144,8 @@ class OrientationPanel:
         here = frame.state.tilt_torsion
         tilts = tilt_map(design, pose.position, here.torsion)
         least = greatest_tilt(design, pose.position, here.torsion)
-        yield self._top, "content", box(*summary(frame, here, least, self._here))
+        of_b4 = point_words(frame.state)
+        yield self._top, "content", box(*summary(frame, here, least, self._here), of_b4)
         home = tilt_torsion_of(home_pose(design).rotation)
         yield self._map, "content", box(polar_map(tilts, least, here, home))
         title = caption("What ends the tilts, by share of azimuths")
@@ -147,7 +158,8 @@ class OrientationPanel:
         view = frame.state.view.orientation
         yield self._scale, "visible", view.tilts
         if view.tilts:
-            yield self._scale, "content", box(tilts_words(self._tilts))
+            drawn_at = note("Drawn where the tool is at tilt zero.") if of_b4 else ""
+            yield self._scale, "content", box(tilts_words(self._tilts), drawn_at)
         yield self._volume, "visible", view.over != "none"
         if view.over != "none":
             yield self._volume, "content", box(range_words(self._ranges))
@@ -218,6 +230,16 @@ def summary(
                 "present azimuth and tilt",
             ),
         )
+    )
+
+
+def point_words(state: State) -> str:
+    """Return that the tilts are those of b4, as HTML; "" unless the platform turns elsewhere."""
+    if not any(point_of(state.design, state.view.at)):
+        return ""
+    return note(
+        "These tilts, torsions and shares hold b4 in its place. The angles below, and a press on "
+        "the map, turn the platform about the tool."
     )
 
 

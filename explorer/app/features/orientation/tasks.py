@@ -129,6 +129,7 @@ class RangeRequest:
         tilt: Largest tilt, in degrees.
         turn: Largest change of the torsion either way, in degrees.
         over: Whether positions have one of the orientations at least, or all of them.
+        point: Point of the platform whose positions these are, in the platform frame.
     """
 
     design: Design
@@ -136,6 +137,7 @@ class RangeRequest:
     tilt: float
     turn: float
     over: Literal["reachable", "dexterous"]
+    point: Triple = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -160,5 +162,6 @@ def range_solid(request: RangeRequest) -> RangeDrawing:
     """Return the workspace over a range of orientations."""
     design = request.design
     make = reachable_solid if request.over == "reachable" else dexterous_solid
-    solid = make(design, orientations_over(request), LIVE_TOLERANCE * design.reach)
+    tolerance = LIVE_TOLERANCE * design.reach
+    solid = make(design, orientations_over(request), tolerance, request.point)
     return RangeDrawing(request, solid)

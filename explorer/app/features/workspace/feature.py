@@ -35,8 +35,8 @@ WORKSPACE = Feature(
     exports=(
         Export(
             "Workspace",
-            "All positions of b4 in the region and orientation of the tab Workspace; STEP has "
-            "exact faces.",
+            "All positions of b4, or of the tool point if the tab Pose shows it, in the region and "
+            "orientation of the tab Workspace; STEP has exact faces.",
             tuple(map(str.upper, FORMATS)),
             _sender("workspace"),
         ),

@@ -8,7 +8,11 @@ from __future__ import annotations
 from explorer.app.features.feature import Services
 from explorer.app.features.forces.loads import load_of
 from explorer.app.features.workspace.load import has_limits, loaded_design
-from explorer.app.features.workspace.orientation import workspace_rows, workspace_start
+from explorer.app.features.workspace.orientation import (
+    workspace_rotation,
+    workspace_rows,
+    workspace_start,
+)
 from explorer.app.features.workspace.tasks import (
     WorkspaceDrawing,
     WorkspaceRequest,
@@ -45,7 +49,10 @@ def workspace_request(frame: Frame) -> WorkspaceRequest | None:
     view = frame.state.view.workspace
     if not (view.solid or view.hull):
         return None
-    is_cut = view.cut is not None
+    is_cut, level = view.cut is not None, view.level
+    if view.cut is not None and level is not None:
+        # The worker counts in coordinates of b4.
+        level -= float(frame.state.offset(workspace_rotation(frame))["xyz".index(view.cut)])
     coloured = view.colour == "margin" or is_cut
     # Without limits all shares are zero.
     is_shareless = view.colour == "share" and not has_limits(frame.state.design)
@@ -59,7 +66,7 @@ def workspace_request(frame: Frame) -> WorkspaceRequest | None:
         start=workspace_start(frame) if view.region == "reachable" else None,
         colour=colour,
         cut=view.cut,
-        level=view.level if is_cut else None,
+        level=level if is_cut else None,
         flipped=is_cut and view.flipped,
         tolerance=view.tolerance,
         hull=view.hull,

@@ -59,9 +59,14 @@ class WorkspaceFiles:
         start: Triple | None,
     ) -> None:
         design = loaded_design(state) if region == "held" else state.design
-        name = f"{design.name}-{exported_name(region, what).replace(' ', '-')}.{file_format}"
+        offset: Triple | None = None
+        if state.view.at == "tool":
+            x, y, z = state.offset(rows).tolist()
+            offset = x, y, z
+        words = exported_name(region, what, offset).replace(" ", "-")
+        name = f"{design.name}-{words}.{file_format}"
         place = design, rows, tolerance_of(state), region, start, load_of(state)
-        self._downloads.compute(who, name, export_mesh, (*place, what, file_format))
+        self._downloads.compute(who, name, export_mesh, (*place, what, file_format, offset))
 
 
 def tolerance_of(state: State) -> float:

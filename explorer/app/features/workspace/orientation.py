@@ -1,4 +1,7 @@
-"""The orientation of the workspace that is shown, and where its paths start."""
+"""The orientation of the workspace that is shown, and where its paths start.
+
+The workspace of the tool point is that of b4, moved by the vector between them.
+"""
 
 from __future__ import annotations
 
@@ -43,7 +46,13 @@ def workspace_rows(frame: Frame) -> Rows:
     return rows_of(workspace_rotation(frame))
 
 
+def workspace_position(frame: Frame) -> Triple:
+    """Return b4 where the shown point is where it is, in the orientation of the workspace."""
+    state, pose = frame.state, workspace_pose(frame)
+    return pose.position if pose == state.pose else state.pose_at(state.position, pose).position
+
+
 def workspace_start(frame: Frame) -> Triple | None:
-    """Return the position where paths start; None for home."""
-    state = frame.state
-    return state.pose.position if state.view.workspace.start == "pose" else None
+    """Return the position of b4 where paths start; None for home."""
+    is_here = frame.state.view.workspace.start == "pose"
+    return workspace_position(frame) if is_here else None

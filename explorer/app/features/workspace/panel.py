@@ -62,7 +62,7 @@ KEYS: Mapping[str, tuple[Key, ...]] = {
 """Keys by the names of commands."""
 
 SHOWN = {
-    "solid": ("Solid", "Draw the positions of b4 within all limits at one orientation."),
+    "solid": ("Solid", "Draw the positions within all limits at one orientation."),
     "hull": ("Convex hull", "Draw the convex hull of the workspace."),
     "planes": (
         "Singular planes",
@@ -199,30 +199,34 @@ class WorkspacePanel:
         yield self._cut, "content", box(self._cuts.html(state))
         yield self._map, "visible", mapped is not None
         if mapped is not None:
-            picture = map_picture(mapped, state.pose, state.design.reach)
+            if drawing is not None and state.view.at == "tool":
+                mapped = mapped.shifted(state.offset(drawing.request.rotation))
+            picture = map_picture(mapped, state.position, state.design.reach)
             yield self._map, "content", box(picture)
         yield self._details, "content", workspace_details(frame, self._feed)
 
     def _level(self, state: State) -> float:
         """Return the level of the cut, or the level that a cut would have."""
         view = state.view.workspace
-        ends = None if view.cut is None else self._ends(view.cut)
+        ends = None if view.cut is None else self._ends(state, view.cut)
         return (view.level or 0.0) if ends is None else level_within(*ends, view.level)
 
     def _cut_span(self, state: State) -> Span:
         """Return the extent of the workspace on the axis across which it is cut."""
         span, axis = coordinate_span(state), state.view.workspace.cut
-        ends = None if axis is None else self._ends(axis)
+        ends = None if axis is None else self._ends(state, axis)
         if ends is None:
             return span
         low, high = math.ceil(ends[0] / span.step), math.floor(ends[1] / span.step)
         return Span(low * span.step, high * span.step, span.step) if low < high else span
 
-    def _ends(self, axis: str) -> tuple[float, float] | None:
+    def _ends(self, state: State, axis: str) -> tuple[float, float] | None:
         """Return the extent of the drawn workspace on an axis; None without a drawing."""
         if self._drawing is None or self._drawing.extent is None:
             return None
-        low, high = (float(end["xyz".index(axis)]) for end in self._drawing.extent)
+        index = "xyz".index(axis)
+        moved = float(state.offset(self._drawing.request.rotation)[index])
+        low, high = (float(end[index]) + moved for end in self._drawing.extent)
         return low, high
 
     def _show_trouble(self, drawing: WorkspaceDrawing | None) -> Iterator[Update]:
@@ -247,11 +251,11 @@ class WorkspacePanel:
         self._session.do(action, who=client.client_id)
 
     def _go_to(self, text: str, client: viser.ClientHandle) -> None:
-        """Move b4 to a position that a page sent, in the orientation of the map."""
+        """Move the point to a position that a page sent, in the orientation of the map."""
         position: Triple | None = decode_text(text, _POSITION)
         if position is not None:
             self._session.do(
-                lambda state: SetPose(Pose(position, workspace_pose(Frame(state)).quaternion)),
+                lambda state: SetPose(state.pose_at(position, workspace_pose(Frame(state)))),
                 who=client.client_id,
             )
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from explorer.app.features.feature import Services
 from explorer.app.features.workspace.feed import WorkspaceFeed
-from explorer.app.features.workspace.orientation import workspace_rotation
+from explorer.app.features.workspace.orientation import workspace_position, workspace_rotation
 from explorer.app.features.workspace.tasks import WorkspaceDrawing, WorkspaceSurface
 from explorer.app.scene.bands import AT_LIMIT, COLLIDING, PLAIN, Shell
 from explorer.app.scene.creases import Drawn
@@ -91,8 +91,17 @@ class WorkspaceScene(ScenePart):
 
     def updates(self, placed: Placed) -> Iterator[Update]:
         """Yield the updates that draw the workspace of a frame."""
-        view = placed.frame.state.view.workspace
+        state, view = placed.frame.state, placed.frame.state.view.workspace
         drawing, surface = self._feed.drawing, self._feed.surface
+        for drawn, handles in (
+            (surface, (*self._shells, self._edges)),
+            (drawing, (self._hull,)),
+        ):
+            if drawn is not None:
+                # The workspace of the tool point is that of b4, moved.
+                place = tuple((placed.scale * state.offset(drawn.request.rotation)).tolist())
+                for handle in handles:
+                    yield handle, "position", place
         self._scale(surface, drawing, placed.scale)
         is_cut = surface is not None and surface.request.cut is not None
         for colour, handle in zip(self._colours, self._shells, strict=True):
@@ -122,7 +131,8 @@ class WorkspaceScene(ScenePart):
         drawing = self._feed.drawing
         if drawing is None or drawing.extent is None:
             return NO_POINTS
-        return corners_of(placed.scale * np.array(drawing.extent))
+        offset = placed.frame.state.offset(drawing.request.rotation)
+        return corners_of(placed.scale * (np.array(drawing.extent) + offset))
 
     def _scale(
         self, surface: WorkspaceSurface | None, drawing: WorkspaceDrawing | None, scale: float
@@ -141,12 +151,15 @@ class WorkspaceScene(ScenePart):
             self._scaled_hull = None if hull is None else _scaled(hull, scale)
 
     def _broken_limit(self, placed: Placed) -> Iterator[Update]:
-        """Yield the updates that draw a line from p to the surface of the limit it breaks most."""
+        """Yield the updates that draw a line from p to the surface of the limit it breaks most.
+
+        Both are moved as the workspace is.
+        """
         frame = placed.frame
         shown = frame.state.view.workspace.solid and frame.state.unclosed is None
         worst: tuple[float, str, FloatArray] | None = None
         if shown and frame.snapshot.violations:
-            p = np.array(frame.state.pose.position)
+            p = np.array(workspace_position(frame))
             for limit in constraints(frame.state.design, workspace_rotation(frame)):
                 if isinstance(limit, Never | Cone):
                     continue
@@ -156,14 +169,15 @@ class WorkspaceScene(ScenePart):
         for handle in (self._broken, self._broken_label):
             yield handle, "visible", worst is not None
         if worst is not None:
-            ends = placed.scale * np.array([frame.state.pose.position, worst[2]])
+            offset = frame.state.offset(workspace_rotation(frame))
+            ends = placed.scale * (np.array([workspace_position(frame), worst[2]]) + offset)
             yield self._broken, "points", ends[None].astype(np.float32)
             yield self._broken_label, "text", f"{worst[1]}: {format_number(-worst[0], 3)} beyond"
             yield self._broken_label, "position", tuple(ends[1].tolist())
 
 
 class _SingularPlane:
-    """One of the three planes of singular positions, which all pass through a1."""
+    """One of the three planes of singular positions; those of b4 all pass through a1."""
 
     def __init__(self, scene: viser.SceneApi, index: int) -> None:
         self._index = index
@@ -187,7 +201,7 @@ class _SingularPlane:
         along /= np.linalg.norm(along)
         across = np.cross(normal, along)
         half = 1.1 * placed.reach
-        corners = half * np.array([a * along + b * across for a, b in CORNERS])
+        corners = half * np.array([a * along + b * across for a, b in CORNERS]) + placed.offset
         yield from self._patch.span(corners, colour)
         yield self._label, "position", tuple(corners[2].tolist())
 

@@ -1,12 +1,12 @@
 """The map of a slice of the workspace: the report's exact drawing, with axes, and the pose in it.
 
-The worker draws the map itself; the page puts it between axes, marks b4, and lets
-`look/map.js` read it under the pointer.
+The worker draws the map itself; the page puts it between axes, marks b4 or the tool point, and
+lets `look/map.js` read it under the pointer.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from html import escape
 from typing import Any, Literal
 from xml.etree.ElementTree import Element
@@ -19,7 +19,7 @@ from explorer.app.widgets.markup import decimals_for
 from explorer.export.report.drawings.slice_drawing import cross, placing, ruler
 from explorer.export.report.drawings.slices import Slices, in_plane
 from explorer.export.report.markup import as_html, coordinate, element
-from explorer.mechanism.pose import Pose
+from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.numerics.number_text import format_number
 from explorer.singularity.ellipsoids import planes_of_singularity
@@ -39,7 +39,7 @@ WIDTH, MOST_HEIGHT = 316.0, 236.0
 LEFT, RIGHT, TOP, BOTTOM = 42.0, 10.0, 8.0, 36.0
 # Digits of a coordinate of the size of the reach.
 DIGITS = 4
-# Distance up to which b4 counts as in the slice, over the reach.
+# Distance up to which the point counts as in the slice, over the reach.
 IN_SLICE = 1e-3
 
 
@@ -69,6 +69,15 @@ class SliceMap:
         """The indices of the two axes of the map."""
         first, second = in_plane(self.axis)
         return first, second
+
+    def shifted(self, offset: FloatArray) -> SliceMap:
+        """Return the map of positions moved by a vector in design units, shape (3,)."""
+        across, (first, second) = AXES.index(self.axis), self.plane
+        du, dv, dw = offset[[first, second, across]].tolist()
+        (u0, v0), (u1, v1) = self.lows, self.highs
+        facts = {**self.facts, "offset": offset.tolist()}
+        lows, highs = (u0 + du, v0 + dv), (u1 + du, v1 + dv)
+        return replace(self, level=self.level + dw, lows=lows, highs=highs, facts=facts)
 
 
 def level_within(low: float, high: float, level: float | None) -> float:
@@ -184,12 +193,12 @@ def cut_loops(solid: Solid, axes: tuple[int, int]) -> list[FloatArray]:
     return loops
 
 
-def map_picture(mapped: SliceMap, pose: Pose, reach: float) -> str:
-    """Return the map between its axes as SVG, with b4 as a cross, for a panel.
+def map_picture(mapped: SliceMap, position: Triple, reach: float) -> str:
+    """Return the map between its axes as SVG, with the present position as a cross, for a panel.
 
     Args:
         mapped: The map.
-        pose: The present pose.
+        position: The present position of the point of which the map is.
         reach: Reach of the design, in design units.
     """
     (u0, v0), (u1, v1) = mapped.lows, mapped.highs
@@ -197,11 +206,11 @@ def map_picture(mapped: SliceMap, pose: Pose, reach: float) -> str:
     scale = min((WIDTH - LEFT - RIGHT) / (u1 - u0), (MOST_HEIGHT - TOP - BOTTOM) / (v1 - v0))
     height = TOP + BOTTOM + scale * (v1 - v0)
     left, bottom = LEFT, height - BOTTOM
-    u, v = pose.position[first], pose.position[second]
+    u, v = position[first], position[second]
     pieces: list[Element] = []
     if u0 <= u <= u1 and v0 <= v <= v1:
-        off = abs(pose.position[AXES.index(mapped.axis)] - mapped.level)
-        # Beside the slice b4 is projected to it, and drawn faint.
+        off = abs(position[AXES.index(mapped.axis)] - mapped.level)
+        # Beside the slice it is projected to it, and drawn faint.
         look = "ex-here" if off <= IN_SLICE * reach else "ex-here is-off"
         pieces.append(
             element("g", *cross(left + scale * (u - u0), bottom - scale * (v - v0)), class_=look)

@@ -246,6 +246,7 @@ def export_mesh(
     load: Six,
     what: str,
     file_format: str,
+    offset: Triple | None = None,
 ) -> bytes:
     """Return a file of the workspace or of its hull, in millimetres.
 
@@ -258,13 +259,14 @@ def export_mesh(
         load: The load of that part, as in `WorkspaceRequest`.
         what: "workspace" or "hull".
         file_format: A format of `explorer.export.mesh`, or `STEP`.
+        offset: Vector from b4 to the tool point, of which the positions are; None for b4.
 
     Raises:
         ExplorerError: an empty workspace, nothing accessible, a load that nothing holds, a missing
             library, or STEP of a solid without exact faces.
     """
     if file_format == STEP:
-        return _exact_file(design, rotation, region, what)
+        return _exact_file(design, rotation, region, what, offset)
     from explorer.export.mesh import mesh_bytes
 
     if region == "limits":
@@ -280,16 +282,21 @@ def export_mesh(
         if isinstance(reached, Trouble):
             raise InputError(reached.reason)
         solid = reached.solid
-    name = f"{design.name} {exported_name(region, what)}"
-    return mesh_bytes(convex_hull(solid) if what == "hull" else solid, file_format, design, name)
+    name = f"{design.name} {exported_name(region, what, offset)}"
+    made = convex_hull(solid) if what == "hull" else solid
+    if offset is not None:
+        made = made.shifted(np.array(offset))
+    return mesh_bytes(made, file_format, design, name)
 
 
-def _exact_file(design: Design, rotation: Rows, region: Region, what: str) -> bytes:
+def _exact_file(
+    design: Design, rotation: Rows, region: Region, what: str, offset: Triple | None
+) -> bytes:
     """Return a STEP file of the workspace within the limits.
 
     Raises:
         InputError: a hull, or a part of the workspace; neither has exact faces.
-        ExplorerError: as of `explorer.export.step.workspace_step`.
+        ExplorerError: as of `explorer.export.step.exact_workspace`.
     """
     meshes = "export it as 3mf, stl, glb, obj or ply"
     if what == "hull":
@@ -300,13 +307,19 @@ def _exact_file(design: Design, rotation: Rows, region: Region, what: str) -> by
             f"STEP takes exact faces, and the surface along which {cause} consists of facets; "
             f'{meshes}, or choose the region "within the limits"'
         )
-    from explorer.export.step import workspace_step
+    from explorer.export.step import exact_workspace, step_bytes
 
-    return workspace_step(design, np.array(rotation))
+    solid = exact_workspace(design, np.array(rotation))
+    if offset is None:
+        return step_bytes(solid, f"workspace of {design.name}")
+    moved = solid.shifted(design.unit_mm * np.array(offset))
+    return step_bytes(moved, f"workspace of the tool of {design.name}")
 
 
-def exported_name(region: Region, what: str) -> str:
-    """Return the name of a file with a "workspace" or a "hull"."""
+def exported_name(region: Region, what: str, offset: Triple | None = None) -> str:
+    """Return the name of a file with a "workspace" or a "hull", of b4 or of the tool point."""
+    if offset is not None:
+        what = f"{what} of the tool"
     match region:
         case "limits":
             return what

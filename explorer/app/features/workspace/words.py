@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
+import numpy as np
+
 from explorer.app.features.workspace.feed import WorkspaceFeed
 from explorer.app.features.workspace.load import has_limits
 from explorer.app.features.workspace.orientation import orientation_word, turned_suffix
@@ -120,13 +122,13 @@ def _volume(newest: MeasuredVolume, frame: Frame) -> str:
     if measured.volume <= 0.0:
         causes = ", ".join(measured.empty_because)
         return alert("The workspace is empty", f"Emptied by: {causes}.")
-    which = orientation_word(frame)
+    where = f"within the limits, in the {orientation_word(frame)} orientation"
+    if frame.state.view.at == "tool":
+        where += ", of the tool"
     return (
         f'<div class="ex-line"><span class="ex-large">{volume_text(newest)}</span>'
         f"{dim(f'± {format_number(measured.error, 1)}')}</div>"
-        + caption(
-            f"{_litres(measured.volume, design)} within the limits, in the {which} orientation"
-        )
+        + caption(f"{_litres(measured.volume, design)} {where}")
     )
 
 
@@ -153,7 +155,7 @@ def workspace_details(frame: Frame, feed: WorkspaceFeed) -> str:
                 "The workspace is too thin for its triangles: their volume is not the exact one.",
             )
         )
-    parts.append(_numbers(drawing))
+    parts.append(_numbers(drawing, frame.state))
     if drawing.reached is not None and drawing.volume > 0.0:
         parts.append(_pairs(drawing.reached, is_coloured=view.colour == "plain"))
     coarse_edge = drawing.surface.coarse_edge
@@ -166,7 +168,7 @@ def workspace_details(frame: Frame, feed: WorkspaceFeed) -> str:
     return box(*parts)
 
 
-def _numbers(drawing: WorkspaceDrawing) -> str:
+def _numbers(drawing: WorkspaceDrawing, state: State) -> str:
     """Return the table of nodes, extent and volumes."""
     rows: list[tuple[str, str, str]] = []
     nodes, reached, request = drawing.nodes, drawing.reached, drawing.request
@@ -190,9 +192,11 @@ def _numbers(drawing: WorkspaceDrawing) -> str:
         ]
     if drawing.extent is not None:
         size = drawing.request.design.reach
-        for axis, low, high in zip("xyz", *drawing.extent, strict=True):
+        ends = np.array(drawing.extent) + state.offset(request.rotation)
+        name = "Extent" if state.view.at == "b4" else "Extent of the tool"
+        for axis, low, high in zip("xyz", *ends.tolist(), strict=True):
             text = f"{format_number(low, size=size)} … {format_number(high, size=size)}"
-            rows.append((f"Extent {axis}", text, "Extent of the workspace, in design units"))
+            rows.append((f"{name} {axis}", text, "Extent of the workspace, in design units"))
     if drawing.hull_volume is not None:
         rows.append(
             ("Hull volume", format_number(drawing.hull_volume, 6), "Volume of the convex hull")
