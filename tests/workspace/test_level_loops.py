@@ -81,3 +81,23 @@ def test_field_beyond_the_level_everywhere_is_the_grid_and_one_below_it_nothing(
     (polygon,) = level_loops(x, y, ones, 0.5)
     assert area(polygon) == pytest.approx(9.0)
     assert level_loops(x, y, ones, 1.5) == []
+
+
+@given(st.floats(1e-3, 0.2), st.floats(-0.4, 0.4), st.floats(0.0, 3.0))
+def test_corners_have_the_level_of_a_field_that_is_known_between_nodes(
+    half: float, off: float, angle: float
+) -> None:
+    """Also beside a strip that is narrower than a cell, and in which the field has a fold."""
+    x = np.linspace(-1.0, 1.0, 9)
+    normal = np.array([np.cos(angle), np.sin(angle)])
+
+    def field_at(points: FloatArray) -> FloatArray:
+        distance = points @ normal - off
+        return distance + np.maximum(0.0, 7.0 * (distance - 2.0 * half))
+
+    nodes = np.stack(np.meshgrid(x, x), axis=-1)
+    values = field_at(nodes.reshape(-1, 2)).reshape(9, 9)
+    (polygon,) = level_loops(x, x, values, half, field_at)
+    inner = (np.abs(polygon) < 1.0).all(axis=1)
+    assert inner.any()
+    np.testing.assert_allclose(polygon[inner] @ normal - off, half, rtol=2e-4)

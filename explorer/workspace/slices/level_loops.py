@@ -1,21 +1,31 @@
 """Outlines of the parts of a grid in which a field is at least a level, by marching squares.
 
 The field is taken as linear along each edge of the grid, so that the outline of a smooth field is
-off by the square of the step.
+off by the square of the step. If the field is known between the nodes, corners are where it has the
+level.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
-from explorer.numerics.arrays import FloatArray
+from explorer.numerics.arrays import FloatArray, IntArray
+from explorer.workspace.faces.divide import find_roots
 
 # The corners of a cell, counter-clockwise, as (row, column); edge k goes from corner k to the next.
 _CORNERS = ((0, 0), (0, 1), (1, 1), (1, 0))
+# Largest error of the field at a corner, over the level.
+ROOT_ERROR = 1e-4
 
 
 def level_loops(
-    columns: FloatArray, rows: FloatArray, values: FloatArray, level: float
+    columns: FloatArray,
+    rows: FloatArray,
+    values: FloatArray,
+    level: float,
+    field_at: Callable[[FloatArray], FloatArray] | None = None,
 ) -> list[FloatArray]:
     """Return closed polygons around the parts of a grid where a field is at least a level.
 
@@ -27,6 +37,8 @@ def level_loops(
         rows: Coordinates on the second axis, ascending, shape (m,).
         values: Values of the field, shape (m, n).
         level: The level, in the unit of the values.
+        field_at: Function from points (k, 2) to values of the field, (k,), that is continuous; None
+            if only the values at nodes are known.
 
     Returns:
         Corners of each polygon, each of shape (k, 2).
@@ -43,19 +55,6 @@ def level_loops(
             return 2 * ((row + (index == 2)) * width + column)
         return 2 * (row * width + column + (index == 1)) + 1
 
-    def point_on(edge: int) -> tuple[float, float]:
-        node, is_upright = divmod(edge, 2)
-        row, column = divmod(node, width)
-        one, other = (row, column), (row + is_upright, column + 1 - is_upright)
-        inner, outer = (one, other) if high[one] else (other, one)
-        inside, outside = float(field[inner]), float(field[outer])
-        share = 0.0 if np.isinf(outside) else (inside - level) / (inside - outside)
-        (v0, u0), (v1, u1) = inner, outer
-        return (
-            float(across[u0] + share * (across[u1] - across[u0])),
-            float(up[v0] + share * (up[v1] - up[v0])),
-        )
-
     counts = sum(high[r : r + len(high) - 1, c : c + width - 1].astype(int) for r, c in _CORNERS)
     following: dict[int, int] = {}
     for row, column in np.argwhere((counts > 0) & (counts < 4)).tolist():
@@ -70,12 +69,38 @@ def level_loops(
             entering = [(k + turn) % 4 for k in leaving]
         for out, into in zip(leaving, entering, strict=True):
             following[edge_of(row, column, out)] = edge_of(row, column, into)
-    loops: list[FloatArray] = []
+    chains: list[list[int]] = []
     while following:
         edge, after = following.popitem()
-        chain = [edge]
+        chains.append([edge])
         while after != edge:
-            chain.append(after)
+            chains[-1].append(after)
             after = following.pop(after)
-        loops.append(np.array([point_on(each) for each in chain]))
-    return loops
+    if not chains:
+        return []
+    edges = np.concatenate([np.array(chain, dtype=np.int64) for chain in chains])
+    nodes, is_upright = np.divmod(edges, 2)
+    others = nodes + np.where(is_upright == 1, width, 1)
+    is_inner = high.ravel()[nodes]
+    inner, outer = np.where(is_inner, nodes, others), np.where(is_inner, others, nodes)
+
+    def place(of: IntArray) -> FloatArray:
+        row, column = np.divmod(of, width)
+        return np.stack([across[column], up[row]], axis=1)
+
+    above, below = field.ravel()[inner] - level, field.ravel()[outer] - level
+    # At the end of the grid the polygon runs along it.
+    is_crossed = np.isfinite(below)
+    share = np.zeros(len(edges))
+    share[is_crossed] = (above / (above - below))[is_crossed]
+    start, end = place(inner), place(outer)
+    if field_at is not None and is_crossed.any():
+        first, span = end[is_crossed], (start - end)[is_crossed]
+        share[is_crossed] = 1.0 - find_roots(
+            lambda at: field_at(first + at[:, None] * span) - level,
+            below[is_crossed],
+            above[is_crossed],
+            ROOT_ERROR * abs(level),
+        )
+    points = start + share[:, None] * (end - start)
+    return np.split(points, np.cumsum([len(chain) for chain in chains])[:-1])

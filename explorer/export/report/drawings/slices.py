@@ -185,12 +185,26 @@ class Slices:
         if self.bands.measure == "margin":
             unit = self.bands.levels[-1] / self.bands.edges[-1]
             return lambda value: self._beyond_margin(axis, level, value * unit)
-        cells = CONDITION_CELLS if self.bands.measure == "condition" else CELLS
-        grid = self._grid(axis, level, cells)
-        values = self.bands.values(grid.points.reshape(-1, 3)).reshape(grid.points.shape[:2])
-        # With the sign of the determinant the field is smooth where it is zero.
-        field = np.sign(margins(grid.points, self.rotation).prod(axis=-1)) * values
-        return lambda value: [*grid.loops(field, value), *grid.loops(-field, value)]
+        is_slow = self.bands.measure == "condition"
+        grid = self._grid(axis, level, CONDITION_CELLS if is_slow else CELLS)
+        field = self._signed(grid.points.reshape(-1, 3)).reshape(grid.points.shape[:2])
+        index = AXES.index(axis)
+
+        def loops(value: float, sign: float) -> list[FloatArray]:
+            def field_at(points: FloatArray) -> FloatArray:
+                return sign * self._signed(np.insert(points, index, level, axis=1))
+
+            return grid.loops(sign * field, value, None if is_slow else field_at)
+
+        return lambda value: [*loops(value, 1.0), *loops(value, -1.0)]
+
+    def _signed(self, points: FloatArray) -> FloatArray:
+        """Return the values of the bands at points (n, 3), smooth where they are zero.
+
+        They have the sign of the determinant.
+        """
+        sign = np.where(margins(points, self.rotation).prod(axis=-1) < 0.0, -1.0, 1.0)
+        return sign * self.bands.values(points)
 
     def _beyond_margin(self, axis: str, level: float, margin: float) -> Iterator[FloatArray]:
         gradients = planes_of_singularity(self.rotation)
@@ -226,9 +240,17 @@ class _Grid:
     rows: FloatArray
     points: FloatArray
 
-    def loops(self, values: FloatArray, level: float) -> list[FloatArray]:
-        """Return the polygons around the parts in which values (m, n) are at least a level."""
-        return level_loops(self.columns, self.rows, values, level)
+    def loops(
+        self,
+        values: FloatArray,
+        level: float,
+        field_at: Callable[[FloatArray], FloatArray] | None = None,
+    ) -> list[FloatArray]:
+        """Return the polygons around the parts in which values (m, n) are at least a level.
+
+        For `field_at` see `level_loops`.
+        """
+        return level_loops(self.columns, self.rows, values, level, field_at)
 
 
 def in_plane(axis: str) -> list[int]:
