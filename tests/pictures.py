@@ -240,6 +240,9 @@ SCENES = {
         tab="Prototype",
         size=(1280, 1000),
     ),
+    "machine": Scene(
+        actions=(Open(LOADED), Set("view", View(handle=False))), panels=True, tab="Machine"
+    ),
     # What is left of the paper's optimum when a3 comes nearer, beside both rows of Table 1.
     "compare": Scene(
         actions=(

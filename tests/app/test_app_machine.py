@@ -370,7 +370,8 @@ def test_panel_tells_the_machine_the_weight_and_the_moment(hand: Hand, desk: Des
     assert "Their moment has no limit." in hand.show()["_moment"]
     desk.session.do(Open(PRESS))
     shown = hand.show()
-    assert machine_words(PRESS) in shown["_summary"]
+    assert machine_words(PRESS) in shown["_summary"].replace("&nbsp;", " ")
+    assert "guide up to 200&nbsp;N and 6&nbsp;N&nbsp;m." in shown["_summary"]
     assert "19.61 N" in shown["_weight"]
     # Of a tube of 8 and 6 mm at 200 MPa: σ π (D⁴ − d⁴) / (32 D).
     moment = 200e6 * math.pi * (0.008**4 - 0.006**4) / (32.0 * 0.008)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator
 from html import escape
 from typing import Literal
@@ -88,7 +89,7 @@ class MachinePanel:
         """Yield the updates that make the panel show the frame."""
         state = frame.state
         design = state.design
-        yield self._summary, "content", box(escape(machine_words(design)))
+        yield self._summary, "content", box(_with_units(machine_words(design)))
         mass = design.payload.mass_kg
         yield self._weight, "visible", mass > 0.0
         yield (
@@ -303,6 +304,15 @@ class MachinePanel:
             step=MEDIUM,
             visible=lambda state: is_on(state) and can_be(state),
         )
+
+
+def _with_units(words: str) -> str:
+    """Return words as HTML in which no line ends between a number and its unit."""
+    return re.sub(r"(?<=\d) (kg|N m|N)\b", _joined_unit, escape(words))
+
+
+def _joined_unit(unit: re.Match[str]) -> str:
+    return unit[0].replace(" ", "&nbsp;")
 
 
 def moment_words(struts: Struts) -> str:
