@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,6 +21,9 @@ from explorer.workspace.extremes import extent_of, least_margins
 from explorer.workspace.node_measures import DEFAULT_NODES, NodeMeasures, node_measures
 from explorer.workspace.slices.volume import NodeCount, Volume, workspace_nodes, workspace_volume
 from explorer.workspace.solids.solid import Solid
+
+if TYPE_CHECKING:
+    from explorer.workspace.held import HeldWorkspace
 
 MESH_TOLERANCE = 0.004
 """Tolerance of the mesh on which a search for the farthest positions starts, as a share of the
@@ -190,12 +194,12 @@ class Case:
         return value is not None and value is not False
 
     @cached_property
-    def held_volume(self) -> float:
-        """The volume where the design's load is held, in cubed design units."""
+    def held(self) -> HeldWorkspace:
+        """The part of the workspace where the design's load is held."""
         # It loads the kernel of solids.
         from explorer.workspace.held import held_workspace
 
-        return held_workspace(self.design, self.rotation).held_volume
+        return held_workspace(self.design, self.rotation)
 
     def inverse_conditions(self, positions: FloatArray) -> FloatArray:
         """Return the inverse condition of the Jacobian at positions (n, 3), shape (n,)."""

@@ -9,9 +9,11 @@ from dataclasses import dataclass
 from explorer.measures.case import Case
 from explorer.measures.measure import Measure, Need, Place, Sense, Unit
 from explorer.measures.statics import BOX_NODES, BoxStatics
+from explorer.mechanism.design import JOINTS
 
 OPTIMISE: frozenset[Place] = frozenset({"optimise"})
 WORKSPACE: frozenset[Place] = frozenset({"workspace"})
+REPORT: frozenset[Place] = frozenset({"report"})
 ELSEWHERE: frozenset[Place] = frozenset({"compare", "studies", "report"})
 
 
@@ -57,7 +59,9 @@ class Kind:
         name, label, hint: As in `Measure`, without the site.
         value: Value of the statics at a site.
         needs: What it needs of the machine.
-        power, unit, sense, is_whole: As in `Measure`.
+        title: As in `Measure`, without the site; the label if empty.
+        power, unit, sense, names: As in `Measure`.
+        in_report: Whether the report lists it among its headlines, rather than in a table.
     """
 
     name: str
@@ -65,30 +69,35 @@ class Kind:
     hint: str
     value: Callable[[BoxStatics], float]
     needs: tuple[Need, ...]
+    title: str = ""
     power: int = 0
     unit: Unit = ""
     sense: Sense | None = "less"
-    is_whole: bool = False
+    names: tuple[str, ...] = ()
+    in_report: bool = True
 
 
 KINDS = (
     Kind(
         "load_share",
-        "load",
+        "load share",
         "The largest share of a limit of actuators, struts or guide under the payload's weight and "
         "force",
         lambda statics: statics.largest_share,
         ("is_loaded", "is_limited"),
+        title="largest share of a limit",
+        unit="share",
     ),
     Kind(
         "worst_actuator",
         "worst actuator",
-        "Place of the actuator with the largest share of its limit in the order l1, d1, d2, d3, "
-        "d4, l4, under the payload's weight and force",
+        "The actuator with the largest share of its limit under the payload's weight and force; 1 "
+        "to 6 stand for l1, d1, d2, d3, d4, l4",
         lambda statics: statics.worst_actuator,
         ("is_loaded", "limits_actuators"),
         sense=None,
-        is_whole=True,
+        names=JOINTS,
+        in_report=False,
     ),
     Kind(
         "largest_payload",
@@ -106,6 +115,7 @@ KINDS = (
         lambda statics: statics.largest_bending,
         ("is_loaded",),
         unit="N m",
+        in_report=False,
     ),
     Kind(
         "worst_error",
@@ -136,8 +146,7 @@ def loads() -> Iterable[Measure]:
         "volume that holds the payload",
         "Volume of the workspace at whose positions the payload's weight and force are held within "
         "the limits of actuators, struts and guide",
-        lambda case: case.held_volume,
-        title="that holds the payload",
+        lambda case: case.held.held_volume,
         power=3,
         sense="more",
         cost="high",
@@ -163,11 +172,13 @@ def _measure(kind: Kind, site: Site) -> Measure:
         f"{kind.label} {site.label}",
         f"{kind.hint}, {site.hint}",
         function,
+        title=f"{kind.title or kind.label} {site.label}",
         power=kind.power,
         unit=kind.unit,
         sense=kind.sense,
-        is_whole=kind.is_whole,
+        is_whole=bool(kind.names),
+        names=kind.names,
         needs=(*site.needs, *kind.needs),
         reason=reason,
-        places=site.places,
+        places=site.places if kind.in_report else site.places - REPORT,
     )

@@ -44,6 +44,7 @@ class Measure:
         sense: Whether more or less of it is better; None if neither is.
         cost: "high" if it takes far longer than the exact volume.
         is_whole: Whether it is a count.
+        names: Names of the whole numbers from 1, if it is one of several things.
         gradient: Partial derivatives by the name of the parameter, as in
             `explorer.workspace.slices.volume.Volume`; None if there is no closed form.
         needs: Attributes of the case that the measure needs, see `Case.has`.
@@ -61,6 +62,7 @@ class Measure:
     sense: Sense | None = None
     cost: Cost = "low"
     is_whole: bool = False
+    names: tuple[str, ...] = ()
     gradient: Callable[[Case], Mapping[str, float]] | None = None
     needs: tuple[Need, ...] = ()
     reason: Callable[[Case], str] = lambda _: ""

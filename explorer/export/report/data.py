@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from explorer.errors import ExplorerError
+from explorer.export.report.loads import ReportLoads, loads_of
 from explorer.export.simulation import DENSITY
 from explorer.measures.case import Case
 from explorer.measures.catalogue import measures_in
@@ -29,6 +30,7 @@ from explorer.singularity.ellipsoids import (
     singularity_free_ball,
 )
 from explorer.workspace.accessible.workspace import ReachableWorkspace, reachable_workspace
+from explorer.workspace.held import HeldWorkspace
 from explorer.workspace.least_clearance import LeastClearances, least_clearances
 from explorer.workspace.slices.volume import NodeCount, Volume
 from explorer.workspace.solids.solid import Solid
@@ -66,6 +68,8 @@ class ReportData:
         ball: Largest ball of positions about the pose that holds no singular one.
         certified: Root-mean-square displacement of b1 to b4, in design units, below which no
             pose is singular.
+        loads: The pose under the payload; None without a tool, a payload and limits of forces.
+        held: Part of the workspace that holds the payload; None without a payload or limits.
         bill: Bill of the prototype's parts.
         record: Record of the search that found the design; None without one.
     """
@@ -82,6 +86,8 @@ class ReportData:
     performance: Performance
     ball: SingularityFreeBall
     certified: float
+    loads: ReportLoads | None
+    held: HeldWorkspace | Missing | None
     bill: Bill | Missing
     record: Record | None
 
@@ -127,6 +133,9 @@ def gather_report_data(
     reachable = None
     if any(design.limits.leg_radii):
         reachable = _compute(lambda: reachable_workspace(design, r, start=at.position))
+    held = None
+    if case.is_loaded and case.is_limited:
+        held = _compute(lambda: case.held)
     return ReportData(
         case=case,
         measured=measure_design(case, measures_in("report")),
@@ -140,6 +149,8 @@ def gather_report_data(
         performance=performance(design, at),
         ball=singularity_free_ball(at),
         certified=certified_radius(design, at),
+        loads=loads_of(case),
+        held=held,
         bill=_compute(lambda: bill_of_materials(make_prototype(design), DENSITY)),
         record=record,
     )

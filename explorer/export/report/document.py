@@ -23,6 +23,7 @@ from explorer.export.report.markup import (
 )
 from explorer.export.report.sections.claims import claims_section
 from explorer.export.report.sections.legs import legs_section
+from explorer.export.report.sections.loads import loads_section
 from explorer.export.report.sections.mechanism import mechanism_section
 from explorer.export.report.sections.parts import parts_section
 from explorer.export.report.sections.search import search_section
@@ -165,6 +166,10 @@ def _commands(data: ReportData, source: str) -> Iterator[str]:
     yield f"explorer workspace --design {source}{turned} --hull{legs}"
     yield f"explorer singularity --design {source}{at}"
     yield f"explorer interference --design {source}{at}"
+    if data.case.is_loaded or data.case.is_limited:
+        yield f"explorer forces --design {source}{at} --at tool"
+    if data.held is not None:
+        yield f"explorer workspace --design {source}{turned} --load 0 0 0"
     if not isinstance(data.bill, Missing):
         yield f"explorer export mechanism --design {source} --out mechanism.zip"
     if data.record is not None:
@@ -180,6 +185,7 @@ _SECTIONS: tuple[Callable[[ReportData], Iterable[Element]], ...] = (
     workspace_section,
     singularity_section,
     legs_section,
+    loads_section,
     parts_section,
     search_section,
     claims_section,

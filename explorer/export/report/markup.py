@@ -11,7 +11,7 @@ from typing import TypeAlias
 from unicodedata import category
 from xml.etree.ElementTree import Element, tostring
 
-from explorer.numerics.number_text import format_number
+from explorer.numerics.number_text import format_column, format_decimals, format_number
 
 Piece: TypeAlias = "Element | str | float | None"
 Cell: TypeAlias = "Piece | Sequence[Piece]"
@@ -69,6 +69,21 @@ def coordinate(value: float) -> str:
 def number(value: float, digits: int = 6) -> Element:
     """Return an element with a rounded number, whose `value` is the number in full."""
     return element("data", format_number(value, digits), value=repr(float(value) + 0.0))
+
+
+def numbers(values: Sequence[float], digits: int = 4) -> list[Element]:
+    """Return elements with numbers of equal decimals, as `number` does, for a column."""
+    texts = format_column(values, digits)
+    return [
+        element("data", text, value=repr(float(value) + 0.0))
+        for text, value in zip(texts, values, strict=True)
+    ]
+
+
+def percentage(share: float) -> Element:
+    """Return an element with a share in per cent to one decimal."""
+    value = 100.0 * share
+    return element("span", element("data", format_decimals(value, 1), value=repr(value)), " %")
 
 
 def drawing_text(

@@ -106,7 +106,12 @@ def best_of(measure: Measure, values: list[float | None]) -> set[int]:
 
 
 def value_text(measure: Measure, value: float, size: float, *, signed: bool = False) -> str:
-    """Return a value with the decimals that suit a size, the largest value of its row."""
+    """Return a value with the decimals that suit a size, the largest value of its row.
+
+    A value that stands for a thing reads as its name, and a difference of such values as nothing.
+    """
+    if measure.names:
+        return "" if signed else measure.names[round(value) - 1]
     if measure.is_whole:
         return format_decimals(value, 0, signed=signed)
     if size != 0.0 and not LEAST <= size < MOST:

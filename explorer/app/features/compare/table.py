@@ -126,6 +126,8 @@ def _exact_text(measure: Measure, column: Column) -> str:
     value = column.own_value(measure)
     if value is None:
         return ""
+    if measure.names:
+        return value_text(measure, value, value)
     own = f"{format_number(value, 12)} {unit_of(measure, millimetres=False)}".strip()
     if measure.power == 0:
         return own

@@ -242,6 +242,7 @@ class Row:
         hint: Meaning.
         before, after: Values; None where there is none.
         is_whole: Whether it is a count.
+        names: Names of the whole numbers from 1, as in `Measure`.
         look: Whether the change keeps or breaks the demands, where that is defined.
         is_goal: Whether it is the objective.
     """
@@ -251,6 +252,7 @@ class Row:
     before: float | None
     after: float | None
     is_whole: bool = False
+    names: tuple[str, ...] = ()
     look: Look | None = None
     is_goal: bool = False
 
@@ -298,6 +300,7 @@ def measure_rows(problem: Problem, before: Measurements, after: Measurements) ->
             before[name],
             after[name],
             measure.is_whole,
+            measure.names,
             _look(problem, name, before, after),
             is_goal=name == goal,
         )
@@ -330,15 +333,15 @@ def _row(line: Row, *, is_first: bool = False) -> str:
     )
     digits = 0 if line.is_whole else decimals_of(largest)
     change = ""
-    if line.before is not None and line.after is not None:
+    if line.before is not None and line.after is not None and not line.names:
         change = _change(line.after - line.before, digits)
     if line.look is not None:
         change = f'<span class="ex-{line.look}">{change}</span>'
     name, _, unit = line.name.partition(", ")
     return row(
         f"{name} {dim(unit)}" if unit else name,
-        _number(line.before, digits),
-        _number(line.after, digits),
+        _value(line, line.before, digits),
+        _value(line, line.after, digits),
         change,
         look=" ".join(["ex-strong"] * line.is_goal + ["ex-first"] * is_first),
         hint=line.hint,
@@ -350,8 +353,10 @@ def decimals_of(size: float) -> int:
     return min(4, decimals_for(size, DIGITS)) if size > 0.0 else 1
 
 
-def _number(value: float | None, digits: int) -> str:
-    return "none" if value is None else signed(value, digits)
+def _value(line: Row, value: float | None, digits: int) -> str:
+    if value is None:
+        return "none"
+    return line.names[round(value) - 1] if line.names else signed(value, digits)
 
 
 def _change(value: float, digits: int) -> str:
