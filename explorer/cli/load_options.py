@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated
 
 import msgspec
 import numpy as np
@@ -13,12 +13,11 @@ from explorer.cli.values import hint, load_numbers, not_negative
 from explorer.errors import NoAnswerError
 from explorer.mechanism.design import Design
 from explorer.mechanism.margins import INCIDENCES, margins
-from explorer.mechanism.pose import Pose, Triple
+from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.statics.equilibrium import SINGULAR
 
 Load = tuple[float, float, float, float, float, float]
-At = Literal["b4", "tool"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,9 +35,6 @@ class LoadOptions(JsonOptions, PoseOptions, DesignOptions):
     ] = None
     """Mass of the payload, in kg; its weight is added to the load."""
 
-    at: At = "b4"
-    """Point at which the load acts and for which results hold: b4 or the design's tool."""
-
     def read_loaded_design(self) -> Design:
         """Return the design with the given mass of the payload.
 
@@ -50,10 +46,6 @@ class LoadOptions(JsonOptions, PoseOptions, DesignOptions):
             return design
         payload = msgspec.structs.replace(design.payload, mass_kg=self.payload)
         return msgspec.structs.replace(design, payload=payload)
-
-    def tool(self, design: Design) -> Triple:
-        """Return the point of the load in the platform frame, in design units."""
-        return design.tool.position if self.at == "tool" else (0.0, 0.0, 0.0)
 
 
 def check_regular(pose: Pose, values: FloatArray) -> None:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import msgspec
+import numpy as np
 import tyro
 
 from explorer.cli.output import write_json, write_lines
@@ -19,6 +20,8 @@ from explorer.mechanism.design_file import load_design
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import Pose, Quadruple, Triple
 from explorer.mechanism.tilt_torsion import pose_of_tilt_torsion
+from explorer.mechanism.tool_point import Point, offset_of, tool_offset, tool_position
+from explorer.numerics.arrays import FloatArray
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,6 +96,23 @@ class RadiiOptions:
         return msgspec.structs.replace(design, limits=limits)
 
 
+@dataclass(frozen=True, kw_only=True)
+class PointOptions:
+    """The option for the point of the platform that is meant."""
+
+    at: Point = "b4"
+    """Point whose positions are meant, and at which loads act and results hold: b4 or the tool of
+    the design."""
+
+    def tool(self, design: Design) -> Triple | None:
+        """Return the tool point in the platform frame, in design units; None for b4."""
+        return design.tool.position if self.at == "tool" else None
+
+    def shift(self, design: Design, pose: Pose) -> FloatArray | None:
+        """Return the vector from b4 to the tool in the base frame, shape (3,); None for b4."""
+        return offset_of(design, pose.rotation, "tool") if self.at == "tool" else None
+
+
 def make_pose(
     option: str,
     default: Pose,
@@ -100,19 +120,22 @@ def make_pose(
     quaternion: Quadruple | None,
     yaw_pitch_roll: Triple | None,
     tilt_torsion: Triple | None,
+    tool: Triple | None = None,
 ) -> Pose:
     """Return the pose that options give, completed from a default pose.
 
     Args:
         option: Start of the names of the options for the orientation, such as ``--to-``.
         default: Pose that completes what is not given.
-        position: Position of b4 in the base frame, in design units.
+        position: Position of b4 or the tool in the base frame, in design units.
         quaternion: Orientation as (w, x, y, z), of any length but zero.
         yaw_pitch_roll: Orientation as angles in degrees.
         tilt_torsion: Orientation as azimuth, tilt and torsion in degrees.
+        tool: Tool point in the platform frame, in design units; None if the position is that of
+            b4. Without a position the tool stays where it is in the default pose.
 
     Raises:
-        InputError: There are two orientations, or the quaternion is zero.
+        InputError: There are two orientations, the quaternion is zero, or b4 is too far away.
     """
     orientations = {
         "quaternion": quaternion,
@@ -124,10 +147,16 @@ def make_pose(
         raise InputError(f"give one of {given[0]} and {given[1]}, not both")
     at = default.position if position is None else position
     if tilt_torsion is not None:
-        return pose_of_tilt_torsion(at, tilt_torsion)
-    if yaw_pitch_roll is not None:
-        return Pose.of_yaw_pitch_roll(at, yaw_pitch_roll)
-    return Pose(at, quaternion or default.quaternion)
+        pose = pose_of_tilt_torsion(at, tilt_torsion)
+    elif yaw_pitch_roll is not None:
+        pose = Pose.of_yaw_pitch_roll(at, yaw_pitch_roll)
+    else:
+        pose = Pose(at, quaternion or default.quaternion)
+    if tool is None or (position is None and not given):
+        return pose
+    here = tool_position(default, tool) if position is None else position
+    x, y, z = (np.array(here) - tool_offset(pose.rotation, tool)).tolist()
+    return Pose((x, y, z), pose.quaternion)
 
 
 _HOME_HINT = hint("default: that of the home pose")
@@ -165,12 +194,13 @@ class OrientationOptions:
 
 
 @dataclass(frozen=True, kw_only=True)
-class PoseOptions(OrientationOptions):
+class PoseOptions(OrientationOptions, PointOptions):
     """The options for the pose; position and orientation are those of the home pose by default."""
 
     position: Annotated[Triple | None, numbers("--position", "x y z"), _HOME_HINT] = None
-    """Position of b4 in the base frame, in design units."""
+    """Position of b4, or of the tool, in the base frame, in design units."""
 
     def pose(self, design: Design) -> Pose:
         """Return the given pose completed from the home pose, as `make_pose` does."""
-        return make_pose("--", home_pose(design), self.position, *self._orientation)
+        given = (home_pose(design), self.position, *self._orientation)
+        return make_pose("--", *given, self.tool(design))

@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Any
 from explorer.cli.streams import write
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import encode_design
-from explorer.mechanism.pose import Pose, yaw_pitch_roll_from_rotation
+from explorer.mechanism.pose import Pose, Triple, yaw_pitch_roll_from_rotation
 from explorer.mechanism.tilt_torsion import tilt_torsion_of
+from explorer.mechanism.tool_point import tool_position
 from explorer.numerics.number_text import format_ascii, format_fixed
 
 if TYPE_CHECKING:
@@ -45,10 +46,16 @@ def attributes(of: object, names: str) -> dict[str, object]:
     return {name: getattr(of, name) for name in names.split()}
 
 
-def pose_json(pose: Pose) -> dict[str, object]:
-    """Return position, quaternion, and azimuth, tilt and torsion in degrees of a pose."""
+def tool_json(pose: Pose, tool: Triple | None) -> dict[str, object]:
+    """Return the position of the tool in a pose, nothing if the tool is None."""
+    return {} if tool is None else {"tool_position": tool_position(pose, tool)}
+
+
+def pose_json(pose: Pose, tool: Triple | None = None) -> dict[str, object]:
+    """Return positions, quaternion, and azimuth, tilt and torsion in degrees of a pose."""
     return {
         "position": pose.position,
+        **tool_json(pose, tool),
         "quaternion": pose.quaternion,
         "tilt_torsion": tilt_torsion_of(pose.rotation),
     }
@@ -143,21 +150,29 @@ def heading(design: Design) -> str:
     return f"{name} (1 unit = {design.unit_mm:g} mm, reach {design.reach:.6g})"
 
 
-def pose_table(design: Design, pose: Pose) -> str:
-    """Return four lines: position, quaternion and angles of a pose."""
+def pose_table(design: Design, pose: Pose, tool: Triple | None = None) -> str:
+    """Return the position, the quaternion and the angles of a pose, and where its tool is."""
     angles = yaw_pitch_roll_from_rotation(pose.rotation).tolist()
-    millimetres = [value * design.unit_mm for value in pose.position]
-    size = max(map(abs, millimetres))
-    in_mm = ", ".join(format_ascii(value, 6, size=size) for value in millimetres)
+    positions = [("position", _position(design, pose.position))]
+    if tool is not None:
+        positions.append(("tool position", _position(design, tool_position(pose, tool))))
     return table(
         [
-            ("position", f"{'  '.join(figures(pose.position))}  [{in_mm} mm]"),
+            *positions,
             ("quaternion", "  ".join(figures(pose.quaternion))),
             ("yaw pitch roll", "  ".join(degrees(angles))),
             ("azimuth tilt torsion", "  ".join(degrees(tilt_torsion_of(pose.rotation)))),
         ],
         "<<",
     )
+
+
+def _position(design: Design, position: Triple) -> str:
+    """Return a position in design units and in millimetres."""
+    millimetres = [value * design.unit_mm for value in position]
+    size = max(map(abs, millimetres))
+    in_mm = ", ".join(format_ascii(value, 6, size=size) for value in millimetres)
+    return f"{'  '.join(figures(position))}  [{in_mm} mm]"
 
 
 def radii_line(design: Design) -> str:

@@ -22,9 +22,12 @@ def point_of(design: Design, at: Point) -> Triple:
 
 def position_of(design: Design, pose: Pose, at: Point) -> Triple:
     """Return the position of a point in the base frame, in design units."""
-    if at == "b4":
-        return pose.position
-    x, y, z = (np.array(pose.position) + offset_of(design, pose.rotation, at)).tolist()
+    return pose.position if at == "b4" else tool_position(pose, point_of(design, at))
+
+
+def tool_position(pose: Pose, tool: Triple) -> Triple:
+    """Return the position of a point of the platform in the base frame, in design units."""
+    x, y, z = (np.array(pose.position) + tool_offset(pose.rotation, tool)).tolist()
     return x, y, z
 
 

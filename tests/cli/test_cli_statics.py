@@ -54,7 +54,8 @@ def test_forces_json_has_those_of_the_load(cli: CommandLine) -> None:
 def test_forces_with_limits_have_a_largest_force(cli: CommandLine, machine: Path) -> None:
     tool = MACHINE.tool.position
     found = cli.answer("forces", *POSE, "--most", "50", "--at", "tool", "--design", machine)
-    expected = explorer.largest_force(MACHINE, *AT, [50.0] * 6, tool)
+    b4 = np.array(AT[0]) - AT[1] @ tool
+    expected = explorer.largest_force(MACHINE, b4, AT[1], [50.0] * 6, tool)
     assert found["largest_force"] == pytest.approx(float(expected))
     own = cli.answer("forces", *POSE, "--design", machine)
     expected = explorer.largest_force(MACHINE, *AT, MACHINE.actuators.limits[0])

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from explorer.cli.output import (
     attributes,
     figure,
@@ -15,6 +17,7 @@ from explorer.cli.output import (
     table,
 )
 from explorer.mechanism.design import Design
+from explorer.numerics.arrays import FloatArray
 
 if TYPE_CHECKING:
     from explorer.workspace.accessible.radii import RadiusCurve
@@ -62,8 +65,11 @@ def curve_json(curve: RadiusCurve) -> dict[str, object]:
     return {**answer, "closest": curve.closest_legs}
 
 
-def curve_table(design: Design, curve: RadiusCurve) -> str:
-    """Return a radius curve at a few radii, and the largest radius without a loss."""
+def curve_table(design: Design, curve: RadiusCurve, shift: FloatArray | None = None) -> str:
+    """Return a radius curve at a few radii, and the largest radius without a loss.
+
+    The place at which legs come closest is moved by `shift`, shape (3,), unless that is None.
+    """
     rows = [("radius of all legs", "mm", "accessible (units³)", "share")]
     # The last radius comes twice: beyond it the volume is zero.
     last = max(0, len(curve.radii) - 2)
@@ -74,7 +80,8 @@ def curve_table(design: Design, curve: RadiusCurve) -> str:
     lines = [table(rows, ">>>>")]
     if curve.closest_legs is not None:
         i, j = curve.closest_legs
-        place = ", ".join(f"{x:.4g}" for x in curve.closest_position)
+        at = np.array(curve.closest_position) + (0.0 if shift is None else shift)
+        place = ", ".join(f"{x:.4g}" for x in at.tolist())
         if curve.harmless > 0.0:
             lines.append(f"no legs collide up to a radius of {figure(curve.harmless)}")
             lines.append(f"legs {i} and {j} come closest, at ({place})")

@@ -19,21 +19,23 @@ from explorer.cli.output import (
     pose_table,
     radii_line,
     table,
+    tool_json,
 )
 from explorer.legs.clearance import PAIRS
 from explorer.measures.snapshot import Snapshot
 from explorer.mechanism.design import Design
-from explorer.mechanism.pose import Pose
+from explorer.mechanism.pose import Pose, Triple
+from explorer.mechanism.tool_point import tool_position
 from explorer.numerics.arrays import BoolArray, FloatArray
 
 if TYPE_CHECKING:
     from explorer.legs.moves import MoveClearance
 
 
-def pose_lines(snapshot: Snapshot) -> Iterator[str]:
+def pose_lines(snapshot: Snapshot, tool: Triple | None = None) -> Iterator[str]:
     """Yield the clearances in a pose as lines of text."""
     design, legs = snapshot.design, snapshot.clearances
-    yield from (heading(design), pose_table(design, snapshot.pose), radii_line(design), "")
+    yield from (heading(design), pose_table(design, snapshot.pose, tool), radii_line(design), "")
     rows = [("legs", "axes apart", "clearance", "mm", "", "closest points", "")]
     for index, pair in enumerate(PAIRS):
         clearance = float(legs.clearance[index])
@@ -56,9 +58,10 @@ def move_lines(move: MoveClearance, start: Snapshot, end: Snapshot) -> Iterator[
     design = start.design
     yield heading(design)
     for name, pose in (("from", move.start), ("to", move.end)):
-        yield from (name, *indented(pose_table(design, pose)))
+        yield from (name, *indented(pose_table(design, pose, move.tool)))
     yield from (radii_line(design), "")
-    rows = [("legs", "clearance", "mm", "never below", "at", "b4 there", "", "step test")]
+    there = "b4 there" if move.tool is None else "tool there"
+    rows = [("legs", "clearance", "mm", "never below", "at", there, "", "step test")]
     for index, (pair, pose) in enumerate(zip(PAIRS, _poses_of_least(move), strict=True)):
         clearance = float(move.clearance[index])
         if math.isinf(clearance):
@@ -70,7 +73,7 @@ def move_lines(move: MoveClearance, start: Snapshot, end: Snapshot) -> Iterator[
                 *lengths(design, clearance),
                 figure(float(move.bound[index])),
                 f"{100.0 * float(move.share[index]):.1f} %",
-                _at(pose.position),
+                _at(pose.position if move.tool is None else tool_position(pose, move.tool)),
                 _collide(clearance),
                 "overlap" if move.overlaps[index] else "free",
             )
@@ -88,7 +91,7 @@ def move_lines(move: MoveClearance, start: Snapshot, end: Snapshot) -> Iterator[
     yield from limits_lines(end, "the end is ")
 
 
-def pose_json(snapshot: Snapshot) -> dict[str, object]:
+def pose_json(snapshot: Snapshot, tool: Triple | None = None) -> dict[str, object]:
     """Return the clearances in a pose as plain values."""
     legs = snapshot.clearances
     return {
@@ -105,6 +108,7 @@ def pose_json(snapshot: Snapshot) -> dict[str, object]:
         "closest": PAIRS[int(legs.closest)],
         "is_clear": (legs.clearance > 0.0).all(),
         "radii": snapshot.design.limits.leg_radii,
+        **tool_json(snapshot.pose, tool),
         **limits_json(snapshot),
     }
 
@@ -120,6 +124,7 @@ def move_json(move: MoveClearance, start: Snapshot, end: Snapshot) -> dict[str, 
                 "bound": finite(float(move.bound[index])),
                 "share": move.share[index],
                 **attributes(pose, place),
+                **tool_json(pose, move.tool),
                 "points": move.points[index],
                 "overlaps": move.overlaps[index],
             }
@@ -129,8 +134,10 @@ def move_json(move: MoveClearance, start: Snapshot, end: Snapshot) -> dict[str, 
         **attributes(move, "is_clear is_free steps tolerance"),
         "radii": start.design.limits.leg_radii,
         "within_limits": not (start.violations or end.violations),
-        "start": attributes(start.pose, place) | limits_json(start),
-        "end": attributes(end.pose, place) | limits_json(end),
+        "start": attributes(start.pose, place)
+        | tool_json(start.pose, move.tool)
+        | limits_json(start),
+        "end": attributes(end.pose, place) | tool_json(end.pose, move.tool) | limits_json(end),
     }
 
 
@@ -138,7 +145,7 @@ def _poses_of_least(move: MoveClearance) -> list[Pose]:
     """Return the pose of the move at which each pair is closest."""
     from explorer.legs.moves import poses_between
 
-    positions, rotations = poses_between(move.start, move.end, move.share)
+    positions, rotations = poses_between(move.start, move.end, move.share, move.tool)
     return [Pose.of(p, r) for p, r in zip(positions, rotations, strict=True)]
 
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
+
+import numpy as np
 
 from explorer.cli.answers.accessible import (
     curve_json,
@@ -23,6 +25,8 @@ from explorer.cli.output import (
 from explorer.measures.case import Case
 from explorer.measures.catalogue import CATALOGUE, measures_in
 from explorer.measures.measurements import Measurements, measure_design
+from explorer.mechanism.pose import Triple
+from explorer.numerics.arrays import FloatArray
 
 if TYPE_CHECKING:
     from explorer.workspace.accessible.radii import RadiusCurve
@@ -30,6 +34,7 @@ if TYPE_CHECKING:
     from explorer.workspace.held import HeldWorkspace
     from explorer.workspace.solids.solid import Solid
 
+Extent: TypeAlias = tuple[Triple, Triple]
 # The measures of nodes that the remark on their volume gives.
 _IN_REMARK = ("node_count", "node_step")
 
@@ -40,6 +45,7 @@ class WorkspaceMeasures:
 
     Attributes:
         case: Design and orientation, with the mesh of the workspace.
+        shift: Vector from b4 to the tool point whose workspace it is, shape (3,); None for b4.
         solid: Mesh of the workspace.
         hull: Convex hull of the mesh.
         orientations: Number of orientations of the next three.
@@ -52,6 +58,7 @@ class WorkspaceMeasures:
     """
 
     case: Case
+    shift: FloatArray | None
     solid: Solid
     hull: Solid | None
     orientations: int | None
@@ -61,6 +68,13 @@ class WorkspaceMeasures:
     interference: ReachableWorkspace | None
     curve: RadiusCurve | None
     held: HeldWorkspace | None
+
+    def _extent(self) -> FloatArray | Extent | None:
+        """Return the lowest and the highest position of the counted nodes."""
+        extent = self.case.paper_nodes.extent
+        if extent is None or self.shift is None:
+            return extent
+        return np.array(extent) + self.shift
 
     def _measured(self) -> Measurements:
         return measure_design(self.case, measures_in("workspace"))
@@ -73,7 +87,7 @@ class WorkspaceMeasures:
             **attributes(self.case.volume, "gradient empty_because"),
             "node_step": measured["node_step"],
             **measured.values,
-            "extent": self.case.paper_nodes.extent,
+            "extent": self._extent(),
             "mesh": mesh_json(self.solid),
         }
         if self.solid.agrees is False:
@@ -120,9 +134,10 @@ class WorkspaceMeasures:
         yield table(rows, "<>><")
         if others:
             yield table(others, "<<")
-        if nodes.extent is not None:
+        extent = self._extent()
+        if extent is not None:
             yield from ("", "extent of the nodes")
-            for axis, low, high in zip("xyz", *nodes.extent, strict=True):
+            for axis, low, high in zip("xyz", *extent, strict=True):
                 yield f"  {axis}  {figure(low)} to {figure(high)}"
         if volume.empty_because:
             yield from ("", f"empty because of {', '.join(volume.empty_because)}")
@@ -135,7 +150,7 @@ class WorkspaceMeasures:
         if accessible is not None:
             yield from ("", interference_table(design, accessible))
         if self.curve is not None:
-            yield from ("", curve_table(design, self.curve))
+            yield from ("", curve_table(design, self.curve, self.shift))
 
     def _volumes_of_meshes(self) -> Iterator[tuple[str, float, str]]:
         """Yield the name, the volume and a remark of each mesh."""

@@ -14,7 +14,7 @@ from explorer.cli.output import figure, figures, heading, pose_table, table
 from explorer.cli.values import hint, numbers
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.machine import DIMENSIONS
-from explorer.mechanism.pose import Pose
+from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.statics.accuracy import Precision, ToolError, geometry_error, pose_precision
 from explorer.statics.compliance import (
@@ -37,6 +37,7 @@ class Answer:
 
     design: Design
     pose: Pose
+    tool: Triple | None
     precision: Precision
     principal: PrincipalCompliances
     deflection: FloatArray
@@ -74,6 +75,7 @@ class Accuracy(LoadOptions):
         answer = Answer(
             design,
             pose,
+            tool,
             precision,
             principal_compliances(precision.compliance),
             deflection(precision.compliance, wrench),
@@ -126,7 +128,7 @@ def _as_json(answer: Answer) -> dict[str, object]:
 
 def _as_lines(answer: Answer) -> Iterator[str]:
     design, precision = answer.design, answer.precision
-    yield from (heading(design), pose_table(design, answer.pose), "")
+    yield from (heading(design), pose_table(design, answer.pose, answer.tool), "")
     rows = [("error from", "displacement, units", "mm", "turn")]
     for name, error in (("all, worst", precision.worst), ("all, RMS", precision.rms)):
         rows.append((name, *_error(design, float(error.displacement), float(error.turn))))

@@ -13,6 +13,7 @@ import tyro
 from explorer.cli.options import DesignOptions, JsonOptions, PoseOptions
 from explorer.cli.values import hint, positive
 from explorer.errors import InputError
+from explorer.mechanism.design import Design
 
 What = Literal["workspace", "hull", "mechanism", "simulation", "scene"]
 
@@ -28,7 +29,7 @@ class Export(JsonOptions, PoseOptions, DesignOptions):
     specification requires. The mechanism consists of its parts, assembled in the home pose; in
     `stl-zip` a part is a file of its own. The simulation is an MJCF model in metres: every joint,
     closed loops, six servos. The scene is one HTML file for any browser, in the home pose unless
-    a pose is given.
+    a pose is given. With `--at tool` the workspace and the hull are those of the tool point.
     """
 
     what: Annotated[What, tyro.conf.Positional]
@@ -121,12 +122,21 @@ def _mesh(command: Export, file_format: str) -> tuple[bytes, Facts]:
     design = command.read_design()
     from explorer.workspace.solids.solids import convex_hull, workspace_solid
 
-    solid = workspace_solid(design, command.oriented_home(design).rotation, command.tolerance)
+    home = command.oriented_home(design)
+    solid = workspace_solid(design, home.rotation, command.tolerance)
+    shift = command.shift(design, home)
+    if shift is not None:
+        solid = solid.shifted(shift)
     if command.what == "hull":
         solid = convex_hull(solid)
-    data = mesh_bytes(solid, file_format, design, f"{command.what} of {design.name}")
+    data = mesh_bytes(solid, file_format, design, _name(command, design))
     facts: Facts = {"format": file_format, "volume": solid.volume, "triangles": len(solid.faces)}
     return data, {**facts, "agrees": False} if solid.agrees is False else facts
+
+
+def _name(command: Export, design: Design) -> str:
+    whose = "" if command.at == "b4" else "the tool of "
+    return f"{command.what} of {whose}{design.name}"
 
 
 def _step(command: Export) -> tuple[bytes, Facts]:
@@ -135,10 +145,14 @@ def _step(command: Export) -> tuple[bytes, Facts]:
     command.refuse("tolerance", "density", "masses", "position")
     check_extra()
     design = command.read_design()
-    solid = exact_workspace(design, command.oriented_home(design).rotation)
+    home = command.oriented_home(design)
+    solid = exact_workspace(design, home.rotation)
+    shift = command.shift(design, home)
+    if shift is not None:
+        solid = solid.shifted(shift * design.unit_mm)
     volume = solid.volume / design.unit_mm**3
     facts = {"format": "step", "volume": volume, "faces": len(solid.limit_of_face)}
-    return step_bytes(solid, f"workspace of {design.name}"), facts
+    return step_bytes(solid, _name(command, design)), facts
 
 
 def _mechanism(command: Export, file_format: str) -> tuple[bytes, Facts]:
@@ -148,7 +162,7 @@ def _mechanism(command: Export, file_format: str) -> tuple[bytes, Facts]:
     from explorer.prototype.bill import bill_of_materials
 
     command.refuse(
-        "tolerance", "masses", "position", "quaternion", "yaw_pitch_roll", "tilt_torsion"
+        "tolerance", "masses", "position", "quaternion", "yaw_pitch_roll", "tilt_torsion", "at"
     )
     file_format = {"zip": "stl-zip", "stp": "step"}.get(file_format, file_format)
     if file_format == "step":
@@ -185,7 +199,7 @@ def _simulation(command: Export, file_format: str) -> tuple[bytes, Facts]:
     from explorer.export.simulation import DENSITY, simulation_mjcf
     from explorer.prototype.chains import BODIES, CHAIN_JOINTS
 
-    command.refuse("tolerance", "position", "quaternion", "yaw_pitch_roll", "tilt_torsion")
+    command.refuse("tolerance", "position", "quaternion", "yaw_pitch_roll", "tilt_torsion", "at")
     if file_format not in ("mjcf", "xml"):
         raise InputError(f"no simulation format {file_format!r}; there is mjcf")
     design, density = command.read_design(), command.density or DENSITY

@@ -12,7 +12,7 @@ from explorer.cli.load_options import LoadOptions, check_regular
 from explorer.cli.output import figure, figures, finite, heading, pose_table, table
 from explorer.cli.values import hint, numbers, positive
 from explorer.mechanism.design import JOINTS, Design
-from explorer.mechanism.pose import Pose
+from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.statics.equilibrium import twists_of_actuators
 from explorer.statics.forces import WorstDirection, worst_direction
@@ -34,6 +34,7 @@ class Answer:
 
     design: Design
     pose: Pose
+    tool: Triple | None
     held: Reactions
     shares: FloatArray
     worst: WorstDirection
@@ -80,6 +81,7 @@ class Forces(LoadOptions):
         answer = Answer(
             design,
             pose,
+            tool,
             held,
             limit_shares(design, held),
             worst_direction(*given, most, tool),
@@ -115,7 +117,7 @@ def _as_json(answer: Answer) -> dict[str, object]:
 
 def _as_lines(answer: Answer) -> Iterator[str]:
     design, held = answer.design, answer.held
-    yield from (heading(design), pose_table(design, answer.pose), "")
+    yield from (heading(design), pose_table(design, answer.pose, answer.tool), "")
     size = float(np.abs(held.actuators).max())
     forces = [figure(value, size) for value in held.actuators.tolist()]
     shares = [_share(value) for value in answer.shares.tolist()]

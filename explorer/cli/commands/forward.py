@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from explorer.cli.options import DesignOptions, JsonOptions
+from explorer.cli.options import DesignOptions, JsonOptions, PointOptions
 from explorer.cli.output import degrees, figures, heading, table, write_json, write_lines
 from explorer.cli.values import numbers
 from explorer.errors import NoAnswerError
@@ -18,15 +18,20 @@ from explorer.mechanism.kinematics import (
     forward,
 )
 from explorer.mechanism.margins import TETRAHEDRA, margins, mode_name, signs_of
-from explorer.mechanism.pose import quaternion_from_rotation, yaw_pitch_roll_from_rotation
+from explorer.mechanism.pose import (
+    Triple,
+    quaternion_from_rotation,
+    yaw_pitch_roll_from_rotation,
+)
 from explorer.mechanism.tilt_torsion import tilt_torsion_from_rotation
+from explorer.mechanism.tool_point import tool_offset
 from explorer.numerics.arrays import FloatArray
 
 Joints = tuple[float, float, float, float, float, float]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Forward(JsonOptions, DesignOptions):
+class Forward(JsonOptions, PointOptions, DesignOptions):
     """Compute the eight assembly modes of the joints.
 
     All eight are real or none is. If none is, the exit status is 1 and the message names the
@@ -45,26 +50,30 @@ class Forward(JsonOptions, DesignOptions):
         design = self.read_design()
         joints = checked_joints(design, self.joints)
         squares, modes = discriminants(design, joints), forward(design, joints)
+        is_shown = self.at == "tool" or any(design.tool.position)
+        tool = design.tool.position if is_shown else None
         if self.json:
-            listed = _modes_json(modes) if modes.feasible else []
+            listed = _modes_json(modes, tool) if modes.feasible else []
             answer = {"feasible": modes.feasible, "discriminants": squares, "modes": listed}
             write_json(answer)
         elif modes.feasible:
             rows = [("joint", *JOINTS), ("units", *figures(self.joints))]
-            write_lines(heading(design), table(rows, "<>>>>>>"), "", _mode_table(modes))
+            write_lines(heading(design), table(rows, "<>>>>>>"), "", _mode_table(modes, tool))
         if not modes.feasible:
             raise NoAnswerError(_failure_message(design, joints, squares))
 
 
-def _modes_json(modes: ForwardKinematics) -> list[dict[str, object]]:
+def _modes_json(modes: ForwardKinematics, tool: Triple | None) -> list[dict[str, object]]:
     quaternion = quaternion_from_rotation(modes.rotation)
     tilt_torsion = tilt_torsion_from_rotation(modes.rotation)
     margin = margins(modes.position, modes.rotation)
+    at_tool = modes.position + tool_offset(modes.rotation, tool)
     return [
         {
             "mode": mode,
             "signs": signs_of(mode),
             "position": modes.position[mode],
+            **({} if tool is None else {"tool_position": at_tool[mode]}),
             "quaternion": quaternion[mode],
             "tilt_torsion": tilt_torsion[mode],
             "margins": margin[mode],
@@ -73,21 +82,24 @@ def _modes_json(modes: ForwardKinematics) -> list[dict[str, object]]:
     ]
 
 
-def _mode_table(modes: ForwardKinematics) -> str:
+def _mode_table(modes: ForwardKinematics, tool: Triple | None) -> str:
     angles = yaw_pitch_roll_from_rotation(modes.rotation)
     margin = margins(modes.position, modes.rotation)
-    rows = [("mode", "signs", *"xyz", "yaw", "pitch", "roll", "δ1", "δ2", "δ3")]
+    at_tool = modes.position + tool_offset(modes.rotation, tool)
+    names = () if tool is None else ("tool x", "tool y", "tool z")
+    rows = [("mode", "signs", *"xyz", *names, "yaw", "pitch", "roll", "δ1", "δ2", "δ3")]
     rows += [
         (
             str(mode),
             mode_name(mode),
             *figures(modes.position[mode].tolist()),
+            *(figures(at_tool[mode].tolist()) if names else ()),
             *degrees(angles[mode].tolist()),
             *figures(margin[mode].tolist()),
         )
         for mode in range(len(margin))
     ]
-    return table(rows, "<<" + ">" * 9)
+    return table(rows, "<<" + ">" * (len(rows[0]) - 2))
 
 
 def _failure_message(design: Design, joints: FloatArray, squares: FloatArray) -> str:

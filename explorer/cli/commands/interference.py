@@ -20,7 +20,9 @@ from explorer.cli.values import OPTIONAL, hint, numbers, whole_number
 from explorer.errors import InputError
 from explorer.measures.snapshot import evaluate
 from explorer.mechanism.design import Design
+from explorer.mechanism.kinematics import platform_points
 from explorer.mechanism.pose import Pose, Quadruple, Triple
+from explorer.mechanism.tool_point import tool_position
 
 MOST_STEPS = 100_000
 
@@ -35,7 +37,7 @@ class Interference(JsonOptions, RadiiOptions, PoseOptions, DesignOptions):
     """
 
     to: Annotated[Triple | None, numbers("--to", "x y z"), OPTIONAL] = None
-    """Move b4 straight to this position, in design units."""
+    """Move b4, or the tool, straight to this position, in design units."""
 
     to_quaternion: Annotated[Quadruple | None, numbers("--to-quaternion", "w x y z"), OPTIONAL] = (
         None
@@ -66,7 +68,7 @@ class Interference(JsonOptions, RadiiOptions, PoseOptions, DesignOptions):
     def run(self) -> None:
         """Write the clearances of the pose or of the move."""
         design = self.with_radii(self.read_design())
-        start = self.pose(design)
+        start, tool = self.pose(design), self.tool(design)
         here = evaluate(design, start)
         target = (self.to, self.to_quaternion, self.to_yaw_pitch_roll, self.to_tilt_torsion)
         if target == (None, None, None, None):
@@ -75,18 +77,18 @@ class Interference(JsonOptions, RadiiOptions, PoseOptions, DesignOptions):
                     "--steps divides a move; say where it goes with --to, --to-quaternion, "
                     "--to-yaw-pitch-roll or --to-tilt-torsion"
                 )
-            self.write(lambda: pose_json(here), lambda: pose_lines(here))
+            self.write(lambda: pose_json(here, tool), lambda: pose_lines(here, tool))
             return
         from explorer.legs.moves import move_clearance
 
-        end = make_pose("--to-", start, *target)
-        steps = _steps_of(design, start, end) if self.steps is None else self.steps
-        move = move_clearance(design, start, end, steps=steps)
+        end = make_pose("--to-", start, *target, tool)
+        steps = _steps_of(design, start, end, tool) if self.steps is None else self.steps
+        move = move_clearance(design, start, end, steps=steps, tool=tool)
         there = evaluate(design, end)
         self.write(lambda: move_json(move, here, there), lambda: move_lines(move, here, there))
 
 
-def _steps_of(design: Design, start: Pose, end: Pose) -> int:
+def _steps_of(design: Design, start: Pose, end: Pose, tool: Triple | None) -> int:
     """Return the number of steps in which no leg's end moves farther than a node step.
 
     Raises:
@@ -98,8 +100,10 @@ def _steps_of(design: Design, start: Pose, end: Pose) -> int:
     turn = math.acos(
         min(1.0, max(-1.0, 0.5 * (float(np.trace(end.rotation @ start.rotation.T)) - 1.0)))
     )
-    arm = max(math.hypot(*design.b1), abs(design.b2), abs(design.b3))
-    count = math.ceil((math.dist(start.position, end.position) + turn * arm) / step * (1.0 - 1e-9))
+    point = tool or (0.0, 0.0, 0.0)
+    arm = max(math.dist(end, point) for end in platform_points(design).tolist())
+    way = math.dist(tool_position(start, point), tool_position(end, point))
+    count = math.ceil((way + turn * arm) / step * (1.0 - 1e-9))
     if count > MOST_STEPS:
         raise InputError(
             f"in steps of {step:g}, the node step, this move takes {count:.3g}; at most "

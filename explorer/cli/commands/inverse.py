@@ -6,9 +6,18 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from explorer.cli.options import DesignOptions, JsonOptions, PoseOptions
-from explorer.cli.output import heading, lengths, limits_json, limits_lines, pose_table, table
+from explorer.cli.output import (
+    heading,
+    lengths,
+    limits_json,
+    limits_lines,
+    pose_json,
+    pose_table,
+    table,
+)
 from explorer.measures.snapshot import Snapshot, evaluate
 from explorer.mechanism.design import JOINTS, LENGTHS
+from explorer.mechanism.pose import Triple
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -21,18 +30,22 @@ class Inverse(JsonOptions, PoseOptions, DesignOptions):
     def run(self) -> None:
         """Write the joints of the pose."""
         design = self.read_design()
-        snapshot = evaluate(design, self.pose(design))
-        self.write(
-            lambda: {"joints": snapshot.joints, **limits_json(snapshot)}, lambda: _lines(snapshot)
-        )
+        snapshot, tool = evaluate(design, self.pose(design)), self.tool(design)
+        self.write(lambda: _as_json(snapshot, tool), lambda: _lines(snapshot, tool))
 
 
-def _lines(snapshot: Snapshot) -> Iterator[str]:
+def _as_json(snapshot: Snapshot, tool: Triple | None) -> dict[str, object]:
+    answer = {"joints": snapshot.joints, **limits_json(snapshot)}
+    return answer if tool is None else {**answer, **pose_json(snapshot.pose, tool)}
+
+
+def _lines(snapshot: Snapshot, tool: Triple | None) -> Iterator[str]:
     design = snapshot.design
     rows = [("joint", "units", "mm", "limits")]
     for name, value in zip(JOINTS, snapshot.joints.tolist(), strict=True):
         bounds = design.length_range(name) if name in LENGTHS else design.limits.guide
         allowed = f"{bounds[0]:.6g} to {bounds[1]:.6g}" if bounds else "none"
         rows.append((name, *lengths(design, value, design.reach), allowed))
-    yield from (heading(design), pose_table(design, snapshot.pose), "", table(rows, "<>><"), "")
+    pose = pose_table(design, snapshot.pose, tool)
+    yield from (heading(design), pose, "", table(rows, "<>><"), "")
     yield from limits_lines(snapshot)

@@ -7,12 +7,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
-from explorer.cli.options import DesignOptions, JsonOptions
+from explorer.cli.options import DesignOptions, JsonOptions, PointOptions
 from explorer.cli.output import degrees, figure, figures, finite, heading, table
 from explorer.cli.values import finite_number, hint, numbers, whole_number
 from explorer.mechanism.design import Design
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import Triple
+from explorer.mechanism.tool_point import Point, position_of
 
 if TYPE_CHECKING:
     from explorer.workspace.orientations.share import OrientationShare
@@ -21,17 +22,18 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Orientation(JsonOptions, DesignOptions):
+class Orientation(JsonOptions, PointOptions, DesignOptions):
     """Measure the orientations of a position: share of all, greatest tilts, torsion.
 
     The platform tilts from tilt zero, at one torsion and in each azimuth, until it meets the first
-    limit. Collisions of legs are not among the limits.
+    limit. Collisions of legs are not among the limits. With `--at tool` the tool stays in its
+    place, and b4 moves about it.
     """
 
     position: Annotated[
         Triple | None, numbers("--position", "x y z"), hint("default: that of the home pose")
     ] = None
-    """Position of b4 in the base frame, in design units."""
+    """Position of b4, or of the tool, in the base frame, in design units."""
 
     torsion: Annotated[
         float | None,
@@ -51,17 +53,18 @@ class Orientation(JsonOptions, DesignOptions):
         from explorer.workspace.orientations.torsions import tilt_by_torsion, torsion_range
 
         design = self.read_design()
-        home = home_pose(design)
-        position = home.position if self.position is None else self.position
+        home, tool = home_pose(design), self.tool(design)
+        position = position_of(design, home, self.at) if self.position is None else self.position
         found = _Orientations(
             design=design,
+            at=self.at,
             position=position,
-            share=orientation_share(design, position, self.samples),
-            least=greatest_tilt(design, position, self.torsion),
-            tilts=tilt_map(design, position, self.torsion),
-            by_torsion=tilt_by_torsion(design, position),
-            torsions=torsion_range(design, position, self.torsion),
-            is_home_connected=is_connected(design, position, home.rotation),
+            share=orientation_share(design, position, self.samples, tool=tool),
+            least=greatest_tilt(design, position, self.torsion, tool),
+            tilts=tilt_map(design, position, self.torsion, tool=tool),
+            by_torsion=tilt_by_torsion(design, position, tool=tool),
+            torsions=torsion_range(design, position, self.torsion, tool=tool),
+            is_home_connected=is_connected(design, position, home.rotation, tool=tool),
         )
         self.write(found.as_json, found.as_lines)
 
@@ -71,6 +74,7 @@ class _Orientations:
     """The orientations of a position, ready to be written."""
 
     design: Design
+    at: Point
     position: Triple
     share: OrientationShare
     least: GreatestTilt
@@ -83,7 +87,7 @@ class _Orientations:
         """Return the answer as plain values."""
         least, torsions, best = self.least, self.torsions, self.by_torsion.best
         return {
-            "position": self.position,
+            "position" if self.at == "b4" else "tool_position": self.position,
             "share": self.share.share,
             "standard_error": self.share.standard_error,
             "orientations": self.share.orientations,
@@ -106,7 +110,8 @@ class _Orientations:
     def as_lines(self) -> Iterator[str]:
         """Yield the answer as lines of text."""
         least = self.least
-        yield from (heading(self.design), f"position  {'  '.join(figures(self.position))}", "")
+        name = "position" if self.at == "b4" else "tool position"
+        yield from (heading(self.design), f"{name}  {'  '.join(figures(self.position))}", "")
         rows = [
             ("share of all orientations", self._share()),
             ("torsion", *degrees([least.torsion])),

@@ -10,7 +10,13 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 import tyro
 
-from explorer.cli.options import DesignOptions, JsonOptions, RadiiOptions, make_pose
+from explorer.cli.options import (
+    DesignOptions,
+    JsonOptions,
+    PointOptions,
+    RadiiOptions,
+    make_pose,
+)
 from explorer.cli.output import (
     attributes,
     figure,
@@ -41,11 +47,12 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Path(JsonOptions, RadiiOptions, DesignOptions):
+class Path(JsonOptions, RadiiOptions, PointOptions, DesignOptions):
     """Plan a path between two poses within limits, margins and clearances.
 
     Both poses must have the same assembly mode. A pose is a position x y z, or a position and yaw
-    pitch roll in degrees, or a position and a quaternion w x y z. Needs the extra `planning`.
+    pitch roll in degrees, or a position and a quaternion w x y z. With `--at tool` positions are
+    those of the tool, which then goes straight in each move. Needs the extra `planning`.
     """
 
     from_: Annotated[
@@ -112,7 +119,8 @@ class Path(JsonOptions, RadiiOptions, DesignOptions):
     """Number of rows of the trajectory."""
 
     out: Annotated[File | None, hint("optional", "FILE.csv")] = None
-    """File for the trajectory as CSV: time, joints and pose."""
+    """File for the trajectory as CSV: time, joints and pose, and the tool's position with `--at
+    tool`."""
 
     def run(self) -> None:
         """Write the path.
@@ -127,6 +135,7 @@ class Path(JsonOptions, RadiiOptions, DesignOptions):
         from explorer.paths.trajectory import trajectory
 
         design = self.with_radii(self.read_design())
+        tool = self.tool(design)
         starts = (
             self.from_,
             self.from_quaternion,
@@ -134,22 +143,22 @@ class Path(JsonOptions, RadiiOptions, DesignOptions):
             self.from_tilt_torsion,
         )
         ends = (self.to, self.to_quaternion, self.to_yaw_pitch_roll, self.to_tilt_torsion)
-        start = _pose("--from", home_pose(design), *starts)
+        start = _pose("--from", home_pose(design), *starts, tool)
         if ends == (None, None, None, None):
             raise InputError(
                 "say where the path ends with --to, --to-quaternion, --to-yaw-pitch-roll "
                 "or --to-tilt-torsion"
             )
-        goal = _pose("--to", start, *ends)
+        goal = _pose("--to", start, *ends, tool)
         if self.out is not None:
             check_writable(self.out)
         try:
-            path = plan_path(design, start, goal, seconds=self.seconds)
+            path = plan_path(design, start, goal, seconds=self.seconds, tool=tool)
         except (EndError, NoPathError) as error:
             if self.json:
                 write_json({"found": False, "reason": error.reason, "poses": []})
             raise
-        timed = trajectory(design, path.poses, speed=self.speed, samples=self.samples)
+        timed = trajectory(design, path.poses, speed=self.speed, samples=self.samples, tool=tool)
         if self.out is not None:
             write_trajectory(timed, self.out)
         self.write(
@@ -165,6 +174,7 @@ def _pose(
     quaternion: Quadruple | None,
     yaw_pitch_roll: Triple | None,
     tilt_torsion: Triple | None,
+    tool: Triple | None,
 ) -> Pose:
     """Return the pose of an option whose position an orientation may follow."""
     position = None
@@ -185,17 +195,19 @@ def _pose(
                 yaw_pitch_roll = (rest[0], rest[1], rest[2])
             else:
                 quaternion = (rest[0], rest[1], rest[2], rest[3])
-    return make_pose(f"{option}-", default, position, quaternion, yaw_pitch_roll, tilt_torsion)
+    given = (position, quaternion, yaw_pitch_roll, tilt_torsion)
+    return make_pose(f"{option}-", default, *given, tool)
 
 
 def _as_json(path: PlannedPath, timed: Trajectory, out: File | None) -> dict[str, object]:
+    names = "time joints position quaternion" + (" tool_position" if path.tool else "")
     answer: dict[str, object] = {
         "found": True,
         "reason": None,
-        "poses": [pose_json(pose) for pose in path.poses],
+        "poses": [pose_json(pose, path.tool) for pose in path.poses],
         **attributes(path, "length margin clearance seconds checked"),
         "duration": timed.duration,
-        "trajectory": attributes(timed, "time joints position quaternion"),
+        "trajectory": attributes(timed, names),
     }
     return answer if out is None else {**answer, "file": out}
 
@@ -205,10 +217,10 @@ def _as_lines(
 ) -> Iterator[str]:
     from explorer.paths.crossings import path_margins
 
-    least = np.abs(path_margins(path.poses).margins).min(axis=0).tolist()
+    least = np.abs(path_margins(path.poses, tool=path.tool).margins).min(axis=0).tolist()
     yield heading(design)
     for name, pose in (("from", path.poses[0]), ("to", path.poses[-1])):
-        yield from (name, *indented(pose_table(design, pose)))
+        yield from (name, *indented(pose_table(design, pose, path.tool)))
     rows = [
         ("moves", f"{len(path.poses) - 1}, each proved to keep limits and clearances"),
         ("length", f"{figure(path.length)} (root mean square of b1 to b4)"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -11,17 +12,21 @@ from explorer.cli.output import (
     degrees,
     figure,
     figures,
+    finite,
     heading,
     lengths,
     pose_json,
     pose_table,
     table,
+    tool_json,
 )
 from explorer.measures.snapshot import Snapshot, evaluate
 from explorer.measures.verdict import verdict
 from explorer.mechanism.margins import INCIDENCES, TETRAHEDRA, describe_modes
-from explorer.mechanism.pose import yaw_pitch_roll_from_rotation
+from explorer.mechanism.pose import Triple, yaw_pitch_roll_from_rotation
 from explorer.singularity.bruhat import describe_stratum, incidences
+from explorer.singularity.ellipsoids import performance
+from explorer.singularity.jacobian import inverse_condition, jacobian
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,17 +35,18 @@ class Singularity(JsonOptions, PoseOptions, DesignOptions):
 
     A margin is zero where its tetrahedron is flat; the signs of the three margins name the
     assembly mode. The nearest singular poses minimise the root-mean-square displacement of the
-    platform's points b1 to b4.
+    platform's points b1 to b4. With `--at tool` the ellipsoids of speeds and forces at the tool
+    follow; the singular poses themselves do not depend on the tool.
     """
 
     def run(self) -> None:
         """Write the margins of the pose and the measures of singularity."""
         design = self.read_design()
-        snapshot = evaluate(design, self.pose(design))
-        self.write(lambda: _as_json(snapshot), lambda: _as_lines(snapshot))
+        snapshot, tool = evaluate(design, self.pose(design)), self.tool(design)
+        self.write(lambda: _as_json(snapshot, tool), lambda: _as_lines(snapshot, tool))
 
 
-def _as_json(snapshot: Snapshot) -> dict[str, object]:
+def _as_json(snapshot: Snapshot, tool: Triple | None) -> dict[str, object]:
     names = "margins volumes determinant inverse_condition stratum stratum_dimension mode signs"
     return {
         **attributes(snapshot, f"{names} proximity"),
@@ -48,16 +54,42 @@ def _as_json(snapshot: Snapshot) -> dict[str, object]:
         "nearest": [
             {
                 **attributes(nearest, "incidence distance"),
-                **pose_json(nearest.pose),
+                **pose_json(nearest.pose, tool),
             }
             for nearest in snapshot.nearest
         ],
+        **({} if tool is None else _tool_json(snapshot, tool)),
     }
 
 
-def _as_lines(snapshot: Snapshot) -> Iterator[str]:
+def _tool_json(snapshot: Snapshot, tool: Triple) -> dict[str, object]:
+    """Return the tool's position, and the condition of J and the ellipsoids at the tool."""
+    found = performance(snapshot.design, snapshot.pose, tool)
+    return {
+        **tool_json(snapshot.pose, tool),
+        "tool_inverse_condition": _condition_at(snapshot, tool),
+        "tool_ellipsoids": {
+            name: {
+                "gain": [finite(gain) for gain in ellipsoid.gain.tolist()],
+                "axes": ellipsoid.axes.T,
+            }
+            for name, ellipsoid in (
+                ("translation", found.translation),
+                ("rotation", found.rotation),
+            )
+        },
+    }
+
+
+def _condition_at(snapshot: Snapshot, tool: Triple) -> float:
+    pose, design = snapshot.pose, snapshot.design
+    rates = jacobian(design, pose.position, pose.rotation, tool)
+    return float(inverse_condition(rates, design.reach))
+
+
+def _as_lines(snapshot: Snapshot, tool: Triple | None) -> Iterator[str]:
     design = snapshot.design
-    yield from (heading(design), pose_table(design, snapshot.pose), "")
+    yield from (heading(design), pose_table(design, snapshot.pose, tool), "")
     rows = [("margin", "units", "mm", "zero when", "tetrahedron", "volume")]
     for index, margin in enumerate(snapshot.margins.tolist()):
         volume = figure(float(snapshot.volumes[index]), float(snapshot.volume_sizes[index]))
@@ -71,6 +103,21 @@ def _as_lines(snapshot: Snapshot) -> Iterator[str]:
         distance = lengths(design, nearest.distance)
         rows.append((f"δ{nearest.incidence} = 0", *distance, x, y, z, yaw, pitch, roll))
     yield table(rows, "<>>>>>>>>")
+    if tool is not None:
+        yield from ("", _tool_lines(snapshot, tool))
+
+
+def _tool_lines(snapshot: Snapshot, tool: Triple) -> str:
+    """Return the axes of the ellipsoids at the tool."""
+    found = performance(snapshot.design, snapshot.pose, tool)
+    rows = [("of the tool per actuator speed", "gain", "x", "y", "z")]
+    for name, ellipsoid in (("speed", found.translation), ("turn times reach", found.rotation)):
+        for gain, axis in zip(ellipsoid.gain.tolist(), ellipsoid.axes.T.tolist(), strict=True):
+            shown = figure(gain) if math.isfinite(gain) else "infinite"
+            x, y, z = figures(axis)
+            rows.append((name, shown, x, y, z))
+    condition = figure(_condition_at(snapshot, tool), 1.0)
+    return f"{table(rows, '<>>>>')}\ninverse condition at the tool  {condition}"
 
 
 def _measures(snapshot: Snapshot) -> str:

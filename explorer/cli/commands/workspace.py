@@ -9,8 +9,14 @@ import numpy as np
 
 from explorer.cli.answers.workspace import WorkspaceMeasures
 from explorer.cli.load_options import Load
-from explorer.cli.options import DesignOptions, JsonOptions, OrientationOptions, RadiiOptions
-from explorer.cli.output import degrees, heading
+from explorer.cli.options import (
+    DesignOptions,
+    JsonOptions,
+    OrientationOptions,
+    PointOptions,
+    RadiiOptions,
+)
+from explorer.cli.output import degrees, figures, heading
 from explorer.cli.values import (
     OPTIONAL,
     Flag,
@@ -39,11 +45,13 @@ SAMPLES_OF_TILT = 33
 
 
 @dataclass(frozen=True, kw_only=True)
-class Workspace(JsonOptions, RadiiOptions, OrientationOptions, DesignOptions):
+class Workspace(JsonOptions, RadiiOptions, OrientationOptions, PointOptions, DesignOptions):
     """Measure the workspace: exact volume and gradient, the paper's nodes, a mesh.
 
     Ranges or a tilt add the reachable volume (union over these orientations) and the dexterous
     volume (intersection). An empty workspace is an answer too, with the limits that empty it.
+    With `--at tool` it is the workspace of the tool point: at one orientation moved as a whole,
+    over several each by its own vector.
     """
 
     step: Annotated[float | None, positive("--step"), hint("default: that of the design")] = None
@@ -89,7 +97,8 @@ class Workspace(JsonOptions, RadiiOptions, OrientationOptions, DesignOptions):
     is held within the limits of actuators, struts and guide."""
 
     capability: Annotated[Triple | None, numbers("--capability", "x y z"), OPTIONAL] = None
-    """Position at which to compute the share of feasible orientations, among the given or all."""
+    """Position of b4, or of the tool, at which to compute the share of feasible orientations, among
+    the given or all."""
 
     table1: Flag = False
     """Measure the claim table-1 of `explorer reproduce` instead: the paper's Table 1."""
@@ -107,7 +116,10 @@ class Workspace(JsonOptions, RadiiOptions, OrientationOptions, DesignOptions):
         pose = self.oriented_home(design)
         measures = self._measure(design, pose, self._orientations(pose))
         angles = "  ".join(degrees(yaw_pitch_roll_from_rotation(pose.rotation).tolist()))
-        head = (heading(design), f"yaw pitch roll  {angles}", "")
+        head = [heading(design), f"yaw pitch roll  {angles}", ""]
+        if self.at == "tool":
+            tool = "  ".join(figures(design.tool.position))
+            head.insert(2, f"of the tool point  {tool}")
         self.write(measures.as_json, lambda: (*head, *measures.as_lines()))
 
     def _measure(
@@ -120,12 +132,16 @@ class Workspace(JsonOptions, RadiiOptions, OrientationOptions, DesignOptions):
         _ = case.paper_nodes
         solid = solids.workspace_solid(design, pose.rotation, self.tolerance, volume=case.volume)
         case.mesh = solid
+        shift, tool = self.shift(design, pose), self.tool(design)
+        if shift is not None:
+            solid = solid.shifted(shift)
         reachable = dexterous = None
         if orientations is not None:
-            reachable = solids.reachable_solid(design, orientations, self.tolerance)
-            dexterous = solids.dexterous_solid(design, orientations, self.tolerance)
+            reachable = solids.reachable_solid(design, orientations, self.tolerance, tool)
+            dexterous = solids.dexterous_solid(design, orientations, self.tolerance, tool)
         return WorkspaceMeasures(
             case=case,
+            shift=shift,
             solid=solid,
             hull=solids.convex_hull(solid) if self.hull else None,
             orientations=None if orientations is None else len(orientations),
@@ -198,4 +214,4 @@ class Workspace(JsonOptions, RadiiOptions, OrientationOptions, DesignOptions):
 
         count = self.samples or CAPABILITY_ORIENTATIONS
         chosen = count if orientations is None else orientations
-        return orientation_capability(design, self.capability, chosen)
+        return orientation_capability(design, self.capability, chosen, self.tool(design))

@@ -1,0 +1,356 @@
+"""The option `--at tool`: positions, loads and results of the tool point, in every command."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+import trimesh
+from command_line import CommandLine
+from mesh_files import mesh_of, read_3mf
+from numpy.testing import assert_allclose
+from scipy.spatial.transform import Rotation
+from tool_moves import tool_move
+
+import explorer
+from explorer.export.opencascade import occ, volume_of
+from explorer.mechanism.tool_point import pose_with, position_of
+from explorer.numerics.arrays import FloatArray
+from explorer.singularity.ellipsoids import performance
+
+OPTIMAL = explorer.PRESETS["paper-optimal"]
+TOOL = (1.0, -0.5, 3.0)
+TOOLED = msgspec.structs.replace(OPTIMAL, tool=explorer.Tool(position=TOOL), name="tooled")
+PLACE = (9.0, 3.0, 12.5)
+ANGLES = (-65.0, 8.0, -4.0)
+TURN = explorer.rotation_from_yaw_pitch_roll(ANGLES)
+B4 = np.array(PLACE) - TURN @ TOOL
+POSE = ["--position", *map(str, PLACE), "--yaw-pitch-roll", *map(str, ANGLES)]
+
+
+@pytest.fixture
+def tooled(tmp_path: Path) -> list[str]:
+    """Return the options that mean the tool of a design in a file."""
+    path = tmp_path / "tooled.json"
+    path.write_bytes(explorer.encode_design(TOOLED))
+    return ["--design", str(path), "--at", "tool"]
+
+
+def test_positions_are_those_of_the_tool(cli: CommandLine, tooled: list[str]) -> None:
+    found = cli.answer("inverse", *POSE, *tooled)
+    assert_allclose(found["joints"], explorer.inverse(TOOLED, B4, TURN), rtol=1e-12)
+    assert_allclose(found["tool_position"], PLACE)
+    assert_allclose(found["position"], B4)
+    assert "tool position         9.00000  3.00000  12.5000" in cli.text("inverse", *POSE, *tooled)
+
+
+def test_poses_are_completed_from_the_tool_at_home(cli: CommandLine, tooled: list[str]) -> None:
+    home = explorer.home_pose(TOOLED)
+    at_home = np.array(home.position) + home.rotation @ TOOL
+    assert cli.answer("inverse", *tooled)["position"] == list(home.position)
+    turned = cli.answer("inverse", "--yaw-pitch-roll", *ANGLES, *tooled)
+    assert_allclose(turned["tool_position"], at_home)
+    assert_allclose(turned["position"], at_home - TURN @ TOOL)
+    moved = cli.answer("inverse", "--position", *PLACE, *tooled)
+    assert_allclose(moved["position"], np.array(PLACE) - home.rotation @ TOOL)
+    assert_allclose(moved["quaternion"], home.quaternion)
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("inverse",),
+        ("singularity",),
+        ("forces", "--load", "1", "2", "3"),
+        ("accuracy", "--errors", "0.1"),
+        ("interference",),
+        ("interference", "--to", "9", "4", "8"),
+        ("orientation", "--samples", "500"),
+        ("workspace", "--step", "4", "--yaw-range", "-80", "-70", "--samples", "2"),
+    ],
+)
+def test_answers_at_b4_are_those_without_the_option(
+    cli: CommandLine, tooled: list[str], command: tuple[str, ...]
+) -> None:
+    pose = [] if command[0] in ("orientation", "workspace") else POSE
+    without, at_b4, in_text = (
+        cli.run(*command, *pose, *more)[0]
+        for more in (["--json"], ["--json", "--at", "b4"], ["--at", "b4"])
+    )
+    assert without == at_b4
+    assert "tool position" not in in_text
+    # With a tool at b4 the numbers are the same.
+    same = cli.answer(*command, *pose, "--at", "tool")
+    for key, value in cli.answer(*command, *pose).items():
+        if isinstance(value, float):
+            assert same[key] == pytest.approx(value, rel=1e-9)
+
+
+def test_forces_are_those_of_a_load_at_the_tool(cli: CommandLine, tooled: list[str]) -> None:
+    load = [3.0, -2.0, -10.0, 0.0, 0.0, 0.0]
+    found = cli.answer("forces", *POSE, "--load", *load, *tooled)
+    assert_allclose(
+        found["actuator_forces"], explorer.actuator_forces(TOOLED, B4, TURN, load, TOOL)
+    )
+
+
+def test_accuracy_is_that_of_the_tool(cli: CommandLine, tooled: list[str]) -> None:
+    found = cli.answer("accuracy", *POSE, "--errors", "0.2", *tooled)
+    expected = explorer.worst_error(TOOLED, B4, TURN, [0.02] * 6, TOOL)
+    assert found["worst_displacement"] == pytest.approx(float(expected.displacement))
+
+
+def test_singularity_has_the_ellipsoids_of_the_tool(cli: CommandLine, tooled: list[str]) -> None:
+    found = cli.answer("singularity", *POSE, *tooled)
+    pose = explorer.Pose.of(B4, TURN)
+    expected = performance(TOOLED, pose, TOOL)
+    for name in ("translation", "rotation"):
+        assert_allclose(found["tool_ellipsoids"][name]["gain"], getattr(expected, name).gain)
+        axes = np.array(found["tool_ellipsoids"][name]["axes"])
+        assert_allclose(np.abs(axes @ getattr(expected, name).axes), np.eye(3), atol=1e-9)
+    # Twists of the tool at unit speed of one actuator lie in the ellipsoid.
+    inverse = np.linalg.inv(explorer.jacobian(TOOLED, B4, TURN))
+    speeds = inverse[:3].T + np.cross(inverse[3:].T, TURN @ TOOL)
+    ellipsoid = found["tool_ellipsoids"]["translation"]
+    shares = speeds @ np.array(ellipsoid["axes"]).T / ellipsoid["gain"]
+    assert np.linalg.norm(shares, axis=-1).max() <= 1.0 + 1e-9
+    # Singular poses do not depend on the tool.
+    same = cli.answer("singularity", "--position", *B4.tolist(), "--yaw-pitch-roll", *ANGLES)
+    for key in ("margins", "determinant", "inverse_condition", "proximity", "stratum"):
+        assert_allclose(found[key], same[key], rtol=1e-9)
+    for ours, theirs in zip(found["nearest"], same["nearest"], strict=True):
+        assert ours["distance"] == pytest.approx(theirs["distance"], rel=1e-6)
+        rotation = Rotation.from_quat(ours["quaternion"], scalar_first=True).as_matrix()
+        assert_allclose(ours["tool_position"], ours["position"] + rotation @ TOOL, atol=1e-9)
+
+
+def test_singularity_at_a_singular_pose_has_infinite_speeds(
+    cli: CommandLine, tooled: list[str]
+) -> None:
+    low = ["--position", *map(str, (np.array([10.0, 5.0, 0.0]) + TURN @ TOOL).tolist())]
+    answer = cli.answer("singularity", *low, *POSE[4:], *tooled)
+    assert None in answer["tool_ellipsoids"]["translation"]["gain"]
+    assert "infinite" in cli.text("singularity", *low, *POSE[4:], *tooled)
+
+
+def test_forward_has_the_tool_of_each_mode(cli: CommandLine, tooled: list[str]) -> None:
+    joints = explorer.inverse(TOOLED, B4, TURN).tolist()
+    for options in (tooled, tooled[:2]):
+        modes = cli.answer("forward", "--joints", *joints, *options)["modes"]
+        for mode in modes:
+            rotation = Rotation.from_quat(mode["quaternion"], scalar_first=True).as_matrix()
+            expected = mode["position"] + rotation @ TOOL
+            assert_allclose(mode["tool_position"], expected, atol=1e-9)
+        assert (
+            min(float(np.linalg.norm(np.array(m["tool_position"]) - PLACE)) for m in modes) < 1e-9
+        )
+    assert "tool z" in cli.text("forward", "--joints", *joints, *tooled)
+    plain = cli.answer("forward", "--joints", *joints)["modes"]
+    assert all("tool_position" not in mode for mode in plain)
+
+
+def test_interference_of_a_move_of_the_tool_is_that_of_its_line(
+    cli: CommandLine, tooled: list[str]
+) -> None:
+    to = ["--to", "11", "5", "11", "--to-yaw-pitch-roll", "-85", "-10", "15"]
+    found = cli.answer("interference", *POSE, *to, "--radii", "0.2", *tooled)
+    turn = explorer.rotation_from_yaw_pitch_roll((-85.0, -10.0, 15.0))
+    start, end = explorer.Pose.of(B4, TURN), explorer.Pose.of([11.0, 5.0, 11.0] - turn @ TOOL, turn)
+    limits = msgspec.structs.replace(TOOLED.limits, leg_radii=(0.2,) * 4)
+    design = msgspec.structs.replace(TOOLED, limits=limits)
+    poses = tool_move(start, end, np.linspace(0.0, 1.0, 2001), np.array(TOOL))
+    least = explorer.leg_clearances(design, *poses).clearance.min(axis=0)
+    for pair, expected in zip(found["pairs"], least, strict=True):
+        assert pair["bound"] <= expected + 1e-9
+        assert pair["clearance"] == pytest.approx(expected, abs=1e-4)
+        place = tool_move(start, end, pair["share"], np.array(TOOL))
+        assert_allclose(pair["position"], place[0][0], atol=1e-9)
+        assert_allclose(pair["tool_position"], place[0][0] + place[1][0] @ TOOL, atol=1e-9)
+    assert_allclose(found["end"]["tool_position"], (11.0, 5.0, 11.0), atol=1e-9)
+    assert "tool there" in cli.text("interference", *POSE, *to, *tooled)
+
+
+def test_path_of_the_tool_goes_straight(
+    cli: CommandLine, tooled: list[str], tmp_path: Path
+) -> None:
+    out = tmp_path / "path.csv"
+    to = ["--to", "11", "5", "11", "--to-yaw-pitch-roll", "-85", "-10", "15"]
+    where = ["--from", *POSE[1:4], "--from-yaw-pitch-roll", *POSE[5:]]
+    found = cli.answer("path", *where, *to, *tooled, "--samples", "41", "--out", out)
+    assert_allclose(found["poses"][0]["tool_position"], PLACE, atol=1e-9)
+    assert_allclose(found["poses"][-1]["tool_position"], (11.0, 5.0, 11.0), atol=1e-9)
+    assert_allclose(found["poses"][0]["position"], B4, atol=1e-9)
+    assert len(found["poses"]) == 2
+    timed = found["trajectory"]
+    positions, tools = np.array(timed["position"]), np.array(timed["tool_position"])
+    rotations = Rotation.from_quat(timed["quaternion"], scalar_first=True).as_matrix()
+    assert_allclose(tools, positions + rotations @ TOOL, atol=1e-9)
+    along = tools - tools[0]
+    way = along[-1] / np.linalg.norm(along[-1])
+    assert_allclose(along, (along @ way)[:, None] * way, atol=1e-9)
+    # b4 goes along a curve, and every pose of it is within the limits.
+    off = positions - positions[0]
+    straight = off[-1] / np.linalg.norm(off[-1])
+    assert np.linalg.norm(off - (off @ straight)[:, None] * straight, axis=1).max() > 0.05
+    assert explorer.poses_are_valid(TOOLED, positions, rotations).all()
+    head, *rows = csv.reader(out.read_text(encoding="utf-8").splitlines())
+    assert head[-3:] == ["tool_x", "tool_y", "tool_z"]
+    assert_allclose([[float(word) for word in row[-3:]] for row in rows], tools)
+    assert "tool position" in cli.text("path", *where, *to, *tooled)
+    assert "tool_position" not in cli.answer("path", "--to", "11", "5", "8")["trajectory"]
+
+
+def is_within(rotation: FloatArray) -> bool:
+    """Return whether the tool can be at `PLACE` with an orientation."""
+    pose = explorer.Pose.of(np.array(PLACE) - rotation @ TOOL, rotation)
+    return not explorer.evaluate(TOOLED, pose).violations
+
+
+def test_workspace_of_the_tool_is_moved_as_a_whole(cli: CommandLine, tooled: list[str]) -> None:
+    options = ["--step", "4", "--hull", "--interference", "--yaw-pitch-roll", *POSE[5:]]
+    found, b4 = (cli.answer("workspace", *options, *more) for more in (tooled, tooled[:2]))
+    for key, value in b4.items():
+        if key != "extent":
+            if key in ("mesh", "reachable_solid"):
+                assert found[key]["volume"] == pytest.approx(value["volume"], rel=1e-9)
+            elif key == "hull_volume":
+                assert found[key] == pytest.approx(value, rel=1e-9)
+            else:
+                assert found[key] == value, key
+    assert_allclose(found["extent"], np.array(b4["extent"]) + TURN @ TOOL)
+    assert "of the tool point  1.00000  -0.500000  3.00000" in cli.text("workspace", *tooled)
+
+
+def test_workspaces_over_orientations_are_those_of_the_tool(
+    cli: CommandLine, tooled: list[str]
+) -> None:
+    options = ["--yaw-range", "-80", "-60", "--pitch-range", "-10", "10", "--samples", "3"]
+    found, b4 = (
+        cli.answer("workspace", *options, "--tolerance", "0.2", *more)
+        for more in (tooled, tooled[:2])
+    )
+    rotations = explorer.rotation_from_yaw_pitch_roll(
+        [(yaw, pitch, 0.0) for yaw in (-80.0, -70.0, -60.0) for pitch in (-10.0, 0.0, 10.0)]
+    )
+    # Volumes by counting random positions of the tool.
+    low, high = np.array([-5.0, -18.0, -4.0]), np.array([26.0, 28.0, 26.0])
+    points = np.random.default_rng(0).uniform(low, high, (60_000, 3))
+    box = float(np.prod(high - low))
+    for tool, answer in ((TOOL, found), ((0.0, 0.0, 0.0), b4)):
+        within = explorer.poses_are_valid(TOOLED, points[:, None] - rotations @ tool, rotations)
+        for key, holds in (("reachable", within.any(axis=1)), ("dexterous", within.all(axis=1))):
+            share = float(holds.mean())
+            error = 5.0 * box * (share * (1.0 - share) / len(points)) ** 0.5
+            volume = answer[f"{key}_mesh"]["volume"]
+            assert volume == pytest.approx(box * share, abs=error + 0.01 * volume)
+            assert answer[f"{key}_mesh"]["watertight"]
+    assert found["dexterous_mesh"]["volume"] < 0.97 * b4["dexterous_mesh"]["volume"]
+
+
+def test_capability_and_orientations_are_those_of_the_tool(
+    cli: CommandLine, tooled: list[str]
+) -> None:
+    share = cli.answer(
+        "workspace", "--capability", *PLACE, "--samples", "3000", "--step", "4", *tooled
+    )["orientation_capability"]
+    assert share == explorer.orientation_capability(TOOLED, PLACE, 3000, TOOL)
+    found = cli.answer("orientation", "--position", *PLACE, "--samples", "3000", *tooled)
+    assert found["share"] == share
+    assert found["tool_position"] == list(PLACE)
+    assert "position" not in found
+    assert found["greatest_tilt"] == explorer.greatest_tilt(TOOLED, PLACE, tool=TOOL).tilt
+    # The tool is in its place along each tilt, up to the limit and not beyond it.
+    for index in range(0, 72, 12):
+        azimuth, tilt = found["azimuths"][index], found["tilts"][index]
+        inside, outside = (
+            explorer.rotation_from_tilt_torsion((azimuth, tilt + more, found["torsion"]))
+            for more in (-0.01, 0.01)
+        )
+        assert is_within(inside)
+        assert not is_within(outside)
+    home = explorer.home_pose(TOOLED)
+    default = cli.answer("orientation", "--samples", "10", *tooled)
+    assert_allclose(default["tool_position"], position_of(TOOLED, home, "tool"))
+    assert default["home_connected"]
+
+
+def points_of(file: Path) -> FloatArray:
+    """Return the vertices in a file of a mesh in millimetres of the base frame, shape (n, 3)."""
+    if file.suffix == ".3mf":
+        resources = read_3mf(file.read_bytes()).GetMeshObjects()
+        resources.MoveNext()
+        return np.asarray(mesh_of(resources.GetCurrentMeshObject()).vertices)
+    untyped: Any = trimesh
+    mesh = untyped.load(file, process=False, force="mesh")
+    points = np.array(mesh.vertices, dtype=np.float64)
+    return 1e3 * points @ [[1, 0, 0], [0, 0, 1], [0, -1, 0]] if file.suffix == ".glb" else points
+
+
+@pytest.mark.parametrize("what", ["workspace", "hull"])
+@pytest.mark.parametrize("suffix", ["ply", "obj", "stl", "glb", "3mf"])
+def test_export_of_the_workspace_is_moved_to_the_tool(
+    cli: CommandLine, tooled: list[str], tmp_path: Path, what: str, suffix: str
+) -> None:
+    files = [tmp_path / f"{name}.{suffix}" for name in ("b4", "tool")]
+    answers = [
+        cli.answer("export", what, "--out", file, "--yaw-pitch-roll", *ANGLES, *options)
+        for file, options in zip(files, (tooled[:2], tooled), strict=True)
+    ]
+    assert answers[1]["volume"] == pytest.approx(answers[0]["volume"], rel=1e-9)
+    b4, tool = (points_of(file) for file in files)
+    offset = TOOLED.unit_mm * TURN @ TOOL
+    assert_allclose(tool.min(axis=0), b4.min(axis=0) + offset, atol=1e-4)
+    assert_allclose(tool.max(axis=0), b4.max(axis=0) + offset, atol=1e-4)
+    if suffix == "ply" and what == "workspace":
+        assert_allclose(tool, b4 + offset, atol=1e-9)
+        assert b"workspace of the tool of tooled" in files[1].read_bytes()
+
+
+def test_export_of_what_has_no_workspace_refuses_the_tool(
+    cli: CommandLine, tooled: list[str], tmp_path: Path
+) -> None:
+    for what, name in (("mechanism", "a.3mf"), ("simulation", "a.mjcf")):
+        refusal = cli.refusal("export", what, "--out", tmp_path / name, *tooled)
+        assert f"--at is not for {what}" in refusal
+
+
+def test_export_of_the_exact_workspace_is_moved_to_the_tool(
+    cli: CommandLine, tooled: list[str], tmp_path: Path
+) -> None:
+    pytest.importorskip("OCP")
+    boxes: list[Any] = []
+    for name, options in (("b4", tooled[:2]), ("tool", tooled)):
+        path = tmp_path / f"{name}.step"
+        answer = cli.answer("export", "workspace", "--out", path, *options)
+        reader = occ("STEPControl_Reader")()
+        reader.ReadFile(str(path))
+        reader.TransferRoots()
+        shape, box = reader.OneShape(), occ("Bnd_Box")()
+        assert volume_of(shape) == pytest.approx(answer["volume"] * 1e3, rel=1e-6)
+        occ("BRepBndLib").AddOptimal_s(shape, box, False, False)
+        corners = box.CornerMin(), box.CornerMax()
+        boxes.append(np.array([[c.X(), c.Y(), c.Z()] for c in corners]))
+    shift = 10.0 * explorer.home_pose(TOOLED).rotation @ TOOL
+    assert_allclose(boxes[1], boxes[0] + shift, atol=1e-3)
+
+
+def test_at_a_bad_point_or_a_tool_too_far_away_is_refused(cli: CommandLine, tmp_path: Path) -> None:
+    assert "'b4', 'tool'" in cli.refusal("inverse", "--at", "b3")
+    far = tmp_path / "far.json"
+    far.write_bytes(explorer.encode_design(TOOLED).replace(b"3.0", b"3e9"))
+    assert "tool" in cli.refusal("inverse", "--at", "tool", "--design", far)
+
+
+def test_pose_with_a_point_at_a_position_is_inverse_to_the_position_of_the_point() -> None:
+    rng = np.random.default_rng(0)
+    for r in Rotation.random(50, random_state=rng).as_matrix():
+        pose = explorer.Pose.of(rng.normal(size=3), r)
+        x, y, z = rng.normal(size=3).tolist()
+        for at in ("b4", "tool"):
+            there = pose_with(TOOLED, at, (x, y, z), pose)
+            assert_allclose(position_of(TOOLED, there, at), (x, y, z), atol=1e-12)
+            assert there.quaternion == pose.quaternion
