@@ -69,6 +69,7 @@ from .mechanism.tilt_torsion import (
     rotation_from_tilt_torsion as rotation_from_tilt_torsion,
     tilt_torsion_from_rotation as tilt_torsion_from_rotation,
 )
+from .mechanism.tool_point import tool_offset as tool_offset, tool_position as tool_position
 from .optimise.defaults import make_problem as make_problem
 from .optimise.outcome import Iterate as Iterate, Outcome as Outcome, Run as Run
 from .optimise.problem import Demands as Demands, Problem as Problem, Variable as Variable
@@ -80,7 +81,11 @@ from .paths.planning import (
     plan_path as plan_path,
 )
 from .prototype.assembly import Prototype as Prototype, make_prototype as make_prototype
-from .singularity.ellipsoids import singularity_free_ball as singularity_free_ball
+from .singularity.ellipsoids import (
+    Performance as Performance,
+    performance as performance,
+    singularity_free_ball as singularity_free_ball,
+)
 from .singularity.jacobian import jacobian as jacobian
 from .singularity.nearest import (
     NearestSingularity as NearestSingularity,
@@ -163,7 +168,12 @@ from .workspace.slices.volume import (
     workspace_volume as workspace_volume,
 )
 from .workspace.solids.solid import Solid as Solid
-from .workspace.solids.solids import convex_hull as convex_hull, workspace_solid as workspace_solid
+from .workspace.solids.solids import (
+    convex_hull as convex_hull,
+    dexterous_solid as dexterous_solid,
+    reachable_solid as reachable_solid,
+    workspace_solid as workspace_solid,
+)
 
 __all__: list[str]
 __version__: str
