@@ -172,7 +172,10 @@ def worst_direction(
     # Row i: the force of actuator i is the product with the load's force.
     rows = -np.swapaxes(twists[..., :3, :], -1, -2)
     sizes = np.sqrt(np.einsum("...ij,...ij->...i", rows, rows))
-    shares = np.where(np.isfinite(sizes), sizes / limits, np.inf)
+    sizes, limits = np.broadcast_arrays(sizes, limits)
+    # A share is infinite in a singular pose, even without a limit.
+    shares = np.full(sizes.shape, np.inf)
+    np.divide(sizes, limits, out=shares, where=np.isfinite(sizes))
     actuator = np.argmax(shares, axis=-1)
     row = np.take_along_axis(rows, actuator[..., None, None], axis=-2)[..., 0, :]
     size = np.take_along_axis(sizes, actuator[..., None], axis=-1)

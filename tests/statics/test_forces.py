@@ -288,7 +288,11 @@ def test_forces_of_singular_pose_are_infinite(
     assert (strut_bending(*given, load) == np.inf).all()
     assert (largest_force(*given, np.ones(6)) == 0.0).all()
     assert (largest_payload(*given) == 0.0).all()
-    assert np.isnan(worst_direction(*given, np.ones(6)).direction).all()
+    # Without a limit, too.
+    for most in (np.ones(6), np.full(6, np.inf)):
+        worst = worst_direction(*given, most)
+        assert np.isnan(worst.direction).all()
+        assert (worst.share == np.inf).all()
     held = reactions(*given, load)
     for values in (*held[:-1], limit_shares(LIMITED, held)):
         assert (values == np.inf).all()

@@ -194,6 +194,8 @@ class LoadHandle(ScenePart):
         state = placed.frame.state
         visible = is_shown(placed) and state.view.handle and has_force(placed)
         yield self.handle, "visible", visible
+        # It has no arcs to turn it, and no turn.
+        yield self.handle, "wxyz", (1.0, 0.0, 0.0, 0.0)
         # A place that was written back during a drag would move the gizmo under the pointer.
         same = SAME_FORCE * state.view.forces.scale
         if not visible or np.allclose(self.force(state), state.view.forces.force, 0.0, same):
