@@ -31,8 +31,9 @@ FEWEST_NODES, MOST_NODES = 8, 160
 BEYOND = 2
 # Nodes on each axis of the grid that finds the box of the part.
 COARSE = 20
-# Nodes on each axis of finer grids about the best position, and the number of rounds.
-ZOOM, ZOOMS = 7, 8
+# To find the best position: numbers of starts, of steps of that grid between them, of nodes on each
+# axis of the grids about one, and of these grids.
+STARTS, APART, FOLLOWING, ROUNDS = 12, 2.5, 5, 30
 NEAR = "near the load's limit"
 
 PART_NAMES = (
@@ -176,18 +177,34 @@ def _part_near(
 def _best_within(
     whole: Solid, held: FloatArray, r: FloatArray, limits: tuple[Constraint, ...]
 ) -> _Best:
-    """Return the best position within the limits, by the coarse grid and finer ones about it."""
+    """Return the best position found within the limits.
+
+    Grids about the best nodes of the coarse grid that lie apart follow the largest values, and
+    shrink where none is larger.
+    """
     grid = _coarse_grid(whole)
-    at, near, reach = whole.vertices, grid.positions.reshape(-1, 3), grid.step
-    cube = np.stack(np.meshgrid(*[np.linspace(-1.0, 1.0, ZOOM)] * 3), axis=-1).reshape(-1, 3)
-    best = _Best(at[0], -1.0, PART_NAMES[0])
-    for _ in range(ZOOMS):
-        at = np.vstack([at, near[(slacks(limits, near) >= 0.0).all(axis=-1)]])
-        values, parts = held_values(held, r, at)
-        index = int(values.argmax())
-        best = _Best(at[index], float(values[index]), PART_NAMES[int(parts[index])])
-        at, near = best.position[None], best.position + reach * cube
-        reach = reach * (2.0 / (ZOOM - 1))
+    nodes = grid.positions.reshape(-1, 3)
+    at = np.vstack([whole.vertices, nodes[(slacks(limits, nodes) >= 0.0).all(axis=-1)]])
+    values, parts = held_values(held, r, at)
+    cube = np.stack(np.meshgrid(*[np.linspace(-1.0, 1.0, FOLLOWING)] * 3), axis=-1).reshape(-1, 3)
+    best, left = _Best(at[0], -np.inf, PART_NAMES[0]), np.argsort(values)[::-1]
+    for _ in range(STARTS):
+        if not len(left):
+            break
+        first = int(left[0])
+        here = _Best(at[first], float(values[first]), PART_NAMES[int(parts[first])])
+        left = left[(np.abs(at[left] - here.position) > APART * grid.step).any(axis=1)]
+        size = 1.0
+        for _ in range(ROUNDS):
+            near = here.position + size * grid.step * cube
+            near = near[(slacks(limits, near) >= 0.0).all(axis=-1)]
+            found, of = held_values(held, r, near)
+            if len(near) and found.max() > here.value:
+                index = int(found.argmax())
+                here = _Best(near[index], float(found[index]), PART_NAMES[int(of[index])])
+            else:
+                size *= 0.5
+        best = max(best, here, key=lambda each: each.value)
     return best
 
 

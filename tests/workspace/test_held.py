@@ -76,6 +76,7 @@ def test_volume_is_that_of_positions_which_hold_the_load(
     error = np.sqrt(share * (1.0 - share) / len(at))
     assert part.held_volume / part.volume == pytest.approx(share, abs=4.0 * error + 0.005 * share)
     assert part.solid.is_empty or part.solid.is_watertight
+    assert len(set(part.solid.limits)) == len(part.solid.limits)
 
 
 @pytest.mark.parametrize("name", ["bending", "actuators", "all parts"])

@@ -46,7 +46,7 @@ LOADED = msgspec.structs.replace(
     guide=Guide(force_n=70.0, moment_nm=5.0),
     unit_mm=8.0,
     # Singular planes pass through a workspace in which any signs of the margins are allowed.
-    limits=Limits(box=((0.0, -12.0, -10.0), (20.0, 22.0, 18.0))),
+    limits=Limits(box=((0.0, -12.0, -10.0), (20.0, 22.0, 18.0)), margin=None),
 )
 LOAD = np.array([4.0, -3.0, -6.0, 5.0, 10.0, -5.0])
 ORIENTATIONS = [

@@ -256,9 +256,10 @@ def cut_solid(solid: Solid, half_space: HalfSpace) -> Solid:
     length = float(np.linalg.norm(half_space.normal))
     x, y, z = (-half_space.normal / length).tolist()
     offset = (half_space.offset - float(half_space.normal @ frame.middle)) / (length * frame.scale)
-    names = (*solid.limits, half_space.name)
+    names = tuple(dict.fromkeys((*solid.limits, half_space.name)))
     part = _solid_of(body.trim_by_plane((x, y, z), -offset), origins, frame, names)
-    limit_of_face = np.where(part.limit_of_face < 0, len(solid.limits), part.limit_of_face)
+    of_cut = names.index(half_space.name)
+    limit_of_face = np.where(part.limit_of_face < 0, of_cut, part.limit_of_face)
     return replace(part, limit_of_face=limit_of_face, agrees=solid.agrees)
 
 

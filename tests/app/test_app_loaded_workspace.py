@@ -1,0 +1,363 @@
+"""The workspace under the load of the page: bands on its surface, the part that holds it, files."""
+
+from __future__ import annotations
+
+import io
+import math
+from dataclasses import replace
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+import trimesh
+from desk import CLIENT, Desk
+from mesh_files import mesh_of, read_3mf
+from services import StubDownloads, StubWorker, services_for
+
+from explorer.app.features.feature import Services
+from explorer.app.features.workspace.feature import WORKSPACE
+from explorer.app.features.workspace.feed import WorkspaceFeed, workspace_request
+from explorer.app.features.workspace.files import FORMATS, WorkspaceFiles
+from explorer.app.features.workspace.panel import COLOUR, WorkspacePanel
+from explorer.app.features.workspace.slice_map import map_picture
+from explorer.app.features.workspace.tasks import STEP, WorkspaceDrawing, export_mesh
+from explorer.app.features.workspace.words import drawing_words, legend
+from explorer.app.scene.bands import AT_LIMIT, PLAIN
+from explorer.app.state.actions import Open, Set
+from explorer.app.state.frame import Frame
+from explorer.app.state.state import State, opened
+from explorer.app.state.view import ForcesView
+from explorer.errors import InputError
+from explorer.mechanism.design import Design, Limits
+from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.machine import Actuators, Payload, Struts, Tool
+from explorer.mechanism.pose import Pose
+from explorer.numerics.arrays import FloatArray
+from explorer.singularity.ellipsoids import planes_of_singularity
+from explorer.statics.reactions import limit_shares, reactions
+from explorer.statics.weights import design_weights
+from explorer.workspace.held import held_workspace
+from explorer.workspace.limits.constraints import constraints, slacks
+from explorer.workspace.position_bands import SHARE_COLOURS, SHARES, STEP_COLOURS
+
+pytestmark = pytest.mark.usefixtures("warm_kernels")
+
+OPTIMAL = PRESETS["paper-optimal"]
+LOADED = msgspec.structs.replace(
+    OPTIMAL,
+    tool=Tool((1.0, 0.0, 2.0)),
+    payload=Payload(0.5, (1.0, 0.0, 1.0), 5.0),
+    actuators=Actuators(push_n=(150, 200, 150, 200, 150, 150)),
+    struts=Struts(moment_nm=4.0),
+)
+FORCES = ForcesView(force=(3.0, 0.0, -40.0), moment=(0.0, 0.2, 0.0))
+# FORCES in N and N × unit.
+LOAD = (3.0, 0.0, -40.0, 0.0, 20.0, 0.0)
+
+
+def shown(design: Design = LOADED, forces: ForcesView = FORCES, **changes: Any) -> State:
+    view = opened(design).view
+    workspace = replace(view.workspace, solid=True, **changes)
+    return Set("view", replace(view, forces=forces, workspace=workspace)).apply(opened(design))
+
+
+def follow(services: Services, state: State) -> None:
+    """Have both feeds of the workspace request and get what a state needs."""
+    worker = services.worker
+    assert isinstance(worker, StubWorker)
+    for kind in WORKSPACE.feeds:
+        services.get(kind).follow(Frame(state))
+    worker.work()
+
+
+def drawing_of(state: State) -> WorkspaceDrawing:
+    services = services_for()
+    follow(services, state)
+    drawing = services.get(WorkspaceFeed).drawing
+    assert drawing is not None
+    return drawing
+
+
+def shares_at(design: Design, points: FloatArray, rotation: FloatArray) -> FloatArray:
+    """Return the largest shares of a limit at positions (n, 3), by reactions."""
+    tool, weights = design.tool.position, design_weights(design)
+    held = reactions(design, points, rotation, np.array(LOAD), tool, weights)
+    return np.asarray(limit_shares(design, held).max(axis=-1))
+
+
+# The bands
+
+
+def singular_within() -> tuple[Design, Pose]:
+    """Return a design and a pose whose workspace has all three singular planes within."""
+    limits = Limits(box=((0.0, -12.0, -10.0), (20.0, 22.0, 18.0)), margin=None)
+    return (
+        msgspec.structs.replace(LOADED, limits=limits),
+        Pose.of_yaw_pitch_roll((10.0, 5.0, 9.0), (-60.0, 20.0, 30.0)),
+    )
+
+
+@pytest.mark.parametrize("cut", [None, "y"])
+@pytest.mark.parametrize("is_singular", [False, True])
+def test_surface_lies_in_the_bands_of_the_shares(is_singular: bool, cut: Any) -> None:
+    """Random points on every triangle have the share of its colour, also beside singular planes."""
+    state = shown(colour="share", cut=cut)
+    design = state.design
+    if is_singular:
+        design, pose = singular_within()
+        state = replace(state, design=design, pose=pose)
+    drawing = drawing_of(state)
+    rotation = np.array(drawing.request.rotation)
+    random = np.random.default_rng(2)
+    ends = (0.0, *SHARES, math.inf)
+    total = wrong = 0.0
+    for shell in drawing.surface.shells:
+        index = SHARE_COLOURS.index(shell.colour)
+        corners = shell.vertices[shell.faces]
+        weights = random.dirichlet([0.5, 0.5, 0.5], len(corners))
+        points = (corners * weights[:, :, None]).sum(axis=1)
+        shares = shares_at(design, points, rotation)
+        areas = np.linalg.norm(
+            np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+        )
+        # Between its corners the end of a band is straight.
+        is_off = (shares < ends[index] * 0.98) | (shares > ends[index + 1] * 1.02)
+        wrong += float(areas[is_off].sum())
+        total += float(areas.sum())
+    assert wrong < 2e-3 * total
+    # Triangles end at the planes that pass through the surface, in the last band.
+    crossed = 0
+    last = drawing.surface.shells[0]
+    assert last.colour == SHARE_COLOURS[-1]
+    corners = np.concatenate([shell.vertices for shell in drawing.surface.shells])
+    for normal in planes_of_singularity(rotation):
+        sides = corners @ normal
+        if sides.min() < -0.1 and sides.max() > 0.1:
+            crossed += 1
+            assert np.abs(last.vertices @ normal).min() < 1e-9
+            across = last.vertices[last.faces] @ normal
+            assert ((across > -1e-9).all(axis=1) | (across < 1e-9).all(axis=1)).all()
+    assert (crossed > 1) == is_singular
+
+
+@pytest.mark.parametrize("colour", ["force", "bending"])
+def test_surface_of_a_design_without_limits_lies_in_the_bands_of_forces(colour: Any) -> None:
+    drawing = drawing_of(shown(OPTIMAL, colour=colour, cut="y"))
+    rotation, ends = np.array(drawing.request.rotation), (*drawing.levels, 0.0)
+    random = np.random.default_rng(2)
+    total = wrong = 0
+    for shell in drawing.surface.shells:
+        index = STEP_COLOURS[::-1].index(shell.colour)
+        weights = random.dirichlet([0.5, 0.5, 0.5], len(shell.faces))
+        points = (shell.vertices[shell.faces] * weights[:, :, None]).sum(axis=1)
+        held = reactions(OPTIMAL, points, rotation, np.array(LOAD))
+        asked = (
+            np.abs(held.actuators).max(axis=-1)
+            if colour == "force"
+            else 0.01 * held.bending.max(axis=-1)
+        )
+        wrong += int(((asked > 1.03 * ends[index]) | (asked < 0.97 * ends[index + 1])).sum())
+        total += len(points)
+    assert wrong < 5e-3 * total
+
+
+def test_load_that_is_not_shown_changes_no_request() -> None:
+    other = replace(FORCES, force=(0.0, 0.0, 7.0))
+    unloaded: tuple[dict[str, Any], ...] = (
+        {"colour": "plain"},
+        {"colour": "margin", "cut": "x"},
+        {"region": "reachable"},
+    )
+    for changes in unloaded:
+        assert workspace_request(Frame(shown(**changes))) == workspace_request(
+            Frame(shown(forces=other, **changes))
+        )
+    loaded: tuple[dict[str, Any], ...] = (
+        {"colour": "share"},
+        {"colour": "force"},
+        {"region": "held"},
+    )
+    for changes in loaded:
+        request = workspace_request(Frame(shown(**changes)))
+        assert request is not None
+        assert request.load == LOAD
+        assert request != workspace_request(Frame(shown(forces=other, **changes)))
+
+
+def test_payload_without_a_weight_loads_nothing_but_its_force() -> None:
+    weightless = replace(FORCES, weighed="none")
+    request = workspace_request(Frame(shown(forces=weightless, region="held")))
+    assert request is not None
+    assert request.design.payload == Payload(0.0, (1.0, 0.0, 1.0), 5.0)
+    drawing = drawing_of(shown(forces=weightless, region="held"))
+    light = held_workspace(request.design, np.array(request.rotation), LOAD)
+    heavy = held_workspace(LOADED, np.array(request.rotation), LOAD)
+    assert drawing.held_volume == pytest.approx(light.held_volume, rel=2e-3)
+    assert light.held_volume > 1.02 * heavy.held_volume
+
+
+def test_legend_has_the_ends_of_the_bands_with_their_unit() -> None:
+    words = legend("share", 1.0, None)
+    assert "Largest share of a limit (%)" in words
+    for text in ("0", "25", "50", "75", "100", "∞"):
+        assert f">{text}</span>" in words
+    state = shown(OPTIMAL, colour="force", cut="x")
+    drawing = drawing_of(state)
+    words = legend("force", 1.0, drawing)
+    assert "Largest actuator force (N)" in words
+    assert all(f">{level:,g}</span>" in words for level in drawing.levels[1:])
+    # Levels are not known before a drawing of that colour.
+    assert ">100</span>" not in legend("bending", 1.0, drawing)
+
+
+def test_share_of_a_design_without_limits_offers_what_needs_none(
+    services: Services, desk: Desk
+) -> None:
+    desk.session.do(Open(OPTIMAL))
+    desk.session.do(Set("view", shown(OPTIMAL, colour="share").view))
+    panel = WorkspacePanel(services)
+
+    def told() -> str:
+        return "".join(str(v) for _, n, v in panel.updates(Frame(desk.state)) if n == "content")
+
+    request = workspace_request(Frame(desk.state))
+    assert request is not None
+    assert request.colour == "plain"
+    assert "has no limits of forces" in told()
+    desk.press(services.buttons, COLOUR, "largest actuator force")
+    assert desk.state.view.workspace.colour == "force"
+    assert "has no limits of forces" not in told()
+
+
+# The part that holds the load
+
+
+def test_part_that_holds_the_load_is_drawn_and_measured() -> None:
+    services, state = services_for(), shown(region="held")
+    follow(services, state)
+    feed = services.get(WorkspaceFeed)
+    drawing = feed.drawing
+    assert drawing is not None
+    assert drawing.trouble is None
+    expected = held_workspace(LOADED, np.array(drawing.request.rotation), LOAD, nodes=60)
+    assert drawing.held_volume == pytest.approx(expected.held_volume, rel=5e-3)
+    assert 0.1 < expected.held_volume / drawing.volume < 0.9
+    percent = f"{100.0 * (drawing.held_volume or 0.0) / drawing.volume:.2f} %"
+    words = drawing_words(Frame(state), feed)
+    assert "hold the load" in words
+    assert percent in words
+    assert "(3, 0, −40) N at the tool, (0, 0.2, 0) N m, 0.5 kg of payload" in words
+    assert {shell.colour for shell in drawing.surface.shells} == {PLAIN, AT_LIMIT}
+    rotation = np.array(drawing.request.rotation)
+    for shell in drawing.surface.shells:
+        shares = shares_at(LOADED, shell.vertices, rotation)
+        assert np.quantile(shares, 0.99) < 1.02
+        if shell.colour == AT_LIMIT:
+            assert np.quantile(shares, 0.1) > 0.99
+
+
+@pytest.mark.parametrize("axis", ["x", "y", "z"])
+def test_map_leaves_out_the_positions_that_do_not_hold_the_load(axis: Any) -> None:
+    drawing = drawing_of(shown(region="held", cut=axis))
+    assert drawing.slice_map is not None
+    picture = map_picture(drawing.slice_map, opened(LOADED).position, LOADED.reach)
+    assert "load not held" in picture
+    assert 'class="is-blocked"' in picture
+    assert "not held" in legend("plain", 1.0, drawing)
+
+
+def test_load_that_nothing_holds_names_the_part_and_the_share_that_is_held() -> None:
+    weak = msgspec.structs.replace(LOADED, actuators=Actuators(push_n=(2, 2, 2, 2, 2, 2)))
+    services, state = services_for(), shown(weak, region="held")
+    follow(services, state)
+    feed = services.get(WorkspaceFeed)
+    drawing = feed.drawing
+    assert drawing is not None
+    assert drawing.trouble is not None
+    assert "up to the force of" in drawing.trouble.reason
+    assert "No position holds the load" in drawing_words(Frame(state), feed)
+    # All within the limits is drawn instead.
+    assert drawing.mesh_volume == pytest.approx(drawing.volume, rel=0.02)
+    rotation = np.array(drawing.request.rotation)
+    held = held_workspace(weak, rotation, LOAD)
+    assert held.factor is not None
+    assert held.best is not None
+    # The factor is that of the best position, and no random one is much better.
+    assert 1.0 / held.factor == pytest.approx(shares_at(weak, held.best[None], rotation)[0])
+    limits = constraints(weak, rotation)
+    points = np.random.default_rng(1).uniform((0, -12, 0), (20, 22, 18), (100_000, 3))
+    points = points[(slacks(limits, points) >= 0.0).all(axis=-1)]
+    assert shares_at(weak, points, rotation).min() > 0.999 / held.factor
+    assert slacks(limits, held.best).min() > -0.1
+
+
+def test_every_factor_below_the_one_told_is_held_somewhere() -> None:
+    weak = msgspec.structs.replace(LOADED, actuators=Actuators(push_n=(2, 2, 2, 2, 2, 2)))
+    rotation = opened(weak).pose.rotation
+    factor = held_workspace(weak, rotation, LOAD).factor
+    assert factor is not None
+    for share, is_held in ((0.98, True), (1.02, False)):
+        scaled = msgspec.structs.replace(
+            weak,
+            payload=Payload(
+                share * factor * weak.payload.mass_kg,
+                weak.payload.centre,
+                share * factor * weak.payload.force_n,
+            ),
+        )
+        part = held_workspace(scaled, rotation, share * factor * np.array(LOAD))
+        assert (part.held_volume > 0.0) == is_held
+
+
+# Files
+
+
+def read_mesh(data: bytes, file_format: str) -> Any:
+    """Return the mesh of a file as one of trimesh."""
+    if file_format == "3mf":
+        meshes = read_3mf(data).GetMeshObjects()
+        assert meshes.MoveNext()
+        return mesh_of(meshes.GetCurrentMeshObject())
+    untyped: Any = trimesh
+    mesh = untyped.load(io.BytesIO(data), file_type=file_format, force="mesh", process=False)
+    if file_format == "stl":
+        # Triangles of STL share no vertices.
+        mesh.merge_vertices()
+    return mesh
+
+
+@pytest.mark.parametrize("what", ["workspace", "hull"])
+@pytest.mark.parametrize("file_format", [name for name in FORMATS if name != STEP])
+def test_part_that_holds_the_load_is_exported_as_a_closed_mesh(what: str, file_format: str) -> None:
+    drawing = drawing_of(shown(region="held"))
+    data = export_mesh(
+        LOADED, drawing.request.rotation, 0.02, "held", None, LOAD, what, file_format
+    )
+    mesh = read_mesh(data, file_format)
+    assert mesh.is_watertight
+    # GLB is in metres, all others in millimetres.
+    unit = LOADED.unit_mm * (1e-3 if file_format == "glb" else 1.0)
+    volume = float(mesh.volume) / unit**3
+    assert drawing.held_volume is not None
+    if what == "workspace":
+        assert volume == pytest.approx(drawing.held_volume, rel=5e-3)
+    else:
+        assert volume > drawing.held_volume
+
+
+def test_files_that_cannot_be_written_say_why() -> None:
+    rows = drawing_of(shown(region="held")).request.rotation
+    with pytest.raises(InputError, match="along which a part takes its limit consists of facets"):
+        export_mesh(LOADED, rows, 0.1, "held", None, LOAD, "workspace", STEP)
+    heavy = (0.0, 0.0, -1e6, 0.0, 0.0, 0.0)
+    with pytest.raises(InputError, match="nothing holds the load: the best position found holds"):
+        export_mesh(LOADED, rows, 0.1, "held", None, heavy, "workspace", "stl")
+
+
+def test_file_has_the_region_in_its_name(services: Services, desk: Desk) -> None:
+    files, downloads = services.get(WorkspaceFiles), services.downloads
+    assert isinstance(downloads, StubDownloads)
+    desk.session.do(Set("view.workspace.region", "held"))
+    files.send("workspace", "3mf", CLIENT.client_id)
+    assert downloads.sent[-1][1] == "paper-optimal-workspace-that-holds-the-load.3mf"
