@@ -75,6 +75,7 @@ from .optimise.outcome import Iterate as Iterate, Outcome as Outcome, Run as Run
 from .optimise.problem import Demands as Demands, Problem as Problem, Variable as Variable
 from .optimise.solver import optimise_design as optimise_design
 from .paths.crossings import path_margins as path_margins
+from .paths.loads import path_loads as path_loads
 from .paths.planning import (
     NoPathError as NoPathError,
     PlannedPath as PlannedPath,

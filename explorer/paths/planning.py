@@ -1,5 +1,8 @@
 """Paths between two poses of one mode that keep all limits, margins and clearances.
 
+A load can be demanded too: every pose of the path then holds it within the limits of actuators,
+struts and guide.
+
 Poses without a path are refused before any search: those of different modes, and those between
 which two legs would have to pass each other on the guide. Other poses are joined by a straight
 move or by `explorer.paths.tree_search`; in both cases a proof covers every move as a whole.
@@ -14,6 +17,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from explorer.errors import InputError, NoAnswerError
 from explorer.legs.clearance import PAIRS
@@ -21,9 +25,12 @@ from explorer.measures.snapshot import Snapshot, evaluate
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.margins import INCIDENCES, mode_name
 from explorer.mechanism.pose import Pose, Triple
+from explorer.paths.loads import PART_NAMES, TOLERANCE, DemandedLoad
+from explorer.paths.move_shares import share_rows_of_moves
 from explorer.paths.smoothing import Smoother
 from explorer.paths.tree_search import TreeSearch, compile_checks, search_is_possible
 from explorer.singularity.bruhat import incidences
+from explorer.statics.weights import Weights
 from explorer.workspace.limits.broken import violations
 from explorer.workspace.limits.valid_poses import Rules
 
@@ -35,14 +42,15 @@ SHARE_FOR_PREFERRED = 0.5
 D1, D3 = JOINTS.index("d1"), JOINTS.index("d3")
 
 Reason = Literal["other mode", "other order", "out of time"]
-EndReason = Literal["outside limits", "singular"]
+EndReason = Literal["outside limits", "singular", "load not held"]
 
 
 class EndError(InputError):
     """A start or goal that no path can have.
 
     Attributes:
-        reason: Kind of the error; the message names the end, and the limits or incidences.
+        reason: Kind of the error; the message names the end, and the limits, incidences, or the
+            part that does not hold the load.
     """
 
     def __init__(self, reason: EndReason, message: str) -> None:
@@ -97,6 +105,8 @@ def plan_path(
     seconds: float = DEFAULT_SECONDS,
     seed: int = 0,
     tool: Triple | None = None,
+    load: ArrayLike | None = None,
+    weights: Weights | None = None,
 ) -> PlannedPath:
     """Return a path from a pose to another that keeps limits, margins and clearances.
 
@@ -112,15 +122,21 @@ def plan_path(
         seed: Seed of the random shortcuts in smoothing.
         tool: Point that each move moves straight in the platform frame, in design units; None for
             b4. If the platform turns, b4 goes along a curve.
+        load: (F; M) at the tool point of the design, shape (6,), in N and N × unit, that every
+            pose has to hold within the limits of actuators, struts and guide, besides the weights
+            and the payload's force of any direction. A proof covers every move, to a millionth of
+            the limits; see `explorer.path_loads`. None to demand no load.
+        weights: All masses for the load, the payload's included; None for the payload alone.
 
     Raises:
-        EndError: the start or the goal is singular or outside the limits.
-        InputError: `seconds` is not a positive number.
+        EndError: the start or the goal is singular, outside the limits or does not hold the load.
+        InputError: `seconds` is not a positive number, or the load is not six finite numbers.
         NoPathError: there is no path, or the search ended without one.
         MissingExtraError: the straight move is not valid, and OMPL is not installed.
     """
     if not (math.isfinite(seconds) and seconds > 0.0):
         raise InputError(f"planning needs a time above zero, in seconds; got {seconds:g}")
+    demanded_load = None if load is None else DemandedLoad.of(design, load, weights, tool)
     ends = evaluate(design, start), evaluate(design, goal)
     named_ends = {"start": ends[0], "goal": ends[1]}
     for name, snapshot in named_ends.items():
@@ -128,9 +144,11 @@ def plan_path(
     _check_same_mode(*ends)
     for name, snapshot in named_ends.items():
         _check_within(name, snapshot, ends[0].signs)
+        if demanded_load is not None:
+            _check_held(name, snapshot.pose, demanded_load)
     _check_same_order(*ends)
     started = time.perf_counter()
-    planner = _Planner(design, start, goal, seed, tool)
+    planner = _Planner(design, start, goal, seed, tool, demanded_load)
     demanded = Rules.of(design, ends[0].signs, _order(ends[0]))
     margin, clearance = _preferred(*ends)
     preferred = demanded.tighten(margin, clearance)
@@ -138,6 +156,8 @@ def plan_path(
     if path is None and search_is_possible():
         # Compiling takes seconds, once on a machine; they do not count as search.
         compile_checks()
+        if demanded_load is not None:
+            share_rows_of_moves.compile()
         started = time.perf_counter()
         path = planner.search(preferred, margin, clearance, SHARE_FOR_PREFERRED * seconds)
     path = path or planner.plan_straight(demanded, 0.0, 0.0)
@@ -147,8 +167,9 @@ def plan_path(
     if path is None:
         raise NoPathError(
             "out of time",
-            f"no path was found within {seconds:g} s ({planner.checked} moves tried); there may "
-            "be one: allow more time, or go by a pose in between",
+            f"no path {'' if load is None else 'that holds the load '}was found within "
+            f"{seconds:g} s ({planner.checked} moves tried); there may be one: allow more time, "
+            "or go by a pose in between",
         )
     return dataclasses.replace(path, seconds=time.perf_counter() - started, checked=planner.checked)
 
@@ -161,18 +182,25 @@ class _Planner:
     """
 
     def __init__(
-        self, design: Design, start: Pose, goal: Pose, seed: int, tool: Triple | None
+        self,
+        design: Design,
+        start: Pose,
+        goal: Pose,
+        seed: int,
+        tool: Triple | None,
+        load: DemandedLoad | None,
     ) -> None:
         self.checked = 0
         self._design = design
         self._ends = start, goal
         self._seed = seed
         self._tool = tool
+        self._load = load
 
     def plan_straight(self, rules: Rules, margin: float, clearance: float) -> PlannedPath | None:
         """Return the straight move if it is valid."""
         self.checked += 1
-        smoother = Smoother(self._design, rules, self._seed, self._tool)
+        smoother = Smoother(self._design, rules, self._seed, self._tool, self._load)
         if not smoother.is_valid(*self._ends):
             return None
         return self._path(smoother, self._ends, self._ends, margin, clearance)
@@ -181,12 +209,12 @@ class _Planner:
         self, rules: Rules, margin: float, clearance: float, seconds: float
     ) -> PlannedPath | None:
         """Return a smoothed path of OMPL's search, or None if the time was too short."""
-        tree = TreeSearch(self._design, rules, self._tool)
+        tree = TreeSearch(self._design, rules, self._tool, self._load)
         unsmoothed = tree.path(*self._ends, seconds)
         self.checked += tree.checked
         if unsmoothed is None:
             return None
-        smoother = Smoother(self._design, rules, self._seed, self._tool)
+        smoother = Smoother(self._design, rules, self._seed, self._tool, self._load)
         return self._path(smoother, unsmoothed, smoother.smooth(unsmoothed), margin, clearance)
 
     def _path(
@@ -252,6 +280,15 @@ def _check_within(name: str, snapshot: Snapshot, signs: tuple[int, int, int]) ->
             broken.append(f"legs {first} and {second} collide (clearance {shown})")
     if broken:
         raise EndError("outside limits", f"the {name} is outside the limits: {'; '.join(broken)}")
+
+
+def _check_held(name: str, pose: Pose, load: DemandedLoad) -> None:
+    shares = load.shares(pose.position, pose.rotation)
+    part, share = int(shares.argmax()), float(shares.max())
+    if share > 1.0 + TOLERANCE:
+        shown = f"{100.0 * share:.{4 if share > 1.001 else 9}g}"
+        message = f"the {name} does not hold the load: {PART_NAMES[part]} is {shown} % of its limit"
+        raise EndError("load not held", message)
 
 
 def _order(snapshot: Snapshot) -> int:

@@ -17,6 +17,7 @@ from explorer.mechanism.design import Design
 from explorer.mechanism.displacement import displacement
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray
+from explorer.paths.loads import DemandedLoad
 from explorer.workspace.limits.valid_moves import moves_are_valid
 from explorer.workspace.limits.valid_poses import Rules
 
@@ -37,12 +38,14 @@ class Smoother:
         rules: Rules that every pose keeps.
         seed: Seed of the random shortcuts.
         tool: Point that moves straight in the platform frame, in design units; None for b4.
+        load: Load that every pose holds, for a path of the same tool; None for none.
     """
 
     design: Design
     rules: Rules
     seed: int = 0
     tool: Triple | None = None
+    load: DemandedLoad | None = None
 
     def smooth(self, poses: Sequence[Pose]) -> tuple[Pose, ...]:
         """Return a path with the same ends, shorter and with its corners cut off."""
@@ -60,6 +63,8 @@ class Smoother:
     def _are_valid(self, pieces: Sequence[tuple[Pose, Pose]]) -> list[bool]:
         (p, r), (q, s) = (_positions_and_rotations(ends) for ends in zip(*pieces, strict=True))
         valid = moves_are_valid(self.design, p, r, q, s, rules=self.rules, tool=self.tool)
+        if self.load is not None and valid.any():
+            valid[valid] = self.load.holds_along(p[valid], r[valid], q[valid], s[valid])
         return valid.tolist()
 
     def _shorten(self, poses: list[Pose]) -> list[Pose]:

@@ -18,6 +18,7 @@ from explorer.errors import MissingExtraError
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import BoolArray, FloatArray
+from explorer.paths.loads import DemandedLoad
 from explorer.workspace.limits.valid_moves import DEFAULT_TOLERANCE, valid_move_rows
 from explorer.workspace.limits.valid_poses import Rules, valid_rows
 
@@ -82,15 +83,23 @@ class TreeSearch:
         design: The manipulator.
         rules: Rules that every pose of the path keeps.
         tool: Point that moves straight in the platform frame, in design units; None for b4.
+        load: Load that every pose of the path holds, for a path of the same tool; None for none.
 
     Attributes:
         checked: Number of moves checked so far.
     """
 
-    def __init__(self, design: Design, rules: Rules, tool: Triple | None = None) -> None:
+    def __init__(
+        self,
+        design: Design,
+        rules: Rules,
+        tool: Triple | None = None,
+        load: DemandedLoad | None = None,
+    ) -> None:
         self.checked = 0
         self._design = design
         self._rules = rules
+        self._load = load
         self._tool = np.array(tool or (0.0, 0.0, 0.0))
         self._tolerance = DEFAULT_TOLERANCE * design.reach
         self._positions: FloatArray = np.empty((2, 1, 3))
@@ -152,7 +161,9 @@ class TreeSearch:
         (p, q), (r, s), rules = self._positions, self._rotations, self._rules
         given = (p, r, q, s, self._tool)
         valid_move_rows(1, rules.row, rules.cones, *given, self._tolerance, self._valid)
-        return bool(self._valid[0])
+        if not self._valid[0] or self._load is None:
+            return bool(self._valid[0])
+        return bool(self._load.holds_along(p, r, q, s)[0])
 
 
 def _validator(base: Any, information: Any, is_valid: Callable[[Any, Any], bool]) -> Any:

@@ -1,0 +1,199 @@
+"""The largest share of a limit along a path is that of dense samples, and bounds them all."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import msgspec
+import numpy as np
+import pytest
+from loaded_designs import random_machine, random_move, random_weights
+from tool_moves import tool_move
+
+from explorer import PRESETS, Design, InputError, Pose, home_pose, margins
+from explorer.numerics.arrays import FloatArray
+from explorer.paths.crossings import path_margins
+from explorer.paths.loads import PART_NAMES, TOLERANCE, DemandedLoad, path_loads
+from explorer.statics.reactions import LIMITED, limit_shares, reactions
+from explorer.statics.weights import Weights, design_weights
+
+OPTIMAL = PRESETS["paper-optimal"]
+DENSE = np.linspace(0.0, 1.0, 4001)
+
+
+def dense_shares(
+    design: Design,
+    move: tuple[Pose, Pose],
+    load: FloatArray,
+    weights: Weights | None,
+    tool: FloatArray,
+) -> FloatArray:
+    """Return the shares of the limits at dense samples of a move, shape (n, 12)."""
+    positions, rotations = tool_move(*move, DENSE, tool)
+    given = design, positions, rotations, load, design.tool.position
+    return limit_shares(design, reactions(*given, weights or design_weights(design)))
+
+
+def test_every_part_has_a_name() -> None:
+    assert len(PART_NAMES) == len(LIMITED) == len(set(PART_NAMES))
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_path_loads_largest_share_is_that_of_dense_samples(seed: int) -> None:
+    rng = np.random.default_rng([3, seed])
+    design = random_machine(OPTIMAL, seed)
+    weights = random_weights(design, seed) if seed % 2 else None
+    tool = rng.normal(size=3) if seed % 3 else np.zeros(3)
+    # Moves without a turn, without a way, and both.
+    size, angle = ((1.5, 0.3), (1.5, 0.0), (0.0, 0.3), (0.05, 0.01))[seed % 4]
+    move = random_move(home_pose(design), seed, size, angle)
+    if path_margins(move, tool=tool).crossings:
+        move = random_move(home_pose(design), seed, 0.5, 0.1)
+    load = rng.normal(size=6) * np.array([20.0, 20.0, 20.0, 50.0, 50.0, 50.0])
+    x, y, z = tool.tolist()
+    along = path_loads(design, move, load, tool=(x, y, z), weights=weights)
+    shares = dense_shares(design, move, load, weights, tool)
+    most = float(shares.max())
+    size = max(1.0, most)
+    assert along.share == pytest.approx(most, abs=2.0 * TOLERANCE * size)
+    assert most <= along.bound * (1.0 + 1e-12)
+    assert along.bound - along.share <= TOLERANCE * size
+    assert along.part is not None
+    # The part and the place are those of the share that is told.
+    there = tool_move(*move, along.place, tool)
+    given = design, *there, load, design.tool.position
+    here = limit_shares(design, reactions(*given, weights or design_weights(design)))[0]
+    assert here[along.part] == here.max() == pytest.approx(along.share, rel=1e-10)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_path_loads_of_moves_near_singular_poses_bound_dense_samples(seed: int) -> None:
+    rng = np.random.default_rng([4, seed])
+    design = random_machine(OPTIMAL, seed)
+    home = home_pose(design)
+    x, y, _ = home.position
+    # b4 dips towards the base plane, δ3 = 0, without touching it.
+    low = 10.0 ** -float(rng.uniform(1.0, 4.0))
+    poses = [home, Pose((x + 1.0, y, low), home.quaternion), home]
+    load = rng.normal(size=6) * 20.0
+    along = path_loads(design, poses, load)
+    moves = [dense_shares(design, m, load, None, np.zeros(3)) for m in itertools.pairwise(poses)]
+    most = max(float(each.max()) for each in moves)
+    assert most <= along.bound * (1.0 + 1e-12)
+    assert along.share >= most * (1.0 - TOLERANCE) - TOLERANCE
+    assert along.bound - along.share <= TOLERANCE * max(1.0, most)
+    assert along.place == pytest.approx(1.0, abs=0.05)
+
+
+def test_path_loads_samples_have_the_shares_of_their_poses() -> None:
+    design = random_machine(OPTIMAL, 5)
+    first, second = random_move(home_pose(design), 5, 1.0, 0.1)
+    poses = (first, second, home_pose(design))
+    load = np.array([3.0, -4.0, 5.0, 0.0, 1.0, 2.0])
+    along = path_loads(design, poses, load, samples=11)
+    assert along.poses == poses
+    np.testing.assert_allclose(along.at, np.linspace(0.0, 2.0, 21), atol=1e-12)
+    for at, shares in zip(along.at, along.shares, strict=True):
+        move = 0 if at <= 1.0 else 1
+        ends = poses[move], poses[move + 1]
+        there = tool_move(*ends, at - move, np.zeros(3))
+        given = design, *there, load, design.tool.position
+        expected = limit_shares(design, reactions(*given, design_weights(design)))[0]
+        np.testing.assert_allclose(shares, expected, rtol=1e-9)
+    assert along.shares.max() <= along.share
+
+
+def test_path_loads_of_singular_path_is_infinite_at_its_first_crossing() -> None:
+    design = random_machine(OPTIMAL, 1)
+    home = home_pose(design)
+    x, y, z = home.position
+    below = Pose((x + 1.0, y, -2.0 * z), home.quaternion)
+    along = path_loads(design, (home, below, home), [1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    crossings = path_margins((home, below, home)).crossings
+    assert len(crossings) >= 2
+    assert along.share == along.bound == math.inf
+    assert along.part is None
+    assert along.place == min(each.move + each.share for each in crossings)
+    # A path that lies in the base plane is singular from its start.
+    flat = tuple(Pose((x + each, y, 0.0), home.quaternion) for each in (0.0, 1.0))
+    along = path_loads(design, flat, [1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    assert (along.share, along.place) == (math.inf, 0.0)
+    assert np.isinf(along.shares).all()
+
+
+def test_path_loads_without_limit_or_load_has_no_part() -> None:
+    x, y, z = home_pose(OPTIMAL).position
+    poses = home_pose(OPTIMAL), Pose((x + 1.0, y, z), home_pose(OPTIMAL).quaternion)
+    along = path_loads(OPTIMAL, poses, [100.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    assert (along.share, along.bound, along.part) == (0.0, 0.0, None)
+    empty = msgspec.structs.replace(random_machine(OPTIMAL, 2), payload=OPTIMAL.payload)
+    along = path_loads(empty, poses, np.zeros(6))
+    assert (along.share, along.part) == (0.0, None)
+
+
+def test_path_loads_of_standing_path_has_the_share_of_its_pose() -> None:
+    design = random_machine(OPTIMAL, 3)
+    pose = home_pose(design)
+    load = np.arange(6.0)
+    along = path_loads(design, (pose, pose), load)
+    given = design, pose.position, pose.rotation, load, design.tool.position
+    shares = limit_shares(design, reactions(*given, design_weights(design)))
+    assert along.share == pytest.approx(float(shares.max()), rel=1e-12)
+    assert along.part == int(shares.argmax())
+
+
+@pytest.mark.parametrize("load", [[1.0, 2.0], [math.nan] * 6, [math.inf] * 6])
+def test_path_loads_bad_load_is_refused(load: list[float]) -> None:
+    pose = home_pose(OPTIMAL)
+    with pytest.raises(InputError, match="load"):
+        path_loads(OPTIMAL, (pose, pose), load)
+    with pytest.raises(InputError, match="at least two poses"):
+        path_loads(OPTIMAL, (pose,), np.zeros(6))
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_holds_along_agrees_with_the_largest_share(seed: int) -> None:
+    rng = np.random.default_rng([5, seed])
+    design = random_machine(OPTIMAL, seed)
+    moves = [random_move(home_pose(design), 100 * seed + k, 1.0, 0.2) for k in range(30)]
+    demanded = DemandedLoad.of(design, rng.normal(size=6) * 10.0)
+    ends = [np.array([move[k].position for move in moves]) for k in (0, 1)]
+    turns = [np.array([move[k].rotation for move in moves]) for k in (0, 1)]
+    given = ends[0], turns[0], ends[1], turns[1]
+    bound, share, place = demanded.largest_along(*given)
+    regular = np.isfinite(bound)
+    assert regular.sum() > 15
+    assert (share[regular] <= bound[regular]).all()
+    assert ((place >= 0.0) & (place <= 1.0)).all()
+    # Limits at which a move just holds the load, or just does not.
+    index = int(np.flatnonzero(regular)[seed % int(regular.sum())])
+    one = tuple(each[index : index + 1] for each in given)
+    for factor, holds in ((1.0 + 1e-5, True), (1.0 - 1e-5, False)):
+        at_limit = DemandedLoad.of(
+            scaled_limits(design, factor * float(share[index])), demanded.load
+        )
+        assert at_limit.holds_along(one[0], one[1], one[2], one[3]) == [holds]
+    crossed = np.array([bool(path_margins(move).crossings) for move in moves])
+    assert not demanded.holds_along(*given)[crossed].any()
+    assert (np.abs(margins(ends[0], turns[0])) > 0.0).all()
+
+
+def scaled_limits(design: Design, factor: float) -> Design:
+    """Return a design with all limits of its machine times a factor."""
+    actuators, guide = design.actuators, design.guide
+    assert actuators.push_n is not None
+    assert actuators.pull_n is not None
+    push, pull = (tuple(factor * each for each in e) for e in (actuators.push_n, actuators.pull_n))
+    return msgspec.structs.replace(
+        design,
+        actuators=msgspec.structs.replace(actuators, push_n=push, pull_n=pull),
+        struts=msgspec.structs.replace(
+            design.struts, moment_nm=factor * (design.struts.moment_nm or 0.0)
+        ),
+        guide=msgspec.structs.replace(
+            guide,
+            force_n=factor * (guide.force_n or 0.0),
+            moment_nm=factor * (guide.moment_nm or 0.0),
+        ),
+    )
