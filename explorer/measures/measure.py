@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Literal, get_args
 
 from explorer.measures.case import Case
@@ -24,6 +25,19 @@ Need = Literal[
     "has_errors",
     "is_elastic",
 ]
+
+NEED_WORDS: Mapping[Need, str] = MappingProxyType(
+    {
+        "box": "required box",
+        "demanded_margin": "demanded clearance",
+        "is_loaded": "payload or force at the tool",
+        "is_limited": "limit of actuators, struts or guide",
+        "limits_actuators": "limit of the actuators",
+        "has_errors": "errors of the actuators",
+        "is_elastic": "stiffness of actuators or struts",
+    }
+)
+"""Words for what measures need, without an article."""
 
 EVERYWHERE: frozenset[Place] = frozenset(get_args(Place))
 POWERS = {1: "", 2: "²", 3: "³"}

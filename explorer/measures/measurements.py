@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 
 from explorer.measures.case import Case
 from explorer.measures.catalogue import CATALOGUE
+from explorer.measures.measure import NEED_WORDS, Need
 from explorer.mechanism.design import Design
 
 
@@ -69,3 +70,21 @@ def reason_for_missing(case: Case, measurements: Measurements) -> str:
         return ""
     lacking = [name for name, value in measurements.values.items() if value is None]
     return "; ".join(filter(None, dict.fromkeys(CATALOGUE[name].reason(case) for name in lacking)))
+
+
+def unmet_needs(cases: Collection[Case], names: Iterable[str]) -> str:
+    """Return which needs of measures none of some cases has, "" if each need is met by one.
+
+    Args:
+        cases: Designs with what they have.
+        names: Names of measures out of `CATALOGUE`.
+    """
+    labels: dict[Need, list[str]] = {}
+    for name in names:
+        for need in CATALOGUE[name].needs:
+            if not any(case.has(need) for case in cases):
+                labels.setdefault(need, []).append(CATALOGUE[name].label)
+    return "; ".join(
+        f"no {NEED_WORDS[need]}, which is needed for {', '.join(needing)}"
+        for need, needing in labels.items()
+    )

@@ -19,10 +19,12 @@ import msgspec
 from explorer.errors import DesignError, InputError
 from explorer.files.versions import versions
 from explorer.measures.case import Case
-from explorer.measures.measurements import measure_design, reason_for_missing
+from explorer.measures.catalogue import CATALOGUE
+from explorer.measures.measurements import measure_design, reason_for_missing, unmet_needs
 from explorer.mechanism.design import Design
 from explorer.numerics.compiled import warm
 from explorer.optimise.problem import YAW, Problem, Variable, start_value, varied, with_strokes
+from explorer.sweep.machine import MACHINE
 from explorer.sweep.sampling import samples
 from explorer.sweep.study import RADIUS, Study, decode_study
 
@@ -144,6 +146,9 @@ def design_of(study: Study, values: Mapping[str, float], name: str | None = None
     if RADIUS in values:
         limits = msgspec.structs.replace(design.limits, leg_radii=(values[RADIUS],) * 4)
         design = msgspec.structs.replace(design, limits=limits)
+    for variable, number in values.items():
+        if variable in MACHINE:
+            design = MACHINE[variable].with_value(design, number)
     if study.polish is not None:
         design = with_strokes(design, study.polish.demands.stroke_ratio)
     return design if name is None else msgspec.structs.replace(design, name=name)
@@ -214,25 +219,35 @@ def end_values(
 
 
 def check_study(study: Study) -> None:
-    """Raise an `InputError` if none of many designs of a study can be made or polished.
+    """Check that some of many designs of a study can be made or polished, and have its measures.
 
     The user then reads at once what is wrong with all of them, rather than in every row.
+
+    Raises:
+        InputError: None of them can be used, or all lack what a measure needs.
     """
     first: InputError | None = None
     tried = _spread_samples(study)
+    has_needs = any(CATALOGUE[name].needs for name in study.measures)
+    cases: list[Case] = []
     for row in tried:
         sample = dict(zip(study.variables, row, strict=True))
         try:
             if study.polish is None:
-                design_of(study, sample)
+                design = design_of(study, sample)
             else:
-                problem_of(study, sample)
+                design = problem_of(study, sample).start
         except InputError as error:
             first = first or error
-        else:
-            return
+            continue
+        cases.append(Case(design))
+        if not has_needs:
+            break
     which = "the" if len(tried) == study.count else f"{len(tried)}"
-    raise InputError(f"none of {which} designs all over the study can be used: {first}")
+    if not cases:
+        raise InputError(f"none of {which} designs all over the study can be used: {first}")
+    if lacking := unmet_needs(cases, study.measures):
+        raise InputError(f"the designs of the study have {lacking}")
 
 
 def _spread_samples(study: Study) -> list[list[float]]:
@@ -258,6 +273,8 @@ def load_kernels(study: Study) -> None:
         importlib.import_module("explorer.optimise.solver")
     if "reachable_volume" in study.measures:
         importlib.import_module("explorer.workspace.accessible.workspace")
+    if "held_volume" in study.measures:
+        importlib.import_module("explorer.workspace.held")
 
 
 @functools.lru_cache(4)
@@ -318,7 +335,9 @@ def _measure(study: Study, sample: dict[str, float], row: dict[str, Value]) -> N
         because = ", ".join(case.volume.empty_because)
         status, reason = "empty workspace", f"emptied by {because}" if because else "no volume"
     measured = measure_design(case, study.measures)
-    reasons = (reason, reason_for_missing(case, measured))
+    lacking = unmet_needs([case], study.measures)
+    lacking = f"it has {lacking}" if lacking else ""
+    reasons = (reason, lacking, reason_for_missing(case, measured))
     row |= measured.values
     row |= {"status": status, "reason": "; ".join(filter(None, reasons))}
 

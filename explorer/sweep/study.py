@@ -32,6 +32,7 @@ from explorer.optimise.problem import (
     ObjectiveName,
     longest_minimum,
 )
+from explorer.sweep.machine import MACHINE
 from explorer.workspace.node_measures import DEFAULT_NODES, FEWEST_NODES, MOST_NODES
 
 Method = Literal["sobol", "latin-hypercube", "grid"]
@@ -42,9 +43,9 @@ RADIUS = "radius"
 POLISHED = (*VARIABLES, YAW, REACH)
 """The variables that the optimiser can change."""
 
-NAMES = (*POLISHED, RADIUS)
+NAMES = (*POLISHED, RADIUS, *MACHINE)
 """The variables of a study: those of X, the yaw of home in degrees, one maximum for all four
-lengths, one radius for all four legs."""
+lengths, one radius for all four legs, and those of the machine."""
 
 # Largest study that is read, in bytes; real ones are much smaller.
 LARGEST_FILE = 1_000_000
@@ -239,6 +240,8 @@ class Study(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         for name, (low, _) in self.variables.items():
             if name == RADIUS and low < 0.0:
                 raise InputError(f"the radius of legs must not be negative; it starts at {low:g}")
+            if name in MACHINE:
+                MACHINE[name].check(name, low)
             least = longest_minimum(self.base)
             if name == REACH and not low > least:
                 raise InputError(

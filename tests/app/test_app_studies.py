@@ -42,13 +42,24 @@ from explorer.app.session.session import UNDO
 from explorer.app.state.actions import Set, SetVariable
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, opened
-from explorer.app.state.studies import Brush, Studies, StudyPlan, range_around, study_around, within
+from explorer.app.state.studies import (
+    Brush,
+    Studies,
+    StudyPlan,
+    choices_for,
+    range_around,
+    study_around,
+    within,
+)
 from explorer.app.storage.study_folders import StudyFolders, check_given, keep_study, study_in
 from explorer.app.widgets.buttons import Buttons
 from explorer.errors import InputError
 from explorer.measures.catalogue import measures_in
 from explorer.mechanism.design import VARIABLES, Design
 from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.home import home_pose
+from explorer.mechanism.machine import Actuators, Guide, Payload, Struts, Tool
+from explorer.sweep.machine import MACHINE
 from explorer.sweep.parts import part_paths, write_part
 from explorer.sweep.results import Results, load_results
 from explorer.sweep.rows import evaluate
@@ -148,6 +159,32 @@ def test_of_too_many_rows_those_to_keep_stay_first(keep: Any, most: int) -> None
         assert keep[found // 3].all()
 
 
+LOADED = msgspec.structs.replace(
+    OPTIMAL,
+    tool=Tool((1.0, 0.0, 2.0)),
+    payload=Payload(0.5, force_n=3.0),
+    actuators=Actuators(
+        (150.0, 90.0, 150.0, 200.0, 150.0, 150.0),
+        (120.0, 200.0, 120.0, 200.0, 80.0, 120.0),
+        (0.1, 0.1, 0.1, 0.1, 0.1, 0.1),
+    ),
+    struts=Struts(moment_nm=6.0, outer_mm=8.0),
+    guide=Guide(200.0, 7.0),
+)
+"""A design with every part of a machine."""
+MACHINE_VALUES = {
+    "payload_mass": 0.5,
+    "payload_force": 3.0,
+    "actuator_limit": 80.0,
+    "strut_limit": 6.0,
+    "guide_force": 200.0,
+    "guide_moment": 7.0,
+    "tool_x": 1.0,
+    "tool_y": 0.0,
+    "tool_z": 2.0,
+}
+
+
 @given(
     st.sampled_from(NAMES),
     st.floats(1.0, 95.0),
@@ -157,14 +194,19 @@ def test_a_range_lies_around_the_live_design(
     name: str, percent: float, variables: list[float]
 ) -> None:
     try:
-        design = OPTIMAL.with_variables(variables)
+        design = LOADED.with_variables(variables)
     except InputError:
         return
     low, high = range_around(design, name, percent)
     values: dict[str, float] = dict(zip(VARIABLES, design.variables, strict=True))
-    value = values.get(name)
+    value = (values | MACHINE_VALUES).get(name)
     if name == "radius":
         assert low == 0.0 < high
+    elif name in MACHINE_VALUES and not name.startswith("tool"):
+        value = MACHINE_VALUES[name]
+        assert 0.0 < low < high
+        assert (low + high) / 2.0 == pytest.approx(value)
+        assert high - low == pytest.approx(2.0 * value * percent / 100.0)
     elif name == "yaw":
         assert high - low == pytest.approx(2.0 * percent / 100.0 * 90.0)
     elif value is not None:
@@ -195,12 +237,46 @@ def test_a_wish_makes_a_study_or_says_what_is_missing(turns: list[tuple[str, str
     measured = {*plan.measures} - {*plan.variables}
     if not plan.variables or not measured:
         with pytest.raises(InputError, match="choose at least one"):
-            study_around(OPTIMAL, plan, "s")
+            study_around(LOADED, plan, "s")
         return
-    study = study_around(OPTIMAL, plan, "s")
+    study = study_around(LOADED, plan, "s")
     assert {*study.variables} == {*plan.variables}
     assert {*study.measures} == measured
     assert study.chunks <= 41
+
+
+def test_a_design_is_offered_what_its_machine_has() -> None:
+    plan = StudyPlan()
+    variables, measures = choices_for(OPTIMAL, plan)
+    assert variables == [name for name in NAMES if name not in MACHINE]
+    assert not {*measures} & {"home_load_share", "home_worst_error", "held_volume"}
+    assert choices_for(LOADED, plan) == ([*NAMES], [*measures_in("studies")])
+    # What a plan has can be left out again.
+    plan = plan.with_variable_toggled("payload_mass").with_measure_advanced("held_volume")
+    variables, measures = choices_for(OPTIMAL, plan)
+    assert "payload_mass" in variables
+    assert "held_volume" in measures
+
+
+@pytest.mark.parametrize(
+    ("plan", "words"),
+    [
+        (
+            StudyPlan(variables=("payload_mass",)),
+            "the design has no payload mass that could vary",
+        ),
+        (
+            StudyPlan(measures=("volume", "home_largest_bending"), objectives=()),
+            "the design has no payload or force at the tool, which is needed for largest bending",
+        ),
+    ],
+)
+def test_a_plan_of_a_machine_that_is_not_there_is_refused(plan: StudyPlan, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        study_around(OPTIMAL, plan, "s")
+    assert study_around(LOADED, plan, "s").base == msgspec.structs.replace(
+        LOADED, home=home_pose(LOADED)
+    )
 
 
 def test_a_measure_is_measured_then_large_then_small_then_left_out() -> None:

@@ -19,9 +19,12 @@ from explorer import (
     Limits,
     home_pose,
     inverse,
+    largest_payload,
     leg_clearances,
+    limit_shares,
     margins,
     reachable_workspace,
+    reactions,
     workspace_nodes,
     workspace_volume,
 )
@@ -30,9 +33,12 @@ from explorer.measures.case import Case
 from explorer.measures.catalogue import measures_in
 from explorer.measures.measurements import measure_design
 from explorer.mechanism.design import VARIABLES
+from explorer.mechanism.machine import Actuators, Guide, Payload, Struts, Tool
 from explorer.mechanism.pose import Pose
 from explorer.singularity.jacobian import inverse_condition, jacobian
+from explorer.statics.weights import design_weights
 from explorer.sweep.front import front, undominated
+from explorer.sweep.machine import MACHINE
 from explorer.sweep.rows import (
     Value,
     check_study,
@@ -57,6 +63,7 @@ from explorer.sweep.study import (
     load_study,
     study_hash,
 )
+from explorer.workspace.held import held_workspace
 from explorer.workspace.limits.broken import violations
 from explorer.workspace.limits.constraints import home_signs
 from explorer.workspace.node_measures import node_measures
@@ -394,6 +401,146 @@ def test_extents_match_the_nodes_of_the_paper_to_a_cell() -> None:
     for axis, low, high in zip("xyz", *paper, strict=True):
         own = measure_design(case, [f"extent_{axis}"])[f"extent_{axis}"]
         assert own == pytest.approx(high - low, abs=2.0 * (high - low) / 40.0 + 1.0)
+
+
+MACHINE_RANGES = {
+    "payload_mass": [0.2, 2],
+    "payload_force": [1, 20],
+    "actuator_limit": [50, 400],
+    "strut_limit": [2, 30],
+    "guide_force": [50, 400],
+    "guide_moment": [2, 30],
+    "tool_x": [-2, 2],
+    "tool_y": [-2, 2],
+    "tool_z": [0, 4],
+}
+LOADS = [
+    *("home_load_share", "home_worst_actuator", "home_largest_payload"),
+    *("home_largest_bending", "held_volume"),
+]
+
+
+def test_study_over_machine_and_geometry_measures_loads_as_statics_does() -> None:
+    study = decoded(variables={"a3y": [4, 8], **MACHINE_RANGES}, measures=LOADS)
+    rows = columns(study, 0, 5)
+    assert rows["status"] == ["done"] * 5
+    for k in range(5):
+        values = {name: float(rows[name][k] or 0.0) for name in study.variables}
+        limit, tool = values["actuator_limit"], [values[f"tool_{axis}"] for axis in "xyz"]
+        # The machine is made anew, without the study's way to change a design.
+        design = msgspec.structs.replace(
+            design_of(study, {"a3y": values["a3y"]}),
+            tool=Tool((tool[0], tool[1], tool[2])),
+            payload=Payload(values["payload_mass"], force_n=values["payload_force"]),
+            actuators=Actuators((limit, limit, limit, limit, limit, limit)),
+            struts=Struts(moment_nm=values["strut_limit"]),
+            guide=Guide(values["guide_force"], values["guide_moment"]),
+        )
+        assert design == design_of(study, values)
+        home = home_pose(design)
+        held = reactions(
+            design, home.position, home.rotation, np.zeros(6), tool, design_weights(design)
+        )
+        shares = limit_shares(design, held)
+        assert rows["home_load_share"][k] == pytest.approx(shares.max(), rel=1e-9)
+        assert rows["home_worst_actuator"][k] == 1 + shares[:6].argmax()
+        most = float(largest_payload(design, home.position, home.rotation, tool=tool))
+        assert rows["home_largest_payload"][k] == pytest.approx(most, rel=1e-9)
+        bending = 1e-3 * design.unit_mm * (held.bending + held.spread[6:8]).max()
+        assert rows["home_largest_bending"][k] == pytest.approx(bending, rel=1e-9)
+        volume = held_workspace(design, home.rotation).held_volume
+        assert rows["held_volume"][k] == pytest.approx(volume, rel=1e-9)
+
+
+def test_limits_of_a_study_replace_both_sides_of_the_design() -> None:
+    own = Actuators(push_n=(1.0, 2.0, 3.0, 4.0, 5.0, 6.0), pull_n=(9.0, 8.0, 7.0, 6.0, 5.0, 4.0))
+    study = decoded(variables={"actuator_limit": [50, 400]}, measures=["volume"])
+    study = msgspec.structs.replace(
+        study, design=msgspec.structs.replace(study.base, actuators=own)
+    )
+    push, pull = design_of(study, {"actuator_limit": 70.0}).actuators.limits
+    assert push.tolist() == pull.tolist() == [70.0] * 6
+    assert MACHINE["actuator_limit"].value_in(study.base) == 1.0
+
+
+@pytest.mark.parametrize("name", [*MACHINE])
+def test_machine_variable_is_read_as_it_is_set(name: str) -> None:
+    design = msgspec.structs.replace(OPTIMAL, tool=Tool((1.0, 2.0, 3.0)))
+    changed = MACHINE[name].with_value(design, 2.5)
+    assert MACHINE[name].value_in(changed) == 2.5
+    others = [other for other in MACHINE if other != name]
+    assert [MACHINE[other].value_in(changed) for other in others] == [
+        MACHINE[other].value_in(design) for other in others
+    ]
+    assert changed.variables == design.variables
+
+
+def test_machine_of_a_plain_design_has_no_values() -> None:
+    assert {variable.value_in(OPTIMAL) for variable in MACHINE.values()} == {None}
+
+
+@pytest.mark.parametrize(
+    ("variables", "words"),
+    [
+        ({"payload_mass": [-1, 1]}, "payload_mass must not be negative; its range starts at -1"),
+        ({"actuator_limit": [0, 1]}, "actuator_limit must be positive; its range starts at 0"),
+        ({"guide_moment": [-2, 1]}, "guide_moment must be positive; its range starts at -2"),
+    ],
+)
+def test_machine_range_that_makes_no_design_is_refused(
+    variables: dict[str, list[float]], words: str
+) -> None:
+    with pytest.raises(InputError, match=words):
+        decoded(variables=variables)
+
+
+def test_measures_of_a_machine_that_no_design_has_are_refused() -> None:
+    study = decoded(measures=["volume", "home_load_share", "home_worst_error"])
+    with pytest.raises(InputError) as refusal:
+        check_study(study)
+    assert str(refusal.value) == (
+        "the designs of the study have no payload or force at the tool, which is needed for load "
+        "share at home; no limit of actuators, struts or guide, which is needed for load share at "
+        "home; no errors of the actuators, which is needed for worst error at home"
+    )
+    check_study(decoded(variables=MACHINE_RANGES, measures=["home_load_share"]))
+
+
+def test_row_without_a_payload_says_what_it_lacks() -> None:
+    study = sampled(
+        "grid", 2, variables={"payload_mass": [0, 1]}, measures=["volume", "home_largest_bending"]
+    )
+    rows = columns(study, 0, 2)
+    assert rows["status"] == ["done"] * 2
+    assert rows["home_largest_bending"][0] is None
+    assert "it has no payload or force at the tool" in str(rows["reason"][0])
+    assert isinstance(rows["home_largest_bending"][1], float)
+    assert rows["reason"][1] == ""
+
+
+def test_polish_for_the_smallest_load_takes_the_payload_of_its_sample() -> None:
+    demands = {"volume": 7000.0, "reach": 20.5, "required_box": [[8, 3, 7], [12, 7, 11]]}
+    study = decoded(
+        variables={"a3x": [15, 21], "b1y": [-6, -2], "b3": [3, 8], "payload_mass": [0.5, 2]},
+        measures=["home_load_share"],
+        polish={"objective": "smallest-load", "demands": demands, "iterations": 3},
+    )
+    limits = Actuators((150.0, 200.0, 150.0, 200.0, 150.0, 150.0))
+    study = msgspec.structs.replace(
+        study, design=msgspec.structs.replace(study.base, actuators=limits)
+    )
+    rows = columns(study, 0, 2)
+    for k in range(2):
+        mass = rows["payload_mass"][k]
+        assert mass == rows["sample_payload_mass"][k]
+        values = {name: float(rows[name][k] or 0.0) for name in study.varied}
+        design = design_of(study, values)
+        assert design.payload.mass_kg == mass
+        home = home_pose(design)
+        weights = design_weights(design)
+        held = reactions(design, home.position, home.rotation, np.zeros(6), weights=weights)
+        share = float(limit_shares(design, held).max())
+        assert rows["home_load_share"][k] == pytest.approx(share, rel=1e-9)
 
 
 def test_empty_workspace_is_a_row_with_a_reason() -> None:

@@ -12,11 +12,14 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from explorer.errors import InputError
+from explorer.measures.case import Case
 from explorer.measures.catalogue import CATALOGUE, measures_in
+from explorer.measures.measurements import unmet_needs
 from explorer.mechanism.design import VARIABLES, Design
 from explorer.numerics.arrays import BoolArray
 from explorer.numerics.number_text import format_number
 from explorer.optimise.problem import REACH, YAW, longest_minimum, start_value
+from explorer.sweep.machine import MACHINE
 from explorer.sweep.study import (
     DEFAULT_MEASURES,
     LONGEST_NAME,
@@ -165,11 +168,18 @@ def range_around(design: Design, name: str, percent: float) -> Range:
     that is larger; for the yaw, of a right angle. A radius stays at zero or above.
 
     Raises:
-        InputError: no such variable.
+        InputError: no such variable, or a part of the machine that the design does not have.
     """
     share = percent / 100.0
     if name == YAW:
         value, span = start_value(design, YAW), share * RIGHT_ANGLE
+    elif name in MACHINE:
+        found = MACHINE[name].value_in(design)
+        if found is None:
+            raise InputError(f"the design has no {label_of(name)} that could vary")
+        value, span = found, share * abs(found)
+        if MACHINE[name].bound == "any":
+            span = share * max(abs(value), LEAST_SHARE * design.reach)
     elif name == RADIUS:
         value = max(design.limits.leg_radii)
         span = share * max(value, LEAST_SHARE**2 * design.reach)
@@ -210,6 +220,8 @@ def study_around(design: Design, plan: StudyPlan, name: str) -> Study:
     measures = tuple(measure for measure in plan.measures if measure not in plan.variables)
     if not measures:
         raise InputError("choose at least one measure")
+    if lacking := unmet_needs([Case(design)], measures):
+        raise InputError(f"the design has {lacking}")
     ranges = {v: range_around(design, v, plan.percent) for v in plan.variables}
     return Study(
         name=name[:LONGEST_NAME],
@@ -226,7 +238,27 @@ def unit_of(name: str) -> str:
     """Return the unit of a variable or measure as the page writes it; "" for a plain number."""
     if name in CATALOGUE:
         return CATALOGUE[name].unit_in("units")
+    if name in MACHINE:
+        return MACHINE[name].unit
     return "°" if name == YAW else "units" if name in NAMES else ""
+
+
+def choices_for(design: Design, plan: StudyPlan) -> tuple[list[str], list[str]]:
+    """Return the variables and the measures that a plan has or a design allows, in their order."""
+    case = Case(design)
+    variables = [
+        name
+        for name in NAMES
+        if name in plan.variables
+        or name not in MACHINE
+        or MACHINE[name].value_in(design) is not None
+    ]
+    measures = [
+        name
+        for name, measure in measures_in("studies").items()
+        if name in plan.measures or all(map(case.has, measure.needs))
+    ]
+    return variables, measures
 
 
 def label_of(name: str) -> str:

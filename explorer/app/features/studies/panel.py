@@ -39,6 +39,7 @@ from explorer.app.widgets.commands import NO_OPTION
 from explorer.app.widgets.markup import alert, beside
 from explorer.errors import ExplorerError
 from explorer.measures.catalogue import measures_in
+from explorer.mechanism.design import Design
 from explorer.sweep.study import NAMES
 
 Axis = Literal["across", "up", "colour"]
@@ -115,7 +116,7 @@ class StudiesPanel:
         yield self.form, "visible", is_new
         yield from self._controls.updates(frame)
         # The texts are made again only after a change.
-        design = frame.state.design.name
+        design = frame.state.design
         key = (drawing, studies, run, self.feed.problem, is_new, design)
         if len(key) == len(self._key) and all(a is b for a, b in zip(key, self._key, strict=True)):
             return
@@ -144,7 +145,7 @@ class StudiesPanel:
         studies: Studies,
         drawing: StudyDrawing | None,
         run: Run | None,
-        design: str,
+        design: Design,
         *,
         is_new: bool,
     ) -> Iterator[Update]:
@@ -159,14 +160,15 @@ class StudiesPanel:
             ),
         )
         problem = None if is_new else self._problem()
-        lines = head(None if problem else drawing, run, studies.plan if is_new else None, design)
+        plan = studies.plan if is_new else None
+        lines = head(None if problem else drawing, run, plan, design.name)
         yield self._head, "content", lines + (problem or "")
         # While a new study is set up, the open one waits.
         seen = None if is_new else drawing
         yield from self.plots.updates(seen)
         yield self.legend, "content", "" if seen is None else legend(seen)
         yield self.table, "content", "" if seen is None else table(seen)
-        yield self.chips, "content", chips(studies.plan)
+        yield self.chips, "content", chips(studies.plan, design)
 
     def _problem(self) -> str | None:
         if self.feed.problem is not None:

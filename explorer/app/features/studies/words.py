@@ -11,7 +11,13 @@ from explorer.app.features.studies.feed import StudyDrawing
 from explorer.app.features.studies.figures import FRONT, PICKED, SCALE
 from explorer.app.features.studies.plot_rows import MOST_ROWS
 from explorer.app.features.studies.runner import Run
-from explorer.app.state.studies import RADIUS, StudyPlan, label_of, title_of
+from explorer.app.state.studies import (
+    RADIUS,
+    StudyPlan,
+    choices_for,
+    label_of,
+    title_of,
+)
 from explorer.app.widgets.buttons import press_button
 from explorer.app.widgets.markup import (
     box,
@@ -23,8 +29,10 @@ from explorer.app.widgets.markup import (
     signed,
 )
 from explorer.measures.catalogue import measures_in
+from explorer.mechanism.design import Design
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.optimise.problem import REACH, YAW
+from explorer.sweep.machine import MACHINE
 from explorer.sweep.study import NAMES, Sense, Study
 
 ROWS = 10
@@ -295,8 +303,14 @@ def _line(drawing: StudyDrawing, row: int, decimals: Mapping[str, int]) -> str:
     )
 
 
-def chips(plan: StudyPlan) -> str:
-    """Return the switches of the variables and measures of a new study, as HTML."""
+def chips(plan: StudyPlan, design: Design) -> str:
+    """Return the switches of the variables and measures of a new study, as HTML.
+
+    Args:
+        plan: The new study.
+        design: The design it is around, whose machine may allow more of them.
+    """
+    variables, measures = choices_for(design, plan)
     varying = "".join(
         press_button(
             "studies.vary",
@@ -306,7 +320,7 @@ def chips(plan: StudyPlan) -> str:
             class_name="ex-chip",
             is_on=name in plan.variables,
         )
-        for name in NAMES
+        for name in variables
     )
     measured = "".join(
         press_button(
@@ -317,7 +331,7 @@ def chips(plan: StudyPlan) -> str:
             class_name="ex-chip",
             is_on=name in plan.measures,
         )
-        for name in measures_in("studies")
+        for name in measures
     )
     return box(
         _title("Variables that vary; press to choose"),
@@ -354,6 +368,7 @@ def _variable_words(name: str) -> str:
         YAW: "the yaw of home [°]",
         REACH: "one maximum for all lengths [units]",
         RADIUS: "one radius for all legs [units]",
+        **{other: f"the {each.words} [{each.unit}]" for other, each in MACHINE.items()},
     }
     return words.get(name, title_of(name)) if name in NAMES else name
 
