@@ -11,7 +11,7 @@ import numpy as np
 
 from explorer.mechanism.design import Design
 from explorer.mechanism.machine import Payload
-from explorer.mechanism.pose import Pose
+from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.statics.equilibrium import twists_of_actuators
 from explorer.statics.forces import largest_force
@@ -44,6 +44,8 @@ class LoadedPose:
         load: (F; M) at the tool point, base axes, shape (6,), in N and N × unit.
         own: Masses of the bodies besides the payload; None for none.
         weighs_payload: Whether the payload has its weight.
+        point: Point at which the load acts in place of the tool, in the platform frame and design
+            units; None for the tool.
     """
 
     design: Design
@@ -51,6 +53,12 @@ class LoadedPose:
     load: FloatArray
     own: Weights | None = None
     weighs_payload: bool = True
+    point: Triple | None = None
+
+    @property
+    def tool(self) -> Triple:
+        """The point at which the load acts, in the platform frame and design units."""
+        return self.design.tool.position if self.point is None else self.point
 
     @cached_property
     def weights(self) -> Weights:
@@ -98,7 +106,7 @@ class LoadedPose:
     def largest_payload(self) -> float:
         """The largest mass in place of the payload that keeps all limits, in kg."""
         given = self.design, self.pose.position, self.pose.rotation, self.load
-        return float(largest_payload(*given, self.design.tool.position, self.own))
+        return float(largest_payload(*given, self.tool, self.own))
 
     @cached_property
     def largest_force(self) -> float:
@@ -108,7 +116,7 @@ class LoadedPose:
         """
         most = np.minimum(*self.design.actuators.limits)
         given = self.design, self.pose.position, self.pose.rotation, most
-        return float(largest_force(*given, self.design.tool.position))
+        return float(largest_force(*given, self.tool))
 
     def worst_force(self, force: float) -> WorstForce:
         """Return the direction of an added force at the tool that uses the largest share.
@@ -121,7 +129,7 @@ class LoadedPose:
             force: Size of the force, in N.
         """
         design, pose = self.design, self.pose
-        twists = twists_of_actuators(design, pose.position, pose.rotation, design.tool.position)
+        twists = twists_of_actuators(design, pose.position, pose.rotation, self.tool)
         rows = twists[:3].T
         if not np.isfinite(rows).all():
             return WorstForce(np.full(3, np.nan), self.worst, np.inf)
@@ -137,6 +145,5 @@ class LoadedPose:
         return WorstForce(direction, part, share)
 
     def _held(self, load: FloatArray) -> Reactions:
-        design, pose = self.design, self.pose
-        tool = design.tool.position
-        return reactions(design, pose.position, pose.rotation, load, tool, self.weights)
+        given = self.design, self.pose.position, self.pose.rotation, load
+        return reactions(*given, self.tool, self.weights)

@@ -99,8 +99,7 @@ def _holds(loaded: LoadedPose, positions: FloatArray) -> BoolArray:
 def _shares(loaded: LoadedPose, positions: FloatArray) -> FloatArray:
     """Return the shares of the limits at positions (..., 3), shape (..., 12)."""
     design, rotation = loaded.design, loaded.pose.rotation
-    tool, weights = design.tool.position, loaded.weights
-    held = reactions(design, positions, rotation, loaded.load, tool, weights)
+    held = reactions(design, positions, rotation, loaded.load, loaded.tool, loaded.weights)
     return limit_shares(design, held)
 
 

@@ -12,6 +12,9 @@ from numpy.testing import assert_allclose
 
 import explorer
 from explorer.mechanism.machine import STANDARD_GRAVITY
+from explorer.prototype.assembly import make_prototype
+from explorer.prototype.weights import machine_weights
+from explorer.statics.weights import carry
 
 POSE = ["--position", "8", "-2.5", "11", "--yaw-pitch-roll", "-60", "12.5", "-7"]
 AT = (8.0, -2.5, 11.0), explorer.rotation_from_yaw_pitch_roll((-60.0, 12.5, -7.0))
@@ -63,6 +66,47 @@ def test_forces_with_limits_have_a_largest_force(cli: CommandLine, machine: Path
     assert own["worst_actuator"] in explorer.JOINTS
     assert own["largest_payload"] == pytest.approx(float(explorer.largest_payload(MACHINE, *AT)))
     assert max(own["shares"].values()) > 0.0
+
+
+def test_an_added_force_has_the_direction_that_is_worst_with_the_load(
+    cli: CommandLine, machine: Path
+) -> None:
+    given = ["forces", *POSE, "--design", machine, "--at", "tool"]
+    found = cli.answer(*given, "--load", *LOAD, "--force", "7")["worst_force"]
+    force = 7.0 * np.array(found["direction"]) + LOAD[:3]
+    there = cli.answer(*given, "--load", *force, *LOAD[3:])
+    assert max(there["shares"].values()) == pytest.approx(found["share"], rel=1e-9)
+    assert there["shares"][found["part"]] == max(there["shares"].values())
+    free = cli.answer("forces", *POSE, "--force", "7")["worst_force"]
+    assert (free["direction"], free["part"], free["share"]) == (None, None, 0.0)
+
+
+def test_where_a_load_is_not_held_the_nearest_position_is_told(
+    cli: CommandLine, machine: Path
+) -> None:
+    given = ["forces", "--design", machine, "--at", "tool", "--load", "0", "0", "-30"]
+    low = ["--position", "10", "5", "4"]
+    found = cli.answer(*given, *low)
+    nearest = found["nearest_held"]
+    assert max(found["shares"].values()) > 1.0
+    there = cli.answer(
+        *given, "--position", *nearest["tool_position"], "--quaternion", *nearest["quaternion"]
+    )
+    assert 0.999 < max(there["shares"].values()) <= 1.0
+    assert there["nearest_held"] is None
+    text = cli.text(*given, *low)
+    assert "gives way" in text
+    assert "nearest position that holds the load" in text
+
+
+def test_parts_of_the_prototype_weigh_in_place_of_bars(cli: CommandLine) -> None:
+    design = explorer.PRESETS["paper-optimal"]
+    weights = machine_weights(design, make_prototype(design).masses(2700.0), payload=False)
+    carried = carry(design, *AT, weights).wrench
+    expected = explorer.actuator_forces(design, *AT, carried)
+    found = cli.answer("forces", *POSE, "--density", "2700", "--parts")
+    assert_allclose(found["actuator_forces"], expected)
+    assert "--density" in cli.refusal("forces", *POSE, "--parts")
 
 
 def test_forces_of_payload_are_those_of_its_weight(cli: CommandLine, machine: Path) -> None:

@@ -3,42 +3,44 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
 
 from explorer.cli.load_options import LoadOptions, check_regular
-from explorer.cli.output import figure, figures, finite, heading, pose_table, table
+from explorer.cli.output import figure, figures, finite, heading, pose_json, pose_table, table
 from explorer.cli.values import hint, numbers, positive
+from explorer.errors import InputError
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.pose import Pose, Triple
-from explorer.numerics.arrays import FloatArray
+from explorer.mechanism.tool_point import tool_position
 from explorer.statics.equilibrium import twists_of_actuators
 from explorer.statics.forces import WorstDirection, worst_direction
-from explorer.statics.reactions import (
-    LIMITED,
-    Reactions,
-    largest_payload,
-    limit_shares,
-    reactions,
-)
-from explorer.statics.weights import Weights, design_weights
+from explorer.statics.loaded import LoadedPose, WorstForce
+from explorer.statics.reactions import LIMITED
+from explorer.statics.weights import Weights
 
 Six = tuple[float, float, float, float, float, float]
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What the command computes of a pose."""
+    """What the command computes of a pose.
 
-    design: Design
-    pose: Pose
+    Attributes:
+        loaded: The pose under the load and all weights.
+        tool: Point that positions are of; None for b4.
+        worst: Direction in which a force alone loads an actuator most.
+        added: An added force in its worst direction; None if none is asked for.
+        nearest: The nearest pose that holds the load; None if this one does, or none was found.
+    """
+
+    loaded: LoadedPose
     tool: Triple | None
-    held: Reactions
-    shares: FloatArray
     worst: WorstDirection
-    payload: float
+    added: WorstForce | None
+    nearest: Pose | None
 
     @property
     def largest_force(self) -> float:
@@ -64,43 +66,65 @@ class Forces(LoadOptions):
     """Largest forces of the actuators in N for the largest force in every direction, or one for
     all."""
 
+    force: Annotated[float | None, positive("--force"), hint("default: none")] = None
+    """Size of an added force in N, of which the worst direction is told."""
+
     density: Annotated[float | None, positive("--density"), hint("default: no weight")] = None
     """Density of the legs and the platform in kg/m³, as bars with the legs' radii."""
 
+    parts: bool = False
+    """Whether the parts of the prototype have this density, in place of bars."""
+
     def run(self) -> None:
         """Write the forces, the bending and the shares of the limits."""
+        if self.parts and self.density is None:
+            raise InputError("--parts needs the density of the parts: add --density KG_PER_M3")
         design = self.read_loaded_design()
         pose, tool = self.pose(design), self.tool(design)
         given = design, pose.position, pose.rotation
         check_regular(pose, twists_of_actuators(*given))
-        own = self._own_weights(design)
-        carried = (*own.on_platform, *design_weights(design).on_platform)
-        weights = replace(own, on_platform=carried)
-        held = reactions(*given, self.load, tool, weights)
+        point = tool or (0.0, 0.0, 0.0)
+        loaded = LoadedPose(
+            design, pose, np.array(self.load), self._own_weights(design), point=point
+        )
         most = np.minimum(*design.actuators.limits) if self.most is None else self.most
+        nearest = None
+        if loaded.share > 1.0:
+            from explorer.workspace.nearest_held import nearest_held
+
+            nearest = nearest_held(loaded)
         answer = Answer(
-            design,
-            pose,
+            loaded,
             tool,
-            held,
-            limit_shares(design, held),
             worst_direction(*given, most, tool),
-            float(largest_payload(*given, self.load, tool, own)),
+            None if self.force is None else loaded.worst_force(self.force),
+            nearest,
         )
         self.write(lambda: _as_json(answer), lambda: _as_lines(answer))
 
     def _own_weights(self, design: Design) -> Weights:
-        """Return the weights of legs and platform."""
+        """Return the weights of legs and platform.
+
+        Raises:
+            ExplorerError: The design has no prototype.
+        """
         if self.density is None:
             return Weights()
         from explorer.prototype.weights import bar_masses, machine_weights
 
-        return machine_weights(design, bar_masses(design, self.density), payload=False)
+        if self.parts:
+            from explorer.prototype.assembly import make_prototype
+
+            masses = make_prototype(design).masses(self.density)
+        else:
+            masses = bar_masses(design, self.density)
+        return machine_weights(design, masses, payload=False)
 
 
 def _as_json(answer: Answer) -> dict[str, object]:
-    held, worst = answer.held, answer.worst
-    is_limited = bool(worst.share)
+    loaded, worst, added = answer.loaded, answer.worst, answer.added
+    held, is_limited = loaded.held, bool(worst.share)
+    nearest = answer.nearest
     return {
         "actuator_forces": held.actuators,
         "strut_bending": held.bending,
@@ -110,17 +134,29 @@ def _as_json(answer: Answer) -> dict[str, object]:
         "joint_forces": held.joints,
         "guide_force": held.guide_force,
         "guide_moment": held.guide_moment,
-        "shares": dict(zip(LIMITED, answer.shares.tolist(), strict=True)),
-        "largest_payload": finite(answer.payload),
+        "shares": dict(zip(LIMITED, loaded.shares.tolist(), strict=True)),
+        "largest_payload": finite(loaded.largest_payload),
+        "worst_force": None if added is None else _force_json(added),
+        "nearest_held": None if nearest is None else pose_json(nearest, answer.tool),
+    }
+
+
+def _force_json(added: WorstForce) -> dict[str, object]:
+    is_limited = added.share > 0.0
+    return {
+        "direction": added.direction if is_limited else None,
+        "part": LIMITED[added.part] if is_limited else None,
+        "share": added.share,
     }
 
 
 def _as_lines(answer: Answer) -> Iterator[str]:
-    design, held = answer.design, answer.held
-    yield from (heading(design), pose_table(design, answer.pose, answer.tool), "")
+    loaded = answer.loaded
+    design, held, of_limits = loaded.design, loaded.held, loaded.shares
+    yield from (heading(design), pose_table(design, loaded.pose, answer.tool), "")
     size = float(np.abs(held.actuators).max())
     forces = [figure(value, size) for value in held.actuators.tolist()]
-    shares = [_share(value) for value in answer.shares.tolist()]
+    shares = [_share(value) for value in of_limits.tolist()]
     rows = [("actuator", "force, N", "of its limit")]
     rows += zip(JOINTS, forces, shares[:6], strict=True)
     yield from (table(rows, "<>>"), "")
@@ -130,7 +166,7 @@ def _as_lines(answer: Answer) -> Iterator[str]:
     ]
     for index in range(2):
         moment = float(held.bending[index])
-        share = max(answer.shares[6 + index], answer.shares[10 + index])
+        share = max(of_limits[6 + index], of_limits[10 + index])
         rows.append(
             (
                 f"leg {index + 2}",
@@ -147,9 +183,24 @@ def _as_lines(answer: Answer) -> Iterator[str]:
         actuator = JOINTS[int(answer.worst.actuator)]
         direction = "  ".join(figures(answer.worst.direction.tolist()))
         rows.append(("worst direction", f"{direction}, of {actuator}"))
-    most = "no limit" if np.isinf(answer.payload) else f"{figure(answer.payload)} kg"
+    payload, added = loaded.largest_payload, answer.added
+    most = "no limit" if np.isinf(payload) else f"{figure(payload)} kg"
     rows.append(("largest payload", most))
+    if added is not None and added.share:
+        direction = "  ".join(figures(added.direction.tolist()))
+        what = f"{LIMITED[added.part]} at {_share(added.share)}"
+        rows.append(("worst direction of the added force", f"{direction}, {what}"))
+    if loaded.share > 1.0:
+        rows.append(("gives way", f"{LIMITED[loaded.worst]} at {_share(loaded.share)}"))
+        rows.append(("nearest position that holds the load", _nearest(answer)))
     yield table(rows, "<<")
+
+
+def _nearest(answer: Answer) -> str:
+    if answer.nearest is None:
+        return "none found in this orientation and mode"
+    there = tool_position(answer.nearest, answer.loaded.tool)
+    return "  ".join(figures(there))
 
 
 def _newtons(value: float) -> str:
