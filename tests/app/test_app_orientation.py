@@ -364,7 +364,7 @@ def tilts_over(state: State) -> TiltsDrawing:
 def test_cut_of_the_workspace_opens_the_tilts_on_the_same_side() -> None:
     state = shown(opened(OPTIMAL), tilts=True)
     drawing = tilts_over(state)
-    assert kept_nodes(drawing.positions, WorkspaceView()).all()
+    assert kept_nodes(drawing, WorkspaceView()).all()
     for axis, cut in enumerate(AXES):
         for flipped in (False, True):
             view = WorkspaceView(solid=True, cut=cut, level=6.0, flipped=flipped)
@@ -373,7 +373,7 @@ def test_cut_of_the_workspace_opens_the_tilts_on_the_same_side() -> None:
             surface = draw_workspace(request).surface
             ends = [shell.vertices[:, axis] for shell in surface.shells if len(shell.vertices)]
             low, high = min(map(np.min, ends)), max(map(np.max, ends))
-            kept = drawing.positions[kept_nodes(drawing.positions, view), axis]
+            kept = drawing.positions[kept_nodes(drawing, view), axis]
             assert len(kept)
             assert low - 1e-9 <= kept.min()
             assert kept.max() <= high + 1e-9

@@ -7,6 +7,7 @@ import html
 import io
 import json
 import re
+import time
 from dataclasses import replace
 from typing import Any, Literal
 
@@ -17,6 +18,7 @@ import trimesh
 import viser
 from desk import Desk, by_name, number, rows_of
 from hypothesis import given, strategies as st
+from scipy.spatial.transform import Rotation
 from services import StubDownloads, StubWorker
 from strategies import Case, all_cases
 
@@ -25,12 +27,13 @@ from explorer.app.features.mechanism.marks import DragHandle
 from explorer.app.features.mechanism.modes import modes_table
 from explorer.app.features.mechanism.pose_panel import MovePanel
 from explorer.app.features.orientation.actions import GoToTilt, SetTiltTorsion
-from explorer.app.features.orientation.feeds import RangeFeed, TiltsFeed
-from explorer.app.features.orientation.panel import point_words
+from explorer.app.features.orientation.feeds import PositionFeed, RangeFeed, TiltsFeed
+from explorer.app.features.orientation.panel import OrientationPanel
 from explorer.app.features.orientation.scene import OrientationScene
 from explorer.app.features.orientation.tasks import orientations_over
 from explorer.app.features.paths.actions import Go
 from explorer.app.features.paths.panel import TYPED, PathsPanel, end_numbers
+from explorer.app.features.paths.runner import PathRunner
 from explorer.app.features.paths.scene import PathScene
 from explorer.app.features.sharing.scene_html import caption_of
 from explorer.app.features.singularity.jog_scene import motion_line
@@ -51,11 +54,13 @@ from explorer.app.features.workspace.tasks import (
 from explorer.app.features.workspace.words import workspace_details
 from explorer.app.inputs.ranges import position_span
 from explorer.app.scene.placing import Placed, scene_scale
+from explorer.app.session.history import start_history
 from explorer.app.session.session import UNDO
 from explorer.app.state.actions import GoHome, Set, SetAngle, SetMode, SetPose, SetPosition
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, angles_of, opened
 from explorer.app.state.view import OrientationView
+from explorer.app.storage.session_format import decode_session, encode_session
 from explorer.app.widgets.assigning import Assigner
 from explorer.app.widgets.pieces import widgets
 from explorer.export.step import exact_workspace, step_bytes
@@ -325,7 +330,7 @@ def test_caption_of_a_scene_has_the_position_of_the_tool() -> None:
 # Paths
 
 
-def test_path_is_drawn_as_the_track_of_the_tool(services: Services) -> None:
+def test_straight_path_is_the_line_of_the_tool(services: Services) -> None:
     state = opened_at(pose=None)
     state = Go().apply(Set("paths.goal", TILTED).apply(state))
     journey = state.journey
@@ -333,11 +338,69 @@ def test_path_is_drawn_as_the_track_of_the_tool(services: Services) -> None:
     placed = Placed(Frame(state))
     points = by_name(PathScene(services).updates(placed))["/path/line"]["points"]
     timed = journey.trajectory
+    # It goes straight, and ends are kept.
+    along = points[-1, 1] - points[0, 0]
+    off = np.cross(points[:, 0] - points[0, 0], along / np.linalg.norm(along))
+    assert np.abs(off).max() < 1e-4
+    assert journey.pose_at(timed.duration) == TILTED
+    for crossing in journey.margins.crossings:
+        at = crossing.pose
+        assert abs(margins(at.position, at.rotation)[crossing.incidence - 1]) < 1e-9
     for index in (0, 40, 133, len(timed.time) - 2):
         there = replace(state, pose=journey.pose_at(float(timed.time[index])))
         np.testing.assert_allclose(
             points[index, 0], placed.scale * tool_of(there), rtol=0.0, atol=1e-5
         )
+
+
+def test_path_keeps_its_moves_when_another_point_is_shown(services: Services) -> None:
+    state = Go().apply(Set("paths.goal", TILTED).apply(opened_at(pose=None)))
+    of_b4 = Set("view.at", "b4").apply(state)
+    assert of_b4.journey == state.journey
+    assert state.journey is not None
+    placed = Placed(Frame(of_b4))
+    points = by_name(PathScene(services).updates(placed))["/path/line"]["points"]
+    expected = placed.scale * state.journey.trajectory.position
+    np.testing.assert_allclose(points[:, 0], expected[:-1], rtol=0.0, atol=1e-5)
+
+
+def test_file_keeps_the_point_and_the_path_of_the_tool() -> None:
+    state = Go().apply(Set("paths.goal", TILTED).apply(opened_at(pose=None)))
+    read = decode_session(encode_session(start_history(state), 3), "file").step.state
+    assert read.journey is not None
+    assert (read.view.at, read.journey.tool) == ("tool", TOOL)
+    assert state.journey is not None
+    assert read.journey.pose_at(1.5) == state.journey.pose_at(1.5)
+
+
+def test_path_is_planned_for_the_tool(services: Services, desk: Desk) -> None:
+    goal = Pose.of_yaw_pitch_roll((10.0, 4.0, 8.0), (-70.0, 8.0, 5.0))
+    for action in (
+        Set("design", with_tool(OPTIMAL)),
+        Set("view.at", "tool"),
+        Set("paths.goal", goal),
+        Set("paths.kind", "planned"),
+    ):
+        desk.session.do(action)
+    runner = PathRunner(services)
+    desk.session.do(Go())
+    runner.follow(Frame(desk.state))
+    deadline = time.monotonic() + 120.0
+    while desk.state.paths.is_planning:
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    journey = desk.state.journey
+    assert journey is not None, desk.state.paths.problem
+    corners = np.array([tool_of(replace(desk.state, pose=pose)) for pose in journey.poses])
+    timed = journey.trajectory
+    for share in range(25):
+        seconds = timed.duration * share / 24.0
+        place = float(np.interp(seconds, timed.time, timed.at))
+        move = min(int(place), len(corners) - 2)
+        between = corners[move] + (place - move) * (corners[move + 1] - corners[move])
+        there = replace(desk.state, pose=journey.pose_at(seconds))
+        np.testing.assert_allclose(tool_of(there), between, atol=1e-9)
+        assert not Frame(there).snapshot.violations
 
 
 @pytest.mark.parametrize("end", ["Start", "Goal"])
@@ -656,8 +719,13 @@ def test_nodes_of_tilts_are_where_the_tool_is_at_tilt_zero(services: Services) -
     upright = SetTiltTorsion(1, 0.0).apply(state)
     tools = nodes(state)
     assert len(tools) == len(feed.drawing.positions)
-    for point in tools[:: len(tools) // 40]:
-        assert is_within(state, point, upright.pose)
+    for index in range(0, len(tools), len(tools) // 40):
+        assert is_within(state, tools[index], upright.pose)
+        x, y, z = tools[index].tolist()
+        there = replace(upright, pose=state.pose_at((x, y, z), upright.pose))
+        tilt = float(feed.drawing.tilts[index]) - 1e-3
+        tilted = (GoToTilt(azimuth, max(0.0, tilt)).apply(there) for azimuth in range(0, 360, 24))
+        assert not any(Frame(each).snapshot.violations for each in tilted)
     box = scene.corners(Placed(Frame(state))) / scale
     np.testing.assert_allclose(
         [box.min(axis=0), box.max(axis=0)], [tools.min(axis=0), tools.max(axis=0)], atol=1e-5
@@ -699,10 +767,39 @@ def test_solid_over_tilts_is_of_the_positions_of_the_tool(
     assert {*seen} == {True, False}
 
 
-def test_tab_of_tilts_tells_that_its_map_is_of_b4() -> None:
-    assert "hold b4 in its place" in point_words(opened_at())
-    assert point_words(opened_at("b4")) == ""
-    assert point_words(opened_at(tool=(0.0, 0.0, 0.0))) == ""
+def test_tab_of_tilts_tells_how_far_the_platform_tilts_about_the_tool(services: Services) -> None:
+    state = opened_at(tool=(0.5, 0.0, 2.0), pose=None)
+    panel = OrientationPanel(services)
+    texts = " ".join(str(v) for _, name, v in panel.updates(Frame(state)) if name == "content")
+    (text,) = re.findall(r'ex-large">([\d.]+)°', texts)
+    of_b4 = " ".join(
+        str(v)
+        for _, name, v in panel.updates(Frame(Set("view.at", "b4").apply(state)))
+        if name == "content"
+    )
+    assert re.findall(r'ex-large">([\d.]+)°', of_b4) != [text]
+    inside, beyond = (
+        [
+            Frame(GoToTilt(azimuth, float(text) + change).apply(state)).snapshot.violations
+            for azimuth in range(-180, 180, 2)
+        ]
+        for change in (-0.1, 0.1)
+    )
+    assert not any(inside)
+    assert any(beyond)
+    feed = services.get(PositionFeed)
+    feed.follow(Frame(state))
+    assert isinstance(services.worker, StubWorker)
+    services.worker.work()
+    assert feed.drawing is not None
+    # The same position as random orientations find it.
+    x, y, z = tool_of(state).tolist()
+    turns = Rotation.random(4000, random_state=np.random.default_rng(10)).as_matrix()
+    poses = (state.pose_at((x, y, z), Pose.of(state.pose.position, turn)) for turn in turns)
+    share = float(np.mean([not evaluate(state.design, pose).violations for pose in poses]))
+    error = np.sqrt(share * (1.0 - share) / 4000)
+    assert share > 0.0
+    assert feed.drawing.share.share == pytest.approx(share, abs=4.0 * error)
 
 
 # A tool at b4

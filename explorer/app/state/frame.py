@@ -10,7 +10,6 @@ from explorer.errors import InputError
 from explorer.legs.moves import MoveClearance, move_clearance
 from explorer.measures.snapshot import Snapshot, evaluate
 from explorer.measures.verdict import Verdict, verdict
-from explorer.mechanism.tool_point import point_of
 from explorer.singularity.ellipsoids import (
     Performance,
     SingularityFreeBall,
@@ -39,8 +38,7 @@ class Frame:
     @cached_property
     def performance(self) -> Performance:
         """How fast and how strong the platform is in its pose, at the point that is shown."""
-        design = self.state.design
-        return performance(design, self.state.pose, point_of(design, self.state.view.at))
+        return performance(self.state.design, self.state.pose, self.state.tool)
 
     @cached_property
     def travels(self) -> tuple[Travel, ...]:
@@ -59,7 +57,9 @@ class Frame:
         if gesture is None:
             return None
         try:
-            return move_clearance(self.state.design, gesture.start, self.state.pose)
+            return move_clearance(
+                self.state.design, gesture.start, self.state.pose, tool=self.state.tool
+            )
         except InputError:
             # The gesture ended where it began: only a move without length is refused.
             return None

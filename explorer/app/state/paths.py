@@ -1,8 +1,8 @@
 """The path that is played on the page, and the settings of the next one.
 
 A path is the straight move between two poses, which may be singular on the way, or was planned
-without a singularity. It belongs to the design that it was made for; with another design there is
-none.
+without a singularity; b4 or the tool point goes along lines. It belongs to the design that it was
+made for; with another design there is none.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from explorer.app.state.parts import TRANSIENT
 from explorer.errors import InputError
 from explorer.legs.moves import poses_between
 from explorer.mechanism.design import Design
-from explorer.mechanism.pose import Pose
+from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.number_text import format_number
 from explorer.paths.crossings import PathMargins, path_margins
 from explorer.paths.planning import DEFAULT_SECONDS
@@ -54,6 +54,7 @@ class Journey:
         poses: The corners of the path.
         at: Time up to which it has been played, in seconds.
         is_playing: Whether it is being played.
+        tool: The tool point in the platform frame, if its moves are straight; None for those of b4.
 
     Raises:
         InputError: fewer than two corners.
@@ -65,6 +66,7 @@ class Journey:
     poses: tuple[Pose, ...]
     at: float = 0.0
     is_playing: bool = field(default=False, metadata=TRANSIENT)
+    tool: Triple | None = None
 
     def __post_init__(self) -> None:
         if len(self.poses) < 2:
@@ -74,12 +76,12 @@ class Journey:
     def trajectory(self) -> Trajectory:
         """The path over time; a straight one is slow enough to watch."""
         seconds = STRAIGHT_SECONDS if self.kind == "straight" else None
-        return _trajectory(self.design, self.poses, seconds)
+        return _trajectory(self.design, self.poses, seconds, self.tool)
 
     @property
     def margins(self) -> PathMargins:
         """The margins over the path, and its crossings."""
-        return _margins(self.poses)
+        return _margins(self.poses, self.tool)
 
     @property
     def pose(self) -> Pose:
@@ -93,7 +95,8 @@ class Journey:
         move = min(int(at), len(self.poses) - 2)
         if at - move in (0.0, 1.0):
             return self.poses[move + int(at - move)]
-        return Pose.of(*poses_between(self.poses[move], self.poses[move + 1], at - move))
+        ends = self.poses[move], self.poses[move + 1]
+        return Pose.of(*poses_between(*ends, at - move, self.tool))
 
 
 @dataclass(frozen=True)
@@ -135,13 +138,16 @@ class Paths:
 
 
 @lru_cache(maxsize=MOST_CACHED)
-def _trajectory(design: Design, poses: tuple[Pose, ...], seconds: float | None) -> Trajectory:
-    timed = trajectory(design, poses)
+def _trajectory(
+    design: Design, poses: tuple[Pose, ...], seconds: float | None, tool: Triple | None
+) -> Trajectory:
+    timed = trajectory(design, poses, tool=tool)
     if seconds is None or timed.duration == 0.0:
         return timed
-    return trajectory(design, poses, speed=DEFAULT_SPEED * design.reach * timed.duration / seconds)
+    speed = DEFAULT_SPEED * design.reach * timed.duration / seconds
+    return trajectory(design, poses, speed=speed, tool=tool)
 
 
 @lru_cache(maxsize=MOST_CACHED)
-def _margins(poses: tuple[Pose, ...]) -> PathMargins:
-    return path_margins(poses)
+def _margins(poses: tuple[Pose, ...], tool: Triple | None) -> PathMargins:
+    return path_margins(poses, tool=tool)

@@ -37,7 +37,7 @@ from explorer.mechanism.tilt_torsion import (
     rotation_from_tilt_torsion,
     tilt_torsion_of,
 )
-from explorer.mechanism.tool_point import Point, offset_of, pose_with, position_of
+from explorer.mechanism.tool_point import Point, offset_of, point_of, pose_with, position_of
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
 from explorer.optimise.outcome import Iterate
@@ -297,6 +297,12 @@ class State:
     def position(self) -> Triple:
         """The position of that point in the base frame, in design units."""
         return position_of(self.design, self.pose, self.view.at)
+
+    @property
+    def tool(self) -> Triple | None:
+        """That point in the platform frame, in design units; None if it is b4."""
+        point = point_of(self.design, self.view.at)
+        return point if any(point) else None
 
     def offset(self, rotation: ArrayLike) -> FloatArray:
         """Return the vector from b4 to that point in the base frame, shape (..., 3).

@@ -17,7 +17,6 @@ from explorer.app.features.orientation.tasks import (
 from explorer.app.session.feed import Feed
 from explorer.app.state.frame import Frame
 from explorer.mechanism.home import home_pose
-from explorer.mechanism.tool_point import point_of
 
 # Digits of a torsion in degrees beyond which tilts are not computed again.
 DIGITS = 3
@@ -30,7 +29,9 @@ class PositionFeed(Feed[PositionRequest, PositionDrawing]):
         super().__init__(
             services.worker,
             orientations_at,
-            lambda frame: PositionRequest(frame.state.design, frame.state.pose.position),
+            lambda frame: PositionRequest(
+                frame.state.design, frame.state.position, frame.state.tool
+            ),
             services.session.redraw,
         )
 
@@ -47,7 +48,8 @@ class TiltsFeed(Feed[TiltsRequest, TiltsDrawing]):
 def _tilts_of(frame: Frame) -> TiltsRequest | None:
     if not frame.state.view.orientation.tilts:
         return None
-    return TiltsRequest(frame.state.design, round(frame.state.tilt_torsion.torsion, DIGITS))
+    torsion = round(frame.state.tilt_torsion.torsion, DIGITS)
+    return TiltsRequest(frame.state.design, torsion, frame.state.tool)
 
 
 class RangeFeed(Feed[RangeRequest, RangeDrawing]):
@@ -61,5 +63,5 @@ def _range_of(frame: Frame) -> RangeRequest | None:
     view, design = frame.state.view.orientation, frame.state.design
     if view.over == "none":
         return None
-    tool = point_of(design, frame.state.view.at)
-    return RangeRequest(design, home_pose(design), view.range, view.turn, view.over, tool)
+    home, tool = home_pose(design), frame.state.tool
+    return RangeRequest(design, home, view.range, view.turn, view.over, tool)

@@ -30,14 +30,12 @@ from explorer.app.widgets.markup import (
     caption,
     dim,
     format_number,
-    note,
     row,
     table,
 )
 from explorer.app.widgets.under_way import UnderWay, problem, progress
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.tilt_torsion import TiltTorsion, tilt_torsion_of
-from explorer.mechanism.tool_point import point_of
 from explorer.numerics.number_text import format_decimals
 from explorer.workspace.orientations.share import OrientationShare
 from explorer.workspace.orientations.tilts import (
@@ -140,12 +138,11 @@ class OrientationPanel:
 
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that show a frame."""
-        design, pose = frame.state.design, frame.state.pose
-        here = frame.state.tilt_torsion
-        tilts = tilt_map(design, pose.position, here.torsion)
-        least = greatest_tilt(design, pose.position, here.torsion)
-        of_b4 = point_words(frame.state)
-        yield self._top, "content", box(*summary(frame, here, least, self._here), of_b4)
+        state, here = frame.state, frame.state.tilt_torsion
+        design, place = state.design, (state.position, here.torsion)
+        tilts = tilt_map(design, *place, tool=state.tool)
+        least = greatest_tilt(design, *place, tool=state.tool)
+        yield self._top, "content", box(*summary(frame, here, least, self._here))
         home = tilt_torsion_of(home_pose(design).rotation)
         yield self._map, "content", box(polar_map(tilts, least, here, home))
         title = caption("What ends the tilts, by share of azimuths")
@@ -158,8 +155,7 @@ class OrientationPanel:
         view = frame.state.view.orientation
         yield self._scale, "visible", view.tilts
         if view.tilts:
-            drawn_at = note("Drawn where the tool is at tilt zero.") if of_b4 else ""
-            yield self._scale, "content", box(tilts_words(self._tilts), drawn_at)
+            yield self._scale, "content", box(tilts_words(self._tilts))
         yield self._volume, "visible", view.over != "none"
         if view.over != "none":
             yield self._volume, "content", box(range_words(self._ranges))
@@ -181,7 +177,7 @@ def summary(
     frame: Frame, here: TiltTorsion, least: GreatestTilt, feed: PositionFeed
 ) -> Iterator[str]:
     """Yield the greatest tilt, the share of orientations and the range of torsions."""
-    design, position = frame.state.design, frame.state.pose.position
+    state, design = frame.state, frame.state.design
     if math.isnan(least.tilt):
         yield alert("Tilt zero is beyond a limit here", f"It violates {least.limit}.")
     else:
@@ -202,7 +198,9 @@ def summary(
     if feed.problem is not None:
         share = best = "unknown"
         yield problem(feed, "The share and the largest tilt could not be computed", "")
-    torsions = torsion_range(design, position, here.torsion, here.azimuth, here.tilt)
+    torsions = torsion_range(
+        design, state.position, here.torsion, here.azimuth, here.tilt, tool=state.tool
+    )
     span = "none here"
     if not math.isnan(torsions.low):
         span = f"{_degrees(torsions.low)} to {_degrees(torsions.high)}"
@@ -230,16 +228,6 @@ def summary(
                 "present azimuth and tilt",
             ),
         )
-    )
-
-
-def point_words(state: State) -> str:
-    """Return that the tilts are those of b4, as HTML; "" unless the platform turns elsewhere."""
-    if not any(point_of(state.design, state.view.at)):
-        return ""
-    return note(
-        "These tilts, torsions and shares hold b4 in its place. The angles below, and a press on "
-        "the map, turn the platform about the tool."
     )
 
 

@@ -14,12 +14,10 @@ from explorer.app.features.workspace.slice_map import AXES, keeps_above, level_w
 from explorer.app.scene.part import NO_POINTS, ScenePart
 from explorer.app.scene.placing import Placed
 from explorer.app.scene.shapes import NO_MESH, add_translucent
-from explorer.app.state.state import State
 from explorer.app.state.view import WorkspaceView
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.colours import Rgb
 from explorer.measures.size import corners_of
-from explorer.mechanism.tilt_torsion import rotation_from_tilt_torsion
 from explorer.numerics.arrays import BoolArray, FloatArray
 
 COLOURS: dict[str, Rgb] = {"reachable": (96, 140, 196), "dexterous": (30, 150, 135)}
@@ -54,14 +52,12 @@ class OrientationScene(ScenePart):
         view, scale = placed.frame.state.view.orientation, placed.scale
         drawing = self._tilts.drawing if view.tilts else None
         cut = placed.frame.state.view.workspace
-        offset = np.zeros(3) if drawing is None else offset_of_tilts(placed.frame.state, drawing)
-        where = scale, cut.cut, cut.level, cut.flipped, *offset.tolist()
+        where = scale, cut.cut, cut.level, cut.flipped
         if self._drawn[0] is not drawing or self._drawn[1] != where:
             self._drawn = drawing, where
             if drawing is not None:
-                nodes = drawing.positions + offset
-                kept = kept_nodes(nodes, cut)
-                positions = np.asarray(scale * nodes[kept], dtype=np.float32)
+                kept = kept_nodes(drawing, cut)
+                positions = np.asarray(scale * drawing.positions[kept], dtype=np.float32)
                 self._cloud = positions, colours_of(drawing.tilts[kept], most_of(drawing))
         is_shown = drawing is not None and len(self._cloud[0]) > 0
         yield self._points, "visible", is_shown
@@ -84,8 +80,7 @@ class OrientationScene(ScenePart):
     def corners(self, placed: Placed) -> FloatArray:
         """Return the corners of the boxes about the nodes and about the solid of the range."""
         tilts, ranged = self._tilts.drawing, self._ranges.drawing
-        state = placed.frame.state
-        drawn = [tilts.positions + offset_of_tilts(state, tilts)] if tilts is not None else []
+        drawn = [tilts.positions] if tilts is not None else []
         drawn += [ranged.solid.vertices] if ranged is not None else []
         ends = [np.array([p.min(axis=0), p.max(axis=0)]) for p in drawn if len(p)]
         if not ends:
@@ -93,15 +88,10 @@ class OrientationScene(ScenePart):
         return placed.scale * np.concatenate([corners_of(box) for box in ends])
 
 
-def offset_of_tilts(state: State, drawing: TiltsDrawing) -> FloatArray:
-    """Return the vector from b4 to the shown point at tilt zero, shape (3,)."""
-    return state.offset(rotation_from_tilt_torsion((0.0, 0.0, drawing.request.torsion)))
-
-
-def kept_nodes(nodes: FloatArray, view: WorkspaceView) -> BoolArray:
-    """Return which nodes (n, 3) the cut of the workspace keeps, shape (n,)."""
-    if view.cut is None or not len(nodes):
-        return np.ones(len(nodes), dtype=np.bool_)
-    along = nodes[:, AXES.index(view.cut)]
+def kept_nodes(drawing: TiltsDrawing, view: WorkspaceView) -> BoolArray:
+    """Return which nodes the cut of the workspace keeps, shape (n,)."""
+    if view.cut is None or not len(drawing.positions):
+        return np.ones(len(drawing.positions), dtype=np.bool_)
+    along = drawing.positions[:, AXES.index(view.cut)]
     level = level_within(float(along.min()), float(along.max()), view.level)
     return np.asarray(along >= level if keeps_above(view.cut, view.flipped) else along <= level)

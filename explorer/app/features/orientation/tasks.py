@@ -15,6 +15,7 @@ from explorer.app.session.worker import Channel
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose, Triple
 from explorer.mechanism.tilt_torsion import rotation_from_tilt_torsion
+from explorer.mechanism.tool_point import tool_offset
 from explorer.numerics.arrays import FloatArray
 from explorer.workspace.extremes import extent_of
 from explorer.workspace.orientations.sets import cone_of_directions
@@ -39,10 +40,17 @@ TURNED_ORIENTATIONS = 17
 
 @dataclass(frozen=True)
 class PositionRequest:
-    """A request for the orientations that a position can have."""
+    """A request for the orientations that a position can have.
+
+    Attributes:
+        design: The manipulator.
+        position: Position of b4 or of the tool point.
+        tool: The tool point in the platform frame; None for b4.
+    """
 
     design: Design
     position: Triple
+    tool: Triple | None = None
 
 
 @dataclass(frozen=True)
@@ -62,17 +70,24 @@ class PositionDrawing:
 
 def orientations_at(request: PositionRequest) -> PositionDrawing:
     """Return the orientations that a position can have."""
-    design, position = request.design, request.position
-    share = orientation_share(design, position)
-    return PositionDrawing(request, share, tilt_by_torsion(design, position))
+    design, position, tool = request.design, request.position, request.tool
+    share = orientation_share(design, position, tool=tool)
+    return PositionDrawing(request, share, tilt_by_torsion(design, position, tool=tool))
 
 
 @dataclass(frozen=True)
 class TiltsRequest:
-    """A request for the greatest tilts over the workspace of one torsion, in degrees."""
+    """A request for the greatest tilts over the workspace of one torsion.
+
+    Attributes:
+        design: The manipulator.
+        torsion: Torsion, in degrees.
+        tool: Tool point that has the positions, in the platform frame; None for b4.
+    """
 
     design: Design
     torsion: float
+    tool: Triple | None = None
 
 
 @dataclass(frozen=True)
@@ -104,7 +119,8 @@ def tilts_at_nodes(request: TiltsRequest, channel: Channel | None = None) -> Til
     solid = workspace_solid(design, rotation)
     if solid.is_empty:
         return TiltsDrawing(request, np.zeros((0, 3)), np.zeros(0), 0.0)
-    lows, highs = extent_of(design, rotation, solid)
+    offset = tool_offset(rotation, request.tool)
+    lows, highs = (end + offset for end in extent_of(design, rotation, solid))
     # Nodes in the middle of cells: on the surface of the workspace no tilt is left.
     shares = (np.arange(NODES) + 0.5) / NODES
     axes = [low + shares * (high - low) for low, high in zip(lows, highs, strict=True)]
@@ -112,7 +128,7 @@ def tilts_at_nodes(request: TiltsRequest, channel: Channel | None = None) -> Til
     parts: list[FloatArray] = []
     for index, part in enumerate(np.array_split(nodes, PARTS)):
         watch("greatest tilts", index / PARTS)
-        parts.append(greatest_tilts(design, part, request.torsion))
+        parts.append(greatest_tilts(design, part, request.torsion, tool=request.tool))
     tilts = np.concatenate(parts)
     known = np.isfinite(tilts)
     step = float((highs - lows).max()) / NODES
@@ -129,7 +145,7 @@ class RangeRequest:
         tilt: Largest tilt, in degrees.
         turn: Largest change of the torsion either way, in degrees.
         over: Whether positions have one of the orientations at least, or all of them.
-        point: Point of the platform whose positions these are, in the platform frame.
+        tool: Tool point that has the positions, in the platform frame; None for b4.
     """
 
     design: Design
@@ -137,7 +153,7 @@ class RangeRequest:
     tilt: float
     turn: float
     over: Literal["reachable", "dexterous"]
-    point: Triple = (0.0, 0.0, 0.0)
+    tool: Triple | None = None
 
 
 @dataclass(frozen=True)
@@ -163,5 +179,5 @@ def range_solid(request: RangeRequest) -> RangeDrawing:
     design = request.design
     make = reachable_solid if request.over == "reachable" else dexterous_solid
     tolerance = LIVE_TOLERANCE * design.reach
-    solid = make(design, orientations_over(request), tolerance, request.point)
+    solid = make(design, orientations_over(request), tolerance, request.tool)
     return RangeDrawing(request, solid)

@@ -51,7 +51,9 @@ class Go(Action):
                 journey=None,
             )
         title = f"{_end_words(state.paths.start).capitalize()} to {_end_words(chosen)}"
-        path = Journey("straight", title, state.design, (start, goal), is_playing=True)
+        path = Journey(
+            "straight", title, state.design, (start, goal), is_playing=True, tool=state.tool
+        )
         after = moved(_with(state, goal=chosen, problem=None, planning=None, journey=path), start)
         mode = state.paths.start
         return replace(after, mode=mode) if isinstance(mode, int) else after

@@ -61,7 +61,7 @@ OPTIONS: dict[EndName, tuple[str, ...]] = {
 KINDS: dict[PathKind, tuple[str, str]] = {
     "straight": (
         "Straight",
-        "Move straight from start to goal; limits and collisions are not checked.",
+        "Move the point straight from start to goal; limits and collisions are not checked.",
     ),
     "planned": (
         "Without singularity",

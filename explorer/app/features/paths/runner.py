@@ -65,18 +65,18 @@ class PathRunner(Runner):
         request, design, paths = self._request, state.design, state.paths
         if paths.planning is None:
             return
-        start, goal = paths.planning
+        (start, goal), tool = paths.planning, state.tool
 
         def take_path(path: PlannedPath) -> None:
             moves = len(path.poses) - 1
             title = f"Planned path of {moves} {'move' if moves == 1 else 'moves'}"
-            journey = Journey("planned", title, design, path.poses, is_playing=True)
+            journey = Journey("planned", title, design, path.poses, is_playing=True, tool=tool)
             self._finish(request, journey, None)
 
         self._order = self.worker.submit(
             "plan",
             tasks.plan,
-            (design, start, goal, paths.seconds),
+            (design, start, goal, paths.seconds, tool),
             take_path,
             lambda problem: self._finish(request, None, problem),
         )
