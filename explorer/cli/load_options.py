@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import msgspec
 import numpy as np
 
 from explorer.cli.options import DesignOptions, JsonOptions, PoseOptions
 from explorer.cli.values import hint, load_numbers, not_negative
-from explorer.errors import NoAnswerError
+from explorer.errors import InputError, NoAnswerError
 from explorer.mechanism.design import Design
 from explorer.mechanism.margins import INCIDENCES, margins
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.statics.equilibrium import SINGULAR
+from explorer.statics.reactions import part_limits
+
+if TYPE_CHECKING:
+    from explorer.workspace.held import HeldWorkspace
 
 Load = tuple[float, float, float, float, float, float]
 
@@ -46,6 +50,30 @@ class LoadOptions(JsonOptions, PoseOptions, DesignOptions):
             return design
         payload = msgspec.structs.replace(design.payload, mass_kg=self.payload)
         return msgspec.structs.replace(design, payload=payload)
+
+
+def held_by(
+    design: Design, rotation: FloatArray, load: Load, tolerance: float | None
+) -> HeldWorkspace:
+    """Return the part of the workspace of a design with limits that holds a load.
+
+    Args:
+        design: The manipulator.
+        rotation: Platform to base, shape (3, 3).
+        load: (F; M) at the tool besides the payload, base axes, in N and N × unit.
+        tolerance: Tolerance of the mesh, in design units; None for the usual one.
+
+    Raises:
+        InputError: The design has no limit that a load could exceed.
+    """
+    from explorer.workspace.held import held_workspace
+
+    if np.isinf(part_limits(design)).all():
+        raise InputError(
+            "the design limits neither its actuators nor its struts nor its guide, so that it "
+            "holds any load: give its file a limit, such as actuators.push_n"
+        )
+    return held_workspace(design, rotation, load, tolerance=tolerance)
 
 
 def check_regular(pose: Pose, values: FloatArray) -> None:

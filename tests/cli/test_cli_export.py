@@ -15,6 +15,9 @@ from command_line import CommandLine
 import explorer
 from explorer.cli import run
 from explorer.export.mesh import FORMATS
+from explorer.mechanism.design_file import encode_design
+from explorer.mechanism.machine import Actuators, Payload
+from explorer.workspace.held import held_workspace
 from explorer.workspace.solids.solids import convex_hull, workspace_solid
 
 COMMAND = ("export",)
@@ -49,6 +52,64 @@ def test_export_hull_has_format_and_orientation_of_options(
     found = untyped.load(out, file_type="ply", process=False)
     assert found.is_watertight
     assert found.volume == pytest.approx(expected * OPTIMAL.unit_mm**3, rel=1e-9)
+
+
+LIMITED = msgspec.structs.replace(
+    OPTIMAL, actuators=Actuators(push_n=(60, 50, 40, 50, 45, 70)), payload=Payload(0.5)
+)
+
+
+@pytest.fixture
+def limited(tmp_path: Path) -> Path:
+    path = tmp_path / "limited.json"
+    path.write_bytes(encode_design(LIMITED))
+    return path
+
+
+@pytest.mark.parametrize("file_format", FORMATS)
+def test_export_with_a_load_writes_the_part_that_holds_it(
+    cli: CommandLine, tmp_path: Path, limited: Path, file_format: str
+) -> None:
+    load = (0.0, 0.0, -20.0, 0.0, 5.0, 0.0)
+    solid = held_workspace(LIMITED, load=load).solid
+    assert solid.is_watertight
+    for what, expected in (("workspace", solid), ("hull", convex_hull(solid))):
+        out = tmp_path / f"{what}.{file_format}"
+        assert cli.answer(what, "--design", limited, "--out", out, "--load", *load) == {
+            "file": str(out),
+            "format": file_format,
+            "volume": pytest.approx(expected.volume, rel=1e-12),
+            "triangles": len(expected.faces),
+        }
+        assert out.stat().st_size > 1000
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "reason"),
+    [
+        (("workspace", "--out", "a.step", "--load", 0, 0, -20), 2, "takes its limit consists of"),
+        (("workspace", "--out", "a.stl", "--load", 0, 0, -1e6), 1, "no position holds the load"),
+        (("workspace", "--out", "a.stl", "--load", 0, 0), 2, "needs a force fx fy fz"),
+        (("scene", "--out", "a.html", "--load", 0, 0, -1), 2, "--load is not for scene"),
+        (("mechanism", "--out", "a.3mf", "--load", 0, 0, -1), 2, "--load is not for mechanism"),
+        (("simulation", "--out", "a.xml", "--load", 0, 0, -1), 2, "--load is not for simulation"),
+    ],
+)
+def test_export_with_a_load_that_cannot_be_written_says_why(
+    cli: CommandLine, limited: Path, words: tuple[Any, ...], status: int, reason: str
+) -> None:
+    what, option, out, *load = words
+    target = limited.with_name(out)
+    argv = (what, "--design", limited, option, target, *load)
+    assert reason in cli.refusal(*argv, status=status)
+    assert not target.exists()
+
+
+def test_export_with_a_load_of_a_design_without_limits_asks_for_one(
+    cli: CommandLine, tmp_path: Path
+) -> None:
+    refusal = cli.refusal("workspace", "--out", tmp_path / "a.stl", "--load", 0, 0, -20)
+    assert "give its file a limit" in refusal
 
 
 def test_export_empty_workspace_writes_no_file(cli: CommandLine, tmp_path: Path) -> None:

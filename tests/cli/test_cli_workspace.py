@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -260,3 +261,9 @@ def test_workspace_with_a_load_has_the_volume_that_holds_it(
     assert "that holds the load" in cli.text("--design", path, "--load", 0, 0, -20)
     refusal = cli.refusal("--design", "paper-optimal", "--load", 0, 0, -20)
     assert "so that it holds any load" in refusal
+    assert "held_factor" not in found
+    heavy = cli.answer("--design", path, "--load", 0, 0, -1e5)
+    assert heavy["held_volume"] == heavy["held_mesh"]["triangles"] == 0
+    assert 0.0 < heavy["held_factor"] < 1e-2
+    text = cli.text("--design", path, "--load", 0, 0, -1e5)
+    assert re.search(r"empty because of force of \w+; 0\.\d+ of load and payload", text)

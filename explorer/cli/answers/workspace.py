@@ -101,6 +101,8 @@ class WorkspaceMeasures:
         if self.held is not None:
             answer["held_volume"] = self.held.held_volume
             answer["held_mesh"] = mesh_json(self.held.solid)
+            if self.held.factor is not None:
+                answer["held_factor"] = self.held.factor
         if self.capability is not None:
             answer["orientation_capability"] = self.capability
         if self.interference is not None:
@@ -162,7 +164,10 @@ class WorkspaceMeasures:
                 remark = f"{self.orientations} orientations, {_mesh_remark(solid)}"
                 yield name, solid.volume, remark
         if self.held is not None:
-            yield "that holds the load", self.held.held_volume, _mesh_remark(self.held.solid)
+            remark = _mesh_remark(self.held.solid)
+            if self.held.factor is not None:
+                remark += f"; {self.held.factor:.3g} of load and payload is held somewhere"
+            yield "that holds the load", self.held.held_volume, remark
 
 
 def _mesh_remark(solid: Solid) -> str:

@@ -10,9 +10,10 @@ from typing import Annotated, Any, Literal
 
 import tyro
 
+from explorer.cli.load_options import Load, held_by
 from explorer.cli.options import DesignOptions, JsonOptions, PoseOptions
-from explorer.cli.values import hint, positive
-from explorer.errors import InputError
+from explorer.cli.values import OPTIONAL, hint, load_numbers, positive
+from explorer.errors import InputError, NoAnswerError
 from explorer.mechanism.design import Design
 
 What = Literal["workspace", "hull", "mechanism", "simulation", "scene"]
@@ -29,7 +30,8 @@ class Export(JsonOptions, PoseOptions, DesignOptions):
     specification requires. The mechanism consists of its parts, assembled in the home pose; in
     `stl-zip` a part is a file of its own. The simulation is an MJCF model in metres: every joint,
     closed loops, six servos. The scene is one HTML file for any browser, in the home pose unless
-    a pose is given. With `--at tool` the workspace and the hull are those of the tool point.
+    a pose is given. With `--at tool` the workspace and the hull are those of the tool point, with
+    `--load` those of the positions that hold the load.
     """
 
     what: Annotated[What, tyro.conf.Positional]
@@ -51,6 +53,10 @@ class Export(JsonOptions, PoseOptions, DesignOptions):
     ] = None
     """Largest distance of the mesh from the true surface, in design units."""
 
+    load: Annotated[Load | None, load_numbers("--load"), OPTIONAL] = None
+    """Force in N and moment in N × unit at the tool, besides the payload: write the part of the
+    workspace where it is held within the limits of actuators, struts and guide."""
+
     density: Annotated[
         float | None,
         positive("--density"),
@@ -65,7 +71,7 @@ class Export(JsonOptions, PoseOptions, DesignOptions):
         """Write the file, and its measures to standard output.
 
         Raises:
-            NoAnswerError: The workspace is empty.
+            NoAnswerError: The workspace is empty, or nothing holds the load.
             MissingExtraError: STEP needs OpenCASCADE, which is not installed.
         """
         from explorer.files.writing import check_writable, write_whole
@@ -123,7 +129,17 @@ def _mesh(command: Export, file_format: str) -> tuple[bytes, Facts]:
     from explorer.workspace.solids.solids import convex_hull, workspace_solid
 
     home = command.oriented_home(design)
-    solid = workspace_solid(design, home.rotation, command.tolerance)
+    if command.load is None:
+        solid = workspace_solid(design, home.rotation, command.tolerance)
+    else:
+        held = held_by(design, home.rotation, command.load, command.tolerance)
+        if held.factor is not None:
+            (part,) = held.solid.empty_because
+            raise NoAnswerError(
+                f"no position holds the load; the best one found holds {held.factor:.3g} of load "
+                f"and payload, up to the {part}"
+            )
+        solid = held.solid
     shift = command.shift(design, home)
     if shift is not None:
         solid = solid.shifted(shift)
@@ -136,12 +152,18 @@ def _mesh(command: Export, file_format: str) -> tuple[bytes, Facts]:
 
 def _name(command: Export, design: Design) -> str:
     whose = "" if command.at == "b4" else "the tool of "
-    return f"{command.what} of {whose}{design.name}"
+    holding = "" if command.load is None else " that holds the load"
+    return f"{command.what}{holding} of {whose}{design.name}"
 
 
 def _step(command: Export) -> tuple[bytes, Facts]:
     from explorer.export.step import check_extra, exact_workspace, step_bytes
 
+    if command.load is not None:
+        raise InputError(
+            "STEP takes exact faces, and the surface along which a part takes its limit consists "
+            "of facets: write 3mf, stl, glb, obj or ply"
+        )
     command.refuse("tolerance", "density", "masses", "position")
     check_extra()
     design = command.read_design()
@@ -162,7 +184,8 @@ def _mechanism(command: Export, file_format: str) -> tuple[bytes, Facts]:
     from explorer.prototype.bill import bill_of_materials
 
     command.refuse(
-        "tolerance", "masses", "position", "quaternion", "yaw_pitch_roll", "tilt_torsion", "at"
+        *("tolerance", "masses", "position", "quaternion", "yaw_pitch_roll", "tilt_torsion"),
+        *("at", "load"),
     )
     file_format = {"zip": "stl-zip", "stp": "step"}.get(file_format, file_format)
     if file_format == "step":
@@ -199,7 +222,9 @@ def _simulation(command: Export, file_format: str) -> tuple[bytes, Facts]:
     from explorer.export.simulation import DENSITY, simulation_mjcf
     from explorer.prototype.chains import BODIES, CHAIN_JOINTS
 
-    command.refuse("tolerance", "position", "quaternion", "yaw_pitch_roll", "tilt_torsion", "at")
+    command.refuse(
+        *("tolerance", "position", "quaternion", "yaw_pitch_roll", "tilt_torsion", "at", "load")
+    )
     if file_format not in ("mjcf", "xml"):
         raise InputError(f"no simulation format {file_format!r}; there is mjcf")
     design, density = command.read_design(), command.density or DENSITY
@@ -214,7 +239,7 @@ def _simulation(command: Export, file_format: str) -> tuple[bytes, Facts]:
 
 
 def _scene(command: Export, file_format: str) -> tuple[bytes, Facts]:
-    command.refuse("tolerance", "density", "masses")
+    command.refuse("tolerance", "density", "masses", "load")
     if file_format not in ("html", "htm"):
         raise InputError(f"no format {file_format!r} of the scene; there is html")
     design = command.read_design()

@@ -5,10 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
-
 from explorer.cli.answers.workspace import WorkspaceMeasures
-from explorer.cli.load_options import Load
+from explorer.cli.load_options import Load, held_by
 from explorer.cli.options import (
     DesignOptions,
     JsonOptions,
@@ -165,15 +163,7 @@ class Workspace(JsonOptions, RadiiOptions, OrientationOptions, PointOptions, Des
     def _held(self, design: Design, pose: Pose) -> HeldWorkspace | None:
         if self.load is None:
             return None
-        from explorer.statics.reactions import part_limits
-        from explorer.workspace.held import held_workspace
-
-        if np.isinf(part_limits(design)).all():
-            raise InputError(
-                "the design limits neither its actuators nor its struts nor its guide, so that it "
-                "holds any load: give its file a limit, such as actuators.push_n"
-            )
-        return held_workspace(design, pose.rotation, self.load, tolerance=self.tolerance)
+        return held_by(design, pose.rotation, self.load, self.tolerance)
 
     def _curve(self, design: Design, pose: Pose) -> RadiusCurve | None:
         if not self.radius_curve:
