@@ -10,6 +10,7 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,7 +20,7 @@ from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.machine import STANDARD_GRAVITY
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import BoolArray, FloatArray, finite_array, for_kernel
-from explorer.paths.crossings import SAMPLES, path_margins
+from explorer.paths.crossings import SAMPLES, PathMargins, path_margins
 from explorer.paths.move_shares import (
     BOUND,
     CARRIAGE,
@@ -59,6 +60,24 @@ PART_NAMES = (
 """Names of the parts with a limit, in the order of `explorer.statics.reactions.LIMITED`."""
 
 
+class LargestShare(NamedTuple):
+    """The largest share of a limit over a path.
+
+    Attributes:
+        share: The share, of which 1 is the limit; infinite if the path is singular somewhere.
+        bound: Upper bound of the share over the whole path, at most a millionth above it, or a
+            millionth of it if it exceeds 1; infinite where no bound was found near a singular pose.
+        place: Number of the move plus the share of it where the share is largest.
+        part: Index in `LIMITED` of the part with this share; None without a limit or load, and if
+            the path is singular.
+    """
+
+    share: float
+    bound: float
+    place: float
+    part: int | None
+
+
 @dataclass(frozen=True)
 class PathLoads:
     """The shares of the limits that a load uses over a path.
@@ -68,21 +87,13 @@ class PathLoads:
         at: Place of the samples: number of the move plus the share of it, shape (n,).
         shares: Shares of the samples in the order of `LIMITED`, shape (n, 12); infinite in a
             singular pose.
-        share: The largest share over the path; infinite if the path is singular somewhere.
-        bound: Upper bound of the share over the whole path, at most a millionth above it, or a
-            millionth of it if it exceeds 1; infinite where no bound was found near a singular pose.
-        place: Place of the largest share, as in `at`.
-        part: Index in `LIMITED` of the part with the largest share; None without a limit or load,
-            and if the path is singular.
+        largest: The largest share over the path.
     """
 
     poses: tuple[Pose, ...]
     at: FloatArray
     shares: FloatArray
-    share: float
-    bound: float
-    place: float
-    part: int | None
+    largest: LargestShare
 
 
 @dataclass(frozen=True)
@@ -164,6 +175,27 @@ class DemandedLoad:
         """
         return self._largest(start, start_rotation, end, end_rotation, math.nan)
 
+    def largest_over(self, path: PathMargins) -> LargestShare:
+        """Return the largest share over a path of the same tool, given with its crossings."""
+        moves = list(itertools.pairwise(path.poses))
+        p, r = (
+            np.array([each.position for each in path.poses]),
+            np.array([each.rotation for each in path.poses]),
+        )
+        bounds, shares, places = self.largest_along(p[:-1], r[:-1], p[1:], r[1:])
+        places = places + np.arange(len(moves))
+        singular = [crossing.move + crossing.share for crossing in path.crossings]
+        singular += places[np.isinf(shares)].tolist()
+        if singular:
+            return LargestShare(math.inf, math.inf, min(singular), None)
+        move = int(shares.argmax())
+        share, place = float(shares[move]), float(places[move])
+        part: int | None = None
+        if share > 0.0:
+            there = poses_between(*moves[move], place - move, self.tool)
+            part = int(self.shares(*there).argmax())
+        return LargestShare(share, float(bounds.max()), place, part)
+
     def _largest(
         self,
         start: FloatArray,
@@ -222,19 +254,7 @@ def path_loads(
         at = number == index
         positions[at], rotations[at] = poses_between(start, end, along.at[at] - index, tool)
     shares = demanded.shares(positions, rotations)
-    singular = [along.at[np.isinf(shares).any(axis=1)].min(initial=math.inf)]
-    singular += [crossing.move + crossing.share for crossing in along.crossings]
-    if min(singular) < math.inf:
-        place = float(min(singular))
-        return PathLoads(tuple(poses), along.at, shares, math.inf, math.inf, place, None)
-    p, r = np.array([e.position for e in poses]), np.array([e.rotation for e in poses])
-    bounds, largest, places = demanded.largest_along(p[:-1], r[:-1], p[1:], r[1:])
-    move = int(largest.argmax())
-    pose = poses_between(*moves[move], places[move], tool)
-    share = float(largest[move])
-    part = int(demanded.shares(*pose).argmax()) if share > 0.0 else None
-    place = move + float(places[move])
-    return PathLoads(tuple(poses), along.at, shares, share, float(bounds.max()), place, part)
+    return PathLoads(along.poses, along.at, shares, demanded.largest_over(along))
 
 
 def _row(design: Design, load: FloatArray, weights: Weights) -> FloatArray:

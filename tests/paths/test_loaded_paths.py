@@ -81,8 +81,8 @@ def test_plan_path_with_load_holds_it_all_along_by_a_detour(index: int) -> None:
     for poses in (path.poses, path.unsmoothed):
         assert densest(case, poses) <= 1.0 + TOLERANCE
         along = path_loads(design, poses, load, weights=weights)
-        assert along.share <= 1.0 + TOLERANCE
-        assert along.bound <= 1.0 + 2.0 * TOLERANCE
+        assert along.largest.share <= 1.0 + TOLERANCE
+        assert along.largest.bound <= 1.0 + 2.0 * TOLERANCE
         assert path_margins(poses).crossings == ()
 
 
@@ -95,7 +95,7 @@ def test_plan_path_of_a_tool_with_load_holds_it_all_along() -> None:
     for poses in (path.poses, path.unsmoothed):
         assert densest(case, poses, tool) <= 1.0 + TOLERANCE
         along = path_loads(design, poses, load, weights=weights, tool=tool)
-        assert along.bound <= 1.0 + 2.0 * TOLERANCE
+        assert along.largest.bound <= 1.0 + 2.0 * TOLERANCE
 
 
 def test_plan_path_with_load_that_the_straight_move_holds_is_straight() -> None:
@@ -104,7 +104,7 @@ def test_plan_path_with_load_that_the_straight_move_holds_is_straight() -> None:
     x, y, z = home.position
     goal = Pose((x + 1.0, y, z - 1.0), home.quaternion)
     load = [5.0, 0.0, -5.0, 0.0, 0.0, 0.0]
-    assert path_loads(design, (home, goal), load).share < 1.0
+    assert path_loads(design, (home, goal), load).largest.share < 1.0
     assert plan_path(design, home, goal, load=load).poses == (home, goal)
     assert plan_path(design, home, home, load=load).length == 0.0
 

@@ -56,15 +56,15 @@ def test_path_loads_largest_share_is_that_of_dense_samples(seed: int) -> None:
     shares = dense_shares(design, move, load, weights, tool)
     most = float(shares.max())
     size = max(1.0, most)
-    assert along.share == pytest.approx(most, abs=2.0 * TOLERANCE * size)
-    assert most <= along.bound * (1.0 + 1e-12)
-    assert along.bound - along.share <= TOLERANCE * size
-    assert along.part is not None
+    assert along.largest.share == pytest.approx(most, abs=2.0 * TOLERANCE * size)
+    assert most <= along.largest.bound * (1.0 + 1e-12)
+    assert along.largest.bound - along.largest.share <= TOLERANCE * size
+    assert along.largest.part is not None
     # The part and the place are those of the share that is told.
-    there = tool_move(*move, along.place, tool)
+    there = tool_move(*move, along.largest.place, tool)
     given = design, *there, load, design.tool.position
     here = limit_shares(design, reactions(*given, weights or design_weights(design)))[0]
-    assert here[along.part] == here.max() == pytest.approx(along.share, rel=1e-10)
+    assert here[along.largest.part] == here.max() == pytest.approx(along.largest.share, rel=1e-10)
 
 
 @pytest.mark.parametrize("seed", range(10))
@@ -80,10 +80,10 @@ def test_path_loads_of_moves_near_singular_poses_bound_dense_samples(seed: int) 
     along = path_loads(design, poses, load)
     moves = [dense_shares(design, m, load, None, np.zeros(3)) for m in itertools.pairwise(poses)]
     most = max(float(each.max()) for each in moves)
-    assert most <= along.bound * (1.0 + 1e-12)
-    assert along.share >= most * (1.0 - TOLERANCE) - TOLERANCE
-    assert along.bound - along.share <= TOLERANCE * max(1.0, most)
-    assert along.place == pytest.approx(1.0, abs=0.05)
+    assert most <= along.largest.bound * (1.0 + 1e-12)
+    assert along.largest.share >= most * (1.0 - TOLERANCE) - TOLERANCE
+    assert along.largest.bound - along.largest.share <= TOLERANCE * max(1.0, most)
+    assert along.largest.place == pytest.approx(1.0, abs=0.05)
 
 
 def test_path_loads_samples_have_the_shares_of_their_poses() -> None:
@@ -101,7 +101,7 @@ def test_path_loads_samples_have_the_shares_of_their_poses() -> None:
         given = design, *there, load, design.tool.position
         expected = limit_shares(design, reactions(*given, design_weights(design)))[0]
         np.testing.assert_allclose(shares, expected, rtol=1e-9)
-    assert along.shares.max() <= along.share
+    assert along.shares.max() <= along.largest.share
 
 
 def test_path_loads_of_singular_path_is_infinite_at_its_first_crossing() -> None:
@@ -112,13 +112,13 @@ def test_path_loads_of_singular_path_is_infinite_at_its_first_crossing() -> None
     along = path_loads(design, (home, below, home), [1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     crossings = path_margins((home, below, home)).crossings
     assert len(crossings) >= 2
-    assert along.share == along.bound == math.inf
-    assert along.part is None
-    assert along.place == min(each.move + each.share for each in crossings)
+    assert along.largest.share == along.largest.bound == math.inf
+    assert along.largest.part is None
+    assert along.largest.place == min(each.move + each.share for each in crossings)
     # A path that lies in the base plane is singular from its start.
     flat = tuple(Pose((x + each, y, 0.0), home.quaternion) for each in (0.0, 1.0))
     along = path_loads(design, flat, [1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
-    assert (along.share, along.place) == (math.inf, 0.0)
+    assert (along.largest.share, along.largest.place) == (math.inf, 0.0)
     assert np.isinf(along.shares).all()
 
 
@@ -126,10 +126,10 @@ def test_path_loads_without_limit_or_load_has_no_part() -> None:
     x, y, z = home_pose(OPTIMAL).position
     poses = home_pose(OPTIMAL), Pose((x + 1.0, y, z), home_pose(OPTIMAL).quaternion)
     along = path_loads(OPTIMAL, poses, [100.0, 0.0, 0.0, 0.0, 0.0, 0.0])
-    assert (along.share, along.bound, along.part) == (0.0, 0.0, None)
+    assert (along.largest.share, along.largest.bound, along.largest.part) == (0.0, 0.0, None)
     empty = msgspec.structs.replace(random_machine(OPTIMAL, 2), payload=OPTIMAL.payload)
     along = path_loads(empty, poses, np.zeros(6))
-    assert (along.share, along.part) == (0.0, None)
+    assert (along.largest.share, along.largest.part) == (0.0, None)
 
 
 def test_path_loads_of_standing_path_has_the_share_of_its_pose() -> None:
@@ -139,8 +139,8 @@ def test_path_loads_of_standing_path_has_the_share_of_its_pose() -> None:
     along = path_loads(design, (pose, pose), load)
     given = design, pose.position, pose.rotation, load, design.tool.position
     shares = limit_shares(design, reactions(*given, design_weights(design)))
-    assert along.share == pytest.approx(float(shares.max()), rel=1e-12)
-    assert along.part == int(shares.argmax())
+    assert along.largest.share == pytest.approx(float(shares.max()), rel=1e-12)
+    assert along.largest.part == int(shares.argmax())
 
 
 @pytest.mark.parametrize("load", [[1.0, 2.0], [math.nan] * 6, [math.inf] * 6])
