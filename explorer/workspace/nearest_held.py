@@ -8,12 +8,12 @@ region of such positions that contains no node of the grid may be missed.
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import minimize
 
 from explorer.mechanism.design import Design
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import BoolArray, FloatArray
+from explorer.numerics.descent import descend
 from explorer.statics.loaded import LoadedPose
 from explorer.statics.reactions import limit_shares, reactions
 from explorer.workspace.limits.constraints import constraints, home_signs, slacks
@@ -21,8 +21,8 @@ from explorer.workspace.limits.valid_poses import Rules, poses_are_valid
 
 NODES = 25
 """Number of nodes of the grid on each axis."""
-# Number of nodes from which descents begin, and the step of differences over the reach.
-BEGINNINGS, DIFFERENCE = 6, 1e-6
+# Number of nodes from which descents begin.
+BEGINNINGS = 6
 # Share of a limit that is kept free, and the largest share that a descent sees.
 KEPT, FAR = 1e-6, 100.0
 
@@ -40,7 +40,8 @@ def nearest_held(loaded: LoadedPose) -> Pose | None:
     lows, highs = _bounds(design, loaded.pose.rotation)
     if (lows > highs).any():
         return None
-    axes = [np.linspace(low, high, NODES) for low, high in zip(lows, highs, strict=True)]
+    steps = np.linspace(0.0, 1.0, NODES)
+    axes = [low + steps * (high - low) for low, high in zip(lows, highs, strict=True)]
     nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     nodes = np.vstack([here[None], nodes])
     found = nodes[_holds(loaded, nodes)]
@@ -57,29 +58,20 @@ def nearest_held(loaded: LoadedPose) -> Pose | None:
 
 def _settled(loaded: LoadedPose, start: FloatArray) -> FloatArray:
     """Return the position to which a descent of the distance leads along the limits, shape (3,)."""
-    design, here = loaded.design, np.array(loaded.pose.position)
-    reach, limits = design.reach, constraints(design, loaded.pose.rotation)
-    steps = reach * DIFFERENCE * np.vstack([np.eye(3), -np.eye(3)])
+    reach, here = loaded.design.reach, np.array(loaded.pose.position)
+    limits = constraints(loaded.design, loaded.pose.rotation)
 
-    def spare(positions: FloatArray) -> FloatArray:
-        shares = _shares(loaded, positions)
-        of_limits = slacks(limits, positions) / reach
+    def distance(at: FloatArray) -> tuple[float, FloatArray]:
+        apart = at - here / reach
+        return float(apart @ apart), 2.0 * apart
+
+    def spare(at: FloatArray) -> FloatArray:
         # Near a singular plane shares are infinite, and the descent turns back.
-        return np.concatenate([1.0 - KEPT - np.minimum(shares, FAR), of_limits], axis=-1)
+        shares = np.minimum(_shares(loaded, reach * at), FAR)
+        return np.concatenate([1.0 - KEPT - shares, slacks(limits, reach * at) / reach])
 
-    def slopes(position: FloatArray) -> FloatArray:
-        sides = spare(position + steps)
-        return np.asarray((sides[:3] - sides[3:]).T / (2.0 * reach * DIFFERENCE))
-
-    found = minimize(
-        lambda p: float((p - here) @ (p - here)) / reach**2,
-        start,
-        jac=lambda p: 2.0 * (p - here) / reach**2,
-        method="SLSQP",
-        constraints={"type": "ineq", "fun": spare, "jac": slopes},
-        options={"maxiter": 60, "ftol": 1e-14},
-    )
-    return np.asarray(found.x)
+    found = descend(distance, spare, start / reach)
+    return start if found is None else reach * found
 
 
 def _holds(loaded: LoadedPose, positions: FloatArray) -> BoolArray:
