@@ -51,7 +51,7 @@ def test_no_random_position_that_holds_the_load_is_nearer(at: tuple[float, float
     distance = float(np.linalg.norm(np.subtract(found.position, at)))
     assert len(distances_held(loaded, np.array([found.position]))) == 1
     rng = np.random.default_rng(5)
-    ball = rng.normal(size=(400_000, 3))
+    ball = rng.normal(size=(80_000, 3))
     radii = distance * rng.uniform(size=len(ball)) ** (1 / 3)
     ball *= (radii / np.linalg.norm(ball, axis=1))[:, None]
     nearer = distances_held(loaded, np.array(at) + ball)
