@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,9 @@ from scipy.spatial.transform import Rotation
 from tool_moves import tool_move
 
 import explorer
+from explorer.cli import COMMANDS
+from explorer.cli.options import PoseOptions
+from explorer.cli.parsing import load_command, parse
 from explorer.export.opencascade import occ, volume_of
 from explorer.mechanism.tool_point import pose_with, position_of
 from explorer.numerics.arrays import FloatArray
@@ -336,6 +340,25 @@ def test_export_of_the_exact_workspace_is_moved_to_the_tool(
         boxes.append(np.array([[c.X(), c.Y(), c.Z()] for c in corners]))
     shift = 10.0 * explorer.home_pose(TOOLED).rotation @ TOOL
     assert_allclose(boxes[1], boxes[0] + shift, atol=1e-3)
+
+
+def test_every_command_that_takes_a_position_takes_the_point() -> None:
+    taking: list[str] = []
+    for name in COMMANDS:
+        command = load_command(name, COMMANDS)
+        names = {field.name for field in dataclasses.fields(command)}
+        if names & {"position", "from_", "capability"}:
+            taking.append(name)
+            assert "at" in names, name
+    assert {"inverse", "screenshot", "export", "path", "orientation", "workspace"} <= {*taking}
+
+
+def test_picture_at_the_tool_is_of_the_pose_of_b4() -> None:
+    parsed = parse("screenshot", load_command("screenshot", COMMANDS), [*POSE, "--at", "tool"])
+    assert isinstance(parsed, PoseOptions)
+    pose = parsed.pose(TOOLED)
+    assert_allclose(pose.position, B4)
+    assert_allclose(pose.rotation, TURN, atol=1e-12)
 
 
 def test_at_a_bad_point_or_a_tool_too_far_away_is_refused(cli: CommandLine, tmp_path: Path) -> None:
