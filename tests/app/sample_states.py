@@ -174,7 +174,12 @@ MAKERS: tuple[Make, ...] = (
     lambda state, i, share: Change("paths", {"start": (None, i, state.pose)[i % 3]}),
     lambda state, i, share: Change("paths", {"goal": (None, 7 - i, state.pose)[i // 2]}),
     lambda state, i, share: Change(
-        "paths", {"kind": "straight" if i > 2 else "planned", "seconds": 1e-3 + share}
+        "paths",
+        {
+            "kind": "straight" if i > 2 else "planned",
+            "seconds": 1e-3 + share,
+            "holds_load": share > 0.5,
+        },
     ),
     _wish,
     lambda state, i, share: StartRun(),
@@ -259,7 +264,7 @@ def rich_state() -> State:
         Change("paths", {"start": 3, "goal": 5}),
         Go(),
         SetPathTime(10 / 3),
-        Change("paths", {"start": home, "goal": beyond, "kind": "planned"}),
+        Change("paths", {"start": home, "goal": beyond, "kind": "planned", "holds_load": True}),
         Pin(OPTIMAL),
         Change("compared", {"look": varied(Look())}),
         Change("", {"studies": varied(Studies())}),

@@ -47,7 +47,7 @@ from explorer.app.features.paths.panel import (
 )
 from explorer.app.features.paths.runner import DIED, PathRunner
 from explorer.app.features.paths.scene import PathScene
-from explorer.app.features.paths.tasks import plan
+from explorer.app.features.paths.tasks import PlanRequest, plan
 from explorer.app.scene.placing import Placed
 from explorer.app.session.session import Session
 from explorer.app.state.actions import Set, SetPose, SetPosition, SetVariable
@@ -348,7 +348,7 @@ def test_why_there_is_no_path_is_told(bench: Bench) -> None:
         bench.session.do(action)
     state = bench.wait(lambda state: state.paths.request == 1 and not state.paths.is_planning)
     with pytest.raises(ExplorerError) as expected:
-        plan(OPTIMAL, opened(OPTIMAL).pose, below, 2.0)
+        plan(PlanRequest(OPTIMAL, opened(OPTIMAL).pose, below, 2.0))
     assert state.paths.problem == str(expected.value)
     words = plan_words(state)
     assert words is not None

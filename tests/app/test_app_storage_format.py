@@ -295,6 +295,7 @@ def test_file_of_an_earlier_schema_opens_to_the_state_it_was_written_from(schema
             expected = with_value(expected, f"{view}.machine", True)
             # Twin and prototype were both switched on.
             expected = with_value(expected, f"{view}.drawn_as", "6-4 twin")
+        expected = with_value(expected, "paths.holds_load", False)
         for request in ("optimisation.request", "optimisation.run.own.optimisation.request"):
             expected = with_value(expected, f"{request}.held", False)
             expected = with_value(expected, f"{request}.error", 0.0)

@@ -308,10 +308,11 @@ class Controls:
         at: Source[bool],
         *,
         disabled: Condition | None = None,
+        visible: Condition | None = None,
     ) -> None:
         """Add a checkbox."""
         handle = self._gui.add_checkbox(label, initial_value=False, hint=hint)
-        self._bind(handle, bound_to(at, label), disabled=disabled)
+        self._bind(handle, bound_to(at, label), disabled=disabled, visible=visible)
 
     def dropdown(
         self,

@@ -107,6 +107,7 @@ class Paths:
         start, goal: Ends of the next path.
         kind: Kind of the next path.
         seconds: Longest time of planning, in seconds.
+        holds_load: Whether a planned path holds the load of the page all along.
         request: Number of the last request to plan; 0 before the first.
         planning: Start and goal of the path that is being planned; None if none is.
         problem: Why planning failed; None if it did not.
@@ -120,6 +121,7 @@ class Paths:
     goal: End = None
     kind: PathKind = "straight"
     seconds: float = DEFAULT_SECONDS
+    holds_load: bool = False
     request: int = field(default=0, metadata=TRANSIENT)
     planning: tuple[Pose, Pose] | None = field(default=None, metadata=TRANSIENT)
     problem: str | None = field(default=None, metadata=TRANSIENT)

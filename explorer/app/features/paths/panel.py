@@ -19,6 +19,8 @@ from explorer.app.features.paths.actions import (
     goal_of,
     pose_of_end,
 )
+from explorer.app.features.paths.load_plot import LoadPlot
+from explorer.app.features.paths.loads import PathShares, demand_note
 from explorer.app.features.paths.margin_plot import MarginPlot, crossing_words
 from explorer.app.inputs.bindings import Bound
 from explorer.app.inputs.controls import Controls
@@ -103,8 +105,16 @@ class PathsPanel:
                 "paths.seconds",
                 least=0.1,
                 step=0.1,
-                visible=lambda state: state.paths.kind == "planned",
+                visible=_is_planned,
             )
+            self._controls.checkbox(
+                "Hold the load",
+                "Demand that the load of the tab Forces, with the weights chosen there, stays "
+                "within the limits of actuators, struts and guide all along the path.",
+                "paths.holds_load",
+                visible=_is_planned,
+            )
+            self._demand = gui.add_html("")
         with gui.add_folder("Playback"):
             self._title = gui.add_html("")
             self.time = self._controls.slider(
@@ -119,6 +129,8 @@ class PathsPanel:
                 disabled=lambda state: state.journey is None,
             )
             self._plot = MarginPlot(gui)
+            self._shares = PathShares(services)
+            self._load_plot = LoadPlot(gui, self._shares)
         self._add_buttons(services.buttons)
 
     def updates(self, frame: Frame) -> Iterator[Update]:
@@ -133,7 +145,11 @@ class PathsPanel:
         yield self._kinds, "content", box(chips, f'<div class="ex-small">{kind_note(state)}</div>')
         yield self.go, "disabled", state.paths.is_planning
         yield self._title, "content", plan_words(state) or path_title(state)
+        demand = demand_note(state, self._shares.is_limited(frame))
+        yield self._demand, "visible", bool(demand)
+        yield self._demand, "content", demand
         yield from self._plot.updates(frame)
+        yield from self._load_plot.updates(frame)
         yield from self._controls.updates(frame)
 
     def _add_end(self, gui: viser.GuiApi, end: EndName) -> viser.GuiHtmlHandle:
@@ -327,6 +343,10 @@ def _set_typed(
         pose = Pose.of_yaw_pitch_roll(pose.position, angles)
     pose = state.pose_at(there, pose)
     return Set(f"paths.{end}", pose, end.capitalize(), "typed numbers")
+
+
+def _is_planned(state: State) -> bool:
+    return state.paths.kind == "planned"
 
 
 def _time_span(state: State) -> Span:

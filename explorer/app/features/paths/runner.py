@@ -6,6 +6,7 @@ import threading
 import time
 
 from explorer.app.features.feature import Runner, Services
+from explorer.app.features.forces.loads import load_of
 from explorer.app.features.paths import tasks
 from explorer.app.features.paths.actions import Advance, TakePlan
 from explorer.app.session.jobs import Worker
@@ -65,18 +66,25 @@ class PathRunner(Runner):
         request, design, paths = self._request, state.design, state.paths
         if paths.planning is None:
             return
-        (start, goal), tool = paths.planning, state.tool
+        tool, load = state.tool, None
+        if paths.holds_load:
+            view = state.view
+            density = view.prototype.density
+            load = tasks.LoadRequest(load_of(state), view.forces.weighed, density)
+        wanted = tasks.PlanRequest(design, *paths.planning, paths.seconds, tool, load)
 
         def take_path(path: PlannedPath) -> None:
             moves = len(path.poses) - 1
             title = f"Planned path of {moves} {'move' if moves == 1 else 'moves'}"
+            if load is not None:
+                title += " that holds the load"
             journey = Journey("planned", title, design, path.poses, is_playing=True, tool=tool)
             self._finish(request, journey, None)
 
         self._order = self.worker.submit(
             "plan",
             tasks.plan,
-            (design, start, goal, paths.seconds, tool),
+            (wanted,),
             take_path,
             lambda problem: self._finish(request, None, problem),
         )

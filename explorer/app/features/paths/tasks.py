@@ -2,13 +2,70 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
+import numpy as np
+
+from explorer.app.features.forces.tasks import Six, WeightsRequest, weights_of_parts
+from explorer.app.state.view import Weighed
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Pose, Triple
 from explorer.paths.planning import PlannedPath, plan_path
+from explorer.statics.loaded import LoadedPose
 
 
-def plan(
-    design: Design, start: Pose, goal: Pose, seconds: float, tool: Triple | None = None
-) -> PlannedPath:
+@dataclass(frozen=True)
+class LoadRequest:
+    """A load that a path has to hold.
+
+    Attributes:
+        load: (F; M) at the tool point, base axes, in N and N × unit.
+        weighed: Bodies whose weights act besides.
+        density: Density of the parts, in kg/m³.
+    """
+
+    load: Six
+    weighed: Weighed
+    density: float
+
+
+@dataclass(frozen=True)
+class PlanRequest:
+    """A request for a path.
+
+    Attributes:
+        design: The manipulator.
+        start: Pose at the start.
+        goal: Pose at the end.
+        seconds: Longest time of the search, in seconds.
+        tool: Point that moves straight in the platform frame, in design units; None for b4.
+        load: Load that the path has to hold; None for none.
+    """
+
+    design: Design
+    start: Pose
+    goal: Pose
+    seconds: float
+    tool: Triple | None = None
+    load: LoadRequest | None = None
+
+
+def plan(request: PlanRequest) -> PlannedPath:
     """Return a path between two poses, see `explorer.paths.planning`."""
-    return plan_path(design, start, goal, seconds=seconds, tool=tool)
+    design, start, load = request.design, request.start, request.load
+    forces, weights = None, None
+    if load is not None:
+        own = None
+        if load.weighed == "payload and legs":
+            own = weights_of_parts(WeightsRequest(design, load.density)).weights
+        forces = np.array(load.load)
+        weights = LoadedPose(design, start, forces, own, load.weighed != "none").weights
+    return plan_path(
+        design,
+        start,
+        request.goal,
+        seconds=request.seconds,
+        tool=request.tool,
+        load=forces,
+        weights=weights,
+    )

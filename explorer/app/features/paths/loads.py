@@ -1,0 +1,89 @@
+"""The shares of the limits along the present path, under the load of the page."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from html import escape
+
+import numpy as np
+
+from explorer.app.features.feature import Services
+from explorer.app.features.forces.loads import Loads
+from explorer.app.features.forces.words import PARTS, share_look, share_words
+from explorer.app.state.frame import Frame
+from explorer.app.state.paths import Journey
+from explorer.app.state.state import State
+from explorer.app.widgets.markup import dim
+from explorer.mechanism.pose import rotation_from_quaternion
+from explorer.numerics.arrays import FloatArray
+from explorer.numerics.number_text import format_decimals
+from explorer.paths.loads import DemandedLoad, LargestShare
+from explorer.statics.loaded import LoadedPose
+
+
+@dataclass(frozen=True)
+class JourneyLoads:
+    """The shares of the limits along a path over time.
+
+    Attributes:
+        time: Times of the samples, in seconds, shape (n,).
+        shares: Largest shares of the samples, shape (n,); infinite in singular poses.
+        largest: The largest share over the whole path.
+        seconds: Time at which it occurs.
+    """
+
+    time: FloatArray
+    shares: FloatArray
+    largest: LargestShare
+    seconds: float
+
+
+class PathShares:
+    """The shares along the path of the present frame, computed anew if path or load change."""
+
+    def __init__(self, services: Services) -> None:
+        self._loads = services.get(Loads)
+        self._kept: tuple[tuple[object, ...], JourneyLoads] | None = None
+
+    def is_limited(self, frame: Frame) -> bool:
+        """Return whether a part of the design has a limit."""
+        return bool(self._loads.of(frame).limited.any())
+
+    def of(self, frame: Frame) -> JourneyLoads | None:
+        """Return the shares along the path of a frame; None without a path or without limits."""
+        journey, loaded = frame.state.journey, self._loads.of(frame)
+        if journey is None or not loaded.limited.any():
+            return None
+        of_path = journey.kind, journey.design, journey.poses, journey.tool
+        key = *of_path, loaded.load.tobytes(), loaded.weights
+        if self._kept is None or self._kept[0] != key:
+            self._kept = key, _loads_of(journey, loaded)
+        return self._kept[1]
+
+
+def _loads_of(journey: Journey, loaded: LoadedPose) -> JourneyLoads:
+    demanded = DemandedLoad.of(journey.design, loaded.load, loaded.weights, journey.tool)
+    timed = journey.trajectory
+    shares = demanded.shares(timed.position, rotation_from_quaternion(timed.quaternion))
+    largest = demanded.largest_over(journey.margins)
+    seconds = float(np.interp(largest.place, timed.at, timed.time))
+    return JourneyLoads(timed.time, shares.max(axis=1), largest, seconds)
+
+
+def load_words(loads: JourneyLoads) -> str:
+    """Return the largest share of a limit along a path, and where, as HTML."""
+    share, _, _, part = loads.largest
+    at = f"at {format_decimals(loads.seconds, 2)} s"
+    if part is None:
+        words = f"Nothing holds a load {at}: singular" if share else "No part bears a load"
+    else:
+        words = f"Largest share {share_words(share)}: {PARTS[part]}, {at}"
+    return f'<div class="ex-{share_look(share)}">{escape(words)}</div>'
+
+
+def demand_note(state: State, is_limited: bool) -> str:
+    """Return what the demand for a load means if nothing has a limit, as HTML; "" otherwise."""
+    paths = state.paths
+    if is_limited or not paths.holds_load or paths.kind != "planned":
+        return ""
+    return dim("No part has a limit, so every load is held: see the tab Machine.")
