@@ -156,12 +156,13 @@ def main(preload: Sequence[str]) -> None:
     """
     # A terminal sends Ctrl-C to this process too; its parent ends it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    inbox = Inbox(os.fdopen(os.dup(0), "rb"))
     replies = os.fdopen(os.dup(1), "wb")
     # The output of libraries must not get between the frames.
     os.dup2(2, 1)
     for module in preload:
         importlib.import_module(module)
+    # Orders name modules too: two threads that import at a time could wait for each other.
+    inbox = Inbox(os.fdopen(os.dup(0), "rb"))
     # Until the kernels are compiled, or loaded, they run interpreted.
     warm_in_background()
     while (order := inbox.next()) is not None:
