@@ -22,7 +22,11 @@ from scipy.spatial.transform import Rotation
 from services import StubDownloads, StubWorker
 from strategies import Case, all_cases
 
+from explorer.app.features.compare.actions import Pin
+from explorer.app.features.compare.feed import CompareFeed
+from explorer.app.features.compare.scene import ComparedScene
 from explorer.app.features.feature import Services
+from explorer.app.features.help.tour import STEPS
 from explorer.app.features.mechanism.marks import DragHandle
 from explorer.app.features.mechanism.modes import modes_table
 from explorer.app.features.mechanism.pose_panel import MovePanel
@@ -57,6 +61,7 @@ from explorer.app.scene.placing import Placed, scene_scale
 from explorer.app.session.history import start_history
 from explorer.app.session.session import UNDO
 from explorer.app.state.actions import GoHome, Set, SetAngle, SetMode, SetPose, SetPosition
+from explorer.app.state.compared import Look
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, angles_of, opened
 from explorer.app.state.view import OrientationView
@@ -67,6 +72,7 @@ from explorer.export.step import exact_workspace, step_bytes
 from explorer.measures.snapshot import evaluate
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.home import home_pose
 from explorer.mechanism.machine import Tool
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import Pose, Triple, rotation_from_quaternion
@@ -800,6 +806,46 @@ def test_tab_of_tilts_tells_how_far_the_platform_tilts_about_the_tool(services: 
     error = np.sqrt(share * (1.0 - share) / 4000)
     assert share > 0.0
     assert feed.drawing.share.share == pytest.approx(share, abs=4.0 * error)
+
+
+# Elsewhere
+
+
+def test_compared_workspaces_are_of_the_tool_of_each_design(services: Services) -> None:
+    initial = with_tool(PRESETS["paper-initial"], (0.0, 2.0, 1.0))
+    other = msgspec.structs.replace(initial, unit_mm=20.0)
+    for at in ("b4", "tool"):
+        state = Set("compared.look", Look(overlay=True)).apply(Pin(other).apply(opened_at(at)))
+        feed = services.get(CompareFeed)
+        feed.follow(Frame(state))
+        assert isinstance(services.worker, StubWorker)
+        services.worker.work()
+        placed = Placed(Frame(state))
+        scene = ComparedScene(services)
+        nodes = by_name(scene.updates(placed))
+        boxes = scene.corners(placed).reshape(-1, 8, 3)
+        for design, name, box in zip((state.design, other), ("live", "A"), boxes, strict=True):
+            home = home_pose(design)
+            unit = scene_scale(state) * design.unit_mm / state.design.unit_mm
+            node = nodes[f"/compared/{name}/workspace"]
+            points = (np.asarray(node["vertices"]) + node["position"]) / unit
+            if at == "tool":
+                points = points - home.rotation @ np.array(design.tool.position)
+            for p in points[:: len(points) // 50]:
+                slack = min(limit.slack(p) for limit in constraints(design, home.rotation))
+                assert abs(float(slack)) < 0.05 * design.reach
+            corners = np.asarray(node["vertices"]) + node["position"]
+            np.testing.assert_allclose(box.min(axis=0), corners.min(axis=0), atol=0.02)
+            np.testing.assert_allclose(box.max(axis=0), corners.max(axis=0), atol=0.02)
+            top = nodes[f"/compared/{name}/label"]["position"]
+            assert top[2] == pytest.approx(corners[:, 2].max())
+
+
+def test_tour_leads_near_a_singular_pose_with_the_tool_too() -> None:
+    for step in STEPS:
+        frame = Frame(opened_at(pose=None))
+        after = step.show(frame).apply(frame.state)
+        assert step.is_done(frame, Frame(after))
 
 
 # A tool at b4

@@ -17,6 +17,7 @@ from explorer.measures.measurements import Measurements, measure_design
 from explorer.measures.snapshot import evaluate
 from explorer.mechanism.design import Design
 from explorer.mechanism.home import home_pose
+from explorer.mechanism.tool_point import Point, offset_of
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.colours import Rgb
 from explorer.workspace.solids.solid import Solid
@@ -61,6 +62,12 @@ class ComparedDrawing:
     shell: Shell | None
     outline: FloatArray
     problem: str | None = None
+
+    def offset(self, at: Point) -> FloatArray:
+        """Return the vector from b4 to a point in the orientation of the drawing, shape (3,)."""
+        design, rows = self.request.design, self.request.rotation
+        rotation = home_pose(design).rotation if rows is None else np.array(rows)
+        return offset_of(design, rotation, at)
 
     @cached_property
     def extent(self) -> FloatArray | None:

@@ -65,7 +65,8 @@ class CompareFeed:
         for column, design in enumerate((state.design, *state.compared.pinned)):
             drawing = self.drawing(column)
             if design is not None and drawing is not None and drawing.extent is not None:
-                extents.append(drawing.extent * unit_ratio(design, state.design))
+                extent = drawing.extent + drawing.offset(state.view.at)
+                extents.append(extent * unit_ratio(design, state.design))
         return extents
 
     def is_current(self, column: int) -> bool:

@@ -1,4 +1,7 @@
-"""The workspaces of the compared designs over one another, each in its colour, to true size."""
+"""The workspaces of the compared designs over one another, each in its colour, to true size.
+
+They are of b4, or of the tool point of each design.
+"""
 
 from __future__ import annotations
 
@@ -64,7 +67,7 @@ class _Column:
         self._drawn: tuple[ComparedDrawing, float] | None = None
         self._workspace: Drawn | None = None
         self._outline: NDArray[np.float32] = np.zeros((1, 2, 3), dtype=np.float32)
-        self._top: tuple[float, float, float] = (0.0, 0.0, 0.0)
+        self._top: FloatArray = np.zeros(3)
 
     def updates(self, placed: Placed, drawing: ComparedDrawing | None) -> Iterator[Update]:
         """Yield the updates that draw the design in this frame."""
@@ -72,13 +75,17 @@ class _Column:
         compared, column = state.compared, self._column
         design = state.design if column == LIVE else compared.pinned[column - 1]
         look = compared.look
+        offset = np.zeros(3)
         if drawing is not None and design is not None:
-            self._scale(drawing, placed.scale * unit_ratio(design, state.design))
+            scale = placed.scale * unit_ratio(design, state.design)
+            self._scale(drawing, scale)
+            offset = scale * drawing.offset(state.view.at)
         # Nothing is overlaid where there is nothing to compare.
         shown = look.overlay and drawing is not None and self._workspace is not None
         yield self._mesh, "visible", shown
         yield self._label, "visible", shown
         if shown and self._workspace is not None:
+            yield self._mesh, "position", tuple(offset.tolist())
             yield self._mesh, "vertices", self._workspace[0]
             yield self._mesh, "faces", self._workspace[1]
             yield (
@@ -86,7 +93,7 @@ class _Column:
                 "text",
                 NAMES[column] if column == LIVE else _title(column, design),
             )
-            yield self._label, "position", self._top
+            yield self._label, "position", tuple((self._top + offset).tolist())
         # The live design has no outline, since its mechanism is drawn.
         outlined = look.outlines and column != LIVE and drawing is not None
         yield self._lines, "visible", outlined
@@ -103,8 +110,7 @@ class _Column:
         if drawing.shell is not None:
             vertices = _scaled(_enlarged(drawing.shell.vertices, self._column * APART), scale)
             self._workspace = vertices, np.asarray(drawing.shell.faces, dtype=np.uint32)
-            x, y, z = vertices[int(vertices[:, 2].argmax())].tolist()
-            self._top = (x, y, z)
+            self._top = vertices[int(vertices[:, 2].argmax())].astype(np.float64)
 
 
 def _title(column: int, design: Design | None) -> str:

@@ -185,10 +185,11 @@ def summary(
         if least.limit is not None:
             azimuth = f"{format_decimals(least.azimuth, 0)}°"
             why = f", ended by {least.limit} at azimuth {azimuth}"
+        about = "" if state.view.at == "b4" else f"about {state.point}, "
         yield (
             f'<div><span class="ex-large">{_degrees(least.tilt)}</span> '
             f"{dim('greatest tilt in every azimuth')}</div>"
-            + caption(f"at torsion {_degrees(here.torsion)}{why}")
+            + caption(f"{about}at torsion {_degrees(here.torsion)}{why}")
         )
     found = feed.drawing
     share = best = "…"
