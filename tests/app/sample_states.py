@@ -82,7 +82,13 @@ def _view(_: State, i: int, share: float) -> Action:
     return Change(
         "view",
         {
-            "workspace": WorkspaceView(solid=i > 2, cut=("x", "y", None)[i % 3], level=share),
+            "workspace": WorkspaceView(
+                solid=i > 2,
+                region=("limits", "reachable", "held")[i % 3],
+                colour=("share", "force", "plain")[i % 3],
+                cut=("x", "y", None)[i % 3],
+                level=share,
+            ),
             "prototype": PrototypeView(exploded=share),
             "drawn_as": ("schematic", "prototype", "6-4 twin")[i % 3],
             "singular": SingularView(ghost="δ2 = 0", strata=i > 2),

@@ -2,24 +2,32 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
 
+import msgspec
 import numpy as np
 import pytest
 from playwright.sync_api import Browser, Locator, expect
 from tab import Tab
 
 from explorer.app.features.workspace.feed import WorkspaceFeed
+from explorer.app.features.workspace.slice_map import map_facts
+from explorer.app.scene.bands import Colouring
 from explorer.app.screenshot import PATIENCE_SECONDS
 from explorer.app.server import Running
-from explorer.app.state.actions import Set, SetVariable
+from explorer.app.state.actions import Open, Set, SetVariable
 from explorer.mechanism.design_file import PRESETS
+from explorer.mechanism.machine import Actuators, Guide, Payload, Struts, Tool
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import rotation_from_yaw_pitch_roll
 from explorer.numerics.number_text import format_number
 from explorer.singularity.ellipsoids import planes_of_singularity
 from explorer.singularity.jacobian import inverse_condition, jacobian
+from explorer.statics.held import held_load, held_values, largest_shares
+from explorer.workspace.held import PART_NAMES
+from explorer.workspace.position_bands import LOAD_WORDS, PositionMeasure
 from explorer.workspace.slices.volume import workspace_volume
 
 OPTIMAL = PRESETS["paper-optimal"]
@@ -146,6 +154,79 @@ def test_page_computes_margins_and_conditioning_as_the_library_does(tab: Tab) ->
         cases,
     )
     np.testing.assert_allclose(computed, expected, rtol=1e-9, atol=1e-12)
+
+
+LOADED = msgspec.structs.replace(
+    OPTIMAL,
+    tool=Tool((1.0, -1.0, 2.0)),
+    payload=Payload(2.0, (1.0, 2.0, 3.0), 4.0),
+    actuators=Actuators(push_n=(60, 50, 40, 50, 45, 70), pull_n=(30, 40, 50, 60, 70, 80)),
+    struts=Struts(moment_nm=4.0),
+    guide=Guide(force_n=70.0),
+)
+
+
+def test_page_computes_what_a_load_asks_as_the_library_does(tab: Tab) -> None:
+    rng = np.random.default_rng(3)
+    load = np.array([4.0, -3.0, -6.0, 5.0, 10.0, -5.0])
+    cases: list[dict[str, object]] = []
+    expected: list[tuple[float, str]] = []
+    for trial in range(60):
+        rotation = rotation_from_yaw_pitch_roll(rng.uniform(-80.0, 80.0, 3))
+        position = rng.uniform(-20.0, 20.0, 3)
+        if trial % 4 == 0:
+            # Near a singular position, or at one.
+            position[2] = (0.0, 1e-6, 1e-3)[trial % 3]
+        measure: PositionMeasure = tuple(LOAD_WORDS)[trial % 3]
+        colouring = Colouring(LOADED, rotation, measure, 1.0, load)
+        held = colouring.bands.held
+        assert held is not None
+        share = float(largest_shares(held, rotation, position[None])[0])
+        part = PART_NAMES[int(held_values(held, rotation, position[None])[1][0])]
+        expected.append((share, part))
+        cases.append({"facts": map_facts(colouring), "p": position.tolist()})
+    tab.wait_for(lambda: bool(tab.page.evaluate("!!window.explorer?.map")), "the script")
+    found = tab.page.evaluate(
+        """cases => cases.map(({ facts, p }) => {
+            const { share, part } = window.explorer.map.largestShare(facts, p);
+            return [Number.isFinite(share) ? share : -1, part];
+        })""",
+        cases,
+    )
+    assert sum(math.isinf(share) for share, _ in expected) > 2
+    for (share, part), (computed, of_page) in zip(expected, found, strict=True):
+        if math.isinf(share):
+            assert computed == -1
+        else:
+            assert computed == pytest.approx(share, rel=1e-6)
+            assert of_page == part
+
+
+def test_map_of_shares_is_read_under_the_pointer(tab: Tab) -> None:
+    page = tab.running.page
+    page.session.do(Open(LOADED))
+    page.session.do(Set("view.workspace.colour", "share"))
+    tab.turn_to("Workspace")
+    tab.push("y")
+    map_in(tab).wait_for()
+    reading = tab.page.locator(".ex-reading")
+    words = re.compile(r"largest share of a limit ([\d.,]+) % \(([\w ]+)\)")
+    rest_on(tab, 0.6, 0.4)
+    expect(reading).to_have_text(words)
+    found = words.search(reading.inner_text())
+    where = re.match(r"x ([−\d.]+), z ([−\d.]+) units", reading.inner_text())
+    drawing = page.services.get(WorkspaceFeed).drawing
+    assert found is not None
+    assert where is not None
+    assert drawing is not None
+    assert drawing.level is not None
+    assert drawing.request.load is not None
+    at = np.array([number(where[1]), drawing.level, number(where[2])])
+    rotation = np.array(drawing.request.rotation)
+    held = held_load(LOADED, rotation, np.array(drawing.request.load))
+    share = float(largest_shares(held, rotation, at[None])[0])
+    assert 0.01 * float(found[1].replace(",", "")) == pytest.approx(share, rel=0.02)
+    assert found[2] in PART_NAMES
 
 
 def test_reading_stays_while_the_map_is_drawn_anew(tab: Tab) -> None:

@@ -113,7 +113,7 @@ def load_words(state: State) -> str:
         parts.append(f"{format_number(payload.mass_kg, 4)} kg of payload")
     if payload.force_n:
         parts.append(f"{format_number(payload.force_n, 4)} N in any direction")
-    weightless = "; legs count as weightless" if forces.weighed == "payload and legs" else ""
+    weightless = "; platform and legs count as weightless" if forces.weighed == "payload and legs" else ""
     return f"Load: {', '.join(parts)}{weightless}"
 
 
