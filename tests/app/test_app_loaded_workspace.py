@@ -22,7 +22,7 @@ from explorer.app.features.workspace.files import FORMATS, WorkspaceFiles
 from explorer.app.features.workspace.panel import COLOUR, WorkspacePanel
 from explorer.app.features.workspace.slice_map import map_picture
 from explorer.app.features.workspace.tasks import STEP, WorkspaceDrawing, export_mesh
-from explorer.app.features.workspace.words import drawing_words, legend
+from explorer.app.features.workspace.words import drawing_words, legend, load_words
 from explorer.app.scene.bands import AT_LIMIT, PLAIN
 from explorer.app.state.actions import Open, Set
 from explorer.app.state.frame import Frame
@@ -195,6 +195,19 @@ def test_payload_without_a_weight_loads_nothing_but_its_force() -> None:
     heavy = held_workspace(LOADED, np.array(request.rotation), LOAD)
     assert drawing.held_volume == pytest.approx(light.held_volume, rel=2e-3)
     assert light.held_volume > 1.02 * heavy.held_volume
+
+
+def test_words_say_what_has_no_weight_over_the_workspace() -> None:
+    for weighed, words in (
+        ("none", "Load: (3, 0, −40) N at the tool, (0, 0.2, 0) N m, 5 N in any direction"),
+        (
+            "payload and legs",
+            "Load: (3, 0, −40) N at the tool, (0, 0.2, 0) N m, 0.5 kg of payload, 5 N in any "
+            "direction; platform and legs count as weightless",
+        ),
+    ):
+        forces: Any = replace(FORCES, weighed=weighed)
+        assert load_words(shown(forces=forces)) == words
 
 
 def test_legend_has_the_ends_of_the_bands_with_their_unit() -> None:

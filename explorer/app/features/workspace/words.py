@@ -113,8 +113,10 @@ def load_words(state: State) -> str:
         parts.append(f"{format_number(payload.mass_kg, 4)} kg of payload")
     if payload.force_n:
         parts.append(f"{format_number(payload.force_n, 4)} N in any direction")
-    weightless = "; platform and legs count as weightless" if forces.weighed == "payload and legs" else ""
-    return f"Load: {', '.join(parts)}{weightless}"
+    words = f"Load: {', '.join(parts)}"
+    if forces.weighed == "payload and legs":
+        words += "; platform and legs count as weightless"
+    return words
 
 
 def _volume(newest: MeasuredVolume, frame: Frame) -> str:
