@@ -198,16 +198,13 @@ def test_payload_without_a_weight_loads_nothing_but_its_force() -> None:
 
 
 def test_words_say_what_has_no_weight_over_the_workspace() -> None:
-    for weighed, words in (
-        ("none", "Load: (3, 0, −40) N at the tool, (0, 0.2, 0) N m, 5 N in any direction"),
-        (
-            "payload and legs",
-            "Load: (3, 0, −40) N at the tool, (0, 0.2, 0) N m, 0.5 kg of payload, 5 N in any "
-            "direction; platform and legs count as weightless",
-        ),
-    ):
-        forces: Any = replace(FORCES, weighed=weighed)
-        assert load_words(shown(forces=forces)) == words
+    load = "Load: (3, 0, −40) N at the tool, (0, 0.2, 0) N m"
+    force, weightless = "5 N in any direction", "platform and legs count as weightless"
+    none, everything = replace(FORCES, weighed="none"), replace(FORCES, weighed="payload and legs")
+    assert load_words(shown(forces=none)) == f"{load}, {force}"
+    assert load_words(shown()) == f"{load}, 0.5 kg of payload, {force}"
+    expected = f"{load}, 0.5 kg of payload, {force}; {weightless}"
+    assert load_words(shown(forces=everything)) == expected
 
 
 def test_legend_has_the_ends_of_the_bands_with_their_unit() -> None:
