@@ -11,23 +11,34 @@ import time
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from typing import Any
 
+import msgspec
+
 from benchmarks.ready_page import ready_page
+from benchmarks.samples import DESIGN
 from benchmarks.socket_client import Drag, HandleDrag, SliderDrag, dragging_process, sweep
 from benchmarks.table import Row, seconds
 from benchmarks.timing import Spread
-from explorer import Pose
+from explorer import Actuators, Guide, Payload, Pose, Struts, Tool
 from explorer.app.features.mechanism.pose_panel import JOINT_LABELS
 from explorer.app.scene.placing import scene_scale
 from explorer.app.server import Running
-from explorer.app.state.actions import Reset
+from explorer.app.state.actions import Open, Set
 from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Assigner, Update
 
 ROUNDS, EVENTS, WARM_UP_EVENTS = 3, 100, 20
+LOADED = msgspec.structs.replace(
+    DESIGN,
+    tool=Tool((1.0, 0.0, 2.0)),
+    payload=Payload(0.5, (1.0, 0.0, 1.0), 5.0),
+    actuators=Actuators(push_n=(150, 200, 150, 200, 150, 150)),
+    struts=Struts(moment_nm=6.0),
+    guide=Guide(force_n=200.0, moment_nm=6.0),
+)
 
 
 @dataclass(frozen=True)
@@ -39,12 +50,14 @@ class Kind:
         drag: The drag of a number of events from a state.
         sent: The value in a message of it.
         arrived: The same value in a state.
+        is_loaded: Whether the machine has limits, and forces are drawn.
     """
 
     name: str
     drag: Callable[[State, int], Drag]
     sent: Callable[[Any], float]
     arrived: Callable[[State], float]
+    is_loaded: bool = False
 
 
 def _value(message: Any) -> float:
@@ -58,6 +71,12 @@ def _handle_drag(state: State, count: int) -> HandleDrag:
     return HandleDrag("/handle", [Pose((v, y, z), quaternion) for v in sweep(x, 1.0, count)])
 
 
+DRAG = Kind(
+    "drag handle",
+    _handle_drag,
+    lambda message: float(message.position[0]),
+    lambda state: state.pose.position[0] * scene_scale(state),
+)
 KINDS = (
     Kind(
         "leg slider l1",
@@ -77,12 +96,8 @@ KINDS = (
         _value,
         lambda state: state.design.b1[0],
     ),
-    Kind(
-        "drag handle",
-        _handle_drag,
-        lambda message: float(message.position[0]),
-        lambda state: state.pose.position[0] * scene_scale(state),
-    ),
+    DRAG,
+    replace(DRAG, name="drag handle, forces drawn", is_loaded=True),
 )
 
 
@@ -181,7 +196,8 @@ def measure() -> dict[str, list[Stopwatch]]:
         # The kinds take turns, so that no disturbance falls on one alone.
         for events in (WARM_UP_EVENTS, *[EVENTS] * ROUNDS):
             for kind in KINDS:
-                session.do(Reset())
+                session.do(Open(LOADED if kind.is_loaded else DESIGN))
+                session.do(Set("view.forces.shown", kind.is_loaded))
                 session.wait_until_idle()
                 stopwatch = Stopwatch(kind)
                 with timed(running, stopwatch):
