@@ -241,3 +241,33 @@ def test_reading_stays_while_the_map_is_drawn_anew(tab: Tab) -> None:
     assert tab.running.page.wait_until_drawn(PATIENCE_SECONDS)
     expect(map_in(tab)).to_have_attribute("aria-label", "Map of the slice at y = 9")
     expect(reading).to_have_text(before)
+
+
+def test_map_of_the_tool_is_read_and_leads_the_tool_there(tab: Tab) -> None:
+    page, tool = tab.running.page, (1.0, 0.0, 3.0)
+    page.session.do(Set("design", msgspec.structs.replace(OPTIMAL, tool=Tool(position=tool))))
+    tab.turn_to("Pose")
+    tab.push("tool point")
+    tab.turn_to("Workspace")
+    tab.push("y")
+    map_in(tab).wait_for()
+    page.session.do(Set("view.workspace.level", 6.0))
+    expect(map_in(tab)).to_have_attribute("aria-label", "Map of the slice at y = 6")
+    reading = tab.page.locator(".ex-reading")
+    rest_on(tab, 0.55, 0.6)
+    expect(reading).to_have_text(READING)
+    found = READING.match(reading.inner_text())
+    assert found is not None
+    goal = np.array([number(found[1]), 6.0, number(found[2])])
+    offset = tab.state.pose.rotation @ np.array(tool)
+    sizes = np.abs(margins(goal - offset, tab.state.pose.rotation))
+    assert number(found[3]) == pytest.approx(float(sizes.min()), abs=0.02)
+    assert int(found[4]) == int(sizes.argmin()) + 1
+    tab.page.mouse.down()
+    tab.page.mouse.up()
+
+    def is_there() -> bool:
+        pose = tab.state.pose
+        return bool(np.allclose(pose.position + pose.rotation @ np.array(tool), goal, atol=0.006))
+
+    tab.wait_for(is_there, "the position read")
