@@ -9,7 +9,7 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from explorer.app.features.paths.loads import JourneyLoads, PathShares, load_words
+from explorer.app.features.paths.loads import JourneyLoads, PathShares
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.charts import BLUE, NEUTRAL, ORANGE, add_chart, axis, line
@@ -22,11 +22,10 @@ LEAST_TOP, MOST_TOP = 120.0, 250.0
 
 
 class LoadPlot:
-    """The chart and a line of words, for designs with limits."""
+    """The chart, for designs with limits."""
 
     def __init__(self, gui: viser.GuiApi, shares: PathShares) -> None:
         self._shares = shares
-        self._words = gui.add_html("", visible=False)
         self._chart = add_chart(
             gui,
             (
@@ -44,15 +43,12 @@ class LoadPlot:
         )
 
     def updates(self, frame: Frame) -> Iterator[Update]:
-        """Yield the updates that make the chart and its words show the frame."""
+        """Yield the updates that make the chart show the frame."""
         journey, loads = frame.state.journey, self._shares.of(frame)
-        has_path = journey is not None and loads is not None
-        yield self._words, "visible", has_path
         columns, top = EMPTY, LEAST_TOP
         if journey is not None and loads is not None:
             top = top_of(loads)
             columns = columns_of(loads, journey.at, top)
-            yield self._words, "content", load_words(loads)
         duration = float(columns[0][-1])
         scales = {
             "x": {"time": False, "range": (0.0, max(duration, 1e-9))},

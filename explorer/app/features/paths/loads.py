@@ -9,14 +9,14 @@ import numpy as np
 
 from explorer.app.features.feature import Services
 from explorer.app.features.forces.loads import Loads
-from explorer.app.features.forces.words import PARTS, share_look, share_words
+from explorer.app.features.forces.words import MOST, PARTS, share_look
 from explorer.app.state.frame import Frame
 from explorer.app.state.paths import Journey
 from explorer.app.state.state import State
-from explorer.app.widgets.markup import dim
+from explorer.app.widgets.markup import note
 from explorer.mechanism.pose import rotation_from_quaternion
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.number_text import format_decimals
+from explorer.numerics.number_text import format_decimals, format_number
 from explorer.paths.loads import DemandedLoad, LargestShare
 from explorer.statics.loaded import LoadedPose
 
@@ -77,7 +77,8 @@ def load_words(loads: JourneyLoads) -> str:
     if part is None:
         words = f"Nothing holds a load {at}: singular" if share else "No part bears a load"
     else:
-        words = f"Largest share {share_words(share)}: {PARTS[part]}, {at}"
+        number = format_number(100.0 * share, 3) if share < MOST else "∞"
+        words = f"Largest share {number} %: {PARTS[part]}, {at}"
     return f'<div class="ex-{share_look(share)}">{escape(words)}</div>'
 
 
@@ -86,4 +87,4 @@ def demand_note(state: State, is_limited: bool) -> str:
     paths = state.paths
     if is_limited or not paths.holds_load or paths.kind != "planned":
         return ""
-    return dim("No part has a limit, so every load is held: see the tab Machine.")
+    return note("No part has a limit, so every load is held: see the tab Machine.")

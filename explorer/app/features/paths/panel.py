@@ -20,7 +20,7 @@ from explorer.app.features.paths.actions import (
     pose_of_end,
 )
 from explorer.app.features.paths.load_plot import LoadPlot
-from explorer.app.features.paths.loads import PathShares, demand_note
+from explorer.app.features.paths.loads import JourneyLoads, PathShares, demand_note, load_words
 from explorer.app.features.paths.margin_plot import MarginPlot, crossing_words
 from explorer.app.inputs.bindings import Bound
 from explorer.app.inputs.controls import Controls
@@ -79,7 +79,7 @@ class PathsPanel:
 
     def __init__(self, services: Services) -> None:
         gui, self._session = services.gui, services.session
-        self._downloads = services.downloads
+        self._downloads, self._shares = services.downloads, PathShares(services)
         self._controls = Controls(gui, services.session)
         kinds = {
             kind: Chip(words, f"Paths › {words}", hint, choose("paths.kind", kind, "Path"))
@@ -92,6 +92,14 @@ class PathsPanel:
                 end: self._add_end(gui, end) for end in ENDS
             }
             self._kinds = gui.add_html("")
+            self._controls.checkbox(
+                "Hold the load",
+                "Demand that the load of the tab Forces, with the weights chosen there, stays "
+                "within the limits of actuators, struts and guide all along the path.",
+                "paths.holds_load",
+                visible=_is_planned,
+            )
+            self._demand = gui.add_html("")
             self.go = self._controls.button(
                 "Go",
                 "Make the path from the start to the goal, and play it.",
@@ -107,14 +115,6 @@ class PathsPanel:
                 step=0.1,
                 visible=_is_planned,
             )
-            self._controls.checkbox(
-                "Hold the load",
-                "Demand that the load of the tab Forces, with the weights chosen there, stays "
-                "within the limits of actuators, struts and guide all along the path.",
-                "paths.holds_load",
-                visible=_is_planned,
-            )
-            self._demand = gui.add_html("")
         with gui.add_folder("Playback"):
             self._title = gui.add_html("")
             self.time = self._controls.slider(
@@ -129,7 +129,6 @@ class PathsPanel:
                 disabled=lambda state: state.journey is None,
             )
             self._plot = MarginPlot(gui)
-            self._shares = PathShares(services)
             self._load_plot = LoadPlot(gui, self._shares)
         self._add_buttons(services.buttons)
 
@@ -144,7 +143,7 @@ class PathsPanel:
         chips = f'<div class="ex-flow">{self._kind_chips.buttons(state)}</div>'
         yield self._kinds, "content", box(chips, f'<div class="ex-small">{kind_note(state)}</div>')
         yield self.go, "disabled", state.paths.is_planning
-        yield self._title, "content", plan_words(state) or path_title(state)
+        yield self._title, "content", plan_words(state) or path_title(state, self._shares.of(frame))
         demand = demand_note(state, self._shares.is_limited(frame))
         yield self._demand, "visible", bool(demand)
         yield self._demand, "content", demand
@@ -259,8 +258,13 @@ def plan_words(state: State) -> str | None:
     return None
 
 
-def path_title(state: State) -> str:
-    """Return the title of the path, its singular poses, and buttons to play and export it."""
+def path_title(state: State, loads: JourneyLoads | None) -> str:
+    """Return the title of the path and what is told of it, and buttons to play and export it.
+
+    Args:
+        state: The state of the page.
+        loads: The shares along the path; None without limits.
+    """
     journey = state.journey
     if journey is None:
         return box(dim("No path yet. Choose a goal and press Go."))
@@ -281,6 +285,7 @@ def path_title(state: State) -> str:
         f'<div class="ex-line">{play}<span class="ex-cut ex-fill" title="{title}">{title}</span>'
         f"{export}</div>",
         crossing_words(journey),
+        "" if loads is None else load_words(loads),
     )
 
 

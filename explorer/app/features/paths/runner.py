@@ -76,8 +76,6 @@ class PathRunner(Runner):
         def take_path(path: PlannedPath) -> None:
             moves = len(path.poses) - 1
             title = f"Planned path of {moves} {'move' if moves == 1 else 'moves'}"
-            if load is not None:
-                title += " that holds the load"
             journey = Journey("planned", title, design, path.poses, is_playing=True, tool=tool)
             self._finish(request, journey, None)
 
