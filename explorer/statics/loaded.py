@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -15,7 +14,13 @@ from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.statics.equilibrium import twists_of_actuators
 from explorer.statics.forces import largest_force
-from explorer.statics.reactions import Reactions, largest_payload, limit_shares, reactions
+from explorer.statics.reactions import (
+    Reactions,
+    largest_payload,
+    limit_shares,
+    limited_parts,
+    reactions,
+)
 from explorer.statics.weights import Weights
 
 
@@ -80,12 +85,7 @@ class LoadedPose:
     @cached_property
     def limited(self) -> BoolArray:
         """Whether each part has a limit, shape (12,), in the order of `LIMITED`."""
-        struts, guide = self.design.struts, self.design.guide
-        bending = math.isfinite(struts.largest_moment)
-        force, moment = guide.force_n is not None, guide.moment_nm is not None
-        push, pull = self.design.actuators.limits
-        actuators: list[bool] = np.isfinite(np.minimum(push, pull)).tolist()
-        return np.array([*actuators, bending, bending, force, force, moment, moment])
+        return limited_parts(self.design)
 
     @property
     def is_regular(self) -> bool:

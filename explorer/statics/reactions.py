@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.kinematics import attachment_points, inverse
 from explorer.mechanism.machine import Payload
-from explorer.numerics.arrays import FloatArray, dot
+from explorer.numerics.arrays import BoolArray, FloatArray, dot
 from explorer.statics.equilibrium import twists_of_actuators
 from explorer.statics.forces import GUIDE_ROWS, STRUT_ROWS, actuator_forces
 from explorer.statics.weights import Carried, Weights, carry
@@ -122,6 +122,12 @@ def part_limits(design: Design) -> FloatArray:
     limits = _limits(design)
     moments = np.minimum(limits[:2], limits[4:])
     return np.array([[*most, *moments, *limits[2:4]] for most in design.actuators.limits])
+
+
+def limited_parts(design: Design) -> BoolArray:
+    """Return whether each part of `LIMITED` has a limit, shape (12,)."""
+    push, pull = design.actuators.limits
+    return np.isfinite(np.concatenate([np.minimum(push, pull), _limits(design)]))
 
 
 def largest_payload(

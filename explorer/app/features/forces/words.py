@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import bisect
 import math
 
-from explorer.app.widgets.colours import CLEAR, FAR, GHOST, SINGULAR, WARNED, Rgb
+from explorer.app.widgets.colours import GHOST, Rgb
 from explorer.app.widgets.markup import Look
 from explorer.mechanism.design import JOINTS
 from explorer.numerics.number_text import format_decimals, format_number
 from explorer.statics.loaded import LoadedPose
+from explorer.workspace.position_bands import SHARE_COLOURS, SHARES
 
 PARTS = (
     *(f"actuator {joint}" for joint in JOINTS),
@@ -18,9 +20,8 @@ PARTS = (
 )
 """Names of the parts with a limit, in the order of `explorer.statics.reactions.LIMITED`."""
 
-CLOSE = 0.8
+CLOSE = SHARES[-2]
 """Share of a limit from which a load is close to it."""
-HALF = 0.5
 # Largest share that is told as a number.
 MOST = 1e4
 
@@ -56,10 +57,7 @@ def share_colour(share: Share) -> Rgb:
     """Return the colour of a share of a limit; grey without a limit."""
     if share is None:
         return GHOST
-    for end, colour in ((HALF, FAR), (CLOSE, CLEAR), (1.0, WARNED)):
-        if share <= end:
-            return colour
-    return SINGULAR
+    return SHARE_COLOURS[bisect.bisect_left(SHARES, share)]
 
 
 def newtons(value: float, digits: int = 4) -> str:

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import msgspec
-import numpy as np
 
 from explorer.app.state.state import State
 from explorer.mechanism.design import Design
-from explorer.statics.reactions import part_limits
+from explorer.statics.reactions import limited_parts
 
 
 def loaded_design(state: State) -> Design:
@@ -21,4 +20,4 @@ def loaded_design(state: State) -> Design:
 
 def has_limits(design: Design) -> bool:
     """Return whether an actuator, a strut or the guide has a limit."""
-    return not np.isinf(part_limits(design)).all()
+    return bool(limited_parts(design).any())
