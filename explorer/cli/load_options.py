@@ -68,12 +68,21 @@ def held_by(
     """
     from explorer.workspace.held import held_workspace
 
+    check_limited(design)
+    return held_workspace(design, rotation, load, tolerance=tolerance)
+
+
+def check_limited(design: Design) -> None:
+    """Check that a part of a design has a limit.
+
+    Raises:
+        InputError: The design has no limit that a load could exceed.
+    """
     if np.isinf(part_limits(design)).all():
         raise InputError(
             "the design limits neither its actuators nor its struts nor its guide, so that it "
             "holds any load: give its file a limit, such as actuators.push_n"
         )
-    return held_workspace(design, rotation, load, tolerance=tolerance)
 
 
 def check_regular(pose: Pose, values: FloatArray) -> None:

@@ -192,7 +192,8 @@ def test_shares_over_time_are_those_of_the_path(services: Services, at: str) -> 
     given = PRESS, journey.poses, load_of(state)
     expected = path_loads(*given, tool=journey.tool, samples=2001)
     assert found.largest == expected.largest
-    most: FloatArray = np.interp(journey.trajectory.at, expected.at, expected.shares.max(axis=1))
+    largest: FloatArray = expected.shares.max(axis=1)
+    most = np.interp(journey.trajectory.at, expected.at, largest)
     np.testing.assert_allclose(found.shares, most, atol=2e-3)
     pose = journey.pose_at(found.seconds)
     here = path_loads(PRESS, (pose, pose), load_of(state)).largest

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import csv
+import json
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +14,7 @@ from command_line import CommandLine
 import explorer
 from explorer.mechanism.pose import rotation_from_yaw_pitch_roll
 from explorer.mechanism.tilt_torsion import tilt_torsion_of
+from explorer.statics.reactions import LIMITED
 
 COMMAND = ("path",)
 PRESET = explorer.PRESETS["paper-optimal"]
@@ -123,3 +126,103 @@ def test_path_text_has_ends_length_and_margins(
     assert "moves       1, each proved to keep limits and clearances" in text
     assert "least |δ|" in text
     assert all(line == line.rstrip() for line in text.splitlines())
+
+
+LIMITED_DESIGN = {
+    "schema": 2,
+    "name": "press",
+    "unit_mm": 10,
+    "a3": [19.1829, 7.0062],
+    "b1": [4.2892, -3.8858],
+    "b2": 2.6067,
+    "b3": 4.9094,
+    "home": {"position": [10, 5, 9], "quaternion": [0.80334, 0, 0, -0.59552]},
+    "tool": {"position": [1, 0, 2]},
+    "payload": {"mass_kg": 0.5, "centre": [1, 0, 1]},
+    "actuators": {"push_n": [150, 200, 150, 200, 150, 150]},
+    "struts": {"outer_mm": 8, "inner_mm": 6, "stress_mpa": 200},
+    "guide": {"force_n": 200, "moment_nm": 6},
+}
+# Both ends hold 40 N downwards; the straight move between them, low over the base, does not.
+LOW = (
+    *("--from", "2.4", "0.2", "1.7", "-53", "-3", "2"),
+    *("--to", "18.5", "9.2", "2.1", "-82", "-5", "1"),
+)
+DOWN = ("--load", "0", "0", "-40")
+
+
+@pytest.fixture
+def press(tmp_path: Path) -> tuple[str, str]:
+    """Return the option of a design whose machine has limits."""
+    file = tmp_path / "press.json"
+    file.write_text(json.dumps(LIMITED_DESIGN), encoding="utf-8")
+    return "--design", str(file)
+
+
+@pytest.mark.skipif(find_spec("ompl") is None, reason="OMPL is not installed")
+def test_path_with_load_holds_it_and_tells_the_largest_share(
+    cli: CommandLine, press: tuple[str, str]
+) -> None:
+    design = explorer.load_design(press[1])
+    free = cli.answer(*press, *LOW)
+    assert len(free["poses"]) == 2
+    assert "largest_share" not in free
+    found = cli.answer(*press, *LOW, *DOWN, "--seconds", "20")
+    load = [0.0, 0.0, -40.0, 0.0, 0.0, 0.0]
+    for answer, holds in ((free, False), (found, True)):
+        poses = [
+            explorer.Pose(tuple(each["position"]), tuple(each["quaternion"]))
+            for each in answer["poses"]
+        ]
+        largest = explorer.path_loads(design, poses, load).largest
+        assert (largest.share <= 1.0 + 1e-6) == holds
+    assert found["largest_share"] == pytest.approx(largest.share, abs=1e-6)
+    assert largest.part is not None
+    assert found["largest_share_part"] == LIMITED[largest.part]
+    assert 0.0 <= found["largest_share_at"] <= len(found["poses"]) - 1
+    # A straight path that holds it tells the same in words.
+    up = ("--to", "11", "5", "9", "--load", "0", "0", "-10", "0", "0", "2")
+    straight = cli.answer(*press, *up)
+    assert 0.0 < straight["largest_share"] < 1.0
+    text = cli.text(*press, *up)
+    share = f"{100.0 * straight['largest_share']:.1f}"
+    assert f"load        held, with {share} % of a limit at most: the " in text
+
+
+def test_path_with_load_at_the_tool_holds_it(cli: CommandLine, press: tuple[str, str]) -> None:
+    up = ("--to", "11", "5", "11", "-70", "5", "5", "--at", "tool", "--load", "0", "0", "-10")
+    found = cli.answer(*press, *up)
+    design = explorer.load_design(press[1])
+    poses = [
+        explorer.Pose(tuple(each["position"]), tuple(each["quaternion"])) for each in found["poses"]
+    ]
+    load = [0.0, 0.0, -10.0, 0.0, 0.0, 0.0]
+    largest = explorer.path_loads(design, poses, load, tool=design.tool.position).largest
+    assert found["largest_share"] == pytest.approx(largest.share, abs=1e-6)
+
+
+def test_path_end_that_does_not_hold_the_load_has_status_2_and_reason(
+    cli: CommandLine, press: tuple[str, str]
+) -> None:
+    words = (*press, *LOW, "--load", "0", "0", "-70")
+    assert cli.answer(*words, status=2) == {
+        "found": False,
+        "reason": "load not held",
+        "poses": [],
+    }
+    assert "the start does not hold the load: the force of d2 is 143.2 %" in cli.refusal(*words)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--load", "1", "2"], "--load needs a force fx fy fz, and may go on with a moment"),
+        (["--load", "1", "2", "x"], "--load"),
+        (["--load", "0", "0", "nan"], "--load"),
+        (["--load", "0", "0", "-1"], "limits neither its actuators nor its struts nor its guide"),
+    ],
+)
+def test_path_bad_load_is_one_line_and_status_2(
+    cli: CommandLine, words: list[str], message: str
+) -> None:
+    assert message in cli.refusal("--to", "12", "8", "7", *words)

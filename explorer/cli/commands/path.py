@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 import tyro
 
+from explorer.cli.load_options import Load, check_limited
 from explorer.cli.options import (
     DesignOptions,
     JsonOptions,
@@ -31,6 +32,7 @@ from explorer.cli.values import (
     OPTIONAL,
     Numbers,
     hint,
+    load_numbers,
     numbers,
     pose_numbers,
     positive,
@@ -40,8 +42,10 @@ from explorer.errors import InputError
 from explorer.mechanism.design import Design
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import Pose, Quadruple, Triple
+from explorer.statics.reactions import LIMITED
 
 if TYPE_CHECKING:
+    from explorer.paths.loads import LargestShare
     from explorer.paths.planning import PlannedPath
     from explorer.paths.trajectory import Trajectory
 
@@ -107,6 +111,10 @@ class Path(JsonOptions, RadiiOptions, PointOptions, DesignOptions):
     ] = None
     """Azimuth, tilt and torsion of the platform at the end, in degrees."""
 
+    load: Annotated[Load | None, load_numbers("--load"), OPTIONAL] = None
+    """Force in N and moment in N × unit at the tool, along the axes of the base, besides the
+    payload: the path holds them within the limits of actuators, struts and guide."""
+
     seconds: Annotated[float, positive("--seconds")] = 2.0
     """Longest time to search for a path, in seconds."""
 
@@ -131,6 +139,7 @@ class Path(JsonOptions, RadiiOptions, PointOptions, DesignOptions):
         """
         from explorer.export.trajectory import write_trajectory
         from explorer.files.writing import check_writable
+        from explorer.paths.loads import path_loads
         from explorer.paths.planning import EndError, NoPathError, plan_path
         from explorer.paths.trajectory import trajectory
 
@@ -150,10 +159,12 @@ class Path(JsonOptions, RadiiOptions, PointOptions, DesignOptions):
                 "or --to-tilt-torsion"
             )
         goal = _pose("--to", start, *ends, tool)
+        if self.load is not None:
+            check_limited(design)
         if self.out is not None:
             check_writable(self.out)
         try:
-            path = plan_path(design, start, goal, seconds=self.seconds, tool=tool)
+            path = plan_path(design, start, goal, seconds=self.seconds, tool=tool, load=self.load)
         except (EndError, NoPathError) as error:
             if self.json:
                 write_json({"found": False, "reason": error.reason, "poses": []})
@@ -161,9 +172,12 @@ class Path(JsonOptions, RadiiOptions, PointOptions, DesignOptions):
         timed = trajectory(design, path.poses, speed=self.speed, samples=self.samples, tool=tool)
         if self.out is not None:
             write_trajectory(timed, self.out)
+        largest = None
+        if self.load is not None:
+            largest = path_loads(design, path.poses, self.load, tool=tool).largest
         self.write(
-            lambda: _as_json(path, timed, self.out),
-            lambda: _as_lines(design, path, timed, self.out),
+            lambda: _as_json(path, timed, largest, self.out),
+            lambda: _as_lines(design, path, timed, largest, self.out),
         )
 
 
@@ -199,7 +213,9 @@ def _pose(
     return make_pose(f"{option}-", default, *given, tool)
 
 
-def _as_json(path: PlannedPath, timed: Trajectory, out: File | None) -> dict[str, object]:
+def _as_json(
+    path: PlannedPath, timed: Trajectory, largest: LargestShare | None, out: File | None
+) -> dict[str, object]:
     names = "time joints position quaternion" + (" tool_position" if path.tool else "")
     answer: dict[str, object] = {
         "found": True,
@@ -209,13 +225,22 @@ def _as_json(path: PlannedPath, timed: Trajectory, out: File | None) -> dict[str
         "duration": timed.duration,
         "trajectory": attributes(timed, names),
     }
+    if largest is not None:
+        answer["largest_share"] = largest.share
+        answer["largest_share_part"] = None if largest.part is None else LIMITED[largest.part]
+        answer["largest_share_at"] = largest.place
     return answer if out is None else {**answer, "file": out}
 
 
 def _as_lines(
-    design: Design, path: PlannedPath, timed: Trajectory, out: File | None
+    design: Design,
+    path: PlannedPath,
+    timed: Trajectory,
+    largest: LargestShare | None,
+    out: File | None,
 ) -> Iterator[str]:
     from explorer.paths.crossings import path_margins
+    from explorer.paths.loads import PART_NAMES
 
     least = np.abs(path_margins(path.poses, tool=path.tool).margins).min(axis=0).tolist()
     yield heading(design)
@@ -229,6 +254,12 @@ def _as_lines(
         ("takes", f"{figure(timed.duration)} s"),
         ("least |δ|", "  ".join(f"δ{i + 1} {figure(v)}" for i, v in enumerate(least))),
     ]
+    if largest is not None:
+        words = f"held, with {100.0 * largest.share:.1f} % of a limit at most"
+        if largest.part is not None:
+            seconds = float(np.interp(largest.place, timed.at, timed.time))
+            words += f": {PART_NAMES[largest.part]}, at {figure(seconds)} s"
+        rows.append(("load", words))
     yield from ("", table(rows, "<<"))
     if out is not None:
         yield from ("", f"{len(timed.time)} rows in {out}")
