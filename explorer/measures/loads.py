@@ -143,10 +143,11 @@ def loads() -> Iterable[Measure]:
             yield _measure(kind, site)
     yield Measure(
         "held_volume",
-        "volume that holds the payload",
+        "held volume",
         "Volume of the workspace at whose positions the payload's weight and force are held within "
         "the limits of actuators, struts and guide",
         lambda case: case.held.held_volume,
+        title="volume that holds the payload",
         power=3,
         sense="more",
         cost="high",

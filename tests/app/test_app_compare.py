@@ -18,7 +18,7 @@ from hypothesis import given, strategies as st
 from services import StubWorker, services_for
 
 from explorer.app.features.compare.actions import Pin, Unpin
-from explorer.app.features.compare.bars import DRAWN, bars
+from explorer.app.features.compare.bars import DRAWN, LOADS, bars
 from explorer.app.features.compare.columns import Column, best_of, columns_of, notes, value_text
 from explorer.app.features.compare.drawing import ComparedRequest, compared_drawing
 from explorer.app.features.compare.feed import LIVE, CompareFeed
@@ -45,10 +45,12 @@ from explorer.errors import InputError
 from explorer.measures.case import Case
 from explorer.measures.catalogue import CATALOGUE, measures_in
 from explorer.measures.measurements import Measurements, measure_design
-from explorer.mechanism.design import Design
+from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.design_file import PRESETS
 from explorer.mechanism.home import home_pose
+from explorer.mechanism.machine import Actuators, Guide, Payload
 from explorer.mechanism.pose import Pose
+from explorer.statics.loaded import LoadedPose
 from explorer.workspace.slices.volume import workspace_nodes, workspace_volume
 
 INITIAL, OPTIMAL = PRESETS.values()
@@ -271,6 +273,52 @@ def test_bars_are_as_long_as_their_values() -> None:
         if values.max() > 0.0:
             expected = np.maximum(drawn.max() * values / values.max(), 0.8)
             assert drawn == pytest.approx(expected, abs=0.02), name
+
+
+LIGHT = msgspec.structs.replace(
+    OPTIMAL,
+    name="light",
+    payload=Payload(0.5, (1.0, 0.0, 1.0)),
+    actuators=Actuators(
+        push_n=(150.0, 200.0, 150.0, 200.0, 150.0, 150.0),
+        error_mm=(0.05, 0.05, 0.05, 0.05, 0.05, 0.05),
+    ),
+    guide=Guide(force_n=200.0, moment_nm=6.0),
+)
+HEAVY = msgspec.structs.replace(LIGHT, name="heavy", payload=Payload(2.0, force_n=10.0))
+
+
+def test_the_table_compares_loads_of_the_designs_that_have_them() -> None:
+    found = columns(compared(HEAVY, INITIAL, live=LIGHT))
+    html = table(found, millimetres=True)
+    assert "nan" not in html
+    assert "inf" not in re.sub("<.*?>", "", html)
+    rows = cells(html)
+    for design, place in ((LIGHT, 0), (HEAVY, 1)):
+        pose = LoadedPose(design, home_pose(design), np.zeros(6))
+        share, part = pose.share, JOINTS[int(pose.shares[:6].argmax())]
+        assert number(rows["load share at home %"][place]) == pytest.approx(100.0 * share, abs=0.01)
+        assert rows["worst actuator at home"][place] == part
+        payload = number(rows["largest payload at home kg"][place])
+        assert payload == pytest.approx(pose.largest_payload, abs=1e-3)
+        moments = pose.held.bending + pose.held.spread[6:8]
+        bending = number(rows["largest bending at home N m"][place])
+        assert bending == pytest.approx(1e-3 * design.unit_mm * moments.max(), abs=1e-3)
+    assert {"worst error at home mm", "held volume mm³"} <= {*rows}
+    # A design without a machine has none of them, and two without one have no such rows.
+    assert rows["load share at home %"][2] == rows["held volume mm³"][2] == "–"
+    plain = cells(table(columns(compared(INITIAL)), millimetres=True))
+    assert not any("load" in name or "payload" in name for name in plain)
+
+
+def test_bars_have_a_row_of_loads_if_a_design_has_them() -> None:
+    html = bars(columns(compared(HEAVY, live=LIGHT)), millimetres=False)
+    widths = re.findall(r'<rect[^>]* width="([\d.]+)"', html)
+    assert len(widths) == 2 * (len(DRAWN) + len(LOADS))
+    assert "nan" not in html
+    for words in (">load share<", ">largest payload<", ">largest bending<", ">held volume<"):
+        assert words in html
+    assert ">load share<" not in bars(columns(compared(INITIAL)), millimetres=False)
 
 
 def test_a_drawing_has_the_workspace_at_the_home_of_the_design_and_its_points() -> None:

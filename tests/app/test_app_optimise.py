@@ -60,6 +60,7 @@ from explorer.app.features.optimise.scene import FARTHEST, box_shown, edges_of, 
 from explorer.app.features.optimise.tasks import compare, optimise
 from explorer.app.features.optimise.words import (
     comparison_table,
+    refused_words,
     result_words,
     search_notice,
     verdict_words,
@@ -90,7 +91,7 @@ from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import Pose
 from explorer.optimise.outcome import Iterate
 from explorer.optimise.paper import paper_problem, paper_start
-from explorer.optimise.problem import OBJECTIVES, YAW
+from explorer.optimise.problem import OBJECTIVES, YAW, ObjectiveName
 from explorer.optimise.record import decode_record, encode_record, record_of
 from explorer.optimise.refutation.lifting import MAXIMA, SWING_LIMIT
 from explorer.optimise.search.trail import Trail
@@ -786,6 +787,49 @@ def test_tilt_is_demanded_over_the_required_box() -> None:
     state = SetRequest("optimisation.request.tilt", 95.0).apply(state)
     (refutation,) = refuted(state)
     assert "the tilt demanded must be below 90°" in refutation.message
+
+
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        ({"objective": "smallest-load"}, "no load: give its payload a mass.* in the tab Machine"),
+        ({"held": True}, "no load: give its payload a mass.* in the tab Machine"),
+        ({"objective": "smallest-error"}, "no errors: give them.* errors .* in the design file"),
+        ({"error": 0.1}, "no errors: give them.* errors of the actuators in the design file"),
+    ],
+)
+def test_a_machine_that_is_lacking_is_told_with_where_to_give_it(
+    asked: dict[str, Any], words: str
+) -> None:
+    request = OptimisationRequest(**asked)
+    state = SetRequest("optimisation.request", request).apply(opened(OPTIMAL))
+    assert liftable(state) == ()
+    text = re.sub("<.*?>", " ", refused_words(refuted(state), liftable(state)))
+    assert "This cannot be optimised" in text
+    assert re.search(words, text), text
+    assert "tab Design" not in text
+
+
+def test_the_chart_of_a_load_or_an_error_has_its_unit() -> None:
+    design = msgspec.structs.replace(
+        OPTIMAL,
+        payload=Payload(force_n=1.0),
+        actuators=Actuators((50.0, 50.0, 50.0, 50.0, 50.0, 50.0), error_mm=(0.01,) * 6),  # pyright: ignore[reportArgumentType]
+    )
+    captions: tuple[tuple[ObjectiveName, str], ...] = (
+        ("smallest-load", "Load share over the box: 0.4"),
+        ("smallest-error", "Worst error over the box (units): 0.4"),
+        ("largest-margin", "Margin over the box (units): 0.4"),
+    )
+    for objective, caption in captions:
+        request = OptimisationRequest(objective=objective)
+        state = StartRun().apply(SetRequest("optimisation.request", request).apply(opened(design)))
+        run = state.optimisation.run
+        assert run is not None
+        step = replace(told_by(run.problem)[0], objective=0.4)
+        run = Advance(run.number, (step,)).apply(state).optimisation.run
+        assert run is not None
+        assert curves_of(run)[0].caption == caption
 
 
 @pytest.mark.parametrize("name", PRESETS)

@@ -32,6 +32,9 @@ DRAWN = (
 )
 """The measures that are drawn, row by row."""
 
+LOADS = ("home_load_share", "home_largest_payload", "home_largest_bending", "held_volume")
+"""The measures of a further row, each drawn if a design has what it needs."""
+
 # Number of drawings in a row.
 ACROSS = 4
 # Sizes in pixels: a drawing's width, heights of its title, a bar and the gap below it; widths of a
@@ -47,13 +50,15 @@ def bars(columns: Sequence[Column], *, millimetres: bool) -> str:
         columns: Columns of the comparison, the live design first.
         millimetres: Whether lengths are in millimetres, rather than in design units.
     """
+    loads = [name for name in LOADS if any(column.has(CATALOGUE[name]) for column in columns)]
+    drawn = (*DRAWN, *loads)
     height = TITLE + len(columns) * (BAR + GAP) + SPACE
     drawings = "".join(
         f'<g transform="translate({(index % ACROSS) * WIDTH:g},{(index // ACROSS) * height:g})">'
         f"{_drawing(CATALOGUE[name], columns, millimetres=millimetres)}</g>"
-        for index, name in enumerate(DRAWN)
+        for index, name in enumerate(drawn)
     )
-    rows = -(-len(DRAWN) // ACROSS)
+    rows = -(-len(drawn) // ACROSS)
     return (
         f'<svg viewBox="0 0 {ACROSS * WIDTH:g} {rows * height:g}" width="100%" '
         'class="ex-bars" role="img" '
@@ -73,8 +78,7 @@ def _drawing(measure: Measure, columns: Sequence[Column], *, millimetres: bool) 
     arrow = {"more": " ↑", "less": " ↓", None: ""}[measure.sense]
     title = (
         f"<title>{escape(hint_of(measure))}</title>"
-        # There is no room for how it was measured; the hint says so.
-        f'<text x="0" y="11" font-weight="600">{escape(measure.label.removesuffix(" at nodes"))}'
+        f'<text x="0" y="11" font-weight="600">{escape(_short_label(measure))}'
         f'<tspan font-weight="400" fill-opacity="0.6"> {unit}{arrow}</tspan></text>'
     )
     parts = [title]
@@ -94,3 +98,9 @@ def _drawing(measure: Measure, columns: Sequence[Column], *, millimetres: bool) 
             f"{value_text(measure, value, size)}</text>"
         )
     return "".join(parts)
+
+
+def _short_label(measure: Measure) -> str:
+    """Return the label without how it was measured, which only the hint has room to say."""
+    label = measure.label.removesuffix(" at nodes")
+    return label.removesuffix(" at home") if measure.name in LOADS else label

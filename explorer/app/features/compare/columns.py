@@ -57,6 +57,10 @@ class Column:
         value = None if self.measured is None else self.measured[measure.name]
         return PERCENT * value if value is not None and measure.unit == "share" else value
 
+    def has(self, measure: Measure) -> bool:
+        """Return whether the design has what a measure needs, such as a load."""
+        return self.measured is not None and measure.name in self.measured.values
+
     def value(self, measure: Measure) -> float | None:
         """Return a value in the unit of the comparison; None if it is unknown."""
         value = self.own_value(measure)

@@ -42,17 +42,12 @@ def table(columns: Sequence[Column], *, millimetres: bool) -> str:
     rows = "".join(
         _row(measure, columns, millimetres=millimetres)
         for measure in measures_in("compare").values()
-        if not measure.needs or any(_has(column, measure) for column in columns)
+        if not measure.needs or any(column.has(measure) for column in columns)
     )
     return (
         f'<table class="ex-compare"><tr><td class="ex-head">{progress(columns)}</td>{head}</tr>'
         f"{rows}</table>"
     )
-
-
-def _has(column: Column, measure: Measure) -> bool:
-    """Return whether a design has what a measure needs, such as a load."""
-    return column.measured is not None and measure.name in column.measured.values
 
 
 def progress(columns: Sequence[Column]) -> str:

@@ -34,8 +34,8 @@ OBJECTIVES: dict[str, ObjectiveName] = {
     "shortest legs for a volume": "smallest-reach",
     "largest volume for a leg length": "largest-volume",
     "largest worst margin over a box": "largest-margin",
-    "smallest load on the parts over a box": "smallest-load",
-    "smallest worst error over a box": "smallest-error",
+    "smallest load over a box": "smallest-load",
+    "smallest error over a box": "smallest-error",
 }
 FREE = {
     **{name: f"Let {name} change." for name in VARIABLES},
@@ -134,7 +134,10 @@ class OptimisePanel:
             At("optimisation.request.error", action=SetRequest),
             least=0.0,
             step=STEP,
-            visible=lambda state: any(state.design.actuators.error_mm),
+            # A demand that another design left behind can be taken back.
+            visible=lambda state: (
+                any(state.design.actuators.error_mm) or state.optimisation.request.error > 0.0
+            ),
         )
         controls.number(
             f"{_label('box_tilt')} (°)",

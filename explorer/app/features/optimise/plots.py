@@ -17,6 +17,7 @@ from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.charts import BLUE, FONT, ORANGE, add_chart, line
 from explorer.app.widgets.colours import css
 from explorer.app.widgets.markup import format_number
+from explorer.measures.catalogue import CATALOGUE
 from explorer.optimise import curves
 from explorer.optimise.outcome import Iterate
 from explorer.optimise.problem import Problem
@@ -93,7 +94,8 @@ def _name(problem: Problem, last: Iterate, curve: curves.Curve) -> str:
         value = format_number(last.objective, 2, size=1.0)
         return f"log10 of F = |1 − V / V′|; F = {value}"
     name = curves.CALLED[problem.objective].capitalize()
-    return f"{name} (units): {format_number(last.objective, 6)}"
+    unit = CATALOGUE[curves.GOALS[problem.objective]].unit_in("units")
+    return f"{name}{f' ({unit})' if unit else ''}: {format_number(last.objective, 6)}"
 
 
 def data_of(curve: Curve) -> tuple[NDArray[np.float64], ...]:

@@ -11,6 +11,7 @@ import numpy as np
 from explorer.app.state.optimisation import PLACE, OptimisationRequest
 from explorer.app.state.state import State
 from explorer.errors import ExplorerError
+from explorer.measures.case import Case
 from explorer.measures.size import longest_leg
 from explorer.mechanism.design import LENGTHS, VARIABLES, Design, Swing
 from explorer.mechanism.home import home_pose
@@ -25,6 +26,9 @@ from explorer.optimise.refutation.lifting import BOX_LIMIT, MAXIMA, SWING_LIMIT,
 from explorer.optimise.refutation.refutation import Refutation, paper_box, refutations
 from explorer.workspace.limits.constraints import Never, constraints
 from explorer.workspace.slices.volume import workspace_volume
+
+NO_LOAD, NO_ERRORS = "no load", "no errors"
+"""What a design may lack for the demands; they stand for the limit of a refusal."""
 
 # Default volume to match, as a multiple of the present volume.
 MORE = 1.1
@@ -108,8 +112,13 @@ def _refuted(design: Design, base: Design, request: OptimisationRequest) -> tupl
 
 
 def _limit_against_problem(design: Design, request: OptimisationRequest) -> str:
-    """Return the limit because of which values make no problem, "" if it is none."""
-    limits = design.limits
+    """Return the limit or lack because of which values make no problem, "" if it is none."""
+    limits, case = design.limits, Case(design)
+    needs_load = request.held or request.objective == "smallest-load"
+    if needs_load and not (case.is_loaded and case.is_limited):
+        return NO_LOAD
+    if (request.error or request.objective == "smallest-error") and not case.has_errors:
+        return NO_ERRORS
     if limits.swing != Swing():
         return SWING_LIMIT
     has_fixed = any(getattr(limits, name)[1] is not None for name in LENGTHS)

@@ -21,7 +21,13 @@ from explorer.app.features.optimise.buttons import (
     button,
 )
 from explorer.app.features.optimise.limits import limits_table
-from explorer.app.features.optimise.problem import box_on_offer, liftable, refuted
+from explorer.app.features.optimise.problem import (
+    NO_ERRORS,
+    NO_LOAD,
+    box_on_offer,
+    liftable,
+    refuted,
+)
 from explorer.app.state.optimisation import SearchResult
 from explorer.app.state.state import Run, State
 from explorer.app.widgets.markup import (
@@ -56,8 +62,13 @@ TITLES = {
     "stalled": "Stalled",
     "cancelled": "Cancelled: the best so far",
 }
+# What a design lacks for a problem, and where to change it.
+LACKING = {
+    NO_LOAD: "payload and limits in the tab Machine",
+    NO_ERRORS: "the errors of the actuators in the design file",
+}
 # Limits of refusals without a problem that could be searched.
-NO_PROBLEM = ("", SWING_LIMIT, MAXIMA)
+NO_PROBLEM = ("", SWING_LIMIT, MAXIMA, *LACKING)
 # Significant digits of the larger of two compared numbers.
 DIGITS = 6
 
@@ -184,7 +195,8 @@ def refused_words(refusals: Sequence[Refutation], limits: Sequence[str] = ()) ->
     """
     body = " ".join(sentence(refusal.message) for refusal in refusals)
     if any(refusal.limit not in limits for refusal in refusals):
-        body += " Change the demands, or the limits in the tab Design."
+        lacking = next((refusal.limit for refusal in refusals if refusal.limit in LACKING), "")
+        body += f" Change the demands, or {LACKING.get(lacking, 'the limits in the tab Design')}."
     is_problem = not any(refusal.limit in NO_PROBLEM for refusal in refusals)
     title = "No design can keep these demands" if is_problem else "This cannot be optimised"
     return alert(title, body)

@@ -103,8 +103,15 @@ def parallel(plotted: PlotRows, revision: int, *, dark: bool) -> Figure:
         "uirevision": revision,
     }
     # Titles have their middle above their axes; a scroll bar may cover the edge of the plot.
-    right = SCROLL_BAR + math.ceil(0.5 * CHARACTER * len(short_title_of(plotted.axes[-1])))
-    margin = {"l": 34, "r": max(44, right), "t": 64 if is_tilted else 34, "b": 12}
+    left, right = (
+        math.ceil(0.5 * CHARACTER * len(short_title_of(plotted.axes[end]))) for end in (0, -1)
+    )
+    margin = {
+        "l": max(34, left),
+        "r": max(44, SCROLL_BAR + right),
+        "t": 64 if is_tilted else 40,
+        "b": 12,
+    }
     layout = _layout(plotted, "parallel", margin, dark=dark)
     # Lines carry no data that could name their designs.
     layout["meta"]["designs"] = plotted.results.columns["index"][plotted.lines].tolist()
