@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 from explorer.measures.case import Case
@@ -61,6 +61,7 @@ class Kind:
         needs: What it needs of the machine.
         title: As in `Measure`, without the site; the label if empty.
         power, unit, sense, names: As in `Measure`.
+        gradient: Derivatives of the statics at a site, as in `Measure`.
         in_report: Whether the report lists it among its headlines, rather than in a table.
     """
 
@@ -74,6 +75,7 @@ class Kind:
     unit: Unit = ""
     sense: Sense | None = "less"
     names: tuple[str, ...] = ()
+    gradient: Callable[[BoxStatics], Mapping[str, float]] | None = None
     in_report: bool = True
 
 
@@ -87,6 +89,7 @@ KINDS = (
         ("is_loaded", "is_limited"),
         title="largest share of a limit",
         unit="share",
+        gradient=lambda statics: statics.share_gradient,
     ),
     Kind(
         "worst_actuator",
@@ -115,6 +118,7 @@ KINDS = (
         lambda statics: statics.largest_bending,
         ("is_loaded",),
         unit="N m",
+        gradient=lambda statics: statics.bending_gradient,
         in_report=False,
     ),
     Kind(
@@ -124,6 +128,7 @@ KINDS = (
         lambda statics: statics.worst_error,
         ("has_errors",),
         power=1,
+        gradient=lambda statics: statics.error_gradient,
     ),
     Kind(
         "softest_compliance",
@@ -168,6 +173,12 @@ def _measure(kind: Kind, site: Site) -> Measure:
         where = "the required box has singular positions" if site.needs else "home is singular"
         return f"{where}, where forces and errors are infinite"
 
+    slopes = kind.gradient
+
+    def gradient(case: Case) -> Mapping[str, float]:
+        statics = site.of(case)
+        return {} if statics is None or slopes is None else slopes(statics)
+
     return Measure(
         f"{site.prefix}{kind.name}",
         f"{kind.label} {site.label}",
@@ -179,6 +190,7 @@ def _measure(kind: Kind, site: Site) -> Measure:
         sense=kind.sense,
         is_whole=bool(kind.names),
         names=kind.names,
+        gradient=None if slopes is None else gradient,
         needs=(*site.needs, *kind.needs),
         reason=reason,
         places=site.places if kind.in_report else site.places - REPORT,

@@ -7,6 +7,7 @@ among its nodes. Where a margin changes its sign within the box, all of them are
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -21,7 +22,15 @@ from explorer.numerics.arrays import FloatArray
 from explorer.statics.accuracy import actuator_errors, worst_error
 from explorer.statics.compliance import compliance, principal_compliances, stiffness_of
 from explorer.statics.forces import STRUT_ROWS
-from explorer.statics.reactions import Reactions, largest_payload, limit_shares, reactions
+from explorer.statics.load_slopes import BENDING, error_slopes, share_slopes
+from explorer.statics.reactions import (
+    Reactions,
+    largest_payload,
+    limit_shares,
+    part_limits,
+    reactions,
+)
+from explorer.statics.slopes import PARAMETERS, twist_slopes
 from explorer.statics.weights import design_weights
 
 BOX_NODES = 9
@@ -119,3 +128,39 @@ class BoxStatics:
         found = compliance(self.design, self.positions, self.rotation, *stiffness, tool)
         softest = principal_compliances(found).displacement.max()
         return self.design.unit_mm * float(softest)
+
+    @property
+    def share_gradient(self) -> Mapping[str, float]:
+        """Derivatives of the largest share by design variables, and by yaw in radians."""
+        return self._largest_slopes(part_limits(self.design))
+
+    @property
+    def bending_gradient(self) -> Mapping[str, float]:
+        """Derivatives of the largest bending moment, as those of the largest share."""
+        limits = np.full((2, 10), np.inf)
+        limits[:, BENDING] = 1e3 / self.design.unit_mm
+        return self._largest_slopes(limits)
+
+    @property
+    def error_gradient(self) -> Mapping[str, float]:
+        """Derivatives of the worst displacement, as those of the largest share."""
+        if not self.is_regular:
+            return {}
+        worst = self.positions[[self.errors.argmax()]]
+        slopes = twist_slopes(self.design, worst, self.rotation)
+        return _by_name(error_slopes(self.design, slopes)[1][0])
+
+    def _largest_slopes(self, limits: FloatArray) -> Mapping[str, float]:
+        """Return the derivatives of the largest share of limits (2, 10); {} if it is infinite."""
+        if not self.is_regular:
+            return {}
+        slopes = twist_slopes(self.design, self.positions, self.rotation)
+        parts = np.divmod(np.arange(10 * len(self.positions)), 10)
+        shares, by = share_slopes(self.design, self.rotation, slopes, parts, limits)
+        return _by_name(by[shares.argmax()])
+
+
+def _by_name(slopes: FloatArray) -> Mapping[str, float]:
+    """Return derivatives by `PARAMETERS`, shape (10,), by name, without those by position."""
+    named = dict(zip(PARAMETERS, slopes.tolist(), strict=True))
+    return {name: value for name, value in named.items() if name not in "xyz"}

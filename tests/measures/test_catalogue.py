@@ -208,7 +208,7 @@ def test_gradients_of_measures_equal_finite_differences(design: Design) -> None:
     reach = 1.2 * design.reach
     limits = dict.fromkeys(LENGTHS, (0.0, reach))
     for measure in CATALOGUE.values():
-        if measure.gradient is None:
+        if measure.gradient is None or measure.needs:
             continue
         held = design if measure.name == "longest_leg" else limited(design, **limits)
         held = msgspec.structs.replace(held, home=home_pose(held))

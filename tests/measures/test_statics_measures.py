@@ -7,6 +7,7 @@ import math
 import msgspec
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from explorer import (
     PRESETS,
@@ -25,6 +26,7 @@ from explorer import (
 from explorer.measures.case import Case
 from explorer.measures.catalogue import CATALOGUE, measures_in
 from explorer.measures.measurements import measure_design, reason_for_missing
+from explorer.mechanism.design import VARIABLES
 from explorer.statics.weights import design_weights
 
 OPTIMAL = PRESETS["paper-optimal"]
@@ -113,3 +115,47 @@ def test_measures_of_statics_are_of_the_given_orientation() -> None:
 def test_measures_of_statics_name_their_units() -> None:
     units = [CATALOGUE[name].unit_in("mm") for name in NAMES]
     assert units == ["", "", "kg", "N m", "mm", "mm/N"]
+
+
+@pytest.mark.parametrize("prefix", ["home_", ""])
+@pytest.mark.parametrize("seed", range(6))
+def test_gradients_of_statics_match_central_differences(seed: int, prefix: str) -> None:
+    rng = np.random.default_rng(seed)
+    force = float(rng.uniform(0.0, 20.0)) if seed % 2 else 0.0
+    design = msgspec.structs.replace(
+        MACHINE.with_variables((MACHINE.variables + rng.uniform(-0.5, 0.5, 6)).tolist()),
+        payload=msgspec.structs.replace(MACHINE.payload, force_n=force),
+        guide=Guide(moment_nm=float(rng.uniform(1.0, 30.0))),
+        gravity=tuple(rng.normal(size=3).tolist()),
+    )
+    home = Pose.of_yaw_pitch_roll((10.0, 5.0, 9.0), (-73.0, 4.0, -6.0))
+    step = 1e-6
+
+    def value(name: str, changed: Design, yaw: float = 0.0) -> float:
+        r = Rotation.from_rotvec([0.0, 0.0, yaw]).as_matrix() @ home.rotation
+        at = msgspec.structs.replace(changed, home=Pose.of(home.position, r))
+        return CATALOGUE[name].function(Case(at, box=BOX))
+
+    for kind in ("load_share", "largest_bending", "worst_error"):
+        name = f"{prefix}{kind}"
+        gradient = CATALOGUE[name].gradient
+        assert gradient is not None
+        found = gradient(Case(msgspec.structs.replace(design, home=home), box=BOX))
+        assert set(found) == {*VARIABLES, "yaw"}
+        size = max(map(abs, found.values()))
+        assert size > 0.0
+        for parameter, own in zip(VARIABLES, design.variables, strict=True):
+            ends = [design.with_variable(parameter, own + side * step) for side in (-1.0, 1.0)]
+            low, high = (value(name, end) for end in ends)
+            expected = (high - low) / (2.0 * step)
+            assert found[parameter] == pytest.approx(expected, abs=1e-5 * size), parameter
+        low, high = (value(name, design, side * step) for side in (-1.0, 1.0))
+        assert found["yaw"] == pytest.approx((high - low) / (2.0 * step), abs=1e-5 * size)
+
+
+def test_gradients_of_statics_of_a_singular_box_are_unknown() -> None:
+    box = ((9.0, 4.0, -1.0), (11.0, 6.0, 1.0))
+    for name in ("load_share", "largest_bending", "worst_error"):
+        gradient = CATALOGUE[name].gradient
+        assert gradient is not None
+        assert gradient(Case(MACHINE, box=box)) == {}

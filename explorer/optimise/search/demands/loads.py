@@ -15,11 +15,10 @@ from explorer.numerics.arrays import BoolArray, FloatArray, IntArray
 from explorer.optimise.problem import SHIFTS
 from explorer.optimise.search.demands.geometry import Measured
 from explorer.optimise.search.state import State
-from explorer.statics.accuracy import actuator_errors
 from explorer.statics.equilibrium import twists_of_actuators
-from explorer.statics.forces import GUIDE_ROWS, STRUT_ROWS
+from explorer.statics.load_slopes import ACTUATOR_OF, BENDING, error_slopes, share_slopes
 from explorer.statics.reactions import part_limits
-from explorer.statics.slopes import PARAMETERS, TwistSlopes, twist_slopes
+from explorer.statics.slopes import twist_slopes
 from explorer.statics.weights import payload_wrench
 from explorer.workspace.limits.constraints import YAW
 
@@ -29,9 +28,6 @@ CHAIN = (*VARIABLES, YAW, *SHIFTS)
 PARTS = (*JOINTS, "bending 2", "bending 3", "guide force 2", "guide force 3")
 """The loaded parts; the moment on the guide is the bending of the strut."""
 
-# Parts by the actuator whose force loads them.
-ACTUATOR_OF = np.array([*range(6), *GUIDE_ROWS, *STRUT_ROWS])
-BENDING = slice(6, 8)
 EIGHTHS = 8
 
 
@@ -83,24 +79,22 @@ class LoadDemand:
     def largest_share(self, state: State) -> float:
         """Return the largest share of a limit at the nodes."""
         box = _statics_of(state)
-        return float(self._shares(state, _twists(box), box)[0].max())
+        return float(self._shares(state, _twists(box), box).max())
 
     def measure(self, state: State) -> Measured:
         """Return what the largest shares of each part leave, see `spare_of`."""
         box = _statics_of(state)
-        shares = self._shares(state, _twists(box), box)[0]
+        shares = self._shares(state, _twists(box), box)
         parts = np.flatnonzero(self.counts)
         worst = _worst_nodes(box, shares[:, parts]).T.ravel()
         part = np.repeat(parts, EIGHTHS)
         nodes, row = np.unique(worst, return_inverse=True)
         slopes = twist_slopes(state.design, box.positions[nodes], state.rotation)
-        share, gradient = self._gradients(state, slopes, row, part)
-        return Measured(spare_of(share), _spare_slope(share)[:, None] * gradient)
+        share, by = share_slopes(state.design, state.rotation, slopes, (row, part), self.limits)
+        return Measured(spare_of(share), _spare_slope(share)[:, None] * by @ state.rows(CHAIN))
 
-    def _shares(
-        self, state: State, twists: FloatArray, box: BoxStatics
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the shares of the limits (n, 10), the forces (n, 6), and their spread (n, 6)."""
+    def _shares(self, state: State, twists: FloatArray, box: BoxStatics) -> FloatArray:
+        """Return the shares of the limits at the nodes, shape (n, 10)."""
         design = state.design
         forces = -np.einsum("nki,k->ni", twists, payload_wrench(design, state.rotation))
         spread = design.payload.force_n * np.linalg.norm(twists[:, :3], axis=1)
@@ -109,37 +103,7 @@ class LoadDemand:
         lever[:, BENDING] = box.strut_lengths
         up = (forces + spread)[:, ACTUATOR_OF] * lever / highs
         down = (spread - forces)[:, ACTUATOR_OF] * lever / lows
-        return np.maximum(up, down), forces, spread
-
-    def _gradients(
-        self, state: State, slopes: TwistSlopes, row: IntArray, part: IntArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return the shares of parts at nodes, shape (k,), and their derivatives, (k, n)."""
-        design, joint = state.design, ACTUATOR_OF[part]
-        wrench = payload_wrench(design, state.rotation)
-        # A turn about z turns the arm of the weight with the platform, not the weight.
-        arm = state.rotation @ (np.array(design.payload.centre) - design.tool.position)
-        turned = np.zeros(6)
-        turned[3:] = np.cross(np.cross([0.0, 0.0, 1.0], arm), wrench[:3])
-        twist, by = slopes.twists[row, :, joint], slopes.by[row, :, :, joint]
-        force, force_by = -twist @ wrench, -by @ wrench
-        force_by[:, PARAMETERS.index("yaw")] -= twist @ turned
-        speed = np.linalg.norm(twist[:, :3], axis=1)
-        along = twist[:, :3] / np.maximum(speed, 1e-300)[:, None]
-        spread = design.payload.force_n * speed
-        spread_by = design.payload.force_n * np.einsum("ki,kqi->kq", along, by[..., :3])
-        highs, lows = self.limits[0, part], self.limits[1, part]
-        is_up = (force + spread) / highs >= (spread - force) / lows
-        sign = np.where(is_up, 1.0, -1.0)
-        limit = np.asarray(np.where(is_up, highs, lows), dtype=np.float64)
-        value = sign * force + spread
-        value_by = sign[:, None] * force_by + spread_by
-        bends = (part >= BENDING.start) & (part < BENDING.stop)
-        strut = np.where(bends, part - BENDING.start, 0)
-        lever = np.where(bends, slopes.struts[row, strut], 1.0)
-        lever_by = np.where(bends[:, None], slopes.struts_by[row, :, strut], 0.0)
-        value_by = value_by * lever[:, None] + value[:, None] * lever_by
-        return value * lever / limit, (value_by / limit[:, None]) @ state.rows(CHAIN)
+        return np.asarray(np.maximum(up, down))
 
 
 class ErrorDemand:
@@ -161,14 +125,7 @@ class ErrorDemand:
         box = _statics_of(state)
         worst = _worst_nodes(box, box.errors[:, None])[:, 0]
         slopes = twist_slopes(state.design, box.positions[worst], state.rotation)
-        errors = actuator_errors(state.design)
-        signed = errors * _corners()
-        moved = np.einsum("kji,ci->kcj", slopes.twists[:, :3], signed)
-        length = np.linalg.norm(moved, axis=2)
-        corner, row = length.argmax(axis=1), np.arange(EIGHTHS)
-        largest = length[row, corner]
-        along = moved[row, corner] / np.maximum(largest, 1e-300)[:, None]
-        by = np.einsum("kj,kqji,ki->kq", along, slopes.by[:, :, :3], signed[corner])
+        largest, by = error_slopes(state.design, slopes)
         share = largest / self.most
         gradient = by @ state.rows(CHAIN) / self.most
         return Measured(spare_of(share), _spare_slope(share)[:, None] * gradient)
@@ -191,9 +148,3 @@ def _statics_of(state: State) -> BoxStatics:
 def _twists(box: BoxStatics) -> FloatArray:
     design = box.design
     return twists_of_actuators(design, box.positions, box.rotation, design.tool.position)
-
-
-def _corners() -> FloatArray:
-    """Return the signs of the corners of the cube of errors, up to a common one, (32, 6)."""
-    bits = np.arange(32)[:, None] >> np.arange(6) & 1
-    return np.asarray(1.0 - 2.0 * bits, dtype=np.float64)
