@@ -140,8 +140,9 @@ def largest_payload(
 ) -> FloatArray:
     """Return the largest mass at the payload's centre that keeps all limits, shape (...), in kg.
 
-    The payload's force of any direction acts besides. The mass is 0 in a singular pose or if the
-    load alone exceeds a limit, and infinite if there is no limit.
+    The payload's force of any direction acts besides. A load that exceeds a limit alone may be
+    held with a mass. The result is 0 in a singular pose and where no mass keeps all limits, and
+    infinite if there is no limit.
 
     Args:
         design: The manipulator, with its limits and the centre of its payload.
@@ -168,14 +169,14 @@ def largest_payload(
     highs, lows = part_limits(design)
     spread = _spread(design, position, rotation, regular.shape)[..., :10]
     highs, lows = highs - spread, lows - spread
-    largest = np.minimum(
-        _largest_linear(start[..., :8], slope[..., :8], lows[..., :8], highs[..., :8]),
-        np.minimum(
-            _largest_square(start[..., _ACROSS_2], slope[..., _ACROSS_2], highs[..., 8]),
-            _largest_square(start[..., _ACROSS_3], slope[..., _ACROSS_3], highs[..., 9]),
-        ),
-    )
-    return np.where(regular, largest, 0.0)
+    smallest, largest = np.zeros(regular.shape), np.full(regular.shape, np.inf)
+    for least, most in (
+        _linear_range(start[..., :8], slope[..., :8], lows[..., :8], highs[..., :8]),
+        _square_range(start[..., _ACROSS_2], slope[..., _ACROSS_2], highs[..., 8]),
+        _square_range(start[..., _ACROSS_3], slope[..., _ACROSS_3], highs[..., 9]),
+    ):
+        smallest, largest = np.maximum(smallest, least), np.minimum(largest, most)
+    return np.where(regular & (smallest <= largest), largest, 0.0)
 
 
 def _limits(design: Design) -> FloatArray:
@@ -252,22 +253,34 @@ def _joint_forces(
     return np.where(np.isfinite(forces[..., 0, None, None]), out, np.inf)
 
 
-def _largest_linear(
+def _linear_range(
     start: FloatArray, slope: FloatArray, lows: FloatArray, highs: FloatArray
-) -> FloatArray:
-    """Return the largest m ≥ 0 with −lows ≤ start + m slope ≤ highs, shape (...)."""
-    room = np.where(slope > 0.0, highs - start, lows + start)
-    free = (slope == 0.0) | np.isinf(room)
-    largest = np.divide(room, np.abs(slope), out=np.full(room.shape, np.inf), where=~free)
-    is_within = (start <= highs) & (start >= -lows)
-    return np.where(is_within.all(axis=-1), largest.min(axis=-1), 0.0)
+) -> tuple[FloatArray, FloatArray]:
+    """Return the least and the largest m with −lows ≤ start + m slope ≤ highs, shapes (...)."""
+    moves = slope != 0.0
+    every = (start <= highs) & (start >= -lows)
+    ends = np.stack(np.broadcast_arrays(-lows - start, highs - start))
+    # A part that the mass does not load keeps its limits with every mass, or with none.
+    bounds = np.stack([np.where(every, -np.inf, np.inf), np.where(every, np.inf, -np.inf)])
+    np.divide(ends, slope, out=bounds, where=moves)
+    is_possible = lows + highs >= 0.0
+    least = np.where(moves, np.where(is_possible, bounds.min(axis=0), np.inf), bounds[0])
+    most = np.where(moves, np.where(is_possible, bounds.max(axis=0), -np.inf), bounds[1])
+    return least.max(axis=-1), most.min(axis=-1)
 
 
-def _largest_square(start: FloatArray, slope: FloatArray, limit: FloatArray) -> FloatArray:
-    """Return the largest m ≥ 0 with |start + m slope| ≤ limit, of vectors (..., 2), shape (...)."""
+def _square_range(
+    start: FloatArray, slope: FloatArray, limit: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the least and the largest m with |start + m slope| ≤ limit, of vectors (..., 2)."""
     if np.isinf(limit).all():
-        return np.full(start.shape[:-1], np.inf)
+        return np.full(start.shape[:-1], -np.inf), np.full(start.shape[:-1], np.inf)
     a, b, c = dot(slope, slope), dot(start, slope), limit**2 - dot(start, start)
-    root = np.sqrt(np.maximum(b * b + a * c, 0.0))
-    largest = np.divide(root - b, a, out=np.full(a.shape, np.inf), where=a > 0.0)
-    return np.where((c >= 0.0) & (limit >= 0.0), largest, 0.0)
+    every = (c >= 0.0) & (limit >= 0.0)
+    least, most = np.where(every, -np.inf, np.inf), np.where(every, np.inf, -np.inf)
+    square = b * b + a * c
+    crosses = (a > 0.0) & (square >= 0.0) & (limit >= 0.0)
+    root = np.sqrt(np.where(crosses, square, 0.0))
+    np.divide(-b - root, a, out=least, where=crosses)
+    np.divide(root - b, a, out=most, where=crosses)
+    return least, most

@@ -241,8 +241,25 @@ def test_largest_payload_uses_a_limit_up_and_keeps_all() -> None:
             held = reactions(LIMITED, positions[k], rotations[k], load, None, weights)
             assert (limit_shares(LIMITED, held).max() <= 1.0) == kept
     for k in np.flatnonzero(most == 0.0):
-        held = reactions(LIMITED, positions[k], rotations[k], load, None, WEIGHTS)
-        assert limit_shares(LIMITED, held).max() > 1.0
+        for mass in np.linspace(0.0, 40.0, 400).tolist():
+            weights = with_payload(WEIGHTS, Payload(mass, LIMITED.payload.centre))
+            held = reactions(LIMITED, positions[k], rotations[k], load, None, weights)
+            assert limit_shares(LIMITED, held).max() > 1.0
+
+
+def test_a_mass_may_hold_a_load_that_exceeds_a_limit_alone() -> None:
+    home = home_pose(LIMITED)
+    given = LIMITED, home.position, home.rotation
+    alone = limit_shares(LIMITED, reactions(*given, [0.0, 0.0, 1.0, 0.0, 0.0, 0.0])).max()
+    load = [0.0, 0.0, 1.2 / float(alone), 0.0, 0.0, 0.0]
+    assert limit_shares(LIMITED, reactions(*given, load)).max() > 1.0
+    most = float(largest_payload(*given, load))
+    free = float(largest_payload(*given))
+    assert most > free > 0.0
+    for factor, kept in ((1.0 - 1e-9, True), (1.0 + 1e-9, False)):
+        weights = Weights(on_platform=(Payload(most * factor, LIMITED.payload.centre),))
+        held = reactions(*given, load, None, weights)
+        assert (limit_shares(LIMITED, held).max() <= 1.0) == kept
 
 
 def with_payload(weights: Weights, payload: Payload) -> Weights:
