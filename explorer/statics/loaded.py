@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
+import msgspec
 import numpy as np
 
 from explorer.mechanism.design import Design
@@ -13,7 +14,6 @@ from explorer.mechanism.machine import Payload
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.statics.equilibrium import twists_of_actuators
-from explorer.statics.forces import largest_force
 from explorer.statics.reactions import (
     Reactions,
     largest_payload,
@@ -109,14 +109,14 @@ class LoadedPose:
         return float(largest_payload(*given, self.tool, self.own))
 
     @cached_property
-    def largest_force(self) -> float:
-        """The largest force at the tool that the actuators alone hold in every direction, in N.
+    def newton(self) -> WorstForce:
+        """A force of 1 N alone at the tool, in the direction that uses the largest share.
 
-        It is infinite if no actuator has a limit. Neither the load nor weights act besides.
+        Neither load nor payload act besides; the largest force that all parts hold in every
+        direction is 1 / share.
         """
-        most = np.minimum(*self.design.actuators.limits)
-        given = self.design, self.pose.position, self.pose.rotation, most
-        return float(largest_force(*given, self.tool))
+        bare = msgspec.structs.replace(self.design, payload=Payload())
+        return LoadedPose(bare, self.pose, np.zeros(6), None, False, self.tool).worst_force(1.0)
 
     def worst_force(self, force: float) -> WorstForce:
         """Return the direction of an added force at the tool that uses the largest share.

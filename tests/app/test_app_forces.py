@@ -138,10 +138,24 @@ def test_a_part_with_a_limit_and_no_force_uses_none_of_it() -> None:
     state = loaded_state(force=(0.0, 0.0, 0.0), weighed="none")
     assert "Holds the load" in words_of(state)
     text = "".join(tables(loaded(state)))
-    assert (text.count(">0 %<"), text.count("no limit")) == (10, 0)
+    assert (text.count(">0\N{NO-BREAK SPACE}%<"), text.count("no limit")) == (10, 0)
     free = msgspec.structs.replace(LIMITED, guide=Guide(), struts=Struts())
     text = "".join(tables(loaded(loaded_state(free))))
     assert text.count("no limit") == 4
+
+
+def test_the_payloads_force_of_any_direction_is_told_beside_the_forces(
+    server: viser.ViserServer,
+) -> None:
+    design = msgspec.structs.replace(LIMITED, payload=Payload(0.0, (0.0, 0.0, 0.0), 20.0))
+    state = loaded_state(design, force=(0.0, 0.0, 0.0))
+    found = loaded(state)
+    text = "".join(tables(found))
+    assert text.count("±") == 10
+    told = number(re.findall(r"± ([0-9.]+) N<", text)[1])
+    assert told == pytest.approx(found.held.spread[1], rel=1e-2)
+    panel = ForcesPanel(services_for(server, Desk(state).session, buttons=Buttons(server)))
+    assert "20 N in any direction" in contents(panel, Frame(state))
 
 
 def test_in_a_singular_pose_the_page_says_that_forces_are_infinite() -> None:
@@ -150,6 +164,7 @@ def test_in_a_singular_pose_the_page_says_that_forces_are_infinite() -> None:
     text = "".join(tables(loaded(state)))
     assert "∞" in text
     assert "nan" not in text.lower()
+    assert "pushes<" not in text
     assert "worst direction" not in "".join(largest(Frame(state), loaded(state)))
 
 
@@ -316,12 +331,16 @@ def test_a_force_that_is_not_finite_is_refused_in_one_line(force: tuple[float, .
 def test_shares_have_words_and_looks() -> None:
     assert [share_words(each) for each in (None, 0.004, 0.5, 1.234, 1e5, math.inf)] == [
         "no limit",
-        "0 %",
-        "50 %",
-        "123 %",
+        "0\N{NO-BREAK SPACE}%",
+        "50\N{NO-BREAK SPACE}%",
+        "123\N{NO-BREAK SPACE}%",
         "∞",
         "∞",
     ]
+    near = [share_words(each).replace("\N{NO-BREAK SPACE}", " ") for each in (0.9996, 1.0, 1.004)]
+    assert near == ["100.0 %", "100.0 %", "100.4 %"]
+    # What exceeds the limit never reads as the limit.
+    assert share_words(1.0000001) == "above 100.0\N{NO-BREAK SPACE}%"
     assert [share_look(each) for each in (0.5, 0.9, 1.0, 1.001)] == [
         "within",
         "close",

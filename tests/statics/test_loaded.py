@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose
 from explorer import PRESETS, Actuators, Design, Guide, Payload, Struts, Tool, Weights
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import Pose
+from explorer.statics.forces import largest_force
 from explorer.statics.loaded import LoadedPose
 from explorer.statics.reactions import limit_shares, reactions
 
@@ -80,12 +81,30 @@ def test_the_largest_payload_takes_a_part_to_its_limit() -> None:
         assert share == pytest.approx(1.0, rel=1e-9)
 
 
-def test_the_largest_force_takes_an_actuator_to_its_limit_in_its_worst_direction() -> None:
+def test_the_largest_force_takes_a_part_to_its_limit_in_its_worst_direction() -> None:
+    rng = np.random.default_rng(6)
+    for loaded in loaded_poses(limited(), 5):
+        newton = loaded.newton
+        force = 1.0 / newton.share
+        # Neither load nor payload act besides.
+        bare = limited(payload=Payload())
+        for direction in rng.normal(size=(50, 3)):
+            unit = direction / np.linalg.norm(direction)
+            other = LoadedPose(bare, loaded.pose, np.array([*(force * unit), 0.0, 0.0, 0.0]))
+            assert other.share <= 1.0 + 1e-9
+        load = np.array([*(force * newton.direction), 0.0, 0.0, 0.0])
+        there = LoadedPose(bare, loaded.pose, load)
+        assert there.share == pytest.approx(1.0, rel=1e-12)
+        assert there.worst == newton.part
+
+
+def test_actuators_alone_hold_what_the_largest_force_says() -> None:
     actuators = Actuators(push_n=(50, 50, 50, 50, 50, 50))
-    design = limited(payload=Payload(), struts=Struts(), guide=Guide(), actuators=actuators)
+    design = limited(struts=Struts(), guide=Guide(), actuators=actuators)
     for loaded in loaded_poses(design, 5):
-        free = LoadedPose(design, loaded.pose, np.zeros(6))
-        assert free.worst_force(free.largest_force).share == pytest.approx(1.0, rel=1e-12)
+        pose, most = loaded.pose, np.full(6, 50.0)
+        expected = largest_force(design, pose.position, pose.rotation, most, design.tool.position)
+        assert 1.0 / loaded.newton.share == pytest.approx(float(expected), rel=1e-12)
 
 
 def test_the_weight_of_the_payload_can_be_left_out() -> None:
@@ -99,7 +118,8 @@ def test_the_weight_of_the_payload_can_be_left_out() -> None:
 def test_without_limits_no_share_is_used_and_no_direction_is_worst() -> None:
     loaded = LoadedPose(OPTIMAL, HOME, np.array([0.0, 0.0, -10.0, 0.0, 0.0, 0.0]))
     assert loaded.share == 0.0
-    assert np.isinf([loaded.largest_payload, loaded.largest_force]).all()
+    assert np.isinf(loaded.largest_payload)
+    assert loaded.newton.share == 0.0
     worst = loaded.worst_force(10.0)
     assert worst.share == 0.0
     assert np.isnan(worst.direction).all()
@@ -110,7 +130,7 @@ def test_in_a_singular_pose_nothing_holds_a_load() -> None:
     loaded = LoadedPose(limited(), pose, np.array([0.0, 0.0, -10.0, 0.0, 0.0, 0.0]))
     assert not loaded.is_regular
     assert np.isinf(loaded.share)
-    assert (loaded.largest_payload, loaded.largest_force) == (0.0, 0.0)
+    assert (loaded.largest_payload, loaded.newton.share) == (0.0, np.inf)
     worst = loaded.worst_force(10.0)
     assert np.isinf(worst.share)
     assert np.isnan(worst.direction).all()

@@ -44,7 +44,8 @@ from explorer.app.widgets.markup import (
 from explorer.app.widgets.under_way import problem
 from explorer.mechanism.design import JOINTS
 from explorer.mechanism.tool_point import position_of
-from explorer.numerics.number_text import format_column, format_decimals
+from explorer.numerics.arrays import FloatArray
+from explorer.numerics.number_text import drop_rounding, format_column, format_decimals
 from explorer.statics.loaded import LoadedPose
 
 WEIGHED: tuple[Weighed, ...] = get_args(Weighed)
@@ -93,6 +94,7 @@ class ForcesPanel:
                 "guide, and the bending of the struts, in colours of their shares.",
                 "view.forces.shown",
             )
+            self._besides = gui.add_html("", visible=False)
         self._tables = gui.add_html("")
         self._most = gui.add_html("")
         services.buttons.on(GO, self._go)
@@ -114,6 +116,13 @@ class ForcesPanel:
         """Yield the updates that make the panel show the frame."""
         loaded = self._loads.of(frame)
         yield self._top, "content", box(*self._summary(frame, loaded))
+        force = frame.state.design.payload.force_n
+        yield self._besides, "visible", force > 0.0
+        yield (
+            self._besides,
+            "content",
+            note(f"Besides, the payload's force of {newtons(force)} in any direction acts."),
+        )
         yield self._tables, "content", box(*tables(loaded))
         yield self._most, "content", box(*largest(frame, loaded))
         yield from self._controls.updates(frame)
@@ -139,7 +148,7 @@ class ForcesPanel:
             return dim("searching the nearest position that holds it …")
         pose = feed.drawing.pose
         if pose is None:
-            return "No position in this orientation and mode holds it."
+            return "None found in this orientation and mode that holds it."
         design, at = frame.state.design, frame.state.view.at
         there = position_of(design, pose, at)
         apart = design.unit_mm * math.dist(pose.position, frame.state.pose.position)
@@ -167,7 +176,7 @@ class ForcesPanel:
 def verdict(loaded: LoadedPose) -> Iterator[str]:
     """Yield whether the load is held, and which part is nearest to its limit, as HTML."""
     if not loaded.is_regular:
-        yield status("Nothing holds a load here", "beyond")
+        yield status("Not every load is held here", "beyond")
         yield '<div class="ex-beyond">The pose is singular: the forces are infinite.</div>'
         return
     if not loaded.limited.any():
@@ -187,38 +196,49 @@ def verdict(loaded: LoadedPose) -> Iterator[str]:
 def tables(loaded: LoadedPose) -> Iterator[str]:
     """Yield the forces of the actuators, the struts and the guide beside their limits, as HTML."""
     held, shares = loaded.held, shares_of(loaded)
-    forces = format_column(held.actuators.tolist(), DIGITS, infinite="∞")
+    spread = np.where(np.isfinite(held.spread), held.spread, 0.0)
+    values = held.actuators.tolist()
+    forces = _column(held.actuators, spread[:6])
+    size = max((abs(value) for value in values if math.isfinite(value)), default=0.0)
     rows = [
-        row(
-            dim(name),
-            f"{force} N",
-            dim(SENSES[value > 0.0] if value else ""),
-            *_share_cells(share),
-        )
-        for name, force, value, share in zip(
-            JOINTS, forces, held.actuators.tolist(), shares[:6], strict=True
-        )
+        row(dim(name), f"{force} N", dim(_sense(drop_rounding(value, size))), *_share_cells(share))
+        for name, force, value, share in zip(JOINTS, forces, values, shares[:6], strict=True)
     ]
     yield caption("Forces of the actuators", "A positive force pushes the value of its joint up.")
     yield f'<div class="ex-shares">{table(rows)}</div>'
     metres = 1e-3 * loaded.design.unit_mm
-    bending = [*(metres * held.bending).tolist(), *(metres * held.guide_moment).tolist()]
-    moments = format_column(bending, DIGITS, infinite="∞")
-    across = format_column(held.guide_force.tolist(), DIGITS, infinite="∞")
+    moments = _column(metres * held.bending, metres * spread[6:8])
+    across = _column(held.guide_force, spread[8:10])
     parts: list[str] = []
     for index, leg in enumerate((2, 3)):
+        bending = larger(shares[6 + index], shares[10 + index])
         parts += [
-            row(dim(f"strut {leg}"), f"{moments[index]} N m", dim("bends"),
-                *_share_cells(larger(shares[6 + index], shares[10 + index]))),
+            row(dim(f"strut {leg}"), f"{moments[index]} N m", dim("bends"), *_share_cells(bending)),
             row(dim(f"carriage {leg}"), f"{across[index]} N", dim("on guide"),
                 *_share_cells(shares[8 + index])),
         ]  # fmt: skip
     yield caption(
         "Struts and guide",
         "The bending moment of a strut at its carriage, which the guide takes, and the force of "
-        "the carriage across the guide.",
+        "the carriage across the guide. A share of a moment is that of the smaller limit.",
     )
     yield f'<div class="ex-shares">{table(parts)}</div>'
+
+
+def _column(values: FloatArray, spread: FloatArray) -> list[str]:
+    """Return forces or moments as text, each with what the payload's force may add, if any."""
+    size = float(np.abs(values[np.isfinite(values)]).max(initial=0.0)) + float(spread.max())
+    texts = format_column(values.tolist(), DIGITS, infinite="∞", size=size)
+    if not spread.any():
+        return texts
+    more = format_column(spread.tolist(), 3, size=size)
+    return [f"{text} ± {each}" for text, each in zip(texts, more, strict=True)]
+
+
+def _sense(force: float) -> str:
+    if not math.isfinite(force) or force == 0.0:
+        return ""
+    return SENSES[force > 0.0]
 
 
 def _share_cells(share: Share) -> tuple[str, str]:
@@ -231,7 +251,7 @@ def _share_cells(share: Share) -> tuple[str, str]:
 def largest(frame: Frame, loaded: LoadedPose) -> Iterator[str]:
     """Yield the largest payload and force, and the worst direction of the force, as HTML."""
     yield caption("Most that is held here")
-    payload = loaded.largest_payload
+    payload, newton = loaded.largest_payload, loaded.newton
     rows = [
         row(
             dim("payload"),
@@ -241,8 +261,11 @@ def largest(frame: Frame, loaded: LoadedPose) -> Iterator[str]:
         ),
         row(
             dim("force in every direction"),
-            newtons(loaded.largest_force) if math.isfinite(loaded.largest_force) else "no limit",
-            hint="Largest force at the tool, alone, that the actuators hold in every direction",
+            f"{newtons(1.0 / newton.share)}, then {dim(PARTS[newton.part])}"
+            if newton.share
+            else "no limit",
+            hint="Largest force at the tool, alone, that all parts hold in every direction, and "
+            "the part that gives way first",
         ),
     ]
     yield table(rows)

@@ -1,7 +1,8 @@
 """The load as an arrow to drag, the forces of the legs, and the bending of the struts.
 
-The arrow of the load is as long as its force asks by a fixed scale. Those of the reactions become
-ever shorter beside theirs, since they have no bound near singular poses; a label tells each force.
+The arrow of the load is as long as its force asks by a fixed scale. Those of weights and reactions
+become ever shorter beside theirs, since they have no bound near singular poses; a label tells each
+force.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import numpy as np
 import viser
 
 from explorer.app.features.feature import Services
-from explorer.app.features.forces.actions import SetForce
+from explorer.app.features.forces.actions import SetForce, fitting_scale
 from explorer.app.features.forces.arrows import ForceArrows
 from explorer.app.features.forces.loads import Loads
 from explorer.app.features.forces.words import (
@@ -36,12 +37,12 @@ from explorer.mechanism.machine import STANDARD_GRAVITY
 from explorer.mechanism.pose import Triple
 from explorer.mechanism.tool_point import position_of
 from explorer.numerics.arrays import FloatArray
-from explorer.numerics.number_text import format_number
+from explorer.numerics.number_text import drop_rounding, format_number
 from explorer.statics.loaded import LoadedPose
 
 LOAD: Rgb = (150, 40, 160)
-# Largest lengths of the arrows of load and reactions and of a bending moment, over the reach.
-LONGEST_LOAD, LONGEST_REACTION, LONGEST_BENDING = 1.2, 0.4, 0.3
+# Largest lengths of the arrows of weight and reactions and of a bending moment, over the reach.
+LONGEST_REACTION, LONGEST_BENDING = 0.4, 0.3
 # Moment over the force of the scale and the reach at which a drawn moment is half its largest.
 HALF_MOMENT = 0.25
 SLEEVE_RADIUS, SLEEVE_OPACITY = 0.3, 0.45
@@ -98,9 +99,14 @@ class ForcesScene(ScenePart):
             yield from self._draw_bending(placed, loaded, index, leg)
         middles = 0.5 * (feet + tips)
         places = (middles[0], feet[1], middles[1], feet[2], middles[2], middles[3])
+        size = float(np.abs(loaded.held.actuators).max())
         for index, joint in enumerate(JOINTS):
-            force, label = float(loaded.held.actuators[index]), self._labels[joint]
-            yield label, "text", f"{joint} {newtons(force, 3)}{_told(shares[index])}"
+            label = self._labels[joint]
+            force, more = float(loaded.held.actuators[index]), float(loaded.held.spread[index])
+            words = newtons(drop_rounding(force, size), 3) + (
+                f" ± {newtons(more, 2)}" if more else ""
+            )
+            yield label, "text", f"{joint} {words}{_told(shares[index])}"
             yield label, "position", tuple(places[index].tolist())
 
     def corners(self, placed: Placed) -> FloatArray:
@@ -122,7 +128,7 @@ class ForcesScene(ScenePart):
         if weight > 0.0:
             centre = placed.frame.snapshot.rotation @ np.array(state.design.payload.centre)
             tails[1] = p["b4"] + placed.scale * centre
-            vectors[1] = length_of(placed, weight) * np.array(state.design.gravity)
+            vectors[1] = reaction_vectors(placed, weight * np.array([state.design.gravity]))[0]
             yield self._labels["weight"], "text", f"weight {newtons(weight, 3)}"
             yield self._labels["weight"], "position", tuple((tails[1] + vectors[1]).tolist())
         if loaded.is_regular:
@@ -144,8 +150,9 @@ class ForcesScene(ScenePart):
         """Yield the updates that draw the bending moment of strut 2 or 3 beside it."""
         design = placed.frame.state.design
         foot, tip = _feet(placed)[leg - 1], placed.points[f"b{leg}"]
-        moment = float(loaded.held.bending[index])
-        half = HALF_MOMENT * placed.frame.state.view.forces.scale * design.reach
+        # With what the payload's force of any direction adds.
+        moment = float(loaded.held.bending[index] + loaded.held.spread[6 + index])
+        half = HALF_MOMENT * scale_of(placed) * design.reach
         height = LONGEST_BENDING * placed.reach * moment / (moment + half)
         towards = math.copysign(1.0, float(loaded.held.actuators[1 + 2 * index]))
         top = foot + np.array([towards * height, 0.0, 0.0])
@@ -162,7 +169,7 @@ class ForcesScene(ScenePart):
         yield self._ordinates[index], "points", lines.astype(np.float32)
         yield self._ordinates[index], "colors", of_one_colour(colour, ORDINATES + 1)
         label = self._labels[f"strut {leg}"]
-        words = f"{format_number(moment * 1e-3 * design.unit_mm, 3)} N m"
+        words = f"strut {leg} {format_number(moment * 1e-3 * design.unit_mm, 3)} N m"
         yield label, "text", words + _told(share)
         yield label, "position", tuple(top.tolist())
 
@@ -235,11 +242,6 @@ def load_tip(placed: Placed) -> FloatArray:
     return tool_point(placed) + placed.reach / forces.scale * np.array(forces.force)
 
 
-def length_of(placed: Placed, force: float) -> float:
-    """Return the length of the arrow of a weight in the scene, by the scale of the load."""
-    return placed.reach * min(force / placed.frame.state.view.forces.scale, LONGEST_LOAD)
-
-
 def weight_of(loaded: LoadedPose) -> float:
     """Return the weight of the payload, in N, that counts."""
     return loaded.design.payload.mass_kg * STANDARD_GRAVITY if loaded.weighs_payload else 0.0
@@ -249,7 +251,17 @@ def reaction_vectors(placed: Placed, forces: FloatArray) -> FloatArray:
     """Return the arrows of forces (n, 3) in N, shape (n, 3), none longer than the largest."""
     sizes = np.linalg.norm(forces, axis=1, keepdims=True)
     longest = LONGEST_REACTION * placed.reach
-    return np.asarray(longest * forces / (sizes + placed.frame.state.view.forces.scale))
+    return np.asarray(longest * forces / (sizes + scale_of(placed)))
+
+
+def scale_of(placed: Placed) -> float:
+    """Return the force, in N, whose arrow is half as long as the longest."""
+    state = placed.frame.state
+    if has_force(placed):
+        return state.view.forces.scale
+    # Without a force the payload's weight tells how large forces are.
+    weight = state.design.payload.mass_kg * STANDARD_GRAVITY
+    return fitting_scale(weight, state.view.forces.scale)
 
 
 def _told(share: Share) -> str:

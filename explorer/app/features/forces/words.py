@@ -22,8 +22,8 @@ PARTS = (
 
 CLOSE = SHARES[-2]
 """Share of a limit from which a load is close to it."""
-# Largest share that is told as a number.
-MOST = 1e4
+# Largest share that is told as a number, and distance from the limit up to which with a decimal.
+MOST, NEAR = 1e4, 0.005
 
 
 Share = float | None
@@ -42,10 +42,14 @@ def larger(*shares: Share) -> Share:
 
 
 def share_words(share: Share) -> str:
-    """Return a share of a limit in words."""
+    """Return a share of a limit in words, which never tell the limit itself for one beyond it."""
     if share is None:
         return "no limit"
-    return f"{format_decimals(100.0 * share, 0)} %" if share < MOST else "∞"
+    if not share < MOST:
+        return "∞"
+    is_near = abs(share - 1.0) < NEAR
+    words = f"{format_decimals(100.0 * share, 1 if is_near else 0)}\N{NO-BREAK SPACE}%"
+    return f"above {words}" if share > 1.0 and words.startswith("100.0") else words
 
 
 def share_look(share: float) -> Look:

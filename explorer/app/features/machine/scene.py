@@ -25,7 +25,7 @@ AXIS_LENGTH, AXIS_RADIUS, THICKNESS = 0.9, 0.035, 2.5
 AXIS_COLOURS: tuple[Rgb, ...] = ((255, 32, 96), (32, 176, 96), (32, 128, 255))
 BRASS: Rgb = (190, 154, 92)
 # Radius of the ball of one kilogram in scene units, and those of the smallest and the largest ball.
-KILOGRAM_RADIUS, LEAST_RADIUS, LARGEST_RADIUS = 0.5, 0.12, 2.0
+KILOGRAM_RADIUS, LEAST_RADIUS, LARGEST_RADIUS = 0.4, 0.12, 0.9
 BALL_OPACITY = 0.6
 
 
