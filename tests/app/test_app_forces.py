@@ -29,7 +29,7 @@ from explorer.app.features.forces.scene import (
     tool_point,
 )
 from explorer.app.features.forces.words import share_colour, share_look, share_words
-from explorer.app.scene.placing import Placed, scene_scale
+from explorer.app.scene.placing import SCENE_REACH, Placed
 from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State, opened
@@ -222,14 +222,14 @@ def test_a_press_turns_the_force_into_its_worst_direction(server: viser.ViserSer
     before = services.get(Loads).of(Frame(desk.state)).share
     desk.press(buttons, WORST)
     state = desk.state
-    assert math.hypot(*state.view.forces.force) == pytest.approx(10.0)
+    assert math.hypot(*state.view.forces.force) == pytest.approx(10.0, rel=1e-3)
     after = services.get(Loads).of(Frame(state)).share
     assert after > before
     rng = np.random.default_rng(3)
     for direction in rng.normal(size=(200, 3)):
         x, y, z = (10.0 * direction / np.linalg.norm(direction)).tolist()
         other = services.get(Loads).of(Frame(SetForce((x, y, z)).apply(state)))
-        assert other.share <= after * (1.0 + 1e-12)
+        assert other.share <= after * (1.0 + 1e-3)
 
 
 def test_the_bar_tells_the_largest_share_where_there_are_limits() -> None:
@@ -303,7 +303,8 @@ def test_a_pull_at_the_handle_sets_the_force_and_leaves_the_handle(services: Ser
         updates = list(handle.updates(Placed(Frame(state))))
         assert "position" not in {name for _, name, _ in updates}
         tip = load_tip(Placed(Frame(state)))
-        np.testing.assert_allclose(tip, handle.handle.position, atol=1e-9 * scene_scale(state))
+        # Forces have few decimals, and the handle stays under the pointer.
+        np.testing.assert_allclose(tip, handle.handle.position, atol=1e-3 * SCENE_REACH)
 
 
 def test_a_typed_force_has_an_arrow_that_can_be_seen() -> None:

@@ -26,6 +26,8 @@ from explorer.numerics.number_text import drop_rounding
 
 # Colour of viser by which the stylesheet tells the main button of a tab from the others.
 MAIN: Literal["blue"] = "blue"
+# Decimals of a field in which values far below its step count.
+MOST_DECIMALS = 9
 Condition = Callable[[State], bool]
 """A function that tells whether a condition holds in a state."""
 
@@ -278,14 +280,27 @@ class Controls:
         least: float,
         step: float | Callable[[State], float],
         visible: Condition | None = None,
+        small: bool = False,
     ) -> None:
-        """Add a number field; its step may follow the state."""
+        """Add a number field; its step may follow the state.
+
+        Args:
+            label: Words beside it.
+            hint: Sentence on what it sets.
+            at: Source of its value.
+            least: Least value.
+            step: Step of its buttons, whose decimals are shown.
+            visible: Condition in which it is visible; None for always.
+            small: Whether values far below a step that is given count, and have their decimals.
+        """
         bound = bound_to(at, label)
         if callable(step):
             handle = self._gui.add_number(label, least, min=least, hint=hint)
             self._controls.append(Number(self._session, handle, bound, step, visible))
         else:
             handle = self._gui.add_number(label, least, min=least, step=step, hint=hint)
+            if small:
+                handle.precision = MOST_DECIMALS
             self._bind(handle, bound, visible=visible)
 
     def triple(
@@ -296,9 +311,12 @@ class Controls:
         *,
         step: float,
         visible: Condition | None = None,
+        small: bool = False,
     ) -> None:
-        """Add three number fields side by side."""
+        """Add three number fields side by side; `small` as in `number`."""
         handle = self._gui.add_vector3(label, (0.0, 0.0, 0.0), step=step, hint=hint)
+        if small:
+            handle.precision = MOST_DECIMALS
         self._bind(handle, bound_to(at, label), visible=visible)
 
     def checkbox(

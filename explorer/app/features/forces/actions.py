@@ -5,10 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from explorer.app.scene.placing import round_step
 from explorer.app.state.action import Action
 from explorer.app.state.state import State
 from explorer.mechanism.pose import Triple
+from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
 
 # Share of the reach below which and above which the arrow of a typed force has another scale.
@@ -48,6 +51,22 @@ class SetForce(Action):
             return self.title
         numbers = ", ".join(format_number(value, 3) for value in self.force)
         return f"Force {numbers} N"
+
+
+def rounded(force: FloatArray, size: float) -> Triple:
+    """Return a force with the decimals that a thousandth of a size has.
+
+    Args:
+        force: The force, shape (3,), in newtons.
+        size: The size, in newtons.
+    """
+    x, y, z = np.round(force, decimals_of(size)).tolist()
+    return x, y, z
+
+
+def decimals_of(size: float) -> int:
+    """Return the decimals of a thousandth of a size."""
+    return 3 - math.floor(math.log10(size))
 
 
 def fitting_scale(force: float, scale: float) -> float:

@@ -11,7 +11,7 @@ import numpy as np
 import viser
 
 from explorer.app.features.feature import Services
-from explorer.app.features.forces.actions import SetForce
+from explorer.app.features.forces.actions import SetForce, rounded
 from explorer.app.features.forces.loads import Loads, NearestFeed
 from explorer.app.features.forces.words import (
     PARTS,
@@ -74,12 +74,14 @@ class ForcesPanel:
                     lambda frame: frame.state.view.forces.force, lambda _, force: SetForce(force)
                 ),
                 step=0.1,
+                small=True,
             )
             controls.triple(
                 "Moment (N m)",
                 "Moment on the platform, about x, y and z of the base.",
                 "view.forces.moment",
                 step=0.01,
+                small=True,
             )
             controls.dropdown(
                 "Weights",
@@ -168,8 +170,8 @@ class ForcesPanel:
         size = math.hypot(*frame.state.view.forces.force)
         direction = without_force(self._loads.of(frame)).worst_force(size).direction
         if size > 0.0 and np.isfinite(direction).all():
-            x, y, z = (size * direction).tolist()
-            action = SetForce((x, y, z), title="Force in its worst direction")
+            force = rounded(size * direction, size)
+            action = SetForce(force, title="Force in its worst direction")
             self._session.do(action, who=client.client_id)
 
 

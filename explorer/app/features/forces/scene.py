@@ -14,7 +14,7 @@ import numpy as np
 import viser
 
 from explorer.app.features.feature import Services
-from explorer.app.features.forces.actions import SetForce, fitting_scale
+from explorer.app.features.forces.actions import SetForce, fitting_scale, rounded
 from explorer.app.features.forces.arrows import ForceArrows
 from explorer.app.features.forces.loads import Loads
 from explorer.app.features.forces.words import (
@@ -49,8 +49,8 @@ SLEEVE_RADIUS, SLEEVE_OPACITY = 0.3, 0.45
 # Number of ordinates of a drawn bending moment.
 ORDINATES = 9
 HANDLE_NAME, HANDLE_SCALE = "/forces/handle", 0.8
-# Difference of forces that is rounding, over the scale.
-SAME_FORCE = 1e-9
+# Difference of forces that rounding makes, over the scale.
+SAME_FORCE = 1e-3
 
 
 class ForcesScene(ScenePart):
@@ -192,9 +192,9 @@ class LoadHandle(ScenePart):
     def force(self, state: State) -> Triple:
         """Return the force whose arrow ends where the gizmo is."""
         tool = scene_scale(state) * np.array(position_of(state.design, state.pose, "tool"))
-        per_length = state.view.forces.scale / (scene_scale(state) * state.design.reach)
-        x, y, z = (per_length * (np.asarray(self.handle.position) - tool)).tolist()
-        return x, y, z
+        scale = state.view.forces.scale
+        per_length = scale / (scene_scale(state) * state.design.reach)
+        return rounded(per_length * (np.asarray(self.handle.position) - tool), scale)
 
     def updates(self, placed: Placed) -> Iterator[Update]:
         """Yield the updates that keep the gizmo at the tip of the arrow."""

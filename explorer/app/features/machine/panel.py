@@ -62,6 +62,7 @@ class MachinePanel:
                 "design.payload.mass_kg",
                 least=0.0,
                 step=FINE,
+                small=True,
             )
             self._weight = gui.add_html("", visible=False)
             self._add_payload()
@@ -138,6 +139,7 @@ class MachinePanel:
             "design.payload.force_n",
             least=0.0,
             step=MEDIUM,
+            small=True,
         )
 
     def _add_gravity(self) -> None:
@@ -193,6 +195,7 @@ class MachinePanel:
             ),
             least=0.0,
             step=MEDIUM,
+            small=True,
             visible=lambda state: _forces(state, side) is not None and _are_alike(state, side),
         )
 
@@ -209,6 +212,7 @@ class MachinePanel:
             Bound(lambda frame: _shown_forces(frame.state, side)[index], write),
             least=0.0,
             step=MEDIUM,
+            small=True,
             visible=lambda state: _forces(state, side) is not None,
         )
 
@@ -245,6 +249,7 @@ class MachinePanel:
             At(f"design.struts.{name}", default=lambda _: OUTER),
             least=0.0,
             step=MEDIUM,
+            small=True,
             visible=_is_tube,
         )
 
@@ -302,6 +307,7 @@ class MachinePanel:
             at,
             least=0.0,
             step=MEDIUM,
+            small=True,
             visible=lambda state: is_on(state) and can_be(state),
         )
 
