@@ -109,6 +109,26 @@ def test_parts_of_the_prototype_weigh_in_place_of_bars(cli: CommandLine) -> None
     assert "--density" in cli.refusal("forces", *POSE, "--parts")
 
 
+def test_a_part_with_a_limit_tells_its_share_though_nothing_loads_it(
+    cli: CommandLine, machine: Path
+) -> None:
+    given = ["forces", *POSE, "--design", machine, "--payload", "0"]
+    text = cli.text(*given)
+    assert text.count("0.0 %") == 10
+    assert "load acts at  b4" in text
+    assert "load acts at  the tool" in cli.text(*given, "--at", "tool")
+    free = cli.text("forces", *POSE)
+    assert "%" not in free
+
+
+def test_all_parts_hold_the_largest_force_by_all_parts(cli: CommandLine, machine: Path) -> None:
+    given = ["forces", *POSE, "--design", machine, "--payload", "0", "--at", "tool"]
+    most = cli.answer(*given)["largest_force_by_all_parts"]
+    worst = cli.answer(*given, "--force", most)["worst_force"]
+    assert worst["share"] == pytest.approx(1.0, rel=1e-9)
+    assert cli.answer(*given)["largest_force"] >= most * (1.0 - 1e-12)
+
+
 def test_forces_of_payload_are_those_of_its_weight(cli: CommandLine, machine: Path) -> None:
     found = cli.answer("forces", *POSE, "--payload", "2", "--design", machine)
     arm = AT[1] @ np.array([0.0, 0.0, 1.0])

@@ -18,7 +18,7 @@ from explorer.mechanism.tool_point import tool_position
 from explorer.statics.equilibrium import twists_of_actuators
 from explorer.statics.forces import WorstDirection, worst_direction
 from explorer.statics.loaded import LoadedPose, WorstForce
-from explorer.statics.reactions import LIMITED
+from explorer.statics.reactions import LIMITED, PART_NAMES
 from explorer.statics.weights import Weights
 
 Six = tuple[float, float, float, float, float, float]
@@ -136,6 +136,7 @@ def _as_json(answer: Answer) -> dict[str, object]:
         "guide_moment": held.guide_moment,
         "shares": dict(zip(LIMITED, loaded.shares.tolist(), strict=True)),
         "largest_payload": finite(loaded.largest_payload),
+        "largest_force_by_all_parts": 1.0 / loaded.newton.share if loaded.newton.share else None,
         "worst_force": None if added is None else _force_json(added),
         "nearest_held": None if nearest is None else pose_json(nearest, answer.tool),
     }
@@ -152,48 +153,71 @@ def _force_json(added: WorstForce) -> dict[str, object]:
 
 def _as_lines(answer: Answer) -> Iterator[str]:
     loaded = answer.loaded
-    design, held, of_limits = loaded.design, loaded.held, loaded.shares
+    design = loaded.design
     yield from (heading(design), pose_table(design, loaded.pose, answer.tool), "")
+    yield from (table([("load acts at", "b4" if answer.tool is None else "the tool")], "<<"), "")
+    yield from (_actuators(loaded), "", _struts(loaded), "", _largest(answer))
+
+
+def _actuators(loaded: LoadedPose) -> str:
+    """Return the table of the actuators' forces."""
+    held, has_process = loaded.held, loaded.design.payload.force_n > 0.0
     size = float(np.abs(held.actuators).max())
-    forces = [figure(value, size) for value in held.actuators.tolist()]
-    shares = [_share(value) for value in of_limits.tolist()]
-    rows = [("actuator", "force, N", "of its limit")]
-    rows += zip(JOINTS, forces, shares[:6], strict=True)
-    yield from (table(rows, "<>>"), "")
-    newton_metre = design.unit_mm * 1e-3
-    rows = [
-        ("strut", "bending, N x unit", "N m", "of its limit", "on the guide, N", "of its limit")
-    ]
+    rows = [("actuator", "force, N", *(["process, ± N"] * has_process), "of its limit")]
+    for index, joint in enumerate(JOINTS):
+        # What the payload's force of any direction may add either way.
+        process = [figure(float(held.spread[index]))] * has_process
+        force = figure(float(held.actuators[index]), size)
+        rows.append((joint, force, *process, _share(loaded, index)))
+    return table(rows, "<" + ">" * (len(rows[0]) - 1))
+
+
+def _struts(loaded: LoadedPose) -> str:
+    """Return the table of struts and carriages."""
+    held, has_process = loaded.held, loaded.design.payload.force_n > 0.0
+    newton_metre = loaded.design.unit_mm * 1e-3
+    head = ["strut", "bending, N x unit", "N m", *(["process, ± N m"] * has_process)]
+    rows = [(*head, "of its limit", "on the guide, N", "of its limit")]
     for index in range(2):
         moment = float(held.bending[index])
-        share = max(of_limits[6 + index], of_limits[10 + index])
+        process = [figure(newton_metre * float(held.spread[6 + index]))] * has_process
         rows.append(
             (
                 f"leg {index + 2}",
                 figure(moment),
                 figure(moment * newton_metre),
-                _share(float(share)),
+                *process,
+                _share(loaded, 6 + index, 10 + index),
                 figure(float(held.guide_force[index])),
-                shares[8 + index],
+                _share(loaded, 8 + index),
             )
         )
-    yield from (table(rows, "<>>>>>"), "")
-    rows = [("largest force in every direction", _newtons(answer.largest_force))]
+    return table(rows, "<" + ">" * (len(rows[0]) - 1))
+
+
+def _largest(answer: Answer) -> str:
+    """Return the table of what is held at most, and where."""
+    loaded, added = answer.loaded, answer.added
+    rows = [("largest force in every direction by the actuators", _newtons(answer.largest_force))]
     if answer.worst.share:
         actuator = JOINTS[int(answer.worst.actuator)]
         direction = "  ".join(figures(answer.worst.direction.tolist()))
         rows.append(("worst direction", f"{direction}, of {actuator}"))
-    payload, added = loaded.largest_payload, answer.added
+    newton = loaded.newton
+    if newton.share:
+        force = f"{_newtons(1.0 / newton.share)}, then {PART_NAMES[newton.part]}"
+        rows.append(("largest force in every direction by all parts", force))
+    payload = loaded.largest_payload
     most = "no limit" if np.isinf(payload) else f"{figure(payload)} kg"
     rows.append(("largest payload", most))
     if added is not None and added.share:
         direction = "  ".join(figures(added.direction.tolist()))
-        what = f"{LIMITED[added.part]} at {_share(added.share)}"
+        what = f"{PART_NAMES[added.part]} at {_percent(added.share)}"
         rows.append(("worst direction of the added force", f"{direction}, {what}"))
     if loaded.share > 1.0:
-        rows.append(("gives way", f"{LIMITED[loaded.worst]} at {_share(loaded.share)}"))
+        rows.append(("gives way", f"{PART_NAMES[loaded.worst]} at {_percent(loaded.share)}"))
         rows.append(("nearest position that holds the load", _nearest(answer)))
-    yield table(rows, "<<")
+    return table(rows, "<<")
 
 
 def _nearest(answer: Answer) -> str:
@@ -207,5 +231,11 @@ def _newtons(value: float) -> str:
     return "no limit" if np.isinf(value) else f"{figure(value)} N"
 
 
-def _share(value: float) -> str:
-    return f"{100.0 * value:.1f} %" if value else "-"
+def _share(loaded: LoadedPose, *parts: int) -> str:
+    """Return the largest share of the limits of some parts; "-" without a limit."""
+    shares = [float(loaded.shares[part]) for part in parts if loaded.limited[part]]
+    return _percent(max(shares)) if shares else "-"
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.1f} %"
