@@ -13,6 +13,7 @@ from explorer.errors import DesignError
 
 # The Jacobian's determinant is a product of seven numbers, which must not overflow.
 LARGEST_NUMBER = 1e40
+SMALLEST_POSITIVE = 1e-40
 
 # Types that Python converts to a number or a sequence although no caller means one.
 _NOT_A_NUMBER = (str, bytes, bytearray, bool)
@@ -46,10 +47,12 @@ def not_negative(name: str, value: object) -> float:
 
 
 def positive(name: str, value: object) -> float:
-    """Return the value as a finite float above zero."""
+    """Return the value as a finite float above zero, of at least `SMALLEST_POSITIVE`."""
     checked = number(name, value)
     if checked <= 0.0:
         raise DesignError(f"{name} must be positive; got {checked:g}", name)
+    if checked < SMALLEST_POSITIVE:
+        raise DesignError(f"{name} must be at least {SMALLEST_POSITIVE:g}; got {checked:g}", name)
     return checked
 
 

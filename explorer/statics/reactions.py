@@ -22,6 +22,14 @@ LIMITED = (
 )
 """The loaded parts with a limit, in the order of `limit_shares`."""
 
+PART_NAMES = (
+    *(f"actuator {joint}" for joint in JOINTS),
+    *("bending of strut 2", "bending of strut 3"),
+    *("carriage 2 across the guide", "carriage 3 across the guide"),
+    *("moment of carriage 2 on the guide", "moment of carriage 3 on the guide"),
+)
+"""Words for these parts, in the order of `LIMITED`."""
+
 # Columns of `_signed`: actuators, moments at the carriages, forces across the guide (y, z).
 _ACTUATORS, _MOMENTS, _ACROSS_2, _ACROSS_3 = slice(0, 6), slice(6, 8), slice(8, 10), slice(10, 12)
 
@@ -262,7 +270,9 @@ def _linear_range(
     ends = np.stack(np.broadcast_arrays(-lows - start, highs - start))
     # A part that the mass does not load keeps its limits with every mass, or with none.
     bounds = np.stack([np.where(every, -np.inf, np.inf), np.where(every, np.inf, -np.inf)])
-    np.divide(ends, slope, out=bounds, where=moves)
+    # Of a mass that loads a part all but not, the bound is infinite.
+    with np.errstate(over="ignore"):
+        np.divide(ends, slope, out=bounds, where=moves)
     is_possible = lows + highs >= 0.0
     least = np.where(moves, np.where(is_possible, bounds.min(axis=0), np.inf), bounds[0])
     most = np.where(moves, np.where(is_possible, bounds.max(axis=0), -np.inf), bounds[1])
@@ -281,6 +291,7 @@ def _square_range(
     square = b * b + a * c
     crosses = (a > 0.0) & (square >= 0.0) & (limit >= 0.0)
     root = np.sqrt(np.where(crosses, square, 0.0))
-    np.divide(-b - root, a, out=least, where=crosses)
-    np.divide(root - b, a, out=most, where=crosses)
+    with np.errstate(over="ignore"):
+        np.divide(-b - root, a, out=least, where=crosses)
+        np.divide(root - b, a, out=most, where=crosses)
     return least, most

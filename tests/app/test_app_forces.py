@@ -308,7 +308,7 @@ def test_a_pull_at_the_handle_sets_the_force_and_leaves_the_handle(services: Ser
 
 
 def test_a_typed_force_has_an_arrow_that_can_be_seen() -> None:
-    assert fitting_scale(0.0, 20.0) == 20.0
+    assert fitting_scale(0.0, 20.0) == fitting_scale(5e-324, 20.0) == 20.0
     for force in np.geomspace(1e-6, 1e6, 40):
         scale = fitting_scale(float(force), 20.0)
         assert 0.1 <= force / scale <= 1.0
@@ -321,7 +321,7 @@ def test_moments_are_in_newton_metres_whatever_the_unit() -> None:
         assert load_of(loaded_state(design, moment=(0.0, 2.0, 0.0)))[4] == 2e3 / unit_mm
 
 
-@pytest.mark.parametrize("force", [(math.nan, 0.0, 0.0), (math.inf, 0.0, 0.0)])
+@pytest.mark.parametrize("force", [(math.nan, 0.0, 0.0), (math.inf, 0.0, 0.0), (0.0, 1e41, 0.0)])
 def test_a_force_that_is_not_finite_is_refused_in_one_line(force: tuple[float, ...]) -> None:
     x, y, z = force
     with pytest.raises(InputError, match="force must be three finite numbers") as refused:

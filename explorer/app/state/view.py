@@ -9,6 +9,7 @@ from typing import Literal
 from explorer.errors import InputError
 from explorer.mechanism.pose import Triple
 from explorer.mechanism.tool_point import Point
+from explorer.numerics.checks import LARGEST_NUMBER
 from explorer.numerics.number_text import format_number
 
 ALUMINIUM = 2700.0
@@ -117,7 +118,7 @@ class ForcesView:
         scale: Force whose arrow is as long as the reach, in N.
 
     Raises:
-        InputError: a number that is not finite, or a scale that is not positive.
+        InputError: a number that is not finite or exceeds 1e40, or a scale that is not positive.
     """
 
     shown: bool = False
@@ -128,8 +129,10 @@ class ForcesView:
 
     def __post_init__(self) -> None:
         for name, unit in (("force", "N"), ("moment", "N m")):
-            if not all(map(math.isfinite, getattr(self, name))):
-                raise InputError(f"the {name} must be three finite numbers, in {unit}")
+            if not all(abs(value) <= LARGEST_NUMBER for value in getattr(self, name)):
+                raise InputError(
+                    f"the {name} must be three finite numbers of at most {LARGEST_NUMBER:g} {unit}"
+                )
         if not (math.isfinite(self.scale) and self.scale > 0.0):
             raise InputError(
                 f"the force whose arrow is as long as the reach must be positive, in N; got "

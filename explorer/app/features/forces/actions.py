@@ -16,6 +16,8 @@ from explorer.numerics.number_text import format_number
 
 # Share of the reach below which and above which the arrow of a typed force has another scale.
 SHORTEST, LONGEST = 0.1, 1.0
+# Force in newtons below which the scale stays.
+LEAST_FORCE = 1e-40
 # Length of the arrow at the new scale, as a share of the reach.
 FITTING = 0.45
 
@@ -76,6 +78,6 @@ def fitting_scale(force: float, scale: float) -> float:
         force: Size of the force, in newtons.
         scale: The present one, which stays while the arrow is neither short nor long.
     """
-    if force == 0.0 or SHORTEST <= force / scale <= LONGEST:
+    if force < LEAST_FORCE or SHORTEST <= force / scale <= LONGEST:
         return scale
     return round_step(force / FITTING)
