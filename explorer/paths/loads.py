@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from explorer.legs.moves import poses_between
-from explorer.mechanism.design import JOINTS, Design
+from explorer.mechanism.design import Design
 from explorer.mechanism.machine import STANDARD_GRAVITY
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import BoolArray, FloatArray, finite_array, for_kernel
@@ -50,14 +50,6 @@ from explorer.statics.weights import Weights, design_weights
 TOLERANCE = 1e-6
 # Number of rows for each move, on which compiling depends; a row of this kernel takes long.
 ROWS_OF_MOVE = 256
-
-PART_NAMES = (
-    *(f"the force of {joint}" for joint in JOINTS),
-    *("the bending of strut 2", "the bending of strut 3"),
-    *("the force of carriage 2 on the guide", "the force of carriage 3 on the guide"),
-    *("the moment of carriage 2 on the guide", "the moment of carriage 3 on the guide"),
-)
-"""Names of the parts with a limit, in the order of `explorer.statics.reactions.LIMITED`."""
 
 
 class LargestShare(NamedTuple):

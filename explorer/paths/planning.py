@@ -25,11 +25,12 @@ from explorer.measures.snapshot import Snapshot, evaluate
 from explorer.mechanism.design import JOINTS, Design
 from explorer.mechanism.margins import INCIDENCES, mode_name
 from explorer.mechanism.pose import Pose, Triple
-from explorer.paths.loads import PART_NAMES, TOLERANCE, DemandedLoad
+from explorer.paths.loads import TOLERANCE, DemandedLoad
 from explorer.paths.move_shares import share_rows_of_moves
 from explorer.paths.smoothing import Smoother
 from explorer.paths.tree_search import TreeSearch, compile_checks, search_is_possible
 from explorer.singularity.bruhat import incidences
+from explorer.statics.reactions import PART_NAMES
 from explorer.statics.weights import Weights
 from explorer.workspace.limits.broken import violations
 from explorer.workspace.limits.valid_poses import Rules
@@ -287,7 +288,7 @@ def _check_held(name: str, pose: Pose, load: DemandedLoad) -> None:
     part, share = int(shares.argmax()), float(shares.max())
     if share > 1.0 + TOLERANCE:
         shown = f"{100.0 * share:.{4 if share > 1.001 else 9}g}"
-        message = f"the {name} does not hold the load: {PART_NAMES[part]} is {shown} % of its limit"
+        message = f"the {name} does not hold the load: {PART_NAMES[part]} at {shown} % of its limit"
         raise EndError("load not held", message)
 
 

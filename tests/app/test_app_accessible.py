@@ -40,7 +40,7 @@ from explorer.app.features.workspace.tasks import (
     export_mesh,
     exported_name,
 )
-from explorer.app.features.workspace.words import drawing_words, workspace_details
+from explorer.app.features.workspace.words import drawing_words, nothing_words, workspace_details
 from explorer.app.scene.bands import COLLIDING, PLAIN
 from explorer.app.state.actions import GoHome, Set, SetPosition
 from explorer.app.state.frame import Frame
@@ -411,7 +411,9 @@ def test_a_home_in_trouble_leaves_the_solid_and_says_what_would_do() -> None:
         shell.colour for shell in whole.surface.shells
     ]
     assert surface(drawing) == pytest.approx(surface(whole), rel=1e-4)
-    assert "Nothing is accessible from the home position" in summary(state)
+    assert nothing_words(drawing) == "Nothing is accessible from the home position"
+    # The alert of the panel tells it.
+    assert nothing_words(drawing) not in summary(state)
 
 
 def test_legs_that_collide_everywhere_are_told_without_a_button(

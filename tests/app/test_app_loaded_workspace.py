@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -277,16 +278,47 @@ def test_map_leaves_out_the_positions_that_do_not_hold_the_load(axis: Any) -> No
     assert "not held" in legend("plain", 1.0, drawing)
 
 
-def test_load_that_nothing_holds_names_the_part_and_the_share_that_is_held() -> None:
+def test_surface_that_holds_the_load_has_no_colour_beyond_the_limit() -> None:
+    for cut in (None, "y"):
+        drawing = drawing_of(shown(region="held", colour="share", cut=cut))
+        colours = {shell.colour for shell in drawing.surface.shells}
+        assert SHARE_COLOURS[-1] not in colours
+        assert SHARE_COLOURS[-2] in colours
+    whole = drawing_of(shown(colour="share"))
+    assert SHARE_COLOURS[-1] in {shell.colour for shell in whole.surface.shells}
+
+
+def test_map_of_the_part_in_one_colour_shows_the_share(services: Services) -> None:
+    def mapped(region: str, colour: str) -> str:
+        drawing = drawing_of(shown(region=region, colour=colour, cut="y"))
+        assert drawing.slice_map is not None
+        return map_picture(drawing.slice_map, opened(LOADED).position, LOADED.reach)
+
+    assert mapped("held", "plain") == mapped("held", "share")
+    assert mapped("held", "plain") != mapped("held", "margin")
+    assert mapped("limits", "plain") == mapped("limits", "margin")
+    panel = WorkspacePanel(services)
+    for region, words in (("held", "Largest share of a limit"), ("limits", "Smallest |δ|")):
+        state = shown(region=region, cut="y")
+        follow(services, state)
+        told = "".join(str(v) for _, n, v in panel.updates(Frame(state)) if n == "content")
+        assert words in told
+
+
+def test_load_that_nothing_holds_names_the_part_and_the_share_that_is_held(
+    services: Services,
+) -> None:
     weak = msgspec.structs.replace(LOADED, actuators=Actuators(push_n=(2, 2, 2, 2, 2, 2)))
-    services, state = services_for(), shown(weak, region="held")
+    state = shown(weak, region="held")
     follow(services, state)
     feed = services.get(WorkspaceFeed)
     drawing = feed.drawing
     assert drawing is not None
     assert drawing.trouble is not None
-    assert "up to the force of" in drawing.trouble.reason
-    assert "No position holds the load" in drawing_words(Frame(state), feed)
+    assert re.search(r"payload; actuator \w+ is at its limit there", drawing.trouble.reason)
+    panel = WorkspacePanel(services)
+    told = "".join(str(v) for _, n, v in panel.updates(Frame(state)) if n == "content")
+    assert told.count("No position holds the load") == 1
     # All within the limits is drawn instead.
     assert drawing.mesh_volume == pytest.approx(drawing.volume, rel=0.02)
     rotation = np.array(drawing.request.rotation)

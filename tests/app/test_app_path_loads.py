@@ -171,7 +171,7 @@ def test_end_that_does_not_hold_the_load_is_told(planner: Planner) -> None:
     largest = path_loads(PRESS, (START, START), load_of(state)).largest
     assert largest.part == LIMITED.index("d2")
     told = f"{100.0 * largest.share:.4g} % of its limit"
-    assert f"The start does not hold the load: the force of d2 is {told}" in words
+    assert f"The start does not hold the load: actuator d2 at {told}" in words
 
 
 # What is told of the present path

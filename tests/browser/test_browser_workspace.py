@@ -26,7 +26,8 @@ from explorer.numerics.number_text import format_number
 from explorer.singularity.ellipsoids import planes_of_singularity
 from explorer.singularity.jacobian import inverse_condition, jacobian
 from explorer.statics.held import held_load, held_values, largest_shares
-from explorer.workspace.held import PART_NAMES
+from explorer.statics.reactions import PART_NAMES
+from explorer.workspace.held import part_names
 from explorer.workspace.position_bands import LOAD_WORDS, PositionMeasure
 from explorer.workspace.slices.volume import workspace_volume
 
@@ -182,7 +183,8 @@ def test_page_computes_what_a_load_asks_as_the_library_does(tab: Tab) -> None:
         held = colouring.bands.held
         assert held is not None
         share = float(largest_shares(held, rotation, position[None])[0])
-        part = PART_NAMES[int(held_values(held, rotation, position[None])[1][0])]
+        names = part_names(LOADED) if measure == "share" else PART_NAMES
+        part = names[int(held_values(held, rotation, position[None])[1][0])]
         expected.append((share, part))
         cases.append({"facts": map_facts(colouring), "p": position.tolist()})
     tab.wait_for(lambda: bool(tab.page.evaluate("!!window.explorer?.map")), "the script")
@@ -226,7 +228,7 @@ def test_map_of_shares_is_read_under_the_pointer(tab: Tab) -> None:
     held = held_load(LOADED, rotation, np.array(drawing.request.load))
     share = float(largest_shares(held, rotation, at[None])[0])
     assert 0.01 * float(found[1].replace(",", "")) == pytest.approx(share, rel=0.02)
-    assert found[2] in PART_NAMES
+    assert found[2] in part_names(LOADED)
 
 
 def test_reading_stays_while_the_map_is_drawn_anew(tab: Tab) -> None:

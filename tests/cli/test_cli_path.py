@@ -186,7 +186,7 @@ def test_path_with_load_holds_it_and_tells_the_largest_share(
     assert 0.0 < straight["largest_share"] < 1.0
     text = cli.text(*press, *up)
     share = f"{100.0 * straight['largest_share']:.1f}"
-    assert f"load        held, with {share} % of a limit at most: the " in text
+    assert f"load        held, with {share} % of a limit at most: " in text
 
 
 def test_path_with_load_at_the_tool_holds_it(cli: CommandLine, press: tuple[str, str]) -> None:
@@ -210,7 +210,7 @@ def test_path_end_that_does_not_hold_the_load_has_status_2_and_reason(
         "reason": "load not held",
         "poses": [],
     }
-    assert "the start does not hold the load: the force of d2 is 143.2 %" in cli.refusal(*words)
+    assert "the start does not hold the load: actuator d2 at 143.2 %" in cli.refusal(*words)
 
 
 @pytest.mark.parametrize(

@@ -266,4 +266,4 @@ def test_workspace_with_a_load_has_the_volume_that_holds_it(
     assert heavy["held_volume"] == heavy["held_mesh"]["triangles"] == 0
     assert 0.0 < heavy["held_factor"] < 1e-2
     text = cli.text("--design", path, "--load", 0, 0, -1e5)
-    assert re.search(r"empty because of force of \w+; 0\.\d+ of load and payload", text)
+    assert re.search(r"empty because of actuator \w+; 0\.\d+ of load and payload", text)

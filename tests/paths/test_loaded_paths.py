@@ -144,7 +144,7 @@ def test_plan_path_end_that_does_not_hold_the_load_names_part_and_share() -> Non
     design, load, start, goal = barred()
     share = float(DemandedLoad.of(design, 2.0 * load).shares(goal.position, goal.rotation).max())
     assert share > 1.0
-    words = f"the force of l4 is {100.0 * share:.4g} % of its limit"
+    words = f"actuator l4 at {100.0 * share:.4g} % of its limit"
     with pytest.raises(EndError, match=f"the goal does not hold the load: {words}") as caught:
         plan_path(design, start, goal, load=2.0 * load)
     assert isinstance(caught.value, InputError)
@@ -153,7 +153,7 @@ def test_plan_path_end_that_does_not_hold_the_load_names_part_and_share() -> Non
         plan_path(design, goal, start, load=2.0 * load)
     # A share that exceeds the limit by little is not told as 100 %.
     slightly = 2.0 * load / share * 1.00001
-    with pytest.raises(EndError, match=r"is 100\.001 % of its limit"):
+    with pytest.raises(EndError, match=r"at 100\.001 % of its limit"):
         plan_path(design, start, goal, load=slightly)
 
 

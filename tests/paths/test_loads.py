@@ -14,8 +14,8 @@ from tool_moves import tool_move
 from explorer import PRESETS, Design, InputError, Pose, home_pose, margins
 from explorer.numerics.arrays import FloatArray
 from explorer.paths.crossings import path_margins
-from explorer.paths.loads import PART_NAMES, TOLERANCE, DemandedLoad, path_loads
-from explorer.statics.reactions import LIMITED, limit_shares, reactions
+from explorer.paths.loads import TOLERANCE, DemandedLoad, path_loads
+from explorer.statics.reactions import LIMITED, PART_NAMES, limit_shares, reactions
 from explorer.statics.weights import Weights, design_weights
 
 OPTIMAL = PRESETS["paper-optimal"]

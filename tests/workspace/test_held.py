@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import Any
 
@@ -15,17 +16,22 @@ from explorer import (
     Design,
     Guide,
     InputError,
+    Limits,
     Payload,
+    Pose,
     Struts,
     Tool,
     limit_shares,
     reactions,
+    workspace_solid,
 )
 from explorer.mechanism.home import home_pose
 from explorer.numerics.arrays import FloatArray
+from explorer.statics.held import held_load, held_values
+from explorer.statics.reactions import PART_NAMES
 from explorer.statics.weights import design_weights
-from explorer.workspace.held import PART_NAMES, held_workspace
-from explorer.workspace.limits.constraints import constraints, satisfies
+from explorer.workspace.held import held_workspace
+from explorer.workspace.limits.constraints import constraints, satisfies, slacks
 
 OPTIMAL = PRESETS["paper-optimal"]
 LOAD = (4.0, -3.0, -6.0, 5.0, 10.0, -5.0)
@@ -89,7 +95,8 @@ def test_volume_error_is_below_half_a_percent(name: str) -> None:
 def test_new_faces_lie_where_a_part_takes_its_limit(name: str) -> None:
     design = CASES[name]
     solid = held_workspace(design).solid
-    of_parts = np.isin(solid.limit_of_face, [solid.limits.index(part) for part in PART_NAMES])
+    parts = [index for index, limit in enumerate(solid.limits) if limit in PART_NAMES]
+    of_parts = np.isin(solid.limit_of_face, parts)
     others = set(solid.faces[~of_parts].ravel().tolist())
     corners = sorted(set(solid.faces[of_parts].ravel().tolist()) - others)
     assert len(corners) > 100
@@ -97,6 +104,66 @@ def test_new_faces_lie_where_a_part_takes_its_limit(name: str) -> None:
     # Where two parts change places the surface has a crease, which faces cut short.
     assert np.quantile(np.abs(shares - 1.0), 0.9) < 1e-6
     assert np.abs(shares - 1.0).max() < 0.1
+
+
+PRESS = msgspec.structs.replace(
+    OPTIMAL,
+    a3=(19.1829, 7.0062),
+    b1=(4.2892, -3.8858),
+    b2=2.6067,
+    b3=4.9094,
+    home=Pose((10.0, 5.0, 9.0), (0.80334, 0.0, 0.0, -0.59552)),
+    limits=Limits(),
+    tool=Tool((1.0, 0.0, 2.0)),
+    payload=Payload(0.5, (1.0, 0.0, 1.0)),
+    actuators=Actuators((150, 200, 150, 200, 150, 150), (120, 200, 120, 200, 120, 120)),
+    struts=Struts(outer_mm=8.0, inner_mm=6.0, stress_mpa=200.0),
+    guide=Guide(force_n=200.0, moment_nm=6.0),
+)
+
+
+@pytest.mark.parametrize(
+    ("force", "error"), [(40.0, 0.005), (100.0, 0.005), (200.0, 0.005), (250.0, 0.03)]
+)
+def test_thin_and_long_parts_are_found_whole(force: float, error: float) -> None:
+    """The volume is that of a million random positions, and only limits and parts bound it."""
+    load = np.array([0.0, 0.0, -force, 0.0, 0.0, 0.0])
+    part = held_workspace(PRESS, load=load)
+    signed = msgspec.structs.replace(PRESS, limits=Limits(margin=0.0))
+    rotation = home_pose(PRESS).rotation
+    limits = constraints(signed, rotation)
+    whole = workspace_solid(signed, rotation)
+    lows, highs = whole.vertices.min(axis=0), whole.vertices.max(axis=0)
+    at = np.random.default_rng(7).uniform(lows, highs, (1_000_000, 3))
+    at = at[(slacks(limits, at) >= 0.0).all(axis=-1)]
+    is_held = held_values(held_load(signed, rotation, load), rotation, at)[0] >= 0.0
+    box = math.prod((highs - lows).tolist())
+    share = int(is_held.sum()) / 1e6
+    sampling = box * math.sqrt(share * (1.0 - share) / 1e6)
+    assert part.held_volume == pytest.approx(box * share, abs=error * box * share + 3.0 * sampling)
+    limit_names = {limit.name for limit in limits}
+    assert set(part.solid.limits) <= limit_names | set(PART_NAMES)
+    assert part.solid.is_watertight
+    used = np.unique(part.solid.limit_of_face)
+    assert (used >= 0).all()
+    assert (used < len(part.solid.limits)).all()
+    # Every position that was drawn and holds the load lies within the extent of the mesh.
+    margin = 0.02 * (highs - lows)
+    ends = part.solid.vertices.min(axis=0) - margin, part.solid.vertices.max(axis=0) + margin
+    assert ((at[is_held] >= ends[0]) & (at[is_held] <= ends[1])).all()
+
+
+@pytest.mark.parametrize("moment", [None, 3.0, 5.0, 7.0])
+def test_faces_have_the_name_of_the_smaller_limit_of_the_moment(moment: float | None) -> None:
+    design = msgspec.structs.replace(CASES["bending"], guide=Guide(moment_nm=moment))
+    solid = held_workspace(design).solid
+    used = {solid.limits[int(index)] for index in np.unique(solid.limit_of_face)}
+    is_of_guide = moment == 3.0
+    names = PART_NAMES[10:] if is_of_guide else PART_NAMES[6:8]
+    others = PART_NAMES[6:8] if is_of_guide else PART_NAMES[10:]
+    assert used & set(names)
+    assert not used & set(others)
+    assert not set(solid.limits) & set(others)
 
 
 def test_load_that_nothing_holds_names_the_part() -> None:

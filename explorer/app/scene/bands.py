@@ -21,10 +21,10 @@ from explorer.mechanism.design import Design
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.singularity.colours import OUTLINE, SINGULAR, WARNED, Rgb, mix
 from explorer.singularity.ellipsoids import planes_of_singularity
+from explorer.statics.reactions import PART_NAMES
 from explorer.workspace.accessible.workspace import PAIR_NAMES
 from explorer.workspace.faces.divide import divide, find_roots
 from explorer.workspace.faces.faces import Faces
-from explorer.workspace.held import PART_NAMES
 from explorer.workspace.position_bands import PositionBands, PositionMeasure, position_bands
 
 Measure = Literal["plain"] | PositionMeasure
@@ -79,8 +79,13 @@ class Colouring:
             self.design, self.rotation, measure, warn_below=self.warn_below, load=self.load
         )
 
-    def shells(self, faces: Faces) -> tuple[tuple[Shell, ...], float | None]:
+    def shells(
+        self, faces: Faces, *, holds: bool = False
+    ) -> tuple[tuple[Shell, ...], float | None]:
         """Return the parts of a surface, one for each colour, and its longest edge.
+
+        If the surface is known to hold the load, no share on it counts as above the limit, which
+        rounding and the flatness of facets would exceed.
 
         The longest edge of a triangle whose measure is not linear, in design units, is given if it
         is longer than usual, because the surface is large beside the reach; it is None otherwise.
@@ -97,8 +102,13 @@ class Colouring:
             longest = float(edge_lengths(vertices, triangles).max())
             coarse_edge = longest if longest > usual else None
         vertices, triangles = self._split_at_folds(vertices, triangles)
-        value = None if is_linear else bands.values
-        parts = _Bands(vertices, triangles, bands.values(vertices), value)
+        least = bands.edges[1] if holds and self.measure == "share" else 0.0
+
+        def value(points: FloatArray) -> FloatArray:
+            return np.maximum(bands.values(points), least)
+
+        values = value(vertices)
+        parts = _Bands(vertices, triangles, values, None if is_linear else value)
         for edge in bands.edges[1:]:
             parts.split(edge)
         return parts.shells(bands), coarse_edge

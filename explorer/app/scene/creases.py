@@ -15,9 +15,9 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from explorer.numerics.arrays import BoolArray, FloatArray, IntArray, dot
+from explorer.statics.reactions import PART_NAMES
 from explorer.workspace.accessible.workspace import PAIR_NAMES
 from explorer.workspace.faces.faces import Faces
-from explorer.workspace.held import PART_NAMES
 from explorer.workspace.solids.solid import Solid
 
 Drawn: TypeAlias = tuple[NDArray[np.float32], NDArray[np.uint32]]

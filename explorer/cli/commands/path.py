@@ -42,7 +42,7 @@ from explorer.errors import InputError
 from explorer.mechanism.design import Design
 from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import Pose, Quadruple, Triple
-from explorer.statics.reactions import LIMITED
+from explorer.statics.reactions import LIMITED, PART_NAMES
 
 if TYPE_CHECKING:
     from explorer.paths.loads import LargestShare
@@ -240,7 +240,6 @@ def _as_lines(
     out: File | None,
 ) -> Iterator[str]:
     from explorer.paths.crossings import path_margins
-    from explorer.paths.loads import PART_NAMES
 
     least = np.abs(path_margins(path.poses, tool=path.tool).margins).min(axis=0).tolist()
     yield heading(design)

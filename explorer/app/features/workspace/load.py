@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import msgspec
 
+from explorer.app.scene.bands import Measure
 from explorer.app.state.state import State
 from explorer.mechanism.design import Design
 from explorer.statics.reactions import limited_parts
@@ -16,6 +17,17 @@ def loaded_design(state: State) -> Design:
         return design
     payload = msgspec.structs.replace(design.payload, mass_kg=0.0)
     return msgspec.structs.replace(design, payload=payload)
+
+
+def map_measure(design: Design, colour: Measure, *, holds: bool) -> Measure:
+    """Return the measure of the map of a slice; "plain" for the margins.
+
+    Args:
+        design: The manipulator.
+        colour: Measure that colours the surface.
+        holds: Whether the part of the workspace that holds the load is shown.
+    """
+    return "share" if colour == "plain" and holds and has_limits(design) else colour
 
 
 def has_limits(design: Design) -> bool:

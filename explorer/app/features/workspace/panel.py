@@ -14,7 +14,7 @@ from explorer.app.browser.viser_gaps import run_script
 from explorer.app.features.feature import Services
 from explorer.app.features.workspace.feed import WorkspaceFeed
 from explorer.app.features.workspace.files import tolerance_of
-from explorer.app.features.workspace.load import has_limits
+from explorer.app.features.workspace.load import has_limits, map_measure
 from explorer.app.features.workspace.orientation import workspace_pose
 from explorer.app.features.workspace.slice_map import Axis, level_within, map_picture
 from explorer.app.features.workspace.tasks import Region, WorkspaceDrawing
@@ -192,7 +192,8 @@ class WorkspacePanel:
         yield self._legend, "visible", view.colour != "plain" or mapped is not None
         words = without_limits(map(_colour_button, NEED_NO_LIMITS)) if is_shareless else ""
         if colour != "plain" or mapped is not None:
-            words += legend(colour, state.warn_below, drawing)
+            measure = map_measure(state.design, colour, holds=view.region == "held")
+            words += legend(measure, state.warn_below, drawing)
         if colour in LOAD_WORDS and view.region != "held":
             words += note(f"{load_words(state)}.")
         yield self._legend, "content", words

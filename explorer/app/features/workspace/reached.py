@@ -128,5 +128,7 @@ def trouble_holding(held: HeldWorkspace) -> Trouble | None:
         return Trouble("the positions that hold it are too few to be drawn", None)
     percent = format_number(100.0 * held.factor, 3)
     return Trouble(
-        f"the best position found holds {percent} % of load and payload, up to the {part}", None
+        f"the best position found holds {percent} % of load and payload; {part} is at its limit "
+        "there",
+        None,
     )

@@ -24,7 +24,8 @@ from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.numerics.number_text import format_number
 from explorer.singularity.ellipsoids import planes_of_singularity
 from explorer.statics.held import FORCE, LIMITS, SIGNS, TOOL, WRENCH
-from explorer.workspace.held import PART_NAMES
+from explorer.statics.reactions import PART_NAMES
+from explorer.workspace.held import part_names
 from explorer.workspace.position_bands import LOAD_WORDS
 from explorer.workspace.solids.solid import Solid
 
@@ -155,7 +156,7 @@ def map_facts(colouring: Colouring) -> dict[str, Any]:
         "anyForce": float(bands.held[FORCE]),
         # Over limits that are infinite shares are zero.
         "overLimits": (1.0 / bands.held[LIMITS:SIGNS]).reshape(2, -1).tolist(),
-        "parts": PART_NAMES,
+        "parts": part_names(design) if bands.measure == "share" else PART_NAMES[:10],
         "words": name,
         "unitName": unit,
         "factor": factor,

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
+from explorer.app.features.workspace.load import map_measure
 from explorer.app.features.workspace.reached import (
     Reached,
     Rows,
@@ -127,7 +128,7 @@ class WorkspaceDrawing:
         extent: (lows, highs) of the solid; None if it is empty.
         nodes: The paper's node count within the limits; None if the grid is too fine.
         empty_because: Names of the limits that empty the workspace.
-        levels: The measure that colours the map and the surface at the edge of each band, see
+        levels: The measure that colours the map at the edge of each band, see
             `explorer.workspace.position_bands.PositionBands`.
     """
 
@@ -169,10 +170,12 @@ def draw_workspace(request: WorkspaceRequest, channel: Channel | None = None) ->
     watch = watch_of(channel)
     load = (0.0,) * 6 if request.load is None else request.load
     colouring = Colouring(design, rotation, request.colour, request.warn_below, np.array(load))
+    measure = map_measure(design, request.colour, holds=request.region == "held")
+    on_map = replace(colouring, measure=measure)
     limits = constraints(design, rotation)
 
-    def draw(faces: Faces) -> WorkspaceSurface:
-        shells, coarse_edge = colouring.shells(faces)
+    def draw(faces: Faces, *, holds: bool = False) -> WorkspaceSurface:
+        shells, coarse_edge = colouring.shells(faces, holds=holds)
         surface = WorkspaceSurface(request, shells, faces.edges, coarse_edge)
         if channel is not None:
             channel.send(surface)
@@ -206,11 +209,12 @@ def draw_workspace(request: WorkspaceRequest, channel: Channel | None = None) ->
         limits = (*limits, cut[2])
         shown = solid if part is None else cut_solid(solid, cut[2])
     if surface is None:
-        surface = draw(workspace_faces(limits) if part is None else creased_faces(shown))
+        faces = workspace_faces(limits) if part is None else creased_faces(shown)
+        surface = draw(faces, holds=held_volume is not None)
     if cut is not None and whole_extent is not None:
         cut_solids = (None, None) if part is None else (cut_solid(whole, cut[2]), shown)
         left_out = "load not held" if request.region == "held" else "not accessible"
-        mapped = slice_map(colouring, whole_extent, *cut[:2], *cut_solids, left_out)
+        mapped = slice_map(on_map, whole_extent, *cut[:2], *cut_solids, left_out)
     hull = convex_hull(solid) if request.hull and not solid.is_empty else None
     try:
         nodes = workspace_nodes(design, rotation)
@@ -233,7 +237,7 @@ def draw_workspace(request: WorkspaceRequest, channel: Channel | None = None) ->
         extent=extent,
         nodes=nodes,
         empty_because=measured.empty_because,
-        levels=colouring.bands.levels,
+        levels=on_map.bands.levels,
     )
 
 

@@ -75,7 +75,8 @@ def _part_words(state: State, drawing: WorkspaceDrawing, waiting: str) -> str:
     """Return the volume of the part of the workspace that is drawn, as HTML."""
     region, volume = drawing.request.region, drawing.part_volume
     if volume is None:
-        return f'<div class="ex-beyond">{nothing_words(drawing)}.</div>'
+        # The alert of the panel tells the trouble.
+        return dim(waiting.capitalize())
     if drawing.volume <= 0.0:
         return ""
     percent = 100.0 * volume / drawing.volume

@@ -30,16 +30,11 @@ from explorer.mechanism.machine import Tool
 from explorer.mechanism.pose import Pose, Triple, yaw_pitch_roll_from_rotation
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.colours import WARN_SHARE
+from explorer.statics.reactions import PART_NAMES
 from explorer.workspace.held import HeldWorkspace
 from explorer.workspace.position_bands import position_bands
 from explorer.workspace.solids.solid import Solid
 
-_PARTS = (
-    *(f"actuator {joint}" for joint in JOINTS),
-    *("the bending of strut 2", "the bending of strut 3"),
-    *("the force of carriage 2 across the guide", "the force of carriage 3 across the guide"),
-    *("the moment of carriage 2 on the guide", "the moment of carriage 3 on the guide"),
-)
 # Digits of forces and moments, and of directions.
 _MANY, _FEW = 4, 3
 
@@ -175,7 +170,7 @@ def _struts_and_guide(loads: ReportLoads) -> list[_Part]:
 
 
 def _verdict(data: ReportData, loads: ReportLoads) -> Element:
-    share, part, pose = loads.loaded.share, _PARTS[loads.loaded.worst], data.pose_words
+    share, part, pose = loads.loaded.share, PART_NAMES[loads.loaded.worst], data.pose_words
     if share > 1.0:
         words = f"The payload is not held in {pose}: {part} needs "
         return paragraph(words, percentage(share), " of its limit.", class_="note")
@@ -221,12 +216,12 @@ def _most(data: ReportData, loads: ReportLoads) -> Element:
     ]
     if data.case.limits_actuators:
         direction = _vector(loads.worst_direction.direction.tolist())
-        part = _PARTS[int(loads.worst_direction.actuator)]
+        part = PART_NAMES[int(loads.worst_direction.actuator)]
         rows.append(("its worst direction", direction, f"where {part} gives way first"))
     worst = loads.worst_payload_force
     if force and np.isfinite(worst.direction).all():
         direction = _vector(worst.direction.tolist())
-        remark = f"with the weight; {_PARTS[worst.part]} needs ", percentage(worst.share)
+        remark = f"with the weight; {PART_NAMES[worst.part]} needs ", percentage(worst.share)
         rows.append(
             ("worst direction of the payload’s force", direction, (*remark, " of its limit"))
         )
