@@ -18,7 +18,7 @@ from explorer.export.report.loads import ReportLoads
 from explorer.measures.case import Case
 from explorer.mechanism.design import JOINTS
 from explorer.numerics.arrays import FloatArray
-from explorer.statics.reactions import LIMITED
+from explorer.statics.reactions import LIMITED, PART_NAMES
 from explorer.statics.weights import design_weights
 from explorer.workspace.held import held_workspace
 
@@ -98,19 +98,23 @@ def test_report_loads_tables_hold_reactions_and_shares(seed: int) -> None:
 @pytest.mark.parametrize("seed", range(3))
 def test_report_loads_largest_payload_and_force_are_those_of_statics(seed: int) -> None:
     design = loaded_case(seed)
-    home, (push, pull) = explorer.home_pose(design), design.actuators.limits
+    home = explorer.home_pose(design)
     given = design, home.position, home.rotation
     tool = design.tool.position
     rows = table_of(page_of(design), "Most that is held")
-    most = np.minimum(push, pull)
     payload = explorer.largest_payload(*given, tool=tool)
     assert rows["payload"].values == [float(payload)]
-    assert rows["force in every direction"].values == [
-        float(explorer.largest_force(*given, most, tool))
-    ]
-    worst = explorer.worst_direction(*given, most, tool)
-    assert rows["its worst direction"].values == worst.direction.tolist()
-    assert f"actuator {JOINTS[int(worst.actuator)]}" in rows["its worst direction"].text
+    # In its worst direction the force takes a part to its limit, without a payload.
+    force = rows["force in every direction"].values[0]
+    direction = np.array(rows["its worst direction"].values)
+    bare = msgspec.structs.replace(design, payload=Payload())
+    held = explorer.reactions(*given, [*(force * direction), 0.0, 0.0, 0.0], tool)
+    shares = explorer.limit_shares(bare, held._replace(spread=np.zeros(12)))
+    assert shares.max() == pytest.approx(1.0, rel=1e-9)
+    assert PART_NAMES[int(shares.argmax())] in rows["its worst direction"].text
+    # The actuators alone hold no less.
+    most = explorer.largest_force(*given, np.minimum(*design.actuators.limits), tool)
+    assert force <= float(most) * (1.0 + 1e-12)
 
 
 @pytest.mark.parametrize("seed", range(6))

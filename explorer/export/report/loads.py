@@ -10,7 +10,6 @@ import numpy as np
 
 from explorer.measures.case import Case
 from explorer.mechanism.machine import Payload, Tool
-from explorer.statics.forces import WorstDirection, worst_direction
 from explorer.statics.loaded import LoadedPose, WorstForce
 
 
@@ -38,13 +37,6 @@ class ReportLoads:
         payload = msgspec.structs.replace(design.payload, force_n=0.0)
         weighed = msgspec.structs.replace(design, payload=payload)
         return LoadedPose(weighed, self.case.at, np.zeros(6)).worst_force(force)
-
-    @cached_property
-    def worst_direction(self) -> WorstDirection:
-        """The direction in which a force alone loads an actuator most."""
-        design, at = self.case.design, self.case.at
-        most = np.minimum(*design.actuators.limits)
-        return worst_direction(design, at.position, at.rotation, most, design.tool.position)
 
 
 def loads_of(case: Case) -> ReportLoads | None:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from explorer.app.features.feature import Services
 from explorer.app.features.forces.loads import Loads
-from explorer.app.features.forces.words import PARTS, share_look, share_words
+from explorer.app.features.forces.words import share_look, share_words
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.buttons import figure
+from explorer.statics.reactions import PART_NAMES
 
 
 class LoadFigure:
@@ -20,6 +21,6 @@ class LoadFigure:
         loaded = self._loads.of(frame)
         if not loaded.limited.any():
             return ""
-        hint = f"Largest share of a limit under the load of this tab: {PARTS[loaded.worst]}."
+        hint = f"Largest share of a limit under the load of this tab: {PART_NAMES[loaded.worst]}."
         look = f"ex-{share_look(loaded.share)}"
         return figure("Forces", "Load here", share_words(loaded.share), hint=hint, look=look)

@@ -14,7 +14,6 @@ from explorer.app.features.feature import Services
 from explorer.app.features.forces.actions import SetForce, rounded
 from explorer.app.features.forces.loads import Loads, NearestFeed
 from explorer.app.features.forces.words import (
-    PARTS,
     Share,
     larger,
     newtons,
@@ -47,6 +46,7 @@ from explorer.mechanism.tool_point import position_of
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import drop_rounding, format_column, format_decimals
 from explorer.statics.loaded import LoadedPose
+from explorer.statics.reactions import PART_NAMES
 
 WEIGHED: tuple[Weighed, ...] = get_args(Weighed)
 GO, WORST = "forces.go", "forces.worst"
@@ -187,7 +187,7 @@ def verdict(loaded: LoadedPose) -> Iterator[str]:
             "Give actuators, struts or the guide limits in the tab Machine to see their shares."
         )
         return
-    share, part = loaded.share, PARTS[loaded.worst]
+    share, part = loaded.share, PART_NAMES[loaded.worst]
     look = share_look(share)
     titles = {"within": "Holds the load", "close": "Holds the load, close to a limit"}
     yield status(titles.get(look, "Does not hold the load"), look)
@@ -263,7 +263,7 @@ def largest(frame: Frame, loaded: LoadedPose) -> Iterator[str]:
         ),
         row(
             dim("force in every direction"),
-            f"{newtons(1.0 / newton.share)}, then {dim(PARTS[newton.part])}"
+            f"{newtons(1.0 / newton.share)}, then {dim(PART_NAMES[newton.part])}"
             if newton.share
             else "no limit",
             hint="Largest force at the tool, alone, that all parts hold in every direction, and "
@@ -279,7 +279,7 @@ def largest(frame: Frame, loaded: LoadedPose) -> Iterator[str]:
     turn = press_button(WORST, "", "Turn", hint=WORST_HINT, class_name="ex-link")
     yield (
         f'<div class="ex-after">{dim("worst direction of this force")} {numbers}: '
-        f"{escape(PARTS[worst.part])} at {share_words(worst.share)} {turn}</div>"
+        f"{escape(PART_NAMES[worst.part])} at {share_words(worst.share)} {turn}</div>"
     )
 
 

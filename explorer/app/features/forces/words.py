@@ -7,18 +7,9 @@ import math
 
 from explorer.app.widgets.colours import GHOST, Rgb
 from explorer.app.widgets.markup import Look
-from explorer.mechanism.design import JOINTS
 from explorer.numerics.number_text import format_decimals, format_number
 from explorer.statics.loaded import LoadedPose
 from explorer.workspace.position_bands import SHARE_COLOURS, SHARES
-
-PARTS = (
-    *(f"actuator {joint}" for joint in JOINTS),
-    *("bending of strut 2", "bending of strut 3"),
-    *("carriage 2 across the guide", "carriage 3 across the guide"),
-    *("moment of carriage 2 on the guide", "moment of carriage 3 on the guide"),
-)
-"""Names of the parts with a limit, in the order of `explorer.statics.reactions.LIMITED`."""
 
 CLOSE = SHARES[-2]
 """Share of a limit from which a load is close to it."""
@@ -31,7 +22,7 @@ Share = float | None
 
 
 def shares_of(loaded: LoadedPose) -> list[Share]:
-    """Return the shares of the limits in the order of `PARTS`."""
+    """Return the shares of the limits in the order of `PART_NAMES`."""
     pairs = zip(loaded.shares.tolist(), loaded.limited.tolist(), strict=True)
     return [share if is_limited else None for share, is_limited in pairs]
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from explorer.app.features.feature import Services
 from explorer.app.features.forces.loads import Loads
-from explorer.app.features.forces.words import MOST, PARTS, share_look
+from explorer.app.features.forces.words import MOST, share_look
 from explorer.app.state.frame import Frame
 from explorer.app.state.paths import Journey
 from explorer.app.state.state import State
@@ -19,6 +19,7 @@ from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_decimals, format_number
 from explorer.paths.loads import DemandedLoad, LargestShare
 from explorer.statics.loaded import LoadedPose
+from explorer.statics.reactions import PART_NAMES
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,7 @@ def load_words(loads: JourneyLoads) -> str:
         words = f"Nothing holds a load {at}: singular" if share else "No part bears a load"
     else:
         number = format_number(100.0 * share, 3) if share < MOST else "∞"
-        words = f"Largest share {number} %: {PARTS[part]}, {at}"
+        words = f"Largest share {number} %: {PART_NAMES[part]}, {at}"
     return f'<div class="ex-{share_look(share)}">{escape(words)}</div>'
 
 

@@ -205,19 +205,19 @@ def _share_cell(part: _Part) -> Cell:
 
 def _most(data: ReportData, loads: ReportLoads) -> Element:
     loaded, force = loads.loaded, data.design.payload.force_n
-    besides = " besides its force" if force else ""
+    newton, besides = loaded.newton, " besides its force" if force else ""
     rows: list[Row] = [
         ("payload", _limit(loaded.largest_payload, "kg"), f"mass at the payload’s centre{besides}"),
         (
             "force in every direction",
-            _limit(loaded.largest_force, "N"),
-            "at the tool, held by the actuators alone, without a payload",
+            _limit(1.0 / newton.share if newton.share else math.inf, "N"),
+            "at the tool, held by all parts, without a payload",
         ),
     ]
-    if data.case.limits_actuators:
-        direction = _vector(loads.worst_direction.direction.tolist())
-        part = PART_NAMES[int(loads.worst_direction.actuator)]
-        rows.append(("its worst direction", direction, f"where {part} gives way first"))
+    if newton.share and np.isfinite(newton.direction).all():
+        direction = _vector(newton.direction.tolist())
+        remark = f"where {PART_NAMES[newton.part]} gives way first"
+        rows.append(("its worst direction", direction, remark))
     worst = loads.worst_payload_force
     if force and np.isfinite(worst.direction).all():
         direction = _vector(worst.direction.tolist())
