@@ -46,6 +46,11 @@ class Weights:
     rods: Quadruple = NOTHING
     rod_centres: Quadruple = NOTHING
 
+    @property
+    def has_legs(self) -> bool:
+        """Whether a carriage, a cylinder or a rod has a mass."""
+        return any((*self.carriages, *self.cylinders, *self.rods))
+
 
 @dataclass(frozen=True)
 class Carried:
@@ -106,20 +111,42 @@ def carry(
     r = np.asarray(rotation, dtype=np.float64)
     shift = np.zeros(3) if tool is None else rotate(r, finite_array("tool", tool, (3,)))
     g = STANDARD_GRAVITY * np.array(design.gravity)
+    if not weights.has_legs:
+        return _carry_on_platform(points, r, shift, weights, g)
     at_joints = _legs_at_joints(points, weights, g)
     ends = np.stack([points.b1, points.b2, points.b3, points.b4], axis=-2)
     arms = ends - points.b4[..., None, :] - shift[..., None, :]
     moment = np.cross(arms, at_joints).sum(axis=-2)
     force = at_joints.sum(axis=-2)
+    own, turning = _of_bodies(r, shift, weights, g)
+    force, moment = force + own, moment + turning
+    wrench = np.concatenate(np.broadcast_arrays(force, moment), axis=-1)
+    legs = np.outer(np.add(weights.cylinders, weights.rods), g)
+    legs += np.outer(np.where(ON_GUIDE, weights.carriages, 0.0), g)
+    return Carried(wrench, at_joints, _moments_along_guide(points, weights, g), legs)
+
+
+def _carry_on_platform(
+    points: AttachmentPoints, r: FloatArray, shift: FloatArray, weights: Weights, g: FloatArray
+) -> Carried:
+    """Return what the weights on the platform do, without those of the legs."""
+    batch = points.b4.shape[:-1]
+    wrench = np.concatenate(_of_bodies(r, shift, weights, g), axis=-1)
+    wrench = np.broadcast_to(wrench, np.broadcast_shapes(wrench.shape, (*batch, 6)))
+    return Carried(wrench, np.zeros((*batch, 4, 3)), np.zeros((*batch, 2)), np.zeros((4, 3)))
+
+
+def _of_bodies(
+    r: FloatArray, shift: FloatArray, weights: Weights, g: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return force and moment at the tool point of the weights on the platform, both (..., 3)."""
+    force, moment = np.zeros(3), np.zeros(3)
     for body in weights.on_platform:
         weight = body.mass_kg * g
         arm = rotate(r, np.array(body.centre)) - shift
         force = force + weight
         moment = moment + np.cross(arm, weight)
-    wrench = np.concatenate(np.broadcast_arrays(force, moment), axis=-1)
-    legs = np.outer(np.add(weights.cylinders, weights.rods), g)
-    legs += np.outer(np.where(ON_GUIDE, weights.carriages, 0.0), g)
-    return Carried(wrench, at_joints, _moments_along_guide(points, weights, g), legs)
+    return np.broadcast_to(force, moment.shape), moment
 
 
 def _legs_at_joints(points: AttachmentPoints, weights: Weights, g: FloatArray) -> FloatArray:

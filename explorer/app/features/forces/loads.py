@@ -71,7 +71,7 @@ class NearestFeed(Feed[NearestRequest, NearestDrawing]):
 
         def request_of(frame: Frame) -> NearestRequest | None:
             loaded = loads.of(frame)
-            if loaded.share <= 1.0 or not loaded.limited.any():
+            if not loaded.limited.any() or loaded.share <= 1.0:
                 return None
             return NearestRequest(
                 loaded.design,
