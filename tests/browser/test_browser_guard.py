@@ -39,6 +39,7 @@ from explorer.app.security.client_messages import (
 )
 from explorer.app.security.guard import MOST_WAITING, Guard
 from explorer.app.server import Running, start
+from explorer.app.state.frame import Frame
 from explorer.errors import ServerError
 from explorer.mechanism.design_file import PRESETS
 
@@ -361,8 +362,18 @@ def test_whatever_a_client_gives_any_control_the_state_stays_sound(
     assert np.isfinite(numbers).all()
 
 
-def test_a_flood_waits_in_the_network_and_not_in_memory(running: Running) -> None:
+def test_a_flood_waits_in_the_network_and_not_in_memory(
+    running: Running, monkeypatch: pytest.MonkeyPatch
+) -> None:
     session = running.page.session
+    # Slow enough that presses wait, however fast the machine is.
+    draw = running.page._draw  # pyright: ignore[reportPrivateUsage]
+
+    def draw_slowly(frame: Frame) -> None:
+        time.sleep(0.005)
+        draw(frame)
+
+    monkeypatch.setattr(session, "_draw", draw_slowly)
     most = 0
     with client_of(running) as client:
         client.read_until_quiet(0.3)
