@@ -11,16 +11,20 @@ import pytest
 from desk import CLIENT
 
 from explorer.app.features.feature import Feature, Services, StateCommand, Tab
+from explorer.app.features.forces.loads import WeightsFeed
 from explorer.app.features.listed import FEATURES
+from explorer.app.features.orientation.feeds import RangeFeed, TiltsFeed
 from explorer.app.inputs.bindings import At, Bound
 from explorer.app.inputs.controls import Control, Controls
 from explorer.app.scene.part import ScenePart
 from explorer.app.scene.placing import Placed
 from explorer.app.server import Running, start
+from explorer.app.session.feed import Feed
 from explorer.app.session.session import UNDO
 from explorer.app.state.actions import Set
 from explorer.app.state.frame import Frame
 from explorer.app.state.values import value_at, with_value
+from explorer.app.state.view import OrientationView
 from explorer.app.storage.study_folders import StudyFolders
 from explorer.app.storage.user_data import open_user_data
 from explorer.app.widgets.assigning import Update
@@ -215,5 +219,20 @@ def test_new_feature_appears_on_the_page_in_the_palette_and_in_the_scene(
         top = Placed(Frame(page.session.state)).points["b4"] + [0.0, 0.0, 70.0]
         assert tuple(ball.position) == pytest.approx(top.tolist())
         assert page.corners().max(axis=0)[2] == pytest.approx(top[2])
+    finally:
+        running.stop()
+
+
+def test_without_panels_the_scene_has_the_feeds_that_it_draws_of() -> None:
+    running = start(OPTIMAL, port=0, panels=False)
+    try:
+        page = running.page
+        page.session.do(Set("view.orientation", OrientationView(tilts=True, over="reachable")))
+        page.session.do(Set("view.forces.weighed", "payload and legs"))
+        page.session.wait_until_idle()
+        feeds: list[Feed[Any, Any]] = [
+            page.services.get(kind) for kind in (TiltsFeed, RangeFeed, WeightsFeed)
+        ]
+        assert all(feed.request is not None for feed in feeds)
     finally:
         running.stop()
