@@ -12,23 +12,22 @@ from explorer.cli.options import DesignOptions, JsonOptions, PoseOptions
 from explorer.cli.values import hint, load_numbers, not_negative
 from explorer.errors import InputError, NoAnswerError
 from explorer.mechanism.design import Design
+from explorer.mechanism.machine import Six
 from explorer.mechanism.margins import INCIDENCES, margins
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.statics.equilibrium import SINGULAR
-from explorer.statics.reactions import part_limits
+from explorer.statics.reactions import has_limits
 
 if TYPE_CHECKING:
     from explorer.workspace.held import HeldWorkspace
-
-Load = tuple[float, float, float, float, float, float]
 
 
 @dataclass(frozen=True, kw_only=True)
 class LoadOptions(JsonOptions, PoseOptions, DesignOptions):
     """The options for a load on the platform in a pose."""
 
-    load: Annotated[Load, load_numbers("--load"), hint("default: none")] = (
+    load: Annotated[Six, load_numbers("--load"), hint("default: none")] = (
         *(0.0, 0.0, 0.0),
         *(0.0, 0.0, 0.0),
     )
@@ -53,7 +52,7 @@ class LoadOptions(JsonOptions, PoseOptions, DesignOptions):
 
 
 def held_by(
-    design: Design, rotation: FloatArray, load: Load, tolerance: float | None
+    design: Design, rotation: FloatArray, load: Six, tolerance: float | None
 ) -> HeldWorkspace:
     """Return the part of the workspace of a design with limits that holds a load.
 
@@ -78,7 +77,7 @@ def check_limited(design: Design) -> None:
     Raises:
         InputError: The design has no limit that a load could exceed.
     """
-    if np.isinf(part_limits(design)).all():
+    if not has_limits(design):
         raise InputError(
             "the design limits neither its actuators nor its struts nor its guide, so that it "
             "holds any load: give its file a limit, such as actuators.push_n"

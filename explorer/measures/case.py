@@ -16,7 +16,7 @@ from explorer.mechanism.home import home_pose
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.jacobian import inverse_condition, jacobian
-from explorer.statics.reactions import part_limits
+from explorer.statics.reactions import has_limits
 from explorer.workspace.extremes import extent_of, least_margins
 from explorer.workspace.node_measures import DEFAULT_NODES, NodeMeasures, node_measures
 from explorer.workspace.slices.volume import NodeCount, Volume, workspace_nodes, workspace_volume
@@ -170,7 +170,7 @@ class Case:
     @property
     def is_limited(self) -> bool:
         """Whether the design limits forces or moments."""
-        return bool(np.isfinite(part_limits(self.design)).any())
+        return has_limits(self.design)
 
     @property
     def limits_actuators(self) -> bool:

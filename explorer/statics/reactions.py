@@ -138,6 +138,11 @@ def limited_parts(design: Design) -> BoolArray:
     return np.isfinite(np.concatenate([np.minimum(push, pull), _limits(design)]))
 
 
+def has_limits(design: Design) -> bool:
+    """Return whether an actuator, a strut or the guide of a design has a limit."""
+    return bool(limited_parts(design).any())
+
+
 def largest_payload(
     design: Design,
     position: ArrayLike,

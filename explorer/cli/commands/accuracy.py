@@ -13,7 +13,7 @@ from explorer.cli.load_options import LoadOptions, check_regular
 from explorer.cli.output import figure, figures, heading, pose_table, table
 from explorer.cli.values import hint, numbers
 from explorer.mechanism.design import JOINTS, Design
-from explorer.mechanism.machine import DIMENSIONS
+from explorer.mechanism.machine import DIMENSIONS, Six
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.statics.accuracy import Precision, ToolError, geometry_error, pose_precision
@@ -26,7 +26,6 @@ from explorer.statics.compliance import (
 )
 from explorer.statics.weights import carry, design_weights
 
-Six = tuple[float, float, float, float, float, float]
 ORDER = "l1 d1 d2 d3 d4 l4"
 PARTS = ("guide", "struts", "actuators")
 

@@ -10,11 +10,12 @@ from typing import Annotated, Any, Literal
 
 import tyro
 
-from explorer.cli.load_options import Load, held_by
+from explorer.cli.load_options import held_by
 from explorer.cli.options import DesignOptions, JsonOptions, PoseOptions
 from explorer.cli.values import OPTIONAL, hint, load_numbers, positive
 from explorer.errors import InputError, NoAnswerError
 from explorer.mechanism.design import Design
+from explorer.mechanism.machine import Six
 
 What = Literal["workspace", "hull", "mechanism", "simulation", "scene"]
 
@@ -53,7 +54,7 @@ class Export(JsonOptions, PoseOptions, DesignOptions):
     ] = None
     """Largest distance of the mesh from the true surface, in design units."""
 
-    load: Annotated[Load | None, load_numbers("--load"), OPTIONAL] = None
+    load: Annotated[Six | None, load_numbers("--load"), OPTIONAL] = None
     """Force in N and moment in N × unit at the tool, besides the payload: write the part of the
     workspace where it is held within the limits of actuators, struts and guide."""
 

@@ -13,6 +13,7 @@ from explorer.cli.output import figure, figures, finite, heading, pose_json, pos
 from explorer.cli.values import hint, numbers, positive
 from explorer.errors import InputError
 from explorer.mechanism.design import JOINTS, Design
+from explorer.mechanism.machine import Six
 from explorer.mechanism.pose import Pose, Triple
 from explorer.mechanism.tool_point import tool_position
 from explorer.statics.equilibrium import twists_of_actuators
@@ -20,8 +21,6 @@ from explorer.statics.forces import WorstDirection, worst_direction
 from explorer.statics.loaded import LoadedPose, WorstForce
 from explorer.statics.reactions import LIMITED, PART_NAMES
 from explorer.statics.weights import Weights
-
-Six = tuple[float, float, float, float, float, float]
 
 
 @dataclass(frozen=True)

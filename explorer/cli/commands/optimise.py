@@ -33,14 +33,13 @@ from explorer.cli.values import (
 from explorer.errors import InputError, NoAnswerError
 from explorer.mechanism.design import Design
 from explorer.mechanism.design_file import encode_design
+from explorer.mechanism.machine import Six
 from explorer.optimise.curves import CALLED
 
 if TYPE_CHECKING:
     from explorer.optimise.outcome import Outcome
     from explorer.optimise.problem import Box, Problem, Variable
     from explorer.optimise.record import Settings
-
-Six = tuple[float, float, float, float, float, float]
 
 _CORNERS = "x-low y-low z-low x-high y-high z-high"
 

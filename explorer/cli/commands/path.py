@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 import tyro
 
-from explorer.cli.load_options import Load, check_limited
+from explorer.cli.load_options import check_limited
 from explorer.cli.options import (
     DesignOptions,
     JsonOptions,
@@ -41,6 +41,7 @@ from explorer.cli.values import (
 from explorer.errors import InputError
 from explorer.mechanism.design import Design
 from explorer.mechanism.home import home_pose
+from explorer.mechanism.machine import Six
 from explorer.mechanism.pose import Pose, Quadruple, Triple
 from explorer.statics.reactions import LIMITED, PART_NAMES
 
@@ -111,7 +112,7 @@ class Path(JsonOptions, RadiiOptions, PointOptions, DesignOptions):
     ] = None
     """Azimuth, tilt and torsion of the platform at the end, in degrees."""
 
-    load: Annotated[Load | None, load_numbers("--load"), OPTIONAL] = None
+    load: Annotated[Six | None, load_numbers("--load"), OPTIONAL] = None
     """Force in N and moment in N × unit at the tool, along the axes of the base, besides the
     payload: the path holds them within the limits of actuators, struts and guide."""
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
 from explorer.cli.answers.workspace import WorkspaceMeasures
-from explorer.cli.load_options import Load, held_by
+from explorer.cli.load_options import held_by
 from explorer.cli.options import (
     DesignOptions,
     JsonOptions,
@@ -27,6 +27,7 @@ from explorer.cli.values import (
 from explorer.errors import InputError
 from explorer.measures.case import Case
 from explorer.mechanism.design import Design
+from explorer.mechanism.machine import Six
 from explorer.mechanism.pose import Pose, Triple, yaw_pitch_roll_from_rotation
 
 if TYPE_CHECKING:
@@ -90,7 +91,7 @@ class Workspace(JsonOptions, RadiiOptions, OrientationOptions, PointOptions, Des
     ] = None
     """Number of orientations: per range, of a tilt, or of all."""
 
-    load: Annotated[Load | None, load_numbers("--load"), OPTIONAL] = None
+    load: Annotated[Six | None, load_numbers("--load"), OPTIONAL] = None
     """Force in N and moment in N × unit at the tool, besides the payload: add the volume where it
     is held within the limits of actuators, struts and guide."""
 

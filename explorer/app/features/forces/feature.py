@@ -11,7 +11,6 @@ from explorer.app.features.forces.panel import ForcesPanel
 from explorer.app.features.forces.scene import ForcesScene, LoadHandle
 from explorer.app.features.forces.tasks import nearest_position, weights_of_parts
 
-
 FORCES = Feature(
     "forces",
     tabs=(Tab("analyse", "Forces", ForcesPanel, viser.Icon.ARROW_DOWN_CIRCLE),),

@@ -7,7 +7,7 @@ from explorer.app.features.forces.loads import Loads
 from explorer.app.features.forces.words import share_look, share_words
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.buttons import figure
-from explorer.statics.reactions import PART_NAMES
+from explorer.statics.reactions import PART_NAMES, has_limits
 
 
 class LoadFigure:
@@ -19,7 +19,7 @@ class LoadFigure:
     def __call__(self, frame: Frame) -> str:
         """Return the figure for a frame, as HTML."""
         loaded = self._loads.of(frame)
-        if not loaded.limited.any():
+        if not has_limits(loaded.design):
             return ""
         hint = f"Largest share of a limit under the load of this tab: {PART_NAMES[loaded.worst]}."
         look = f"ex-{share_look(loaded.share)}"

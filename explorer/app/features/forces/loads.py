@@ -9,7 +9,6 @@ from explorer.app.features.feature import Services
 from explorer.app.features.forces.tasks import (
     NearestDrawing,
     NearestRequest,
-    Six,
     WeightsDrawing,
     WeightsRequest,
     nearest_position,
@@ -18,7 +17,9 @@ from explorer.app.features.forces.tasks import (
 from explorer.app.session.feed import Feed
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
+from explorer.mechanism.machine import Six
 from explorer.statics.loaded import LoadedPose
+from explorer.statics.reactions import has_limits
 from explorer.statics.weights import Weights
 
 
@@ -71,7 +72,7 @@ class NearestFeed(Feed[NearestRequest, NearestDrawing]):
 
         def request_of(frame: Frame) -> NearestRequest | None:
             loaded = loads.of(frame)
-            if not loaded.limited.any() or loaded.share <= 1.0:
+            if not has_limits(loaded.design) or loaded.share <= 1.0:
                 return None
             return NearestRequest(
                 loaded.design,

@@ -46,7 +46,7 @@ from explorer.mechanism.tool_point import position_of
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import drop_rounding, format_column, format_decimals
 from explorer.statics.loaded import LoadedPose
-from explorer.statics.reactions import PART_NAMES
+from explorer.statics.reactions import PART_NAMES, has_limits
 
 WEIGHED: tuple[Weighed, ...] = get_args(Weighed)
 GO, WORST = "forces.go", "forces.worst"
@@ -181,7 +181,7 @@ def verdict(loaded: LoadedPose) -> Iterator[str]:
         yield status("Not every load is held here", "beyond")
         yield '<div class="ex-beyond">The pose is singular: the forces are infinite.</div>'
         return
-    if not loaded.limited.any():
+    if not has_limits(loaded.design):
         yield '<div class="ex-status">No limits are given</div>'
         yield dim(
             "Give actuators, struts or the guide limits in the tab Machine to see their shares."

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from explorer.mechanism.design import Design
+from explorer.mechanism.machine import Six
 from explorer.mechanism.pose import Pose
 from explorer.statics.loaded import LoadedPose
 from explorer.statics.weights import Weights
 from explorer.workspace.nearest_held import nearest_held
-
-Six = tuple[float, float, float, float, float, float]
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,6 @@ from explorer.app.features.orientation.panel import OrientationPanel
 from explorer.app.features.orientation.scene import OrientationScene
 from explorer.app.features.orientation.tasks import orientations_at, range_solid, tilts_at_nodes
 
-
 ORIENTATION = Feature(
     "orientation",
     tabs=(Tab("analyse", "Tilt", OrientationPanel, viser.Icon.COMPASS),),

@@ -19,7 +19,7 @@ from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_decimals, format_number
 from explorer.paths.loads import DemandedLoad, LargestShare
 from explorer.statics.loaded import LoadedPose
-from explorer.statics.reactions import PART_NAMES
+from explorer.statics.reactions import PART_NAMES, has_limits
 
 
 @dataclass(frozen=True)
@@ -48,12 +48,12 @@ class PathShares:
 
     def is_limited(self, frame: Frame) -> bool:
         """Return whether a part of the design has a limit."""
-        return bool(self._loads.of(frame).limited.any())
+        return has_limits(frame.state.design)
 
     def of(self, frame: Frame) -> JourneyLoads | None:
         """Return the shares along the path of a frame; None without a path or without limits."""
         journey, loaded = frame.state.journey, self._loads.of(frame)
-        if journey is None or not loaded.limited.any():
+        if journey is None or not has_limits(loaded.design):
             return None
         of_path = journey.kind, journey.design, journey.poses, journey.tool
         key = *of_path, loaded.load.tobytes(), loaded.weights

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from explorer.app.features.forces.tasks import Six, WeightsRequest, weights_of_parts
+from explorer.app.features.forces.tasks import WeightsRequest, weights_of_parts
 from explorer.app.state.view import Weighed
 from explorer.mechanism.design import Design
+from explorer.mechanism.machine import Six
 from explorer.mechanism.pose import Pose, Triple
 from explorer.paths.planning import PlannedPath, plan_path
 from explorer.statics.loaded import LoadedPose

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from explorer.app.features.feature import Services
 from explorer.app.features.forces.loads import load_of
-from explorer.app.features.workspace.load import has_limits, loaded_design
+from explorer.app.features.workspace.load import loaded_design
 from explorer.app.features.workspace.orientation import (
     workspace_rotation,
     workspace_rows,
@@ -21,6 +21,7 @@ from explorer.app.features.workspace.tasks import (
 )
 from explorer.app.session.feed import Feed
 from explorer.app.state.frame import Frame
+from explorer.statics.reactions import has_limits
 from explorer.workspace.position_bands import LOAD_WORDS
 
 

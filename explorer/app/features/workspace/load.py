@@ -7,7 +7,7 @@ import msgspec
 from explorer.app.scene.bands import Measure
 from explorer.app.state.state import State
 from explorer.mechanism.design import Design
-from explorer.statics.reactions import limited_parts
+from explorer.statics.reactions import has_limits
 
 
 def loaded_design(state: State) -> Design:
@@ -28,8 +28,3 @@ def map_measure(design: Design, colour: Measure, *, holds: bool) -> Measure:
         holds: Whether the part of the workspace that holds the load is shown.
     """
     return "share" if colour == "plain" and holds and has_limits(design) else colour
-
-
-def has_limits(design: Design) -> bool:
-    """Return whether an actuator, a strut or the guide has a limit."""
-    return bool(limited_parts(design).any())

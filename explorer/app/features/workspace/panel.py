@@ -14,7 +14,7 @@ from explorer.app.browser.viser_gaps import run_script
 from explorer.app.features.feature import Services
 from explorer.app.features.workspace.feed import WorkspaceFeed
 from explorer.app.features.workspace.files import tolerance_of
-from explorer.app.features.workspace.load import has_limits, map_measure
+from explorer.app.features.workspace.load import map_measure
 from explorer.app.features.workspace.orientation import workspace_pose
 from explorer.app.features.workspace.slice_map import Axis, level_within, map_picture
 from explorer.app.features.workspace.tasks import Region, WorkspaceDrawing
@@ -48,6 +48,7 @@ from explorer.app.widgets.commands import Key, shift
 from explorer.app.widgets.markup import alert, box, note, sentence
 from explorer.app.widgets.under_way import UnderWay
 from explorer.mechanism.pose import Pose, Triple
+from explorer.statics.reactions import has_limits
 from explorer.workspace.position_bands import LOAD_WORDS
 
 KEYS: Mapping[str, tuple[Key, ...]] = {

@@ -8,7 +8,6 @@ from collections.abc import Iterable
 import numpy as np
 
 from explorer.app.features.workspace.feed import WorkspaceFeed
-from explorer.app.features.workspace.load import has_limits
 from explorer.app.features.workspace.orientation import orientation_word, turned_suffix
 from explorer.app.features.workspace.reached import Reached
 from explorer.app.features.workspace.tasks import WorkspaceDrawing
@@ -36,6 +35,7 @@ from explorer.legs.clearance import pair_name
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import Triple
 from explorer.singularity.colours import BAND_EDGES, WARN_CONDITION, band_colours
+from explorer.statics.reactions import has_limits
 from explorer.workspace.accessible.workspace import PairCost
 from explorer.workspace.position_bands import LOAD_WORDS, SHARE_COLOURS, SHARES, STEP_COLOURS
 
