@@ -84,6 +84,11 @@ class Payload(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         _set(self, "centre", tuple(numbers("payload.centre", self.centre, 3)))
         _set(self, "force_n", not_negative("payload.force_n", self.force_n))
 
+    @property
+    def weight_n(self) -> float:
+        """Weight of the mass, in newtons."""
+        return self.mass_kg * STANDARD_GRAVITY
+
 
 class Actuators(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Data of the six actuators, each six numbers in the order of `JOINTS`.

@@ -83,7 +83,7 @@ def payload_wrench(design: Design, rotation: FloatArray) -> FloatArray:
         design: The manipulator.
         rotation: Platform to base, shape (3, 3).
     """
-    weight = design.payload.mass_kg * STANDARD_GRAVITY * np.array(design.gravity)
+    weight = design.payload.weight_n * np.array(design.gravity)
     arm = rotation @ (np.array(design.payload.centre) - design.tool.position)
     return np.concatenate([weight, np.cross(arm, weight)])
 

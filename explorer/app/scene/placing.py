@@ -15,6 +15,7 @@ import numpy as np
 
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
+from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
 
 # Approximate reach of a design in scene units.
@@ -103,6 +104,18 @@ class Placed:
     def offset(self) -> FloatArray:
         """The vector from b4 to that point in scene units, (3,)."""
         return self.scale * self.frame.state.offset(self.frame.snapshot.rotation)
+
+    @cached_property
+    def struts(self) -> tuple[FloatArray, FloatArray]:
+        """Base ends and platform ends of the four legs in scene units, each (4, 3)."""
+        p, on_guide = self.points, np.array([1.0, 0.0, 0.0])
+        bases = np.array([p["a1"], on_guide * p["b2"], on_guide * p["b3"], p["a3"]])
+        return bases, np.array([p["b1"], p["b2"], p["b3"], p["b4"]])
+
+    def on_platform(self, point: Triple) -> FloatArray:
+        """Return a point (3,) in scene units of one in the platform frame, in design units."""
+        turned = self.frame.snapshot.rotation @ np.array(point)
+        return self.points["b4"] + self.scale * turned
 
     @cached_property
     def reach(self) -> float:

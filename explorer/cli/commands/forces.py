@@ -204,7 +204,7 @@ def _largest(answer: Answer) -> str:
         rows.append(("worst direction", f"{direction}, of {actuator}"))
     newton = loaded.newton
     if newton.share:
-        force = f"{_newtons(1.0 / newton.share)}, then {PART_NAMES[newton.part]}"
+        force = f"{_newtons(1.0 / newton.share)}, limited by {PART_NAMES[newton.part]}"
         rows.append(("largest force in every direction by all parts", force))
     payload = loaded.largest_payload
     most = "no limit" if np.isinf(payload) else f"{figure(payload)} kg"

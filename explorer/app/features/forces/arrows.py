@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 import viser
 
-from explorer.app.scene.shapes import Instances, Rods, cone, turned_to
+from explorer.app.scene.shapes import Instances, Rods, cone, linear_colour, turned_to
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.colours import Rgb
 from explorer.numerics.arrays import FloatArray
@@ -56,8 +56,9 @@ class ForceArrows:
         necks = tails + units * (lengths - heads)
         drawn = lengths[:, 0] > NOTHING
         yield from self._shafts.between(tails, necks, np.where(drawn, SHAFT * size, NOTHING))
-        yield from self._shafts.colour(colours)
+        linear = [linear_colour(each) for each in colours]
+        yield from self._shafts.colour(linear)
         radii = np.minimum(HEAD * size, heads * HEAD / HEAD_LENGTH)
         scales = np.maximum(np.concatenate([radii, radii, heads], axis=1), NOTHING)
         yield from self._heads.place(necks, turned_to(vectors), scales)
-        yield from self._heads.colour(colours)
+        yield from self._heads.colour(linear)

@@ -263,7 +263,7 @@ def largest(frame: Frame, loaded: LoadedPose) -> Iterator[str]:
         ),
         row(
             dim("force in every direction"),
-            f"{newtons(1.0 / newton.share)}, then {dim(PART_NAMES[newton.part])}"
+            f"{newtons(1.0 / newton.share)}, limited by {dim(PART_NAMES[newton.part])}"
             if newton.share
             else "no limit",
             hint="Largest force at the tool, alone, that all parts hold in every direction, and "

@@ -28,12 +28,18 @@ from explorer.app.features.forces.words import (
 from explorer.app.scene.labels import add_label
 from explorer.app.scene.part import NO_POINTS, ScenePart
 from explorer.app.scene.placing import Placed, scene_scale
-from explorer.app.scene.shapes import NO_MESH, Rods, add_lines, add_translucent, of_one_colour
+from explorer.app.scene.shapes import (
+    NO_MESH,
+    Rods,
+    add_lines,
+    add_translucent,
+    linear_colour,
+    of_one_colour,
+)
 from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.colours import GHOST, Rgb
 from explorer.mechanism.design import JOINTS
-from explorer.mechanism.machine import STANDARD_GRAVITY
 from explorer.mechanism.pose import Triple
 from explorer.mechanism.tool_point import position_of
 from explorer.numerics.arrays import FloatArray
@@ -88,13 +94,13 @@ class ForcesScene(ScenePart):
         yield from self._draw_arrows(placed, loaded)
         if not holds:
             return
-        p = placed.points
-        feet = _feet(placed)
-        tips = np.array([p["b1"], p["b2"], p["b3"], p["b4"]])
+        feet, tips = placed.struts
         radius = np.full(4, SLEEVE_RADIUS * placed.thickness)
         shares = shares_of(loaded)
         yield from self._sleeves.between(feet, tips, radius)
-        yield from self._sleeves.colour([share_colour(shares[i]) for i in (0, 2, 4, 5)])
+        yield from self._sleeves.colour(
+            [linear_colour(share_colour(shares[i])) for i in (0, 2, 4, 5)]
+        )
         for index, leg in enumerate((2, 3)):
             yield from self._draw_bending(placed, loaded, index, leg)
         middles = 0.5 * (feet + tips)
@@ -116,7 +122,7 @@ class ForcesScene(ScenePart):
         return load_tip(placed)[None]
 
     def _draw_arrows(self, placed: Placed, loaded: LoadedPose) -> Iterator[Update]:
-        state, p = placed.frame.state, placed.points
+        state = placed.frame.state
         tails, vectors = np.zeros((8, 3)), np.zeros((8, 3))
         colours: list[Rgb] = [LOAD] * 8
         tool = tool_point(placed)
@@ -126,13 +132,12 @@ class ForcesScene(ScenePart):
         yield self._labels["load"], "position", tuple((tails[0] + vectors[0]).tolist())
         weight = weight_of(loaded)
         if weight > 0.0:
-            centre = placed.frame.snapshot.rotation @ np.array(state.design.payload.centre)
-            tails[1] = p["b4"] + placed.scale * centre
+            tails[1] = placed.on_platform(state.design.payload.centre)
             vectors[1] = reaction_vectors(placed, weight * np.array([state.design.gravity]))[0]
             yield self._labels["weight"], "text", f"weight {newtons(weight, 3)}"
             yield self._labels["weight"], "position", tuple((tails[1] + vectors[1]).tolist())
         if loaded.is_regular:
-            tips, feet = np.array([p["b1"], p["b2"], p["b3"], p["b4"]]), _feet(placed)
+            feet, tips = placed.struts
             tails[2:6], tails[6:8] = tips, feet[1:3]
             forces = np.zeros((6, 3))
             forces[:4] = loaded.held.joints
@@ -149,7 +154,7 @@ class ForcesScene(ScenePart):
     ) -> Iterator[Update]:
         """Yield the updates that draw the bending moment of strut 2 or 3 beside it."""
         design = placed.frame.state.design
-        foot, tip = _feet(placed)[leg - 1], placed.points[f"b{leg}"]
+        foot, tip = (ends[leg - 1] for ends in placed.struts)
         # With what the payload's force of any direction adds.
         moment = float(loaded.held.bending[index] + loaded.held.spread[6 + index])
         half = HALF_MOMENT * scale_of(placed) * design.reach
@@ -232,8 +237,7 @@ def has_force(placed: Placed) -> bool:
 
 def tool_point(placed: Placed) -> FloatArray:
     """Return the tool point in the scene, shape (3,)."""
-    state = placed.frame.state
-    return placed.scale * np.array(position_of(state.design, state.pose, "tool"))
+    return placed.on_platform(placed.frame.state.design.tool.position)
 
 
 def load_tip(placed: Placed) -> FloatArray:
@@ -244,7 +248,7 @@ def load_tip(placed: Placed) -> FloatArray:
 
 def weight_of(loaded: LoadedPose) -> float:
     """Return the weight of the payload, in N, that counts."""
-    return loaded.design.payload.mass_kg * STANDARD_GRAVITY if loaded.weighs_payload else 0.0
+    return loaded.design.payload.weight_n if loaded.weighs_payload else 0.0
 
 
 def reaction_vectors(placed: Placed, forces: FloatArray) -> FloatArray:
@@ -260,16 +264,9 @@ def scale_of(placed: Placed) -> float:
     if has_force(placed):
         return state.view.forces.scale
     # Without a force the payload's weight tells how large forces are.
-    weight = state.design.payload.mass_kg * STANDARD_GRAVITY
-    return fitting_scale(weight, state.view.forces.scale)
+    return fitting_scale(state.design.payload.weight_n, state.view.forces.scale)
 
 
 def _told(share: Share) -> str:
     """Return what a label adds of a share."""
     return "" if share is None else f" · {share_words(share)}"
-
-
-def _feet(placed: Placed) -> FloatArray:
-    """Return where the four struts begin in the scene, shape (4, 3)."""
-    p, on_guide = placed.points, np.array([1.0, 0.0, 0.0])
-    return np.array([p["a1"], on_guide * p["b2"], on_guide * p["b3"], p["a3"]])

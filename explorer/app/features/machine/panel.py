@@ -26,7 +26,7 @@ from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.commands import NO_OPTION
 from explorer.app.widgets.markup import box, note
 from explorer.mechanism.design import JOINTS
-from explorer.mechanism.machine import STANDARD_GRAVITY, Six, Struts
+from explorer.mechanism.machine import Six, Struts
 from explorer.numerics.number_text import format_number
 
 Side = Literal["push", "pull"]
@@ -91,12 +91,12 @@ class MachinePanel:
         state = frame.state
         design = state.design
         yield self._summary, "content", box(_with_units(machine_words(design)))
-        mass = design.payload.mass_kg
-        yield self._weight, "visible", mass > 0.0
+        weight = design.payload.weight_n
+        yield self._weight, "visible", weight > 0.0
         yield (
             self._weight,
             "content",
-            note(f"Its weight is {format_number(mass * STANDARD_GRAVITY)} N."),
+            note(f"Its weight is {format_number(weight)} N."),
         )
         yield self._alike, "visible", not (_are_alike(state, "push") and _are_alike(state, "pull"))
         yield self._each, "visible", _is_limited(state)

@@ -15,7 +15,6 @@ from explorer.app.scene.placing import Placed
 from explorer.app.scene.shapes import Rods, add_lines, add_translucent, linear_colour, sphere
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.colours import GHOST, Rgb
-from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray
 from explorer.numerics.number_text import format_number
 
@@ -62,7 +61,7 @@ class ToolScene(ScenePart):
         """Return the corners of a cube about the tool point."""
         if not is_tool_shown(placed):
             return NO_POINTS
-        return around(in_scene(placed, placed.frame.state.design.tool.position)[None])
+        return around(placed.on_platform(placed.frame.state.design.tool.position)[None])
 
 
 class PayloadScene(ScenePart):
@@ -97,7 +96,7 @@ class PayloadScene(ScenePart):
         payload = placed.frame.state.design.payload
         radius = ball_radius(payload.mass_kg)
         ends = radius * np.concatenate([np.eye(3), -np.eye(3)])
-        return in_scene(placed, payload.centre) + ends
+        return placed.on_platform(payload.centre) + ends
 
 
 def ball_radius(mass: float) -> float:
@@ -114,12 +113,6 @@ def is_tool_shown(placed: Placed) -> bool:
 def is_payload_shown(placed: Placed) -> bool:
     """Whether the design has a payload with a mass, and it is drawn."""
     return _is_shown(placed) and placed.frame.state.design.payload.mass_kg > 0.0
-
-
-def in_scene(placed: Placed, point: Triple) -> FloatArray:
-    """Return a point (3,) in scene units of one in the platform frame in design units."""
-    turned = placed.frame.snapshot.rotation @ np.array(point)
-    return placed.points["b4"] + placed.scale * turned
 
 
 def _is_shown(placed: Placed) -> bool:

@@ -84,10 +84,7 @@ class Legs(ScenePart):
             yield from part.show(visible)
         if not visible:
             return
-        p, size = placed.points, placed.thickness
-        d1, d3 = p["b2"] * [1.0, 0.0, 0.0], p["b3"] * [1.0, 0.0, 0.0]
-        bases = np.array([p["a1"], d1, d3, p["a3"]])
-        tips = np.array([p["b1"], p["b2"], p["b3"], p["b4"]])
+        size, (bases, tips) = placed.thickness, placed.struts
         yield from self._actuators.along(placed, bases, tips)
         yield from self._actuators.colour_alarms(colliding_legs(placed.frame.snapshot))
         yield from self._balls.at(
@@ -95,7 +92,7 @@ class Legs(ScenePart):
             size * np.array([BALL_RADIUS] * 4 + [1.2 * TUBE_RADIUS] * 2),
         )
         yield from self._joint_rods(bases, tips, size)
-        yield from self._guide_boxes(placed, d1, d3, size)
+        yield from self._guide_boxes(placed, bases[1], bases[2], size)
 
     def _joint_rods(self, bases: FloatArray, tips: FloatArray, size: float) -> Iterator[Update]:
         starts: list[FloatArray] = []
