@@ -36,7 +36,7 @@ from explorer.paths.taylor_models import (
     turning,
 )
 from explorer.statics.equilibrium import A3X, A3Y, B1X, B1Y, B2, B3, column, is_singular
-from explorer.workspace.limits.valid_moves import move_by_arm, write_pose_at, write_turn
+from explorer.workspace.limits.valid_moves import move_by_arm, write_line, write_pose_at, write_turn
 
 # Columns of the row of a machine and its load after the design variables: the point of the load in
 # platform coordinates, the load there, the force of any direction, the first moment and the weight
@@ -313,15 +313,11 @@ def share_rows_of_moves(
             share of all evaluated poses; and the share of the move at which it occurs.
     """
     p, r, axis, step = np.empty(3), np.empty((3, 3)), np.empty(3), np.empty(3)
-    first, last = np.empty(3), np.empty(3)
+    first = np.empty(3)
     middles, halves = np.empty(DEEPEST), np.empty(DEEPEST)
     for index in range(start.shape[0]):
-        for i in range(3):
-            first[i], last[i] = start[index, i], end[index, i]
-        move_by_arm(1.0, start_rotation[index], tool, first)
-        move_by_arm(1.0, end_rotation[index], tool, last)
-        for i in range(3):
-            step[i] = last[i] - first[i]
+        write_line(start[index], start_rotation[index], end[index], end_rotation[index], tool,
+                   first, step)  # fmt: skip
         angle = write_turn(start_rotation[index], end_rotation[index], axis)
         best, best_at, largest_bound, examined, queued = -1.0, 0.0, 0.0, 0, 1
         middles[0], halves[0] = 0.5, 0.5

@@ -16,6 +16,7 @@ from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.statics.equilibrium import twists_of_actuators
 from explorer.statics.reactions import (
     Reactions,
+    has_limits,
     largest_payload,
     limit_shares,
     limited_parts,
@@ -133,6 +134,8 @@ class LoadedPose:
         rows = twists[:3].T
         if not np.isfinite(rows).all():
             return WorstForce(np.full(3, np.nan), self.worst, np.inf)
+        if not has_limits(design):
+            return WorstForce(np.full(3, np.nan), 0, 0.0)
         sizes = np.linalg.norm(rows, axis=1)
         units = rows[sizes > 0.0] / sizes[sizes > 0.0, None]
         directions = np.concatenate([units, -units])

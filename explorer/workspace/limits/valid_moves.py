@@ -163,6 +163,28 @@ def move_by_arm(share: float, r: FloatArray, arm: FloatArray, p: FloatArray) -> 
         p[i] += share * (r[i, 0] * arm[0] + r[i, 1] * arm[1] + r[i, 2] * arm[2])
 
 
+@helper
+def write_line(
+    start: FloatArray,
+    start_rotation: FloatArray,
+    end: FloatArray,
+    end_rotation: FloatArray,
+    tool: FloatArray,
+    first: FloatArray,
+    step: FloatArray,
+) -> None:
+    """Write where the tool starts on a straight move, and how far it goes, shape (3,) each.
+
+    Start and end are positions of b4; the tool is in platform coordinates.
+    """
+    for i in range(3):
+        first[i], step[i] = start[i], end[i]
+    move_by_arm(1.0, start_rotation, tool, first)
+    move_by_arm(1.0, end_rotation, tool, step)
+    for i in range(3):
+        step[i] -= first[i]
+
+
 @kernel(
     "void(f8[::1], f8[:,::1], f8[:,::1], f8[:,:,::1], f8[:,::1], f8[:,:,::1], f8[::1], f8, b1[::1])"
 )
@@ -183,7 +205,7 @@ def valid_move_rows(
     """
     base, ends, p, r = np.zeros((4, 3)), np.zeros((4, 3)), np.zeros(3), np.zeros((3, 3))
     step, axis, speeds = np.zeros(3), np.zeros(3), np.zeros(SPEEDS)
-    first, last = np.zeros(3), np.zeros(3)
+    first = np.zeros(3)
     reach, least = math.hypot(row[0], row[1]), LEAST_SHARE * tolerance
     for index in range(start.shape[0]):
         valid[index] = False
@@ -191,12 +213,8 @@ def valid_move_rows(
             continue
         if not is_valid(row, cones, start[index], start_rotation[index], base, ends):
             continue
-        for i in range(3):
-            first[i], last[i] = start[index, i], end[index, i]
-        move_by_arm(1.0, start_rotation[index], tool, first)
-        move_by_arm(1.0, end_rotation[index], tool, last)
-        for i in range(3):
-            step[i] = last[i] - first[i]
+        write_line(start[index], start_rotation[index], end[index], end_rotation[index], tool,
+                   first, step)  # fmt: skip
         angle = write_turn(start_rotation[index], end_rotation[index], axis)
         write_speeds(row, first, start_rotation[index], step, axis, angle, tool, speeds)
         t = 0.0
