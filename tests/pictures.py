@@ -16,6 +16,7 @@ from tempfile import TemporaryDirectory
 
 import msgspec
 import numpy as np
+from machines import PRESS
 from playwright.sync_api import Browser, FloatRect, Page
 
 from explorer.app.browser.headless import headless_browser
@@ -44,7 +45,6 @@ from explorer.app.state.view import (
 from explorer.app.storage.study_folders import StudyFolders
 from explorer.mechanism.design import JOINTS
 from explorer.mechanism.design_file import PRESETS
-from explorer.mechanism.machine import Actuators, Guide, Payload, Struts, Tool
 from explorer.mechanism.pose import Pose
 from explorer.optimise.paper import CLEARANCE, PAPER_VOLUME, paper_start
 from explorer.sweep.results import load_results
@@ -63,18 +63,6 @@ REPORT_STYLE = (
     "img{width:400px;box-shadow:0 1px 6px rgb(28 37 48/.25)}"
 )
 
-# The same with a machine around it, such as that of the manual's page on loads.
-LOADED = msgspec.structs.replace(
-    DESIGN,
-    tool=Tool((1.0, 0.0, 2.0)),
-    payload=Payload(0.5, (1.0, 0.0, 1.0)),
-    actuators=Actuators(
-        push_n=(150.0, 200.0, 150.0, 200.0, 150.0, 150.0),
-        pull_n=(120.0, 200.0, 120.0, 200.0, 120.0, 120.0),
-    ),
-    struts=Struts(outer_mm=8.0, inner_mm=6.0, stress_mpa=200.0),
-    guide=Guide(force_n=200.0, moment_nm=6.0),
-)
 LOAD = ForcesView(force=(0.0, 0.0, -40.0))
 
 # The mechanism without what would hide the workspace, or hide in it.
@@ -179,7 +167,7 @@ SCENES = {
     ),
     "forces": Scene(
         actions=(
-            Open(LOADED),
+            Open(PRESS),
             SetPosition(2, 6.0),
             Set(
                 "view",
@@ -197,7 +185,7 @@ SCENES = {
     # Shares grow beyond all bounds towards the base plane.
     "load-share": Scene(
         actions=(
-            Open(LOADED),
+            Open(PRESS),
             Set(
                 "view",
                 replace(
@@ -213,7 +201,7 @@ SCENES = {
     ),
     "held": Scene(
         actions=(
-            Open(LOADED),
+            Open(PRESS),
             Set(
                 "view",
                 replace(BARE, forces=LOAD, workspace=WorkspaceView(solid=True, region="held")),
@@ -241,7 +229,7 @@ SCENES = {
         size=(1280, 1000),
     ),
     "machine": Scene(
-        actions=(Open(LOADED), Set("view", View(handle=False))), panels=True, tab="Machine"
+        actions=(Open(PRESS), Set("view", View(handle=False))), panels=True, tab="Machine"
     ),
     # What is left of the paper's optimum when a3 comes nearer, beside both rows of Table 1.
     "compare": Scene(

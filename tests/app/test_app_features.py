@@ -15,7 +15,8 @@ from explorer.app.features.forces.loads import WeightsFeed
 from explorer.app.features.listed import FEATURES
 from explorer.app.features.orientation.feeds import RangeFeed, TiltsFeed
 from explorer.app.inputs.bindings import At, Bound
-from explorer.app.inputs.controls import Control, Controls
+from explorer.app.inputs.control import Control
+from explorer.app.inputs.controls import Controls
 from explorer.app.scene.part import ScenePart
 from explorer.app.scene.placing import Placed
 from explorer.app.server import Running, start

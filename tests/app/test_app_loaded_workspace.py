@@ -14,15 +14,15 @@ import pytest
 import trimesh
 from desk import CLIENT, Desk
 from mesh_files import mesh_of, read_3mf
-from services import StubDownloads, StubWorker, services_for
+from services import StubDownloads, services_for
+from workspace_feeds import drawing_of, follow
 
 from explorer.app.features.feature import Services
-from explorer.app.features.workspace.feature import WORKSPACE
 from explorer.app.features.workspace.feed import WorkspaceFeed, workspace_request
 from explorer.app.features.workspace.files import FORMATS, WorkspaceFiles
 from explorer.app.features.workspace.panel import COLOUR, WorkspacePanel
 from explorer.app.features.workspace.slice_map import map_picture
-from explorer.app.features.workspace.tasks import STEP, WorkspaceDrawing, export_mesh
+from explorer.app.features.workspace.tasks import STEP, export_mesh
 from explorer.app.features.workspace.words import drawing_words, legend, load_words
 from explorer.app.scene.bands import AT_LIMIT, PLAIN
 from explorer.app.state.actions import Open, Set
@@ -61,23 +61,6 @@ def shown(design: Design = LOADED, forces: ForcesView = FORCES, **changes: Any) 
     view = opened(design).view
     workspace = replace(view.workspace, solid=True, **changes)
     return Set("view", replace(view, forces=forces, workspace=workspace)).apply(opened(design))
-
-
-def follow(services: Services, state: State) -> None:
-    """Have both feeds of the workspace request and get what a state needs."""
-    worker = services.worker
-    assert isinstance(worker, StubWorker)
-    for kind in WORKSPACE.feeds:
-        services.get(kind).follow(Frame(state))
-    worker.work()
-
-
-def drawing_of(state: State) -> WorkspaceDrawing:
-    services = services_for()
-    follow(services, state)
-    drawing = services.get(WorkspaceFeed).drawing
-    assert drawing is not None
-    return drawing
 
 
 def shares_at(design: Design, points: FloatArray, rotation: FloatArray) -> FloatArray:

@@ -13,16 +13,15 @@ import msgspec
 import numpy as np
 import pytest
 from desk import CLIENT, Desk, thick
-from services import StubDownloads, StubWorker, services_for
+from services import StubDownloads, services_for
+from workspace_feeds import drawing_of, follow
 
 from explorer.app.features.feature import Services
-from explorer.app.features.workspace.feature import WORKSPACE
 from explorer.app.features.workspace.feed import WorkspaceFeed
 from explorer.app.features.workspace.files import FORMATS, WorkspaceFiles
 from explorer.app.features.workspace.orientation import workspace_rotation
 from explorer.app.features.workspace.panel import CUTS, KEYS, SHOWN, WorkspacePanel
 from explorer.app.features.workspace.slice_map import cut_loops, map_picture
-from explorer.app.features.workspace.tasks import WorkspaceDrawing
 from explorer.app.features.workspace.volume import VolumeFeed
 from explorer.app.features.workspace.words import deviation_text, legend, volume_headline
 from explorer.app.session.history import History
@@ -53,24 +52,6 @@ AXES: tuple[Axis, ...] = ("x", "y", "z")
 
 def shown(state: State, **changes: Any) -> State:
     return Set("view.workspace", replace(state.view.workspace, **changes)).apply(state)
-
-
-def follow(services: Services, state: State) -> StubWorker:
-    """Have both feeds of the workspace request and get what a state needs."""
-    worker = services.worker
-    assert isinstance(worker, StubWorker)
-    for kind in WORKSPACE.feeds:
-        services.get(kind).follow(Frame(state))
-    worker.work()
-    return worker
-
-
-def drawing_of(state: State) -> WorkspaceDrawing:
-    services = services_for()
-    follow(services, state)
-    drawing = services.get(WorkspaceFeed).drawing
-    assert drawing is not None
-    return drawing
 
 
 # The volume

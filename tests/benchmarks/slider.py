@@ -15,14 +15,14 @@ from dataclasses import dataclass, replace
 from itertools import chain
 from typing import Any
 
-import msgspec
+from machines import PRESS
 
 from benchmarks.ready_page import ready_page
 from benchmarks.samples import DESIGN
 from benchmarks.socket_client import Drag, HandleDrag, SliderDrag, dragging_process, sweep
 from benchmarks.table import Row, seconds
 from benchmarks.timing import Spread
-from explorer import Actuators, Guide, Payload, Pose, Struts, Tool
+from explorer import Pose
 from explorer.app.features.mechanism.pose_panel import JOINT_LABELS
 from explorer.app.scene.placing import scene_scale
 from explorer.app.server import Running
@@ -31,14 +31,6 @@ from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Assigner, Update
 
 ROUNDS, EVENTS, WARM_UP_EVENTS = 3, 100, 20
-LOADED = msgspec.structs.replace(
-    DESIGN,
-    tool=Tool((1.0, 0.0, 2.0)),
-    payload=Payload(0.5, (1.0, 0.0, 1.0), 5.0),
-    actuators=Actuators(push_n=(150, 200, 150, 200, 150, 150)),
-    struts=Struts(moment_nm=6.0),
-    guide=Guide(force_n=200.0, moment_nm=6.0),
-)
 
 
 @dataclass(frozen=True)
@@ -196,7 +188,7 @@ def measure() -> dict[str, list[Stopwatch]]:
         # The kinds take turns, so that no disturbance falls on one alone.
         for events in (WARM_UP_EVENTS, *[EVENTS] * ROUNDS):
             for kind in KINDS:
-                session.do(Open(LOADED if kind.is_loaded else DESIGN))
+                session.do(Open(PRESS if kind.is_loaded else DESIGN))
                 session.do(Set("view.forces.shown", kind.is_loaded))
                 session.wait_until_idle()
                 stopwatch = Stopwatch(kind)

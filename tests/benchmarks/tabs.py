@@ -24,7 +24,7 @@ from benchmarks.socket_client import PLATFORM, Seen, SliderDrag, dragging_proces
 from benchmarks.table import Row, seconds
 from benchmarks.timing import Spread
 from explorer.app.features.mechanism.pose_panel import JOINT_LABELS
-from explorer.app.inputs.controls import Slider
+from explorer.app.inputs.control import Slider
 from explorer.app.server import Running
 from explorer.app.session.session import Session
 from explorer.app.state.state import State

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 import msgspec
 import numpy as np
 import pytest
+from machines import FULL
 from playwright.sync_api import Browser, Locator, expect
 from tab import Tab
 
@@ -19,7 +20,7 @@ from explorer.app.screenshot import PATIENCE_SECONDS
 from explorer.app.server import Running
 from explorer.app.state.actions import Open, Set, SetVariable
 from explorer.mechanism.design_file import PRESETS
-from explorer.mechanism.machine import Actuators, Guide, Payload, Struts, Tool
+from explorer.mechanism.machine import Tool
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import rotation_from_yaw_pitch_roll
 from explorer.numerics.number_text import format_number
@@ -157,16 +158,6 @@ def test_page_computes_margins_and_conditioning_as_the_library_does(tab: Tab) ->
     np.testing.assert_allclose(computed, expected, rtol=1e-9, atol=1e-12)
 
 
-LOADED = msgspec.structs.replace(
-    OPTIMAL,
-    tool=Tool((1.0, -1.0, 2.0)),
-    payload=Payload(2.0, (1.0, 2.0, 3.0), 4.0),
-    actuators=Actuators(push_n=(60, 50, 40, 50, 45, 70), pull_n=(30, 40, 50, 60, 70, 80)),
-    struts=Struts(moment_nm=4.0),
-    guide=Guide(force_n=70.0),
-)
-
-
 def test_page_computes_what_a_load_asks_as_the_library_does(tab: Tab) -> None:
     rng = np.random.default_rng(3)
     load = np.array([4.0, -3.0, -6.0, 5.0, 10.0, -5.0])
@@ -179,11 +170,11 @@ def test_page_computes_what_a_load_asks_as_the_library_does(tab: Tab) -> None:
             # Near a singular position, or at one.
             position[2] = (0.0, 1e-6, 1e-3)[trial % 3]
         measure: PositionMeasure = tuple(LOAD_WORDS)[trial % 3]
-        colouring = Colouring(LOADED, rotation, measure, 1.0, load)
+        colouring = Colouring(FULL, rotation, measure, 1.0, load)
         held = colouring.bands.held
         assert held is not None
         share = float(largest_shares(held, rotation, position[None])[0])
-        names = part_names(LOADED) if measure == "share" else PART_NAMES
+        names = part_names(FULL) if measure == "share" else PART_NAMES
         part = names[int(held_values(held, rotation, position[None])[1][0])]
         expected.append((share, part))
         cases.append({"facts": map_facts(colouring), "p": position.tolist()})
@@ -206,7 +197,7 @@ def test_page_computes_what_a_load_asks_as_the_library_does(tab: Tab) -> None:
 
 def test_map_of_shares_is_read_under_the_pointer(tab: Tab) -> None:
     page = tab.running.page
-    page.session.do(Open(LOADED))
+    page.session.do(Open(FULL))
     page.session.do(Set("view.workspace.colour", "share"))
     tab.turn_to("Workspace")
     tab.push("y")
@@ -225,10 +216,10 @@ def test_map_of_shares_is_read_under_the_pointer(tab: Tab) -> None:
     assert drawing.request.load is not None
     at = np.array([number(where[1]), drawing.level, number(where[2])])
     rotation = np.array(drawing.request.rotation)
-    held = held_load(LOADED, rotation, np.array(drawing.request.load))
+    held = held_load(FULL, rotation, np.array(drawing.request.load))
     share = float(largest_shares(held, rotation, at[None])[0])
     assert 0.01 * float(found[1].replace(",", "")) == pytest.approx(share, rel=0.02)
-    assert found[2] in part_names(LOADED)
+    assert found[2] in part_names(FULL)
 
 
 def test_reading_stays_while_the_map_is_drawn_anew(tab: Tab) -> None:

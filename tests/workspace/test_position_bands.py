@@ -7,15 +7,11 @@ from typing import Any
 import msgspec
 import numpy as np
 import pytest
+from machines import FULL
 
 from explorer import (
     PRESETS,
-    Actuators,
     Design,
-    Guide,
-    Payload,
-    Struts,
-    Tool,
     limit_shares,
     reactions,
 )
@@ -38,12 +34,7 @@ MEASURES: tuple[PositionMeasure, ...] = tuple(LOAD_WORDS)
 
 OPTIMAL = PRESETS["paper-optimal"]
 LOADED = msgspec.structs.replace(
-    OPTIMAL,
-    tool=Tool((1.0, -1.0, 2.0)),
-    payload=Payload(2.0, (1.0, 2.0, 3.0), 4.0),
-    actuators=Actuators(push_n=(60, 50, 40, 50, 45, 70), pull_n=(30, 40, 50, 60, 70, 80)),
-    struts=Struts(moment_nm=4.0),
-    guide=Guide(force_n=70.0, moment_nm=5.0),
+    FULL,
     unit_mm=8.0,
     # Singular planes pass through a workspace in which any signs of the margins are allowed.
     limits=Limits(box=((0.0, -12.0, -10.0), (20.0, 22.0, 18.0)), margin=None),

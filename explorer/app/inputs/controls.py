@@ -1,20 +1,16 @@
-"""Controls bound to the state: each reads its value from a frame and turns changes into actions.
-
-A control posts only that it was changed; its value is read when the session handles the change. A
-value is assigned to a control only if it differs from the one that the user just set, so that a
-slider never moves under the pointer.
-"""
+"""Makes the controls of a panel and keeps them in step with the state."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any, Generic, Literal, cast
+from typing import Any, Literal
 
 import viser
 
-from explorer.app.browser.viser_gaps import Mark, SliderMarks
+from explorer.app.browser.viser_gaps import Mark
 from explorer.app.inputs.bindings import Bound, Source, Value, bound_to
-from explorer.app.inputs.tracks import Intervals, Span, Track, decimals, tint_marks
+from explorer.app.inputs.control import Condition, Control, Ends, Number, Slider
+from explorer.app.inputs.tracks import Intervals, Span
 from explorer.app.session.session import Session
 from explorer.app.state.action import Action
 from explorer.app.state.frame import Frame
@@ -22,170 +18,11 @@ from explorer.app.state.state import State
 from explorer.app.widgets.assigning import Update
 from explorer.mechanism.design import Pair
 from explorer.mechanism.pose import Triple
-from explorer.numerics.number_text import drop_rounding
 
 # Colour of viser by which the stylesheet tells the main button of a tab from the others.
 MAIN: Literal["blue"] = "blue"
 # Decimals of a field in which values far below its step count.
 MOST_DECIMALS = 9
-Condition = Callable[[State], bool]
-"""A function that tells whether a condition holds in a state."""
-
-
-class Control(Generic[Value]):
-    """An input of the page, bound to the state.
-
-    Args:
-        session: Session to which changes are posted.
-        handle: The input.
-        bound: Binding of its value.
-        disabled: Condition in which it is disabled; None for never.
-        visible: Condition in which it is visible; None for always.
-    """
-
-    def __init__(
-        self,
-        session: Session,
-        handle: viser.GuiInputHandle[Value],
-        bound: Bound[Value],
-        *,
-        disabled: Condition | None = None,
-        visible: Condition | None = None,
-    ) -> None:
-        self.handle = handle
-        self._session = session
-        self._bound = bound
-        self._disabled = disabled
-        self._visible = visible
-        self._last_value: Value | None = None
-        # Whether the last value came from the control itself.
-        self._is_set_here = False
-        handle.on_update(self._post_change)
-
-    # A coroutine runs on the thread that reads messages, so that changes and presses keep their
-    # order.
-    async def _post_change(self, event: viser.GuiEvent[Any]) -> None:
-        # Assignments by the explorer itself have no client.
-        if event.client_id is None:
-            return
-        self._session.post(
-            self, self._change, stamp=self.handle.update_timestamp, who=event.client_id
-        )
-
-    def _change(self, state: State) -> Action:
-        self._last_value = self.handle.value
-        self._is_set_here = True
-        return self._bound.write(state, self._last_value)
-
-    def updates(self, frame: Frame) -> Iterator[Update]:
-        """Yield the updates that make the control show the frame."""
-        yield from self._show(frame.state, self._bound.read(frame))
-
-    def _show(self, state: State, value: Value) -> Iterator[Update]:
-        if self._disabled is not None:
-            yield self.handle, "disabled", self._disabled(state)
-        if self._visible is not None:
-            yield self.handle, "visible", self._visible(state)
-        # While a newer change waits, its value counts.
-        if value != self._last_value and not self._session.is_waiting(self):
-            self._last_value = value
-            self._is_set_here = False
-            yield self.handle, "value", value
-
-    def _is_own(self, value: Value) -> bool:
-        """Whether a value is the one that was last set with the control itself."""
-        return self._is_set_here and (value == self._last_value or self._session.is_waiting(self))
-
-
-class Slider(Control[float]):
-    """A slider with a number field, whose range and tinted parts follow the state."""
-
-    def __init__(
-        self,
-        session: Session,
-        handle: viser.GuiSliderHandle[float],
-        bound: Bound[float],
-        span: Span | Callable[[State], Span],
-        disabled: Condition | None,
-        tinted: Callable[[Frame], Intervals] | None,
-        ends: Callable[[Frame], tuple[Mark, ...]] | None = None,
-        *,
-        closes_up: bool = False,
-    ) -> None:
-        super().__init__(session, handle, bound, disabled=disabled)
-        self._track = Track(handle, span, closes_up=closes_up)
-        self._tinted = tinted
-        self._ends = ends
-        self._marks = SliderMarks(handle)
-
-    def updates(self, frame: Frame) -> Iterator[Update]:
-        """Yield the updates that make the slider show the frame, its range first."""
-        value = self._bound.read(frame)
-        tinted = () if self._tinted is None else self._tinted(frame)
-        is_own = self._is_own(value)
-        span = self._track.span(frame.state, (value,), tinted, is_own=is_own)
-        # A field would show rounding as −0.00, or as 5.00 where 5 was meant.
-        shown = round(value, decimals(span.step))
-        value = shown + drop_rounding(value - shown, max(abs(span.low), abs(span.high)))
-        yield from self._track.updates(span)
-        if self._tinted is not None:
-            yield self._marks, "marks", tint_marks(tinted, span)
-        elif self._ends is not None:
-            yield self._marks, "marks", self._ends(frame)
-        yield from self._show(frame.state, value)
-
-
-class Ends(Control[Pair]):
-    """The two thumbs of a range, or its two number fields."""
-
-    def __init__(
-        self,
-        session: Session,
-        handle: viser.GuiMultiSliderHandle[float] | viser.GuiVector2Handle,
-        bound: Bound[Pair],
-        span: Callable[[State], Span],
-        disabled: Condition | None,
-    ) -> None:
-        super().__init__(session, cast("Any", handle), bound, disabled=disabled)
-        self._thumbs = None
-        if isinstance(handle, viser.GuiMultiSliderHandle):
-            self._thumbs = Track(handle, span)
-        self._span = span
-
-    def updates(self, frame: Frame) -> Iterator[Update]:
-        """Yield the updates that make the thumbs or fields show the frame, their range first."""
-        ends = self._bound.read(frame)
-        if self._thumbs is not None:
-            is_own = self._is_own(ends)
-            yield from self._thumbs.updates(self._thumbs.span(frame.state, ends, is_own=is_own))
-        else:
-            step = self._span(frame.state).step
-            yield self.handle, "step", step
-            yield self.handle, "precision", decimals(step)
-        yield from self._show(frame.state, ends)
-
-
-class Number(Control[float]):
-    """A number field, whose step follows the state."""
-
-    def __init__(
-        self,
-        session: Session,
-        handle: viser.GuiNumberHandle[float],
-        bound: Bound[float],
-        step: Callable[[State], float],
-        visible: Condition | None,
-    ) -> None:
-        super().__init__(session, handle, bound, visible=visible)
-        self._number = handle
-        self._step = step
-
-    def updates(self, frame: Frame) -> Iterator[Update]:
-        """Yield the updates that make the field show the frame, its step first."""
-        step = self._step(frame.state)
-        yield self._number, "step", step
-        yield self._number, "precision", decimals(step)
-        yield from super().updates(frame)
 
 
 class Controls:

@@ -14,7 +14,8 @@ from explorer.app.features.feature import Services
 from explorer.app.features.machine.actions import ANGLES, MakeAlike, SetToolAngle
 from explorer.app.features.machine.words import DIRECTIONS, direction_name, machine_words
 from explorer.app.inputs.bindings import At, Bound
-from explorer.app.inputs.controls import Condition, Controls
+from explorer.app.inputs.control import Condition
+from explorer.app.inputs.controls import Controls
 from explorer.app.inputs.ranges import platform_span
 from explorer.app.inputs.tracks import Span
 from explorer.app.state.action import Action

@@ -18,7 +18,8 @@ from explorer.app.features.studies.plots import HINT, StudyPlots
 from explorer.app.features.studies.runner import Run, study_feed, study_runner
 from explorer.app.features.studies.words import ALONG, acts, chips, head, legend, table
 from explorer.app.inputs.bindings import At, Bound
-from explorer.app.inputs.controls import Control, Controls
+from explorer.app.inputs.control import Control
+from explorer.app.inputs.controls import Controls
 from explorer.app.inputs.tracks import Span
 from explorer.app.session.session import Who
 from explorer.app.state.action import Action
