@@ -10,13 +10,19 @@ import viser
 from numpy.typing import NDArray
 
 from explorer.app.features.paths.loads import JourneyLoads, PathShares
+from explorer.app.features.paths.time_chart import (
+    add_time_chart,
+    line_at_now,
+    no_columns,
+    time_scales,
+    with_now,
+)
 from explorer.app.state.frame import Frame
 from explorer.app.widgets.assigning import Update
-from explorer.app.widgets.charts import BLUE, NEUTRAL, ORANGE, add_chart, axis, line
+from explorer.app.widgets.charts import BLUE, NEUTRAL, ORANGE, line
 
 HEIGHT = 96
-# Columns of the chart while there is no path: a second without values.
-EMPTY = (np.array([0.0, 1.0]), *(np.full(2, np.nan) for _ in range(4)))
+EMPTY = no_columns(4)
 # Least and greatest top of the chart, in percent; beyond it shares leave the chart.
 LEAST_TOP, MOST_TOP = 120.0, 250.0
 
@@ -26,7 +32,7 @@ class LoadPlot:
 
     def __init__(self, gui: viser.GuiApi, shares: PathShares) -> None:
         self._shares = shares
-        self._chart = add_chart(
+        self._chart = add_time_chart(
             gui,
             (
                 line("limit", NEUTRAL, width=1.0, dash=(4.0, 3.0)),
@@ -34,12 +40,9 @@ class LoadPlot:
                 line("beyond the limit", ORANGE),
                 line("now", NEUTRAL, width=1.5),
             ),
-            (
-                axis("", label_size=0, size=26),
-                axis("share (%)", label_size=18, size=40, space=22),
-            ),
+            "share (%)",
             height=HEIGHT,
-            padding=(8, 12, 0, 0),
+            space=22,
         )
 
     def updates(self, frame: Frame) -> Iterator[Update]:
@@ -49,12 +52,7 @@ class LoadPlot:
         if journey is not None and loads is not None:
             top = top_of(loads)
             columns = columns_of(loads, journey.at, top)
-        duration = float(columns[0][-1])
-        scales = {
-            "x": {"time": False, "range": (0.0, max(duration, 1e-9))},
-            "y": {"range": (0.0, top)},
-        }
-        yield self._chart, "scales", scales
+        yield self._chart, "scales", time_scales(float(columns[0][-1]), 0.0, top)
         yield self._chart, "data", columns
         # It does not wait for a path, as that of the margins.
         yield self._chart, "visible", self._shares.is_limited(frame)
@@ -73,16 +71,13 @@ def columns_of(loads: JourneyLoads, now: float, top: float) -> tuple[NDArray[Any
         now: The present time, in seconds.
         top: Top of the chart, in percent.
     """
-    # The largest share has a row of its own, and the present time two for a line upwards.
-    times = np.concatenate([loads.time, [loads.seconds, now, now]])
-    order = np.argsort(times, kind="stable")
-    x = times[order]
+    # The largest share has a row of its own.
+    times = np.concatenate([loads.time, [loads.seconds]])
+    x, order = with_now(times, now)
     own = np.concatenate([loads.shares, [loads.largest.share]])
-    known = np.argsort(times[:-2], kind="stable")
+    known = np.argsort(times, kind="stable")
     # Far above the chart a line is as good as at infinity.
     percent = np.minimum(100.0 * own[known], 4.0 * top)
-    share = np.interp(x, times[:-2][known], percent)
+    share = np.interp(x, times[known], percent)
     beyond = np.where(share > 100.0, share, np.nan)
-    cursor = np.full(len(x), np.nan)
-    cursor[order == len(times) - 2], cursor[order == len(times) - 1] = 0.0, top
-    return x, np.full(len(x), 100.0), share, beyond, cursor
+    return x, np.full(len(x), 100.0), share, beyond, line_at_now(order, 0.0, top)

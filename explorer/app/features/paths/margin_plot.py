@@ -9,16 +9,20 @@ from typing import Any
 import numpy as np
 import viser
 from numpy.typing import NDArray
-from viser import uplot
 
+from explorer.app.features.paths.time_chart import (
+    add_time_chart,
+    line_at_now,
+    no_columns,
+    time_scales,
+    with_now,
+)
 from explorer.app.state.frame import Frame
 from explorer.app.state.paths import Journey
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.charts import (
     NEUTRAL,
     ORANGE,
-    add_chart,
-    axis,
     dots,
     line,
 )
@@ -32,8 +36,7 @@ from explorer.numerics.number_text import format_decimals
 DASHES: tuple[tuple[float, ...], ...] = ((), (7.0, 3.0), (2.0, 3.0))
 STROKES = ("ex-stroke", "ex-stroke is-dashed", "ex-stroke is-dotted")
 HEIGHT = 112
-# Columns of the chart while there is no path: a second without values.
-EMPTY = (np.array([0.0, 1.0]), *(np.full(2, np.nan) for _ in range(6)))
+EMPTY = no_columns(6)
 # Number of crossings that are listed; the others are counted.
 MOST_LISTED = 4
 
@@ -42,13 +45,12 @@ class MarginPlot:
     """The chart and its legend, empty while there is no path."""
 
     def __init__(self, gui: viser.GuiApi) -> None:
-        # The slider above names the horizontal axis.
         self._legend = gui.add_html("", visible=False)
         deltas = (
             line(f"δ{index}", colour, dash=dash)
             for index, colour, dash in zip((1, 2, 3), MARGIN_COLOURS, DASHES, strict=True)
         )
-        self._chart = add_chart(
+        self._chart = add_time_chart(
             gui,
             (
                 *deltas,
@@ -56,12 +58,9 @@ class MarginPlot:
                 dots("singular", ORANGE, 9),
                 line("now", NEUTRAL, width=1.5),
             ),
-            (
-                axis("", label_size=0, size=26),
-                axis("δ (units)", label_size=18, size=40, space=26),
-            ),
+            "δ (units)",
             height=HEIGHT,
-            padding=(8, 12, 0, 0),
+            space=26,
         )
 
     def updates(self, frame: Frame) -> Iterator[Update]:
@@ -69,8 +68,8 @@ class MarginPlot:
         journey = frame.state.journey
         columns = EMPTY if journey is None else columns_of(journey)
         # The line at the present time goes from bottom to top.
-        top = 1.0 if journey is None else float(np.nanmax(columns[-1]))
-        yield self._chart, "scales", _scales(float(columns[0][-1]), top)
+        top = max(1.0 if journey is None else float(np.nanmax(columns[-1])), 1e-9)
+        yield self._chart, "scales", time_scales(float(columns[0][-1]), -top, top)
         yield self._chart, "data", columns
         # viser's chart draws no numbers below it if it appears while it is given data time after
         # time; so it does not wait for a path that is played at once.
@@ -84,19 +83,13 @@ def columns_of(journey: Journey) -> tuple[NDArray[Any], ...]:
     """Return the columns of the chart: time, δ1 to δ3, zero, crossings, and the present time."""
     trajectory = journey.trajectory
     crossings = [crossing_time(journey, i) for i in range(len(journey.margins.crossings))]
-    now = journey.at
-    # The present time has two rows, for a line from bottom to top.
-    times = np.concatenate([trajectory.time, crossings, [now, now]])
-    order = np.argsort(times, kind="stable")
-    x = times[order]
+    x, order = with_now(np.concatenate([trajectory.time, crossings]), journey.at)
     deltas = _margins_at(journey, np.interp(x, trajectory.time, trajectory.at))
-    zero, crossed, cursor = np.zeros(len(x)), np.full(len(x), np.nan), np.full(len(x), np.nan)
+    zero, crossed = np.zeros(len(x)), np.full(len(x), np.nan)
     first = len(trajectory.time)
     crossed[np.isin(order, np.arange(first, first + len(crossings)))] = 0.0
     top = 1.08 * float(np.abs(deltas).max())
-    cursor[order == len(times) - 2] = -top
-    cursor[order == len(times) - 1] = top
-    return (x, *deltas.T, zero, crossed, cursor)
+    return (x, *deltas.T, zero, crossed, line_at_now(order, -top, top))
 
 
 def crossing_time(journey: Journey, index: int) -> float:
@@ -152,10 +145,3 @@ def crossing_words(journey: Journey) -> str:
     times = "once" if len(places) == 1 else f"{len(places)} times"
     dot = swatch(ORANGE, "ex-dot")
     return f"<div>{dot}Singular {times}: {listed}</div>"
-
-
-def _scales(duration: float, top: float) -> dict[str, uplot.Scale]:
-    return {
-        "x": {"time": False, "range": (0.0, max(duration, 1e-9))},
-        "y": {"range": (-max(top, 1e-9), max(top, 1e-9))},
-    }

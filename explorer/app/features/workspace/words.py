@@ -289,9 +289,10 @@ def legend(measure: Measure, warn_below: float, drawing: WorkspaceDrawing | None
         if any(drawing.request.design.limits.leg_radii):
             marks += f"<span>{swatch(COLLIDING)}legs collide</span>"
         if drawing.part_volume is not None:
-            faint = f"opacity:{NOT_ACCESSIBLE_OPACITY:g}"
+            faint = f"--opacity:{NOT_ACCESSIBLE_OPACITY:g}"
             left_out = "not held" if drawing.request.region == "held" else "not accessible"
-            marks += f'<span><span style="{faint}">{swatch(NOT_ACCESSIBLE)}</span>{left_out}</span>'
+            mark = f'<span class="ex-faint" style="{faint}">{swatch(NOT_ACCESSIBLE)}</span>'
+            marks += f"<span>{mark}{left_out}</span>"
     return box(
         f'<div class="ex-line"><span class="ex-dim">{name}</span>'
         f'<span class="ex-flow ex-dim">{marks}</span></div>'
