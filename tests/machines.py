@@ -3,8 +3,18 @@
 from __future__ import annotations
 
 import msgspec
+import numpy as np
+from numpy.typing import ArrayLike
 
 from explorer import PRESETS, Actuators, Guide, Payload, Struts, Tool
+from explorer.mechanism.machine import Six
+
+
+def six(values: ArrayLike) -> Six:
+    """Return six numbers as a tuple."""
+    a, b, c, d, e, f = np.asarray(values, dtype=np.float64).tolist()
+    return a, b, c, d, e, f
+
 
 OPTIMAL = PRESETS["paper-optimal"]
 

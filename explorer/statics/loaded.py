@@ -8,9 +8,10 @@ from typing import NamedTuple
 
 import msgspec
 import numpy as np
+from numpy.typing import ArrayLike
 
 from explorer.mechanism.design import Design
-from explorer.mechanism.machine import Payload
+from explorer.mechanism.machine import Payload, Six
 from explorer.mechanism.pose import Pose, Triple
 from explorer.numerics.arrays import BoolArray, FloatArray
 from explorer.statics.equilibrium import twists_of_actuators
@@ -23,6 +24,8 @@ from explorer.statics.reactions import (
     reactions,
 )
 from explorer.statics.weights import Weights
+
+NO_LOAD: Six = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class WorstForce(NamedTuple):
@@ -47,7 +50,7 @@ class LoadedPose:
     Attributes:
         design: The manipulator, with its tool, payload and limits.
         pose: The pose.
-        load: (F; M) at the tool point, base axes, shape (6,), in N and N × unit.
+        load: (F; M) at the tool point, base axes, in N and N × unit.
         own: Masses of the bodies besides the payload; None for none.
         weighs_payload: Whether the payload has its weight.
         point: Point at which the load acts in place of the tool, in the platform frame and design
@@ -56,7 +59,7 @@ class LoadedPose:
 
     design: Design
     pose: Pose
-    load: FloatArray
+    load: Six = NO_LOAD
     own: Weights | None = None
     weighs_payload: bool = True
     point: Triple | None = None
@@ -117,7 +120,7 @@ class LoadedPose:
         direction is 1 / share.
         """
         bare = msgspec.structs.replace(self.design, payload=Payload())
-        return LoadedPose(bare, self.pose, np.zeros(6), None, False, self.tool).worst_force(1.0)
+        return LoadedPose(bare, self.pose, weighs_payload=False, point=self.tool).worst_force(1.0)
 
     def worst_force(self, force: float) -> WorstForce:
         """Return the direction of an added force at the tool that uses the largest share.
@@ -147,6 +150,6 @@ class LoadedPose:
         direction = directions[row] if share > 0.0 else np.full(3, np.nan)
         return WorstForce(direction, part, share)
 
-    def _held(self, load: FloatArray) -> Reactions:
+    def _held(self, load: ArrayLike) -> Reactions:
         given = self.design, self.pose.position, self.pose.rotation, load
         return reactions(*given, self.tool, self.weights)

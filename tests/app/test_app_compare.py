@@ -295,7 +295,7 @@ def test_the_table_compares_loads_of_the_designs_that_have_them() -> None:
     assert "inf" not in re.sub("<.*?>", "", html)
     rows = cells(html)
     for design, place in ((LIGHT, 0), (HEAVY, 1)):
-        pose = LoadedPose(design, home_pose(design), np.zeros(6))
+        pose = LoadedPose(design, home_pose(design))
         share, part = pose.share, JOINTS[int(pose.shares[:6].argmax())]
         assert number(rows["load share at home %"][place]) == pytest.approx(100.0 * share, abs=0.01)
         assert rows["worst actuator at home"][place] == part

@@ -5,6 +5,7 @@ from __future__ import annotations
 import msgspec
 import numpy as np
 import pytest
+from machines import six
 from numpy.testing import assert_allclose
 
 from explorer import PRESETS, Actuators, Design, Guide, Payload, Struts, Tool, Weights
@@ -40,7 +41,7 @@ def loaded_poses(design: Design, count: int, seed: int = 3) -> list[LoadedPose]:
         )
         for _ in range(count)
     ]
-    return [LoadedPose(design, pose, rng.normal(size=6) * 5.0, OWN) for pose in poses]
+    return [LoadedPose(design, pose, six(rng.normal(size=6) * 5.0), OWN) for pose in poses]
 
 
 @pytest.mark.parametrize("limits", ["all", "guide"])
@@ -61,8 +62,8 @@ def test_no_sampled_direction_uses_a_larger_share_than_the_worst(limits: str) ->
         assert sampled <= worst.share * (1.0 + 1e-12)
         assert sampled >= worst.share * 0.998
         # The direction reaches it, and the part is the one that does.
-        load = loaded.load + [*(12.0 * worst.direction), 0.0, 0.0, 0.0]
-        there = LoadedPose(design, pose, load, OWN)
+        load = np.array(loaded.load) + [*(12.0 * worst.direction), 0.0, 0.0, 0.0]
+        there = LoadedPose(design, pose, six(load), OWN)
         assert there.share == pytest.approx(worst.share, rel=1e-12)
         assert there.worst == worst.part
 
@@ -90,10 +91,10 @@ def test_the_largest_force_takes_a_part_to_its_limit_in_its_worst_direction() ->
         bare = limited(payload=Payload())
         for direction in rng.normal(size=(50, 3)):
             unit = direction / np.linalg.norm(direction)
-            other = LoadedPose(bare, loaded.pose, np.array([*(force * unit), 0.0, 0.0, 0.0]))
+            other = LoadedPose(bare, loaded.pose, six([*(force * unit), 0.0, 0.0, 0.0]))
             assert other.share <= 1.0 + 1e-9
         load = np.array([*(force * newton.direction), 0.0, 0.0, 0.0])
-        there = LoadedPose(bare, loaded.pose, load)
+        there = LoadedPose(bare, loaded.pose, six(load))
         assert there.share == pytest.approx(1.0, rel=1e-12)
         assert there.worst == newton.part
 
@@ -109,14 +110,14 @@ def test_actuators_alone_hold_what_the_largest_force_says() -> None:
 
 def test_the_weight_of_the_payload_can_be_left_out() -> None:
     design = limited()
-    with_weight = LoadedPose(design, HOME, np.zeros(6))
-    without = LoadedPose(design, HOME, np.zeros(6), weighs_payload=False)
+    with_weight = LoadedPose(design, HOME)
+    without = LoadedPose(design, HOME, weighs_payload=False)
     assert_allclose(without.held.actuators, 0.0, atol=1e-12)
     assert np.abs(with_weight.held.actuators).max() > 1.0
 
 
 def test_without_limits_no_share_is_used_and_no_direction_is_worst() -> None:
-    loaded = LoadedPose(OPTIMAL, HOME, np.array([0.0, 0.0, -10.0, 0.0, 0.0, 0.0]))
+    loaded = LoadedPose(OPTIMAL, HOME, (0.0, 0.0, -10.0, 0.0, 0.0, 0.0))
     assert loaded.share == 0.0
     assert np.isinf(loaded.largest_payload)
     assert loaded.newton.share == 0.0
@@ -127,7 +128,7 @@ def test_without_limits_no_share_is_used_and_no_direction_is_worst() -> None:
 
 def test_in_a_singular_pose_nothing_holds_a_load() -> None:
     pose = Pose((10.0, 5.0, 0.0), HOME.quaternion)
-    loaded = LoadedPose(limited(), pose, np.array([0.0, 0.0, -10.0, 0.0, 0.0, 0.0]))
+    loaded = LoadedPose(limited(), pose, (0.0, 0.0, -10.0, 0.0, 0.0, 0.0))
     assert not loaded.is_regular
     assert np.isinf(loaded.share)
     assert (loaded.largest_payload, loaded.newton.share) == (0.0, np.inf)
@@ -141,6 +142,6 @@ def test_parts_with_a_limit_are_those_whose_share_a_load_changes() -> None:
     for change in ("actuators", "struts", "guide"):
         none = {"actuators": Actuators(), "struts": Struts(), "guide": Guide()}
         kept = getattr(limited(), change)
-        loaded = LoadedPose(limited(**(none | {change: kept})), HOME, load)
+        loaded = LoadedPose(limited(**(none | {change: kept})), HOME, six(load))
         assert (loaded.limited == (loaded.shares > 0.0)).all()
         assert loaded.limited.any()

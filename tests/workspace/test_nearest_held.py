@@ -25,7 +25,7 @@ LIMITED = msgspec.structs.replace(
     actuators=Actuators(push_n=(60, 60, 60, 60, 60, 60)),
     struts=Struts(moment_nm=3.0),
 )
-LOAD = np.array([0.0, 0.0, -10.0, 0.0, 0.0, 0.0])
+LOAD = (0.0, 0.0, -10.0, 0.0, 0.0, 0.0)
 
 
 def distances_held(loaded: LoadedPose, positions: FloatArray) -> FloatArray:
@@ -67,7 +67,7 @@ def test_a_position_that_holds_the_load_is_its_own_nearest() -> None:
 
 def test_none_is_found_where_no_position_holds_the_load() -> None:
     weak = msgspec.structs.replace(LIMITED, actuators=Actuators(push_n=(1, 1, 1, 1, 1, 1)))
-    assert nearest_held(LoadedPose(weak, HOME, 10.0 * LOAD)) is None
+    assert nearest_held(LoadedPose(weak, HOME, (0.0, 0.0, -100.0, 0.0, 0.0, 0.0))) is None
 
 
 def test_none_is_found_where_the_limits_leave_no_position() -> None:
@@ -79,7 +79,9 @@ def test_none_is_found_where_the_limits_leave_no_position() -> None:
 
 
 def test_from_a_singular_pose_it_is_in_the_mode_of_home() -> None:
-    loaded = LoadedPose(LIMITED, Pose((10.0, 5.0, 0.0), HOME.quaternion), 0.1 * LOAD)
+    loaded = LoadedPose(
+        LIMITED, Pose((10.0, 5.0, 0.0), HOME.quaternion), (0.0, 0.0, -1.0, 0.0, 0.0, 0.0)
+    )
     found = nearest_held(loaded)
     assert found is not None
     signs = np.sign(margins(found.position, found.rotation))

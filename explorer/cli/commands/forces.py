@@ -83,9 +83,7 @@ class Forces(LoadOptions):
         given = design, pose.position, pose.rotation
         check_regular(pose, twists_of_actuators(*given))
         point = tool or (0.0, 0.0, 0.0)
-        loaded = LoadedPose(
-            design, pose, np.array(self.load), self._own_weights(design), point=point
-        )
+        loaded = LoadedPose(design, pose, self.load, self._own_weights(design), point=point)
         most = np.minimum(*design.actuators.limits) if self.most is None else self.most
         nearest = None
         if loaded.share > 1.0:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import msgspec
-import numpy as np
 
 from explorer.measures.case import Case
 from explorer.mechanism.machine import Payload, Tool
@@ -28,7 +27,7 @@ class ReportLoads:
     @cached_property
     def loaded(self) -> LoadedPose:
         """The pose under the payload."""
-        return LoadedPose(self.case.design, self.case.at, np.zeros(6))
+        return LoadedPose(self.case.design, self.case.at)
 
     @cached_property
     def worst_payload_force(self) -> WorstForce:
@@ -36,7 +35,7 @@ class ReportLoads:
         design, force = self.case.design, self.case.design.payload.force_n
         payload = msgspec.structs.replace(design.payload, force_n=0.0)
         weighed = msgspec.structs.replace(design, payload=payload)
-        return LoadedPose(weighed, self.case.at, np.zeros(6)).worst_force(force)
+        return LoadedPose(weighed, self.case.at).worst_force(force)
 
 
 def loads_of(case: Case) -> ReportLoads | None:

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import msgspec
-import numpy as np
 
 from explorer.app.features.feature import Services
 from explorer.app.features.forces.tasks import (
     NearestDrawing,
-    NearestRequest,
     WeightsDrawing,
     WeightsRequest,
     nearest_position,
@@ -58,29 +56,20 @@ class Loads:
             if kept_state is state and kept_weights is weights:
                 return loaded
         weighs_payload = state.view.forces.weighed != "none"
-        load = np.array(load_of(state))
-        loaded = LoadedPose(state.design, state.pose, load, weights, weighs_payload)
+        loaded = LoadedPose(state.design, state.pose, load_of(state), weights, weighs_payload)
         self._kept = (state, weights), loaded
         return loaded
 
 
-class NearestFeed(Feed[NearestRequest, NearestDrawing]):
+class NearestFeed(Feed[LoadedPose, NearestDrawing]):
     """The nearest position that holds the load, while the present one does not."""
 
     def __init__(self, services: Services) -> None:
         loads = services.get(Loads)
 
-        def request_of(frame: Frame) -> NearestRequest | None:
+        def request_of(frame: Frame) -> LoadedPose | None:
             loaded = loads.of(frame)
-            if not has_limits(loaded.design) or loaded.share <= 1.0:
-                return None
-            return NearestRequest(
-                loaded.design,
-                loaded.pose,
-                load_of(frame.state),
-                loaded.own,
-                loaded.weighs_payload,
-            )
+            return loaded if has_limits(loaded.design) and loaded.share > 1.0 else None
 
         super().__init__(services.worker, nearest_position, request_of, services.session.redraw)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from html import escape
 from typing import get_args
 
@@ -285,5 +286,4 @@ def largest(frame: Frame, loaded: LoadedPose) -> Iterator[str]:
 
 def without_force(loaded: LoadedPose) -> LoadedPose:
     """Return the pose under its moment and weights, without the force at the tool."""
-    load = np.concatenate([np.zeros(3), loaded.load[3:]])
-    return LoadedPose(loaded.design, loaded.pose, load, loaded.own, loaded.weighs_payload)
+    return replace(loaded, load=(0.0, 0.0, 0.0, *loaded.load[3:]))

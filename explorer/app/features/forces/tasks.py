@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from explorer.mechanism.design import Design
-from explorer.mechanism.machine import Six
 from explorer.mechanism.pose import Pose
 from explorer.statics.loaded import LoadedPose
 from explorer.statics.weights import Weights
@@ -54,44 +51,18 @@ def weights_of_parts(request: WeightsRequest) -> WeightsDrawing:
 
 
 @dataclass(frozen=True)
-class NearestRequest:
-    """A request for the nearest position that holds a load.
-
-    Attributes:
-        design: The manipulator.
-        pose: The present pose.
-        load: (F; M) at the tool point, base axes, in N and N × unit.
-        own: Weights of platform and legs; None for none.
-        weighs_payload: Whether the payload has its weight.
-    """
-
-    design: Design
-    pose: Pose
-    load: Six
-    own: Weights | None
-    weighs_payload: bool
-
-
-@dataclass(frozen=True)
 class NearestDrawing:
     """The nearest position that holds a load.
 
     Attributes:
-        request: The request.
+        request: The pose that does not hold it.
         pose: The pose there; None if none was found.
     """
 
-    request: NearestRequest
+    request: LoadedPose
     pose: Pose | None
 
 
-def nearest_position(request: NearestRequest) -> NearestDrawing:
-    """Return the nearest position that holds a load."""
-    loaded = LoadedPose(
-        request.design,
-        request.pose,
-        np.array(request.load),
-        request.own,
-        request.weighs_payload,
-    )
-    return NearestDrawing(request, nearest_held(loaded))
+def nearest_position(request: LoadedPose) -> NearestDrawing:
+    """Return the nearest position that holds the load of a pose."""
+    return NearestDrawing(request, nearest_held(request))

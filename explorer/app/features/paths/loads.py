@@ -56,7 +56,7 @@ class PathShares:
         if journey is None or not has_limits(loaded.design):
             return None
         of_path = journey.kind, journey.design, journey.poses, journey.tool
-        key = *of_path, loaded.load.tobytes(), loaded.weights
+        key = *of_path, loaded.load, loaded.weights
         if self._kept is None or self._kept[0] != key:
             self._kept = key, _loads_of(journey, loaded)
         return self._kept[1]

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from explorer.app.features.forces.tasks import WeightsRequest, weights_of_parts
 from explorer.app.state.view import Weighed
 from explorer.mechanism.design import Design
@@ -59,7 +57,7 @@ def plan(request: PlanRequest) -> PlannedPath:
         own = None
         if load.weighed == "payload and legs":
             own = weights_of_parts(WeightsRequest(design, load.density)).weights
-        forces = np.array(load.load)
+        forces = load.load
         weights = LoadedPose(design, start, forces, own, load.weighed != "none").weights
     return plan_path(
         design,
