@@ -179,7 +179,7 @@ def test_feeds_compute_what_is_shown_and_nothing_else() -> None:
 
     def follow(now: State) -> None:
         for kind in ORIENTATION.later_feeds:
-            kind(services).follow(Frame(now))
+            services.get(kind).follow(Frame(now))
         worker.work()
 
     follow(state)
