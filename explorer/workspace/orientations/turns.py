@@ -12,6 +12,7 @@ import math
 
 import numpy as np
 
+from explorer.legs.segments import Vector
 from explorer.mechanism.design import LENGTHS, Design
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.numerics.compiled import helper, kernel
@@ -162,6 +163,24 @@ def end_by_lengths(
 
 
 @helper
+def end_at_bound(
+    offset: float, i: int, side: int, arm: Vector, turn: FloatArray, end: float
+) -> float:
+    """Return what `nearer_linear_end` does for coordinate i of a point and one bound of it.
+
+    The offset is that of the tool from the bound, the arm leads from the tool to the point, and the
+    side is 0 for a lower bound and 1 for an upper one.
+    """
+    sign = -1.0 if side else 1.0
+    return nearer_linear_end(
+        sign * (offset + turned(turn, i, 0, arm)),
+        sign * turned(turn, i, 1, arm),
+        sign * (offset + turned(turn, i, 2, arm)),
+        end,
+    )
+
+
+@helper
 def end_by_guide(
     row: FloatArray, p: FloatArray, tool: FloatArray, turn: FloatArray, end: float
 ) -> tuple[float, int]:
@@ -173,14 +192,7 @@ def end_by_guide(
             bound = row[GUIDE_HIGH] if side else row[GUIDE_LOW]
             if math.isinf(bound):
                 continue
-            sign = -1.0 if side else 1.0
-            offset = p[0] - bound
-            found = nearer_linear_end(
-                sign * (offset + turned(turn, 0, 0, arm)),
-                sign * turned(turn, 0, 1, arm),
-                sign * (offset + turned(turn, 0, 2, arm)),
-                end,
-            )
+            found = end_at_bound(p[0] - bound, 0, side, arm, turn, end)
             if found < end:
                 end, limit = found, GUIDE_LIMITS + 2 * carriage + side
             if found < 0.0:
@@ -221,14 +233,7 @@ def end_by_box(
             bound = row[BOX_HIGHS + i] if side else row[BOX_LOWS + i]
             if math.isinf(bound):
                 continue
-            sign = -1.0 if side else 1.0
-            offset = p[i] - bound
-            found = nearer_linear_end(
-                sign * (offset + turned(turn, i, 0, arm)),
-                sign * turned(turn, i, 1, arm),
-                sign * (offset + turned(turn, i, 2, arm)),
-                end,
-            )
+            found = end_at_bound(p[i] - bound, i, side, arm, turn, end)
             if found < end:
                 end, limit = found, BOX_LIMITS + 2 * i + side
             if found < 0.0:
