@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from explorer.errors import InputError
 from explorer.mechanism.design import Design
 from explorer.mechanism.pose import checked_rotation
-from explorer.numerics.arrays import FloatArray, IntArray, finite_array
+from explorer.numerics.arrays import BoolArray, FloatArray, IntArray, finite_array
 from explorer.statics.held import HIGHEST, held_load, held_values, settle_on_limit
 from explorer.statics.reactions import PART_NAMES
 from explorer.workspace.accessible.nodes import Grid, make_grid
@@ -117,16 +117,44 @@ def held_workspace(
     whole = workspace_solid(design, r, tolerance, volume=exact)
     if whole.is_empty:
         return HeldWorkspace(exact.volume, 0.0, whole)
-    held, names = held_load(design, r, w), part_names(design)
-    limits = constraints(design, r)
-    solid = _held_part(whole, held, r, limits, nodes, names)
+    load_here = _LoadHere(held_load(design, r, w), r, constraints(design, r), part_names(design))
+    solid = _held_part(whole, load_here, nodes)
     if solid.is_empty:
-        best = _best_within(whole, held, r, limits)
+        best = _best_within(whole, load_here)
         factor = max(0.0, 1.0 + best.value)
-        empty = replace(solid, empty_because=(names[best.part],))
+        empty = replace(solid, empty_because=(load_here.part_names[best.part],))
         return HeldWorkspace(exact.volume, 0.0, empty, best.position, factor)
     # The mesh of the whole lacks a share of the exact volume, and so does its part.
     return HeldWorkspace(exact.volume, solid.volume * exact.volume / whole.volume, solid)
+
+
+@dataclass(frozen=True)
+class _LoadHere:
+    """A load at one orientation, with the limits of the workspace there.
+
+    Attributes:
+        held: What `explorer.statics.held.held_load` returns.
+        rotation: Platform to base, shape (3, 3).
+        limits: Limits of positions.
+        part_names: Names of the parts that may give way.
+    """
+
+    held: FloatArray
+    rotation: FloatArray
+    limits: tuple[Constraint, ...]
+    part_names: tuple[str, ...]
+
+    def values(self, positions: FloatArray) -> tuple[FloatArray, IntArray]:
+        """Return what `explorer.statics.held.held_values` does at positions (n, 3)."""
+        return held_values(self.held, self.rotation, positions)
+
+    def holds(self, positions: FloatArray) -> BoolArray:
+        """Return at which positions (n, 3) the parts hold the load, shape (n,)."""
+        return self.values(positions)[0] >= 0.0
+
+    def allows(self, positions: FloatArray) -> BoolArray:
+        """Return which positions (n, 3) keep the limits of the workspace, shape (n,)."""
+        return np.asarray((slacks(self.limits, positions) >= 0.0).all(axis=-1))
 
 
 class _Best(NamedTuple):
@@ -143,14 +171,7 @@ class _Best(NamedTuple):
     part: int
 
 
-def _held_part(
-    whole: Solid,
-    held: FloatArray,
-    r: FloatArray,
-    limits: tuple[Constraint, ...],
-    nodes: int,
-    names: tuple[str, ...],
-) -> Solid:
+def _held_part(whole: Solid, load: _LoadHere, nodes: int) -> Solid:
     """Return the part of a workspace that holds a load.
 
     It is carved out of a box about the nodes of a coarse grid that hold the load, which grows on
@@ -160,9 +181,9 @@ def _held_part(
     """
     grid = _coarse_grid(whole)
     positions = np.vstack([grid.positions.reshape(-1, 3), whole.vertices])
-    kept = positions[held_values(held, r, positions)[0] >= 0.0]
+    kept = positions[load.holds(positions)]
     if not len(kept):
-        best = _best_within(whole, held, r, limits)
+        best = _best_within(whole, load)
         if best.value < 0.0:
             return replace(whole, vertices=kept, faces=whole.faces[:0])
         kept = best.position[None]
@@ -171,7 +192,7 @@ def _held_part(
         near, side_of_limit = _crop(whole, box)
         if near.is_empty:
             return _without_limits(near, set(side_of_limit))
-        part, missed = _carve(near, held, r, limits, nodes, names)
+        part, missed = _carve(near, load, nodes)
         bounding = {side_of_limit.get(limit) for limit in np.unique(part.limit_of_face).tolist()}
         open_sides = [side for side in bounding if side is not None]
         if open_sides:
@@ -228,42 +249,33 @@ class _Missed(NamedTuple):
         return len(self.positions) * float(np.prod(self.step))
 
 
-def _carve(
-    near: Solid,
-    held: FloatArray,
-    r: FloatArray,
-    limits: tuple[Constraint, ...],
-    nodes: int,
-    names: tuple[str, ...],
-) -> tuple[Solid, _Missed]:
+def _carve(near: Solid, load: _LoadHere, nodes: int) -> tuple[Solid, _Missed]:
     """Return the positions of a solid that hold a load, by a grid, and what that misses."""
     lows, highs = near.vertices.min(axis=0), near.vertices.max(axis=0)
     grid = make_grid(lows, highs, nodes, BEYOND)
-    values = held_values(held, r, grid.positions.reshape(-1, 3))[0].reshape(grid.counts)
+    values = load.values(grid.positions.reshape(-1, 3))[0].reshape(grid.counts)
     highest = values
     for axis in range(3):
         beside = np.moveaxis(highest, axis, 0)
         highest = np.moveaxis(np.maximum(beside[1:], beside[:-1]), 0, axis)
     centres = grid.positions[:-1, :-1, :-1][highest < 0.0] + 0.5 * grid.step
-    centres = centres[held_values(held, r, centres)[0] >= 0.0]
-    centres = centres[(slacks(limits, centres) >= 0.0).all(axis=-1)]
+    centres = centres[load.holds(centres)]
+    centres = centres[load.allows(centres)]
     # The surface of what is cut out is closed beyond the workspace.
     for axis in range(3):
         np.moveaxis(values, axis, 0)[[0, -1]] = HIGHEST
 
     def settle(points: FloatArray, beside: FloatArray) -> FloatArray:
-        return settle_on_limit(held, r, points, beside, grid.step)
+        return settle_on_limit(load.held, load.rotation, points, beside, grid.step)
 
     def part_at(points: FloatArray) -> IntArray:
-        return held_values(held, r, points)[1]
+        return load.values(points)[1]
 
-    surface = Surface(values, grid.lows, grid.step, settle, names, part_at)
+    surface = Surface(values, grid.lows, grid.step, settle, load.part_names, part_at)
     return carved_solid(near, surface), _Missed(centres, grid.step)
 
 
-def _best_within(
-    whole: Solid, held: FloatArray, r: FloatArray, limits: tuple[Constraint, ...]
-) -> _Best:
+def _best_within(whole: Solid, load: _LoadHere) -> _Best:
     """Return the best position found within the limits.
 
     Grids about the best nodes of the coarse grid that lie apart follow the largest values, and
@@ -271,8 +283,8 @@ def _best_within(
     """
     grid = _coarse_grid(whole)
     nodes = grid.positions.reshape(-1, 3)
-    at = np.vstack([whole.vertices, nodes[(slacks(limits, nodes) >= 0.0).all(axis=-1)]])
-    values, parts = held_values(held, r, at)
+    at = np.vstack([whole.vertices, nodes[load.allows(nodes)]])
+    values, parts = load.values(at)
     cube = np.stack(np.meshgrid(*[np.linspace(-1.0, 1.0, FOLLOWING)] * 3), axis=-1).reshape(-1, 3)
     best, left = _Best(at[0], -np.inf, 0), np.argsort(values)[::-1]
     for _ in range(STARTS):
@@ -284,8 +296,8 @@ def _best_within(
         size = 1.0
         for _ in range(ROUNDS):
             near = here.position + size * grid.step * cube
-            near = near[(slacks(limits, near) >= 0.0).all(axis=-1)]
-            found, of = held_values(held, r, near)
+            near = near[load.allows(near)]
+            found, of = load.values(near)
             if len(near) and found.max() > here.value:
                 index = int(found.argmax())
                 here = _Best(near[index], float(found[index]), int(of[index]))
