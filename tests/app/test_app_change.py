@@ -74,6 +74,17 @@ def test_change_shows_the_differences_of_volume_reach_and_clearance(watcher: Wat
     assert cells.count("same") == 1, "the clearance in the pose does not depend on a3x"
 
 
+def test_page_that_never_showed_what_was_before_measures_it_too(
+    server: viser.ViserServer, buttons: Buttons, desk: Desk
+) -> None:
+    desk.session.do(SetVariable("a3x", 20.0))
+    watcher = Watcher(server, buttons, desk)
+    card = watcher.card(watcher.follow())
+    before = workspace_volume(OPTIMAL, home_pose(OPTIMAL).rotation).volume
+    assert f"{before:,.0f}" in card
+    assert "…" not in card
+
+
 def test_ghost_is_the_mechanism_before_the_change_to_true_size(watcher: Watcher) -> None:
     frame = watcher.do(SetVariable("a3x", 20.0))
     placed = Placed(frame)

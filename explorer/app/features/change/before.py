@@ -7,14 +7,18 @@ from dataclasses import dataclass
 import viser
 
 from explorer.app.features.feature import Services
-from explorer.app.features.workspace.volume import VolumeFeed
+from explorer.app.features.workspace.volume import (
+    MeasuredVolume,
+    VolumeFeed,
+    VolumeRequest,
+    measure_volume,
+    volume_request,
+)
+from explorer.app.session.feed import Feed
 from explorer.app.state.frame import Frame
 from explorer.app.state.state import State
-from explorer.mechanism.design import Design
 
 OVER = "change.over"
-# Number of designs whose volume is kept: those of the last slider's values may come late.
-MOST_VOLUMES = 32
 
 
 @dataclass(frozen=True)
@@ -24,12 +28,10 @@ class Before:
     Attributes:
         frame: The design and its pose.
         words: The change in words.
-        volume: Volume of its workspace in cubed design units; None if it is not known.
     """
 
     frame: Frame
     words: str
-    volume: float | None
 
 
 class DesignChange:
@@ -40,8 +42,15 @@ class DesignChange:
 
     def __init__(self, services: Services) -> None:
         self._session = services.session
-        self._feed = services.get(VolumeFeed)
-        self._volumes: dict[Design, float] = {}
+        self._now = services.get(VolumeFeed)
+        # Another page of the same state may not have measured the design before the change.
+        self._then = Feed[VolumeRequest, MeasuredVolume](
+            services.worker,
+            measure_volume,
+            self._request_for,
+            services.session.redraw,
+            key="volume before",
+        )
         self._ended: State | None = None
         self._before: Before | None = None
         services.buttons.on(OVER, self._end, values=("",))
@@ -51,20 +60,18 @@ class DesignChange:
         """What was before the change; None if the last step did not change the design."""
         return self._before
 
-    def volume_of(self, design: Design) -> float | None:
-        """Return the volume of a design's workspace; None if it is not known."""
-        return self._volumes.get(design)
+    @property
+    def volumes(self) -> tuple[float | None, float | None]:
+        """Volumes before and now, in cubed design units; None for one that is being computed."""
+        return _volume(self._then), _volume(self._now)
 
     def follow(self, frame: Frame) -> None:
-        """Find what was before the change that led to a frame."""
-        measured = self._feed.drawing
-        if measured is not None:
-            design = measured.request.design
-            self._volumes.pop(design, None)
-            self._volumes[design] = measured.measured.volume
-            while len(self._volumes) > MOST_VOLUMES:
-                del self._volumes[next(iter(self._volumes))]
+        """Find what was before the change that led to a frame, and request its volume."""
         self._before = self._find(frame)
+        self._then.follow(frame)
+
+    def _request_for(self, _: Frame) -> VolumeRequest | None:
+        return None if self._before is None else volume_request(self._before.frame)
 
     def _find(self, frame: Frame) -> Before | None:
         history = self._session.history
@@ -79,10 +86,15 @@ class DesignChange:
         known = self._before
         # What a frame has computed is kept from one value of a slider to the next.
         old = Frame(state) if known is None or known.frame.state is not state else known.frame
-        return Before(old, history.step.words, self.volume_of(state.design))
+        return Before(old, history.step.words)
 
     def _end(self, _: str, client: viser.ClientHandle) -> None:
         del client
         if self._before is not None:
             self._ended = self._before.frame.state
             self._session.redraw()
+
+
+def _volume(feed: Feed[VolumeRequest, MeasuredVolume]) -> float | None:
+    drawing = feed.drawing
+    return None if drawing is None or not feed.is_current else drawing.measured.volume

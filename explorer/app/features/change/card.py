@@ -26,12 +26,7 @@ class ChangeCard:
             return ""
         old, new = before.frame, frame
         lines = [
-            difference(
-                "Volume",
-                before.volume,
-                self._change.volume_of(new.state.design),
-                "units³",
-            ),
+            difference("Volume", *self._change.volumes, "units³"),
             difference("Reach", _reach(old), _reach(new), "mm"),
             difference("Clearance here", _clearance(old), _clearance(new), "mm"),
         ]

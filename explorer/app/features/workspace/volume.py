@@ -65,7 +65,7 @@ class VolumeFeed(Feed[VolumeRequest, MeasuredVolume]):
     """
 
     def __init__(self, services: Services) -> None:
-        super().__init__(services.worker, measure_volume, _request_for, services.session.redraw)
+        super().__init__(services.worker, measure_volume, volume_request, services.session.redraw)
 
     @property
     def text(self) -> VolumeText:
@@ -93,5 +93,6 @@ def exact_volume(design: Design, rotation: Rows) -> Volume:
     return workspace_volume(design, np.array(rotation))
 
 
-def _request_for(frame: Frame) -> VolumeRequest:
+def volume_request(frame: Frame) -> VolumeRequest:
+    """Return the request for the volume of a frame's design."""
     return VolumeRequest(frame.state.design, workspace_rows(frame))
