@@ -10,7 +10,7 @@ from typing import Literal
 
 from likeness import decoded
 from playwright.sync_api import Locator, Page, expect
-from tab import Tab
+from tab import Tab, middle_of_button
 
 Words = str | re.Pattern[str]
 Role = Literal["button", "checkbox", "tab"]
@@ -35,15 +35,6 @@ PLOTS = """() => {
     return plots.length === 2 && plots.every((plot) => plot.explorerListens);
 }"""
 COLOUR = "it => getComputedStyle(it).color.match(/[\\d.]+/g)?.slice(0, 3).map(Number)"
-# The middle of a button once it is within the window. One that is drawn anew may be gone between
-# finding and measuring it, unless both are done in one task of the browser.
-MIDDLE_OF_BUTTON = """(words) => {
-    const isIt = (button) => button.textContent.trim() === words && button.checkVisibility();
-    const box = [...document.querySelectorAll("button")].find(isIt)?.getBoundingClientRect();
-    const { left, right, top, bottom } = box ?? { left: -1 };
-    if (left < 0 || top < 0 || right > innerWidth || bottom > innerHeight) return null;
-    return [0.5 * (left + right), 0.5 * (top + bottom)];
-}"""
 
 
 class Newcomer:
@@ -73,7 +64,7 @@ class Newcomer:
 
     def press_running(self, words: str) -> None:
         """Press a button that is drawn anew again and again, where it stands."""
-        x, y = self.page.wait_for_function(MIDDLE_OF_BUTTON, arg=words).json_value()
+        x, y = middle_of_button(self.page, words)
         self.press_at(x, y)
 
     def press_at(self, x: float, y: float) -> None:
