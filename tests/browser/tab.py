@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 import viser
-from playwright.sync_api import Browser, ConsoleMessage, Download, Locator, Page, expect
+from playwright.sync_api import Browser, ConsoleMessage, Download, Locator, expect
 
 from explorer.app.scene.camera import ViewName, framing, has_perspective
 from explorer.app.screenshot import PATIENCE_SECONDS, SCENE_CANVAS, fixed_resolution_url, settle
@@ -54,12 +54,6 @@ MIDDLE_OF_BUTTON = """(words) => {
         left >= 0 && top >= 0 && right <= innerWidth && bottom <= innerHeight);
     return box ? [0.5 * (box.left + box.right), 0.5 * (box.top + box.bottom)] : null;
 }"""
-
-
-def middle_of_button(page: Page, words: str) -> tuple[float, float]:
-    """Return the middle of a button that may be drawn anew again and again, in pixels."""
-    x, y = page.wait_for_function(MIDDLE_OF_BUTTON, arg=words).json_value()
-    return x, y
 
 
 class Tab:
@@ -205,12 +199,13 @@ class Tab:
         # What runs stands in the bar too, with the buttons that it has in its tab.
         self.page.get_by_role("button", name=words, exact=True).first.click()
 
-    def push_moving(self, words: str) -> None:
+    def push_running(self, words: str) -> None:
         """Click a button that is drawn anew with each frame, where it stands.
 
         A hand meets it; Playwright waits until a button stays for two frames of the browser.
         """
-        self.page.mouse.click(*middle_of_button(self.page, words))
+        x, y = self.page.wait_for_function(MIDDLE_OF_BUTTON, arg=words).json_value()
+        self.page.mouse.click(x, y)
 
     def turn_to(self, name: str) -> None:
         """Turn to another tab of the panels."""
