@@ -43,7 +43,7 @@ def typical_machine(design: Design) -> tuple[Design, tuple[str, ...]]:
         assumed.append(f"struts of tube {OUTER:g} × {INNER:g} mm, {struts.modulus_gpa:g} GPa")
     if not tolerances.values(design.unit_mm).any():
         each: Triple = (LENGTH, LENGTH, LENGTH)
-        tolerances = Tolerances(*(each,) * 3, (TILT, TILT), *(each,) * 4)
+        tolerances = Tolerances(each, each, each, (TILT, TILT), each, each, each, each)
         assumed.append(f"tolerances {LENGTH:g} mm and {TILT:g}°")
     filled = msgspec.structs.replace(
         design, actuators=actuators, struts=struts, tolerances=tolerances

@@ -101,6 +101,12 @@ PLAIN: list[tuple[str, object, Callable[[Design], object]]] = [
     ("Moment given directly", True, lambda design: design.struts.moment_nm),
     ("Limited guide force", True, lambda design: design.guide.force_n),
     ("Limited guide moment", True, lambda design: design.guide.moment_nm),
+    ("Error of each (mm)", 0.02, lambda design: design.actuators.error_mm[3]),
+    ("Elastic", True, lambda design: design.actuators.stiffness_n_mm),
+    ("a3 (± mm)", (0.1, 0.2, 0.0), lambda design: design.tolerances.a3),
+    ("guide tilt z (± °)", 0.05, lambda design: design.tolerances.guide_tilt_deg[1]),
+    ("Every length (± mm)", 0.04, lambda design: design.tolerances.b4[2]),
+    ("Both tilts (± °)", 0.03, lambda design: design.tolerances.guide_tilt_deg[0]),
 ]
 
 
@@ -181,8 +187,8 @@ def test_forces_of_single_actuators_differ_until_they_are_made_alike(
     alike, common = hand.controls["Make all six alike"], hand.controls["Push of each (N)"]
     hand.set("Limited forces", True)
     assert (common.visible, alike.visible) == (True, False)
-    hand.set("push of d1", 250.0)
-    design = hand.set("push of l4", 80.0)
+    hand.set("push of d1 (N)", 250.0)
+    design = hand.set("push of l4 (N)", 80.0)
     assert design.actuators == Actuators((100.0, 250.0, 100.0, 100.0, 100.0, 80.0))
     assert (common.visible, alike.visible) == (False, True)
     desk.click(alike)
@@ -190,10 +196,34 @@ def test_forces_of_single_actuators_differ_until_they_are_made_alike(
     assert desk.state.design.actuators == Actuators(six(80.0))
     assert (common.visible, common.value, alike.visible) == (True, 80.0, False)
     hand.set("Pull of its own", True)
-    design = hand.set("pull of d3", 60.0)
+    design = hand.set("pull of d3 (N)", 60.0)
     assert design.actuators.pull_n == (80.0, 80.0, 80.0, 60.0, 80.0, 80.0)
     assert hand.controls["Push of each (N)"].visible
     assert not hand.controls["Pull of each (N)"].visible
+
+
+def test_errors_and_stiffness_of_single_actuators_differ_until_they_are_made_alike(
+    hand: Hand, desk: Desk
+) -> None:
+    hand.set("Elastic", True)
+    assert hand.set("Stiffness of each (N/mm)", 500.0).actuators.stiffness_n_mm == six(500.0)
+    hand.set("stiffness of d2 (N/mm)", 400.0)
+    hand.set("error of l1 (mm)", 0.03)
+    assert not hand.controls["Error of each (mm)"].visible
+    desk.click(hand.controls["Make all six alike"])
+    hand.show()
+    assert desk.state.design.actuators == Actuators(error_mm=six(0.03), stiffness_n_mm=six(400.0))
+    assert hand.set("Elastic", False).actuators.stiffness_n_mm is None
+
+
+def test_fields_of_all_tolerances_show_the_largest(hand: Hand) -> None:
+    hand.set("b2 (± mm)", (0.0, 0.3, 0.0))
+    hand.set("guide tilt y (± °)", 0.2)
+    assert hand.controls["Every length (± mm)"].value == 0.3
+    assert hand.controls["Both tilts (± °)"].value == 0.2
+    design = hand.set("Every length (± mm)", 0.1)
+    assert design.tolerances.values(1.0)[[0, 15]].tolist() == [0.1, 0.1]
+    assert design.tolerances.guide_tilt_deg == (0.2, 0.0)
 
 
 def test_limit_of_the_pull_alone_is_shown_and_kept(services: Services, desk: Desk) -> None:
@@ -239,9 +269,12 @@ IMPOSSIBLE = [
         ),
     ),
     ("Direction", (0.0, 0.0, 0.0), "The direction of gravity must not be all zeros"),
-    ("push of d1", 0.0, "The push of an actuator must be positive; got 0"),
-    ("pull of l4", -3.0, "The pull of an actuator must be positive; got -3"),
+    ("push of d1 (N)", 0.0, "The push of an actuator must be positive; got 0"),
+    ("pull of l4 (N)", -3.0, "The pull of an actuator must be positive; got -3"),
     ("Push of each (N)", 0.0, "The push of an actuator must be positive; got 0"),
+    ("Error of each (mm)", -1.0, "The error of an actuator must not be negative; got -1"),
+    ("Stiffness of each (N/mm)", 0.0, "The stiffness of an actuator must be positive; got 0"),
+    ("b1 (± mm)", (0.0, -0.1, 0.0), "A tolerance must not be negative; got -0.1"),
     ("Outer diameter (mm)", 0.0, "The outer diameter of the struts must be positive; got 0"),
     (
         "Inner diameter (mm)",

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from explorer.errors import DesignError, ExplorerError
 from explorer.mechanism.design import LENGTHS
+from explorer.mechanism.machine import Tolerances
 
 SWINGS = {
     "a1": "U joint",
@@ -39,6 +40,9 @@ FIELD_WORDS = {
     "gravity": "The direction of gravity",
     "actuators.push_n": "The push of an actuator",
     "actuators.pull_n": "The pull of an actuator",
+    "actuators.error_mm": "The error of an actuator",
+    "actuators.stiffness_n_mm": "The stiffness of an actuator",
+    **{f"tolerances.{name}": "A tolerance" for name in Tolerances.__struct_fields__},
     "struts.outer_mm": "The outer diameter of the struts",
     "struts.inner_mm": "The inner diameter of the struts",
     "struts.modulus_gpa": "Young's modulus of the struts",

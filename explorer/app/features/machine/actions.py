@@ -46,7 +46,7 @@ class SetToolAngle(Action):
 
 @dataclass(frozen=True)
 class MakeAlike(Action):
-    """Give each actuator the least push and the least pull of the six."""
+    """Give each actuator the least push, pull and stiffness, and the largest error, of the six."""
 
     template: ClassVar[str] = "All six actuators alike"
 
@@ -58,9 +58,15 @@ class MakeAlike(Action):
         """
         check_free(state)
         actuators = state.design.actuators
-        push, pull = (
-            None if forces is None else (min(forces),) * 6
-            for forces in (actuators.push_n, actuators.pull_n)
+        push, pull, stiffness = (
+            None if values is None else (min(values),) * 6
+            for values in (actuators.push_n, actuators.pull_n, actuators.stiffness_n_mm)
         )
-        alike = msgspec.structs.replace(actuators, push_n=push, pull_n=pull)
+        alike = msgspec.structs.replace(
+            actuators,
+            push_n=push,
+            pull_n=pull,
+            error_mm=(max(actuators.error_mm),) * 6,
+            stiffness_n_mm=stiffness,
+        )
         return with_value(state, "design.actuators", alike)

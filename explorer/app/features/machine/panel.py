@@ -1,4 +1,4 @@
-"""The panel of the machine: tool, payload, gravity, actuators, struts and guide."""
+"""The panel of the machine: tool, payload, gravity, actuators, struts, guide and tolerances."""
 
 from __future__ import annotations
 
@@ -6,12 +6,13 @@ import math
 import re
 from collections.abc import Iterator
 from html import escape
-from typing import Literal
 
 import msgspec
 
 from explorer.app.features.feature import Services
-from explorer.app.features.machine.actions import ANGLES, MakeAlike, SetToolAngle
+from explorer.app.features.machine.actions import ANGLES, SetToolAngle
+from explorer.app.features.machine.actuators import FORCE, ActuatorControls
+from explorer.app.features.machine.tolerances import add_tolerances
 from explorer.app.features.machine.words import DIRECTIONS, direction_name, machine_words
 from explorer.app.inputs.bindings import At, Bound
 from explorer.app.inputs.control import Condition
@@ -26,17 +27,12 @@ from explorer.app.state.values import value_at
 from explorer.app.widgets.assigning import Update
 from explorer.app.widgets.commands import NO_OPTION
 from explorer.app.widgets.markup import box, note
-from explorer.mechanism.design import JOINTS
-from explorer.mechanism.machine import Six, Struts
+from explorer.mechanism.machine import Struts
 from explorer.numerics.number_text import format_number
 
-Side = Literal["push", "pull"]
-SIDES: tuple[Side, ...] = ("push", "pull")
-
-# Limits that are switched on begin with these: N, N m and MPa; the tube in mm.
-FORCE, MOMENT, STRESS = 100.0, 10.0, 200.0
+# Limits that are switched on begin with these: N m and MPa; the tube in mm.
+MOMENT, STRESS = 10.0, 200.0
 OUTER, INNER = 12.0, 10.0
-FORCES: Six = (FORCE, FORCE, FORCE, FORCE, FORCE, FORCE)
 # Steps of the number fields, which show no more decimals.
 FINE, MEDIUM = 0.001, 0.01
 # What each angle of the tool turns about, and its edge in degrees.
@@ -69,23 +65,15 @@ class MachinePanel:
             self._add_payload()
         with gui.add_folder("Gravity", expand_by_default=False):
             self._add_gravity()
-        with gui.add_folder("Actuators (N)", expand_by_default=False):
-            self._add_forces()
-            self._each = gui.add_folder("Each of the six (N)", expand_by_default=False)
-            with self._each:
-                for side in SIDES:
-                    for index, name in enumerate(JOINTS):
-                        self._add_force(side, index, name)
-            self._alike = controls.button(
-                "Make all six alike",
-                "Give each of the six actuators the least push, and the least pull, of them all.",
-                MakeAlike,
-            )
+        with gui.add_folder("Actuators", expand_by_default=False):
+            self._actuators = ActuatorControls(gui, controls)
         with gui.add_folder("Struts of legs 2 and 3", expand_by_default=False):
             self._add_struts()
             self._moment = gui.add_html("")
         with gui.add_folder("Guide", expand_by_default=False):
             self._add_guide()
+        with gui.add_folder("Tolerances", expand_by_default=False):
+            add_tolerances(controls)
 
     def updates(self, frame: Frame) -> Iterator[Update]:
         """Yield the updates that make the panel show the frame."""
@@ -99,8 +87,7 @@ class MachinePanel:
             "content",
             note(f"Its weight is {format_number(weight)} N."),
         )
-        yield self._alike, "visible", not (_are_alike(state, "push") and _are_alike(state, "pull"))
-        yield self._each, "visible", _is_limited(state)
+        yield from self._actuators.updates(frame)
         yield self._moment, "content", note(moment_words(design.struts))
         yield from self._controls.updates(frame)
 
@@ -163,58 +150,6 @@ class MachinePanel:
                 lambda _, direction: Set("design.gravity", direction, "Gravity"),
             ),
             step=FINE,
-        )
-
-    def _add_forces(self) -> None:
-        self._controls.checkbox(
-            "Limited forces",
-            "Limit the forces of the actuators; off, they push and pull without limit.",
-            Bound(lambda frame: _is_limited(frame.state), _limit_forces),
-        )
-        self._add_common_force("push", "Largest force that increases a joint's value")
-        self._controls.checkbox(
-            "Pull of its own",
-            "Give the pull a limit of its own; off, the largest pull is the largest push.",
-            Bound(
-                lambda frame: _forces(frame.state, "pull") is not None,
-                _give_own_pull,
-            ),
-            disabled=lambda state: not _is_limited(state),
-        )
-        self._add_common_force("pull", "Largest force that decreases a joint's value")
-
-    def _add_common_force(self, side: Side, meaning: str) -> None:
-        label = f"{side.capitalize()} of each (N)"
-        self._controls.number(
-            label,
-            f"{meaning}, the same for all six.",
-            Bound(
-                lambda frame: _shown_forces(frame.state, side)[0],
-                lambda _, value: Set(
-                    f"design.actuators.{side}_n", (value,) * 6, label, format_number(value, 6)
-                ),
-            ),
-            least=0.0,
-            step=MEDIUM,
-            small=True,
-            visible=lambda state: _forces(state, side) is not None and _are_alike(state, side),
-        )
-
-    def _add_force(self, side: Side, index: int, joint: str) -> None:
-        def write(state: State, value: float) -> Action:
-            forces = list(_shown_forces(state, side))
-            forces[index] = value
-            text = format_number(value, 6)
-            return Set(f"design.actuators.{side}_n", tuple(forces), f"{side} of {joint} (N)", text)
-
-        self._controls.number(
-            f"{side} of {joint}",
-            f"Largest {side} of the actuator of {joint}, in N.",
-            Bound(lambda frame: _shown_forces(frame.state, side)[index], write),
-            least=0.0,
-            step=MEDIUM,
-            small=True,
-            visible=lambda state: _forces(state, side) is not None,
         )
 
     def _add_struts(self) -> None:
@@ -346,33 +281,3 @@ def _first_moment(state: State) -> float:
     """Return the moment to begin with: that of tube and stress, if there is one."""
     moment = state.design.struts.largest_moment
     return moment if math.isfinite(moment) else MOMENT
-
-
-def _forces(state: State, side: Side) -> Six | None:
-    """Return the largest forces to one side; None for no limit, or a pull like the push."""
-    actuators = state.design.actuators
-    return actuators.push_n if side == "push" else actuators.pull_n
-
-
-def _shown_forces(state: State, side: Side) -> Six:
-    """Return the forces that the fields hold; where there are none, those to begin with."""
-    return _forces(state, side) or state.design.actuators.push_n or FORCES
-
-
-def _are_alike(state: State, side: Side) -> bool:
-    return len(set(_shown_forces(state, side))) == 1
-
-
-def _is_limited(state: State) -> bool:
-    return any(_forces(state, side) is not None for side in SIDES)
-
-
-def _limit_forces(state: State, on: bool) -> Action:
-    push = _shown_forces(state, "push") if on else None
-    actuators = msgspec.structs.replace(state.design.actuators, push_n=push, pull_n=None)
-    return Set("design.actuators", actuators, "Limited forces", "on" if on else "off")
-
-
-def _give_own_pull(state: State, on: bool) -> Action:
-    pull = _shown_forces(state, "push") if on else None
-    return Set("design.actuators.pull_n", pull, "Pull of its own", "on" if on else "off")
