@@ -42,11 +42,13 @@ class Loaded:
 CASES = [Loaded(each) for each in read_reference("loads")["cases"]]
 
 
-def random_poses(design: Design, count: int, seed: int = 0) -> tuple[FloatArray, FloatArray]:
-    """Return random poses whose margins exceed a 20th of the reach."""
+def random_poses(
+    design: Design, count: int, seed: int = 0, margin: float = 0.05
+) -> tuple[FloatArray, FloatArray]:
+    """Return random poses whose margins exceed a share of the reach."""
     rng = np.random.default_rng(seed)
     many = 20 * count
     positions = rng.uniform(-1.0, 1.0, (many, 3)) * design.reach
     rotations = Rotation.random(many, random_state=rng).as_matrix()
-    regular = np.abs(margins(positions, rotations)).min(axis=1) > 0.05 * design.reach
+    regular = np.abs(margins(positions, rotations)).min(axis=1) > margin * design.reach
     return positions[regular][:count], rotations[regular][:count]

@@ -1,4 +1,4 @@
-"""Errors of the tool: the reference, all corners, Monte Carlo, perturbed dimensions."""
+"""Errors of the tool: the reference, all corners, random errors, other dimensions."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from refusals import refusal
-from scipy.optimize import least_squares
+from scipy.optimize import root
 from scipy.spatial.transform import Rotation
 from statics_cases import CASES, Loaded, random_poses
 
@@ -21,14 +21,18 @@ from explorer import (
     Tolerances,
     compliance,
     error_by_actuator,
+    forward,
     geometry_error,
     home_pose,
+    inverse,
+    margins,
     pose_error_by_geometry,
     pose_precision,
     rms_error,
     worst_error,
 )
 from explorer.mechanism.machine import DIMENSIONS
+from explorer.mechanism.margins import mode_of
 from explorer.numerics.arrays import FloatArray
 from explorer.statics.compliance import stiffness_of
 from explorer.statics.equilibrium import twists_of_actuators
@@ -62,15 +66,43 @@ def test_worst_error_is_the_largest_of_all_corners() -> None:
     assert (alone.turn.max(axis=1) <= worst.turn * (1.0 + 1e-12)).all()
 
 
-def test_rms_error_is_that_of_random_errors() -> None:
-    positions, rotations = random_poses(OPTIMAL, 5)
-    rms = rms_error(OPTIMAL, positions, rotations, ERRORS, TOOL)
-    drawn = np.random.default_rng(3).normal(size=(100_000, 6)) * ERRORS
-    for k, matrix in enumerate(twists_of_actuators(OPTIMAL, positions, rotations, TOOL)):
-        twists = drawn @ matrix.T
-        squares = [(twists[:, half] ** 2).sum(axis=1).mean() for half in (slice(3), slice(3, 6))]
-        assert float(rms.displacement[k]) == pytest.approx(np.sqrt(squares[0]), rel=0.01)
-        assert float(rms.turn[k]) == pytest.approx(np.sqrt(squares[1]), rel=0.01)
+@pytest.mark.parametrize("seed", range(6))
+def test_errors_bound_100000_poses_of_forward_kinematics_to_the_second_order(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    (position,), (rotation,) = random_poses(OPTIMAL, 1, seed, margin=0.2)
+    tool = rng.uniform(-0.2, 0.2, 3) * OPTIMAL.reach
+    held, mode = inverse(OPTIMAL, position, rotation), int(mode_of(margins(position, rotation)))
+    largest = 1e-4 * OPTIMAL.reach * rng.uniform(0.5, 1.0, 6)
+    # Every error comes with its opposite, and the corners are among them.
+    corners = np.array(list(itertools.product((-1.0, 1.0), repeat=6)))[:32]
+    signs = np.concatenate([corners, rng.uniform(-1.0, 1.0, (50_000 - len(corners), 6))])
+
+    def moved(errors: FloatArray) -> tuple[FloatArray, FloatArray]:
+        found = forward(OPTIMAL, held + errors)
+        turned = found.rotation[:, mode]
+        at = found.position[:, mode] + turned @ tool
+        turn = Rotation.from_matrix(turned @ rotation.T).as_rotvec()
+        return at - position - rotation @ tool, turn
+
+    def odd_and_even(size: float) -> list[tuple[FloatArray, FloatArray]]:
+        ends = zip(moved(size * signs * largest), moved(-size * signs * largest), strict=True)
+        return [(0.5 * (high - low), 0.5 * (high + low)) for high, low in ends]
+
+    given = OPTIMAL, position, rotation
+    worst, rms = (each(*given, largest, tool) for each in (worst_error, rms_error))
+    for bound, mean, whole, half in zip(
+        worst, rms, odd_and_even(1.0), odd_and_even(0.5), strict=True
+    ):
+        odd, even = (np.linalg.norm(each, axis=1) for each in whole)
+        assert even.max() < 0.05 * bound
+        # Without the part of the second order no sample exceeds the worst, but for the third
+        # order, and a corner reaches it.
+        assert odd.max() == pytest.approx(bound, rel=5.0 * float(even.max() / bound) ** 2)
+        # That part falls by four when the errors halve, so that the model is exact to first order.
+        assert_allclose(np.linalg.norm(half[1], axis=1).max(), 0.25 * even.max(), rtol=1e-3)
+        squares = [((whole[0] + sign * whole[1]) ** 2).sum(axis=1) for sign in (1.0, -1.0)]
+        # Errors of equal chance within ± e have the deviation e / √3.
+        assert np.sqrt(np.mean(squares)) == pytest.approx(mean / np.sqrt(3.0), rel=0.01)
 
 
 def joints_of(dimensions: FloatArray, position: FloatArray, rotation: FloatArray) -> FloatArray:
@@ -88,30 +120,39 @@ def joints_of(dimensions: FloatArray, position: FloatArray, rotation: FloatArray
     return np.array([*joints, float(np.linalg.norm(b4 - a3))])
 
 
-def test_error_by_geometry_is_that_of_a_machine_with_other_dimensions() -> None:
-    home = home_pose(OPTIMAL)
-    position, rotation = np.array(home.position), home.rotation
+@pytest.mark.parametrize("seed", range(6))
+def test_error_by_geometry_is_that_of_a_machine_with_23_other_dimensions(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    (position,), (rotation,) = random_poses(OPTIMAL, 1, seed)
+    tool = rng.uniform(-0.2, 0.2, 3) * OPTIMAL.reach
     nominal = np.zeros(23)
     nominal[3:5] = OPTIMAL.a3
     nominal[11:13] = OPTIMAL.b1
     nominal[14], nominal[17] = OPTIMAL.b2, OPTIMAL.b3
     held = joints_of(nominal, position, rotation)
-    found = pose_error_by_geometry(OPTIMAL, position, rotation, TOOL)
-    step = 1e-4
-    for index, name in enumerate(DIMENSIONS):
-        ends: list[FloatArray] = []
-        for sign in (1.0, -1.0):
-            dimensions = nominal + sign * step * np.eye(23)[index]
+    found = pose_error_by_geometry(OPTIMAL, position, rotation, tool)
 
-            def unmet(twist: FloatArray, dimensions: FloatArray = dimensions) -> FloatArray:
-                turn = Rotation.from_rotvec(twist[3:]).as_matrix() @ rotation
-                place = position + rotation @ TOOL + twist[:3] - turn @ TOOL
-                return joints_of(dimensions, place, turn) - held
+    def moved(errors: FloatArray) -> FloatArray:
+        """Return the twist that meets the loop equations with other dimensions."""
 
-            solved = least_squares(unmet, np.zeros(6), xtol=1e-15, ftol=1e-15, gtol=1e-15)
-            ends.append(solved.x)
-        slope = (ends[0] - ends[1]) / (2.0 * step)
-        assert_allclose(slope, found[:, index], atol=1e-5 * np.abs(found).max(), err_msg=name)
+        def unmet(twist: FloatArray) -> FloatArray:
+            turn = Rotation.from_rotvec(twist[3:]).as_matrix() @ rotation
+            place = position + rotation @ tool + twist[:3] - turn @ tool
+            return joints_of(nominal + errors, place, turn) - held
+
+        solved = root(unmet, np.zeros(6), tol=1e-15)
+        assert np.abs(solved.fun).max() < 1e-12
+        return np.asarray(solved.x)
+
+    for _ in range(20):
+        errors = rng.normal(size=23)
+        errors *= 1e-2 / np.abs(found @ errors).max()
+        # What the linear model lacks falls by four when all errors halve.
+        lack = [moved(size * errors) - found @ (size * errors) for size in (1.0, 0.5)]
+        size = np.abs(lack[0]).max()
+
+        assert 1e-8 < size < 1e-2
+        assert_allclose(lack[1], 0.25 * lack[0], atol=0.01 * size)
 
 
 def test_error_by_geometry_of_a_shift_of_the_whole_base_is_that_shift() -> None:
