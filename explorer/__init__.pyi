@@ -112,6 +112,14 @@ from .statics.compliance import (
     deflection as deflection,
     principal_compliances as principal_compliances,
 )
+from .statics.error_sources import (
+    SOURCES as SOURCES,
+    LargestError as LargestError,
+    largest_error as largest_error,
+    pose_error_by_source as pose_error_by_source,
+    rms_of_sources as rms_of_sources,
+    source_errors as source_errors,
+)
 from .statics.forces import (
     actuator_forces as actuator_forces,
     largest_force as largest_force,

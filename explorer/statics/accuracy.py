@@ -48,6 +48,7 @@ class Precision(NamedTuple):
         rms: Root-mean-square errors, with the bounds as standard deviations.
         by_actuator: Errors of each actuator alone, with axes of six in the order of `JOINTS`.
         by_geometry: Error of the tool per error of each dimension, shape (..., 6, 23).
+        by_joint: Error of the tool per error of each actuator, J⁻¹, shape (..., 6, 6).
     """
 
     compliance: FloatArray
@@ -55,6 +56,7 @@ class Precision(NamedTuple):
     rms: ToolError
     by_actuator: ToolError
     by_geometry: FloatArray
+    by_joint: FloatArray
 
 
 @helper
@@ -289,6 +291,7 @@ def pose_precision(
         rms,
         single,
         _by_geometry(poses, twists).reshape(*poses.batch, 6, len(DIMENSIONS)),
+        twists.reshape(*poses.batch, 6, 6),
     )
 
 
