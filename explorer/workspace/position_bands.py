@@ -1,8 +1,9 @@
 """Measures of positions at one orientation, and the bands of colour that show them.
 
-Each value is zero in singular positions and grows away from them. For a load it is the reciprocal
-of what the load asks of the machine, which is infinite there: the first band has no end of its
-own, so that it holds whatever is beyond the last round number.
+Each value is zero in singular positions and grows away from them. For a load and for errors it is
+the reciprocal of what the load asks of the machine, or of how far the tool moves, which is infinite
+there: the first band has no end of its own, so that it holds whatever is beyond the last round
+number.
 """
 
 from __future__ import annotations
@@ -30,28 +31,37 @@ from explorer.singularity.colours import (
     mix,
 )
 from explorer.singularity.jacobian import inverse_condition, jacobian
+from explorer.statics.accuracy import actuator_errors, worst_error
+from explorer.statics.compliance import compliance, deflection, stiffness_of
 from explorer.statics.held import held_load, largest_shares
+from explorer.statics.reactions import has_limits
+from explorer.statics.weights import payload_wrench
 from explorer.workspace.limits.constraints import constraints, slacks
 from explorer.workspace.limits.region import region_of
 from explorer.workspace.slices.volume import bounds
 
-PositionMeasure = Literal["margin", "condition", "share", "force", "bending"]
-LoadMeasure = Literal["share", "force", "bending"]
+PositionMeasure = Literal["margin", "condition", "share", "force", "bending", "error", "deflection"]
+PartMeasure = Literal["share", "force", "bending"]
 
-LOAD_WORDS: dict[PositionMeasure, tuple[str, str, float]] = {
+MEASURE_WORDS: dict[PositionMeasure, tuple[str, str, float]] = {
     "share": ("largest share of a limit", "%", 100.0),
     "force": ("largest actuator force", "N", 1.0),
     "bending": ("largest bending of a strut", "N m", 1.0),
+    "error": ("worst error of the tool", "mm", 1.0),
+    "deflection": ("deflection under the load", "mm", 1.0),
 }
-"""Words and unit for what a load asks, and the factor from the measure to that unit.
-The measures are in 1, N and N m."""
+"""Words and unit of the measures that are infinite in singular positions, and the factor from the
+measure to that unit. The measures are in 1, N, N m and mm."""
+
+LOAD_MEASURES: tuple[PositionMeasure, ...] = ("share", "force", "bending", "deflection")
+"""Measures that depend on the load."""
 
 SHARES = (0.25, 0.5, 0.75, 1.0)
 """Ends of the bands of shares of a limit; the last one is the limit."""
 SHARE_COLOURS: tuple[Rgb, ...] = (FAR, mix(FAR, CLEAR, 0.5), CLEAR, WARNED, SINGULAR)
 
 STEPS = (1.0, 2.0, 5.0)
-"""Ends of the bands of forces and moments, over powers of ten."""
+"""Ends of the bands of forces, moments and displacements, over powers of ten."""
 # Number of these ends. The lowest exceeds this share of the values within the limits.
 LEVELS, LEAST_SHARE = 6, 0.05
 STEP_COLOURS: tuple[Rgb, ...] = (
@@ -70,9 +80,11 @@ class PositionBands:
         measure: The measure.
         edges: Least value of each band, ascending from 0.
         colours: Colour of each band.
-        levels: The measure at each edge, in units for a margin; infinite at the first for a load.
+        levels: The measure at each edge, in units for a margin; infinite at the first for the
+            measures of `MEASURE_WORDS`.
         values: Function from positions (n, 3) to values (n,), which are zero in singular ones.
-        held: Row of numbers of a load, see `explorer.statics.held.held_load`; None without one.
+        held: Row of numbers of a load, see `explorer.statics.held.held_load`; None for a measure
+            that no part of the machine has.
     """
 
     measure: PositionMeasure
@@ -115,11 +127,48 @@ def position_bands(
 
         return _proximity(measure, WARN_CONDITION, condition)
     w = np.zeros(6) if load is None else load
+    if measure == "error":
+        errors, tool = actuator_errors(design), design.tool.position
+
+        def worst(points: FloatArray) -> FloatArray:
+            error = worst_error(design, points, rotation, errors, tool)
+            return error.displacement * design.unit_mm
+
+        return _unbounded(design, rotation, measure, worst)
+    if measure == "deflection":
+        wrench, stiffness = payload_wrench(design, rotation) + w, stiffness_of(design)
+
+        def deflected(points: FloatArray) -> FloatArray:
+            soft = compliance(design, points, rotation, *stiffness, design.tool.position)
+            return np.linalg.norm(deflection(soft, wrench)[:, :3], axis=-1) * design.unit_mm
+
+        return _unbounded(design, rotation, measure, deflected)
     held = held_load(design, rotation, w, measured_limits(design, measure))
-    return _of_load(design, rotation, measure, held)
+
+    def asked(points: FloatArray) -> FloatArray:
+        return largest_shares(held, rotation, points)
+
+    return _unbounded(design, rotation, measure, asked, held)
 
 
-def measured_limits(design: Design, measure: LoadMeasure) -> FloatArray | None:
+def is_unstated(design: Design, measure: PositionMeasure) -> bool:
+    """Return whether a design states nothing of what makes a measure more than zero.
+
+    A share needs a limit of a part, the worst error an error of an actuator, and the deflection a
+    stiffness of the actuators or the tube of a strut.
+    """
+    match measure:
+        case "share":
+            return not has_limits(design)
+        case "error":
+            return not any(design.actuators.error_mm)
+        case "deflection":
+            return design.actuators.stiffness_n_mm is None and design.struts.outer_mm is None
+        case _:
+            return False
+
+
+def measured_limits(design: Design, measure: PartMeasure) -> FloatArray | None:
     """Return the limits of which the largest share is the measure, shape (2, 10).
 
     They are those of the design, as None, for a share. For a force or a moment they are one newton
@@ -143,27 +192,35 @@ def _proximity(
     return PositionBands(measure, BAND_EDGES, band_colours(), levels, values)
 
 
-def _of_load(
-    design: Design, rotation: FloatArray, measure: LoadMeasure, held: FloatArray
+def _unbounded(
+    design: Design,
+    rotation: FloatArray,
+    measure: PositionMeasure,
+    measured: Callable[[FloatArray], FloatArray],
+    held: FloatArray | None = None,
 ) -> PositionBands:
-    """Return the bands of what a load asks; values are the highest level over it."""
+    """Return the bands of what is infinite in singular positions.
+
+    The values of the bands are the highest level over what is measured at positions (n, 3).
+    """
     if measure == "share":
         levels, colours = SHARES, SHARE_COLOURS
     else:
-        levels, colours = _round_levels(design, rotation, held), STEP_COLOURS
+        levels, colours = _round_levels(design, rotation, measured), STEP_COLOURS
     highest = levels[-1]
     edges = (0.0, *(highest / level for level in reversed(levels)))
 
     def values(points: FloatArray) -> FloatArray:
-        asked = largest_shares(held, rotation, points)
-        return highest / np.maximum(asked, highest / (FARTHEST * edges[-1]))
+        return highest / np.maximum(measured(points), highest / (FARTHEST * edges[-1]))
 
     ends = (math.inf, *reversed(levels))
     return PositionBands(measure, edges, colours[::-1], ends, values, held)
 
 
-def _round_levels(design: Design, rotation: FloatArray, held: FloatArray) -> tuple[float, ...]:
-    """Return round numbers that suit the values at positions within the limits, ascending."""
+def _round_levels(
+    design: Design, rotation: FloatArray, measured: Callable[[FloatArray], FloatArray]
+) -> tuple[float, ...]:
+    """Return round numbers that suit what is measured within the limits, ascending."""
     limits = constraints(design, rotation)
     lows, highs = bounds(region_of(limits))
     if not (lows < highs).all():
@@ -171,9 +228,9 @@ def _round_levels(design: Design, rotation: FloatArray, held: FloatArray) -> tup
     axes = np.linspace(lows, highs, NODES + 2)[1:-1].T
     nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     within = nodes[(slacks(limits, nodes) >= 0.0).all(axis=-1)]
-    asked = largest_shares(held, rotation, within if len(within) else nodes)
-    asked = asked[np.isfinite(asked) & (asked > 0.0)]
-    least = float(np.quantile(asked, LEAST_SHARE)) if len(asked) else 1.0
+    found = measured(within if len(within) else nodes)
+    found = found[np.isfinite(found) & (found > 0.0)]
+    least = float(np.quantile(found, LEAST_SHARE)) if len(found) else 1.0
     exponent = math.floor(math.log10(least))
     # Division by a power of ten is exact where a product with a negative one is not.
     steps = (

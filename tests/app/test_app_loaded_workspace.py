@@ -1,4 +1,7 @@
-"""The workspace under the load of the page: bands on its surface, the part that holds it, files."""
+"""The workspace under the load of the page and by the precision of the tool.
+
+Bands on its surface, the part that holds the load, files.
+"""
 
 from __future__ import annotations
 
@@ -13,6 +16,7 @@ import numpy as np
 import pytest
 import trimesh
 from desk import CLIENT, Desk
+from machines import six
 from mesh_files import mesh_of, read_3mf
 from services import StubDownloads, services_for
 from workspace_feeds import drawing_of, follow
@@ -32,12 +36,14 @@ from explorer.app.state.view import ForcesView
 from explorer.errors import InputError
 from explorer.mechanism.design import Design, Limits
 from explorer.mechanism.design_file import PRESETS
-from explorer.mechanism.machine import Actuators, Payload, Struts, Tool
+from explorer.mechanism.machine import Actuators, Guide, Payload, Struts, Tool
 from explorer.mechanism.pose import Pose
 from explorer.numerics.arrays import FloatArray
 from explorer.singularity.ellipsoids import planes_of_singularity
+from explorer.statics.accuracy import worst_error
+from explorer.statics.compliance import compliance, deflection, stiffness_of
 from explorer.statics.reactions import limit_shares, reactions
-from explorer.statics.weights import design_weights
+from explorer.statics.weights import design_weights, payload_wrench
 from explorer.workspace.held import held_workspace
 from explorer.workspace.limits.constraints import constraints, slacks
 from explorer.workspace.position_bands import SHARE_COLOURS, SHARES, STEP_COLOURS
@@ -51,6 +57,13 @@ LOADED = msgspec.structs.replace(
     payload=Payload(0.5, (1.0, 0.0, 1.0), 5.0),
     actuators=Actuators(push_n=(150, 200, 150, 200, 150, 150)),
     struts=Struts(moment_nm=4.0),
+)
+PRECISE = msgspec.structs.replace(
+    OPTIMAL,
+    tool=Tool((1.0, 0.0, 2.0)),
+    payload=Payload(0.5, (1.0, 0.0, 1.0), 5.0),
+    actuators=Actuators(error_mm=six([0.05] * 6), stiffness_n_mm=six([1000.0] * 6)),
+    struts=Struts(outer_mm=12.0, inner_mm=10.0),
 )
 FORCES = ForcesView(force=(3.0, 0.0, -40.0), moment=(0.0, 0.2, 0.0))
 # FORCES in N and N × unit.
@@ -146,27 +159,79 @@ def test_surface_of_a_design_without_limits_lies_in_the_bands_of_forces(colour: 
     assert wrong < 5e-3 * total
 
 
+@pytest.mark.parametrize("cut", [None, "y"])
+@pytest.mark.parametrize("colour", ["error", "deflection"])
+def test_surface_lies_in_the_bands_of_how_far_the_tool_moves(colour: Any, cut: Any) -> None:
+    drawing = drawing_of(shown(PRECISE, colour=colour, cut=cut))
+    rotation, ends = np.array(drawing.request.rotation), (*drawing.levels, 0.0)
+    random = np.random.default_rng(2)
+    total = wrong = 0
+    for shell in drawing.surface.shells:
+        index = STEP_COLOURS[::-1].index(shell.colour)
+        weights = random.dirichlet([0.5, 0.5, 0.5], len(shell.faces))
+        points = (shell.vertices[shell.faces] * weights[:, :, None]).sum(axis=1)
+        tool = PRECISE.tool.position
+        if colour == "error":
+            moved = worst_error(PRECISE, points, rotation, six([0.05] * 6), tool).displacement
+        else:
+            # The payload's force of any direction does not count.
+            wrench = LOAD + payload_wrench(PRECISE, rotation)
+            soft = compliance(PRECISE, points, rotation, *stiffness_of(PRECISE), tool)
+            moved = PRECISE.unit_mm * np.linalg.norm(deflection(soft, wrench)[:, :3], axis=-1)
+        wrong += int(((moved > 1.03 * ends[index]) | (moved < 0.97 * ends[index + 1])).sum())
+        total += len(points)
+    assert wrong < 5e-3 * total
+    assert len(drawing.surface.shells) > 3
+
+
+def test_precision_of_an_ideal_design_asks_for_what_it_needs(services: Services) -> None:
+    panel = WorkspacePanel(services)
+
+    def told(design: Design, colour: str) -> str:
+        state = shown(design, colour=colour)
+        request = workspace_request(Frame(state))
+        assert request is not None
+        assert request.colour == (colour if design is PRECISE else "plain")
+        return "".join(str(v) for _, n, v in panel.updates(Frame(state)) if n == "content")
+
+    assert "The actuators of the design have no errors" in told(OPTIMAL, "error")
+    assert "The design is rigid" in told(OPTIMAL, "deflection")
+    for colour, title in (
+        ("error", "Worst error of the tool (mm)"),
+        ("deflection", "Deflection under the load (mm)"),
+    ):
+        words = told(PRECISE, colour)
+        assert title in words
+        assert "no errors" not in words
+        assert "rigid" not in words
+        assert ("0.5 kg of payload" in words) == (colour == "deflection")
+        assert "in any direction" not in words
+
+
 def test_load_that_is_not_shown_changes_no_request() -> None:
     other = replace(FORCES, force=(0.0, 0.0, 7.0))
     unloaded: tuple[dict[str, Any], ...] = (
         {"colour": "plain"},
         {"colour": "margin", "cut": "x"},
         {"region": "reachable"},
+        {"colour": "error"},
     )
     for changes in unloaded:
-        assert workspace_request(Frame(shown(**changes))) == workspace_request(
-            Frame(shown(forces=other, **changes))
+        assert workspace_request(Frame(shown(PRECISE, **changes))) == workspace_request(
+            Frame(shown(PRECISE, forces=other, **changes))
         )
     loaded: tuple[dict[str, Any], ...] = (
         {"colour": "share"},
         {"colour": "force"},
+        {"colour": "deflection"},
         {"region": "held"},
     )
+    limited = msgspec.structs.replace(PRECISE, guide=Guide(force_n=100.0))
     for changes in loaded:
-        request = workspace_request(Frame(shown(**changes)))
+        request = workspace_request(Frame(shown(limited, **changes)))
         assert request is not None
         assert request.load == LOAD
-        assert request != workspace_request(Frame(shown(forces=other, **changes)))
+        assert request != workspace_request(Frame(shown(limited, forces=other, **changes)))
 
 
 def test_payload_without_a_weight_loads_nothing_but_its_force() -> None:

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import msgspec
 import numpy as np
 import pytest
-from machines import FULL
+from machines import FULL, six
 from playwright.sync_api import Browser, Locator, expect
 from tab import Tab
 
@@ -20,16 +20,19 @@ from explorer.app.screenshot import PATIENCE_SECONDS
 from explorer.app.server import Running
 from explorer.app.state.actions import Open, Set, SetVariable
 from explorer.mechanism.design_file import PRESETS
-from explorer.mechanism.machine import Tool
+from explorer.mechanism.machine import Actuators, Struts, Tool
 from explorer.mechanism.margins import margins
 from explorer.mechanism.pose import rotation_from_yaw_pitch_roll
 from explorer.numerics.number_text import format_number
 from explorer.singularity.ellipsoids import planes_of_singularity
 from explorer.singularity.jacobian import inverse_condition, jacobian
+from explorer.statics.accuracy import worst_error
+from explorer.statics.compliance import compliance, deflection, stiffness_of
 from explorer.statics.held import held_load, held_values, largest_shares
 from explorer.statics.reactions import PART_NAMES
+from explorer.statics.weights import payload_wrench
 from explorer.workspace.held import part_names
-from explorer.workspace.position_bands import LOAD_WORDS, PositionMeasure
+from explorer.workspace.position_bands import PartMeasure, PositionMeasure
 from explorer.workspace.slices.volume import workspace_volume
 
 OPTIMAL = PRESETS["paper-optimal"]
@@ -169,7 +172,7 @@ def test_page_computes_what_a_load_asks_as_the_library_does(tab: Tab) -> None:
         if trial % 4 == 0:
             # Near a singular position, or at one.
             position[2] = (0.0, 1e-6, 1e-3)[trial % 3]
-        measure: PositionMeasure = tuple(LOAD_WORDS)[trial % 3]
+        measure: PartMeasure = ("share", "force", "bending")[trial % 3]
         colouring = Colouring(FULL, rotation, measure, 1.0, load)
         held = colouring.bands.held
         assert held is not None
@@ -181,8 +184,8 @@ def test_page_computes_what_a_load_asks_as_the_library_does(tab: Tab) -> None:
     tab.wait_for(lambda: bool(tab.page.evaluate("!!window.explorer?.map")), "the script")
     found = tab.page.evaluate(
         """cases => cases.map(({ facts, p }) => {
-            const { share, part } = window.explorer.map.largestShare(facts, p);
-            return [Number.isFinite(share) ? share : -1, part];
+            const { value, part } = window.explorer.map.amount(facts, p);
+            return [Number.isFinite(value) ? value : -1, part];
         })""",
         cases,
     )
@@ -193,6 +196,82 @@ def test_page_computes_what_a_load_asks_as_the_library_does(tab: Tab) -> None:
         else:
             assert computed == pytest.approx(share, rel=1e-6)
             assert of_page == part
+
+
+@pytest.mark.parametrize("measure", ["error", "deflection"])
+def test_page_computes_how_far_the_tool_moves_as_the_library_does(
+    tab: Tab, measure: PositionMeasure
+) -> None:
+    rng = np.random.default_rng(4)
+    cases: list[dict[str, object]] = []
+    expected: list[float] = []
+    for trial in range(40):
+        design = msgspec.structs.replace(
+            FULL,
+            unit_mm=float(rng.uniform(1.0, 20.0)),
+            actuators=Actuators(
+                error_mm=six(rng.uniform(0.0, 0.1, 6)),
+                stiffness_n_mm=six(rng.uniform(100.0, 2000.0, 6)) if trial % 3 else None,
+            ),
+            struts=Struts(outer_mm=None if trial % 3 == 1 else 12.0, inner_mm=10.0),
+        )
+        rotation = rotation_from_yaw_pitch_roll(rng.uniform(-80.0, 80.0, 3))
+        position = rng.uniform(-20.0, 20.0, 3)
+        if trial % 4 == 0:
+            # Near a singular position, or at one.
+            position[2] = (0.0, 1e-6, 1e-3)[trial % 3]
+        load = rng.uniform(-50.0, 50.0, 6)
+        pose, tool = (design, position, rotation), design.tool.position
+        if measure == "error":
+            moved = worst_error(*pose, design.actuators.error_mm, tool).displacement
+        else:
+            wrench = load + payload_wrench(design, rotation)
+            soft = compliance(*pose, *stiffness_of(design), tool)
+            moved = design.unit_mm * np.linalg.norm(deflection(soft, wrench)[:3])
+        expected.append(float(moved))
+        facts = map_facts(Colouring(design, rotation, measure, 1.0, load))
+        cases.append({"facts": facts, "p": position.tolist()})
+    tab.wait_for(lambda: bool(tab.page.evaluate("!!window.explorer?.map")), "the script")
+    found = tab.page.evaluate(
+        """cases => cases.map(({ facts, p }) => {
+            const { value } = window.explorer.map.amount(facts, p);
+            return Number.isFinite(value) ? value : -1;
+        })""",
+        cases,
+    )
+    assert sum(map(math.isinf, expected)) > 2
+    finite = [-1.0 if math.isinf(moved) else moved for moved in expected]
+    np.testing.assert_allclose(found, finite, rtol=1e-6)
+
+
+@pytest.mark.parametrize("measure", ["error", "deflection"])
+def test_map_of_displacements_is_read_under_the_pointer(tab: Tab, measure: str) -> None:
+    page, load = tab.running.page, (0.0, 0.0, -50.0)
+    actuators = Actuators(error_mm=six([0.05] * 6), stiffness_n_mm=six([1000.0] * 6))
+    page.session.do(Open(msgspec.structs.replace(OPTIMAL, actuators=actuators)))
+    page.session.do(Set("view.forces.force", load))
+    page.session.do(Set("view.workspace.colour", measure))
+    tab.turn_to("Workspace")
+    tab.push("y")
+    map_in(tab).wait_for()
+    reading = tab.page.locator(".ex-reading")
+    name = {"error": "worst error of the tool", "deflection": "deflection under the load"}[measure]
+    words = re.compile(rf"x ([−\d.]+), z ([−\d.]+) units: {name} ([\d.,]+) mm")
+    rest_on(tab, 0.6, 0.4)
+    expect(reading).to_have_text(words)
+    found = words.match(reading.inner_text())
+    drawing = page.services.get(WorkspaceFeed).drawing
+    assert found is not None
+    assert drawing is not None
+    assert drawing.level is not None
+    at = np.array([number(found[1]), drawing.level, number(found[2])])
+    rotation = np.array(drawing.request.rotation)
+    if measure == "error":
+        moved = worst_error(OPTIMAL, at, rotation, [0.05] * 6).displacement
+    else:
+        soft = compliance(OPTIMAL, at, rotation, [1000.0] * 6)
+        moved = np.linalg.norm(deflection(soft, [*load, 0.0, 0.0, 0.0])[:3])
+    assert number(found[3].replace(",", "")) == pytest.approx(float(moved), rel=0.02)
 
 
 def test_map_of_shares_is_read_under_the_pointer(tab: Tab) -> None:

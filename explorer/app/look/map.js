@@ -4,6 +4,8 @@ window.explorer.map ??= (() => {
   const AXES = ["x", "y", "z"],
     // Share of the distance from a1 up to which a margin is zero.
     SINGULAR = 1e-13,
+    // Signs of six errors, but for a common one.
+    CORNERS = 32,
     HINT = "Point at the map to read it, click to go there.";
   const dot = (a, b) => a.reduce((sum, value, k) => sum + value * b[k], 0);
   const plus = (a, b) => a.map((value, k) => value + b[k]);
@@ -84,23 +86,28 @@ window.explorer.map ??= (() => {
     return table.map((row, k) => row.slice(table.length).map((value) => value / row[k]));
   };
 
+  const isSingular = (facts, p) => leastMargin(facts, p).least <= SINGULAR * Math.hypot(...p);
+  // The loads (F; M about b4) of a unit force at the tool along each axis. The forces that hold
+  // them are minus how far a unit of each actuator moves the tool along that axis.
+  const unitLoads = ({ tool }) =>
+    AXES.map((_, axis) => {
+      const force = AXES.map((__, k) => (k === axis ? 1 : 0));
+      return force.concat(cross(tool, force));
+    });
+  const strutLength = (p, arm) => Math.hypot(p[1] + arm[1], p[2] + arm[2]);
+
   // The largest share of a limit that the load uses at a position, and the part of the machine; see
   // statics/held.py. It is infinite on a singular plane.
   const largestShare = (facts, p) => {
-    const { wrench, tool, anyForce, overLimits, parts } = facts.load;
-    if (leastMargin(facts, p).least <= SINGULAR * Math.hypot(...p)) {
-      return { share: Infinity, part: "" };
-    }
-    const units = [0, 1, 2].map((axis) => {
-      const force = [0, 1, 2].map((k) => (k === axis ? 1 : 0));
-      return force.concat(cross(tool, force));
-    });
-    const forces = holdingForces(facts, p, [wrench, ...units]).map(([value, ...rates]) => ({
+    const { wrench, anyForce, overLimits, parts } = facts.load;
+    if (isSingular(facts, p)) return { value: Infinity, part: "" };
+    const loads = [wrench, ...unitLoads(facts)];
+    const forces = holdingForces(facts, p, loads).map(([value, ...rates]) => ({
       value,
       spread: anyForce * Math.hypot(...rates),
     }));
     const bending = ({ value, spread }, arm) => {
-      const length = Math.hypot(p[1] + arm[1], p[2] + arm[2]);
+      const length = strutLength(p, arm);
       return { value: value * length, spread: spread * length };
     };
     const [, b2, b3] = facts.arms;
@@ -115,7 +122,37 @@ window.explorer.map ??= (() => {
       Math.max((spread + value) * overLimits[0][k], (spread - value) * overLimits[1][k]),
     );
     const share = Math.max(0, ...shares);
-    return { share, part: share ? parts[shares.indexOf(share)] : "" };
+    return { value: share, part: share ? parts[shares.indexOf(share)] : "" };
+  };
+
+  // The largest displacement of the tool by errors of the actuators of any signs; see
+  // statics/accuracy.py. It is infinite on a singular plane.
+  const worstError = (facts, p) => {
+    if (isSingular(facts, p)) return Infinity;
+    const moves = holdingForces(facts, p, unitLoads(facts)).map((rates, i) =>
+      rates.map((rate) => rate * facts.errors[i]),
+    );
+    let largest = 0;
+    for (let corner = 0; corner < CORNERS; corner += 1) {
+      const signed = moves.map((move, i) => ((corner >> i) & 1 ? move.map((d) => -d) : move));
+      largest = Math.max(largest, Math.hypot(...signed.reduce(plus)));
+    }
+    return largest;
+  };
+
+  // The displacement of the tool under the load; see statics/compliance.py. It is infinite on a
+  // singular plane.
+  const deflection = (facts, p) => {
+    if (isSingular(facts, p)) return Infinity;
+    const { wrench, actuators, struts } = facts.giving;
+    const [, b2, b3] = facts.arms;
+    const softness = [...actuators];
+    softness[1] += struts[0] * strutLength(p, b2) ** 3;
+    softness[3] += struts[1] * strutLength(p, b3) ** 3;
+    const moves = holdingForces(facts, p, [wrench, ...unitLoads(facts)]).map(
+      ([force, ...rates], i) => rates.map((rate) => rate * softness[i] * force),
+    );
+    return Math.hypot(...moves.reduce(plus));
   };
 
   const number = (value, decimals) =>
@@ -126,16 +163,21 @@ window.explorer.map ??= (() => {
         signDisplay: "negative",
       })
       .replace("-", "\u2212");
+  // What a measure in words is at a position, and the part of the machine that has it.
+  const amount = (facts, p) => {
+    if (facts.load) return largestShare(facts, p);
+    return { value: facts.errors ? worstError(facts, p) : deflection(facts, p), part: "" };
+  };
   // The measures are those of b4, from which the point of the map is at an offset.
   const measure = (facts, point) => {
     const p = facts.offset ? point.map((value, k) => value - facts.offset[k]) : point;
-    if (facts.load) {
-      const { words, unitName, factor } = facts.load;
-      const { share, part } = largestShare(facts, p);
-      const value = Number.isFinite(share)
-        ? (factor * share).toLocaleString("en", { maximumSignificantDigits: 3 })
+    if (facts.words) {
+      const { name, unit: unitName, factor } = facts.words;
+      const { value, part } = amount(facts, p);
+      const text = Number.isFinite(value)
+        ? (factor * value).toLocaleString("en", { maximumSignificantDigits: 3 })
         : "\u221e";
-      return `${words} ${value} ${unitName}${part && ` (${part})`}`;
+      return `${name} ${text} ${unitName}${part && ` (${part})`}`;
     }
     if (facts.arms) {
       const value = inverseCondition(jacobian(facts, p));
@@ -212,5 +254,5 @@ window.explorer.map ??= (() => {
     const rounded = p.map((value) => Number(value.toFixed(facts.decimals)));
     window.explorer.press("workspace.go", JSON.stringify(rounded));
   });
-  return { leastMargin, inverseCondition, jacobian, largestShare };
+  return { leastMargin, inverseCondition, jacobian, amount };
 })();

@@ -43,7 +43,9 @@ class WorkspaceView:
     hull: bool = False
     planes: bool = False
     orientation: Literal["pose", "home"] = "pose"
-    colour: Literal["plain", "margin", "condition", "share", "force", "bending"] = "plain"
+    colour: Literal[
+        "plain", "margin", "condition", "share", "force", "bending", "error", "deflection"
+    ] = "plain"
     cut: Literal["x", "y", "z"] | None = None
     level: float | None = None
     flipped: bool = False

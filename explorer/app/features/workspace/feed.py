@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from explorer.app.features.feature import Services
 from explorer.app.features.forces.loads import load_of
-from explorer.app.features.workspace.load import loaded_design
+from explorer.app.features.workspace.load import drawn_measure, loaded_design
 from explorer.app.features.workspace.orientation import (
     workspace_rotation,
     workspace_rows,
@@ -21,8 +21,7 @@ from explorer.app.features.workspace.tasks import (
 )
 from explorer.app.session.feed import Feed
 from explorer.app.state.frame import Frame
-from explorer.statics.reactions import has_limits
-from explorer.workspace.position_bands import LOAD_WORDS
+from explorer.workspace.position_bands import LOAD_MEASURES
 
 
 class WorkspaceFeed(Feed[WorkspaceRequest, WorkspaceDrawing]):
@@ -55,11 +54,9 @@ def workspace_request(frame: Frame) -> WorkspaceRequest | None:
         # The worker counts in coordinates of b4.
         level -= float(frame.state.offset(workspace_rotation(frame))["xyz".index(view.cut)])
     coloured = view.colour == "margin" or is_cut
-    # Without limits all shares are zero.
-    is_shareless = view.colour == "share" and not has_limits(frame.state.design)
-    colour = "plain" if is_shareless else view.colour
+    colour = drawn_measure(frame.state)
     # The load changes no drawing that does not show it.
-    is_loaded = colour in LOAD_WORDS or view.region == "held"
+    is_loaded = colour in LOAD_MEASURES or view.region == "held"
     return WorkspaceRequest(
         design=loaded_design(frame.state) if is_loaded else frame.state.design,
         rotation=workspace_rows(frame),

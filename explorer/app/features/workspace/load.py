@@ -8,6 +8,7 @@ from explorer.app.scene.bands import Measure
 from explorer.app.state.state import State
 from explorer.mechanism.design import Design
 from explorer.statics.reactions import has_limits
+from explorer.workspace.position_bands import is_unstated
 
 
 def loaded_design(state: State) -> Design:
@@ -17,6 +18,16 @@ def loaded_design(state: State) -> Design:
         return design
     payload = msgspec.structs.replace(design.payload, mass_kg=0.0)
     return msgspec.structs.replace(design, payload=payload)
+
+
+def drawn_measure(state: State) -> Measure:
+    """Return the measure that colours the surface; "plain" for one that would be zero everywhere.
+
+    Shares are zero without limits, errors without errors of actuators, and the deflection of a
+    rigid machine.
+    """
+    colour = state.view.workspace.colour
+    return "plain" if colour != "plain" and is_unstated(state.design, colour) else colour
 
 
 def map_measure(design: Design, colour: Measure, *, holds: bool) -> Measure:

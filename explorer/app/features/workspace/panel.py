@@ -14,7 +14,7 @@ from explorer.app.browser.viser_gaps import run_script
 from explorer.app.features.feature import Services
 from explorer.app.features.workspace.feed import WorkspaceFeed
 from explorer.app.features.workspace.files import tolerance_of
-from explorer.app.features.workspace.load import map_measure
+from explorer.app.features.workspace.load import drawn_measure, map_measure
 from explorer.app.features.workspace.orientation import workspace_pose
 from explorer.app.features.workspace.slice_map import Axis, level_within, map_picture
 from explorer.app.features.workspace.tasks import Region, WorkspaceDrawing
@@ -24,8 +24,8 @@ from explorer.app.features.workspace.words import (
     legend,
     load_words,
     nothing_words,
+    unstated_words,
     volume_headline,
-    without_limits,
     workspace_details,
 )
 from explorer.app.inputs.bindings import At, Bound
@@ -48,8 +48,7 @@ from explorer.app.widgets.commands import Key, shift
 from explorer.app.widgets.markup import alert, box, note, sentence
 from explorer.app.widgets.under_way import UnderWay
 from explorer.mechanism.pose import Pose, Triple
-from explorer.statics.reactions import has_limits
-from explorer.workspace.position_bands import LOAD_WORDS
+from explorer.workspace.position_bands import LOAD_MEASURES, MEASURE_WORDS
 
 KEYS: Mapping[str, tuple[Key, ...]] = {
     "Workspace › Solid": (Key("V"),),
@@ -84,9 +83,9 @@ COLOURINGS: dict[str, Measure] = {
     "one colour": "plain",
     "smallest margin": "margin",
     "1 / cond J": "condition",
-    **{words: measure for measure, (words, _, _) in LOAD_WORDS.items()},
+    **{words: measure for measure, (words, _, _) in MEASURE_WORDS.items()},
 }
-NEED_NO_LIMITS = [LOAD_WORDS[measure][0] for measure in ("force", "bending")]
+NEED_NO_LIMITS = [MEASURE_WORDS[measure][0] for measure in ("force", "bending")]
 # The button of a colouring that needs no limits.
 COLOUR = "workspace.colour"
 ORIENTATIONS = {"of the present pose": "pose", "of the home pose": "home"}
@@ -141,8 +140,9 @@ class WorkspacePanel:
         )
         controls.dropdown(
             "Colour by",
-            "One colour, the smallest margin |δ|, the inverse condition number, or what the load "
-            "of the tab Forces asks of actuators and struts.",
+            "One colour, the smallest margin |δ|, the inverse condition number, what the load of "
+            "the tab Forces asks of actuators and struts, or how far the errors of the actuators "
+            "or that load move the tool.",
             COLOURINGS,
             "view.workspace.colour",
         )
@@ -188,15 +188,17 @@ class WorkspacePanel:
         yield from self._under_way.updates()
         yield from self._show_trouble(drawing)
         mapped = None if drawing is None or view.cut is None else drawing.slice_map
-        is_shareless = view.colour == "share" and not has_limits(state.design)
-        colour = "plain" if is_shareless else view.colour
+        colour = drawn_measure(state)
         yield self._legend, "visible", view.colour != "plain" or mapped is not None
-        words = without_limits(map(_colour_button, NEED_NO_LIMITS)) if is_shareless else ""
+        words = ""
+        if colour != view.colour:
+            words = unstated_words(view.colour, map(_colour_button, NEED_NO_LIMITS))
         if colour != "plain" or mapped is not None:
             measure = map_measure(state.design, colour, holds=view.region == "held")
             words += legend(measure, state.warn_below, drawing)
-        if colour in LOAD_WORDS and view.region != "held":
-            words += note(f"{load_words(state)}.")
+        if colour in LOAD_MEASURES and view.region != "held":
+            any_direction = colour != "deflection"
+            words += note(f"{load_words(state, any_direction=any_direction)}.")
         yield self._legend, "content", words
         yield self._cut, "content", box(self._cuts.html(state))
         yield self._map, "visible", mapped is not None

@@ -23,10 +23,11 @@ from explorer.mechanism.pose import Triple
 from explorer.numerics.arrays import FloatArray, IntArray
 from explorer.numerics.number_text import format_number
 from explorer.singularity.ellipsoids import planes_of_singularity
-from explorer.statics.held import FORCE, LIMITS, SIGNS, TOOL, WRENCH
+from explorer.statics.compliance import stiffness_of
+from explorer.statics.held import FORCE, LIMITS, SIGNS, WRENCH, held_load
 from explorer.statics.reactions import PART_NAMES
 from explorer.workspace.held import part_names
-from explorer.workspace.position_bands import LOAD_WORDS
+from explorer.workspace.position_bands import MEASURE_WORDS
 from explorer.workspace.solids.solid import Solid
 
 Axis = Literal["x", "y", "z"]
@@ -136,8 +137,9 @@ def slice_map(
 def map_facts(colouring: Colouring) -> dict[str, Any]:
     """Return what `look/map.js` needs to compute the measure at a position.
 
-    It is the gradients of the margins; the arms of the joints for other measures; and the load, its
-    limits and the words for what it asks, for a measure of a load.
+    It is the gradients of the margins; the arms of the joints for other measures; and the words for
+    a measure that is infinite in singular positions, with the load and the limits of the parts, the
+    errors of the actuators, or the load and what gives way.
     """
     design, rotation, bands = colouring.design, colouring.rotation, colouring.bands
     facts: dict[str, Any] = {"gradients": planes_of_singularity(rotation).tolist()}
@@ -147,21 +149,36 @@ def map_facts(colouring: Colouring) -> dict[str, Any]:
     facts["arms"] = (platform @ rotation.T).tolist()
     facts["a3"] = [*design.a3, 0.0]
     facts["reach"] = design.reach
-    if bands.held is None or bands.measure == "condition":
+    if bands.measure == "condition":
         return facts
-    name, unit, factor = LOAD_WORDS[bands.measure]
-    facts["load"] = {
-        "wrench": bands.held[WRENCH:FORCE].tolist(),
-        "tool": bands.held[TOOL:WRENCH].tolist(),
-        "anyForce": float(bands.held[FORCE]),
-        # Over limits that are infinite shares are zero.
-        "overLimits": (1.0 / bands.held[LIMITS:SIGNS]).reshape(2, -1).tolist(),
-        "parts": part_names(design) if bands.measure == "share" else PART_NAMES[:10],
-        "words": name,
-        "unitName": unit,
-        "factor": factor,
-    }
+    facts["tool"] = (rotation @ np.array(design.tool.position)).tolist()
+    name, unit, factor = MEASURE_WORDS[bands.measure]
+    facts["words"] = {"name": name, "unit": unit, "factor": factor}
+    if bands.measure == "error":
+        facts["errors"] = design.actuators.error_mm
+    elif bands.measure == "deflection":
+        facts["giving"] = _giving_facts(colouring)
+    elif bands.held is not None:
+        facts["load"] = {
+            "wrench": bands.held[WRENCH:FORCE].tolist(),
+            "anyForce": float(bands.held[FORCE]),
+            # Over limits that are infinite shares are zero.
+            "overLimits": (1.0 / bands.held[LIMITS:SIGNS]).reshape(2, -1).tolist(),
+            "parts": part_names(design) if bands.measure == "share" else PART_NAMES[:10],
+        }
     return facts
+
+
+def _giving_facts(colouring: Colouring) -> dict[str, Any]:
+    """Return the load about b4 and what gives way, in mm/N: 1 / k, and 1 / 3EI per cubic unit."""
+    design, rotation = colouring.design, colouring.rotation
+    load = np.zeros(6) if colouring.load is None else colouring.load
+    stiffness, bending = stiffness_of(design)
+    return {
+        "wrench": held_load(design, rotation, load)[WRENCH:FORCE].tolist(),
+        "actuators": (design.unit_mm / stiffness).tolist(),
+        "struts": (design.unit_mm / (3.0 * bending)).tolist(),
+    }
 
 
 def cut_loops(solid: Solid, axes: tuple[int, int]) -> list[FloatArray]:

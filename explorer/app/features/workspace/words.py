@@ -37,7 +37,12 @@ from explorer.mechanism.pose import Triple
 from explorer.singularity.colours import BAND_EDGES, WARN_CONDITION, band_colours
 from explorer.statics.reactions import has_limits
 from explorer.workspace.accessible.workspace import PairCost
-from explorer.workspace.position_bands import LOAD_WORDS, SHARE_COLOURS, SHARES, STEP_COLOURS
+from explorer.workspace.position_bands import (
+    MEASURE_WORDS,
+    SHARE_COLOURS,
+    SHARES,
+    STEP_COLOURS,
+)
 
 # Bounds of a deviation that are told, in percent.
 DEVIATIONS = (0.001, 0.01, 0.1, 1.0)
@@ -100,8 +105,13 @@ def nothing_words(drawing: WorkspaceDrawing) -> str:
     return f"Nothing is accessible from the {which} position"
 
 
-def load_words(state: State) -> str:
-    """Return what loads the platform over the workspace, without a full stop."""
+def load_words(state: State, *, any_direction: bool = True) -> str:
+    """Return what loads the platform over the workspace, without a full stop.
+
+    Args:
+        state: The state.
+        any_direction: Whether the payload's force of any direction counts.
+    """
     forces, payload = state.view.forces, state.design.payload
 
     def vector(numbers: Triple, unit: str) -> str:
@@ -112,7 +122,7 @@ def load_words(state: State) -> str:
         parts.append(vector(forces.moment, "N m"))
     if forces.weighed != "none" and payload.mass_kg:
         parts.append(f"{format_number(payload.mass_kg, 4)} kg of payload")
-    if payload.force_n:
+    if any_direction and payload.force_n:
         parts.append(f"{format_number(payload.force_n, 4)} N in any direction")
     words = f"Load: {', '.join(parts)}"
     if forces.weighed == "payload and legs":
@@ -260,8 +270,8 @@ def _pair(pair: PairCost) -> str:
 
 def legend(measure: Measure, warn_below: float, drawing: WorkspaceDrawing | None) -> str:
     """Return the bands of colours with the values at their edges, and the colours of the map."""
-    if measure in LOAD_WORDS:
-        words, unit, factor = LOAD_WORDS[measure]
+    if measure in MEASURE_WORDS:
+        words, unit, factor = MEASURE_WORDS[measure]
         name = f"{words.capitalize()} ({unit})"
         colours = SHARE_COLOURS if measure == "share" else STEP_COLOURS
         levels = _levels(measure, drawing)
@@ -301,7 +311,7 @@ def legend(measure: Measure, warn_below: float, drawing: WorkspaceDrawing | None
 
 
 def _levels(measure: Measure, drawing: WorkspaceDrawing | None) -> tuple[float, ...]:
-    """Return the ends of the bands of what a load asks, ascending; () if none are known yet."""
+    """Return the ends of the bands of a measure, ascending; () if none are known yet."""
     if measure == "share":
         return SHARES
     if drawing is None or drawing.request.colour != measure:
@@ -309,12 +319,22 @@ def _levels(measure: Measure, drawing: WorkspaceDrawing | None) -> tuple[float, 
     return drawing.levels[:0:-1]
 
 
-def without_limits(buttons: Iterable[str]) -> str:
-    """Return that a design has no limit of which a load could use a share, and what helps.
+def unstated_words(measure: Measure, buttons: Iterable[str]) -> str:
+    """Return what a design states nothing of, so that a measure is zero, and what helps.
 
     Args:
+        measure: The measure, of which `explorer.workspace.position_bands.is_unstated` is true.
         buttons: Buttons of the colourings that need no limit, HTML.
     """
-    return note(
-        f"The design has no limits of forces: colour by the {' or the '.join(buttons)} instead."
-    )
+    match measure:
+        case "error":
+            words = "The actuators of the design have no errors: state them in the tab Machine."
+        case "deflection":
+            words = (
+                "The design is rigid: state the stiffness of its actuators or the tubes of its "
+                "struts in the tab Machine."
+            )
+        case _:
+            others = " or the ".join(buttons)
+            words = f"The design has no limits of forces: colour by the {others} instead."
+    return note(words)

@@ -11,7 +11,7 @@ from explorer.export.report.drawings.slices import Slices, in_plane
 from explorer.export.report.markup import coordinate, drawing_text, element
 from explorer.numerics.number_text import format_number
 from explorer.singularity.colours import OUTLINE, css
-from explorer.workspace.position_bands import LOAD_WORDS
+from explorer.workspace.position_bands import MEASURE_WORDS
 from explorer.workspace.slices.axes import AXES
 
 # The space around a map that has ticks, and between maps.
@@ -76,14 +76,14 @@ def slice_strip(
 
 
 def legend(slices: Slices, unit_mm: float) -> Element:
-    """Return the legend of the colours of maps of the smallest margin, or of what a load asks."""
+    """Return the legend of the colours of maps, of the smallest margin or of another measure."""
     bands, step, left, pieces = slices.bands, 46.0, 130.0, list[Element]()
     colours, levels = bands.colours, bands.levels
     title, rows = "smallest margin", [("units", 1.0), ("mm", unit_mm)]
-    words = LOAD_WORDS.get(bands.measure)
+    words = MEASURE_WORDS.get(bands.measure)
     if words is not None:
         title, rows = words[0], [words[1:]]
-        # Of a load, less is better; the last band goes on without end.
+        # Of these, less is better; the last band goes on without end.
         colours, levels = colours[::-1], (0.0, *levels[:0:-1])
         left += 30.0
     pieces.append(drawing_text(title, left - 12.0, 15.0, anchor="end"))
