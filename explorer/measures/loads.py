@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 from explorer.measures.case import Case
 from explorer.measures.measure import Measure, Need, Place, Sense, Unit
-from explorer.measures.statics import BOX_NODES, BoxStatics
+from explorer.measures.size import BOX_NODES
+from explorer.measures.statics import BoxStatics
 from explorer.mechanism.design import JOINTS
 
 OPTIMISE: frozenset[Place] = frozenset({"optimise"})

@@ -29,6 +29,18 @@ def corners_of(box: tuple[Triple, Triple] | FloatArray) -> FloatArray:
     return np.array([[(lows, highs)[c >> a & 1][a] for a in range(3)] for c in range(8)])
 
 
+def box_nodes(box: tuple[Triple, Triple]) -> FloatArray:
+    """Return the nodes of a grid over a box (lows, highs), its corners included, shape (n, 3).
+
+    An axis has `BOX_NODES` of them, or one if its low is its high.
+    """
+    axes = [
+        np.linspace(low, high, BOX_NODES if high > low else 1)
+        for low, high in zip(*box, strict=True)
+    ]
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+
+
 def box_margin(box: tuple[Triple, Triple], rotation: FloatArray) -> float:
     """Return the least |δ| at the corners of a box at an orientation, in design units.
 
@@ -61,7 +73,5 @@ def box_tilt(design: Design, box: tuple[Triple, Triple], pose: Pose) -> float:
         box: Lows and highs of the positions.
         pose: Pose whose torsion the tilts have.
     """
-    axes = [np.linspace(low, high, BOX_NODES) for low, high in zip(*box, strict=True)]
-    nodes = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-    tilts = greatest_tilts(design, nodes, tilt_torsion_of(pose.rotation).torsion)
+    tilts = greatest_tilts(design, box_nodes(box), tilt_torsion_of(pose.rotation).torsion)
     return float(np.nan_to_num(tilts).min())

@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from explorer.measures.size import corners_of
+from explorer.measures.size import box_nodes, corners_of
 from explorer.mechanism.design import Design
 from explorer.mechanism.kinematics import inverse
 from explorer.mechanism.margins import margins
@@ -32,9 +32,6 @@ from explorer.statics.reactions import (
 )
 from explorer.statics.slopes import PARAMETERS, twist_slopes
 from explorer.statics.weights import design_weights
-
-BOX_NODES = 9
-"""Number of nodes on each axis of the required box."""
 
 
 @dataclass(frozen=True)
@@ -62,11 +59,7 @@ class BoxStatics:
     @cached_property
     def positions(self) -> FloatArray:
         """Nodes of the grid, shape (n, 3)."""
-        axes = [
-            np.linspace(low, high, BOX_NODES if high > low else 1)
-            for low, high in zip(*self.box, strict=True)
-        ]
-        return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+        return box_nodes(self.box)
 
     @cached_property
     def held(self) -> Reactions:

@@ -1,0 +1,1 @@
+"""Tolerances: what each costs in precision, and which ones keep a wanted precision."""

@@ -1,0 +1,366 @@
+"""The budget of tolerances: exact costs, the least effort by another solver, extreme designs."""
+
+from __future__ import annotations
+
+import pickle
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from refusals import refusal
+from scipy.optimize import minimize
+from statics_cases import random_poses
+
+from explorer import (
+    PRESETS,
+    SOURCES,
+    Actuators,
+    Budget,
+    Design,
+    InputError,
+    NoAnswerError,
+    Tolerances,
+    decode_design,
+    encode_design,
+    home_pose,
+    largest_error,
+    make_prototype,
+    pose_error_by_source,
+    rms_of_sources,
+    source_costs,
+    source_errors,
+    tolerance_budget,
+    with_tolerances,
+)
+from explorer.measures.positions import positions_over
+from explorer.mechanism.pose import Triple
+from explorer.numerics.arrays import FloatArray
+from explorer.statics.budget.costs import (
+    IS_TILT,
+    PARTS,
+    error_lengths,
+    source_influences,
+    stated_tolerances,
+)
+from explorer.statics.budget.cuts import Cuts
+
+OPTIMAL = PRESETS["paper-optimal"]
+HOME = home_pose(OPTIMAL)
+TOOL = (0.5, -0.3, 1.5)
+BOX: tuple[Triple, Triple] = (8.0, 3.0, 7.0), (12.0, 7.0, 11.0)
+EACH: Triple = (0.1, 0.2, 0.15)
+STATED = msgspec.structs.replace(
+    OPTIMAL,
+    actuators=Actuators(error_mm=(0.01, 0.02, 0.01, 0.02, 0.01, 0.03)),
+    tolerances=Tolerances(EACH, EACH, EACH, (0.1, 0.05), EACH, EACH, EACH, EACH),
+)
+
+
+def box_positions() -> FloatArray:
+    return positions_over(OPTIMAL, "box", HOME, BOX)
+
+
+def as_errors(design: Design, tolerances: FloatArray) -> FloatArray:
+    """Return tolerances in mm and degrees as errors in design units and radians."""
+    finite = np.where(np.isfinite(tolerances), tolerances, 0.0)
+    return np.where(IS_TILT, np.radians(finite), finite / design.unit_mm)
+
+
+def scaled(design: Design, factor: float) -> Design:
+    """Return the same machine in design units that are smaller by a factor."""
+    return msgspec.structs.replace(
+        design.with_variables([factor * value for value in design.variables]),
+        unit_mm=design.unit_mm / factor,
+        home=None,
+    )
+
+
+def test_costs_are_those_of_the_worst_position_in_mm_and_degrees() -> None:
+    positions = box_positions()
+    costs = source_costs(STATED, positions, HOME.rotation, TOOL)
+    by_source = pose_error_by_source(STATED, positions, HOME.rotation, TOOL)
+    bounds = source_errors(STATED)
+    worst, rms = largest_error(by_source, bounds), rms_of_sources(by_source, bounds)
+    place = int(worst.displacement.argmax())
+    assert costs.worst_displacement == pytest.approx(10.0 * float(worst.displacement.max()))
+    assert costs.worst_turn == pytest.approx(float(np.degrees(worst.turn.max())))
+    assert costs.rms_displacement == pytest.approx(10.0 * float(rms.displacement.max()))
+    assert costs.rms_turn == pytest.approx(float(np.degrees(rms.turn.max())))
+    assert_allclose(costs.position, positions[place])
+    # Each error alone, as the design states it.
+    moved = 10.0 * np.linalg.norm(by_source[:, :3] * bounds, axis=1).max(axis=0)
+    turned = np.degrees(np.linalg.norm(by_source[:, 3:] * bounds, axis=1).max(axis=0))
+    assert_allclose(costs.displacement_within, moved, rtol=1e-12)
+    assert_allclose(costs.turn_within, turned, rtol=1e-12)
+    assert costs.shares.sum() == pytest.approx(1.0)
+    assert costs.turn_shares.sum() == pytest.approx(1.0)
+    # The part of a source is what the worst error lacks along its own direction without it.
+    along = worst.vectors[place, 0] / worst.displacement[place]
+    part = np.abs(along @ by_source[place, :3]) * bounds * 10.0
+    assert_allclose(costs.shares * costs.worst_displacement, part, rtol=1e-9)
+    ranked = costs.displacement_within[costs.ranking]
+    assert (np.diff(ranked) <= 0.0).all()
+    assert sorted(costs.ranking) == list(range(29))
+
+
+def test_costs_of_ideal_design_are_those_per_error_alone() -> None:
+    costs = source_costs(OPTIMAL, box_positions(), HOME.rotation)
+    assert (costs.worst_displacement, costs.worst_turn, costs.rms_turn) == (0.0, 0.0, 0.0)
+    assert not costs.shares.any()
+    assert not costs.displacement_within.any()
+    stated = source_costs(STATED, box_positions(), HOME.rotation)
+    assert_allclose(costs.displacement, stated.displacement)
+    by_length = (costs.displacement / costs.lengths)[costs.ranking]
+    assert (np.diff(by_length) <= 0.0).all()
+
+
+@pytest.mark.parametrize("wanted_turn", [None, 0.1, 0.005])
+@pytest.mark.parametrize("keep", [False, True])
+def test_found_tolerances_keep_what_is_wanted_for_all_errors(
+    wanted_turn: float | None, keep: bool
+) -> None:
+    design = msgspec.structs.replace(
+        STATED, actuators=Actuators(error_mm=(1e-4, 2e-4, 1e-4, 2e-4, 1e-4, 3e-4))
+    )
+    positions = box_positions()
+    given = design, positions, HOME.rotation
+    found = tolerance_budget(*given, 0.05, wanted_turn, tool=TOOL, keep_actuators=keep)
+    by_source = pose_error_by_source(*given, TOOL)
+    bounds = as_errors(design, found.tolerances)
+    worst = largest_error(by_source, bounds)
+    displacement, turn = 10.0 * worst.displacement.max(), np.degrees(worst.turn.max())
+    assert displacement <= 0.05
+    assert wanted_turn is None or turn <= wanted_turn
+    # What is wanted is used up but for the rounding to two digits.
+    assert max(displacement / 0.05, turn / (wanted_turn or np.inf)) > 0.9
+    assert found.costs.worst_displacement == pytest.approx(float(displacement))
+    signs = np.sign(np.random.default_rng(5).normal(size=(500, 29)))
+    moved = np.einsum("nij,cj->nci", by_source, signs * bounds)
+    assert 10.0 * np.linalg.norm(moved[..., :3], axis=-1).max() <= 0.05
+    assert found.effort >= found.least_effort > 0.0
+    assert 0.0 <= found.excess < 0.1
+    if keep:
+        assert_allclose(found.tolerances[:6], design.actuators.error_mm)
+    # Two digits each.
+    for value in found.tolerances[6 * keep :].tolist():
+        assert float(f"{value:.1e}") == value
+
+
+def vertices_of(vectors: FloatArray, rng: np.random.Generator) -> FloatArray:
+    """Return the signs of sums that are farthest in a direction, each once but for its opposite."""
+    directions = rng.normal(size=(200_000, 3))
+    signs = np.where(directions @ vectors >= 0.0, 1.0, -1.0)
+    signs *= signs[:, :1]
+    return np.unique(signs, axis=0)
+
+
+def least_by_slsqp(
+    shares: FloatArray, lengths: FloatArray, signs: list[FloatArray], start: FloatArray
+) -> float:
+    """Return the least Σ 1 / (t_i length_i) with |Σ ± t_i v_i| ≤ 1, by SLSQP over log t."""
+    sums = np.concatenate(
+        [
+            each[:, None, :] * half
+            for each, half in zip(signs, (shares[:3], shares[3:]), strict=True)
+        ]
+    )
+
+    def effort(x: FloatArray) -> tuple[float, FloatArray]:
+        values = np.exp(-x) / lengths / scale
+        return float(values.sum()), -values
+
+    def room(x: FloatArray) -> FloatArray:
+        return 1.0 - ((sums @ np.exp(x)) ** 2).sum(axis=1)
+
+    def room_slopes(x: FloatArray) -> FloatArray:
+        t = np.exp(x)
+        return -2.0 * np.einsum("ki,kij->kj", sums @ t, sums) * t
+
+    scale = float((1.0 / (start * lengths)).sum())
+    rooms: Any = {"type": "ineq", "fun": room, "jac": room_slopes}
+    options: Any = {"maxiter": 500, "ftol": 1e-12}
+    begin = np.log(0.5 * start)
+    solved = minimize(effort, begin, jac=True, method="SLSQP", constraints=rooms, options=options)
+    assert solved.success, solved.message
+    assert room(solved.x).min() > -1e-7
+    return scale * float(solved.fun)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("wanted_turn", [None, 0.05])
+def test_least_effort_is_that_of_slsqp_over_all_vertices(
+    seed: int, wanted_turn: float | None
+) -> None:
+    positions, rotations = random_poses(OPTIMAL, 3, seed)
+    given = OPTIMAL, positions[:1], rotations[0]
+    found = tolerance_budget(*given, 0.05, wanted_turn, tool=TOOL)
+    influences = source_influences(*given, TOOL)[0]
+    shares = influences / np.repeat([0.05, wanted_turn or np.inf], 3)[:, None]
+    rng = np.random.default_rng(seed)
+    signs = [vertices_of(half, rng) for half in (influences[:3], influences[3:])]
+    if wanted_turn is None:
+        signs[1] = signs[1][:0]
+    least = least_by_slsqp(shares, error_lengths(OPTIMAL), signs, found.tolerances)
+    assert found.least_effort == pytest.approx(least, rel=1e-4)
+
+
+def test_no_other_tolerances_over_the_box_take_less_effort() -> None:
+    positions = box_positions()
+    found = tolerance_budget(OPTIMAL, positions, HOME.rotation, 0.05, 0.05)
+    shares = source_influences(OPTIMAL, positions, HOME.rotation, None)
+    shares = shares / np.repeat([0.05, 0.05], 3)[:, None]
+    lengths, rng = error_lengths(OPTIMAL), np.random.default_rng(1)
+    least: list[float] = []
+    for size in (1e-4, 1e-3, 1e-2, 0.1, 1.0):
+        for _ in range(20):
+            tried = found.tolerances * np.exp(size * rng.normal(size=29))
+            worst = largest_error(shares, tried)
+            tried /= max(worst.displacement.max(), worst.turn.max())
+            least.append(float((1.0 / (tried * lengths)).sum()))
+    assert min(least) >= found.least_effort
+
+
+def test_tolerances_of_one_bound_are_those_of_the_multiplier() -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        row, costs = rng.uniform(0.1, 1.0, (2, 9))
+        costs *= 10.0 ** float(rng.uniform(-30.0, 30.0))
+        cuts = Cuts(costs)
+        cuts.add(2.0 * row, 2.0)
+        expected = np.sqrt(costs / row) / np.sqrt(costs * row).sum()
+        assert (expected < 1.0).all()
+        assert_allclose(cuts.solve(), expected, rtol=1e-3)
+        assert cuts.least == pytest.approx(float((costs / expected).sum()), rel=1e-9)
+        assert cuts.least <= (costs / expected).sum() * (1.0 + 1e-14)
+
+
+def test_parallel_sources_share_by_the_root_of_their_influence() -> None:
+    # The errors of l1, a1 and b1 act along leg 1 alone, so that their sums are parallel.
+    given = OPTIMAL, [HOME.position], HOME.rotation
+    found = tolerance_budget(*given, 0.05, 0.01)
+    influence = source_influences(OPTIMAL, np.array([HOME.position]), HOME.rotation, None)[0]
+    group = [SOURCES.index(name) for name in ("l1", "a1x", "a1y", "a1z", "b1x", "b1y", "b1z")]
+    turns = np.linalg.norm(influence[3:, group], axis=0)
+    ratios = found.tolerances[group] * np.sqrt(turns)
+    assert ratios.max() / ratios.min() < 1.1
+
+
+@pytest.mark.parametrize("factor", [1e-25, 1e-4, 1e4, 1e25])
+def test_tolerances_do_not_depend_on_the_design_unit(factor: float) -> None:
+    design = scaled(OPTIMAL, factor)
+    positions = box_positions()
+    found = tolerance_budget(design, factor * positions, HOME.rotation, 0.05, 0.05)
+    expected = tolerance_budget(OPTIMAL, positions, HOME.rotation, 0.05, 0.05)
+    assert_allclose(found.tolerances, expected.tolerances, rtol=0.1)
+    assert found.least_effort == pytest.approx(expected.least_effort, rel=1e-7)
+
+
+@pytest.mark.parametrize("unit_mm", [1e-3, 1.0, 1e3])
+def test_tolerances_of_large_and_small_machines_grow_with_what_is_wanted(unit_mm: float) -> None:
+    positions = box_positions()
+    design = msgspec.structs.replace(OPTIMAL, unit_mm=unit_mm)
+    found = tolerance_budget(design, positions, HOME.rotation, 5e-3 * unit_mm)
+    expected = tolerance_budget(OPTIMAL, positions, HOME.rotation, 0.05)
+    sizes = np.where(IS_TILT, 1.0, unit_mm / OPTIMAL.unit_mm)
+    assert_allclose(found.tolerances, expected.tolerances * sizes, rtol=0.1)
+    least = expected.least_effort * OPTIMAL.unit_mm / unit_mm
+    assert found.least_effort == pytest.approx(least, rel=1e-7)
+
+
+@pytest.mark.parametrize("wanted", [1e-100, 1e-9, 1e9, 1e100])
+def test_wanted_precision_of_any_size_is_kept(wanted: float) -> None:
+    found = tolerance_budget(OPTIMAL, box_positions(), HOME.rotation, wanted)
+    assert 0.9 * wanted < found.costs.worst_displacement <= wanted
+
+
+def test_source_that_moves_nothing_takes_any_tolerance() -> None:
+    # Leg 4 is perpendicular to an offset of a3 along y.
+    position = np.array([[10.0, OPTIMAL.a3[1], 9.0]])
+    found = tolerance_budget(STATED, position, HOME.rotation, 0.05)
+    any_one = np.flatnonzero(np.isinf(found.tolerances))
+    # Without a wanted turn those of leg 1, which b4 does not depend on, are free too.
+    leg_1 = ("l1", "a1x", "a1y", "a1z", "b1x", "b1y", "b1z")
+    assert {SOURCES[index] for index in any_one} == {"a3y", *leg_1}
+    kept = with_tolerances(STATED, found.tolerances)
+    assert kept.tolerances.a3[1] == STATED.tolerances.a3[1]
+    assert np.isfinite(found.effort)
+    assert {*found.costs.ranking[-8:]} == {*any_one}
+    worst = source_costs(kept, position, HOME.rotation).worst_displacement
+    assert 0.045 < worst <= 0.05
+
+
+def test_errors_of_actuators_that_exceed_what_is_wanted_are_told() -> None:
+    given = STATED, box_positions(), HOME.rotation
+    alone = source_costs(
+        msgspec.structs.replace(STATED, tolerances=Tolerances()), *given[1:]
+    ).worst_displacement
+    with pytest.raises(NoAnswerError, match=rf"up to {alone:.4g} mm.*{alone - 0.05:.3g} mm more"):
+        tolerance_budget(*given, 0.05, keep_actuators=True)
+    with pytest.raises(NoAnswerError, match="turn the tool by up to"):
+        tolerance_budget(*given, 10.0, 0.001, keep_actuators=True)
+    # A little more than the actuators' own part leaves a little for the dimensions.
+    found = tolerance_budget(*given, alone * (1.0 + 1e-6), keep_actuators=True)
+    assert found.costs.worst_displacement <= alone * (1.0 + 1e-6)
+    assert (found.tolerances > 0.0).all()
+
+
+def test_positions_about_a_singularity_have_no_budget() -> None:
+    for z in (0.0, -1.0):
+        positions = [[10.0, 5.0, 9.0], [10.0, 5.0, z]]
+        words = "of the 2 positions .*δ3 = 0: b4 on the base plane"
+        with pytest.raises(NoAnswerError, match=words):
+            source_costs(STATED, positions, HOME.rotation)
+        with pytest.raises(NoAnswerError, match=words):
+            tolerance_budget(STATED, positions, HOME.rotation, 1.0)
+    with pytest.raises(NoAnswerError, match="the pose is singular"):
+        source_costs(STATED, [10.0, 5.0, 0.0], HOME.rotation)
+    near = [[10.0, 5.0, 1e-9]]
+    found = tolerance_budget(STATED, near, HOME.rotation, 0.05)
+    assert found.costs.worst_displacement <= 0.05
+
+
+@pytest.mark.parametrize("wanted", [0.0, -1.0, np.nan, np.inf])
+def test_unusable_wanted_precision_is_refused(wanted: float) -> None:
+    given = OPTIMAL, [HOME.position], HOME.rotation
+    assert "displacement must be positive" in refusal(
+        tolerance_budget, *given, wanted, kind=InputError
+    )
+    assert "turn must be positive" in refusal(
+        tolerance_budget, *given, 1.0, wanted, kind=InputError
+    )
+
+
+def test_design_with_found_tolerances_keeps_what_is_wanted_after_its_file_is_read() -> None:
+    found = tolerance_budget(STATED, box_positions(), HOME.rotation, 0.05, 0.05)
+    written = encode_design(with_tolerances(STATED, found.tolerances))
+    design = decode_design(written, "the file")
+    assert_allclose(stated_tolerances(design), found.tolerances, rtol=0.0)
+    costs = source_costs(design, box_positions(), HOME.rotation)
+    assert costs.worst_displacement == found.costs.worst_displacement
+    assert costs.worst_displacement <= 0.05
+    assert costs.worst_turn <= 0.05
+    read: Budget = pickle.loads(pickle.dumps(found))
+    assert_allclose(read.tolerances, found.tolerances)
+
+
+def test_budget_over_the_workspace_holds_at_its_nodes() -> None:
+    design = msgspec.structs.replace(
+        OPTIMAL, limits=msgspec.structs.replace(OPTIMAL.limits, margin=2.0)
+    )
+    positions = positions_over(design, "workspace", HOME, None)
+    found = tolerance_budget(design, positions, HOME.rotation, 0.1)
+    assert len(positions) > 100
+    assert 0.09 < found.costs.worst_displacement <= 0.1
+    limits = msgspec.structs.replace(design.limits, margin=1e3)
+    empty = msgspec.structs.replace(design, limits=limits)
+    with pytest.raises(NoAnswerError, match="no position"):
+        positions_over(empty, "workspace", HOME, None)
+    assert "need a box" in refusal(positions_over, design, "box", HOME, None, kind=InputError)
+
+
+def test_parts_of_sources_are_parts_of_the_prototype() -> None:
+    names = {part.name for part in make_prototype(OPTIMAL).parts}
+    assert len(PARTS) == len(SOURCES)
+    assert {name for part in PARTS for name in part.split(", ")} <= names
